@@ -1,0 +1,334 @@
+/* nebel: exact fog for any renderer.
+ *
+ * nebel answers one question: what does fog do to the light along this piece of a ray?
+ *
+ *     pixel = transmittance * surface + in_scattering
+ *
+ * Along origin + t * direction, 0 <= t <= t_max (metres), every volume of fog has an extinction [1/m, RGB]: a shape times a
+ * density profile times an amount. Volumes that overlap add. Where a closed form exists the answer is exact; elsewhere it
+ * is integrated until a proven bound is below the tolerance, and `error` says what is left.
+ *
+ * A first program:
+ *
+ *     nebel_fog *fog = NULL;
+ *     nebel_snapshot *now = NULL;
+ *     nebel_create_fog(&(nebel_fog_desc){0}, &fog);
+ *     nebel_add_volume(fog, &(nebel_volume_desc){
+ *         .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 1, -5}, .radius = 2},
+ *         .extinction = {.5, .5, .5}, .source = {.7, .7, .8}}, NULL);
+ *     nebel_commit_fog(fog, &now);
+ *
+ *     const nebel_ray ray = {.origin = {0, 1, 0}, .direction = {0, 0, -1}, .t_max = 100};
+ *     nebel_light light;
+ *     nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light);
+ *     // light.transmittance = exp(-.5 * 4), light.in_scattering = source * (1 - transmittance)
+ *
+ *     nebel_release_snapshot(now);
+ *     nebel_destroy_fog(fog);
+ *
+ * nebel does NOT open windows, create graphics contexts, decode images, read files, start threads, print, exit or keep
+ * global state. Scene files and models live in nebel/scene.h, the CPU renderer in nebel/render.h.
+ *
+ * Conventions: metres, right-handed coordinates, linear Rec. 709 RGB. A description that is
+ * all zero is valid; a zero member means the default named beside it. Functions return NEBEL_OK (0) or a negative
+ * nebel_result; what went wrong, where and how to mend it goes to the log callback. Without a callback nebel is silent.
+ *
+ * Threads: different fogs may be used from different threads at once. One fog belongs to one thread at a time. A snapshot
+ * never changes and may be queried by any number of threads.
+ */
+#ifndef NEBEL_NEBEL_H
+#define NEBEL_NEBEL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define NEBEL_VERSION_MAJOR 0
+#define NEBEL_VERSION_MINOR 1
+#define NEBEL_VERSION_PATCH 0
+
+/* The version as text, "0.1.0". Never NULL; lives for ever; any thread. */
+const char *nebel_version(void);
+
+/* ---- results ------------------------------------------------------------------------------------------------------ */
+
+/* One list gives the enumeration and its texts. */
+#define NEBEL_RESULTS(X)                                                                           \
+    X(OK, 0, "success")                                                                            \
+    X(ERROR_ARGUMENT, -1, "an argument is not what the function takes")                            \
+    X(ERROR_MEMORY, -2, "memory could not be had")                                                 \
+    X(ERROR_VALUE, -3, "a value is outside its range")                                             \
+    X(ERROR_UNBOUNDED, -4, "a ray without end gathers infinite light")                             \
+    X(ERROR_LIMIT, -5, "a limit is exceeded")                                                      \
+    X(ERROR_FILE, -6, "a file could not be read or written")                                       \
+    X(ERROR_FORMAT, -7, "a file is not what it should be")                                         \
+    X(ERROR_UNSUPPORTED, -8, "this build or this version cannot do that")
+
+typedef enum nebel_result {
+#define NEBEL_RESULT_ENUM(name, value, text) NEBEL_##name = value,
+    NEBEL_RESULTS(NEBEL_RESULT_ENUM)
+#undef NEBEL_RESULT_ENUM
+} nebel_result;
+
+/* The text of a result, in English. Never NULL, also for numbers that are no result; any thread. */
+const char *nebel_result_text(nebel_result result);
+
+/* ---- memory, messages, processors --------------------------------------------------------------------------------- */
+
+/* Memory from the caller. Both functions or neither (NULL: malloc and free). `allocate` returns memory aligned for any
+ * object, or NULL; `release` takes what `allocate` gave, never NULL. They are called from the thread that called nebel. */
+typedef struct nebel_allocator {
+    void *(*allocate)(size_t size, void *user);
+    void (*release)(void *memory, void *user);
+    void *user;
+} nebel_allocator;
+
+/* Messages to the caller: what, where and how to mend it, one line without a newline, valid during the call only. */
+typedef void (*nebel_log_fn)(nebel_result result, const char *message, void *user);
+
+typedef struct nebel_log {
+    nebel_log_fn write; /* NULL: silent */
+    void *user;
+} nebel_log;
+
+/* Instruction sets, for float queries. DEFAULT takes the best one this processor has. */
+typedef enum nebel_isa {
+    NEBEL_ISA_DEFAULT = 0,
+    NEBEL_ISA_SCALAR,
+    NEBEL_ISA_SSE2,
+    NEBEL_ISA_AVX2, /* with FMA3; results do not use fused operations */
+    NEBEL_ISA_AVX512, /* F, DQ, BW, VL */
+    NEBEL_ISA_NEON,
+    NEBEL_ISA_COUNT
+} nebel_isa;
+
+/* 1 when this build and this processor can run `isa`, else 0. Any thread. */
+int nebel_isa_available(nebel_isa isa);
+
+/* The name as the command line takes it: "scalar", "sse2", "avx2", "avx512", "neon"; "default" for DEFAULT and unknown
+ * numbers. Any thread. */
+const char *nebel_isa_name(nebel_isa isa);
+
+/* ---- describing fog ----------------------------------------------------------------------------------------------- */
+
+typedef enum nebel_shape_type {
+    NEBEL_SHAPE_WORLD = 0,    /* everywhere */
+    NEBEL_SHAPE_HALF_SPACE,   /* point, normal (pointing out of the fog; any length but 0) */
+    NEBEL_SHAPE_BOX,          /* min < max on every axis */
+    NEBEL_SHAPE_SPHERE,       /* center, radius > 0 */
+    NEBEL_SHAPE_ELLIPSOID,    /* center, radii > 0 */
+    NEBEL_SHAPE_CYLINDER,     /* from, to (apart), radius > 0 */
+    NEBEL_SHAPE_CAPSULE,      /* from, to (may coincide: a sphere), radius > 0 */
+    NEBEL_SHAPE_CONE,         /* from, to (apart), radius_from, radius_to >= 0, one of them > 0 */
+    NEBEL_SHAPE_CONVEX,       /* planes n.x <= d; may be unbounded, must not be empty */
+    NEBEL_SHAPE_UNION,        /* parts; where parts overlap the body counts once */
+    NEBEL_SHAPE_INTERSECTION, /* parts */
+    NEBEL_SHAPE_COUNT
+} nebel_shape_type;
+
+/* Applied to the shape: scale first, then rotation, then position. */
+typedef struct nebel_transform {
+    double position[3]; /* m */
+    double rotation[4]; /* quaternion x y z w, normalised here; all zero: none */
+    double scale[3];    /* all zero: 1; otherwise none may be 0; negative mirrors */
+} nebel_transform;
+
+typedef struct nebel_plane {
+    double normal[3]; /* any length but 0 */
+    double distance;  /* inside where normal . x <= distance */
+} nebel_plane;
+
+/* Only the members named beside the type are read. Arrays are copied by the call that takes the description. */
+typedef struct nebel_shape {
+    nebel_shape_type type;
+    nebel_transform transform;
+    double min[3], max[3];         /* box */
+    double center[3];              /* sphere, ellipsoid */
+    double radius;                 /* sphere, cylinder, capsule */
+    double radii[3];               /* ellipsoid */
+    double from[3], to[3];         /* cylinder, capsule, cone: the axis */
+    double radius_from, radius_to; /* cone */
+    double point[3], normal[3];    /* half space */
+    const nebel_plane *planes;     /* convex: 1 to NEBEL_MAX_PLANES */
+    size_t plane_count;
+    const struct nebel_shape *parts; /* union, intersection: 1 to NEBEL_MAX_LEAVES leaves in all, NEBEL_MAX_DEPTH deep */
+    size_t part_count;
+} nebel_shape;
+
+#define NEBEL_MAX_PLANES 1024
+#define NEBEL_MAX_LEAVES 1024
+#define NEBEL_MAX_DEPTH 16
+
+/* What fraction of the stated extinction a place has. Height, linear and gaussian are in world coordinates; radial and
+ * soft edge follow the shape and its transform. */
+typedef enum nebel_density_type {
+    NEBEL_DENSITY_CONSTANT = 0,
+    NEBEL_DENSITY_HEIGHT,   /* exp(-(y - base) / scale_height); `below` says what holds under the base */
+    NEBEL_DENSITY_LINEAR,   /* 0 at `from`, 1 at `to`, clamped, level across */
+    NEBEL_DENSITY_RADIAL,   /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
+    NEBEL_DENSITY_GAUSSIAN, /* exp(-r^2 / (2 sigma^2)) around center */
+    NEBEL_DENSITY_SOFT_EDGE, /* product over the axes of min(1, distance to the nearer face / distance); box only */
+    NEBEL_DENSITY_COUNT
+} nebel_density_type;
+
+typedef enum nebel_below {
+    NEBEL_BELOW_GROW = 0, /* the exponential goes on under the base */
+    NEBEL_BELOW_CONSTANT  /* 1 under the base */
+} nebel_below;
+
+typedef struct nebel_density {
+    nebel_density_type type;
+    nebel_below below;     /* height */
+    double base;           /* height: m */
+    double scale_height;   /* height: m, > 0 */
+    double from[3], to[3]; /* linear: m, apart */
+    int power;             /* radial: 1, 2 or 3 */
+    double center[3];      /* gaussian: m */
+    double sigma;          /* gaussian: m, > 0 */
+    double distance;       /* soft edge: m in the shape's own coordinates, > 0 */
+} nebel_density;
+
+typedef enum nebel_operation {
+    NEBEL_OPERATION_ADD = 0,
+    NEBEL_OPERATION_EXCLUDE /* inside the shape there is no fog, whatever else is there; only `shape` is read */
+} nebel_operation;
+
+/* One volume of fog. Colours are linear RGB. */
+typedef struct nebel_volume_desc {
+    nebel_operation operation;
+    nebel_shape shape;
+    nebel_density density;
+    double extinction[3]; /* 1/m, >= 0, where the density is 1 */
+    double source[3];     /* radiance of opaque fog, >= 0: alone it gives source * (1 - transmittance) */
+    double albedo[3];     /* 0..1: lit by the fog's ambient light, scattered evenly; not together with source */
+    double emission[3];   /* radiance per metre, >= 0, where the density is 1 */
+} nebel_volume_desc;
+
+/* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) / visibility.
+ * contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when visibility is not
+ * > 0 or contrast not within (0, 1). Any thread. */
+double nebel_extinction_from_visibility(double visibility, double contrast);
+
+/* ---- fog that can be edited ---------------------------------------------------------------------------------------- */
+
+typedef struct nebel_fog nebel_fog;
+typedef struct nebel_snapshot nebel_snapshot;
+typedef uint64_t nebel_volume_id; /* 0 is never one */
+
+typedef struct nebel_fog_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    double ambient[3]; /* radiance, the same from everywhere, >= 0; lights volumes with an albedo */
+} nebel_fog_desc;
+
+/* Makes an empty fog in *fog; destroy it with nebel_destroy_fog. On an error *fog is NULL.
+ * Errors: ARGUMENT, VALUE, MEMORY. */
+nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog);
+
+/* Frees a fog; its snapshots live on. NULL is fine. */
+void nebel_destroy_fog(nebel_fog *fog);
+
+/* Adds a volume; its id in *id (NULL: not wanted). The description is copied. Cost: amortised O(1), plus the checks of a
+ * convex body (linear in its planes on average). On an error nothing has changed. Errors: ARGUMENT, VALUE, LIMIT, MEMORY. */
+nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, nebel_volume_id *id);
+
+/* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; an unknown id is ARGUMENT. */
+nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
+
+/* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
+nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
+
+/* Sets the ambient radiance, >= 0. Cost O(1). Errors: ARGUMENT, VALUE. */
+nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
+
+/* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the same
+ * bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT, MEMORY. */
+nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
+
+/* One more owner of the snapshot; any thread. Returns its argument. */
+nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
+
+/* One owner less; the last one frees it, through the fog's allocator (which must still be usable). Any thread. NULL is fine. */
+void nebel_release_snapshot(nebel_snapshot *snapshot);
+
+/* How many volumes the snapshot holds. */
+size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot);
+
+/* ---- asking ------------------------------------------------------------------------------------------------------- */
+
+typedef struct nebel_ray {
+    double origin[3];    /* m */
+    double direction[3]; /* any length but 0; normalised here */
+    double t_max;        /* m, >= 0; INFINITY is legal */
+} nebel_ray;
+
+typedef struct nebel_light {
+    double transmittance[3]; /* RGB, 0..1 */
+    double in_scattering[3]; /* RGB radiance, >= 0 */
+    double error;            /* bound of the absolute error of the six numbers */
+} nebel_light;
+
+typedef enum nebel_precision {
+    NEBEL_PRECISION_DOUBLE = 0, /* the reference: 64 bit, one ray after the other */
+    NEBEL_PRECISION_FLOAT       /* 32 bit with 64-bit positions, several rays at once */
+} nebel_precision;
+
+typedef struct nebel_trace_desc {
+    nebel_precision precision;
+    nebel_isa isa;        /* float only */
+    double tolerance;     /* > 0: absolute on transmittance; relative to max(1, largest source radiance) on in-scattering.
+                             0: 0.002. Closed forms stay exact whatever it is. */
+    size_t *failed_ray;   /* NULL, or where the index of a ray that is an error is written */
+} nebel_trace_desc;
+
+#define NEBEL_DEFAULT_TOLERANCE 0.002
+
+/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. rays and lights must not overlap.
+ * A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and for every
+ * way of splitting the rays into calls. Any thread.
+ * Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN, infinite where it must not be, of no direction, of negative
+ * t_max), UNSUPPORTED (isa not available), UNBOUNDED (emission in an endless volume that does not absorb), MEMORY (scratch
+ * for very many volumes on one ray). On an error the contents of lights are undefined. */
+nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
+                         size_t ray_stride, nebel_light *lights, size_t light_stride);
+
+/* Visibility: how far one sees along each ray until the transmittance of `channel` (0 red, 1 green, 2 blue) falls to
+ * `transmittance` (0 < transmittance < 1): distances[i] in metres, INFINITY where it does not within t_max. In double
+ * precision, to 1e-12 relative where the fog is not vanishing. Errors as nebel_trace. Any thread. */
+nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
+                                      const nebel_ray *rays, size_t ray_stride, double *distances);
+
+/* ---- segments in, transmittances out: the hot path of an engine ----------------------------------------------------- */
+
+/* n segments in caller memory, from[i] to to[i], three floats each, relative to `origin` (so that floats suffice far from
+ * the world's origin). Strides in bytes, multiples of 4; from_stride 0: all segments start at the same place. */
+typedef struct nebel_segments {
+    double origin[3];
+    const float *from;
+    size_t from_stride;
+    const float *to;
+    size_t to_stride; /* 0: 12 */
+} nebel_segments;
+
+/* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in bytes
+ * (0: 4). Boxes of constant density take the shortest way; everything else goes through nebel_trace in float. A segment
+ * that holds a NaN gives 1. Same bits for every isa. Any thread. Errors as nebel_trace. */
+nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
+                                     const nebel_segments *segments, float *out, size_t out_stride);
+
+/* ---- standard fog factors ------------------------------------------------------------------------------------------ */
+
+/* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +
+ * (1 - f) fog. c is the distance or fog coordinate [m]. end == start gives a step: 1 below start, 0 from it on.
+ * Source: OpenGL 2.1, section 3.10. Any thread. */
+double nebel_fog_factor_linear(double c, double start, double end);
+double nebel_fog_factor_exp(double c, double density);
+double nebel_fog_factor_exp2(double c, double density);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,72 @@
+/* The nebel CPU renderer: surfaces by Embree, fog by nebel, one picture.
+ *
+ *     nebel_renderer *renderer = NULL;
+ *     nebel_create_renderer(scene_data, fog, &(nebel_renderer_desc){0}, &renderer);
+ *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
+ *
+ * Lambert surfaces lit by the sun (ray-traced shadows; the sunlight is attenuated by all fog on its way) and by the ambient
+ * radiance; transmittance and in-scattering from nebel_trace in float. The same picture, bit for bit, for every thread count.
+ * Link with libnebel_cpu and libnebel.
+ */
+#ifndef NEBEL_RENDER_H
+#define NEBEL_RENDER_H
+
+#include <nebel/nebel.h>
+#include <nebel/scene.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct nebel_renderer nebel_renderer;
+
+typedef struct nebel_renderer_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    nebel_isa isa; /* for fog and for Embree; DEFAULT: the best of this processor */
+    int threads;   /* 0: all */
+} nebel_renderer_desc;
+
+/* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else: the
+ * snapshot is retained. Errors: ARGUMENT, MEMORY, UNSUPPORTED. */
+nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
+                                   nebel_renderer **renderer);
+void nebel_destroy_renderer(nebel_renderer *renderer);
+
+/* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
+typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);
+
+typedef struct nebel_frame_desc {
+    nebel_camera camera;
+    uint32_t width, height; /* pixels, 1 to 32768 */
+    uint32_t samples;       /* per pixel, 1 to 4096; 0: 4. Stratified, box filter. */
+    double tolerance;       /* as in nebel_trace_desc */
+    nebel_progress_fn progress;
+    void *progress_user;
+} nebel_frame_desc;
+
+/* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not wanted. */
+typedef struct nebel_frame {
+    float *color;         /* 3: transmittance * surface + in_scattering */
+    float *transmittance; /* 3: mean over the samples */
+    float *in_scattering; /* 3 */
+    float *depth;         /* 1: distance from the camera [m], mean over the samples that hit; INFINITY where none did */
+    float *normal;        /* 3: mean of the world-space shading normals; 0 where nothing is hit */
+    float *error;         /* 1: largest error bound of the samples */
+} nebel_frame;
+
+/* Renders. Uses OpenMP with the renderer's number of threads. One frame at a time per renderer.
+ * Errors: ARGUMENT, VALUE, MEMORY, UNBOUNDED, LIMIT (stopped by progress). */
+nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame);
+
+/* Exposure (stops; 0 leaves the light as it is), a filmic tone curve and the sRGB transfer function; n pixels of 3 floats,
+ * out may be in. Result within 0..1; NaN gives 0. Any thread. */
+void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
+
+/* The Embree version this build uses, "Embree 3.13.5". Never NULL. */
+const char *nebel_renderer_libraries(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,146 @@
+/* nebel scene files, models and pictures: what stands around the fog.
+ *
+ *     nebel_scene *scene = NULL;
+ *     if (nebel_load_scene("mist.json", &(nebel_scene_desc){0}, &scene) != NEBEL_OK) ...;   // the log said why
+ *     nebel_snapshot *fog = NULL;
+ *     nebel_commit_scene_fog(scene, &fog);
+ *
+ * Reads and checks the JSON of docs/scene-file.md, loads models through Assimp, 16-bit PNG height maps, and reads and
+ * writes PNG and OpenEXR pictures. Link with libnebel_scene and libnebel.
+ *
+ * Threads: a loaded scene is read-only and may be used by many threads; everything else as in nebel/nebel.h.
+ */
+#ifndef NEBEL_SCENE_H
+#define NEBEL_SCENE_H
+
+#include <nebel/nebel.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- the scene ------------------------------------------------------------------------------------------------------ */
+
+typedef enum nebel_projection {
+    NEBEL_PROJECTION_PERSPECTIVE = 0,
+    NEBEL_PROJECTION_ORTHOGRAPHIC,
+    NEBEL_PROJECTION_PANORAMA /* 360 x 180 degrees, equirectangular; the middle of the picture is the view direction */
+} nebel_projection;
+
+typedef struct nebel_camera {
+    double position[3];  /* m */
+    double look_at[3];   /* m, apart from position */
+    double up[3];        /* not along the view; any length but 0 */
+    double vertical_fov; /* degrees, 0 < fov < 180: perspective */
+    double view_height;  /* m, > 0: orthographic, what the picture's height shows */
+    nebel_projection projection;
+} nebel_camera;
+
+/* A moving camera: a turntable (position turns around look_at about up, once in turntable_frames) or keys; not both. */
+typedef struct nebel_camera_key {
+    double frame;
+    nebel_camera camera;
+} nebel_camera_key;
+
+typedef struct nebel_mesh {
+    double origin[3];          /* m; positions are relative to it */
+    const float *positions;    /* 3 per vertex, m, already rotated and scaled */
+    const float *normals;      /* 3 per vertex, unit length; NULL: use the triangles' own */
+    const float *uvs;          /* 2 per vertex, v downwards as in the texture's rows; NULL: no texture */
+    const uint32_t *indices;   /* 3 per triangle, each < vertex_count */
+    uint32_t vertex_count;
+    uint32_t triangle_count;
+    float base_color[3];       /* linear reflectance, 0..1; multiplies the texture */
+    int32_t texture;           /* index into textures, or -1 */
+} nebel_mesh;
+
+typedef struct nebel_texture {
+    uint32_t width, height;
+    const uint8_t *rgba; /* sRGB, 4 bytes per texel, top row first */
+} nebel_texture;
+
+/* Everything the file says, resolved: defaults filled in, directions normalised. Owned by the scene. */
+typedef struct nebel_scene_data {
+    nebel_camera camera;
+    size_t camera_key_count;             /* 0: the camera stands still or turns */
+    const nebel_camera_key *camera_keys; /* ascending frames */
+    uint32_t turntable_frames;           /* 0: none */
+
+    double background[3]; /* radiance where no surface is */
+    int has_sun;
+    double sun_direction[3];  /* towards the sun, unit length */
+    double sun_irradiance[3]; /* on a surface that faces it, before any fog */
+    double ambient[3];        /* radiance */
+
+    size_t volume_count; /* the fog, in the order of the file */
+    const nebel_volume_desc *volumes;
+    const char *const *volume_names; /* UTF-8; "" where the file gives none */
+
+    size_t mesh_count; /* 0 until nebel_load_scene_models */
+    const nebel_mesh *meshes;
+    size_t texture_count;
+    const nebel_texture *textures;
+} nebel_scene_data;
+
+typedef struct nebel_scene nebel_scene;
+
+typedef struct nebel_scene_desc {
+    nebel_allocator allocator;
+    nebel_log log; /* errors as "FILE:LINE:COLUMN: key: what is wrong; what is allowed" */
+} nebel_scene_desc;
+
+/* Reads and checks a scene file. Models named in it are not loaded yet. "-" is a file name like any other.
+ * On an error *scene is NULL. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY. */
+nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, nebel_scene **scene);
+
+/* The same from memory. `name` stands for the file in messages; relative paths in the scene start at its folder. The text
+ * need not end in a zero byte. */
+nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
+                               nebel_scene **scene);
+
+/* Loads the models and height fields that the scene names. Idempotent. Not thread safe against readers of the same scene.
+ * Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
+nebel_result nebel_load_scene_models(nebel_scene *scene);
+
+/* The contents; lives as long as the scene (mesh pointers change with nebel_load_scene_models). Never NULL. */
+const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene);
+
+/* The camera at a frame: standing, turning or between its keys (smooth cubic through the keys, still before the first and
+ * after the last). */
+nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
+
+/* A snapshot of the scene's fog; release it with nebel_release_snapshot before the scene's allocator goes away. */
+nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
+
+/* NULL is fine. */
+void nebel_destroy_scene(nebel_scene *scene);
+
+/* ---- pictures ------------------------------------------------------------------------------------------------------- */
+
+/* A picture of float planes, top row first: samples[(y * width + x) * channel_count + c]. */
+typedef struct nebel_image {
+    uint32_t width, height;
+    uint32_t channel_count;
+    const char *const *channel_names; /* "R", "G", "B", "transmittance.R", ... in EXR naming */
+    float *samples;
+} nebel_image;
+
+/* Reads a PNG (8 or 16 bit; 0..1, values as stored) or EXR (scan lines or tiles, half, float or uint channels, sorted as R,
+ * G, B, A, then the others by name). Free with nebel_free_image and the same allocator. Errors: FILE, FORMAT, LIMIT,
+ * UNSUPPORTED, MEMORY. */
+nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image);
+void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image);
+
+/* Writes by the ending of `path`: .png takes channels R, G, B in 0..1, already in sRGB, 8 bit with an ordered rounding
+ * (no dithering noise between runs); .exr takes every channel as 32-bit float, ZIP compressed. Regular files are written to a
+ * temporary name beside the target and renamed; devices and pipes are written directly. On an error nothing of the target has
+ * changed and no temporary file is left. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
+nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image);
+
+/* What this build of libnebel_scene has: "Assimp 5.2.5, libpng 1.6.39, OpenEXR 3.1.5, yajl 2.1.0". Never NULL. */
+const char *nebel_scene_libraries(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
