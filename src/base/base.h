@@ -7,9 +7,9 @@
 #include <stdarg.h>
 
 #if defined(__GNUC__)
-#define NB_PRINTF(format, first) __attribute__((format(printf, format, first)))
+#define NB_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
-#define NB_PRINTF(format, first)
+#define NB_PRINTF(text, first)
 #endif
 
 /* The caller's allocator, or malloc and free where both functions are NULL. */

@@ -1,0 +1,65 @@
+# Headers, libraries, program, pkg-config files and the CMake package. One set of files per library, so that a program that
+# uses the core alone needs none of the libraries around it.
+
+include(CMakePackageConfigHelpers)
+set(nebel_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/nebel)
+
+# The package files find the libraries beside them, so that a prefix can be moved; absolute directories stay as they are.
+if(IS_ABSOLUTE "${CMAKE_INSTALL_LIBDIR}" OR IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
+    set(pc_prefix ${CMAKE_INSTALL_PREFIX})
+    set(pc_libdir ${CMAKE_INSTALL_FULL_LIBDIR})
+    set(pc_includedir ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+else()
+    file(RELATIVE_PATH pc_prefix /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
+    string(REGEX REPLACE "/$" "" pc_prefix "\${pcfiledir}/${pc_prefix}")
+    set(pc_libdir "\${prefix}/${CMAKE_INSTALL_LIBDIR}")
+    set(pc_includedir "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
+
+# On a static library the private dependencies are the caller's to link; on a shared one they are not.
+function(nebel_write_pkgconfig name description requires private_requires private_libs)
+    set(pc_name ${name})
+    set(pc_description ${description})
+    if(BUILD_SHARED_LIBS)
+        set(pc_requires "${requires}")
+        set(pc_requires_private "${private_requires}")
+        set(pc_libs "")
+        set(pc_libs_private "${private_libs}")
+    else()
+        string(STRIP "${requires} ${private_requires}" pc_requires)
+        set(pc_requires_private "")
+        set(pc_libs " ${private_libs}")
+        set(pc_libs_private "")
+    endif()
+    configure_file(${PROJECT_SOURCE_DIR}/cmake/library.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
+    install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endfunction()
+
+function(nebel_install_library name header)
+    install(TARGETS ${name} EXPORT ${name}_targets)
+    install(FILES ${PROJECT_SOURCE_DIR}/include/nebel/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/nebel)
+    install(EXPORT ${name}_targets NAMESPACE nebel:: DESTINATION ${nebel_package_dir})
+endfunction()
+
+nebel_install_library(nebel nebel.h)
+nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
+if(TARGET nebel_scene)
+    nebel_install_library(nebel_scene scene.h)
+    nebel_write_pkgconfig(nebel_scene "Scene files, models and pictures for nebel" nebel
+        "assimp libpng yajl OpenEXR" "-lm")
+endif()
+if(TARGET nebel_cpu)
+    nebel_install_library(nebel_cpu render.h)
+    list(JOIN OpenMP_C_FLAGS " " openmp)
+    nebel_write_pkgconfig(nebel_cpu "The nebel CPU renderer" nebel_scene "" "-lembree3 ${openmp} -lm")
+endif()
+if(TARGET nebel_tool)
+    install(TARGETS nebel_tool)
+endif()
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/nebelConfig.cmake.in ${PROJECT_BINARY_DIR}/nebelConfig.cmake
+    INSTALL_DESTINATION ${nebel_package_dir} NO_SET_AND_CHECK_MACRO)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/nebelConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/nebelConfig.cmake ${PROJECT_BINARY_DIR}/nebelConfigVersion.cmake
+    cmake/NebelDependencies.cmake DESTINATION ${nebel_package_dir})

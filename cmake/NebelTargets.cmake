@@ -1,0 +1,114 @@
+# How every target of the project is compiled, and the libraries and programs made of the rooms of src/.
+
+set(nebel_warnings -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Wshadow -Wstrict-prototypes
+    -Wmissing-prototypes)
+if(NEBEL_WERROR)
+    list(APPEND nebel_warnings -Werror)
+endif()
+
+# Results must be the same bits in every build: no fused multiply-add unless written, no errno from the maths library.
+set(nebel_arithmetic -ffp-contract=off -fno-math-errno)
+
+set(nebel_sanitizers "")
+if(NEBEL_SANITIZE)
+    set(nebel_sanitizers -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+endif()
+if(NEBEL_BUILD_FUZZ)
+    if(NOT CMAKE_C_COMPILER_ID MATCHES "Clang")
+        message(FATAL_ERROR "NEBEL_BUILD_FUZZ needs clang: configure with -DCMAKE_C_COMPILER=clang")
+    endif()
+    list(APPEND nebel_sanitizers -fsanitize=fuzzer-no-link)
+endif()
+
+# -O3 is CMake's choice for Release; -O2 is ours, also for the kernels, which are vectorized by hand.
+string(REPLACE "-O3" "-O2" CMAKE_C_FLAGS_RELEASE "${CMAKE_C_FLAGS_RELEASE}")
+
+function(nebel_set_options target)
+    set_target_properties(${target} PROPERTIES
+        C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target} PRIVATE ${nebel_warnings} ${nebel_arithmetic} ${nebel_sanitizers})
+    target_link_options(${target} PRIVATE ${nebel_sanitizers})
+endfunction()
+
+# The sources of a room; a room may still be empty.
+function(nebel_glob result)
+    file(GLOB sources CONFIGURE_DEPENDS ${ARGN})
+    set(${result} ${sources} PARENT_SCOPE)
+endfunction()
+
+# Compiles objects once; makes the library <name> of them and of the kernel objects named after the sources.
+function(nebel_add_library name sources extra_objects)
+    add_library(${name}_objects OBJECT ${sources})
+    nebel_set_options(${name}_objects)
+    target_include_directories(${name}_objects PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
+
+    add_library(${name} $<TARGET_OBJECTS:${name}_objects> ${extra_objects})
+    set_target_properties(${name} PROPERTIES
+        LINKER_LANGUAGE C VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+        nebel_objects "$<TARGET_OBJECTS:${name}_objects>;${extra_objects}")
+    target_include_directories(${name} INTERFACE
+        $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+    # PUBLIC where the library is static: whoever links it links with the sanitizers' run time, too.
+    target_link_options(${name} PUBLIC $<BUILD_INTERFACE:${nebel_sanitizers}>)
+    if(BUILD_SHARED_LIBS)
+        set(map ${PROJECT_SOURCE_DIR}/cmake/nebel.map)
+        target_link_options(${name} PRIVATE LINKER:--version-script=${map} LINKER:--no-undefined)
+        set_target_properties(${name} PROPERTIES LINK_DEPENDS ${map})
+    endif()
+endfunction()
+
+function(nebel_add_core)
+    nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c)
+    nebel_add_kernels(kernel_objects definitions)
+    list(REMOVE_ITEM sources ${nebel_kernel_files})
+    nebel_add_library(nebel "${sources}" "${kernel_objects}")
+    target_compile_definitions(nebel_objects PRIVATE ${definitions})
+    target_link_libraries(nebel PRIVATE m)
+    add_library(nebel::nebel ALIAS nebel)
+endfunction()
+
+# A library on top of the core. It sees the core through include/ only and brings its own copy of the memory helpers.
+function(nebel_add_layer name room)
+    nebel_glob(sources src/${room}/*.c)
+    nebel_add_library(${name} "${sources};${PROJECT_SOURCE_DIR}/src/base/base.c" "")
+    target_link_libraries(${name} PUBLIC nebel PRIVATE m)
+    set_target_properties(${name} PROPERTIES EXPORT_NAME ${room})
+    add_library(nebel::${room} ALIAS ${name})
+endfunction()
+
+# <name>_internal: the library with every symbol visible, for tests and benchmarks that enter the rooms.
+function(nebel_add_internal_libraries)
+    foreach(name nebel nebel_scene nebel_cpu)
+        if(NOT TARGET ${name})
+            continue()
+        endif()
+        get_target_property(objects ${name} nebel_objects)
+        add_library(${name}_internal STATIC EXCLUDE_FROM_ALL ${objects})
+        set_target_properties(${name}_internal PROPERTIES LINKER_LANGUAGE C)
+        target_include_directories(${name}_internal INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
+        target_link_options(${name}_internal INTERFACE ${nebel_sanitizers})
+        target_link_libraries(${name}_internal INTERFACE m)
+    endforeach()
+    if(TARGET nebel_scene)
+        target_link_libraries(nebel_scene_internal INTERFACE nebel_internal ${nebel_scene_dependencies})
+    endif()
+    if(TARGET nebel_cpu)
+        target_link_libraries(nebel_cpu_internal INTERFACE nebel_scene_internal ${nebel_cpu_dependencies})
+    endif()
+endfunction()
+
+# A program of the project, linked with what is given.
+function(nebel_add_program name sources)
+    add_executable(${name} ${sources})
+    nebel_set_options(${name})
+    target_link_libraries(${name} PRIVATE ${ARGN})
+endfunction()
+
+function(nebel_add_tool)
+    nebel_glob(sources tools/*.c)
+    if(NOT sources)
+        return()
+    endif()
+    nebel_add_program(nebel_tool "${sources}" nebel_cpu nebel_scene nebel m)
+    set_target_properties(nebel_tool PROPERTIES OUTPUT_NAME nebel RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+endfunction()
