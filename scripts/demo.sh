@@ -1,0 +1,27 @@
+#!/bin/bash
+# demo.sh BUILD: renders every example scene into BUILD/demo and says where the pictures are.
+set -euo pipefail
+
+source=$(cd "$(dirname "$0")/.." && pwd)
+build=${1:?usage: demo.sh BUILD}
+pictures=$build/demo
+
+shopt -s nullglob
+scenes=("$source"/examples/scenes/*.json)
+if [ ${#scenes[@]} -eq 0 ]; then
+    echo "demo: no scenes in examples/scenes" >&2
+    exit 1
+fi
+
+mkdir -p "$pictures"
+for scene in "${scenes[@]}"; do
+    name=$(basename "$scene" .json)
+    echo "demo: $name"
+    "$build/nebel" render "$scene" -o "$pictures/$name.png"
+done
+
+echo
+echo "The pictures:"
+for scene in "${scenes[@]}"; do
+    echo "    $pictures/$(basename "$scene" .json).png"
+done
