@@ -1,0 +1,119 @@
+#!/usr/bin/env python3
+"""Checks the #include lines of the project against the table of rooms in docs/internal.md.
+
+Prints every offending line and exits 1 where there is one.
+"""
+
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+# Which rooms of src/ a room may enter beside itself. Every room may use the public face.
+ROOMS = {
+    "formulas": set(),
+    "base": set(),
+    "kernels": {"base", "formulas"},
+    "media": {"base", "formulas"},
+    "march": {"base", "formulas", "media", "kernels"},
+    "classic": {"base", "march", "media"},
+    "nebula": {"base", "march", "media"},
+    "planet": {"base", "march", "media"},
+    "scene": {"base"},
+    "cpu": {"base"},
+    "gl": {"base", "formulas"},
+}
+
+# Everything outside src/ uses the public face and its own folder. Tests and fuzzers may enter every room.
+OUTSIDE = ("tools", "examples", "bench")
+
+C_STANDARD = set("""assert.h complex.h ctype.h errno.h fenv.h float.h inttypes.h iso646.h limits.h locale.h math.h setjmp.h
+    signal.h stdalign.h stdarg.h stdatomic.h stdbool.h stddef.h stdint.h stdio.h stdlib.h stdnoreturn.h string.h tgmath.h
+    threads.h time.h uchar.h wchar.h wctype.h""".split())
+POSIX = {"fcntl.h", "unistd.h", "dirent.h", "sys/types.h", "sys/stat.h", "sys/ioctl.h", "sys/resource.h", "sys/time.h",
+         "sys/wait.h", "sys/mman.h"}
+
+# Headers of other people, by the places that may use them; a trailing slash stands for a folder.
+FOREIGN = {
+    "formulas": {"immintrin.h", "arm_neon.h"},
+    "base": {"cpuid.h", "sys/auxv.h"},
+    "scene": POSIX | {"assimp/", "png.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h"},
+    "cpu": {"embree3/", "omp.h"},
+    "gl": {"epoxy/"},
+    "tools": POSIX | {"omp.h"},
+    "bench": POSIX | {"omp.h", "embree3/"},
+    "examples": POSIX,
+}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
+PUBLIC = re.compile(r"nebel/\w+\.h$")
+
+
+def place_of(path):
+    """The room of a file under src/, or its top folder."""
+    parts = path.relative_to(ROOT).parts
+    return parts[1] if parts[0] == "src" else parts[0]
+
+
+def is_foreign_allowed(place, name):
+    allowed = FOREIGN.get(place, set())
+    return name in C_STANDARD or any(name == a or (a.endswith("/") and name.startswith(a)) for a in allowed)
+
+
+def own_target(path, name):
+    """The file of ours that a quoted include means, or None."""
+    for folder in (path.parent, ROOT / "src", ROOT / "include"):
+        target = (folder / name).resolve()
+        if target.is_file():
+            return target
+    return None
+
+
+def judge(path, quote, name):
+    """What is wrong with an include line, or None."""
+    place = place_of(path)
+    if PUBLIC.match(name):
+        return None if (ROOT / "include" / name).is_file() else "no such public header"
+    if quote == "<":
+        return None if is_foreign_allowed(place, name) else f"{place} may not use <{name}>"
+    target = own_target(path, name)
+    if target is None:
+        return f'"{name}" is no file of the project'
+    if ROOT not in target.parents:
+        return f'"{name}" is outside the project'
+    there = place_of(target)
+    if there == place or there in ROOMS.get(place, set()):
+        return None
+    return f"{place} may not enter {there}"
+
+
+def sources():
+    roots = [ROOT / "include", ROOT / "src"] + [ROOT / folder for folder in OUTSIDE]
+    for root in roots:
+        for path in sorted(root.rglob("*")):
+            if path.suffix in (".c", ".h", ".inc", ".cpp"):
+                yield path
+
+
+def main():
+    faults = []
+    count = 0
+    for path in sources():
+        place = place_of(path)
+        if path.is_relative_to(ROOT / "src") and place not in ROOMS:
+            faults.append(f"{path.relative_to(ROOT)}: room {place} is not in the table of scripts/check_includes.py")
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            match = INCLUDE.match(line)
+            if match is None:
+                continue
+            count += 1
+            fault = judge(path, match[1], match[2])
+            if fault is not None:
+                faults.append(f"{path.relative_to(ROOT)}:{number}: {fault}")
+    print("\n".join(faults + [f"check_includes: {count} include lines, {len(faults)} faults"]))
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,46 @@
+#!/bin/bash
+# check_qemu.sh BUILD: the kernels on processors that this machine is not. test_kernels for aarch64 (NEON), and of BUILD on
+# x86 models without AVX2, without AVX, and with AVX2; there the dispatcher must pick a level that the model has.
+set -euo pipefail
+
+build=$(cd "${1:?usage: check_qemu.sh BUILD}" && pwd)
+source=$(cd "$(dirname "$0")/.." && pwd)
+cross=$build/aarch64
+passed=0
+
+ran() {
+    passed=$((passed + 1))
+    echo "check_qemu: $* passed"
+}
+
+build_aarch64() {
+    cmake -S "$source" -B "$cross" -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
+        -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DNEBEL_WERROR=ON -DNEBEL_BUILD_SCENE=OFF -DNEBEL_BUILD_CPU=OFF \
+        -DNEBEL_BUILD_TESTS=OFF >"$build/aarch64.log"
+    cmake --build "$cross" -j "$(nproc)" --target nebel >>"$build/aarch64.log"
+}
+
+run_aarch64() {
+    local name=$1
+    aarch64-linux-gnu-gcc -std=c11 -O2 -ffp-contract=off -fno-math-errno -static -DNEBEL_SOURCE="\"$source\"" \
+        -I"$source/tests/cross" -I"$source/include" -I"$source/src" \
+        "$source/tests/$name.c" "$cross/libnebel.a" -lm -o "$cross/$name"
+    qemu-aarch64 "$cross/$name"
+    ran "$name on aarch64"
+}
+
+if [ ! -e "$source/tests/test_kernels.c" ]; then
+    echo "check_qemu: no kernel tests yet"
+    exit 0
+fi
+
+if ! build_aarch64; then
+    cat "$build/aarch64.log"
+    exit 1
+fi
+run_aarch64 test_kernels
+for model in Conroe Nehalem Haswell; do
+    qemu-x86_64 -cpu "$model" "$build/tests/test_kernels"
+    ran "test_kernels on $model"
+done
+echo "check_qemu: $passed passed, 0 failed"

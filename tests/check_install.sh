@@ -1,0 +1,71 @@
+#!/bin/bash
+# Installs into a fresh prefix, builds a small program through pkg-config and another through find_package, runs both.
+set -euo pipefail
+
+work=$(mktemp -d "${TMPDIR:-/tmp}/nebel-install.XXXXXX")
+trap 'rm -rf "$work"' EXIT
+prefix=$work/prefix
+
+cmake --install "$NEBEL_BUILD" --prefix "$prefix" >"$work/install.log"
+library=$(dirname "$(find "$prefix" -name nebel.pc)")/..
+library=$(cd "$library" && pwd)
+export PKG_CONFIG_PATH=$library/pkgconfig LD_LIBRARY_PATH=$library
+
+mkdir "$work/consumer"
+cat >"$work/consumer/core.c" <<'C'
+#include <math.h>
+#include <nebel/nebel.h>
+#include <stdio.h>
+
+int main(void)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *now = NULL;
+    const nebel_volume_desc sphere = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 1, -5}, .radius = 2},
+                                      .extinction = {.5, .5, .5}, .source = {.7, .7, .8}};
+    const nebel_ray ray = {.origin = {0, 1, 0}, .direction = {0, 0, -1}, .t_max = 100};
+    nebel_light light;
+    if (nebel_create_fog(&(nebel_fog_desc){0}, &fog) != NEBEL_OK || nebel_add_volume(fog, &sphere, NULL) != NEBEL_OK ||
+        nebel_commit_fog(fog, &now) != NEBEL_OK ||
+        nebel_trace(now, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light) != NEBEL_OK)
+        return 1;
+    nebel_release_snapshot(now);
+    nebel_destroy_fog(fog);
+    printf("nebel %s: transmittance %.6f\n", nebel_version(), light.transmittance[0]);
+    return fabs(light.transmittance[0] - exp(-2.0)) < 1e-9 ? 0 : 1;
+}
+C
+cat >"$work/consumer/layers.c" <<'C'
+#include <nebel/render.h>
+#include <stdio.h>
+
+int main(void)
+{
+    printf("%s, %s\n", nebel_scene_libraries(), nebel_renderer_libraries());
+    return 0;
+}
+C
+cat >"$work/consumer/CMakeLists.txt" <<'C'
+cmake_minimum_required(VERSION 3.21)
+project(consumer LANGUAGES C)
+find_package(nebel 0.1 REQUIRED COMPONENTS scene cpu)
+add_executable(core core.c)
+target_link_libraries(core PRIVATE nebel::nebel m)
+add_executable(layers layers.c)
+target_link_libraries(layers PRIVATE nebel::cpu)
+C
+
+cd "$work/consumer"
+compiler=${CC:-cc}
+$compiler -std=c11 -o core core.c $(pkg-config --cflags --libs nebel) -lm
+$compiler -std=c11 -o layers layers.c $(pkg-config --cflags --libs nebel_cpu)
+./core
+./layers
+
+cmake -S . -B build -DCMAKE_PREFIX_PATH="$prefix" >"$work/configure.log"
+cmake --build build >"$work/build.log" || { cat "$work/build.log"; exit 1; }
+build/core
+build/layers
+
+if [ -x "$NEBEL" ]; then "$prefix/bin/nebel" --help >/dev/null; fi
+echo "installed, built twice, run"
