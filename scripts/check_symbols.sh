@@ -23,14 +23,14 @@ check_object() {
     count=$((count + 1))
     bytes=$(writable_bytes "$1")
     [ "$bytes" -eq 0 ] || fault "$1: $bytes bytes of writable data"
-    names=$(nm -g --defined-only "$1" | awk 'NF == 3 && $3 !~ /^(nebel|nb)_/ { print $3 }')
-    [ -z "$names" ] || fault "$1: global names without nebel_ or nb_:" $names
+    names=$(nm -g --defined-only "$1" | awk 'NF == 3 && $3 !~ /^(nebel|nb)_/ { print $3 }' | xargs)
+    [ -z "$names" ] || fault "$1: global names without nebel_ or nb_: $names"
 }
 
 check_kernel() {
     local globals
-    globals=$(nm -g --defined-only "$1" | awk 'NF == 3 { print $3 }')
-    [ "$(wc -w <<<"$globals")" -eq 1 ] || fault "$1: one global symbol is allowed, these are global:" $globals
+    globals=$(nm -g --defined-only "$1" | awk 'NF == 3 { print $3 }' | xargs)
+    [ "$(wc -w <<<"$globals")" -eq 1 ] || fault "$1: one global symbol is allowed, these are global: $globals"
 }
 
 shopt -s nullglob

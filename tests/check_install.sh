@@ -57,8 +57,10 @@ C
 
 cd "$work/consumer"
 compiler=${CC:-cc}
-$compiler -std=c11 -o core core.c $(pkg-config --cflags --libs nebel) -lm
-$compiler -std=c11 -o layers layers.c $(pkg-config --cflags --libs nebel_cpu)
+read -ra core_flags < <(pkg-config --cflags --libs nebel)
+read -ra layer_flags < <(pkg-config --cflags --libs nebel_cpu)
+"$compiler" -std=c11 -o core core.c "${core_flags[@]}" -lm
+"$compiler" -std=c11 -o layers layers.c "${layer_flags[@]}"
 ./core
 ./layers
 
