@@ -35,47 +35,46 @@ verdict() {
 warnings=(-Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Wshadow -Wstrict-prototypes -Wmissing-prototypes
     -Wno-psabi -Wno-unused-function -Werror)
 
-c_source() {
-    echo "#include \"formulas/$1\""
+{
+    echo '#include "formulas/prelude.h"'
     printf '#include "formulas/%s"\n' "${order[@]}"
     echo "extern int translation_unit_is_not_empty;"
-}
+} >"$work/formulas.c"
 
-# try_c COMPILER LEVEL PRELUDE FLAGS...: gcc also makes code of functions that nothing calls.
+# try_c COMPILER NAME FLAGS...: gcc also makes code of functions that nothing calls.
 try_c() {
-    local compiler=$1 level=$2 prelude=$3
-    shift 3
+    local compiler=$1 name=$2
+    shift 2
     local keep=()
     case $compiler in *gcc) keep=(-fkeep-inline-functions -fkeep-static-functions) ;; esac
-    c_source "$prelude" >"$work/formulas.c"
-    verdict "$compiler, $level" "$compiler" -std=c11 -O2 -ffp-contract=off -fno-math-errno "${warnings[@]}" "${keep[@]}" \
-        -Isrc -Iinclude "-DNB_ISA_${level^^}=1" "-DNB_SUFFIX=$level" "$@" -c "$work/formulas.c" -o "$work/formulas.o"
+    for width in "" -DNB_FAST=1; do
+        verdict "$compiler, $name $width" "$compiler" -std=c11 -O1 -ffp-contract=off -fno-math-errno "${warnings[@]}" \
+            "${keep[@]}" -Isrc -Iinclude "$@" $width -c "$work/formulas.c" -o "$work/formulas.o"
+    done
 }
 
 try_glsl() {
-    local prelude=$1 version=$2
     {
-        grep -q '^#version' "$formulas/$prelude" || echo "#version $version"
-        cat "$formulas/$prelude"
+        cat "$formulas/$1" "$formulas/prelude_glsl.glsl"
         for file in "${order[@]}"; do cat "$formulas/$file"; done
         echo "out vec4 color;"
         echo "void main() { color = vec4(0.0); }"
     } >"$work/formulas.frag"
-    verdict "GLSL $version" glslangValidator -S frag "$work/formulas.frag"
+    verdict "GLSL, $1" glslangValidator -S frag "$work/formulas.frag"
 }
 
 for compiler in gcc clang; do
-    try_c $compiler scalar prelude_c.h
-    try_c $compiler double prelude_c.h
+    try_c $compiler scalar
+    try_c $compiler double -DNB_DOUBLE=1
     if [ "$(uname -m)" = x86_64 ]; then
-        try_c $compiler sse2 prelude_simd.h -msse2
-        try_c $compiler avx2 prelude_simd.h -mavx2 -mfma
-        try_c $compiler avx512 prelude_simd.h -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mavx2
+        try_c $compiler sse2 -DNB_ISA_SSE2=1 -msse2
+        try_c $compiler avx2 -DNB_ISA_AVX2=1 -mavx2 -mfma
+        try_c $compiler avx512 -DNB_ISA_AVX512=1 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mavx2
     fi
 done
-try_c aarch64-linux-gnu-gcc neon prelude_simd.h
-try_glsl prelude_330.glsl "330 core"
-try_glsl prelude_300es.glsl "300 es"
+try_c aarch64-linux-gnu-gcc neon -DNB_ISA_NEON=1
+try_glsl prelude_330.glsl
+try_glsl prelude_300es.glsl
 
 echo "check_formulas: ${#order[@]} files, $passed targets passed, $failed failed"
 [ "$failed" -eq 0 ]
