@@ -105,7 +105,7 @@ def erf_tail(z):
     return fill(z, 0, 2 / sqrt(pi) - 1, lambda z: erf(sqrt(z)) / sqrt(z) - 1)
 
 
-ERFCX_POLE = 4
+ERFCX_POLE = 2
 
 
 def erfcx(x):
@@ -136,7 +136,7 @@ TABLES = [
     ("exp: (e^r - 1 - r - r^2/2) / r^3", exp_tail, lambda r: abs(r) ** 3 + mpf(10) ** -9, (-HALF_LN2, HALF_LN2), 3, 8),
     ("log: (log((1+s)/(1-s))/s - 2) / s^2 in s^2", log_tail, lambda z: z / 2 + mpf(10) ** -9, (0, LOG_Z), 2, 6),
     ("erf: erf(x)/x - 1 in x^2", erf_tail, lambda z: 1 / (1 + erf_tail(z)), (0, mpf("1.001")), 6, 11),
-    ("erfcx: (x + 4) erfcx(x) in t = (x - 4)/(x + 4)", erfcx_mapped, lambda t: 1 / erfcx_mapped(t), (-1, 1), 11, 23),
+    ("erfcx: (x + 2) erfcx(x) in t = (x - 2)/(x + 2)", erfcx_mapped, lambda t: 1 / erfcx_mapped(t), (-1, 1), 11, 26),
 ]
 
 CONSTANTS = [

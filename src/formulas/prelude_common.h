@@ -3,6 +3,10 @@
 #ifndef NB_PRELUDE_COMMON_H
 #define NB_PRELUDE_COMMON_H
 
+/* A structure that formulas return: NB_STRUCT(name) members NB_STRUCT_END(name). GLSL has no typedef. */
+#define NB_STRUCT(name) typedef struct name {
+#define NB_STRUCT_END(name) } name;
+
 typedef struct nb_vec3 {
     nb_real x, y, z;
 } nb_vec3;
@@ -18,12 +22,12 @@ typedef struct nb_wvec3 {
 /* IEEE 754: significand bits below the leading one, exponent bias, and the numbers built from them. */
 #ifdef NB_DOUBLE
 #define NB_SHIFT 52
-#define NB_SIGN_BIT 0x8000000000000000u
-#define NB_FRACTION_BITS 0x000fffffffffffffu
-#define NB_LOW_HALF_BITS 0x0000000007ffffffu
-#define NB_ONE_BITS 0x3ff0000000000000u
-#define NB_SQRT_HALF_BITS 0x3fe6a09e667f3bcdu
-#define NB_INTEGER_BITS 0x4330000000000000u
+#define NB_SIGN_BIT UINT64_C(0x8000000000000000)
+#define NB_FRACTION_BITS UINT64_C(0x000fffffffffffff)
+#define NB_LOW_HALF_BITS UINT64_C(0x0000000007ffffff)
+#define NB_ONE_BITS UINT64_C(0x3ff0000000000000)
+#define NB_SQRT_HALF_BITS UINT64_C(0x3fe6a09e667f3bcd)
+#define NB_INTEGER_BITS UINT64_C(0x4330000000000000)
 #define NB_INTEGER NB_F(4503599627370496.0) /* 2^52: from here on every number is an integer */
 #define NB_BIAS NB_F(1023.0)
 #else
@@ -55,6 +59,9 @@ static inline nb_real nb_round(nb_real x)
     return (x + shifter) - shifter;
 }
 
+#ifdef NB_REAL_FLOOR
+static inline nb_real nb_floor(nb_real x) { return NB_REAL_FLOOR(x); }
+#else
 /* Any x: rounds |x|, corrects a step too high, and leaves what has no fraction (and NaN) alone. */
 static inline nb_real nb_floor(nb_real x)
 {
@@ -63,6 +70,7 @@ static inline nb_real nb_floor(nb_real x)
     const nb_real below = nearest - nb_select(nearest > x, NB_F(1.0), NB_F(0.0));
     return nb_select(size < NB_INTEGER, below, x);
 }
+#endif
 
 /* x * 2^n for an integer n with a normal 2^n, -126 to 127 (float) or -1022 to 1023 (double). The addition leaves n + bias in the lowest
  * bits, the shift moves it to the exponent and everything above it out. */

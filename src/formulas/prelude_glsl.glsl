@@ -3,6 +3,8 @@
  * GLSL promises no infinity, no NaN and no exact -0; nb_min and nb_max are written out so that at least they choose
  * as in C where a machine does have them. */
 #define NB_FUNCTION
+#define NB_STRUCT(name) struct name {
+#define NB_STRUCT_END(name) };
 #define NB_F(x) (x)
 #define NB_W(x) (x)
 #define NB_EPSILON 5.9604644775390625e-8

@@ -97,11 +97,13 @@
 #if defined(NB_FAST)
 #define NB_WIDTH 4
 #define NB_REAL_SQRT(x) vsqrtq_f32(x)
+#define NB_REAL_FLOOR(x) vrndmq_f32(x)
 #define NB_REAL_SELECT(m, a, b) vbslq_f32((uint32x4_t)(m), a, b)
 #define NB_REAL_SIGNS(m) (NB_TWO_SIGNS(m) | (unsigned)((m)[2] & 4) | (unsigned)((m)[3] & 8))
 #else
 #define NB_WIDTH 2
 #define NB_REAL_SQRT(x) vsqrt_f32(x)
+#define NB_REAL_FLOOR(x) vrndm_f32(x)
 #define NB_REAL_SELECT(m, a, b) vbsl_f32((uint32x2_t)(m), a, b)
 #define NB_REAL_SIGNS(m) NB_TWO_SIGNS(m)
 #endif
@@ -112,6 +114,10 @@
 #endif
 #define NB_ALL_LANES ((1u << NB_WIDTH) - 1u)
 #define NB_BITWISE_SELECT(mask_type, type, m, a, b) ((type)(((mask_type)(a) & (m)) | ((mask_type)(b) & ~(m))))
+
+#if defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512)
+#define NB_REAL_FLOOR(x) NB_REAL_OP(floor)(x)
+#endif
 
 #if defined(NB_ISA_NEON)
 #define NB_REAL_MIN(a, b) nb_select(a < b, a, b)
