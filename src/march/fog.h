@@ -1,0 +1,22 @@
+/* The editable fog behind nebel_fog. */
+#ifndef NB_MARCH_FOG_H
+#define NB_MARCH_FOG_H
+
+#include "media/volume.h"
+
+typedef struct nb_slot {
+    nb_volume volume;
+    size_t next_free; /* 1 + slot, 0: none */
+    uint32_t generation;
+    int used;
+} nb_slot;
+
+struct nebel_fog {
+    nebel_allocator allocator;
+    nebel_log log;
+    double ambient[3];
+    nb_slot *slots;
+    size_t slot_count, slot_capacity, first_free, free_count;
+};
+
+#endif

@@ -1,0 +1,130 @@
+#include "snapshot.h"
+
+#include "fog.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int compare_media(const void *a, const void *b)
+{
+    return nb_volume_compare(&((const nb_medium *)a)->body, &((const nb_medium *)b)->body);
+}
+
+static void light_medium(nb_medium *medium, const double ambient[3])
+{
+    const nb_volume *v = &medium->body;
+    for (int c = 0; c < 3; c++) {
+        medium->radiance[c] = v->lit ? v->albedo[c] * ambient[c] : v->source[c];
+        medium->light[c] = medium->radiance[c] * v->extinction[c] + v->emission[c];
+        medium->densest = fmax(medium->densest, v->extinction[c]);
+        medium->brightest = fmax(medium->brightest, medium->light[c]);
+        medium->emits = medium->emits || v->emission[c] > 0;
+    }
+}
+
+static void free_snapshot(nebel_snapshot *s)
+{
+    const nebel_allocator allocator = s->allocator;
+    for (size_t i = 0; i < s->medium_count; i++) nb_volume_free(&allocator, &s->media[i].body);
+    nb_bvh_free(&allocator, &s->bvh);
+    nb_release(&allocator, s->media);
+    nb_release(&allocator, s->endless);
+    nb_release(&allocator, s->bounded);
+    nb_release(&allocator, s);
+}
+
+static int has_body(const nb_volume *volume)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(volume->low[i] <= volume->high[i])) return 0;
+    return 1;
+}
+
+/* Copies the volumes that can touch a ray. 0 when memory is out. */
+static int copy_media(const nebel_fog *fog, nebel_snapshot *s)
+{
+    s->media = nb_allocate_zero(&s->allocator, fog->slot_count, sizeof *s->media);
+    if (s->media == NULL) return 0;
+    for (size_t i = 0; i < fog->slot_count; i++) {
+        const nb_slot *slot = &fog->slots[i];
+        if (!slot->used || !has_body(&slot->volume)) continue;
+        nb_medium *medium = &s->media[s->medium_count];
+        if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
+        s->medium_count++;
+        light_medium(medium, fog->ambient);
+        s->most_leaves += medium->body.leaf_count;
+        for (int c = 0; c < 3; c++) s->largest_radiance = fmax(s->largest_radiance, medium->radiance[c]);
+    }
+    return 1;
+}
+
+static int is_bounded(const nb_volume *volume)
+{
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(volume->low[i]) || !isfinite(volume->high[i])) return 0;
+    return 1;
+}
+
+static nebel_result index_media(nebel_snapshot *s)
+{
+    s->endless = nb_allocate(&s->allocator, s->medium_count, sizeof *s->endless);
+    s->bounded = nb_allocate(&s->allocator, s->medium_count, sizeof *s->bounded);
+    nb_aabb *boxes = nb_allocate(&s->allocator, s->medium_count, sizeof *boxes);
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    if (s->endless != NULL && s->bounded != NULL && boxes != NULL) {
+        for (size_t i = 0; i < s->medium_count; i++) {
+            const nb_volume *body = &s->media[i].body;
+            if (!is_bounded(body)) {
+                s->endless[s->endless_count++] = (uint32_t)i;
+                continue;
+            }
+            memcpy(boxes[s->bounded_count].low, body->low, sizeof body->low);
+            memcpy(boxes[s->bounded_count].high, body->high, sizeof body->high);
+            s->bounded[s->bounded_count++] = (uint32_t)i;
+        }
+        result = nb_bvh_build(&s->allocator, boxes, s->bounded_count, &s->bvh);
+    }
+    nb_release(&s->allocator, boxes);
+    return result;
+}
+
+nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
+{
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    *snapshot = NULL;
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_snapshot *s = nb_allocate_zero(&fog->allocator, 1, sizeof *s);
+    if (s == NULL) return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "snapshot: out of memory");
+    s->allocator = fog->allocator;
+    s->log = fog->log;
+    atomic_init(&s->owners, 1);
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    if (copy_media(fog, s)) {
+        qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
+        result = index_media(s);
+    }
+    if (result != NEBEL_OK) {
+        free_snapshot(s);
+        return nb_fail(&fog->log, result, "snapshot: out of memory for %zu volumes", fog->slot_count);
+    }
+    *snapshot = s;
+    return NEBEL_OK;
+}
+
+nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot)
+{
+    if (snapshot != NULL) atomic_fetch_add_explicit(&snapshot->owners, 1, memory_order_relaxed);
+    return snapshot;
+}
+
+void nebel_release_snapshot(nebel_snapshot *snapshot)
+{
+    if (snapshot == NULL) return;
+    if (atomic_fetch_sub_explicit(&snapshot->owners, 1, memory_order_acq_rel) == 1) free_snapshot(snapshot);
+}
+
+size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot)
+{
+    return snapshot->medium_count;
+}

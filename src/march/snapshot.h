@@ -1,0 +1,35 @@
+/* The immutable fog that queries read: volumes in canonical order, what they give as light, and where they are. */
+#ifndef NB_MARCH_SNAPSHOT_H
+#define NB_MARCH_SNAPSHOT_H
+
+#include "bvh.h"
+#include "media/volume.h"
+
+#include <stdatomic.h>
+
+/* A volume and what the integrator wants to know of it at once. */
+typedef struct nb_medium {
+    nb_volume body;
+    double radiance[3]; /* of opaque fog: source, or albedo times ambient */
+    double light[3];    /* radiance * extinction + emission: radiance per metre at density 1 */
+    double densest;     /* largest channel of the extinction */
+    double brightest;   /* largest channel of light */
+    int emits;
+} nb_medium;
+
+struct nebel_snapshot {
+    nebel_allocator allocator;
+    nebel_log log;
+    atomic_size_t owners;
+    size_t medium_count;
+    nb_medium *media;        /* fog first, then exclusions; each in the order of nb_volume_compare */
+    double largest_radiance; /* of all volumes and channels */
+    size_t endless_count;    /* media without finite bounds, by index: every ray may meet them */
+    uint32_t *endless;
+    nb_bvh bvh;              /* over the others */
+    uint32_t *bounded;       /* the media that the tree's boxes stand for */
+    size_t bounded_count;
+    size_t most_leaves;      /* in all media */
+};
+
+#endif

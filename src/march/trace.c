@@ -1,0 +1,113 @@
+/* The public queries: arguments checked, a kernel chosen. */
+#include "trace_kernel.h"
+
+#include "base/cpu.h"
+
+#include <math.h>
+
+/* C first, then ascending: the last one that runs is the default. */
+static const struct {
+    nebel_isa isa;
+    nb_trace_fn *trace;
+} kernels[] = {
+    {NEBEL_ISA_SCALAR, nb_trace_scalar},
+#if defined(NB_HAVE_NEON)
+    {NEBEL_ISA_NEON, nb_trace_neon},
+#endif
+#if defined(NB_HAVE_SSE2)
+    {NEBEL_ISA_SSE2, nb_trace_sse2},
+#endif
+#if defined(NB_HAVE_AVX2)
+    {NEBEL_ISA_AVX2, nb_trace_avx2},
+#endif
+#if defined(NB_HAVE_AVX512)
+    {NEBEL_ISA_AVX512, nb_trace_avx512},
+#endif
+};
+
+static nb_trace_fn *kernel_for(nebel_isa isa)
+{
+    nb_trace_fn *found = NULL;
+    for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
+        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa)) found = kernels[i].trace;
+    return found;
+}
+
+int nebel_isa_available(nebel_isa isa)
+{
+    return kernel_for(isa) != NULL;
+}
+
+const char *nebel_isa_name(nebel_isa isa)
+{
+    switch (isa) {
+    case NEBEL_ISA_SCALAR: return "scalar";
+    case NEBEL_ISA_SSE2: return "sse2";
+    case NEBEL_ISA_AVX2: return "avx2";
+    case NEBEL_ISA_AVX512: return "avx512";
+    case NEBEL_ISA_NEON: return "neon";
+    default: return "default";
+    }
+}
+
+/* Squares of distances stay finite in every target. */
+#define LARGEST_COORDINATE 1e15
+
+static const char *fault_of_ray(const nebel_ray *ray)
+{
+    int zero = 1;
+    for (int i = 0; i < 3; i++) {
+        if (!(fabs(ray->origin[i]) <= LARGEST_COORDINATE)) return "origin must be finite and at most 1e15 m away";
+        if (!isfinite(ray->direction[i])) return "direction must be finite";
+        zero = zero && ray->direction[i] == 0;
+    }
+    if (zero) return "direction must not be zero";
+    return ray->t_max >= 0 ? NULL : "t_max must be 0 or more";
+}
+
+static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const nebel_ray *rays, size_t stride,
+                               size_t *failed)
+{
+    if (snapshot == NULL || (n > 0 && rays == NULL)) return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++) {
+        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * stride);
+        const char *fault = fault_of_ray(ray);
+        if (fault == NULL) continue;
+        if (failed != NULL) *failed = i;
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "ray %zu: %s", i, fault);
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t *failed)
+{
+    if (result == NEBEL_OK) return result;
+    if (failed != NULL) *failed = job->failed;
+    if (result == NEBEL_ERROR_UNBOUNDED)
+        return nb_fail(&job->snapshot->log, result,
+                       "ray %zu: gathers infinite light; fog that emits without end must absorb, or t_max be finite", job->failed);
+    return nb_fail(&job->snapshot->log, result, "ray %zu: out of memory for the fog it meets", job->failed);
+}
+
+nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
+                         size_t ray_stride, nebel_light *lights, size_t light_stride)
+{
+    if (desc == NULL || (n > 0 && lights == NULL)) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
+    if (valid != NEBEL_OK) return valid;
+    const double tolerance = desc->tolerance == 0 ? NEBEL_DEFAULT_TOLERANCE : desc->tolerance;
+    if (!(tolerance > 0 && isfinite(tolerance)))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "tolerance: must be finite and more than 0");
+    const int is_float = desc->precision == NEBEL_PRECISION_FLOAT;
+    nb_trace_fn *kernel = is_float ? kernel_for(desc->isa) : nb_trace_double;
+    if (kernel == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(desc->isa));
+    nb_trace_job job = {.snapshot = snapshot,
+                        .budget = tolerance * fmax(1, snapshot->largest_radiance),
+                        .count = n,
+                        .rays = rays,
+                        .ray_stride = ray_stride,
+                        .lights = lights,
+                        .light_stride = light_stride};
+    return explain(&job, kernel(&job), desc->failed_ray);
+}

@@ -1,0 +1,329 @@
+/* The march, compiled once per instruction set and once as the double reference: packets of rays in, light out.
+ *
+ * NB_SUFFIX names the one symbol; everything else is static. Every lane's arithmetic is independent of the others, so a ray
+ * gives the same bits alone, in any company and in any width. */
+#if defined(NB_ISA_DOUBLE)
+#define NB_DOUBLE
+#endif
+
+#include "trace_kernel.h"
+
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+#include "formulas/shapes.inc"
+#include "formulas/profiles.inc"
+#include "formulas/medium.inc"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "trace_packet.h"
+#include "trace_walk.h"
+#include "trace_mixed.h"
+
+#define JOIN_NAMES(a, b) a##b
+#define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
+
+/* ---- memory for very many media on one ray ---------------------------------------------------------------------------- */
+
+/* Most rays meet few media: their contacts live on the stack. Beyond that the job takes memory once and keeps it. */
+#define STACK_CONTACTS 24
+#define ALIGNMENT 64
+
+typedef struct workspace {
+    contact contacts[STACK_CONTACTS];
+    leaf_span spans[2 * STACK_CONTACTS];
+    size_t contact_capacity, span_capacity;
+    void *contact_memory, *span_memory; /* as allocated; NULL while the stack suffices */
+    uint32_t *found;                    /* media that the packet may meet, by index */
+    size_t found_count, found_capacity;
+    march m;
+} workspace;
+
+/* Moves `used` of an array of `size` bytes per element to a larger aligned one. NULL when memory is out. */
+static void *grow_aligned(const nebel_allocator *allocator, const void *old, size_t used, size_t size, size_t *capacity,
+                          size_t wanted, void **memory)
+{
+    size_t larger = *capacity;
+    while (larger < wanted) larger *= 2;
+    char *raw = nb_allocate(allocator, larger + 1, size > ALIGNMENT ? size : ALIGNMENT);
+    if (raw == NULL) return NULL;
+    char *aligned = raw + (ALIGNMENT - (uintptr_t)raw % ALIGNMENT) % ALIGNMENT;
+    memcpy(aligned, old, used * size);
+    nb_release(allocator, *memory);
+    *memory = raw;
+    *capacity = larger;
+    return aligned;
+}
+
+/* Room for one more contact and its leaves. 0 when memory is out. */
+static int reserve(workspace *w, const nebel_allocator *allocator, size_t leaves)
+{
+    march *m = &w->m;
+    if (m->contact_count + 1 > w->contact_capacity) {
+        contact *moved = grow_aligned(allocator, m->contacts, m->contact_count, sizeof *moved, &w->contact_capacity,
+                                      m->contact_count + 1, &w->contact_memory);
+        if (moved == NULL) return 0;
+        m->contacts = moved;
+    }
+    if (m->span_count + leaves > w->span_capacity) {
+        leaf_span *moved = grow_aligned(allocator, m->spans, m->span_count, sizeof *moved, &w->span_capacity,
+                                        m->span_count + leaves, &w->span_memory);
+        if (moved == NULL) return 0;
+        m->spans = moved;
+    }
+    return 1;
+}
+
+static void open_workspace(workspace *w)
+{
+    w->contact_capacity = STACK_CONTACTS;
+    w->span_capacity = 2 * STACK_CONTACTS;
+    w->contact_memory = NULL;
+    w->span_memory = NULL;
+    w->found = NULL;
+    w->found_count = 0;
+    w->found_capacity = 0;
+    w->m.contacts = w->contacts;
+    w->m.spans = w->spans;
+}
+
+static void close_workspace(workspace *w, const nebel_allocator *allocator)
+{
+    nb_release(allocator, w->contact_memory);
+    nb_release(allocator, w->span_memory);
+    nb_release(allocator, w->found);
+}
+
+/* ---- rays in ------------------------------------------------------------------------------------------------------------- */
+
+static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
+{
+    return (const nebel_ray *)(const void *)((const char *)rays + i * stride);
+}
+
+/* Unit length. The largest component is taken out first, so that no square overflows or vanishes; adding +0 makes every zero
+ * positive, on which the ownership of faces rests. */
+static nb_wvec3 normalized(nb_wvec3 d)
+{
+    const nb_wide size = nb_wmax(nb_wmax(nb_wabs(d.x), nb_wabs(d.y)), nb_wabs(d.z));
+    const nb_wvec3 scaled = nb_wvec3(d.x / size, d.y / size, d.z / size);
+    const nb_wide inverse = NB_W(1.0) / nb_wlength3(scaled);
+    return nb_wvec3(scaled.x * inverse + NB_W(0.0), scaled.y * inverse + NB_W(0.0), scaled.z * inverse + NB_W(0.0));
+}
+
+/* Lanes beyond `count` get a ray of no length. */
+static packet load_packet(const nebel_ray *rays, size_t stride, size_t count)
+{
+    double lane[7][NB_WIDTH];
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        const nebel_ray *ray = ray_at(rays, stride, i < count ? i : 0);
+        for (int c = 0; c < 3; c++) {
+            lane[c][i] = ray->origin[c];
+            lane[3 + c][i] = ray->direction[c];
+        }
+        lane[6][i] = i >= count ? 0 : ray->t_max > 1e18 ? 1e18 : ray->t_max;
+    }
+    const nb_wvec3 direction = nb_wvec3(nb_wload_lanes(lane[3]), nb_wload_lanes(lane[4]), nb_wload_lanes(lane[5]));
+    return (packet){nb_wvec3(nb_wload_lanes(lane[0]), nb_wload_lanes(lane[1]), nb_wload_lanes(lane[2])),
+                    normalized(direction), nb_wload_lanes(lane[6])};
+}
+
+/* Below this it is quicker to ask every medium than to walk the tree. */
+#define FEW_MEDIA 8
+
+static void begin_query(nb_bvh_cursor *cursor, const nebel_snapshot *snapshot, const packet *rays)
+{
+    double origin[3][NB_BVH_LANES], inverse[3][NB_BVH_LANES], t_max[NB_BVH_LANES];
+    const nb_wide from[3] = {rays->origin.x, rays->origin.y, rays->origin.z};
+    const nb_wide along[3] = {rays->direction.x, rays->direction.y, rays->direction.z};
+    for (int c = 0; c < 3; c++) {
+        nb_wstore_lanes(origin[c], from[c]);
+        nb_wstore_lanes(inverse[c], nb_wrcp_bounded(along[c]));
+    }
+    nb_wstore_lanes(t_max, rays->t_max);
+    unsigned active = 0;
+    for (unsigned i = 0; i < NB_WIDTH; i++) active |= t_max[i] > 0 ? 1u << i : 0;
+    nb_bvh_begin(cursor, &snapshot->bvh, NB_WIDTH, active, (const double(*)[NB_BVH_LANES])origin,
+                 (const double(*)[NB_BVH_LANES])inverse, t_max);
+}
+
+static int note_found(workspace *w, const nebel_allocator *allocator, uint32_t index)
+{
+    void *found = w->found;
+    if (!nb_grow(allocator, &found, sizeof *w->found, w->found_count, &w->found_capacity, w->found_count + 1)) return 0;
+    w->found = found;
+    w->found[w->found_count++] = index;
+    return 1;
+}
+
+static int compare_indices(const void *a, const void *b)
+{
+    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* The media that the packet may touch, ascending, which is the canonical order. 0 when memory is out. */
+static int find_media(workspace *w, const nebel_snapshot *snapshot)
+{
+    w->found_count = 0;
+    for (size_t i = 0; i < snapshot->endless_count; i++)
+        if (!note_found(w, &snapshot->allocator, snapshot->endless[i])) return 0;
+    nb_bvh_cursor cursor;
+    begin_query(&cursor, snapshot, &w->m.rays);
+    uint32_t box;
+    while (nb_bvh_next(&cursor, &box))
+        if (!note_found(w, &snapshot->allocator, snapshot->bounded[box])) return 0;
+    if (w->found_count > 1) qsort(w->found, w->found_count, sizeof *w->found, compare_indices);
+    return 1;
+}
+
+static int meet_one(workspace *w, const nebel_snapshot *snapshot, size_t index)
+{
+    if (!reserve(w, &snapshot->allocator, snapshot->media[index].body.leaf_count)) return 0;
+    meet_medium(&w->m, &snapshot->media[index]);
+    return 1;
+}
+
+/* Meets all media the packet can touch. 0 when memory is out. */
+static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
+{
+    march *m = &w->m;
+    m->contact_count = 0;
+    m->span_count = 0;
+    m->end_depth = NB_F(0.0);
+    m->end_light = NB_F(0.0);
+    m->event_count = NB_F(0.0);
+    if (snapshot->bounded_count <= FEW_MEDIA) {
+        for (size_t i = 0; i < snapshot->medium_count; i++)
+            if (!meet_one(w, snapshot, i)) return 0;
+        return 1;
+    }
+    if (!find_media(w, snapshot)) return 0;
+    for (size_t i = 0; i < w->found_count; i++)
+        if (!meet_one(w, snapshot, w->found[i])) return 0;
+    return 1;
+}
+
+/* ---- light out ------------------------------------------------------------------------------------------------------------ */
+
+/* Beyond this optical depth exp gives 0 in this precision, and nothing behind adds a bit. */
+#if defined(NB_DOUBLE)
+#define OPAQUE_DEPTH NB_F(800.0)
+#else
+#define OPAQUE_DEPTH NB_F(120.0)
+#endif
+
+static gathered nothing_gathered(void)
+{
+    const nb_real zero = NB_F(0.0), one = NB_F(1.0);
+    return (gathered){{zero, zero, zero}, {one, one, one}, {zero, zero, zero}, zero, zero};
+}
+
+static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
+{
+    const piece_sum sum = sum_piece(m, p);
+    *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
+    const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
+    const nb_mask mixed = nb_and(p->lanes, sum.mixed);
+    if (nb_any(closed)) gather_closed(g, &sum, closed);
+    if (nb_any(mixed)) {
+        gathered within = *g;
+        gather_mixed(m, p, mixed, may, &within);
+        for (int c = 0; c < 3; c++) g->radiance[c] = within.radiance[c];
+        g->radiance_error = within.radiance_error;
+    }
+    pass_piece(g, &sum);
+}
+
+/* From event to event along all rays at once. */
+static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
+{
+    gathered g = nothing_gathered();
+    nb_wide t = NB_W(0.0);
+    nb_wmask lanes = m->rays.t_max > NB_W(0.0);
+    *unbounded = nb_mask_false;
+    for (;;) {
+        const nb_wide next = next_event(m, t);
+        lanes = nb_wand(lanes, next <= NB_WFAR);
+        if (!nb_wany(lanes)) return g;
+        const piece p = {t, next, nb_narrow(next - t), nb_narrow_mask(lanes)};
+        if (mark_inside(m, &p)) {
+            gather_piece(m, &p, may, &g, unbounded);
+            const nb_real thinnest = nb_min(nb_min(g.depth[0], g.depth[1]), g.depth[2]);
+            lanes = nb_wand(lanes, nb_widen_mask(thinnest < OPAQUE_DEPTH));
+        }
+        t = nb_wselect(lanes, next, t);
+    }
+}
+
+/* The bound of the absolute error of all six numbers: an error e of optical depth changes the light by a factor e^e at most. */
+static nb_real bound_error(const march *m, const gathered *g)
+{
+    const nb_real ends = nb_expm1(nb_min(m->end_depth, NB_F(2.0)));
+    const nb_real rounding = nb_expm1(nb_min(g->depth_error, NB_F(2.0)));
+    const nb_real pieces = m->event_count + NB_F(4.0);
+    const nb_real transmittance = nb_min(largest(g->transmittance) * (ends + rounding + NB_F(4.0) * NB_EPSILON), NB_F(1.0));
+    const nb_real radiance = g->radiance_error + m->end_light + largest(g->radiance) * (ends + pieces * NB_EPSILON);
+    return nb_max(transmittance, radiance);
+}
+
+static void store_light(const march *m, const gathered *g, nebel_light *lights, size_t stride, size_t count)
+{
+    nb_scalar lane[7][NB_WIDTH];
+    for (int c = 0; c < 3; c++) {
+        nb_store_lanes(lane[c], g->transmittance[c]);
+        nb_store_lanes(lane[3 + c], g->radiance[c]);
+    }
+    nb_store_lanes(lane[6], bound_error(m, g));
+    for (size_t i = 0; i < count; i++) {
+        nebel_light *light = (nebel_light *)(void *)((char *)lights + i * stride);
+        for (int c = 0; c < 3; c++) {
+            light->transmittance[c] = (double)lane[c][i];
+            light->in_scattering[c] = (double)lane[3 + c][i];
+        }
+        light->error = (double)lane[6][i];
+    }
+}
+
+/* Where the budget goes: most by loss of transmittance and by length, a tenth to the last steps of the pieces, of which
+ * there are at most two per leaf. */
+static allowance share_budget(const nebel_snapshot *snapshot, double budget)
+{
+    const double radiance = snapshot->largest_radiance > 1 ? snapshot->largest_radiance : 1;
+    return (allowance){REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget), choose_ellipse(budget / radiance)};
+}
+
+static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
+{
+    const size_t count = job->count - first < NB_WIDTH ? job->count - first : NB_WIDTH;
+    w->m.rays = load_packet(ray_at(job->rays, job->ray_stride, first), job->ray_stride, count);
+    job->failed = first;
+    if (!meet_fog(w, job->snapshot)) return NEBEL_ERROR_MEMORY;
+    allowance share = *may;
+    const nb_real pieces = w->m.event_count + NB_F(1.0);
+    share.last_share = share.last_share / pieces;
+    share.length_share = share.length_share / pieces;
+    nb_mask unbounded;
+    const gathered g = gather_light(&w->m, &share, &unbounded);
+    for (size_t i = 0; i < count && nb_any(unbounded); i++)
+        if (nb_lane(unbounded, i)) {
+            job->failed = first + i;
+            return NEBEL_ERROR_UNBOUNDED;
+        }
+    nebel_light *lights = (nebel_light *)(void *)((char *)job->lights + first * job->light_stride);
+    store_light(&w->m, &g, lights, job->light_stride, count);
+    return NEBEL_OK;
+}
+
+nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
+{
+    workspace w;
+    open_workspace(&w);
+    const allowance may = share_budget(job->snapshot, job->budget);
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < job->count && result == NEBEL_OK; i += NB_WIDTH) result = trace_packet(job, &w, &may, i);
+    close_workspace(&w, &job->snapshot->allocator);
+    return result;
+}

@@ -1,0 +1,295 @@
+/* A packet of rays and the fog on it: intervals of every leaf that any of them meets, and the profile of every medium in
+ * coordinates along the ray. Included by trace_kernel.c once the vocabulary of formulas/prelude.h is there. */
+
+/* The double reference keeps the digits that resolving had. */
+#if defined(NB_DOUBLE)
+#define FRAME(leaf, member) ((leaf)->exact_##member)
+#define WIDE(x) ((nb_wide)(x))
+#define REAL(x) ((nb_real)(x))
+#else
+#define FRAME(leaf, member) ((leaf)->member)
+#define WIDE(x) nb_wsplat((double)(x))
+#define REAL(x) nb_splat((float)(x))
+#endif
+
+typedef struct packet {
+    nb_wvec3 origin, direction; /* the direction has unit length */
+    nb_wide t_max;              /* NB_WFAR at most; 0 in lanes without a ray */
+} packet;
+
+typedef struct leaf_span {
+    nb_wide enter, leave; /* clipped to [0, t_max]; enter >= leave where there is nothing */
+} leaf_span;
+
+/* A medium as the packet meets it. */
+typedef struct contact {
+    const nb_medium *medium;
+    size_t first_span;
+    nb_real extinction[3], light[3], radiance[3];
+    nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
+    nb_wvec3 size;          /* soft edge: half widths */
+    nb_real level;          /* gaussian: m; radial: c */
+    nb_mask inside;         /* within the current piece of the ray */
+} contact;
+
+typedef struct march {
+    packet rays;
+    size_t contact_count, span_count;
+    contact *contacts;
+    leaf_span *spans;
+    nb_real event_count;          /* two for every leaf that the lane's ray meets, whatever its company meets */
+    nb_real end_depth, end_light; /* what the uncertainty of the ends may do to optical depth and to radiance */
+} march;
+
+static nb_wvec3 wide_vector(const double v[3])
+{
+    return nb_wvec3(WIDE(v[0]), WIDE(v[1]), WIDE(v[2]));
+}
+
+/* The ray in a leaf's frame, and the rounding noise of its coordinates near the shape: that of the difference from the
+ * frame's origin and that of the direction over the way there. */
+typedef struct local_ray {
+    nb_wvec3 p, d;
+    nb_wide reach;
+} local_ray;
+
+static local_ray localize(const packet *rays, const nb_leaf *leaf)
+{
+    const nb_wvec3 origin =
+        nb_wvec3(WIDE(FRAME(leaf, origin)[0]), WIDE(FRAME(leaf, origin)[1]), WIDE(FRAME(leaf, origin)[2]));
+    const nb_wvec3 p = nb_wsub3(rays->origin, origin);
+    local_ray local = {p, rays->direction, NB_W(0.0)};
+    nb_wide distance = nb_wabs(p.x) + nb_wabs(p.y) + nb_wabs(p.z);
+    if (!leaf->aligned) {
+        nb_wvec3 row[3];
+        for (int i = 0; i < 3; i++)
+            row[i] = nb_wvec3(WIDE(FRAME(leaf, matrix)[3 * i]), WIDE(FRAME(leaf, matrix)[3 * i + 1]),
+                              WIDE(FRAME(leaf, matrix)[3 * i + 2]));
+        local.p = nb_wvec3(nb_wdot3(row[0], p), nb_wdot3(row[1], p), nb_wdot3(row[2], p));
+        local.d = nb_wvec3(nb_wdot3(row[0], rays->direction), nb_wdot3(row[1], rays->direction),
+                           nb_wdot3(row[2], rays->direction));
+        distance = distance * WIDE(leaf->scale);
+    }
+    const nb_wide size = WIDE(1.0 + leaf->radius + leaf->length);
+    local.reach = (distance + size) * (NB_W(8.0) * NB_WEPSILON);
+    return local;
+}
+
+static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
+{
+    double size = 0;
+    for (int i = 0; i < 3; i++) size += fabs(leaf->low[i]) + fabs(leaf->high[i]);
+    const nb_wide reach = leaf->aligned ? NB_W(0.0) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
+    return nb_interval_box(local->p, local->d, wide_vector(leaf->low), wide_vector(leaf->high), reach);
+}
+
+static nb_interval planes_interval(const nb_volume *body, const nb_leaf *leaf, const local_ray *local)
+{
+    nb_interval meet = nb_interval_all();
+    for (size_t i = 0; i < leaf->face_count; i++) {
+        const nb_face *face = &body->faces[leaf->first_face + i];
+        const nb_wide reach = local->reach * NB_W(3.0) + WIDE(fabs(face->distance)) * (NB_W(4.0) * NB_WEPSILON);
+        meet = nb_interval_meet(meet, nb_interval_half_space(local->p, local->d, wide_vector(face->normal),
+                                                             WIDE(face->distance), WIDE(face->tie), reach));
+    }
+    return meet;
+}
+
+static nb_interval leaf_interval(const packet *rays, const nb_volume *body, const nb_leaf *leaf)
+{
+    if (leaf->type == NB_LEAF_WORLD) return nb_interval_all();
+    const local_ray local = localize(rays, leaf);
+    switch (leaf->type) {
+    case NB_LEAF_PLANES: return planes_interval(body, leaf, &local);
+    case NB_LEAF_BOX: return box_interval(leaf, &local);
+    case NB_LEAF_BALL: return nb_interval_ball(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
+    case NB_LEAF_TUBE: return nb_interval_tube(local.p, local.d, local.reach);
+    case NB_LEAF_CONE:
+        return nb_interval_cone(local.p, local.d, WIDE(FRAME(leaf, radius)), WIDE(FRAME(leaf, slope)), local.reach);
+    default: return nb_interval_capsule(local.p, local.d, WIDE(FRAME(leaf, length)), local.reach);
+    }
+}
+
+/* ---- profiles in coordinates along the ray --------------------------------------------------------------------------- */
+
+static void height_contact(contact *k, const packet *rays, const nebel_density *density)
+{
+    const nb_wide inverse = NB_W(1.0) / WIDE(density->scale_height);
+    k->offset.x = (rays->origin.y - WIDE(density->base)) * inverse;
+    k->slope.x = rays->direction.y * inverse;
+}
+
+static void linear_contact(contact *k, const packet *rays, const nebel_density *density)
+{
+    const nb_wvec3 from = wide_vector(density->from);
+    const nb_wvec3 axis = nb_wsub3(wide_vector(density->to), from);
+    const nb_wide inverse = NB_W(1.0) / nb_wdot3(axis, axis);
+    k->offset.x = nb_wdot3(nb_wsub3(rays->origin, from), axis) * inverse;
+    k->slope.x = nb_wdot3(rays->direction, axis) * inverse;
+}
+
+/* x = (t - closest approach) / (sqrt(2) sigma) */
+static void gaussian_contact(contact *k, const packet *rays, const nebel_density *density)
+{
+    const nb_wvec3 p = nb_wsub3(rays->origin, wide_vector(density->center));
+    const nb_wide inverse = NB_W(0.70710678118654752440084436210485) / WIDE(density->sigma);
+    const nb_wide closest = -nb_wdot3(p, rays->direction);
+    const nb_wvec3 q = nb_wscale3(nb_wadd3(p, nb_wscale3(rays->direction, closest)), inverse);
+    k->offset.x = -closest * inverse;
+    k->slope.x = inverse;
+    k->level = nb_narrow(nb_wmin(nb_wdot3(q, q), NB_W(1e9)));
+}
+
+/* x = (t - closest approach) |d| / radius, c = 1 - (closest distance / radius)^2 */
+static void radial_contact(contact *k, const packet *rays, const nb_leaf *leaf)
+{
+    const local_ray local = localize(rays, leaf);
+    const nb_wide inverse = NB_W(1.0) / WIDE(FRAME(leaf, radius));
+    const nb_wide speed = nb_wsqrt(nb_wdot3(local.d, local.d));
+    const nb_wide closest = -nb_wdot3(local.p, local.d) / nb_wmax(speed * speed, NB_W(1e-30));
+    const nb_wvec3 q = nb_wscale3(nb_wadd3(local.p, nb_wscale3(local.d, closest)), inverse);
+    k->slope.x = speed * inverse;
+    k->offset.x = -closest * k->slope.x;
+    k->level = nb_narrow(NB_W(1.0) - nb_wmin(nb_wdot3(q, q), NB_W(1e9)));
+}
+
+static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+{
+    const local_ray local = localize(rays, leaf);
+    const nb_wide inverse = NB_W(1.0) / WIDE(width);
+    const nb_wvec3 low = wide_vector(leaf->low), high = wide_vector(leaf->high);
+    const nb_wvec3 middle = nb_wscale3(nb_wadd3(low, high), NB_W(0.5));
+    k->offset = nb_wscale3(nb_wsub3(local.p, middle), inverse);
+    k->slope = nb_wscale3(local.d, inverse);
+    k->size = nb_wscale3(nb_wsub3(high, low), NB_W(0.5) * inverse);
+}
+
+static void profile_contact(contact *k, const packet *rays)
+{
+    const nb_volume *body = &k->medium->body;
+    switch (body->density.type) {
+    case NEBEL_DENSITY_HEIGHT: height_contact(k, rays, &body->density); break;
+    case NEBEL_DENSITY_LINEAR: linear_contact(k, rays, &body->density); break;
+    case NEBEL_DENSITY_GAUSSIAN: gaussian_contact(k, rays, &body->density); break;
+    case NEBEL_DENSITY_RADIAL: radial_contact(k, rays, &body->leaves[0]); break;
+    case NEBEL_DENSITY_SOFT_EDGE: soft_edge_contact(k, rays, &body->leaves[0], body->density.distance); break;
+    default: break;
+    }
+}
+
+/* Coordinates at t, narrowed only here, where they are small again for a shape that is far away. */
+static nb_real coordinate(const contact *k, nb_wide t)
+{
+    return nb_narrow(k->offset.x + k->slope.x * t);
+}
+
+static nb_real contact_density(const contact *k, nb_wide t)
+{
+    const nebel_density *density = &k->medium->body.density;
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+        return density->below == NEBEL_BELOW_GROW ? nb_height_density(coordinate(k, t))
+                                                  : nb_height_capped_density(coordinate(k, t));
+    case NEBEL_DENSITY_LINEAR: return nb_linear_density(coordinate(k, t));
+    case NEBEL_DENSITY_GAUSSIAN: return nb_gaussian_density(k->level, coordinate(k, t));
+    case NEBEL_DENSITY_RADIAL: return nb_radial_density(k->level, coordinate(k, t), density->power);
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return nb_soft_edge_density(nb_wadd3(k->offset, nb_wscale3(k->slope, t)), k->size);
+    default: return NB_F(1.0);
+    }
+}
+
+/* The density integrated from start over h metres. */
+static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
+{
+    const nebel_density *density = &k->medium->body.density;
+    const nb_real u = coordinate(k, start);
+    const nb_real slope = nb_narrow(k->slope.x);
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+        return density->below == NEBEL_BELOW_GROW ? nb_height_integral(u, slope, h)
+                                                  : nb_height_capped_integral(u, slope, h);
+    case NEBEL_DENSITY_LINEAR: return nb_linear_integral(u, slope, h);
+    case NEBEL_DENSITY_GAUSSIAN:
+        return nb_gaussian_integral(k->level, u, coordinate(k, start + nb_widen(h)), slope);
+    case NEBEL_DENSITY_RADIAL: return nb_radial_integral(k->level, u, slope, h, density->power);
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return nb_soft_edge_integral(nb_wadd3(k->offset, nb_wscale3(k->slope, start)), k->slope, k->size, nb_widen(h));
+    default: return nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON));
+    }
+}
+
+/* The next place after t where the profile is not smooth; NB_WFAR where there is none. */
+static nb_wide contact_kink(const contact *k, nb_wide t)
+{
+    const nebel_density *density = &k->medium->body.density;
+    if (density->type == NEBEL_DENSITY_SOFT_EDGE) return nb_soft_edge_kink(k->offset, k->slope, k->size, t);
+    const int linear = density->type == NEBEL_DENSITY_LINEAR;
+    if (!linear && !(density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)) return NB_WFAR;
+    const nb_wide inverse = nb_wrcp_bounded(k->slope.x);
+    const nb_wide zero = -k->offset.x * inverse;
+    const nb_wide next = nb_wselect(zero > t, zero, NB_WFAR);
+    if (!linear) return next;
+    const nb_wide one = (NB_W(1.0) - k->offset.x) * inverse;
+    return nb_wselect(nb_wand(one > t, one < next), one, next);
+}
+
+static int grows_without_bound(const nebel_density *density)
+{
+    return density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_GROW;
+}
+
+/* ---- meeting the fog ---------------------------------------------------------------------------------------------------- */
+
+/* Clips to the ray and says in `spread` by how much the ends that are left may be off, times the density there. */
+static leaf_span clip_interval(const packet *rays, const contact *k, const nb_interval *raw, nb_real *spread)
+{
+    const nb_wmask touched = nb_wand(raw->enter <= raw->leave, nb_wand(raw->leave > NB_W(0.0), raw->enter < rays->t_max));
+    const nb_wmask enters = nb_wand(touched, raw->enter > NB_W(0.0));
+    const nb_wmask leaves = nb_wand(touched, raw->leave < rays->t_max);
+    const leaf_span span = {nb_wmax(raw->enter, NB_W(0.0)), nb_wmin(raw->leave, rays->t_max)};
+    const nb_real first = nb_narrow(nb_wselect(enters, raw->enter_slack, NB_W(0.0)));
+    const nb_real last = nb_narrow(nb_wselect(leaves, raw->leave_slack, NB_W(0.0)));
+    *spread = first + last;
+    if (grows_without_bound(&k->medium->body.density))
+        *spread = first * contact_density(k, span.enter) + last * contact_density(k, span.leave);
+    return span;
+}
+
+/* Intervals of all leaves of one medium. Returns whether any lane is inside any of them. */
+static int meet_leaves(march *m, contact *k)
+{
+    const nb_volume *body = &k->medium->body;
+    nb_real spread = NB_F(0.0);
+    int hit = 0;
+    for (size_t i = 0; i < body->leaf_count; i++) {
+        const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
+        nb_real own;
+        const leaf_span span = clip_interval(&m->rays, k, &raw, &own);
+        m->spans[k->first_span + i] = span;
+        spread = spread + own;
+        const nb_wmask met = span.enter < span.leave;
+        m->event_count = m->event_count + nb_select(nb_narrow_mask(met), NB_F(2.0), NB_F(0.0));
+        hit = hit || nb_wany(met);
+    }
+    m->end_depth = m->end_depth + spread * REAL(k->medium->densest);
+    m->end_light = m->end_light + spread * REAL(k->medium->brightest);
+    return hit;
+}
+
+/* Adds a medium to the march when any ray meets it. */
+static void meet_medium(march *m, const nb_medium *medium)
+{
+    contact *k = &m->contacts[m->contact_count];
+    k->medium = medium;
+    k->first_span = m->span_count;
+    if (medium->body.operation == NEBEL_OPERATION_ADD) profile_contact(k, &m->rays);
+    if (!meet_leaves(m, k)) return;
+    for (int c = 0; c < 3; c++) {
+        k->extinction[c] = REAL(medium->body.extinction[c]);
+        k->light[c] = REAL(medium->light[c]);
+        k->radiance[c] = REAL(medium->radiance[c]);
+    }
+    m->contact_count++;
+    m->span_count += medium->body.leaf_count;
+}

@@ -1,0 +1,164 @@
+/* The partition of the rays: from event to event, which media are there, and what they do to the light. */
+
+/* Light gathered so far, and what may be wrong with it. */
+typedef struct gathered {
+    nb_real depth[3];         /* optical depth from the camera */
+    nb_real transmittance[3]; /* exp(-depth) */
+    nb_real radiance[3];
+    nb_real depth_error;      /* rounding, of the worst channel */
+    nb_real radiance_error;   /* rounding and the bound of adaptive integration */
+} gathered;
+
+/* A piece between two neighbouring events. */
+typedef struct piece {
+    nb_wide start, end;
+    nb_real length;
+    nb_mask lanes; /* that have this piece */
+} piece;
+
+/* What the media of a piece add up to. */
+typedef struct piece_sum {
+    nb_real depth[3], light[3]; /* optical depth; radiance it would add if nothing attenuated it */
+    nb_real depth_error, light_error;
+    nb_mask mixed; /* the quotient of light and extinction changes along the piece: no closed form */
+} piece_sum;
+
+/* The next event after t, NB_WFAR * 2 where there is none: the sentinel must lie beyond an endless ray's end. */
+static nb_wide next_event(const march *m, nb_wide t)
+{
+    nb_wide next = NB_W(2.0) * NB_WFAR;
+    for (size_t i = 0; i < m->span_count; i++) {
+        const leaf_span *span = &m->spans[i];
+        const nb_wmask some = span->enter < span->leave;
+        next = nb_wselect(nb_wand(some, nb_wand(span->enter > t, span->enter < next)), span->enter, next);
+        next = nb_wselect(nb_wand(some, nb_wand(span->leave > t, span->leave < next)), span->leave, next);
+    }
+    return next;
+}
+
+/* Membership of a leaf needs no midpoint: between neighbouring events a span is either all there or not at all. */
+static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
+{
+    const nb_volume *body = &k->medium->body;
+    nb_mask stack[NB_STEP_STACK];
+    int top = 0;
+    size_t leaf = k->first_span;
+    for (size_t i = 0; i < body->step_count; i++) {
+        if (body->steps[i] == NB_STEP_LEAF) {
+            const leaf_span *span = &m->spans[leaf++];
+            stack[top++] = nb_narrow_mask(nb_wand(span->enter <= start, span->leave > start));
+            continue;
+        }
+        top--;
+        stack[top - 1] = body->steps[i] == NB_STEP_ANY ? nb_or(stack[top - 1], stack[top])
+                                                       : nb_and(stack[top - 1], stack[top]);
+    }
+    return stack[0];
+}
+
+/* Marks which media are there. Returns whether any is. */
+static int mark_inside(march *m, const piece *p)
+{
+    nb_mask free_of_fog = nb_not(p->lanes);
+    int any = 0;
+    for (size_t i = m->contact_count; i-- > 0;) { /* exclusions come last in the canonical order */
+        contact *k = &m->contacts[i];
+        k->inside = is_inside(m, k, p->start);
+        if (k->medium->body.operation == NEBEL_OPERATION_EXCLUDE) {
+            free_of_fog = nb_or(free_of_fog, k->inside);
+            k->inside = nb_mask_false;
+            continue;
+        }
+        k->inside = nb_and(k->inside, nb_not(free_of_fog));
+        any = any || nb_any(k->inside);
+    }
+    return any;
+}
+
+static nb_real largest(const nb_real v[3])
+{
+    return nb_max(nb_max(v[0], v[1]), v[2]);
+}
+
+/* Adds one medium's optical depth and light over h metres from `start` to the sum. */
+static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_real h)
+{
+    const nb_estimate along = contact_integral(k, start, h);
+    const nb_real length = nb_select(k->inside, along.value, NB_F(0.0));
+    const nb_real error = nb_select(k->inside, along.error, NB_F(0.0));
+    for (int c = 0; c < 3; c++) {
+        sum->depth[c] = sum->depth[c] + k->extinction[c] * length;
+        sum->light[c] = sum->light[c] + k->light[c] * length;
+    }
+    sum->depth_error = sum->depth_error + REAL(k->medium->densest) * error;
+    sum->light_error = sum->light_error + REAL(k->medium->brightest) * error;
+}
+
+static piece_sum no_sum(void)
+{
+    const nb_real zero = NB_F(0.0);
+    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, zero, zero, nb_mask_false};
+}
+
+/* A piece is mixed where some density varies and not all media give the same light per extinction. */
+static piece_sum sum_piece(const march *m, const piece *p)
+{
+    piece_sum sum = no_sum();
+    nb_mask seen = nb_mask_false, uneven = nb_mask_false, emits = nb_mask_false, varies = nb_mask_false;
+    nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        if (!nb_any(k->inside)) continue;
+        add_contact(&sum, k, p->start, p->length);
+        const nb_mask again = nb_and(k->inside, seen);
+        nb_mask differs = k->medium->emits ? nb_mask_true : emits;
+        for (int c = 0; c < 3; c++) {
+            differs = nb_or(differs, nb_not(k->radiance[c] == first[c]));
+            first[c] = nb_select(nb_and(k->inside, nb_not(seen)), k->radiance[c], first[c]);
+        }
+        uneven = nb_or(uneven, nb_and(again, differs));
+        emits = k->medium->emits ? nb_or(emits, k->inside) : emits;
+        seen = nb_or(seen, k->inside);
+        if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) varies = nb_or(varies, k->inside);
+    }
+    sum.mixed = nb_and(uneven, varies);
+    return sum;
+}
+
+/* The closed form: light (1 - e^-depth) / depth, seen through what lies before. */
+static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
+{
+    nb_real most = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        const nb_real light = nb_select(lanes, g->transmittance[c] * nb_medium_gather(sum->light[c], sum->depth[c]), NB_F(0.0));
+        g->radiance[c] = g->radiance[c] + light;
+        most = nb_max(most, light);
+    }
+    const nb_real error = sum->light_error * largest(g->transmittance) + most * (g->depth_error + sum->depth_error + NB_F(16.0) * NB_EPSILON);
+    g->radiance_error = g->radiance_error + nb_select(lanes, error, NB_F(0.0));
+}
+
+/* Moves behind the piece. */
+static void pass_piece(gathered *g, const piece_sum *sum)
+{
+    for (int c = 0; c < 3; c++) {
+        g->depth[c] = g->depth[c] + sum->depth[c];
+        g->transmittance[c] = nb_exp(-g->depth[c]);
+    }
+    g->depth_error = g->depth_error + sum->depth_error + largest(g->depth) * (NB_F(2.0) * NB_EPSILON);
+}
+
+/* Endless light: the piece has no end, something in it shines, and nothing in it absorbs. */
+static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum)
+{
+    nb_mask endless = nb_mask_false;
+    const nb_mask open = nb_and(p->lanes, p->length >= NB_F(0.5) * NB_FAR);
+    for (size_t i = 0; i < m->contact_count && nb_any(open); i++) {
+        const contact *k = &m->contacts[i];
+        if (!k->medium->emits) continue;
+        const nb_mask here = nb_and(open, nb_and(k->inside, contact_integral(k, p->start, p->length).value >= NB_F(0.5) * NB_FAR));
+        for (int c = 0; c < 3; c++)
+            if (k->medium->body.emission[c] > 0) endless = nb_or(endless, nb_and(here, sum->depth[c] < NB_F(1.0)));
+    }
+    return endless;
+}

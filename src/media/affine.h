@@ -1,0 +1,80 @@
+/* Small algebra in long double for resolving transforms: what is rounded here is rounded for every ray. */
+#ifndef NB_MEDIA_AFFINE_H
+#define NB_MEDIA_AFFINE_H
+
+#include <nebel/nebel.h>
+
+#include <math.h>
+
+/* world = matrix local + offset; the matrix row by row */
+typedef struct nb_affine {
+    long double matrix[9], offset[3];
+} nb_affine;
+
+static inline nb_affine nb_affine_identity(void)
+{
+    return (nb_affine){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+}
+
+static inline void nb_affine_direction(const nb_affine *a, const long double v[3], long double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = a->matrix[3 * i] * v[0] + a->matrix[3 * i + 1] * v[1] + a->matrix[3 * i + 2] * v[2];
+}
+
+static inline void nb_affine_point(const nb_affine *a, const long double p[3], long double out[3])
+{
+    nb_affine_direction(a, p, out);
+    for (int i = 0; i < 3; i++) out[i] += a->offset[i];
+}
+
+/* scale first, then rotation, then position; zero rotation or scale mean none */
+static inline nb_affine nb_affine_from_transform(const nebel_transform *t)
+{
+    nb_affine a = nb_affine_identity();
+    const long double x = (long double)t->rotation[0], y = (long double)t->rotation[1];
+    const long double z = (long double)t->rotation[2], w = (long double)t->rotation[3];
+    const long double n = x * x + y * y + z * z + w * w;
+    if (n > 0) {
+        const long double s = 2 / n;
+        const long double m[9] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
+                                  s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
+                                  s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
+        for (int i = 0; i < 9; i++) a.matrix[i] = m[i];
+    }
+    const int scaled = t->scale[0] != 0 || t->scale[1] != 0 || t->scale[2] != 0;
+    for (int i = 0; i < 9 && scaled; i++) a.matrix[i] *= (long double)t->scale[i % 3];
+    for (int i = 0; i < 3; i++) a.offset[i] = (long double)t->position[i];
+    return a;
+}
+
+/* outer after inner */
+static inline nb_affine nb_affine_compose(const nb_affine *outer, const nb_affine *inner)
+{
+    nb_affine out;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            long double sum = 0;
+            for (int k = 0; k < 3; k++) sum += outer->matrix[3 * i + k] * inner->matrix[3 * k + j];
+            out.matrix[3 * i + j] = sum;
+        }
+    nb_affine_point(outer, inner->offset, out.offset);
+    return out;
+}
+
+/* The inverse of the matrix by its cofactors; 0 where it is singular. */
+static inline int nb_affine_invert_matrix(const nb_affine *a, long double out[9])
+{
+    const long double *m = a->matrix;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int r0 = (j + 1) % 3, r1 = (j + 2) % 3, c0 = (i + 1) % 3, c1 = (i + 2) % 3;
+            out[3 * i + j] = m[3 * r0 + c0] * m[3 * r1 + c1] - m[3 * r0 + c1] * m[3 * r1 + c0];
+        }
+    const long double determinant = m[0] * out[0] + m[1] * out[3] + m[2] * out[6];
+    if (!(fabsl(determinant) > 0) || !isfinite((double)determinant)) return 0;
+    for (int i = 0; i < 9; i++) out[i] /= determinant;
+    return 1;
+}
+
+#endif

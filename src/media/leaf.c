@@ -1,0 +1,248 @@
+#include "leaf.h"
+
+#include "convex.h"
+
+#include <float.h>
+#include <math.h>
+
+static void widen_point(const double v[3], long double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = (long double)v[i];
+}
+
+/* The frame whose origin is `center` and whose axes are normalised by `shaping` (rows, in the shape's coordinates). */
+static int set_frame(nb_leaf *leaf, const nb_affine *world, const long double center[3], const long double shaping[9])
+{
+    long double inverse[9];
+    if (!nb_affine_invert_matrix(world, inverse)) return 0;
+    const nb_affine shape = {{shaping[0], shaping[1], shaping[2], shaping[3], shaping[4], shaping[5], shaping[6],
+                              shaping[7], shaping[8]}, {0, 0, 0}};
+    nb_affine back = nb_affine_identity();
+    for (int i = 0; i < 9; i++) back.matrix[i] = inverse[i];
+    const nb_affine frame = nb_affine_compose(&shape, &back);
+    nb_affine_point(world, center, leaf->exact_origin);
+    leaf->aligned = 1;
+    leaf->scale = 0;
+    for (int i = 0; i < 3; i++) {
+        leaf->origin[i] = (double)leaf->exact_origin[i];
+        const long double *row = &frame.matrix[3 * i];
+        leaf->scale = fmax(leaf->scale, (double)sqrtl(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
+    }
+    for (int i = 0; i < 9; i++) {
+        leaf->exact_matrix[i] = frame.matrix[i];
+        leaf->matrix[i] = (double)frame.matrix[i];
+        leaf->aligned = leaf->aligned && frame.matrix[i] == (i % 4 == 0 ? 1 : 0);
+    }
+    return isfinite(leaf->scale);
+}
+
+static const long double no_shaping[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/* Encloses center +- the image of the unit ball under the given columns. */
+static void enclose_ball(const nb_affine *world, const long double center[3], long double axes[3][3], int axis_count,
+                         double low[3], double high[3])
+{
+    long double middle[3], image[3][3];
+    nb_affine_point(world, center, middle);
+    for (int k = 0; k < axis_count; k++) nb_affine_direction(world, axes[k], image[k]);
+    for (int i = 0; i < 3; i++) {
+        long double square = 0;
+        for (int k = 0; k < axis_count; k++) square += image[k][i] * image[k][i];
+        const double half = (double)sqrtl(square), m = (double)middle[i];
+        const double margin = 1e-12 * (fabs(m) + half) + DBL_MIN;
+        low[i] = fmin(low[i], m - half - margin);
+        high[i] = fmax(high[i], m + half + margin);
+    }
+}
+
+static int set_ball(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+{
+    long double center[3], axes[3][3] = {{0}}, shaping[9] = {0};
+    const int sphere = shape->type == NEBEL_SHAPE_SPHERE;
+    widen_point(shape->center, center);
+    for (int i = 0; i < 3; i++) {
+        axes[i][i] = (long double)(sphere ? shape->radius : shape->radii[i]);
+        shaping[4 * i] = sphere ? 1 : 1 / axes[i][i];
+    }
+    leaf->type = NB_LEAF_BALL;
+    leaf->exact_radius = sphere ? (long double)shape->radius : 1;
+    leaf->radius = (double)leaf->exact_radius;
+    enclose_ball(world, center, axes, 3, low, high);
+    return set_frame(leaf, world, center, shaping);
+}
+
+static void enclose_box(const nb_affine *world, const nebel_shape *shape, double low[3], double high[3])
+{
+    for (int corner = 0; corner < 8; corner++) {
+        long double p[3];
+        for (int i = 0; i < 3; i++) p[i] = (long double)(corner >> i & 1 ? shape->max[i] : shape->min[i]);
+        enclose_ball(world, p, NULL, 0, low, high);
+    }
+}
+
+static int set_box(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+{
+    leaf->type = NB_LEAF_BOX;
+    for (int i = 0; i < 3; i++) {
+        leaf->low[i] = shape->min[i];
+        leaf->high[i] = shape->max[i];
+    }
+    enclose_box(world, shape, low, high);
+    return set_frame(leaf, world, (const long double[3]){0, 0, 0}, no_shaping);
+}
+
+/* Two unit vectors across `axis` (unit length), without a branch cut near the poles that would lose digits. */
+static void across(const long double axis[3], long double u[3], long double v[3])
+{
+    int smallest = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabsl(axis[i]) < fabsl(axis[smallest])) smallest = i;
+    const int j = (smallest + 1) % 3, k = (smallest + 2) % 3;
+    const long double length = sqrtl(axis[j] * axis[j] + axis[k] * axis[k]);
+    u[smallest] = 0;
+    u[j] = -axis[k] / length;
+    u[k] = axis[j] / length;
+    for (int i = 0; i < 3; i++)
+        v[i] = axis[(i + 1) % 3] * u[(i + 2) % 3] - axis[(i + 2) % 3] * u[(i + 1) % 3];
+}
+
+/* Encloses the two end discs (or balls, for a capsule) of a body around an axis. */
+static void enclose_ends(const nebel_shape *shape, const nb_affine *world, long double basis[3][3],
+                         const long double radii[2], double low[3], double high[3])
+{
+    for (int end = 0; end < 2; end++) {
+        long double center[3], axes[3][3];
+        widen_point(end ? shape->to : shape->from, center);
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < 3; i++) axes[k][i] = basis[k][i] * radii[end];
+        enclose_ball(world, center, axes, shape->type == NEBEL_SHAPE_CAPSULE ? 3 : 2, low, high);
+    }
+}
+
+static void set_profile_of_axis(nb_leaf *leaf, const nebel_shape *shape, long double length, const long double radii[2],
+                                long double across_unit)
+{
+    leaf->type = shape->type == NEBEL_SHAPE_CAPSULE ? NB_LEAF_CAPSULE
+                 : radii[0] == radii[1]             ? NB_LEAF_TUBE
+                                                    : NB_LEAF_CONE;
+    leaf->exact_length = length / across_unit;
+    leaf->exact_radius = radii[0] / across_unit;
+    leaf->exact_slope = (radii[1] - radii[0]) / across_unit;
+    leaf->length = (double)leaf->exact_length;
+    leaf->radius = (double)leaf->exact_radius;
+    leaf->slope = (double)leaf->exact_slope;
+}
+
+static int set_axis_body(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+{
+    const int cone = shape->type == NEBEL_SHAPE_CONE;
+    const long double radii[2] = {(long double)(cone ? shape->radius_from : shape->radius),
+                                  (long double)(cone ? shape->radius_to : shape->radius)};
+    long double basis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, from[3], square = 0, axis[3];
+    widen_point(shape->from, from);
+    for (int i = 0; i < 3; i++) {
+        axis[i] = (long double)shape->to[i] - from[i];
+        square += axis[i] * axis[i];
+    }
+    const long double length = sqrtl(square), widest = fmaxl(radii[0], radii[1]);
+    if (length > 0) {
+        for (int i = 0; i < 3; i++) basis[2][i] = axis[i] / length;
+        across(basis[2], basis[0], basis[1]);
+    }
+    const long double along = shape->type == NEBEL_SHAPE_CAPSULE ? widest : length;
+    long double shaping[9];
+    for (int i = 0; i < 9; i++) shaping[i] = basis[i / 3][i % 3] / (i < 6 ? widest : along);
+    set_profile_of_axis(leaf, shape, length, radii, widest);
+    enclose_ends(shape, world, basis, radii, low, high);
+    return set_frame(leaf, world, from, shaping);
+}
+
+/* Which of two bodies that share a face owns a ray in it: the one whose outward normal points to the negative side. */
+static double tie_of(const double normal[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (normal[i] != 0) return normal[i] < 0 ? -1 : 1;
+    return 1;
+}
+
+/* Scaled by a power of two, so that the plane stays exactly the one that was given. */
+static void set_face(nb_face *face, const double normal[3], double distance)
+{
+    int exponent;
+    frexp(fmax(fabs(normal[0]), fmax(fabs(normal[1]), fabs(normal[2]))), &exponent);
+    for (int i = 0; i < 3; i++) face->normal[i] = ldexp(normal[i], -exponent);
+    face->distance = ldexp(distance, -exponent);
+    face->tie = tie_of(normal);
+}
+
+/* The faces in world coordinates relative to the leaf's origin, for the bounds. */
+static int bound_faces(const nb_leaf *leaf, const nb_face *faces, double low[3], double high[3])
+{
+    double planes[NEBEL_MAX_PLANES][4];
+    for (size_t k = 0; k < leaf->face_count; k++) {
+        const nb_face *face = &faces[k];
+        long double n[3] = {0, 0, 0}, square = 0;
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) n[i] += leaf->exact_matrix[3 * j + i] * (long double)face->normal[j];
+            square += n[i] * n[i];
+        }
+        const long double length = sqrtl(square);
+        for (int i = 0; i < 3; i++) planes[k][i] = (double)(n[i] / length);
+        planes[k][3] = (double)((long double)face->distance / length);
+    }
+    double l[3], h[3];
+    const double(*planes_view)[4] = (const double(*)[4])planes;
+    if (!nb_convex_bounds(planes_view, leaf->face_count, l, h)) return 0;
+    for (int i = 0; i < 3; i++) {
+        const double margin = 1e-12 * fabs(leaf->origin[i]);
+        low[i] = fmin(low[i], l[i] + leaf->origin[i] - margin);
+        high[i] = fmax(high[i], h[i] + leaf->origin[i] + margin);
+    }
+    return 1;
+}
+
+static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world,
+                               nb_face *faces, double low[3], double high[3])
+{
+    const int half_space = shape->type == NEBEL_SHAPE_HALF_SPACE;
+    long double center[3] = {0, 0, 0};
+    leaf->type = NB_LEAF_PLANES;
+    leaf->face_count = half_space ? 1 : shape->plane_count;
+    if (half_space) {
+        widen_point(shape->point, center);
+        set_face(&faces[0], shape->normal, 0);
+    }
+    for (size_t i = 0; i < leaf->face_count && !half_space; i++)
+        set_face(&faces[i], shape->planes[i].normal, shape->planes[i].distance);
+    if (!set_frame(leaf, world, center, no_shaping)) return nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
+    if (!bound_faces(leaf, faces, low, high))
+        return nb_fail(log, NEBEL_ERROR_VALUE, "convex: no point is inside all planes; the body is empty");
+    return NEBEL_OK;
+}
+
+nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, const nb_affine *world, nb_face *faces,
+                             size_t first_face, nb_leaf *leaf, double low[3], double high[3])
+{
+    *leaf = (nb_leaf){.first_face = first_face};
+    for (int i = 0; i < 3; i++) {
+        low[i] = HUGE_VAL;
+        high[i] = -HUGE_VAL;
+    }
+    int regular = 1;
+    switch (shape->type) {
+    case NEBEL_SHAPE_WORLD:
+        leaf->type = NB_LEAF_WORLD;
+        for (int i = 0; i < 3; i++) {
+            low[i] = -HUGE_VAL;
+            high[i] = HUGE_VAL;
+        }
+        break;
+    case NEBEL_SHAPE_BOX: regular = set_box(leaf, shape, world, low, high); break;
+    case NEBEL_SHAPE_SPHERE:
+    case NEBEL_SHAPE_ELLIPSOID: regular = set_ball(leaf, shape, world, low, high); break;
+    case NEBEL_SHAPE_HALF_SPACE:
+    case NEBEL_SHAPE_CONVEX: return set_planes(log, leaf, shape, world, faces, low, high);
+    default: regular = set_axis_body(leaf, shape, world, low, high); break;
+    }
+    return regular ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
+}

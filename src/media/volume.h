@@ -1,0 +1,73 @@
+/* A volume as the core keeps it: checked, every default resolved, every shape a set of convex leaves in frames of their own.
+ *
+ * A leaf gives one interval on a ray. Unions and intersections are a postfix program over the leaves' membership, so that
+ * the partition of a ray needs no algebra of intervals: it evaluates the program between two neighbouring events. */
+#ifndef NB_MEDIA_VOLUME_H
+#define NB_MEDIA_VOLUME_H
+
+#include "base/base.h"
+
+#include <nebel/nebel.h>
+
+typedef enum nb_leaf_type {
+    NB_LEAF_WORLD,
+    NB_LEAF_PLANES,  /* n.x <= d for each plane */
+    NB_LEAF_BOX,     /* low <= x < high */
+    NB_LEAF_BALL,    /* |x| <= radius */
+    NB_LEAF_TUBE,    /* x^2 + y^2 <= 1, 0 <= z <= 1 */
+    NB_LEAF_CONE,    /* x^2 + y^2 <= (radius + slope z)^2, 0 <= z <= 1 */
+    NB_LEAF_CAPSULE  /* within 1 of the z axis from 0 to length */
+} nb_leaf_type;
+
+/* normal.x <= distance, the largest component of the normal within 0.5 and 1. `tie` decides for rays that lie in the face: the body with tie < 0 owns it, so that of
+ * two bodies that touch there exactly one does. */
+typedef struct nb_face {
+    double normal[3], distance, tie;
+} nb_face;
+
+typedef struct nb_leaf {
+    nb_leaf_type type;
+    int aligned;             /* the matrix is the identity */
+    double origin[3];        /* local = matrix (world - origin) */
+    double matrix[9];        /* row by row */
+    long double exact_origin[3], exact_matrix[9]; /* the same for the double reference */
+    double scale;            /* largest row length of the matrix */
+    double low[3], high[3];  /* box */
+    double radius, slope;    /* ball, cone */
+    double length;           /* capsule */
+    long double exact_radius, exact_slope, exact_length;
+    size_t first_face, face_count; /* planes: into the volume's faces */
+} nb_leaf;
+
+/* A postfix program over leaf membership: LEAF pushes the next leaf, the others fold the two topmost results into one. */
+typedef enum nb_step { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_step;
+
+/* The deepest stack a program needs. */
+#define NB_STEP_STACK (NEBEL_MAX_DEPTH + 2)
+
+typedef struct nb_volume {
+    nebel_operation operation;
+    nebel_density density;
+    double extinction[3], source[3], albedo[3], emission[3];
+    int lit; /* albedo rather than source */
+    size_t leaf_count, face_count, step_count;
+    nb_leaf *leaves;
+    nb_face *faces;
+    nb_step *steps;
+    double low[3], high[3]; /* world bounds, infinite where unbounded */
+} nb_volume;
+
+/* Checks `desc` and resolves it into *volume, whose arrays are one allocation owned by the caller (nb_volume_free).
+ * On an error nothing is allocated. Errors: ARGUMENT, VALUE, LIMIT, MEMORY. */
+nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log *log, const nebel_volume_desc *desc,
+                               nb_volume *volume);
+
+/* A copy with arrays of its own. 0 when memory is out. */
+int nb_volume_copy(const nebel_allocator *allocator, const nb_volume *from, nb_volume *to);
+
+void nb_volume_free(const nebel_allocator *allocator, nb_volume *volume);
+
+/* A total order on what volumes are, whatever the order they were added in: the canonical order of summation. */
+int nb_volume_compare(const nb_volume *a, const nb_volume *b);
+
+#endif
