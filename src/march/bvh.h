@@ -18,11 +18,12 @@ typedef struct nb_bvh_node {
 
 #define NB_BVH_LEAF 0x80000000u
 
-/* Up to NB_BVH_SPLIT_DEPTH levels split where the surface area heuristic says, all deeper ones in equal halves, and
- * there are at most 2^30 boxes: no path is longer than NB_BVH_DEPTH, and a traversal, which holds at most one waiting
- * sibling for each level, fits a stack of that size. */
+/* The first NB_BVH_SPLIT_DEPTH levels split where the surface area heuristic says (four million scattered boxes need
+ * 26), all deeper ones in equal halves, and there are at most 2^30 boxes: no path is longer than NB_BVH_SPLIT_DEPTH +
+ * ceil(log2 n) and thus NB_BVH_DEPTH - 2. A traversal, which holds at most one waiting sibling for each level and one
+ * child more, fits a stack of NB_BVH_DEPTH. */
 #define NB_BVH_MOST_BOXES 0x40000000u
-#define NB_BVH_SPLIT_DEPTH 64
+#define NB_BVH_SPLIT_DEPTH 32
 #define NB_BVH_DEPTH (NB_BVH_SPLIT_DEPTH + 32)
 
 typedef struct nb_bvh {

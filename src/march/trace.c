@@ -111,3 +111,17 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
                         .light_stride = light_stride};
     return explain(&job, kernel(&job), desc->failed_ray);
 }
+
+nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
+                                      const nebel_ray *rays, size_t ray_stride, double *distances)
+{
+    if (n > 0 && distances == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, NULL);
+    if (valid != NEBEL_OK) return valid;
+    if (!(transmittance > 0 && transmittance < 1))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transmittance: must be within 0 and 1");
+    if (channel < 0 || channel > 2)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
+    nb_find_job job = {snapshot, -log(transmittance), channel, n, rays, ray_stride, distances};
+    return nb_find_double(&job);
+}

@@ -327,3 +327,7 @@ nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
     close_workspace(&w, &job->snapshot->allocator);
     return result;
 }
+
+#if defined(NB_DOUBLE)
+#include "trace_find.h"
+#endif

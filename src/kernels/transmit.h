@@ -1,0 +1,25 @@
+/* Streams of segments through boxes of constant density, one kernel per instruction set. */
+#ifndef NB_KERNELS_TRANSMIT_H
+#define NB_KERNELS_TRANSMIT_H
+
+#include <stddef.h>
+
+typedef struct nb_fog_box {
+    float low[3], high[3]; /* relative to the segments' origin */
+    float extinction;      /* of the channel asked for, 1/m */
+} nb_fog_box;
+
+typedef struct nb_transmit_job {
+    const nb_fog_box *boxes;
+    size_t box_count;
+    size_t count;
+    const float *from, *to; /* three floats each; strides in bytes */
+    size_t from_stride, to_stride, out_stride;
+    float *out;
+} nb_transmit_job;
+
+typedef void nb_transmit_fn(const nb_transmit_job *job);
+
+nb_transmit_fn nb_transmit_scalar, nb_transmit_sse2, nb_transmit_avx2, nb_transmit_avx512, nb_transmit_neon;
+
+#endif

@@ -1,0 +1,127 @@
+/* Segments in, transmittances out: a few boxes take the stream kernel, everything else the march. */
+#include "snapshot.h"
+
+#include "base/cpu.h"
+#include "kernels/transmit.h"
+
+#include <math.h>
+
+static const struct {
+    nebel_isa isa;
+    nb_transmit_fn *transmit;
+} kernels[] = {
+    {NEBEL_ISA_SCALAR, nb_transmit_scalar},
+#if defined(NB_HAVE_NEON)
+    {NEBEL_ISA_NEON, nb_transmit_neon},
+#endif
+#if defined(NB_HAVE_SSE2)
+    {NEBEL_ISA_SSE2, nb_transmit_sse2},
+#endif
+#if defined(NB_HAVE_AVX2)
+    {NEBEL_ISA_AVX2, nb_transmit_avx2},
+#endif
+#if defined(NB_HAVE_AVX512)
+    {NEBEL_ISA_AVX512, nb_transmit_avx512},
+#endif
+};
+
+static nb_transmit_fn *kernel_for(nebel_isa isa)
+{
+    nb_transmit_fn *found = NULL;
+    for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
+        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa)) found = kernels[i].transmit;
+    return found;
+}
+
+/* More boxes than this are better asked through the tree. */
+#define MOST_BOXES 64
+
+static int is_plain_box(const nb_volume *body)
+{
+    return body->operation == NEBEL_OPERATION_ADD && body->density.type == NEBEL_DENSITY_CONSTANT &&
+           body->step_count == 1 && body->leaves[0].type == NB_LEAF_BOX && body->leaves[0].aligned;
+}
+
+/* The fog as boxes relative to `origin`; 0 when it is something else. */
+static int list_boxes(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes)
+{
+    if (snapshot->medium_count > MOST_BOXES) return 0;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *body = &snapshot->media[i].body;
+        if (!is_plain_box(body)) return 0;
+        const nb_leaf *leaf = &body->leaves[0];
+        for (int c = 0; c < 3; c++) {
+            boxes[i].low[c] = (float)(leaf->low[c] + (leaf->origin[c] - origin[c]));
+            boxes[i].high[c] = (float)(leaf->high[c] + (leaf->origin[c] - origin[c]));
+        }
+        boxes[i].extinction = (float)body->extinction[channel];
+    }
+    return 1;
+}
+
+static const float *point_at(const float *base, size_t stride, size_t i)
+{
+    return (const float *)(const void *)((const char *)base + i * stride);
+}
+
+/* A ray of no length where the segment has none or is not finite. */
+static nebel_ray ray_of_segment(const nebel_segments *segments, const float *from, const float *to)
+{
+    nebel_ray ray = {.origin = {segments->origin[0], segments->origin[1], segments->origin[2]}, .direction = {1, 0, 0}};
+    double way[3], square = 0;
+    for (int c = 0; c < 3; c++) {
+        way[c] = (double)to[c] - (double)from[c];
+        square += way[c] * way[c];
+    }
+    if (!(square > 0 && square < 1e30)) return ray;
+    for (int c = 0; c < 3; c++) {
+        ray.origin[c] += (double)from[c];
+        ray.direction[c] = way[c];
+    }
+    ray.t_max = sqrt(square);
+    return ray;
+}
+
+/* Through the march, a few rays at a time. */
+static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
+                                   const nebel_segments *segments, float *out, size_t out_stride)
+{
+    enum { BATCH = 64 };
+    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa};
+    for (size_t first = 0; first < n; first += BATCH) {
+        nebel_ray rays[BATCH];
+        nebel_light lights[BATCH];
+        const size_t count = n - first < BATCH ? n - first : BATCH;
+        for (size_t i = 0; i < count; i++)
+            rays[i] = ray_of_segment(segments, point_at(segments->from, segments->from_stride, first + i),
+                                     point_at(segments->to, segments->to_stride, first + i));
+        const nebel_result result = nebel_trace(snapshot, &desc, count, rays, sizeof *rays, lights, sizeof *lights);
+        if (result != NEBEL_OK) return result;
+        for (size_t i = 0; i < count; i++)
+            *(float *)(void *)((char *)out + (first + i) * out_stride) = (float)lights[i].transmittance[channel];
+    }
+    return NEBEL_OK;
+}
+
+nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
+                                     const nebel_segments *segments, float *out, size_t out_stride)
+{
+    if (snapshot == NULL || segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))
+        return NEBEL_ERROR_ARGUMENT;
+    if (channel < 0 || channel > 2)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
+    for (int c = 0; c < 3; c++)
+        if (!(fabs(segments->origin[c]) <= 1e15))
+            return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments origin: must be finite and at most 1e15 m away");
+    nb_transmit_fn *kernel = kernel_for(isa);
+    if (kernel == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(isa));
+    if (n == 0) return NEBEL_OK;
+    nebel_segments s = *segments;
+    if (s.to_stride == 0) s.to_stride = 3 * sizeof(float);
+    const size_t stride = out_stride == 0 ? sizeof(float) : out_stride;
+    nb_fog_box boxes[MOST_BOXES];
+    if (!list_boxes(snapshot, s.origin, channel, boxes)) return trace_segments(snapshot, isa, channel, n, &s, out, stride);
+    kernel(&(nb_transmit_job){boxes, snapshot->medium_count, n, s.from, s.to, s.from_stride, s.to_stride, stride, out});
+    return NEBEL_OK;
+}

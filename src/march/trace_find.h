@@ -1,0 +1,72 @@
+/* Visibility: where along a ray the optical depth reaches a value. Included by the double kernel only.
+ *
+ * Optical depth never falls along a ray, and is exact at every point, so the piece that holds the place is found by the march
+ * and the place in it by Newton's method, kept inside a shrinking bracket. */
+
+/* Optical depth of one channel over h metres of a marked piece, and the extinction at its end. */
+static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real h, nb_real *extinction)
+{
+    nb_real depth = NB_F(0.0);
+    *extinction = NB_F(0.0);
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        if (!nb_any(k->inside)) continue;
+        depth = depth + k->extinction[channel] * contact_integral(k, start, h).value;
+        *extinction = *extinction + k->extinction[channel] * contact_density(k, start + nb_widen(h));
+    }
+    return depth;
+}
+
+/* The h within `length` at which the depth is `wanted`. */
+static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real length, nb_real wanted)
+{
+    nb_real low = NB_F(0.0), high = length, h = NB_F(0.5) * length;
+    for (int i = 0; i < 400 && high - low > NB_F(2.0) * NB_EPSILON * high; i++) {
+        nb_real extinction;
+        const nb_real excess = depth_within(m, channel, start, h, &extinction) - wanted;
+        if (excess == 0) return h;
+        if (excess > 0) high = h;
+        else low = h;
+        const nb_real newton = h - excess / extinction;
+        const int trusted = newton > low && newton < high;
+        /* between bounds many magnitudes apart the middle that halves the search is the geometric one */
+        const nb_real middle = low > 0 && high > NB_F(4.0) * low ? nb_sqrt(low * high) : NB_F(0.5) * (low + high);
+        const nb_real first = low == 0 && high > NB_F(1.0) ? nb_min(NB_F(1.0), middle) : middle;
+        if (trusted && nb_abs(newton - h) <= NB_EPSILON * h) return newton;
+        h = trusted ? newton : first;
+    }
+    return h;
+}
+
+static double find_depth(march *m, int channel, nb_real wanted)
+{
+    nb_real depth = NB_F(0.0);
+    nb_wide t = NB_W(0.0);
+    for (;;) {
+        const nb_wide next = next_event(m, t);
+        if (next > NB_WFAR) return HUGE_VAL;
+        const piece p = {t, next, nb_narrow(next - t), nb_mask_true};
+        if (mark_inside(m, &p)) {
+            nb_real extinction;
+            const nb_real within = depth_within(m, channel, t, p.length, &extinction);
+            if (depth + within >= wanted)
+                return (double)(t + nb_widen(find_in_piece(m, channel, t, p.length, wanted - depth)));
+            depth = depth + within;
+        }
+        t = next;
+    }
+}
+
+nebel_result nb_find_double(nb_find_job *job)
+{
+    workspace w;
+    open_workspace(&w);
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < job->count && result == NEBEL_OK; i++) {
+        w.m.rays = load_packet(ray_at(job->rays, job->ray_stride, i), job->ray_stride, 1);
+        if (meet_fog(&w, job->snapshot)) job->distances[i] = find_depth(&w.m, job->channel, job->depth);
+        else result = NEBEL_ERROR_MEMORY;
+    }
+    close_workspace(&w, &job->snapshot->allocator);
+    return result;
+}
