@@ -32,7 +32,7 @@ float nb_max(float a, float b) { return a > b ? a : b; }
 float nb_abs(float x) { return abs(x); }
 float nb_sqrt(float x) { return sqrt(x); }
 float nb_floor(float x) { return floor(x); }
-float nb_round(float x) { return floor(x + 0.5); }
+float nb_round(float x) { return roundEven(x); }
 
 #define nb_wand nb_and
 #define nb_wor nb_or
