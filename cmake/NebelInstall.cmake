@@ -46,7 +46,7 @@ nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
     nebel_install_library(nebel_scene scene.h)
     nebel_write_pkgconfig(nebel_scene "Scene files, models and pictures for nebel" nebel
-        "assimp libpng yajl OpenEXR" "-lm")
+        "assimp libpng libjpeg yajl OpenEXR" "-lm")
 endif()
 if(TARGET nebel_cpu)
     nebel_install_library(nebel_cpu render.h)

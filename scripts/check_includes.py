@@ -32,13 +32,13 @@ C_STANDARD = set("""assert.h complex.h ctype.h errno.h fenv.h float.h inttypes.h
     signal.h stdalign.h stdarg.h stdatomic.h stdbool.h stddef.h stdint.h stdio.h stdlib.h stdnoreturn.h string.h tgmath.h
     threads.h time.h uchar.h wchar.h wctype.h""".split())
 POSIX = {"fcntl.h", "unistd.h", "dirent.h", "sys/types.h", "sys/stat.h", "sys/ioctl.h", "sys/resource.h", "sys/time.h",
-         "sys/wait.h", "sys/mman.h"}
+         "sys/wait.h", "sys/mman.h", "sys/random.h", "strings.h"}
 
 # Headers of other people, by the places that may use them; a trailing slash stands for a folder.
 FOREIGN = {
     "formulas": {"immintrin.h", "arm_neon.h"},
     "base": {"cpuid.h", "sys/auxv.h"},
-    "scene": POSIX | {"assimp/", "png.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h"},
+    "scene": POSIX | {"assimp/", "png.h", "jpeglib.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h"},
     "cpu": {"embree3/", "omp.h"},
     "gl": {"epoxy/"},
     "tools": POSIX | {"omp.h"},

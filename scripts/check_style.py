@@ -26,8 +26,9 @@ TEXT = CODE | {".py", ".sh", ".cmake", ".md", ".json", ".txt", ".in", ".map"}
 GIVEN = re.compile(r"""_Static_assert|_Alignas|_Alignof|_Noreturn|_Generic|_Thread_local|_Bool|_Atomic|_Pragma|_OPENMP
     |_POSIX_C_SOURCE|_XOPEN_SOURCE|_GNU_SOURCE|_DEFAULT_SOURCE|_FILE_OFFSET_BITS|_WIN32|_MSC_VER
     |__[A-Za-z0-9_]+__|__cplusplus|__VA_ARGS__|__builtin_\w+|__has_\w+|__VERSION__
-    |__m(64|128|256|512)[id]?|__mmask\d+|_mm\d*_\w*|_p[sd]|_s[sd]|_epi\d+|_MM_\w+|_CMP_\w+|__get_cpuid\w*|__cpuid\w*|__u?int128""", re.X)
-IDENTIFIER = re.compile(r"(?<![\w])[A-Za-z_]\w*")
+    |__m(64|128|256|512)[id]?|__mmask\d+|_mm\d*_\w+|_SC_\w+|_MM_\w+|_CMP_\w+|__get_cpuid\w*|__cpuid\w*|__u?int128""", re.X)
+IDENTIFIER = re.compile(r"\b[A-Za-z_]\w*")
+PASTED = re.compile(r"\b\w*\s*##\s*\w*(?:\s*##\s*\w*)*")
 UNFINISHED = re.compile(r"\b(" + "|".join(("TO" + "DO", "FIX" + "ME", "XX" + "X", "HA" + "CK")) + r")\b")
 LITERALS = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'', re.S)
 DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.M)
@@ -99,7 +100,7 @@ def check_text(path, text):
 
 def check_names(path, code):
     for number, line in enumerate(code.split("\n"), 1):
-        for name in IDENTIFIER.findall(line):
+        for name in IDENTIFIER.findall(PASTED.sub(" ", line)):
             if (name.startswith("_") or "__" in name) and not GIVEN.fullmatch(name):
                 yield number, f"reserved name {name}"
             elif path.suffix == ".inc" and "__" in name:
