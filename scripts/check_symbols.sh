@@ -1,6 +1,6 @@
 #!/bin/bash
-# check_symbols.sh BUILD: what the compiled libraries give away. A kernel object has one global symbol; no object of the core
-# has writable data; what is global begins with nebel_ or nb_; the core asks for nothing but the C library and maths.
+# check_symbols.sh BUILD: what the compiled libraries give away. A kernel object has one global symbol, named after its
+# level; no object of the core has writable data; what is global begins with nebel_ or nb_; the core asks for nothing but the C library and maths.
 # Not for sanitized builds, which add data and symbols of their own.
 set -euo pipefail
 
@@ -27,10 +27,15 @@ check_object() {
     [ -z "$names" ] || fault "$1: global names without nebel_ or nb_: $names"
 }
 
+# A function shared by two levels would be linked once, with the instructions of either: so every name ends in the level.
+# The double reference alone may have several entries.
 check_kernel() {
-    local globals
-    globals=$(nm -g --defined-only "$1" | awk 'NF == 3 { print $3 }' | xargs)
-    [ "$(wc -w <<<"$globals")" -eq 1 ] || fault "$1: one global symbol is allowed, these are global: $globals"
+    local level names foreign
+    level=$(sed -E 's/.*_kernel_([a-z0-9]+)\.dir.*/\1/' <<<"$1")
+    names=$(nm -g --defined-only "$1" | awk 'NF == 3 { print $3 }')
+    foreign=$(grep -v "_$level\$" <<<"$names" | xargs || true)
+    [ -z "$foreign" ] || fault "$1: global names that do not end in _$level: $foreign"
+    [ "$level" = double ] || [ "$(wc -l <<<"$names")" -eq 1 ] || fault "$1: more than one global name: $(xargs <<<"$names")"
 }
 
 shopt -s nullglob
