@@ -1,0 +1,171 @@
+#include "scene/assimp_load.h"
+#include "scene/path.h"
+
+#include <assimp/cimport.h>
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+
+#include <stdio.h>
+#include <threads.h>
+
+/* Edges sharper than this stay edges where a model has no normals of its own. */
+static const float smoothing_angle = 60;
+
+/* Nodes seen but not yet visited; larger scene graphs are refused. */
+enum { MAX_NODES_WAITING = 1 << 20 };
+
+/* Assimp keeps the reason of the last failure in one place for all threads: imports go one after the other. */
+static once_flag import_once = ONCE_FLAG_INIT;
+static mtx_t import_lock;
+
+static void prepare_lock(void)
+{
+    mtx_init(&import_lock, mtx_plain);
+}
+
+/* ---- import
+ * ---------------------------------------------------------------------------------------------------------- */
+
+static const struct aiScene *import(const char *file, char *reason, size_t size)
+{
+    const unsigned flags = aiProcess_ValidateDataStructure | aiProcess_RemoveComponent | aiProcess_Triangulate |
+                           aiProcess_GenSmoothNormals | aiProcess_JoinIdenticalVertices | aiProcess_FlipUVs;
+    const int dropped = aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS | aiComponent_BONEWEIGHTS |
+                        aiComponent_ANIMATIONS | aiComponent_LIGHTS | aiComponent_CAMERAS;
+    struct aiPropertyStore *properties = aiCreatePropertyStore();
+    aiSetImportPropertyInteger(properties, AI_CONFIG_PP_RVC_FLAGS, dropped);
+    aiSetImportPropertyFloat(properties, AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, smoothing_angle);
+    call_once(&import_once, prepare_lock);
+    mtx_lock(&import_lock);
+    const struct aiScene *scene = aiImportFileExWithProperties(file, flags, NULL, properties);
+    if (scene == NULL) snprintf(reason, size, "%s", aiGetErrorString());
+    mtx_unlock(&import_lock);
+    aiReleasePropertyStore(properties);
+    return scene;
+}
+
+/* ---- transforms
+ * ------------------------------------------------------------------------------------------------------ */
+
+static nb_affine from_assimp(const struct aiMatrix4x4 *matrix)
+{
+    return (nb_affine){{{(double)matrix->a1, (double)matrix->a2, (double)matrix->a3, (double)matrix->a4},
+                        {(double)matrix->b1, (double)matrix->b2, (double)matrix->b3, (double)matrix->b4},
+                        {(double)matrix->c1, (double)matrix->c2, (double)matrix->c3, (double)matrix->c4}}};
+}
+
+static nb_affine compose(const nb_affine *outer, const nb_affine *inner)
+{
+    nb_affine result;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++) {
+            const double *row = outer->m[i];
+            result.m[i][j] = row[0] * inner->m[0][j] + row[1] * inner->m[1][j] + row[2] * inner->m[2][j];
+            if (j == 3) result.m[i][j] += row[3];
+        }
+    return result;
+}
+
+/* Scale, then rotation; the position stays apart, as the meshes' origin. */
+static nb_affine place_of(const nb_model_source *source)
+{
+    const double x = source->rotation[0], y = source->rotation[1], z = source->rotation[2], w = source->rotation[3];
+    const double rotation[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                                   {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                                   {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
+    nb_affine place = {0};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) place.m[i][j] = rotation[i][j] * source->scale[j];
+    return place;
+}
+
+/* ---- the scene graph
+ * ------------------------------------------------------------------------------------------------- */
+
+typedef struct waiting {
+    const struct aiNode *node;
+    nb_affine place; /* of its parent */
+} waiting;
+
+typedef struct stack {
+    waiting *items;
+    size_t count, capacity;
+} stack;
+
+static nebel_result push(const nb_assimp *in, stack *nodes, const struct aiNode *node, const nb_affine *place)
+{
+    void *items = nodes->items;
+    if (nodes->count == MAX_NODES_WAITING)
+        return nb_model_fail(in->load, NEBEL_ERROR_LIMIT, "\"%s\" has too many nodes", in->load->source->file);
+    if (!nb_grow(&in->load->allocator, &items, sizeof *nodes->items, nodes->count, &nodes->capacity, nodes->count + 1))
+        return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
+    nodes->items = items;
+    nodes->items[nodes->count++] = (waiting){node, *place};
+    return NEBEL_OK;
+}
+
+static nebel_result visit(nb_assimp *in, stack *nodes)
+{
+    const waiting top = nodes->items[--nodes->count];
+    const nb_affine own = from_assimp(&top.node->mTransformation), place = compose(&top.place, &own);
+    nebel_result result = NEBEL_OK;
+    for (unsigned i = 0; i < top.node->mNumMeshes && result == NEBEL_OK; i++)
+        if (top.node->mMeshes[i] < in->scene->mNumMeshes)
+            result = nb_assimp_add_mesh(in, in->scene->mMeshes[top.node->mMeshes[i]], &place);
+    for (unsigned i = top.node->mNumChildren; i > 0 && result == NEBEL_OK; i--)
+        result = push(in, nodes, top.node->mChildren[i - 1], &place);
+    return result;
+}
+
+static nebel_result walk(nb_assimp *in)
+{
+    stack nodes = {0};
+    const nb_affine place = place_of(in->load->source);
+    nebel_result result = push(in, &nodes, in->scene->mRootNode, &place);
+    while (nodes.count > 0 && result == NEBEL_OK) result = visit(in, &nodes);
+    nb_release(&in->load->allocator, nodes.items);
+    return result;
+}
+
+/* ---- loading
+ * --------------------------------------------------------------------------------------------------------- */
+
+static nebel_result convert(nb_assimp *in)
+{
+    const nb_model_load *load = in->load;
+    const uint64_t before = load->set->triangle_count;
+    in->folder = nb_path_folder(&in->scratch, load->source->file);
+    in->surfaces = nb_arena_allocate(&in->scratch, in->scene->mNumMaterials, sizeof *in->surfaces);
+    if (in->folder == NULL || in->surfaces == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    const nebel_result result = walk(in);
+    if (result != NEBEL_OK) return result;
+    if (in->left_out_faces > 0)
+        nb_model_fail(load, NEBEL_OK, "%llu points and lines of \"%s\" are left out; only triangles are drawn",
+                      (unsigned long long)in->left_out_faces, load->source->file);
+    if (in->left_out_triangles > 0)
+        nb_model_fail(load, NEBEL_OK,
+                      "%llu triangles of \"%s\" are left out; their corners are not numbers or do not exist",
+                      (unsigned long long)in->left_out_triangles, load->source->file);
+    if (load->set->triangle_count > before) return NEBEL_OK;
+    return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", load->source->file);
+}
+
+nebel_result nb_assimp_load(const nb_model_load *load)
+{
+    char reason[400] = "";
+    const char *file = load->source->file;
+    nebel_result result = nb_file_check(&load->log, load->source->where, "model", file);
+    if (result != NEBEL_OK) return result;
+    nb_assimp in = {.load = load, .scratch = {.allocator = load->allocator}};
+    in.scene = import(file, reason, sizeof reason);
+    if (in.scene == NULL)
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: %s", file, reason);
+    if (in.scene->mRootNode == NULL)
+        result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", file);
+    else
+        result = convert(&in);
+    aiReleaseImport(in.scene);
+    nb_release(&load->allocator, in.textures);
+    nb_arena_release(&in.scratch);
+    return result;
+}

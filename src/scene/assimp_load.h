@@ -1,0 +1,44 @@
+/* Models through Assimp: its scene graph, its meshes, its materials. */
+#ifndef NB_SCENE_ASSIMP_LOAD_H
+#define NB_SCENE_ASSIMP_LOAD_H
+
+#include "scene/model.h"
+
+#include <assimp/scene.h>
+
+/* A place in the model's own space times three rows of four: R x = m[.][0..2] x + m[.][3]. */
+typedef struct nb_affine {
+    double m[3][4];
+} nb_affine;
+
+/* What a material says, once it has been looked at. */
+typedef struct nb_surface {
+    bool known;
+    float base_color[3];
+    int32_t texture;   /* or -1 */
+    unsigned uv_index; /* which set of coordinates the texture takes */
+} nb_surface;
+
+typedef struct nb_loaded_texture {
+    const char *key;
+    int32_t index;
+} nb_loaded_texture;
+
+typedef struct nb_assimp {
+    const nb_model_load *load;
+    const struct aiScene *scene;
+    nb_arena scratch;
+    const char *folder;          /* of the model */
+    nb_surface *surfaces;        /* one for each material */
+    nb_loaded_texture *textures; /* those already tried */
+    size_t loaded_count, loaded_capacity;
+    uint64_t left_out_faces, left_out_triangles; /* points and lines; triangles with bad corners */
+} nb_assimp;
+
+/* Adds one mesh of the model at a place. A mesh without triangles adds nothing. */
+nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
+
+/* Finds the surface of a material; a texture that cannot be read leaves the plain colour and a note in the log. */
+nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface);
+
+#endif

@@ -1,0 +1,191 @@
+/* The camera at a frame: standing, turning, or on its way between keys. */
+#include "scene/scene_internal.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double pi = 3.14159265358979323846;
+
+nebel_camera nb_camera_default(void)
+{
+    return (nebel_camera){
+        .position = {0, 1.7, 0}, .look_at = {0, 1.7, -1}, .up = {0, 1, 0}, .vertical_fov = 50, .view_height = 10};
+}
+
+/* ---- directions
+ * ------------------------------------------------------------------------------------------------------ */
+
+static void cross(const double a[3], const double b[3], double result[3])
+{
+    result[0] = a[1] * b[2] - a[2] * b[1];
+    result[1] = a[2] * b[0] - a[0] * b[2];
+    result[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The unit view direction; zero where there is none. Halved first: the difference of two doubles may overflow. */
+static void find_view(const nebel_camera *camera, double view[3])
+{
+    for (int i = 0; i < 3; i++) view[i] = camera->look_at[i] / 2 - camera->position[i] / 2;
+    nb_vector_normalize(view, 3);
+}
+
+bool nb_camera_is_apart(const nebel_camera *camera)
+{
+    double view[3];
+    find_view(camera, view);
+    return dot(view, view) > .5;
+}
+
+/* Less than a millionth of a radian between up and view leaves the picture's roll to rounding. */
+bool nb_camera_is_upright(const nebel_camera *camera)
+{
+    double view[3], up[3], side[3];
+    find_view(camera, view);
+    memcpy(up, camera->up, sizeof up);
+    nb_vector_normalize(up, 3);
+    cross(view, up, side);
+    return dot(side, side) > 1e-12;
+}
+
+/* ---- keys
+ * ------------------------------------------------------------------------------------------------------------ */
+
+/* A camera as numbers: position, look_at, up, and from FIRST_LIMITED on those that have a range to keep. */
+enum { FIRST_LIMITED = 9, NUMBER_COUNT = 11 };
+
+static void to_numbers(const nebel_camera *camera, double numbers[NUMBER_COUNT])
+{
+    memcpy(numbers, camera->position, sizeof camera->position);
+    memcpy(numbers + 3, camera->look_at, sizeof camera->look_at);
+    memcpy(numbers + 6, camera->up, sizeof camera->up);
+    numbers[9] = camera->vertical_fov;
+    numbers[10] = camera->view_height;
+}
+
+static nebel_camera from_numbers(const double numbers[NUMBER_COUNT], nebel_projection projection)
+{
+    nebel_camera camera = {.vertical_fov = numbers[9], .view_height = numbers[10], .projection = projection};
+    memcpy(camera.position, numbers, sizeof camera.position);
+    memcpy(camera.look_at, numbers + 3, sizeof camera.look_at);
+    memcpy(camera.up, numbers + 6, sizeof camera.up);
+    return camera;
+}
+
+/* The slope at a key between two intervals of lengths h0, h1 and mean slopes d0, d1: that of the parabola through the
+ * three keys (Catmull and Rom, for unequal distances). */
+static double smooth_slope(double h0, double d0, double h1, double d1)
+{
+    return (d0 * h1 + d1 * h0) / (h0 + h1);
+}
+
+/* The same without leaving the keys' range: the weighted harmonic mean of F. Fritsch and J. Butland (1984). */
+static double limited_slope(double h0, double d0, double h1, double d1)
+{
+    if (d0 * d1 <= 0) return 0;
+    const double w0 = 2 * h1 + h0, w1 = h1 + 2 * h0;
+    return (w0 + w1) / (w0 / d0 + w1 / d1);
+}
+
+/* At the first and last key the camera rests. */
+static void find_slopes(const nebel_camera_key *keys, size_t count, size_t at, double slopes[NUMBER_COUNT])
+{
+    memset(slopes, 0, NUMBER_COUNT * sizeof *slopes);
+    if (at == 0 || at + 1 == count) return;
+    const double h0 = keys[at].frame - keys[at - 1].frame, h1 = keys[at + 1].frame - keys[at].frame;
+    double before[NUMBER_COUNT], here[NUMBER_COUNT], after[NUMBER_COUNT];
+    to_numbers(&keys[at - 1].camera, before);
+    to_numbers(&keys[at].camera, here);
+    to_numbers(&keys[at + 1].camera, after);
+    for (int i = 0; i < NUMBER_COUNT; i++) {
+        const double d0 = (here[i] - before[i]) / h0, d1 = (after[i] - here[i]) / h1;
+        slopes[i] = i < FIRST_LIMITED ? smooth_slope(h0, d0, h1, d1) : limited_slope(h0, d0, h1, d1);
+    }
+}
+
+/* Cubic Hermite basis on 0..1; h is the interval's length. */
+static double interpolate(double s, double h, double p0, double m0, double p1, double m1)
+{
+    const double r = 1 - s;
+    return r * r * (1 + 2 * s) * p0 + s * s * (3 - 2 * s) * p1 + s * r * h * (r * m0 - s * m1);
+}
+
+/* The last key at or before the frame, which lies between the first and the last. */
+static size_t find_key(const nebel_camera_key *keys, size_t count, double frame)
+{
+    size_t low = 0, high = count - 1;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (keys[middle].frame <= frame)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static bool is_usable(const double numbers[NUMBER_COUNT], const nebel_camera *camera)
+{
+    for (int i = 0; i < NUMBER_COUNT; i++)
+        if (!isfinite(numbers[i])) return false;
+    return nb_camera_is_apart(camera) && nb_camera_is_upright(camera);
+}
+
+/* Between keys that look in opposite directions the cubic may pass through a place where there is no view or no up:
+ * there the camera keeps the direction of the nearer key. */
+static nebel_camera mend(const nebel_camera *between, const nebel_camera *nearer)
+{
+    nebel_camera camera = *nearer;
+    for (int i = 0; i < 3; i++) {
+        if (!isfinite(between->position[i])) return *nearer;
+        camera.position[i] = between->position[i];
+        camera.look_at[i] = between->position[i] + (nearer->look_at[i] - nearer->position[i]);
+    }
+    return nb_camera_is_apart(&camera) && nb_camera_is_upright(&camera) ? camera : *nearer;
+}
+
+static nebel_camera camera_between_keys(const nebel_camera_key *keys, size_t count, double frame)
+{
+    if (!(frame > keys[0].frame)) return keys[0].camera;
+    if (frame >= keys[count - 1].frame) return keys[count - 1].camera;
+    const size_t at = find_key(keys, count, frame);
+    const double h = keys[at + 1].frame - keys[at].frame, s = (frame - keys[at].frame) / h;
+    double p0[NUMBER_COUNT], p1[NUMBER_COUNT], m0[NUMBER_COUNT], m1[NUMBER_COUNT], numbers[NUMBER_COUNT];
+    to_numbers(&keys[at].camera, p0);
+    to_numbers(&keys[at + 1].camera, p1);
+    find_slopes(keys, count, at, m0);
+    find_slopes(keys, count, at + 1, m1);
+    for (int i = 0; i < NUMBER_COUNT; i++) numbers[i] = interpolate(s, h, p0[i], m0[i], p1[i], m1[i]);
+    const nebel_camera camera = from_numbers(numbers, keys[at].camera.projection);
+    return is_usable(numbers, &camera) ? camera : mend(&camera, &keys[s < .5 ? at : at + 1].camera);
+}
+
+/* ---- turntable
+ * ------------------------------------------------------------------------------------------------------- */
+
+/* Rotation by Rodrigues' formula, right-handed about up: the camera walks to its right. */
+static nebel_camera turn(const nebel_camera *start, double frame, uint32_t frames)
+{
+    const double angle = 2 * pi * fmod(frame, frames) / frames;
+    double axis[3], arm[3], side[3];
+    memcpy(axis, start->up, sizeof axis);
+    nb_vector_normalize(axis, 3);
+    for (int i = 0; i < 3; i++) arm[i] = start->position[i] - start->look_at[i];
+    cross(axis, arm, side);
+    const double c = cos(angle), s = sin(angle), along = dot(axis, arm) * (1 - c);
+    nebel_camera camera = *start;
+    for (int i = 0; i < 3; i++) camera.position[i] = start->look_at[i] + arm[i] * c + side[i] * s + axis[i] * along;
+    return camera;
+}
+
+nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame)
+{
+    const nebel_scene_data *data = &scene->data;
+    if (data->camera_key_count > 0) return camera_between_keys(data->camera_keys, data->camera_key_count, frame);
+    const bool turns = data->turntable_frames > 0 && isfinite(frame) && fmod(frame, data->turntable_frames) != 0;
+    return turns ? turn(&data->camera, frame, data->turntable_frames) : data->camera;
+}

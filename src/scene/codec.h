@@ -1,0 +1,54 @@
+/* Picture formats: bytes in memory to pixels and back. Each format lives in one file. */
+#ifndef NB_SCENE_CODEC_H
+#define NB_SCENE_CODEC_H
+
+#include <nebel/scene.h>
+
+#include "scene/file.h"
+
+#include <stdbool.h>
+
+/* Who asks: whose memory, whose log, and the name of the picture in messages. */
+typedef struct nb_codec {
+    nebel_allocator allocator;
+    nebel_log log;
+    const char *name;
+} nb_codec;
+
+/* Larger pictures are refused before memory is asked for: pixels, and samples of all channels. */
+#define NB_MAX_PIXELS ((uint64_t)1 << 28)
+#define NB_MAX_SAMPLES ((uint64_t)1 << 30)
+
+/* A grey picture as whole numbers 0..max, top row first. */
+typedef struct nb_heights {
+    uint32_t width, height, max;
+    uint16_t *values;
+} nb_heights;
+
+/* Files are told apart by their first bytes. */
+bool nb_png_is(const nb_bytes *bytes);
+bool nb_exr_is(const nb_bytes *bytes);
+bool nb_jpeg_is(const nb_bytes *bytes);
+
+/* Errors: FORMAT, LIMIT, MEMORY, UNSUPPORTED; on an error the target is empty. */
+nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
+nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
+nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, nb_heights *heights);
+nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
+nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
+
+/* The encoded file in *bytes; free bytes->data also after an error. */
+nebel_result nb_png_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
+nebel_result nb_exr_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
+
+/* Gives the image memory for its samples, cleared, and copies of the names. Checks the limits. */
+nebel_result nb_image_allocate(const nb_codec *codec, uint64_t width, uint64_t height, size_t channel_count,
+                               const char *const *names, nebel_image *image);
+void nb_image_release(const nebel_allocator *allocator, nebel_image *image);
+
+/* The index of a channel, or -1. */
+int nb_image_channel(const nebel_image *image, const char *name);
+
+nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t height, uint64_t channel_count);
+
+#endif

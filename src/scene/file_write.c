@@ -1,0 +1,145 @@
+#define _DEFAULT_SOURCE
+#include "scene/file.h"
+#include "scene/path.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { MAX_LINKS = 40, NAME_TRIES = 16 };
+
+int nb_bytes_write(const nebel_allocator *allocator, nb_bytes *bytes, size_t offset, const void *data, size_t size)
+{
+    void *grown = bytes->data;
+    if (size > SIZE_MAX - offset) return 0;
+    const size_t end = offset + size;
+    if (!nb_grow(allocator, &grown, 1, bytes->size, &bytes->capacity, end)) return 0;
+    bytes->data = grown;
+    if (offset > bytes->size) memset(bytes->data + bytes->size, 0, offset - bytes->size);
+    if (size > 0) memcpy(bytes->data + offset, data, size);
+    if (end > bytes->size) bytes->size = end;
+    return 1;
+}
+
+/* ---- where to write
+ * -------------------------------------------------------------------------------------------------- */
+
+/* Follows symbolic links to the path they end at, which need not exist. NULL, with errno, where that fails. */
+static const char *follow_links(nb_arena *arena, const char *path)
+{
+    char target[PATH_MAX];
+    for (int i = 0; i < MAX_LINKS; i++) {
+        struct stat status;
+        if (lstat(path, &status) != 0) return errno == ENOENT ? path : NULL;
+        if (!S_ISLNK(status.st_mode)) return path;
+        const ssize_t size = readlink(path, target, sizeof target - 1);
+        if (size < 0) return NULL;
+        target[size] = '\0';
+        const char *folder = nb_path_folder(arena, path);
+        path = folder != NULL ? nb_path_join(arena, folder, target) : NULL;
+        if (path == NULL) errno = ENOMEM;
+        if (path == NULL) return NULL;
+    }
+    errno = ELOOP;
+    return NULL;
+}
+
+/* Creates a file that nobody can have put there before, beside `path`. Its mode is what a plain open would give, or
+ * that of the file it replaces. -1, with errno, on failure. */
+static int create_beside(nb_arena *arena, const char *path, const char **temporary)
+{
+    const char *folder = nb_path_folder(arena, path);
+    for (int i = 0; folder != NULL && i < NAME_TRIES; i++) {
+        unsigned long long number;
+        char name[40];
+        if (getrandom(&number, sizeof number, 0) != (ssize_t)sizeof number) return -1;
+        snprintf(name, sizeof name, ".nebel-%016llx.tmp", number);
+        *temporary = nb_path_join(arena, folder, name);
+        if (*temporary == NULL) break;
+        const int file = open(*temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+        if (file >= 0 || errno != EEXIST) return file;
+    }
+    errno = folder == NULL || *temporary == NULL ? ENOMEM : EEXIST;
+    return -1;
+}
+
+/* ---- writing
+ * --------------------------------------------------------------------------------------------------------- */
+
+/* 0 or an error number. */
+static int write_all(int file, const nb_bytes *bytes)
+{
+    for (size_t written = 0; written < bytes->size;) {
+        const ssize_t count = write(file, bytes->data + written, bytes->size - written);
+        if (count < 0 && errno != EINTR) return errno;
+        if (count > 0) written += (size_t)count;
+    }
+    return 0;
+}
+
+static int write_directly(const char *path, const nb_bytes *bytes)
+{
+    const int file = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY);
+    if (file < 0) return errno;
+    const int error = write_all(file, bytes);
+    return close(file) != 0 && error == 0 ? errno : error;
+}
+
+static int fill_and_rename(int file, const char *temporary, const char *path, const struct stat *replaced,
+                           const nb_bytes *bytes)
+{
+    int error = write_all(file, bytes);
+    if (error == 0 && replaced != NULL && fchmod(file, replaced->st_mode & 0777) != 0) error = errno;
+    if (error == 0 && fsync(file) != 0) error = errno;
+    if (close(file) != 0 && error == 0) error = errno;
+    if (error == 0 && rename(temporary, path) != 0) error = errno;
+    if (error != 0) unlink(temporary);
+    return error;
+}
+
+static int replace(nb_arena *arena, const char *path, const struct stat *replaced, const nb_bytes *bytes)
+{
+    const char *temporary = NULL;
+    if (replaced != NULL && access(path, W_OK) != 0) return errno;
+    const int file = create_beside(arena, path, &temporary);
+    if (file < 0) return errno;
+    return fill_and_rename(file, temporary, path, replaced, bytes);
+}
+
+/* Names of files that are open already: what they stand for may be a regular file, but it is the open one that is
+ * meant. */
+static bool is_open_file(const char *path)
+{
+    static const char *const places[] = {"/dev/fd/", "/dev/std", "/proc/"};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++)
+        if (strncmp(path, places[i], strlen(places[i])) == 0) return true;
+    return false;
+}
+
+static int write_file(nb_arena *arena, const char *path, const nb_bytes *bytes)
+{
+    struct stat status;
+    const bool exists = stat(path, &status) == 0;
+    if (!exists && errno != ENOENT) return errno;
+    if (exists && S_ISDIR(status.st_mode)) return EISDIR;
+    if (exists && (!S_ISREG(status.st_mode) || is_open_file(path))) return write_directly(path, bytes);
+    const char *target = follow_links(arena, path);
+    return target != NULL ? replace(arena, target, exists ? &status : NULL, bytes) : errno;
+}
+
+nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *log, const char *path,
+                           const nb_bytes *bytes)
+{
+    nb_arena arena = {.allocator = *allocator};
+    const int error = write_file(&arena, path, bytes);
+    nb_arena_release(&arena);
+    if (error == 0) return NEBEL_OK;
+    const nebel_result result = error == ENOMEM ? NEBEL_ERROR_MEMORY : NEBEL_ERROR_FILE;
+    return nb_fail(log, result, "cannot write \"%s\": %s", path, strerror(error));
+}

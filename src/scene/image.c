@@ -1,0 +1,163 @@
+/* Pictures: which format, which memory, which file. */
+#include "scene/codec.h"
+
+#include <string.h>
+#include <strings.h>
+
+/* The largest picture file: 8 GiB where sizes have 64 bits. */
+#define FILE_LIMIT (SIZE_MAX >> 31)
+
+/* Channel names of EXR end at 255 bytes. */
+enum { MAX_NAME = 255, MAX_CHANNELS = 1024 };
+
+/* ---- memory
+ * ---------------------------------------------------------------------------------------------------------- */
+
+nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t height, uint64_t channel_count)
+{
+    const bool fits = width <= NB_MAX_PIXELS && height <= NB_MAX_PIXELS && width * height <= NB_MAX_PIXELS &&
+                      channel_count <= MAX_CHANNELS && width * height * channel_count <= NB_MAX_SAMPLES;
+    if (fits) return NEBEL_OK;
+    return nb_fail(
+        &codec->log, NEBEL_ERROR_LIMIT,
+        "%s: a picture of %llu x %llu pixels and %llu channels; at most 2^28 pixels, 2^30 samples, %d channels",
+        codec->name, (unsigned long long)width, (unsigned long long)height, (unsigned long long)channel_count,
+        MAX_CHANNELS);
+}
+
+/* Pointers and names share one block. */
+static const char *const *copy_names(const nebel_allocator *allocator, size_t count, const char *const *names)
+{
+    size_t size = count * sizeof *names;
+    for (size_t i = 0; i < count; i++) size += strlen(names[i]) + 1;
+    const char **copy = nb_allocate(allocator, size, 1);
+    if (copy == NULL) return NULL;
+    char *at = (char *)(copy + count);
+    for (size_t i = 0; i < count; i++) {
+        const size_t length = strlen(names[i]) + 1;
+        copy[i] = memcpy(at, names[i], length);
+        at += length;
+    }
+    return copy;
+}
+
+nebel_result nb_image_allocate(const nb_codec *codec, uint64_t width, uint64_t height, size_t channel_count,
+                               const char *const *names, nebel_image *image)
+{
+    *image = (nebel_image){0};
+    const nebel_result result = nb_codec_check_size(codec, width, height, channel_count);
+    if (result != NEBEL_OK) return result;
+    image->width = (uint32_t)width;
+    image->height = (uint32_t)height;
+    image->channel_count = (uint32_t)channel_count;
+    image->channel_names = copy_names(&codec->allocator, channel_count, names);
+    image->samples = nb_allocate_zero(&codec->allocator, (size_t)(width * height) * channel_count, sizeof(float));
+    if (image->channel_names != NULL && image->samples != NULL) return NEBEL_OK;
+    nb_image_release(&codec->allocator, image);
+    return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
+}
+
+void nb_image_release(const nebel_allocator *allocator, nebel_image *image)
+{
+    nb_release(allocator, (void *)image->channel_names);
+    nb_release(allocator, image->samples);
+    *image = (nebel_image){0};
+}
+
+int nb_image_channel(const nebel_image *image, const char *name)
+{
+    for (uint32_t i = 0; i < image->channel_count; i++)
+        if (strcmp(image->channel_names[i], name) == 0) return (int)i;
+    return -1;
+}
+
+/* ---- reading
+ * --------------------------------------------------------------------------------------------------------- */
+
+static nebel_result check_desc(const nebel_scene_desc *desc)
+{
+    if (nb_allocator_is_valid(&desc->allocator)) return NEBEL_OK;
+    return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+}
+
+static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
+{
+    if (nb_png_is(bytes)) return nb_png_read_image(codec, bytes, image);
+    if (nb_exr_is(bytes)) return nb_exr_read_image(codec, bytes, image);
+    return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: neither a PNG nor an OpenEXR picture", codec->name);
+}
+
+nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image)
+{
+    if (image != NULL) *image = (nebel_image){0};
+    if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check_desc(desc);
+    if (result != NEBEL_OK) return result;
+    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
+    nb_bytes bytes;
+    result = nb_file_read(&codec.allocator, &codec.log, NULL, "picture", path, FILE_LIMIT, &bytes);
+    if (result != NEBEL_OK) return result;
+    result = decode(&codec, &bytes, image);
+    nb_release(&codec.allocator, bytes.data);
+    return result;
+}
+
+void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image)
+{
+    if (desc == NULL || image == NULL || !nb_allocator_is_valid(&desc->allocator)) return;
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    nb_image_release(&allocator, image);
+}
+
+/* ---- writing
+ * --------------------------------------------------------------------------------------------------------- */
+
+static bool ends_in(const char *path, const char *ending)
+{
+    const size_t size = strlen(path), length = strlen(ending);
+    return size > length && strcasecmp(path + size - length, ending) == 0;
+}
+
+static const char *find_fault(const nebel_image *image)
+{
+    if (image->width == 0 || image->height == 0 || image->channel_count == 0) return "it has no samples";
+    if (image->samples == NULL || image->channel_names == NULL) return "its samples or channel_names are NULL";
+    if (image->channel_count > MAX_CHANNELS) return "it has more than 1024 channels";
+    for (uint32_t i = 0; i < image->channel_count; i++) {
+        const char *name = image->channel_names[i];
+        if (name == NULL || name[0] == '\0') return "a channel has no name";
+        if (strlen(name) > MAX_NAME) return "the name of a channel is longer than 255 bytes";
+        if (nb_image_channel(image, name) != (int)i) return "two channels have the same name";
+    }
+    return NULL;
+}
+
+static nebel_result check_image(const nb_codec *codec, const nebel_image *image)
+{
+    const char *fault = find_fault(image);
+    if (fault != NULL)
+        return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: the picture cannot be written: %s", codec->name, fault);
+    return nb_codec_check_size(codec, image->width, image->height, image->channel_count);
+}
+
+static nebel_result encode(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes)
+{
+    if (ends_in(codec->name, ".png")) return nb_png_write_image(codec, image, bytes);
+    if (ends_in(codec->name, ".exr")) return nb_exr_write_image(codec, image, bytes);
+    return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
+                   codec->name);
+}
+
+nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image)
+{
+    if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check_desc(desc);
+    if (result != NEBEL_OK) return result;
+    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
+    nb_bytes bytes = {0};
+    result = check_image(&codec, image);
+    if (result == NEBEL_OK) result = encode(&codec, image, &bytes);
+    if (result == NEBEL_OK) result = nb_file_write(&codec.allocator, &codec.log, path, &bytes);
+    nb_release(&codec.allocator, bytes.data);
+    return result;
+}

@@ -1,0 +1,80 @@
+/* JPEG in, for textures. libjpeg leaves on an error by longjmp, so what must be released lives outside the jump. */
+#include "scene/codec.h"
+
+#include <setjmp.h>
+#include <stdio.h>
+#include <jpeglib.h>
+
+typedef struct decoder {
+    struct jpeg_decompress_struct jpeg;
+    struct jpeg_error_mgr errors;
+    jmp_buf leave;
+    const nb_codec *codec;
+    unsigned char *pixels;
+    nebel_result result;
+    char message[JMSG_LENGTH_MAX];
+} decoder;
+
+bool nb_jpeg_is(const nb_bytes *bytes)
+{
+    return bytes->size >= 3 && bytes->data[0] == 0xFF && bytes->data[1] == 0xD8 && bytes->data[2] == 0xFF;
+}
+
+static void on_error(j_common_ptr jpeg)
+{
+    decoder *in = jpeg->client_data;
+    if (in->result == NEBEL_OK) in->result = NEBEL_ERROR_FORMAT;
+    jpeg->err->format_message(jpeg, in->message);
+    longjmp(in->leave, 1);
+}
+
+/* A warning (level -1) means that data were corrupt and guessed at: for us the picture is broken. */
+static void on_message(j_common_ptr jpeg, int level)
+{
+    if (level < 0) on_error(jpeg);
+}
+
+static void read_rows(decoder *in)
+{
+    struct jpeg_decompress_struct *jpeg = &in->jpeg;
+    const size_t row_size = (size_t)jpeg->output_width * 4;
+    while (jpeg->output_scanline < jpeg->output_height) {
+        JSAMPROW row = in->pixels + jpeg->output_scanline * row_size;
+        jpeg_read_scanlines(jpeg, &row, 1);
+    }
+    jpeg_finish_decompress(jpeg);
+}
+
+static void run(decoder *in, const nb_bytes *bytes)
+{
+    if (setjmp(in->leave) != 0) return;
+    jpeg_create_decompress(&in->jpeg);
+    in->jpeg.client_data = in;
+    jpeg_mem_src(&in->jpeg, bytes->data, bytes->size);
+    jpeg_read_header(&in->jpeg, TRUE);
+    in->result = nb_codec_check_size(in->codec, in->jpeg.image_width, in->jpeg.image_height, 4);
+    if (in->result != NEBEL_OK) return;
+    in->jpeg.out_color_space = JCS_EXT_RGBA;
+    jpeg_start_decompress(&in->jpeg);
+    in->pixels = nb_allocate(&in->codec->allocator, (size_t)in->jpeg.output_width * in->jpeg.output_height, 4);
+    if (in->pixels == NULL)
+        in->result = NEBEL_ERROR_MEMORY;
+    else
+        read_rows(in);
+}
+
+nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
+{
+    decoder in = {.codec = codec, .message = "out of memory"};
+    in.jpeg.err = jpeg_std_error(&in.errors);
+    in.jpeg.client_data = &in;
+    in.errors.error_exit = on_error;
+    in.errors.emit_message = on_message;
+    run(&in, bytes);
+    *texture = (nebel_texture){0};
+    if (in.result == NEBEL_OK) *texture = (nebel_texture){in.jpeg.output_width, in.jpeg.output_height, in.pixels};
+    jpeg_destroy_decompress(&in.jpeg);
+    if (in.result == NEBEL_OK || in.result == NEBEL_ERROR_LIMIT) return in.result;
+    nb_release(&codec->allocator, in.pixels);
+    return nb_fail(&codec->log, in.result, "%s: not a good JPEG picture: %s", codec->name, in.message);
+}

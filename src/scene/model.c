@@ -1,0 +1,136 @@
+#include "scene/model.h"
+
+#include <stdio.h>
+
+nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const char *format, ...)
+{
+    char message[768];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    return nb_fail(&load->log, result, "%s: %s", load->source->where, message);
+}
+
+static void keep_note(nebel_result result, const char *message, void *user)
+{
+    nb_note *note = user;
+    (void)result;
+    snprintf(note->text, sizeof note->text, "%s", message);
+}
+
+nebel_log nb_note_log(nb_note *note)
+{
+    return (nebel_log){keep_note, note};
+}
+
+/* ---- meshes
+ * ---------------------------------------------------------------------------------------------------------- */
+
+bool nb_mesh_allocate(const nebel_allocator *allocator, uint32_t vertex_count, uint32_t triangle_count, bool has_uvs,
+                      nebel_mesh *mesh)
+{
+    *mesh = (nebel_mesh){.vertex_count = vertex_count, .triangle_count = triangle_count, .texture = -1};
+    mesh->positions = nb_allocate(allocator, vertex_count, 3 * sizeof(float));
+    mesh->normals = nb_allocate(allocator, vertex_count, 3 * sizeof(float));
+    mesh->indices = nb_allocate(allocator, triangle_count, 3 * sizeof(uint32_t));
+    if (has_uvs) mesh->uvs = nb_allocate(allocator, vertex_count, 2 * sizeof(float));
+    if (mesh->positions != NULL && mesh->normals != NULL && mesh->indices != NULL && (!has_uvs || mesh->uvs != NULL))
+        return true;
+    nb_mesh_release(allocator, mesh);
+    return false;
+}
+
+void nb_mesh_release(const nebel_allocator *allocator, nebel_mesh *mesh)
+{
+    nb_release(allocator, (void *)mesh->positions);
+    nb_release(allocator, (void *)mesh->normals);
+    nb_release(allocator, (void *)mesh->uvs);
+    nb_release(allocator, (void *)mesh->indices);
+    *mesh = (nebel_mesh){0};
+}
+
+nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh)
+{
+    nb_model_set *set = load->set;
+    void *meshes = set->meshes;
+    nebel_result result = NEBEL_OK;
+    if (set->triangle_count + mesh->triangle_count > NB_MAX_TRIANGLES)
+        result = nb_model_fail(load, NEBEL_ERROR_LIMIT, "the models have more than %llu triangles together",
+                               (unsigned long long)NB_MAX_TRIANGLES);
+    else if (!nb_grow(&load->allocator, &meshes, sizeof *mesh, set->mesh_count, &set->mesh_capacity,
+                      set->mesh_count + 1))
+        result = nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    if (result != NEBEL_OK) {
+        nb_mesh_release(&load->allocator, mesh);
+        return result;
+    }
+    set->meshes = meshes;
+    set->meshes[set->mesh_count++] = *mesh;
+    set->triangle_count += mesh->triangle_count;
+    return NEBEL_OK;
+}
+
+nebel_result nb_model_add_texture(const nb_model_load *load, const nebel_texture *texture, int32_t *index)
+{
+    nb_model_set *set = load->set;
+    void *textures = set->textures;
+    const size_t count = set->texture_count;
+    if (count >= INT32_MAX ||
+        !nb_grow(&load->allocator, &textures, sizeof *texture, count, &set->texture_capacity, count + 1)) {
+        nb_release(&load->allocator, (void *)texture->rgba);
+        return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    }
+    set->textures = textures;
+    set->textures[count] = *texture;
+    set->texture_count++;
+    *index = (int32_t)count;
+    return NEBEL_OK;
+}
+
+static void release_set(const nebel_allocator *allocator, nb_model_set *set)
+{
+    for (size_t i = 0; i < set->mesh_count; i++) nb_mesh_release(allocator, &set->meshes[i]);
+    for (size_t i = 0; i < set->texture_count; i++) nb_release(allocator, (void *)set->textures[i].rgba);
+    nb_release(allocator, set->meshes);
+    nb_release(allocator, set->textures);
+    *set = (nb_model_set){0};
+}
+
+void nb_models_release(nebel_scene *scene)
+{
+    release_set(&scene->allocator, &scene->loaded);
+}
+
+/* ---- loading
+ * --------------------------------------------------------------------------------------------------------- */
+
+static nebel_result load_all(const nebel_scene *scene, nb_model_set *set)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < scene->model_count && result == NEBEL_OK; i++) {
+        const nb_model_source *source = &scene->models[i];
+        const nb_model_load load = {scene->allocator, scene->log, source, set};
+        result = source->is_heightfield ? nb_heightfield_load(&load) : nb_assimp_load(&load);
+    }
+    return result;
+}
+
+nebel_result nebel_load_scene_models(nebel_scene *scene)
+{
+    if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (scene->models_loaded) return NEBEL_OK;
+    nb_model_set set = {0};
+    const nebel_result result = load_all(scene, &set);
+    if (result != NEBEL_OK) {
+        release_set(&scene->allocator, &set);
+        return result;
+    }
+    scene->loaded = set;
+    scene->models_loaded = true;
+    scene->data.meshes = set.meshes;
+    scene->data.mesh_count = set.mesh_count;
+    scene->data.textures = set.textures;
+    scene->data.texture_count = set.texture_count;
+    return NEBEL_OK;
+}

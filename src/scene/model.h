@@ -1,0 +1,41 @@
+/* Models become meshes: what the loaders share. */
+#ifndef NB_SCENE_MODEL_H
+#define NB_SCENE_MODEL_H
+
+#include "scene/codec.h"
+#include "scene/scene_internal.h"
+
+/* The most triangles of all models together. */
+#define NB_MAX_TRIANGLES ((uint64_t)1 << 28)
+
+/* What a loader works with; `set` receives the meshes. */
+typedef struct nb_model_load {
+    nebel_allocator allocator;
+    nebel_log log;
+    const nb_model_source *source;
+    nb_model_set *set;
+} nb_model_load;
+
+nebel_result nb_heightfield_load(const nb_model_load *load);
+nebel_result nb_assimp_load(const nb_model_load *load);
+
+/* Memory for a mesh: positions and normals, uvs where wanted, indices. False, with nothing held, when memory is out. */
+bool nb_mesh_allocate(const nebel_allocator *allocator, uint32_t vertex_count, uint32_t triangle_count, bool has_uvs,
+                      nebel_mesh *mesh);
+void nb_mesh_release(const nebel_allocator *allocator, nebel_mesh *mesh);
+
+/* Hand over a mesh or a texture, also its memory on failure. Errors: LIMIT, MEMORY. */
+nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh);
+nebel_result nb_model_add_texture(const nb_model_load *load, const nebel_texture *texture, int32_t *index);
+
+/* Logs "FILE:LINE:COLUMN: models[0].file: message" and returns the result. */
+nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const char *format, ...) NB_PRINTF(3, 4);
+
+/* A log that keeps the last message, so that it can be passed on with the model's place before it. */
+typedef struct nb_note {
+    char text[512];
+} nb_note;
+
+nebel_log nb_note_log(nb_note *note);
+
+#endif

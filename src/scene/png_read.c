@@ -1,0 +1,193 @@
+/* PNG in. libpng leaves on an error by longjmp, so all that must be released lives in `decoder`, outside the jump. */
+#include "scene/codec.h"
+
+#include <png.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef enum target { TARGET_IMAGE, TARGET_TEXTURE, TARGET_HEIGHTS } target;
+
+typedef struct decoder {
+    const nb_codec *codec;
+    const nb_bytes *bytes;
+    size_t at;
+    target target;
+    png_structp png;
+    png_infop info;
+    png_uint_32 width, height;
+    int bits, channel_count;
+    size_t row_size;
+    unsigned char *pixels;
+    nebel_result result;
+    char message[200];
+} decoder;
+
+bool nb_png_is(const nb_bytes *bytes)
+{
+    return bytes->size >= 8 && memcmp(bytes->data, "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+/* ---- libpng's callbacks
+ * ---------------------------------------------------------------------------------------------- */
+
+static void on_error(png_structp png, png_const_charp message)
+{
+    decoder *in = png_get_error_ptr(png);
+    if (in->result == NEBEL_OK) in->result = NEBEL_ERROR_FORMAT;
+    snprintf(in->message, sizeof in->message, "%s", message);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp message)
+{
+    (void)png;
+    (void)message;
+}
+
+static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
+{
+    const decoder *in = png_get_mem_ptr(png);
+    return nb_allocate(&in->codec->allocator, size, 1);
+}
+
+static void on_release(png_structp png, png_voidp memory)
+{
+    const decoder *in = png_get_mem_ptr(png);
+    nb_release(&in->codec->allocator, memory);
+}
+
+static void on_read(png_structp png, png_bytep target_bytes, size_t size)
+{
+    decoder *in = png_get_io_ptr(png);
+    if (size > in->bytes->size - in->at) png_error(png, "the file ends too early");
+    memcpy(target_bytes, in->bytes->data + in->at, size);
+    in->at += size;
+}
+
+/* ---- decoding
+ * -------------------------------------------------------------------------------------------------------- */
+
+static void stop(decoder *in, nebel_result result, const char *message)
+{
+    in->result = result;
+    png_error(in->png, message);
+}
+
+static void choose_transforms(decoder *in)
+{
+    const int type = png_get_color_type(in->png, in->info);
+    if (in->target == TARGET_HEIGHTS && type != PNG_COLOR_TYPE_GRAY)
+        stop(in, NEBEL_ERROR_FORMAT, "a height map must be grey, 8 or 16 bit, without alpha; convert it");
+    png_set_expand(in->png);
+    if (in->target != TARGET_TEXTURE) return;
+    png_set_scale_16(in->png);
+    png_set_gray_to_rgb(in->png);
+    png_set_add_alpha(in->png, 0xFF, PNG_FILLER_AFTER);
+}
+
+static void read_header(decoder *in)
+{
+    png_read_info(in->png, in->info);
+    in->width = png_get_image_width(in->png, in->info);
+    in->height = png_get_image_height(in->png, in->info);
+    in->result = nb_codec_check_size(in->codec, in->width, in->height, 4);
+    if (in->result != NEBEL_OK) png_longjmp(in->png, 1);
+    choose_transforms(in);
+}
+
+static void read_pixels(decoder *in)
+{
+    const int passes = png_set_interlace_handling(in->png);
+    png_read_update_info(in->png, in->info);
+    in->row_size = png_get_rowbytes(in->png, in->info);
+    in->bits = png_get_bit_depth(in->png, in->info);
+    in->channel_count = png_get_channels(in->png, in->info);
+    in->pixels = nb_allocate(&in->codec->allocator, in->height, in->row_size);
+    if (in->pixels == NULL) stop(in, NEBEL_ERROR_MEMORY, "out of memory");
+    for (int pass = 0; pass < passes; pass++)
+        for (png_uint_32 y = 0; y < in->height; y++) png_read_row(in->png, in->pixels + y * in->row_size, NULL);
+    png_read_end(in->png, NULL);
+}
+
+static void run(decoder *in)
+{
+    if (setjmp(png_jmpbuf(in->png)) != 0) return;
+    png_set_user_limits(in->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    png_set_read_fn(in->png, in, on_read);
+    read_header(in);
+    read_pixels(in);
+}
+
+/* The pixels in in->pixels, to be released by the caller. */
+static nebel_result decode(decoder *in)
+{
+    in->png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, in, on_error, on_warning, in, on_allocate, on_release);
+    in->info = in->png != NULL ? png_create_info_struct(in->png) : NULL;
+    if (in->info != NULL)
+        run(in);
+    else
+        in->result = NEBEL_ERROR_MEMORY;
+    png_destroy_read_struct(&in->png, &in->info, NULL);
+    if (in->result == NEBEL_OK) return NEBEL_OK;
+    nb_release(&in->codec->allocator, in->pixels);
+    in->pixels = NULL;
+    if (in->result == NEBEL_ERROR_LIMIT) return in->result;
+    const char *message = in->message[0] != '\0' ? in->message : "out of memory";
+    return nb_fail(&in->codec->log, in->result, "%s: not a good PNG picture: %s", in->codec->name, message);
+}
+
+/* ---- what becomes of the pixels
+ * -------------------------------------------------------------------------------------- */
+
+/* PNG stores the high byte first. */
+static uint16_t read_16(const unsigned char *at)
+{
+    return (uint16_t)(at[0] << 8 | at[1]);
+}
+
+static void convert_row(const decoder *in, const unsigned char *row, float *samples)
+{
+    const size_t count = (size_t)in->width * (size_t)in->channel_count;
+    for (size_t i = 0; i < count; i++)
+        samples[i] = in->bits == 16 ? (float)read_16(row + 2 * i) / 65535.0f : (float)row[i] / 255.0f;
+}
+
+nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
+{
+    static const char *const names[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_IMAGE};
+    *image = (nebel_image){0};
+    nebel_result result = decode(&in);
+    if (result != NEBEL_OK) return result;
+    const size_t channel_count = (size_t)in.channel_count;
+    result = nb_image_allocate(codec, in.width, in.height, channel_count, names[channel_count - 1], image);
+    for (size_t y = 0; result == NEBEL_OK && y < in.height; y++)
+        convert_row(&in, in.pixels + y * in.row_size, image->samples + y * in.width * channel_count);
+    nb_release(&codec->allocator, in.pixels);
+    return result;
+}
+
+nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
+{
+    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_TEXTURE};
+    *texture = (nebel_texture){0};
+    const nebel_result result = decode(&in);
+    if (result == NEBEL_OK) *texture = (nebel_texture){in.width, in.height, in.pixels};
+    return result;
+}
+
+nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, nb_heights *heights)
+{
+    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_HEIGHTS};
+    *heights = (nb_heights){0};
+    const nebel_result result = decode(&in);
+    if (result != NEBEL_OK) return result;
+    const size_t count = (size_t)in.width * in.height;
+    uint16_t *values = nb_allocate(&codec->allocator, count, sizeof *values);
+    for (size_t i = 0; values != NULL && i < count; i++)
+        values[i] = in.bits == 16 ? read_16(in.pixels + 2 * i) : in.pixels[i];
+    nb_release(&codec->allocator, in.pixels);
+    if (values == NULL) return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
+    *heights = (nb_heights){in.width, in.height, in.bits == 16 ? 65535 : 255, values};
+    return NEBEL_OK;
+}

@@ -1,0 +1,113 @@
+/* The sections "camera", its turntable and its keys. */
+#include "scene/scene_internal.h"
+
+enum { POSITION, LOOK_AT, UP, VERTICAL_FOV, VIEW_HEIGHT, PROJECTION, TURNTABLE, KEYS, FRAME, CAMERA_KEY_COUNT };
+
+static const char *const names[] = {"position",   "look_at",   "up",   "vertical_fov", "view_height",
+                                    "projection", "turntable", "keys", "frame"};
+
+#define VIEW_KEYS (NB_BIT(POSITION) | NB_BIT(LOOK_AT) | NB_BIT(UP) | NB_BIT(VERTICAL_FOV) | NB_BIT(VIEW_HEIGHT))
+
+static const nb_keys camera_keys = {names, CAMERA_KEY_COUNT,
+                                    VIEW_KEYS | NB_BIT(PROJECTION) | NB_BIT(TURNTABLE) | NB_BIT(KEYS), 0, "a camera"};
+static const nb_keys key_keys = {names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(FRAME), NB_BIT(FRAME), "a camera key"};
+
+static const nb_range fov_range = {0, 180, true, "a number of degrees, > 0 and < 180"};
+
+/* Without a look_at of its own a camera looks along -z from wherever it is. */
+static void look_ahead(nebel_camera *camera)
+{
+    for (int i = 0; i < 3; i++) camera->look_at[i] = camera->position[i];
+    camera->look_at[2] -= 1;
+}
+
+static bool check_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found,
+                       const nebel_camera *camera)
+{
+    const nb_json_node *at = found[LOOK_AT] != NULL ? found[LOOK_AT] : node;
+    if (!nb_camera_is_apart(camera))
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "the camera looks at its own position; move one of them");
+    if (found[UP] != NULL) at = found[UP];
+    if (!nb_camera_is_upright(camera))
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, at,
+                            "the view is along \"up\"; give an \"up\" in another direction, such as [0, 0, -1]");
+    return true;
+}
+
+/* Reads what a camera and its keys have in common. `has_look_at` says whether one was given before. */
+static bool read_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found, bool has_look_at,
+                      nebel_camera *camera)
+{
+    if (!nb_value_vector(json, found[POSITION], camera->position)) return false;
+    if (found[LOOK_AT] == NULL && !has_look_at) look_ahead(camera);
+    return nb_value_vector(json, found[LOOK_AT], camera->look_at) && nb_value_direction(json, found[UP], camera->up) &&
+           nb_value_number(json, found[VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
+           nb_value_number(json, found[VIEW_HEIGHT], &nb_range_positive, &camera->view_height) &&
+           check_view(json, node, found, camera);
+}
+
+static bool read_projection(nb_json *json, const nb_json_node *node, nebel_projection *projection)
+{
+    static const char *const projections[] = {"perspective", "orthographic", "panorama"};
+    if (node == NULL) return true;
+    const int choice = nb_value_choice(json, node, projections, 3);
+    if (choice >= 0) *projection = (nebel_projection)choice;
+    return choice >= 0;
+}
+
+static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *frames)
+{
+    static const char *const turntable_names[] = {"frames"};
+    static const nb_keys keys = {turntable_names, 1, 1, 1, "a turntable"};
+    const nb_json_node *found[1];
+    int count = 0;
+    if (node == NULL) return true;
+    if (!nb_value_members(json, node, &keys, found) || !nb_value_integer(json, found[0], 1, 1000000, &count))
+        return false;
+    *frames = (uint32_t)count;
+    return true;
+}
+
+static bool read_key(nb_json *json, const nb_json_node *node, bool has_look_at, nebel_camera_key *key)
+{
+    const nb_json_node *found[CAMERA_KEY_COUNT];
+    return nb_value_members(json, node, &key_keys, found) &&
+           nb_value_number(json, found[FRAME], &nb_range_any, &key->frame) &&
+           read_view(json, node, found, has_look_at, &key->camera);
+}
+
+static bool read_keys(nb_scene_reader *in, const nb_json_node *node, bool has_look_at)
+{
+    nebel_scene_data *data = &in->scene->data;
+    if (node == NULL) return true;
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of camera keys")) return false;
+    if (node->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "holds no key; give one or more");
+    nebel_camera_key *keys = nb_arena_allocate(&in->scene->arena, node->count, sizeof *keys);
+    if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    size_t i = 0;
+    for (const nb_json_node *at = nb_json_first(in->json, node); at != NULL; at = nb_json_next(in->json, at), i++) {
+        keys[i].camera = data->camera;
+        if (!read_key(in->json, at, has_look_at, &keys[i])) return false;
+        if (i > 0 && keys[i].frame <= keys[i - 1].frame)
+            return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, at,
+                                "its frame %.15g is not after the key before it, %.15g; frames must ascend",
+                                keys[i].frame, keys[i - 1].frame);
+    }
+    data->camera_keys = keys;
+    data->camera_key_count = node->count;
+    return true;
+}
+
+bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node)
+{
+    const nb_json_node *found[CAMERA_KEY_COUNT];
+    nebel_scene_data *data = &in->scene->data;
+    if (!nb_value_members(in->json, node, &camera_keys, found)) return false;
+    if (found[TURNTABLE] != NULL && found[KEYS] != NULL)
+        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, found[KEYS],
+                                "a camera has \"turntable\" or \"keys\", not both; remove one");
+    return read_projection(in->json, found[PROJECTION], &data->camera.projection) &&
+           read_view(in->json, node, found, false, &data->camera) &&
+           read_turntable(in->json, found[TURNTABLE], &data->turntable_frames) &&
+           read_keys(in, found[KEYS], found[LOOK_AT] != NULL);
+}

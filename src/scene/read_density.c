@@ -1,0 +1,116 @@
+/* Density profiles and phase functions. */
+#include "scene/scene_internal.h"
+
+/* ---- density
+ * --------------------------------------------------------------------------------------------------------- */
+
+enum { TYPE, BASE, SCALE_HEIGHT, BELOW, FROM, TO, POWER, CENTER, SIGMA, DISTANCE, DENSITY_KEY_COUNT };
+
+static const char *const key_names[] = {"type", "base",  "scale_height", "below", "from",
+                                        "to",   "power", "center",       "sigma", "distance"};
+
+static const char *const type_names[] = {"constant", "height",    "linear", "radial",
+                                         "gaussian", "soft_edge", "grid",   "noise"};
+
+enum { TYPE_COUNT = sizeof type_names / sizeof *type_names };
+
+#define DENSITY_KEYS(required, optional, owner)                                                                        \
+    {                                                                                                                  \
+        key_names, DENSITY_KEY_COUNT, (required) | (optional) | NB_BIT(TYPE), (required), owner                        \
+    }
+
+/* In the order of nebel_density_type. */
+static const nb_keys density_keys[NEBEL_DENSITY_COUNT] = {
+    DENSITY_KEYS(0, 0, "a constant density"),
+    DENSITY_KEYS(NB_BIT(SCALE_HEIGHT), NB_BIT(BASE) | NB_BIT(BELOW), "a height density"),
+    DENSITY_KEYS(NB_BIT(FROM) | NB_BIT(TO), 0, "a linear density"),
+    DENSITY_KEYS(0, NB_BIT(POWER), "a radial density"),
+    DENSITY_KEYS(NB_BIT(CENTER) | NB_BIT(SIGMA), 0, "a gaussian density"),
+    DENSITY_KEYS(NB_BIT(DISTANCE), 0, "a soft edge"),
+};
+
+static bool fail_shape(nb_json *json, const nb_json_node *node, const char *wanted)
+{
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "\"%.*s\" does not fit this shape; it needs %s",
+                        (int)node->string_size, node->string, wanted);
+}
+
+static bool check_type(nb_json *json, const nb_json_node *node, int type, nebel_shape_type shape)
+{
+    if (type >= NEBEL_DENSITY_COUNT)
+        return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node,
+                            "this version has no \"%s\" densities; use one of the others", type_names[type]);
+    if (type == NEBEL_DENSITY_RADIAL && shape != NEBEL_SHAPE_SPHERE && shape != NEBEL_SHAPE_ELLIPSOID)
+        return fail_shape(json, node, "a sphere or an ellipsoid");
+    if (type == NEBEL_DENSITY_SOFT_EDGE && shape != NEBEL_SHAPE_BOX) return fail_shape(json, node, "a box");
+    return true;
+}
+
+static bool read_below(nb_json *json, const nb_json_node *node, nebel_below *below)
+{
+    static const char *const names[] = {"grow", "constant"};
+    if (node == NULL) return true;
+    const int choice = nb_value_choice(json, node, names, 2);
+    if (choice >= 0) *below = (nebel_below)choice;
+    return choice >= 0;
+}
+
+static bool check_ends(nb_json *json, const nb_json_node *to, const nebel_density *density)
+{
+    const double *a = density->from, *b = density->to;
+    if (to == NULL || a[0] != b[0] || a[1] != b[1] || a[2] != b[2]) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, to, "is the same place as \"from\"; the two must lie apart");
+}
+
+static const nb_json_node *find_type(const nb_json *json, const nb_json_node *object)
+{
+    const nb_json_node *node = nb_json_first(json, object);
+    while (!nb_json_has_key(node, "type")) node = nb_json_next(json, node);
+    return node;
+}
+
+bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density)
+{
+    const nb_json_node *found[DENSITY_KEY_COUNT];
+    nb_json *json = in->json;
+    if (node == NULL) return true;
+    const int type = nb_value_type(json, node, type_names, TYPE_COUNT);
+    if (type < 0 || !check_type(json, find_type(json, node), type, shape) ||
+        !nb_value_members(json, node, &density_keys[type], found))
+        return false;
+    *density = (nebel_density){.type = (nebel_density_type)type, .power = type == NEBEL_DENSITY_RADIAL ? 1 : 0};
+    return nb_value_number(json, found[BASE], &nb_range_any, &density->base) &&
+           nb_value_number(json, found[SCALE_HEIGHT], &nb_range_positive, &density->scale_height) &&
+           read_below(json, found[BELOW], &density->below) && nb_value_vector(json, found[FROM], density->from) &&
+           nb_value_vector(json, found[TO], density->to) && check_ends(json, found[TO], density) &&
+           nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
+           nb_value_vector(json, found[CENTER], density->center) &&
+           nb_value_number(json, found[SIGMA], &nb_range_positive, &density->sigma) &&
+           nb_value_number(json, found[DISTANCE], &nb_range_positive, &density->distance);
+}
+
+/* ---- phase
+ * ----------------------------------------------------------------------------------------------------------- */
+
+/* Under ambient light, the same from everywhere, each of these scatters as much as the isotropic one: they integrate
+ * to 1. That is why the core is not told. */
+bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node)
+{
+    enum { PHASE_TYPE, G, DIAMETER, COUNT };
+    static const char *const names[] = {"type", "g", "diameter"};
+    static const char *const types[] = {"isotropic", "henyey_greenstein", "rayleigh", "cornette_shanks", "droplets"};
+    static const nb_keys keys[] = {
+        {names, COUNT, NB_BIT(PHASE_TYPE), 0, "an isotropic phase function"},
+        {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a henyey_greenstein phase function"},
+        {names, COUNT, NB_BIT(PHASE_TYPE), 0, "a rayleigh phase function"},
+        {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a cornette_shanks phase function"},
+        {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
+    static const nb_range g_range = {-1, 1, true, "a number > -1 and < 1"};
+    const nb_json_node *found[COUNT];
+    double value;
+    if (node == NULL) return true;
+    const int type = nb_value_type(in->json, node, types, 5);
+    return type >= 0 && nb_value_members(in->json, node, &keys[type], found) &&
+           nb_value_number(in->json, found[G], &g_range, &value) &&
+           nb_value_number(in->json, found[DIAMETER], &nb_range_positive, &value);
+}

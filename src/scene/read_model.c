@@ -1,0 +1,86 @@
+/* One entry of the section "models". The files are read later, by nebel_load_scene_models. */
+#include "scene/path.h"
+#include "scene/scene_internal.h"
+
+#include <stdio.h>
+
+enum { FILE_KEY, POSITION, ROTATION, SCALE, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
+
+static const char *const model_names[] = {"file", "position", "rotation", "scale", "heightfield", "color"};
+static const nb_keys model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
+
+static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
+{
+    char path[NB_JSON_PATH], where[NB_JSON_PATH + 48];
+    nb_json_path(in->json, node, path);
+    const nb_text_place place = nb_json_place(in->json, node->offset);
+    const int size = snprintf(where, sizeof where, ":%zu:%zu: %s", place.line, place.column, path);
+    if (size < 0) return NULL;
+    const char *tail = nb_arena_copy_text(&in->scene->arena, where, (size_t)size);
+    return tail != NULL ? nb_path_join(&in->scene->arena, in->json->desc.name, tail) : NULL;
+}
+
+static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
+{
+    nb_arena *arena = &in->scene->arena;
+    const char *file = "";
+    if (!nb_value_text(in->json, node, arena, &file)) return false;
+    if (file[0] == '\0')
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; must be the path of a file");
+    model->file = nb_path_join(arena, in->scene->folder, file);
+    model->where = describe_place(in, node);
+    if (model->file != NULL && model->where != NULL) return true;
+    return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+}
+
+static bool read_heightfield(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
+{
+    enum { HEIGHTFIELD_FILE, SIZE, HEIGHT, COUNT };
+    static const char *const names[] = {"file", "size", "height"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a heightfield"};
+    const nb_json_node *found[COUNT];
+    model->is_heightfield = true;
+    return nb_value_members(in->json, node, &keys, found) && read_file(in, found[HEIGHTFIELD_FILE], model) &&
+           nb_value_numbers(in->json, found[SIZE], &nb_range_positive, 2, model->size) &&
+           nb_value_number(in->json, found[HEIGHT], &nb_range_positive, &model->height);
+}
+
+static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
+{
+    if (found[FILE_KEY] == NULL && found[HEIGHTFIELD] == NULL)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is neither; a model has \"file\" or \"heightfield\"");
+    if (found[HEIGHTFIELD] == NULL) return true;
+    for (int i = FILE_KEY; i <= SCALE; i++) {
+        if (i == POSITION || found[i] == NULL) continue;
+        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[i],
+                                "does not go with \"heightfield\", which has: position, color");
+    }
+    return true;
+}
+
+static bool keep_model(nb_scene_reader *in, const nb_json_node *node, const nb_model_source *model)
+{
+    nebel_scene *scene = in->scene;
+    void *models = scene->models;
+    const size_t count = scene->model_count;
+    if (!nb_grow(&scene->allocator, &models, sizeof *model, count, &scene->model_capacity, count + 1))
+        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    scene->models = models;
+    scene->models[scene->model_count++] = *model;
+    return true;
+}
+
+bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
+{
+    const nb_json_node *found[MODEL_KEY_COUNT];
+    nb_json *json = in->json;
+    nb_model_source model = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
+    if (!nb_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
+    model.has_color = found[COLOR] != NULL;
+    return (found[FILE_KEY] != NULL ? read_file(in, found[FILE_KEY], &model)
+                                    : read_heightfield(in, found[HEIGHTFIELD], &model)) &&
+           nb_value_vector(json, found[POSITION], model.position) &&
+           nb_value_rotation(json, found[ROTATION], model.rotation) &&
+           nb_value_scale(json, found[SCALE], model.scale) &&
+           nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) && keep_model(in, node, &model);
+}

@@ -1,0 +1,167 @@
+/* Shapes of fog, and their transforms. */
+#include "scene/scene_internal.h"
+
+enum {
+    TYPE,
+    TRANSFORM,
+    MIN,
+    MAX,
+    CENTER,
+    RADIUS,
+    RADII,
+    FROM,
+    TO,
+    RADIUS_FROM,
+    RADIUS_TO,
+    POINT,
+    NORMAL,
+    PLANES,
+    SHAPES,
+    SHAPE_KEY_COUNT
+};
+
+static const char *const key_names[] = {"type",      "transform", "min",    "max",    "center",
+                                        "radius",    "radii",     "from",   "to",     "radius_from",
+                                        "radius_to", "point",     "normal", "planes", "shapes"};
+
+static const char *const type_names[] = {"world",   "half_space", "box",    "sphere", "ellipsoid",   "cylinder",
+                                         "capsule", "cone",       "convex", "union",  "intersection"};
+
+/* In the order of nebel_shape_type. Only "transform" and "type" are not required. */
+#define SHAPE_KEYS(required, owner)                                                                                    \
+    {                                                                                                                  \
+        key_names, SHAPE_KEY_COUNT, (required) | NB_BIT(TYPE) | NB_BIT(TRANSFORM), (required), owner                   \
+    }
+
+static const nb_keys shape_keys[NEBEL_SHAPE_COUNT] = {
+    SHAPE_KEYS(0, "a shape \"world\""),
+    SHAPE_KEYS(NB_BIT(POINT) | NB_BIT(NORMAL), "a half space"),
+    SHAPE_KEYS(NB_BIT(MIN) | NB_BIT(MAX), "a box"),
+    SHAPE_KEYS(NB_BIT(CENTER) | NB_BIT(RADIUS), "a sphere"),
+    SHAPE_KEYS(NB_BIT(CENTER) | NB_BIT(RADII), "an ellipsoid"),
+    SHAPE_KEYS(NB_BIT(FROM) | NB_BIT(TO) | NB_BIT(RADIUS), "a cylinder"),
+    SHAPE_KEYS(NB_BIT(FROM) | NB_BIT(TO) | NB_BIT(RADIUS), "a capsule"),
+    SHAPE_KEYS(NB_BIT(FROM) | NB_BIT(TO) | NB_BIT(RADIUS_FROM) | NB_BIT(RADIUS_TO), "a cone"),
+    SHAPE_KEYS(NB_BIT(PLANES), "a convex body"),
+    SHAPE_KEYS(NB_BIT(SHAPES), "a union"),
+    SHAPE_KEYS(NB_BIT(SHAPES), "an intersection"),
+};
+
+static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
+{
+    enum { POSITION, ROTATION, SCALE, COUNT };
+    static const char *const names[] = {"position", "rotation", "scale"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a transform"};
+    const nb_json_node *found[COUNT];
+    if (node == NULL) return true;
+    return nb_value_members(json, node, &keys, found) && nb_value_vector(json, found[POSITION], transform->position) &&
+           nb_value_rotation(json, found[ROTATION], transform->rotation) &&
+           nb_value_scale(json, found[SCALE], transform->scale);
+}
+
+static bool check_box(nb_json *json, const nb_json_node *max, const nebel_shape *shape)
+{
+    const nb_json_node *element = nb_json_first(json, max);
+    for (int i = 0; i < 3; i++, element = nb_json_next(json, element))
+        if (shape->min[i] >= shape->max[i])
+            return nb_json_fail(json, NEBEL_ERROR_FORMAT, element,
+                                "is %.15g; must be greater than min[%d], which is %.15g", shape->max[i], i,
+                                shape->min[i]);
+    return true;
+}
+
+static bool check_axis(nb_json *json, const nb_json_node *to, const nebel_shape *shape)
+{
+    const bool apart =
+        shape->from[0] != shape->to[0] || shape->from[1] != shape->to[1] || shape->from[2] != shape->to[2];
+    if (apart || shape->type == NEBEL_SHAPE_CAPSULE) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, to, "is the same place as \"from\"; the ends must lie apart");
+}
+
+static bool check_cone(nb_json *json, const nb_json_node *radius_to, const nebel_shape *shape)
+{
+    if (shape->radius_from > 0 || shape->radius_to > 0) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, radius_to, "both radii are 0; one must be > 0");
+}
+
+static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+{
+    nb_json *json = in->json;
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of planes [nx, ny, nz, d]")) return false;
+    if (node->count < 1 || node->count > NEBEL_MAX_PLANES)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu planes; must hold 1 to %d",
+                            (unsigned long)node->count, NEBEL_MAX_PLANES);
+    nebel_plane *planes = nb_arena_allocate(&in->scene->arena, node->count, sizeof *planes);
+    if (planes == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    size_t i = 0;
+    for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++) {
+        double numbers[4];
+        if (!nb_value_numbers(json, at, &nb_range_any, 4, numbers)) return false;
+        if (numbers[0] == 0 && numbers[1] == 0 && numbers[2] == 0)
+            return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "has the normal 0; one of nx, ny, nz must not be 0");
+        planes[i] = (nebel_plane){{numbers[0], numbers[1], numbers[2]}, numbers[3]};
+    }
+    shape->planes = planes;
+    shape->plane_count = node->count;
+    return true;
+}
+
+/* leaf_count is that of the volume so far. */
+static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count);
+
+static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count)
+{
+    nb_json *json = in->json;
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of shapes")) return false;
+    if (node->count < 1 || node->count > NEBEL_MAX_LEAVES)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %lu shapes; must hold 1 to %d",
+                            (unsigned long)node->count, NEBEL_MAX_LEAVES);
+    nebel_shape *parts = nb_arena_allocate(&in->scene->arena, node->count, sizeof *parts);
+    if (parts == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    size_t i = 0;
+    for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++)
+        if (!read_shape(in, at, &parts[i], leaf_count)) return false;
+    shape->parts = parts;
+    shape->part_count = node->count;
+    return true;
+}
+
+static bool count_leaf(nb_json *json, const nb_json_node *node, size_t *leaf_count)
+{
+    if (++*leaf_count <= NEBEL_MAX_LEAVES) return true;
+    return nb_json_fail(json, NEBEL_ERROR_LIMIT, node, "one volume is made of too many shapes; at most %d",
+                        NEBEL_MAX_LEAVES);
+}
+
+static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_shape *shape)
+{
+    return read_transform(json, found[TRANSFORM], &shape->transform) && nb_value_vector(json, found[MIN], shape->min) &&
+           nb_value_vector(json, found[MAX], shape->max) && nb_value_vector(json, found[CENTER], shape->center) &&
+           nb_value_number(json, found[RADIUS], &nb_range_positive, &shape->radius) &&
+           nb_value_numbers(json, found[RADII], &nb_range_positive, 3, shape->radii) &&
+           nb_value_vector(json, found[FROM], shape->from) && nb_value_vector(json, found[TO], shape->to) &&
+           nb_value_number(json, found[RADIUS_FROM], &nb_range_not_negative, &shape->radius_from) &&
+           nb_value_number(json, found[RADIUS_TO], &nb_range_not_negative, &shape->radius_to) &&
+           nb_value_vector(json, found[POINT], shape->point) && nb_value_direction(json, found[NORMAL], shape->normal);
+}
+
+static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count)
+{
+    const nb_json_node *found[SHAPE_KEY_COUNT];
+    nb_json *json = in->json;
+    const int type = nb_value_type(json, node, type_names, NEBEL_SHAPE_COUNT);
+    if (type < 0 || !nb_value_members(json, node, &shape_keys[type], found)) return false;
+    *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}}};
+    if (!read_members(json, found, shape)) return false;
+    if (found[SHAPES] != NULL) return read_parts(in, found[SHAPES], shape, leaf_count);
+    return count_leaf(json, node, leaf_count) && (found[MAX] == NULL || check_box(json, found[MAX], shape)) &&
+           (found[TO] == NULL || check_axis(json, found[TO], shape)) &&
+           (found[RADIUS_TO] == NULL || check_cone(json, found[RADIUS_TO], shape)) &&
+           (found[PLANES] == NULL || read_planes(in, found[PLANES], shape));
+}
+
+bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+{
+    size_t leaf_count = 0;
+    return read_shape(in, node, shape, &leaf_count);
+}

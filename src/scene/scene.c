@@ -1,0 +1,209 @@
+/* Scenes: read, kept, given back. */
+#include "scene/file.h"
+#include "scene/path.h"
+#include "scene/scene_internal.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* The longest scene file. */
+#define TEXT_LIMIT ((size_t)1 << 30)
+
+enum { NEBEL, CAMERA, BACKGROUND, SUN, AMBIENT, LIGHTS, MODELS, FOG, SECTION_COUNT };
+
+static const char *const section_names[] = {"nebel",   "camera", "background", "sun",
+                                            "ambient", "lights", "models",     "fog"};
+static const char *const streamed_names[] = {"lights", "models", "fog", NULL};
+static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
+                                     NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
+
+/* ---- reading
+ * --------------------------------------------------------------------------------------------------------- */
+
+static bool read_version(nb_json *json, const nb_json_node *node)
+{
+    double version = 0;
+    if (!nb_value_number(json, node, &nb_range_any, &version)) return false;
+    if (version == 1) return true;
+    return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node, "is %.15g; this program reads version 1", version);
+}
+
+static bool read_section(nb_scene_reader *in, const nb_json_node *node)
+{
+    nebel_scene_data *data = &in->scene->data;
+    const int section = nb_value_find_key(in->json, node, &section_keys);
+    if (section < 0) return false;
+    if ((in->seen & NB_BIT(section)) != 0)
+        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node, "the key appears twice; remove one");
+    in->seen |= NB_BIT(section);
+    switch (section) {
+    case NEBEL:
+        return read_version(in->json, node);
+    case CAMERA:
+        return nb_read_camera(in, node);
+    case BACKGROUND:
+        return nb_value_color(in->json, node, &nb_range_not_negative, data->background);
+    case SUN:
+        return nb_read_sun(in, node);
+    case AMBIENT:
+        return nb_value_color(in->json, node, &nb_range_not_negative, data->ambient);
+    default:
+        return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
+    }
+}
+
+static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
+{
+    if (nb_json_has_key(array, "fog")) return nb_read_volume(in, node);
+    if (nb_json_has_key(array, "models")) return nb_read_model(in, node);
+    return nb_read_light(in, node);
+}
+
+/* Sections come in any order, so what joins two of them waits for the end. */
+static bool check_whole(nb_scene_reader *in, const nb_json_node *root)
+{
+    const double *sun = in->scene->data.sun_irradiance;
+    const uint32_t missing = section_keys.required & ~in->seen;
+    if (missing != 0)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, root, "the key \"%s\" is missing; a scene needs it",
+                            (missing & NB_BIT(NEBEL)) != 0 ? "nebel" : "fog");
+    if (in->lit_offset == 0 || (sun[0] == 0 && sun[1] == 0 && sun[2] == 0)) return true;
+    return nb_json_fail_at(
+        in->json, NEBEL_ERROR_UNSUPPORTED, in->lit_offset, in->lit_path,
+        "this version cannot light fog with the sun; give the volume a \"source\" instead, or remove "
+        "\"sun\"");
+}
+
+static bool take(nb_json *json, const nb_json_node *value, void *user)
+{
+    nb_scene_reader *in = user;
+    const nb_json_node *parent = nb_json_parent(json, value);
+    if (parent == NULL) return check_whole(in, value);
+    return nb_json_parent(json, parent) == NULL ? read_section(in, value) : read_element(in, parent, value);
+}
+
+static void keep_core_message(nebel_result result, const char *message, void *user)
+{
+    nb_scene_reader *in = user;
+    (void)result;
+    snprintf(in->core_message, sizeof in->core_message, "%s", message);
+}
+
+static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name)
+{
+    nb_json json;
+    nb_scene_reader in = {.json = &json, .scene = scene};
+    const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {keep_core_message, &in}};
+    const nb_json_desc desc = {.text = text,
+                               .size = size,
+                               .name = name,
+                               .allocator = scene->allocator,
+                               .log = scene->log,
+                               .streamed = streamed_names,
+                               .take = take,
+                               .user = &in};
+    scene->folder = nb_path_folder(&scene->arena, name);
+    nebel_result result = scene->folder != NULL ? nebel_create_fog(&fog, &in.trial) : NEBEL_ERROR_MEMORY;
+    if (result != NEBEL_OK) return nb_fail(&scene->log, result, "%s: %s", name, nebel_result_text(result));
+    result = nb_json_read(&json, &desc);
+    nebel_destroy_fog(in.trial);
+    scene->data.volumes = scene->volumes;
+    scene->data.volume_names = scene->volume_names;
+    return result;
+}
+
+static nebel_scene *create_scene(const nebel_scene_desc *desc)
+{
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    nebel_scene *scene = nb_allocate_zero(&allocator, 1, sizeof *scene);
+    if (scene == NULL) return NULL;
+    scene->allocator = scene->arena.allocator = allocator;
+    scene->log = desc->log;
+    scene->data.camera = nb_camera_default();
+    return scene;
+}
+
+static nebel_result check_arguments(const char *name, const void *text, size_t size, const nebel_scene_desc *desc,
+                                    nebel_scene **scene)
+{
+    if (scene != NULL) *scene = NULL;
+    if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (name == NULL || scene == NULL || (text == NULL && size > 0))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "a scene needs a text, a name and a place to go; one is NULL");
+    if (!nb_allocator_is_valid(&desc->allocator))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    return NEBEL_OK;
+}
+
+nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
+                               nebel_scene **scene)
+{
+    nebel_result result = check_arguments(name, text, size, desc, scene);
+    if (result != NEBEL_OK) return result;
+    if (size > TEXT_LIMIT)
+        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "%s: larger than %zu bytes, the most that is read", name,
+                       TEXT_LIMIT);
+    nebel_scene *fresh = create_scene(desc);
+    if (fresh == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", name);
+    result = read_scene(fresh, text, size, name);
+    if (result == NEBEL_OK)
+        *scene = fresh;
+    else
+        nebel_destroy_scene(fresh);
+    return result;
+}
+
+nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, nebel_scene **scene)
+{
+    nb_bytes bytes;
+    nebel_result result = check_arguments(path, path, 0, desc, scene);
+    if (result != NEBEL_OK) return result;
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    result = nb_file_read(&allocator, &desc->log, NULL, "scene", path, TEXT_LIMIT, &bytes);
+    if (result != NEBEL_OK) return result;
+    result = nebel_parse_scene((const char *)bytes.data, bytes.size, path, desc, scene);
+    nb_release(&allocator, bytes.data);
+    return result;
+}
+
+/* ---- the scene
+ * ------------------------------------------------------------------------------------------------------- */
+
+const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene)
+{
+    return &scene->data;
+}
+
+static nebel_result add_volumes(nebel_fog *fog, const nebel_scene_data *data)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++)
+        result = nebel_add_volume(fog, &data->volumes[i], NULL);
+    return result;
+}
+
+nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)
+{
+    if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_fog *fog = NULL;
+    nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
+    *snapshot = NULL;
+    memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
+    nebel_result result = nebel_create_fog(&desc, &fog);
+    if (result == NEBEL_OK) result = add_volumes(fog, &scene->data);
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);
+    nebel_destroy_fog(fog);
+    return result;
+}
+
+void nebel_destroy_scene(nebel_scene *scene)
+{
+    if (scene == NULL) return;
+    const nebel_allocator allocator = scene->allocator;
+    nb_models_release(scene);
+    nb_arena_release(&scene->arena);
+    nb_release(&allocator, scene->volumes);
+    nb_release(&allocator, (void *)scene->volume_names);
+    nb_release(&allocator, scene->models);
+    nb_release(&allocator, scene);
+}

@@ -1,0 +1,74 @@
+/* What a scene is inside, and the readers of its sections. */
+#ifndef NB_SCENE_INTERNAL_H
+#define NB_SCENE_INTERNAL_H
+
+#include <nebel/scene.h>
+
+#include "scene/value.h"
+
+/* A model or height field as the file describes it. */
+typedef struct nb_model_source {
+    const char *file;  /* path, resolved against the scene's folder */
+    const char *where; /* "FILE:LINE:COLUMN: models[0].file", for messages */
+    bool is_heightfield;
+    double position[3], rotation[4], scale[3];
+    double size[2], height; /* height field */
+    bool has_color;
+    double color[3];
+} nb_model_source;
+
+/* Meshes and textures of loaded models. */
+typedef struct nb_model_set {
+    nebel_mesh *meshes;
+    size_t mesh_count, mesh_capacity;
+    nebel_texture *textures;
+    size_t texture_count, texture_capacity;
+    uint64_t triangle_count;
+} nb_model_set;
+
+struct nebel_scene {
+    nebel_allocator allocator;
+    nebel_log log;
+    nb_arena arena;
+    const char *folder; /* of the file, ending in a slash; "" is the current one */
+    nebel_scene_data data;
+
+    nebel_volume_desc *volumes;
+    const char **volume_names;
+    size_t volume_capacity, name_capacity;
+
+    nb_model_source *models;
+    size_t model_count, model_capacity;
+    nb_model_set loaded;
+    bool models_loaded;
+};
+
+/* What reading needs beside the scene itself. */
+typedef struct nb_scene_reader {
+    nb_json *json;
+    nebel_scene *scene;
+    nebel_fog *trial;       /* takes every volume once, for the core's own checks */
+    char core_message[512]; /* what the core said about the last one */
+    uint32_t seen;          /* sections */
+    size_t lit_offset;      /* of the first albedo that is not 0; 0: none */
+    char lit_path[NB_JSON_PATH];
+} nb_scene_reader;
+
+bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
+bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
+
+nebel_camera nb_camera_default(void);
+
+/* True when position and look_at differ and up is not along the view. */
+bool nb_camera_is_apart(const nebel_camera *camera);
+bool nb_camera_is_upright(const nebel_camera *camera);
+
+void nb_models_release(nebel_scene *scene);
+
+#endif

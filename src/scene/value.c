@@ -1,0 +1,257 @@
+#include "scene/value.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+const nb_range nb_range_any = {-HUGE_VAL, HUGE_VAL, false, "a number"};
+const nb_range nb_range_positive = {0, HUGE_VAL, true, "a number > 0"};
+const nb_range nb_range_not_negative = {0, HUGE_VAL, false, "a number >= 0"};
+const nb_range nb_range_fraction = {0, 1, false, "a number from 0 to 1"};
+
+/* ---- names
+ * ----------------------------------------------------------------------------------------------------------- */
+
+/* Lists in messages are cut at this size. */
+enum { LIST_SIZE = 480 };
+
+typedef struct list {
+    char text[LIST_SIZE];
+    size_t size;
+} list;
+
+static void append(list *names, const char *separator, const char *name)
+{
+    const size_t room = sizeof names->text - names->size;
+    const int length = snprintf(names->text + names->size, room, "%s%s", names->size > 0 ? separator : "", name);
+    if (length > 0) names->size += (size_t)length < room ? (size_t)length : room - 1;
+}
+
+static bool is_near(const char *word, size_t size, const char *name)
+{
+    const size_t length = strlen(name), limit = length < 5 ? 1 : length < 10 ? 2 : 3;
+    return nb_text_distance(word, size, name, length) <= limit;
+}
+
+/* "; did you mean "radius"?" for the nearest of the allowed names, "" where none is near. */
+static void suggest(const char *word, size_t size, const char *const *names, uint32_t count, uint32_t allowed,
+                    char text[64])
+{
+    size_t best = SIZE_MAX;
+    text[0] = '\0';
+    for (uint32_t i = 0; i < count; i++) {
+        if ((allowed & NB_BIT(i)) == 0 || !is_near(word, size, names[i])) continue;
+        const size_t distance = nb_text_distance(word, size, names[i], strlen(names[i]));
+        if (distance >= best) continue;
+        best = distance;
+        snprintf(text, 64, "; did you mean \"%s\"?", names[i]);
+    }
+}
+
+static void fail_unknown_key(nb_json *json, const nb_json_node *node, const nb_keys *keys)
+{
+    list allowed = {.size = 0};
+    char suggestion[64];
+    for (uint32_t i = 0; i < keys->count; i++)
+        if ((keys->allowed & NB_BIT(i)) != 0) append(&allowed, ", ", keys->names[i]);
+    suggest(node->key, node->key_size, keys->names, keys->count, keys->allowed, suggestion);
+    nb_json_fail_key(json, NEBEL_ERROR_FORMAT, node, "unknown key; %s has: %s%s", keys->owner, allowed.text,
+                     suggestion);
+}
+
+int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys)
+{
+    for (uint32_t i = 0; i < keys->count; i++)
+        if ((keys->allowed & NB_BIT(i)) != 0 && nb_json_has_key(node, keys->names[i])) return (int)i;
+    fail_unknown_key(json, node, keys);
+    return -1;
+}
+
+static bool fail_missing(nb_json *json, const nb_json_node *object, const nb_keys *keys, uint32_t missing)
+{
+    uint32_t i = 0;
+    while ((missing & NB_BIT(i)) == 0) i++;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, object, "the key \"%s\" is missing; %s needs it", keys->names[i],
+                        keys->owner);
+}
+
+bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found)
+{
+    uint32_t seen = 0;
+    if (!nb_value_is(json, object, NB_JSON_OBJECT, "an object {...}")) return false;
+    for (uint32_t i = 0; i < keys->count; i++) found[i] = NULL;
+    for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node)) {
+        const int key = nb_value_find_key(json, node, keys);
+        if (key < 0) return false;
+        if ((seen & NB_BIT(key)) != 0)
+            return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, node, "the key appears twice; remove one");
+        seen |= NB_BIT(key);
+        found[key] = node;
+    }
+    const uint32_t missing = keys->required & ~seen;
+    return missing == 0 || fail_missing(json, object, keys, missing);
+}
+
+int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count)
+{
+    list allowed = {.size = 0};
+    char suggestion[64];
+    for (int i = 0; i < count; i++) {
+        const size_t size = strlen(names[i]);
+        const bool equal = node->string_size == size && memcmp(node->string, names[i], size) == 0;
+        if (node->type == NB_JSON_STRING && equal) return i;
+        append(&allowed, ", ", names[i]);
+    }
+    if (node->type != NB_JSON_STRING) {
+        nb_value_is(json, node, NB_JSON_STRING, "a string");
+        return -1;
+    }
+    suggest(node->string, node->string_size, names, (uint32_t)count, UINT32_MAX, suggestion);
+    nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "unknown; must be one of: %s%s", allowed.text, suggestion);
+    return -1;
+}
+
+int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *names, int count)
+{
+    list allowed = {.size = 0};
+    if (!nb_value_is(json, object, NB_JSON_OBJECT, "an object {\"type\": ...}")) return -1;
+    for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node))
+        if (nb_json_has_key(node, "type")) return nb_value_choice(json, node, names, count);
+    for (int i = 0; i < count; i++) append(&allowed, ", ", names[i]);
+    nb_json_fail(json, NEBEL_ERROR_FORMAT, object, "the key \"type\" is missing; must be one of: %s", allowed.text);
+    return -1;
+}
+
+/* ---- numbers
+ * --------------------------------------------------------------------------------------------------------- */
+
+static const char *const type_names[] = {"null", "true or false", "a number", "a string", "an array", "an object"};
+
+bool nb_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, const char *wanted)
+{
+    if (node->type == type) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %s; must be %s", type_names[node->type], wanted);
+}
+
+bool nb_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value)
+{
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_NUMBER, range->text)) return false;
+    const double number = node->number;
+    const bool inside =
+        range->open ? number > range->low && number < range->high : number >= range->low && number <= range->high;
+    if (!inside) return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %.15g; must be %s", number, range->text);
+    *value = number;
+    return true;
+}
+
+bool nb_value_integer(nb_json *json, const nb_json_node *node, int low, int high, int *value)
+{
+    char text[64];
+    double number = 0;
+    if (node == NULL) return true;
+    snprintf(text, sizeof text, "a whole number from %d to %d", low, high);
+    const nb_range range = {low, high, false, text};
+    if (!nb_value_number(json, node, &range, &number)) return false;
+    if (number != floor(number))
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %.15g; must be %s", number, text);
+    *value = (int)number;
+    return true;
+}
+
+bool nb_value_numbers(nb_json *json, const nb_json_node *node, const nb_range *range, size_t count, double *values)
+{
+    if (node == NULL) return true;
+    if (node->type != NB_JSON_ARRAY)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %s; must be an array of %zu numbers",
+                            type_names[node->type], count);
+    if (node->count != count)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %lu elements; must be an array of %zu numbers",
+                            (unsigned long)node->count, count);
+    const nb_json_node *element = nb_json_first(json, node);
+    for (size_t i = 0; i < count; i++, element = nb_json_next(json, element))
+        if (!nb_value_number(json, element, range, &values[i])) return false;
+    return true;
+}
+
+bool nb_value_vector(nb_json *json, const nb_json_node *node, double vector[3])
+{
+    return nb_value_numbers(json, node, &nb_range_any, 3, vector);
+}
+
+static bool is_zero(const double *vector, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (vector[i] != 0) return false;
+    return true;
+}
+
+bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3])
+{
+    if (node == NULL) return true;
+    if (!nb_value_vector(json, node, vector)) return false;
+    if (!is_zero(vector, 3)) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has no direction; one number must not be 0");
+}
+
+bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4])
+{
+    if (node == NULL) return true;
+    if (!nb_value_numbers(json, node, &nb_range_any, 4, rotation)) return false;
+    if (is_zero(rotation, 4))
+        return nb_json_fail(
+            json, NEBEL_ERROR_FORMAT, node,
+            "a quaternion [x, y, z, w] of zeros is no rotation; [0, 0, 0, 1] leaves things as they are");
+    nb_vector_normalize(rotation, 4);
+    return true;
+}
+
+static bool read_one_or_three(nb_json *json, const nb_json_node *node, const nb_range *range, const char *wanted,
+                              double values[3])
+{
+    if (node->type == NB_JSON_ARRAY) return nb_value_numbers(json, node, range, 3, values);
+    if (!nb_value_is(json, node, NB_JSON_NUMBER, wanted) || !nb_value_number(json, node, range, &values[0]))
+        return false;
+    values[1] = values[2] = values[0];
+    return true;
+}
+
+bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3])
+{
+    if (node == NULL) return true;
+    if (!read_one_or_three(json, node, &nb_range_any, "a number or an array of 3 numbers", scale)) return false;
+    if (scale[0] != 0 && scale[1] != 0 && scale[2] != 0) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                        "a scale of 0 makes the transform singular; every scale must differ from 0");
+}
+
+bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3])
+{
+    if (node == NULL) return true;
+    return read_one_or_three(json, node, range, "a number or an array of 3 numbers [r, g, b]", color);
+}
+
+void nb_vector_normalize(double *vector, size_t count)
+{
+    double largest = 0, square = 0;
+    for (size_t i = 0; i < count; i++) largest = fmax(largest, fabs(vector[i]));
+    if (!(largest > 0)) return;
+    for (size_t i = 0; i < count; i++) {
+        vector[i] /= largest;
+        square += vector[i] * vector[i];
+    }
+    for (size_t i = 0; i < count; i++) vector[i] /= sqrt(square);
+}
+
+/* ---- text
+ * ------------------------------------------------------------------------------------------------------------ */
+
+bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text)
+{
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_STRING, "a string")) return false;
+    if (node->string_size > 0 && memchr(node->string, '\0', node->string_size) != NULL)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds a zero character (\\u0000); remove it");
+    *text = nb_arena_copy_text(arena, node->string, node->string_size);
+    return *text != NULL || nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+}

@@ -1,0 +1,57 @@
+/* Checked values out of a JSON tree. Every function logs what is wrong with the place, and what is allowed, and then
+ * returns false. Where `node` is NULL (the key is absent) the readers leave their target as it is and return true. */
+#ifndef NB_SCENE_VALUE_H
+#define NB_SCENE_VALUE_H
+
+#include "scene/json.h"
+
+/* The keys an object may have, at most 32; bit i of a mask stands for names[i]. */
+typedef struct nb_keys {
+    const char *const *names;
+    uint32_t count;
+    uint32_t allowed, required;
+    const char *owner; /* "a sphere": whose keys they are, in messages */
+} nb_keys;
+
+#define NB_BIT(i) ((uint32_t)1 << (i))
+
+/* Sorts the members of an object into found[0..count), NULL where absent. Unknown, repeated and missing keys are
+ * errors. */
+bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found);
+
+/* Where `key` is among names: its index; otherwise an error at the key that lists the allowed ones and returns -1. */
+int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys);
+
+/* The type of an object's tree: the value of its member "type", as an index into names; -1 after an error. */
+int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *names, int count);
+
+/* An index into names, of a string; -1 after an error. */
+int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count);
+
+bool nb_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, const char *wanted);
+
+/* A closed or open interval of numbers, and its name in messages. */
+typedef struct nb_range {
+    double low, high;
+    bool open; /* without its ends */
+    const char *text;
+} nb_range;
+
+extern const nb_range nb_range_any, nb_range_positive, nb_range_not_negative, nb_range_fraction;
+
+bool nb_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value);
+bool nb_value_integer(nb_json *json, const nb_json_node *node, int low, int high, int *value);
+bool nb_value_numbers(nb_json *json, const nb_json_node *node, const nb_range *range, size_t count, double *values);
+bool nb_value_vector(nb_json *json, const nb_json_node *node, double vector[3]);
+bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3]);  /* not zero; length kept */
+bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4]); /* not zero; normalised */
+bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3]);       /* one number or three, none 0 */
+bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3]); /* one or three */
+
+/* Copies a string without zero bytes into the arena. */
+bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text);
+
+/* Makes the vector of `count` numbers a unit one, whatever its length. */
+void nb_vector_normalize(double *vector, size_t count);
+
+#endif
