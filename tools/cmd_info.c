@@ -1,0 +1,126 @@
+/* nebel info: what this program is, and what is in a scene. */
+#include "commands.h"
+#include "info_scene.h"
+#include "isa.h"
+#include "report.h"
+#include "workers.h"
+
+#include <nebel/nebel.h>
+#include <nebel/render.h>
+#include <nebel/scene.h>
+
+#include <stdio.h>
+#include <string.h>
+
+static const char about[] = "Without SCENE: version, compiler, libraries, processor, instruction sets and\n"
+                            "threads, as bug reports need them.\n"
+                            "\n"
+                            "With SCENE: checks the file and its models and says what is in them (camera,\n"
+                            "light, fog by shape and density, triangles, bounds), how far one sees from the\n"
+                            "camera, and what looks like a mistake.\n";
+
+static const char examples[] = "Examples:\n"
+                               "  nebel info\n"
+                               "  nebel info mist.json\n"
+                               "\n"
+                               "Exit status: 0 done, 1 the scene or a model is wrong, 2 the call was wrong.\n";
+
+#if defined(__clang__)
+#define COMPILER "clang " __clang_version__
+#elif defined(__GNUC__)
+#define COMPILER "gcc " __VERSION__
+#else
+#define COMPILER "unknown"
+#endif
+
+#if defined(__x86_64__)
+#define ARCHITECTURE "x86-64"
+#elif defined(__aarch64__)
+#define ARCHITECTURE "aarch64"
+#else
+#define ARCHITECTURE "another architecture"
+#endif
+
+#if defined(__OPTIMIZE__)
+#define OPTIMIZATION "optimized"
+#else
+#define OPTIMIZATION "not optimized"
+#endif
+
+#if defined(NDEBUG)
+#define ASSERTIONS "without assertions"
+#else
+#define ASSERTIONS "with assertions"
+#endif
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define SANITIZER ", with AddressSanitizer"
+#endif
+#elif defined(__SANITIZE_ADDRESS__)
+#define SANITIZER ", with AddressSanitizer"
+#endif
+#if !defined(SANITIZER)
+#define SANITIZER ""
+#endif
+
+/* The name that Linux gives the processor; "unknown" elsewhere. */
+static void read_processor(char *name, size_t size)
+{
+    static const char key[] = "model name";
+    (void)snprintf(name, size, "unknown");
+    FILE *const file = fopen("/proc/cpuinfo", "r");
+    if (file == NULL) return;
+    char line[512];
+    while (fgets(line, sizeof line, file) != NULL) {
+        const char *const colon = strchr(line, ':');
+        if (colon == NULL || strncmp(line, key, sizeof key - 1) != 0) continue;
+        line[strcspn(line, "\n")] = '\0';
+        (void)snprintf(name, size, "%s", colon + 1 + strspn(colon + 1, " \t"));
+        break;
+    }
+    (void)fclose(file);
+}
+
+static void print_instruction_sets(void)
+{
+    (void)printf("instruction sets:");
+    for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
+        if (nebel_isa_available((nebel_isa)isa)) (void)printf(" %s", nebel_isa_name((nebel_isa)isa));
+    }
+    (void)printf("\nchosen: %s\n", nebel_isa_name(nb_isa_best()));
+}
+
+static int print_program(void)
+{
+    char processor[256];
+    read_processor(processor, sizeof processor);
+    (void)printf("nebel %s\n", nebel_version());
+    (void)printf("compiler: %s\n", COMPILER);
+    (void)printf("build: %s, %s, %s%s\n", ARCHITECTURE, OPTIMIZATION, ASSERTIONS, SANITIZER);
+    (void)printf("scene libraries: %s\n", nebel_scene_libraries());
+    (void)printf("renderer libraries: %s\n", nebel_renderer_libraries());
+    (void)printf("processor: %s\n", processor);
+    print_instruction_sets();
+    (void)printf("threads: %d\n", nb_workers_available());
+    return NB_DONE;
+}
+
+static int run(int count, char **words)
+{
+    nb_arguments arguments;
+    const int status = nb_options_parse(&nb_commands_info, count, words, &arguments);
+    if (status >= 0) return status;
+    return arguments.operand_count == 0 ? print_program() : nb_info_print_scene(arguments.operands[0]);
+}
+
+const nb_command nb_commands_info = {
+    .name = "info",
+    .summary = "what this program is, or what is in a scene",
+    .synopsis = "[SCENE]",
+    .about = about,
+    .operands = "one scene file or nothing",
+    .most_operands = 1,
+    .examples = examples,
+    .run = run,
+};

@@ -1,0 +1,405 @@
+/* nebel render: a scene to a picture, or to many. */
+#define _POSIX_C_SOURCE 200809L
+
+#include "commands.h"
+#include "decimal.h"
+#include "interrupt.h"
+#include "isa.h"
+#include "load.h"
+#include "meter.h"
+#include "pattern.h"
+#include "report.h"
+#include "target.h"
+#include "workers.h"
+
+#include <nebel/render.h>
+
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { OUTPUT, SIZE, SAMPLES, EXPOSURE, FRAME, FRAMES, AOV, TOLERANCE, METHOD, DEVICE, ISA, THREADS, QUIET };
+
+static const nb_option options[] = {
+    [OUTPUT] = {"output", 'o', "FILE",
+                "The picture: .png (tone mapped, sRGB, 8 bit) or .exr\n(linear light, float). Needed."},
+    [SIZE] = {"size", 's', "WxH", "Pixels, each side 1 to 32768, 2^28 in all (--aov:\n2^26). Default: 1280x720."},
+    [SAMPLES] = {"samples", 0, "N", "Samples for each pixel, 1 to 4096. Default: 4."},
+    [EXPOSURE] = {"exposure", 'e', "EV", "Stops, -20 to 20: 1 doubles the light. PNG only.\nDefault: 0."},
+    [FRAME] = {"frame", 0, "N", "The frame of a moving camera, 0 to 1000000.\nDefault: 0."},
+    [FRAMES] = {"frames", 0, "A-B",
+                "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %)."},
+    [AOV] = {"aov", 0, NULL,
+             "EXR only: adds transmittance.{R,G,B},\nin_scattering.{R,G,B}, depth.Z (m, inf: nothing\n"
+             "there), normal.{X,Y,Z} and error (its bound)."},
+    [TOLERANCE] = {"tolerance", 0, "E",
+                   "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
+                   "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
+    [METHOD] = {"method", 0, "NAME", "exact, the only one in this version."},
+    [DEVICE] = {"device", 0, "NAME", "cpu (default); gl is not in this version."},
+    [ISA] = {"isa", 0, "NAME",
+             "Instruction set: scalar, sse2, avx2, avx512 or neon.\nDefault: the best of this processor."},
+    [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},
+    [QUIET] = {"quiet", 'q', NULL, "No progress bar and no summary; errors are still\nreported."},
+};
+
+static const char about[] = "Renders SCENE (JSON): models lit by the sun and the ambient light, in exact fog.\n"
+                            "\n"
+                            "A picture appears under its name when it is complete: it is written beside its\n"
+                            "place and renamed. Devices and pipes are written to directly. Ctrl-C ends the\n"
+                            "work and leaves nothing behind; pictures that were complete stay.\n"
+                            "\n"
+                            "Where standard error is a terminal, a bar shows how long it will take.\n";
+
+static const char examples[] = "Examples:\n"
+                               "  A first look, then the real one:\n"
+                               "    nebel render mist.json -o look.png --size 320x180 --samples 1\n"
+                               "    nebel render mist.json -o mist.png --size 1920x1080 --samples 16\n"
+                               "  Everything a compositor wants, in linear light:\n"
+                               "    nebel render mist.json -o mist.exr --aov\n"
+                               "  Four seconds of film:\n"
+                               "    nebel render orbit.json -o 'frames/orbit_%04d.png' --frames 0-95\n"
+                               "\n"
+                               "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
+
+/* Pictures of more samples are not written. */
+enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, LAST_FRAME = 1000000 };
+
+typedef struct settings {
+    const char *scene, *output;
+    nb_target_kind kind;
+    uint32_t width, height, samples;
+    double exposure, tolerance;
+    uint32_t first_frame, last_frame;
+    int many_frames, aov, quiet;
+    nebel_renderer_desc renderer;
+} settings;
+
+/* ---- the call ------------------------------------------------------------------------------------------------------
+ */
+
+/* "A<separator>B", two whole numbers up to `most`. */
+static int read_pair(const char *text, char separator, uint32_t most, uint32_t *a, uint32_t *b)
+{
+    const char *const middle = strchr(text, separator);
+    if (middle == NULL) return 0;
+    const int good = nb_decimal_read_whole(text, (size_t)(middle - text), a) == NB_DECIMAL_GOOD &&
+                     nb_decimal_read_whole(middle + 1, strlen(middle + 1), b) == NB_DECIMAL_GOOD;
+    return good && *a <= most && *b <= most;
+}
+
+static void read_size(nb_arguments *arguments, settings *wanted)
+{
+    wanted->width = 1280;
+    wanted->height = 720;
+    const char *const text = arguments->values[SIZE];
+    if (text == NULL) return;
+    const int good = read_pair(text, 'x', LARGEST_SIDE, &wanted->width, &wanted->height);
+    const uint64_t pixels = (uint64_t)wanted->width * wanted->height;
+    if (!good || pixels == 0) {
+        nb_options_reject(arguments, SIZE, "is no size such as 1280x720, each side from 1 to 32768");
+    } else if (pixels > (wanted->aov ? MOST_PIXELS_AOV : MOST_PIXELS)) {
+        nb_options_reject(arguments, SIZE, "is too large; 2^28 pixels are possible, 2^26 with --aov");
+    }
+}
+
+static void read_frames(nb_arguments *arguments, settings *wanted)
+{
+    wanted->first_frame = nb_options_whole(arguments, FRAME, 0, LAST_FRAME, 0);
+    wanted->last_frame = wanted->first_frame;
+    const char *const text = arguments->values[FRAMES];
+    wanted->many_frames = text != NULL;
+    if (text == NULL) return;
+    if (arguments->values[FRAME] != NULL) nb_options_reject(arguments, FRAMES, "contradicts --frame; leave one out");
+    const int good = read_pair(text, '-', LAST_FRAME, &wanted->first_frame, &wanted->last_frame);
+    if (good && wanted->first_frame <= wanted->last_frame) return;
+    nb_options_reject(arguments, FRAMES, "is no range such as 0-95, of frames up to 1000000");
+}
+
+static void read_output(nb_arguments *arguments, settings *wanted)
+{
+    wanted->output = arguments->values[OUTPUT];
+    if (wanted->output == NULL) {
+        nb_report_message("render: where to? add -o FILE.png or -o FILE.exr");
+        arguments->misused = 1;
+        return;
+    }
+    wanted->kind = nb_target_find_kind(wanted->output);
+    if (wanted->kind == NB_TARGET_NONE) nb_options_reject(arguments, OUTPUT, "ends neither in .png nor in .exr");
+    const char *const fault = wanted->many_frames ? nb_pattern_find_fault(wanted->output) : NULL;
+    if (fault != NULL) nb_options_reject(arguments, OUTPUT, fault);
+    if (wanted->kind == NB_TARGET_PNG && wanted->aov)
+        nb_options_reject(arguments, OUTPUT, "is no .exr; --aov needs one");
+    if (wanted->kind == NB_TARGET_EXR && arguments->values[EXPOSURE] != NULL) {
+        nb_options_reject(arguments, EXPOSURE, "is for PNG; an EXR keeps the light as it is");
+    }
+}
+
+/* NB_DONE, or NB_FAILED where something known is not in this version. */
+static int read_device(nb_arguments *arguments)
+{
+    static const char *const devices[] = {"cpu", "gl", NULL};
+    static const char *const methods[] = {"exact", NULL};
+    (void)nb_options_choice(arguments, METHOD, methods, 0);
+    const int device = nb_options_choice(arguments, DEVICE, devices, 0);
+    if (device == 0 || arguments->misused) return NB_DONE;
+    return nb_report_failure("render: --device: %s is not in this version; leave it out or say cpu", devices[device]);
+}
+
+/* -1 to go on, or the exit status. */
+static int read_settings(nb_arguments *arguments, settings *wanted)
+{
+    wanted->scene = arguments->operands[0];
+    wanted->aov = arguments->values[AOV] != NULL;
+    wanted->quiet = arguments->values[QUIET] != NULL;
+    wanted->samples = nb_options_whole(arguments, SAMPLES, 1, 4096, 4);
+    wanted->exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
+    wanted->tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
+    if (wanted->tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");
+    wanted->renderer.threads = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
+    wanted->renderer.isa = nb_isa_choose(arguments, ISA);
+    read_size(arguments, wanted);
+    read_frames(arguments, wanted);
+    read_output(arguments, wanted);
+    const int status = read_device(arguments);
+    if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
+    if (status != NB_DONE) return status;
+    return nb_isa_check("render", wanted->renderer.isa) == NB_DONE ? -1 : NB_FAILED;
+}
+
+/* The file name of a frame; free it. NULL after a message. */
+static char *name_picture(const settings *wanted, uint32_t frame)
+{
+    char *const name = wanted->many_frames ? nb_pattern_expand(wanted->output, frame) : strdup(wanted->output);
+    if (name == NULL) (void)nb_report_failure("render: %s: memory is out", wanted->output);
+    return name;
+}
+
+/* Before minutes of work: every picture has a place to go to. */
+static int check_targets(const settings *wanted)
+{
+    for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
+        char *const name = name_picture(wanted, frame);
+        const int status = name != NULL ? nb_target_check("render", name) : NB_FAILED;
+        free(name);
+        if (status != NB_DONE) return status;
+    }
+    return NB_DONE;
+}
+
+/* ---- the pictures --------------------------------------------------------------------------------------------------
+ */
+
+/* The planes of a frame in the order of an EXR's channels. */
+typedef struct plane {
+    const char *names[3];
+    uint32_t channels;
+} plane;
+
+enum { COLOR, TRANSMITTANCE, IN_SCATTERING, DEPTH, NORMAL, ERROR, PLANES };
+
+static const plane planes[PLANES] = {
+    [COLOR] = {{"R", "G", "B"}, 3},
+    [TRANSMITTANCE] = {{"transmittance.R", "transmittance.G", "transmittance.B"}, 3},
+    [IN_SCATTERING] = {{"in_scattering.R", "in_scattering.G", "in_scattering.B"}, 3},
+    [DEPTH] = {{"depth.Z"}, 1},
+    [NORMAL] = {{"normal.X", "normal.Y", "normal.Z"}, 3},
+    [ERROR] = {{"error"}, 1},
+};
+
+enum { CHANNELS_AOV = 14 };
+
+/* What lives as long as all frames. */
+typedef struct studio {
+    const settings *wanted;
+    nb_report_listener listener;
+    nb_load_result loaded;
+    nebel_renderer *renderer;
+    float *samples[PLANES]; /* NULL: not wanted */
+    float *interleaved;     /* all planes pixel by pixel; NULL where there is only one */
+    nb_meter meter;
+    uint32_t frame;
+} studio;
+
+static float *allocate_pixels(const settings *wanted, uint32_t channels)
+{
+    const size_t most = SIZE_MAX / sizeof(float) / channels;
+    if (wanted->width > most / wanted->height) return NULL;
+    return malloc((size_t)wanted->width * wanted->height * channels * sizeof(float));
+}
+
+static int allocate_planes(studio *all)
+{
+    const int count = all->wanted->aov ? PLANES : 1;
+    int good = 1;
+    for (int i = 0; i < count && good; i++) {
+        all->samples[i] = allocate_pixels(all->wanted, planes[i].channels);
+        good = all->samples[i] != NULL;
+    }
+    if (good && count > 1) {
+        all->interleaved = allocate_pixels(all->wanted, CHANNELS_AOV);
+        good = all->interleaved != NULL;
+    }
+    if (good) return NB_DONE;
+    return nb_report_failure("render: --size: memory is out for %u x %u pixels; ask for fewer",
+                             (unsigned)all->wanted->width, (unsigned)all->wanted->height);
+}
+
+static void free_studio(studio *all)
+{
+    for (int i = 0; i < PLANES; i++) free(all->samples[i]);
+    free(all->interleaved);
+    nebel_destroy_renderer(all->renderer);
+    nb_load_free(&all->loaded);
+}
+
+/* Puts the plane's channels into every pixel, from channel `first` on. */
+static void interleave(const studio *all, int which, uint32_t first)
+{
+    const size_t pixels = (size_t)all->wanted->width * all->wanted->height;
+    const uint32_t channels = planes[which].channels;
+    for (size_t i = 0; i < pixels; i++) {
+        memcpy(all->interleaved + i * CHANNELS_AOV + first, all->samples[which] + i * channels,
+               channels * sizeof(float));
+    }
+}
+
+static int write_picture(studio *all, const char *name)
+{
+    const settings *const wanted = all->wanted;
+    const size_t pixels = (size_t)wanted->width * wanted->height;
+    const char *names[CHANNELS_AOV];
+    nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
+    for (int i = 0; i < PLANES && all->samples[i] != NULL; i++) {
+        if (all->interleaved != NULL) interleave(all, i, image.channel_count);
+        for (uint32_t c = 0; c < planes[i].channels; c++) names[image.channel_count++] = planes[i].names[c];
+    }
+    image.samples = all->interleaved != NULL ? all->interleaved : all->samples[COLOR];
+    if (wanted->kind == NB_TARGET_PNG) nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
+    const nebel_scene_desc desc = {.log = nb_report_log(&all->listener)};
+    const nebel_result result = nebel_write_image(name, &desc, &image);
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, name, result);
+}
+
+static int show_progress(size_t done, size_t total, void *user)
+{
+    studio *const all = user;
+    const settings *const wanted = all->wanted;
+    const uint32_t frames = wanted->last_frame - wanted->first_frame + 1;
+    const uint32_t before = all->frame - wanted->first_frame;
+    char label[64] = "";
+    if (frames > 1) (void)snprintf(label, sizeof label, "frame %u of %u", (unsigned)before + 1, (unsigned)frames);
+    const double share = total > 0 ? (double)done / (double)total : 0;
+    nb_meter_show(&all->meter, (before + share) / frames, label);
+    return nb_interrupt_is_requested();
+}
+
+static int render_frame(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const nebel_frame_desc desc = {
+        .camera = nebel_scene_camera(all->loaded.scene, all->frame),
+        .width = wanted->width,
+        .height = wanted->height,
+        .samples = wanted->samples,
+        .tolerance = wanted->tolerance,
+        .progress = show_progress,
+        .progress_user = all,
+    };
+    const nebel_frame frame = {
+        .color = all->samples[COLOR],
+        .transmittance = all->samples[TRANSMITTANCE],
+        .in_scattering = all->samples[IN_SCATTERING],
+        .depth = all->samples[DEPTH],
+        .normal = all->samples[NORMAL],
+        .error = all->samples[ERROR],
+    };
+    (void)show_progress(0, 1, all);
+    all->listener.mode = NB_REPORT_KEEP; /* that the frame was stopped is no news */
+    const nebel_result result = nebel_render_frame(all->renderer, &desc, &frame);
+    all->listener.mode = NB_REPORT_PRINT;
+    if (result == NEBEL_OK || nb_interrupt_is_requested()) return NB_DONE;
+    return nb_report_failure("render: %s: %s", wanted->scene,
+                             all->listener.kept[0] != '\0' ? all->listener.kept : nebel_result_text(result));
+}
+
+static int make_picture(studio *all)
+{
+    int status = render_frame(all);
+    if (status != NB_DONE || nb_interrupt_is_requested()) return status;
+    char *const name = name_picture(all->wanted, all->frame);
+    status = name != NULL ? write_picture(all, name) : NB_FAILED;
+    free(name);
+    return status;
+}
+
+static int set_up(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    int status = nb_load_scene(wanted->scene, 1, &all->listener, &all->loaded);
+    if (status != NB_DONE || nb_interrupt_is_requested()) return status;
+    status = allocate_planes(all);
+    if (status != NB_DONE) return status;
+    nebel_renderer_desc desc = wanted->renderer;
+    desc.log = nb_report_log(&all->listener);
+    const nebel_result result =
+        nebel_create_renderer(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->renderer);
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
+}
+
+static void summarize(const settings *wanted, double seconds)
+{
+    char span[32], count[32] = "";
+    nb_meter_write_span(seconds, span, sizeof span);
+    const unsigned frames = (unsigned)(wanted->last_frame - wanted->first_frame + 1);
+    if (wanted->many_frames) (void)snprintf(count, sizeof count, "%u picture%s, ", frames, frames > 1 ? "s" : "");
+    nb_report_message("%s: %s%u x %u, %u sample%s, %s", wanted->output, count, (unsigned)wanted->width,
+                      (unsigned)wanted->height, (unsigned)wanted->samples, wanted->samples > 1 ? "s" : "", span);
+}
+
+static int render(const settings *wanted)
+{
+    studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet)};
+    int status = set_up(&all);
+    for (all.frame = wanted->first_frame; all.frame <= wanted->last_frame; all.frame++) {
+        if (status != NB_DONE || nb_interrupt_is_requested()) break;
+        status = make_picture(&all);
+    }
+    const double seconds = nb_meter_end(&all.meter);
+    free_studio(&all);
+    if (nb_interrupt_is_requested() && all.frame <= wanted->last_frame) {
+        return nb_report_failure("render: %s: stopped; the picture in work was given up", wanted->output);
+    }
+    if (status == NB_DONE && !wanted->quiet) summarize(wanted, seconds);
+    return status;
+}
+
+static int run(int count, char **words)
+{
+    nb_arguments arguments;
+    settings wanted = {0};
+    int status = nb_options_parse(&nb_commands_render, count, words, &arguments);
+    if (status < 0) status = read_settings(&arguments, &wanted);
+    if (status >= 0) return status;
+    status = check_targets(&wanted);
+    if (status != NB_DONE) return status;
+    nb_interrupt_listen();
+    status = render(&wanted);
+    nb_interrupt_obey();
+    return status;
+}
+
+const nb_command nb_commands_render = {
+    .name = "render",
+    .summary = "a scene to a picture, or to many",
+    .synopsis = "SCENE -o FILE [options]",
+    .about = about,
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .operands = "one scene file",
+    .fewest_operands = 1,
+    .most_operands = 1,
+    .examples = examples,
+    .run = run,
+};

@@ -1,0 +1,214 @@
+#include "info_scene.h"
+
+#include "load.h"
+#include "report.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static const char *const shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_space", "box",         "sphere",
+                                                           "ellipsoid", "cylinder",   "capsule",     "cone",
+                                                           "convex",    "union",      "intersection"};
+static const char *const density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",   "linear",
+                                                               "radial",   "gaussian", "soft_edge"};
+
+enum { X, Y, Z };
+
+static const double degrees = 57.295779513082320877;
+
+/* ---- what it holds -------------------------------------------------------------------------------------------------
+ */
+
+static void print_triple(const char *before, const double *v)
+{
+    (void)printf("%s%g %g %g", before, v[X], v[Y], v[Z]);
+}
+
+static void print_camera(const nebel_scene_data *scene)
+{
+    const nebel_camera *const camera = &scene->camera;
+    (void)printf("camera:");
+    print_triple(" at ", camera->position);
+    print_triple(", towards ", camera->look_at);
+    switch (camera->projection) {
+    case NEBEL_PROJECTION_PERSPECTIVE:
+        (void)printf(", perspective, vertical field of view %g degrees\n", camera->vertical_fov);
+        break;
+    case NEBEL_PROJECTION_ORTHOGRAPHIC:
+        (void)printf(", orthographic, view height %g m\n", camera->view_height);
+        break;
+    case NEBEL_PROJECTION_PANORAMA:
+        (void)printf(", panorama\n");
+        break;
+    }
+    if (scene->turntable_frames > 0) {
+        (void)printf("motion: once around in %u frames\n", (unsigned)scene->turntable_frames);
+    } else if (scene->camera_key_count > 0) {
+        (void)printf("motion: %zu keys, frames %g to %g\n", scene->camera_key_count, scene->camera_keys[0].frame,
+                     scene->camera_keys[scene->camera_key_count - 1].frame);
+    }
+}
+
+static void print_light(const nebel_scene_data *scene)
+{
+    if (scene->has_sun) {
+        print_triple("sun: irradiance ", scene->sun_irradiance);
+        (void)printf(", %.3g degrees above the horizon\n", asin(fmin(fmax(scene->sun_direction[Y], -1), 1)) * degrees);
+    }
+    print_triple("ambient: ", scene->ambient);
+    print_triple("\nbackground: ", scene->background);
+    (void)printf("\n");
+}
+
+typedef struct box {
+    double min[3], max[3];
+} box;
+
+static void grow_box(box *bounds, const nebel_mesh *mesh)
+{
+    for (uint32_t v = 0; v < mesh->vertex_count; v++) {
+        for (int axis = X; axis <= Z; axis++) {
+            const double at = mesh->origin[axis] + (double)mesh->positions[3 * (size_t)v + (size_t)axis];
+            bounds->min[axis] = fmin(bounds->min[axis], at);
+            bounds->max[axis] = fmax(bounds->max[axis], at);
+        }
+    }
+}
+
+static void print_models(const nebel_scene_data *scene)
+{
+    const double far = (double)INFINITY;
+    box bounds = {{far, far, far}, {-far, -far, -far}};
+    size_t triangles = 0, vertices = 0;
+    for (size_t i = 0; i < scene->mesh_count; i++) {
+        triangles += scene->meshes[i].triangle_count;
+        vertices += scene->meshes[i].vertex_count;
+        grow_box(&bounds, &scene->meshes[i]);
+    }
+    (void)printf("models: %zu meshes, %zu triangles, %zu vertices, %zu textures\n", scene->mesh_count, triangles,
+                 vertices, scene->texture_count);
+    if (vertices == 0) return;
+    print_triple("bounds: ", bounds.min);
+    print_triple(" to ", bounds.max);
+    (void)printf(" (m)\n");
+}
+
+/* How many volumes have each shape and density. */
+typedef struct census {
+    size_t counts[NEBEL_SHAPE_COUNT][NEBEL_DENSITY_COUNT];
+    size_t excluded[NEBEL_SHAPE_COUNT];
+} census;
+
+static census count_volumes(const nebel_scene_data *scene)
+{
+    census all = {0};
+    for (size_t i = 0; i < scene->volume_count; i++) {
+        const nebel_volume_desc *const volume = &scene->volumes[i];
+        if (volume->operation == NEBEL_OPERATION_EXCLUDE) {
+            all.excluded[volume->shape.type]++;
+        } else {
+            all.counts[volume->shape.type][volume->density.type]++;
+        }
+    }
+    return all;
+}
+
+static void print_volumes(const nebel_scene_data *scene)
+{
+    const census all = count_volumes(scene);
+    (void)printf("fog: %zu volume%s\n", scene->volume_count, scene->volume_count == 1 ? "" : "s");
+    for (int s = 0; s < NEBEL_SHAPE_COUNT; s++) {
+        for (int d = 0; d < NEBEL_DENSITY_COUNT; d++) {
+            if (all.counts[s][d] > 0)
+                (void)printf("  %zu x %s, %s\n", all.counts[s][d], shape_names[s], density_names[d]);
+        }
+        if (all.excluded[s] > 0) (void)printf("  %zu x %s, excluded\n", all.excluded[s], shape_names[s]);
+    }
+}
+
+/* Where 5 % of the light of the green channel is left, straight ahead: the meteorological range in uniform fog. NaN:
+ * unknown. */
+static double visibility_of(const nebel_scene_data *scene, const nebel_snapshot *fog)
+{
+    const nebel_camera *const camera = &scene->camera;
+    nebel_ray ray = {.t_max = (double)INFINITY};
+    for (int axis = X; axis <= Z; axis++) {
+        ray.origin[axis] = camera->position[axis];
+        ray.direction[axis] = camera->look_at[axis] - camera->position[axis];
+    }
+    double distance;
+    const nebel_result result = nebel_find_transmittance(fog, 0.05, 1, 1, &ray, sizeof ray, &distance);
+    return result == NEBEL_OK ? distance : (double)NAN;
+}
+
+static void print_visibility(double visibility)
+{
+    if (isinf(visibility)) {
+        (void)printf("visibility: no end, straight ahead from the camera (5 %% of green light left)\n");
+    } else if (!isnan(visibility)) {
+        (void)printf("visibility: %.4g m, straight ahead from the camera (5 %% of green light left)\n", visibility);
+    }
+}
+
+/* ---- what looks like a mistake
+ * --------------------------------------------------------------------------------------- */
+
+static int is_black(const double *color)
+{
+    return color[0] == 0 && color[1] == 0 && color[2] == 0;
+}
+
+static const char *find_mistake(const nebel_scene_data *scene, const nebel_volume_desc *volume)
+{
+    if (volume->operation == NEBEL_OPERATION_EXCLUDE) return NULL;
+    const int glows = !is_black(volume->emission);
+    if (is_black(volume->extinction) && !glows) return "has no extinction and no emission: it cannot be seen";
+    const int scatters = !is_black(volume->albedo);
+    if (scatters && is_black(scene->ambient)) return "scatters light, but 'ambient' is black: it only absorbs";
+    if (!scatters && !glows && is_black(volume->source)) {
+        return "has neither source nor albedo nor emission: it only absorbs";
+    }
+    return NULL;
+}
+
+static void warn_of_volumes(const nebel_scene_data *scene)
+{
+    for (size_t i = 0; i < scene->volume_count; i++) {
+        const char *const mistake = find_mistake(scene, &scene->volumes[i]);
+        if (mistake == NULL) continue;
+        const char *const name = scene->volume_names[i];
+        (void)printf("warning: fog[%zu]%s%s%s %s\n", i, name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "",
+                     mistake);
+    }
+}
+
+static void warn_of_scene(const nebel_scene_data *scene, double visibility)
+{
+    size_t volumes = 0;
+    for (size_t i = 0; i < scene->volume_count; i++) volumes += scene->volumes[i].operation == NEBEL_OPERATION_ADD;
+    if (volumes == 0) (void)printf("warning: there is no fog\n");
+    if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
+    const int lit = (scene->has_sun && !is_black(scene->sun_irradiance)) || !is_black(scene->ambient);
+    if (scene->mesh_count > 0 && !lit) (void)printf("warning: no sun and no ambient light: the models are black\n");
+}
+
+int nb_info_print_scene(const char *path)
+{
+    nb_report_listener listener = {0};
+    nb_load_result loaded;
+    if (nb_load_scene(path, 0, &listener, &loaded) != NB_DONE) return NB_FAILED;
+    const nebel_result models = nebel_load_scene_models(loaded.scene);
+    const nebel_scene_data *const scene = nebel_scene_contents(loaded.scene);
+    const double visibility = visibility_of(scene, loaded.fog);
+    (void)printf("scene: %s\n", path);
+    print_camera(scene);
+    print_light(scene);
+    if (models == NEBEL_OK) print_models(scene);
+    print_volumes(scene);
+    print_visibility(visibility);
+    warn_of_volumes(scene);
+    warn_of_scene(scene, visibility);
+    const int status = models == NEBEL_OK ? NB_DONE : nb_report_result(&listener, path, models);
+    nb_load_free(&loaded);
+    return status;
+}

@@ -1,0 +1,14 @@
+/* Ctrl-C and its like: the work ends at the next good moment. */
+#ifndef NB_INTERRUPT_H
+#define NB_INTERRUPT_H
+
+/* From now on SIGINT, SIGTERM and SIGHUP ask the work to end; a second one ends the program at once. A signal that the
+ * caller has told the program to ignore stays ignored. */
+void nb_interrupt_listen(void);
+
+int nb_interrupt_is_requested(void);
+
+/* Where a signal came, ends the program by it, as the shell expects of an interrupted program; else returns. */
+void nb_interrupt_obey(void);
+
+#endif

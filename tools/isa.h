@@ -1,0 +1,19 @@
+/* Instruction sets by name. */
+#ifndef NB_ISA_H
+#define NB_ISA_H
+
+#include "options.h"
+
+#include <nebel/nebel.h>
+
+/* The value of an option --isa; DEFAULT where it is not given. An unknown name is reported as the other options' values
+ * are. */
+nebel_isa nb_isa_choose(nb_arguments *arguments, int option);
+
+/* NB_DONE, or NB_FAILED with a message where this processor or this build does not have it. */
+int nb_isa_check(const char *command, nebel_isa isa);
+
+/* What DEFAULT stands for on this processor. */
+nebel_isa nb_isa_best(void);
+
+#endif

@@ -1,0 +1,79 @@
+/* nebel: exact fog from the command line. */
+#include "commands.h"
+#include "output.h"
+#include "report.h"
+
+#include <nebel/nebel.h>
+
+#include <stdio.h>
+#include <string.h>
+
+static const nb_command *const commands[] = {&nb_commands_render, &nb_commands_trace, &nb_commands_info,
+                                             &nb_commands_compare};
+
+enum { COMMANDS = sizeof commands / sizeof *commands };
+
+/* Named in the plan, not in this version. */
+static const char view_name[] = "view";
+
+static int print_help(void)
+{
+    (void)printf("nebel: exact fog, in pictures and in numbers\n\nUsage: nebel COMMAND [options]\n\nCommands:\n");
+    for (int i = 0; i < COMMANDS; i++) (void)printf("  %-10s%s\n", commands[i]->name, commands[i]->summary);
+    (void)printf("\n"
+                 "Examples:\n"
+                 "  A picture of a scene:\n"
+                 "    nebel render mist.json -o mist.png\n"
+                 "  What fog does to the light along one ray, 50 m straight ahead:\n"
+                 "    echo '0 1.7 0  0 0 -1  50' | nebel trace mist.json\n"
+                 "\n"
+                 "  nebel COMMAND --help    options and examples of a command\n"
+                 "  nebel --version         the version\n"
+                 "\n"
+                 "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n");
+    return NB_DONE;
+}
+
+static int reject_command(const char *word)
+{
+    const char *names[COMMANDS + 1];
+    for (int i = 0; i < COMMANDS; i++) names[i] = commands[i]->name;
+    names[COMMANDS] = view_name;
+    const char *const kind = word[0] == '-' ? "option" : "command";
+    const char *const nearest = nb_options_nearest(word, names, COMMANDS + 1);
+    if (nearest == NULL) return nb_report_misuse(NULL, "there is no %s '%s'", kind, word);
+    return nb_report_misuse(NULL, "there is no %s '%s'; did you mean %s", kind, word, nearest);
+}
+
+static const nb_command *find_command(const char *name)
+{
+    for (int i = 0; i < COMMANDS; i++) {
+        if (strcmp(name, commands[i]->name) == 0) return commands[i];
+    }
+    return NULL;
+}
+
+static int print_version(void)
+{
+    (void)printf("nebel %s\n", nebel_version());
+    return NB_DONE;
+}
+
+static int run(int count, char **words)
+{
+    if (count == 0) return nb_report_misuse(NULL, "a command is missing");
+    const char *const word = words[0];
+    if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) return print_help();
+    if (strcmp(word, "--version") == 0) return print_version();
+    if (strcmp(word, view_name) == 0) {
+        return nb_report_failure("view: there is no viewer in this version; 'nebel render' makes pictures");
+    }
+    const nb_command *const command = find_command(word);
+    return command != NULL ? command->run(count - 1, words + 1) : reject_command(word);
+}
+
+int main(int count, char **words)
+{
+    nb_output_prepare();
+    return nb_output_finish(run(count > 0 ? count - 1 : 0, words + 1));
+}

@@ -1,0 +1,100 @@
+#define _POSIX_C_SOURCE 200809L
+#define _DEFAULT_SOURCE
+
+#include "meter.h"
+
+#include "report.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <time.h>
+#include <unistd.h>
+
+/* Between two drawings, and before the first guess of the time left, in seconds. */
+static const double drawing_pause = 0.1;
+static const double guessing_pause = 0.5;
+
+enum { DEFAULT_COLUMNS = 80, WIDEST_BAR = 40, NARROWEST_BAR = 8 };
+
+double nb_meter_clock(void)
+{
+    struct timespec now;
+    if (clock_gettime(CLOCK_MONOTONIC, &now) != 0) return 0;
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+nb_meter nb_meter_start(int quiet)
+{
+    const char *const terminal = getenv("TERM");
+    const int able = terminal != NULL && terminal[0] != '\0' && strcmp(terminal, "dumb") != 0;
+    return (nb_meter){.visible = !quiet && able && isatty(STDERR_FILENO), .started = nb_meter_clock(), .drawn = -1};
+}
+
+void nb_meter_write_span(double seconds, char *text, size_t size)
+{
+    if (seconds < 9.95) {
+        (void)snprintf(text, size, "%.2g s", seconds < 0.01 ? 0.01 : seconds);
+        return;
+    }
+    const long whole = seconds < 1e9 ? (long)(seconds + 0.5) : 1000000000;
+    if (whole < 60) {
+        (void)snprintf(text, size, "%ld s", whole);
+    } else if (whole < 3600) {
+        (void)snprintf(text, size, "%ld min %02ld s", whole / 60, whole % 60);
+    } else {
+        (void)snprintf(text, size, "%ld h %02ld min", whole / 3600, whole / 60 % 60);
+    }
+}
+
+static int terminal_columns(void)
+{
+    struct winsize window;
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) != 0 || window.ws_col == 0) return DEFAULT_COLUMNS;
+    return window.ws_col;
+}
+
+/* "LABEL [#####.....]  45 %  12 s left", as much of it as the terminal is wide. */
+static void draw(double done, const char *label, const char *left)
+{
+    char bar[WIDEST_BAR + 3] = "", line[256];
+    const int columns = terminal_columns();
+    const int rest = (int)strlen(label) + (int)strlen(left) + 16;
+    int width = columns - rest;
+    if (width > WIDEST_BAR) width = WIDEST_BAR;
+    if (width >= NARROWEST_BAR) {
+        const int full = (int)(done * width);
+        bar[0] = '[';
+        memset(bar + 1, '#', (size_t)full);
+        memset(bar + 1 + full, '.', (size_t)(width - full));
+        bar[width + 1] = ']';
+    }
+    const int size = snprintf(line, sizeof line, "%s%s%s %3d %%%s%s", label, label[0] != '\0' ? " " : "", bar,
+                              (int)(100 * done), left[0] != '\0' ? "  " : "", left);
+    if (size >= columns && columns < (int)sizeof line) line[columns > 0 ? columns - 1 : 0] = '\0';
+    nb_report_status(line);
+}
+
+void nb_meter_show(nb_meter *meter, double done, const char *label)
+{
+    if (!meter->visible) return;
+    const double now = nb_meter_clock();
+    if (meter->drawn >= 0 && now - meter->drawn < drawing_pause) return;
+    meter->drawn = now;
+    char span[32], left[48] = "";
+    const double share = done > 1 ? 1 : done < 0 ? 0 : done;
+    const double spent = now - meter->started;
+    if (spent > guessing_pause && share > 0) {
+        const double remaining = spent * (1 - share) / share;
+        nb_meter_write_span(remaining < 1 ? 1 : remaining, span, sizeof span);
+        (void)snprintf(left, sizeof left, "%s left", span);
+    }
+    draw(share, label, left);
+}
+
+double nb_meter_end(nb_meter *meter)
+{
+    if (meter->visible) nb_report_status("");
+    return nb_meter_clock() - meter->started;
+}

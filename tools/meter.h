@@ -1,0 +1,28 @@
+/* A bar on the terminal that says how far the work is and how long it will take. */
+#ifndef NB_METER_H
+#define NB_METER_H
+
+#include <stddef.h>
+
+typedef struct nb_meter {
+    int visible;
+    double started, drawn; /* s */
+} nb_meter;
+
+/* Seconds since some moment; never goes back. */
+double nb_meter_clock(void);
+
+/* Starts the clock. The bar is drawn only where standard error is a terminal that can go back to the beginning of a
+ * line. */
+nb_meter nb_meter_start(int quiet);
+
+/* `done` of all the work, 0 to 1; `label` may be "". Cheap to call often. */
+void nb_meter_show(nb_meter *meter, double done, const char *label);
+
+/* Clears the bar. Returns the seconds since the start. */
+double nb_meter_end(nb_meter *meter);
+
+/* Writes a span of time for people: "0.31 s", "12 s", "3 min 05 s", "2 h 10 min". */
+void nb_meter_write_span(double seconds, char *text, size_t size);
+
+#endif

@@ -1,0 +1,61 @@
+/* Options of a command: one table makes the parser, the checks and the help page. */
+#ifndef NB_OPTIONS_H
+#define NB_OPTIONS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { NB_OPTIONS_MOST = 20, NB_OPERANDS_MOST = 2 };
+
+typedef struct nb_option {
+    const char *name;  /* without the dashes */
+    char letter;       /* 0: none */
+    const char *value; /* what the help calls the value; NULL: the option takes none */
+    const char *help;  /* lines of at most 52 characters */
+} nb_option;
+
+typedef struct nb_command {
+    const char *name;
+    const char *summary;  /* half a line, for the list of commands */
+    const char *synopsis; /* what follows "nebel NAME" */
+    const char *about;    /* paragraphs, wrapped */
+    const nb_option *options;
+    size_t option_count;
+    const char *operands; /* their names, for messages */
+    int fewest_operands, most_operands;
+    const char *examples; /* the rest of the page, from the examples on */
+    int (*run)(int count, char **words);
+} nb_command;
+
+/* What a command was called with. */
+typedef struct nb_arguments {
+    const nb_command *command;
+    const char *values[NB_OPTIONS_MOST]; /* by position in the table; NULL: not given; "" for an option without value */
+    const char *operands[NB_OPERANDS_MOST];
+    int operand_count;
+    int misused; /* a value asked for was not what the option takes, and was reported */
+} nb_arguments;
+
+/* Takes apart the words after the command's name: --name value, --name=value, -x value, -xvalue; -- ends the options;
+ * the last of repeated options counts. Returns -1 to go on, or the exit status where the call was wrong or asked for
+ * help. */
+int nb_options_parse(const nb_command *command, int count, char **words, nb_arguments *arguments);
+
+/* The page that --help prints. */
+void nb_options_print_help(const nb_command *command);
+
+/* Values with their range, or `fallback` where the option is not given. A value that is none is reported and sets
+ * arguments->misused. */
+double nb_options_number(nb_arguments *arguments, int option, double low, double high, double fallback);
+uint32_t nb_options_whole(nb_arguments *arguments, int option, uint32_t low, uint32_t high, uint32_t fallback);
+
+/* The position of the value in `names`, which ends with NULL. */
+int nb_options_choice(nb_arguments *arguments, int option, const char *const *names, int fallback);
+
+/* Reports that the option's value is wrong: "NAME: --option: 'value' PROBLEM". */
+void nb_options_reject(nb_arguments *arguments, int option, const char *problem);
+
+/* The name that `word` was likely meant to be; NULL: none is near. */
+const char *nb_options_nearest(const char *word, const char *const *names, size_t count);
+
+#endif

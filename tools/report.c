@@ -1,0 +1,112 @@
+#define _POSIX_C_SOURCE 200809L
+
+#include "report.h"
+
+#include "output.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MESSAGE_SIZE = 8192 };
+
+static size_t status_length;
+
+static void put(const char *text, size_t size)
+{
+    (void)nb_output_write(STDERR_FILENO, text, size);
+}
+
+static int is_control(unsigned char c)
+{
+    return c < 0x20 || c == 0x7f;
+}
+
+/* One write for the whole line: messages of several programs in a pipeline do not mix. */
+static void write_line(const char *format, va_list arguments)
+{
+    static const char prefix[] = "nebel: ", cut[] = " ...";
+    char line[sizeof prefix - 1 + MESSAGE_SIZE + sizeof cut];
+    memcpy(line, prefix, sizeof prefix - 1);
+    char *const text = line + sizeof prefix - 1;
+    const int wanted = vsnprintf(text, MESSAGE_SIZE, format, arguments);
+    size_t size = wanted < 0 ? 0 : (size_t)wanted;
+    if (size >= MESSAGE_SIZE) {
+        memcpy(text + MESSAGE_SIZE - 1, cut, sizeof cut - 1);
+        size = MESSAGE_SIZE - 1 + sizeof cut - 1;
+    }
+    for (size_t i = 0; i < size; i++) {
+        if (is_control((unsigned char)text[i])) text[i] = '?';
+    }
+    text[size] = '\n';
+    nb_report_status("");
+    put(line, sizeof prefix - 1 + size + 1);
+}
+
+void nb_report_message(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    write_line(format, arguments);
+    va_end(arguments);
+}
+
+int nb_report_failure(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    write_line(format, arguments);
+    va_end(arguments);
+    return NB_FAILED;
+}
+
+int nb_report_misuse(const char *command, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    write_line(format, arguments);
+    va_end(arguments);
+    if (command != NULL) {
+        nb_report_message("'nebel %s --help' explains the options", command);
+    } else {
+        nb_report_message("'nebel --help' lists the commands");
+    }
+    return NB_MISUSED;
+}
+
+static void hand_on(nebel_result result, const char *message, void *user)
+{
+    nb_report_listener *const listener = user;
+    (void)result;
+    if (listener->mode == NB_REPORT_KEEP) (void)snprintf(listener->kept, sizeof listener->kept, "%s", message);
+    if (listener->mode != NB_REPORT_PRINT) return;
+    listener->printed++;
+    nb_report_message("%s", message);
+}
+
+nebel_log nb_report_log(nb_report_listener *listener)
+{
+    return (nebel_log){.write = hand_on, .user = listener};
+}
+
+int nb_report_result(const nb_report_listener *listener, const char *what, nebel_result result)
+{
+    if (listener->printed == 0) nb_report_message("%s: %s", what, nebel_result_text(result));
+    return NB_FAILED;
+}
+
+void nb_report_status(const char *text)
+{
+    if (text[0] == '\0' && status_length == 0) return;
+    char line[1024];
+    const size_t size = strlen(text) < sizeof line / 2 ? strlen(text) : sizeof line / 2;
+    const size_t blanks = status_length > size ? status_length - size : 0;
+    line[0] = '\r';
+    memcpy(line + 1, text, size);
+    memset(line + 1 + size, ' ', blanks);
+    size_t used = 1 + size + blanks;
+    if (size == 0) line[used++] = '\r';
+    put(line, used);
+    status_length = size;
+}

@@ -1,0 +1,45 @@
+#define _POSIX_C_SOURCE 200809L
+
+#include "workers.h"
+
+#include <threads.h>
+#include <unistd.h>
+
+typedef struct share {
+    thrd_t thread;
+    int started;
+    int worker, count;
+    nb_workers_fn work;
+    void *user;
+} share;
+
+static int run_share(void *user)
+{
+    const share *const mine = user;
+    mine->work(mine->worker, mine->count, mine->user);
+    return 0;
+}
+
+int nb_workers_available(void)
+{
+    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    if (processors < 1) return 1;
+    return processors > NB_WORKERS_MOST ? NB_WORKERS_MOST : (int)processors;
+}
+
+void nb_workers_run(int count, nb_workers_fn work, void *user)
+{
+    share shares[NB_WORKERS_MOST];
+    for (int i = 1; i < count; i++) {
+        shares[i] = (share){.worker = i, .count = count, .work = work, .user = user};
+        shares[i].started = thrd_create(&shares[i].thread, run_share, &shares[i]) == thrd_success;
+    }
+    work(0, count, user);
+    for (int i = 1; i < count; i++) {
+        if (shares[i].started) {
+            (void)thrd_join(shares[i].thread, NULL);
+        } else {
+            work(i, count, user);
+        }
+    }
+}
