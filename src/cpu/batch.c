@@ -1,0 +1,160 @@
+/* One sample of 16 x 16 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
+#include "renderer.h"
+
+#include <math.h>
+
+static void set_inside(const nb_frame *frame, uint32_t left, uint32_t top, int *inside)
+{
+    const uint32_t columns = frame->width - left, rows = frame->height - top;
+    for (uint32_t i = 0; i < NB_BATCH; i++) inside[i] = nb_lane_x(i) < columns && nb_lane_y(i) < rows ? -1 : 0;
+}
+
+/* ---- fog on the way to the camera ------------------------------------------------------------------------------------ */
+
+static void set_clear(nb_light_samples *samples)
+{
+    for (int c = 0; c < 3; c++) {
+        for (int i = 0; i < NB_BATCH; i++) {
+            samples->transmittance[c][i] = 1;
+            samples->in_scattering[c][i] = 0;
+        }
+    }
+    for (int i = 0; i < NB_BATCH; i++) samples->error[i] = 0;
+}
+
+/* From the ray's start, before it was advanced, to the hit or to infinity. */
+static double distance_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t i)
+{
+    if (scratch->hits.surface[i] == NB_NONE) return HUGE_VAL;
+    return frame->view.advance * (double)scratch->rays.length[i] + (double)scratch->hits.t[i];
+}
+
+static size_t set_camera_rays(const nb_frame *frame, nb_scratch *scratch)
+{
+    const nb_rays *rays = &scratch->rays;
+    const int moves = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    size_t count = 0;
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        if (!scratch->inside[i]) continue;
+        nebel_ray *ray = &scratch->fog_rays[count];
+        scratch->lanes[count++] = i;
+        for (int c = 0; c < 3; c++) {
+            ray->origin[c] = frame->view.position[c] + (moves ? rays->offset[c][i] : 0);
+            ray->direction[c] = rays->direction[c][i];
+        }
+        ray->t_max = distance_of(frame, scratch, i);
+    }
+    return count;
+}
+
+static nebel_result trace_fog(const nb_frame *frame, nb_scratch *scratch, size_t count)
+{
+    if (count == 0) return NEBEL_OK;
+    return nebel_trace(frame->renderer->fog, &frame->trace, count, scratch->fog_rays, sizeof(nebel_ray),
+                       scratch->fog_lights, sizeof(nebel_light));
+}
+
+static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
+{
+    nb_light_samples *samples = &scratch->samples;
+    if (frame->renderer->fog == NULL) {
+        set_clear(samples);
+        return NEBEL_OK;
+    }
+    const size_t count = set_camera_rays(frame, scratch);
+    const nebel_result result = trace_fog(frame, scratch, count);
+    if (result != NEBEL_OK) return result;
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t i = scratch->lanes[k];
+        const nebel_light *light = &scratch->fog_lights[k];
+        for (int c = 0; c < 3; c++) {
+            samples->transmittance[c][i] = (float)light->transmittance[c];
+            samples->in_scattering[c][i] = (float)light->in_scattering[c];
+        }
+        samples->error[i] = (float)light->error;
+    }
+    return NEBEL_OK;
+}
+
+/* ---- surfaces -------------------------------------------------------------------------------------------------------- */
+
+static size_t set_sun_rays(const nb_frame *frame, nb_scratch *scratch)
+{
+    const double *origin = frame->renderer->geometry.origin;
+    size_t count = 0;
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        if (!scratch->points.lit[i]) continue;
+        nebel_ray *ray = &scratch->fog_rays[count];
+        scratch->lanes[count++] = i;
+        for (int c = 0; c < 3; c++) {
+            ray->origin[c] = origin[c] + (double)scratch->points.start[c][i];
+            ray->direction[c] = frame->lighting.sun_direction[c];
+        }
+        ray->t_max = HUGE_VAL;
+    }
+    return count;
+}
+
+/* Irradiance of the sun over pi, in samples->color. */
+static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
+{
+    static const float inverse_pi = 0.318309886f;
+    nb_light_samples *samples = &scratch->samples;
+    const float *irradiance = frame->lighting.irradiance;
+    for (int c = 0; c < 3; c++) {
+        for (int i = 0; i < NB_BATCH; i++) {
+            const float light = irradiance[c] * inverse_pi * scratch->points.cosine[i];
+            samples->color[c][i] = scratch->points.lit[i] ? light : 0;
+        }
+    }
+    if (frame->renderer->fog == NULL) return NEBEL_OK;
+    const size_t count = set_sun_rays(frame, scratch);
+    const nebel_result result = trace_fog(frame, scratch, count);
+    if (result != NEBEL_OK) return result;
+    for (size_t k = 0; k < count; k++) {
+        for (int c = 0; c < 3; c++) {
+            samples->color[c][scratch->lanes[k]] *= (float)scratch->fog_lights[k].transmittance[c];
+        }
+    }
+    return NEBEL_OK;
+}
+
+/* color = transmittance * surface + in_scattering; Lambert's surface = reflectance * (irradiance / pi + ambient). */
+NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratch)
+{
+    for (int c = 0; c < 3; c++) {
+        const float ambient = lighting->ambient[c], background = lighting->background[c];
+        const float *restrict reflectance = scratch->points.reflectance[c];
+        const float *restrict transmittance = scratch->samples.transmittance[c];
+        const float *restrict in_scattering = scratch->samples.in_scattering[c];
+        const uint32_t *restrict surface = scratch->hits.surface;
+        float *restrict color = scratch->samples.color[c];
+#pragma omp simd
+        for (int i = 0; i < NB_BATCH; i++) {
+            const float reflected = reflectance[i] * (color[i] + ambient);
+            color[i] = transmittance[i] * (surface[i] != NB_NONE ? reflected : background) + in_scattering[i];
+        }
+    }
+}
+
+nebel_result nb_batch_render(const nb_frame *frame, uint32_t left, uint32_t top, const nb_sample *sample,
+                             nb_scratch *scratch)
+{
+    const nebel_renderer *renderer = frame->renderer;
+    const nb_geometry *geometry = &renderer->geometry;
+    const nb_lighting *lighting = &frame->lighting;
+    set_inside(frame, left, top, scratch->inside);
+    nb_sample_points(sample, left, top, scratch->x, scratch->y);
+    nb_view_rays(&frame->view, scratch->x, scratch->y, &scratch->rays);
+    nb_hits_trace(geometry->scene, &scratch->rays, scratch->inside, &scratch->packets, &scratch->hits);
+    nebel_result result = trace_camera_fog(frame, scratch);
+    if (result != NEBEL_OK) return result;
+    nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,
+                      &scratch->points);
+    if (geometry->scene != NULL && lighting->has_sun) {
+        nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
+    }
+    result = set_sunlight(frame, scratch);
+    if (result == NEBEL_OK) set_colors(lighting, scratch);
+    return result;
+}

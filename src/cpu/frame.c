@@ -1,0 +1,150 @@
+#include "renderer.h"
+
+#include <math.h>
+#include <omp.h>
+#include <string.h>
+
+/* What the threads of a frame share. */
+typedef struct nb_state {
+    const nebel_frame_desc *desc;
+    size_t total, done;  /* regions */
+    size_t step;         /* regions between two calls of progress */
+    int stop;            /* a thread failed or the caller had enough */
+    nebel_result result; /* of the first that failed */
+} nb_state;
+
+/* ---- checks -------------------------------------------------------------------------------------------------------- */
+
+static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *log)
+{
+    if (desc->width < 1 || desc->width > 32768 || desc->height < 1 || desc->height > 32768) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: %u x %u pixels; 1 to 32768 are possible", (unsigned)desc->width,
+                       (unsigned)desc->height);
+    }
+    if (desc->samples > 4096) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)desc->samples);
+    }
+    if (!(desc->tolerance >= 0) || isinf(desc->tolerance)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: tolerance is %g, it must be above 0, or 0 for %g", desc->tolerance,
+                       NEBEL_DEFAULT_TOLERANCE);
+    }
+    return NEBEL_OK;
+}
+
+static int is_light(const double rgb[3])
+{
+    return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
+}
+
+static nebel_result set_lighting(const nebel_scene_data *scene, nb_lighting *lighting, const nebel_log *log)
+{
+    if (!is_light(scene->background) || !is_light(scene->ambient) ||
+        (scene->has_sun && !is_light(scene->sun_irradiance))) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
+    }
+    const double *d = scene->sun_direction;
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    if (scene->has_sun && !(length > 0 && isfinite(length))) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
+    }
+    lighting->has_sun = scene->has_sun != 0;
+    for (int c = 0; c < 3; c++) {
+        lighting->background[c] = (float)scene->background[c];
+        lighting->ambient[c] = (float)scene->ambient[c];
+        lighting->irradiance[c] = scene->has_sun ? (float)scene->sun_irradiance[c] : 0;
+        lighting->sun_direction[c] = scene->has_sun ? d[c] / length : 0;
+        lighting->sun[c] = (float)lighting->sun_direction[c];
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
+{
+    nebel_renderer *renderer = frame->renderer;
+    nb_geometry *geometry = &renderer->geometry;
+    nebel_result result = check_desc(desc, &renderer->log);
+    if (result == NEBEL_OK) result = set_lighting(renderer->scene, &frame->lighting, &renderer->log);
+    if (result == NEBEL_OK) result = nb_view_set(&frame->view, &desc->camera, desc->width, desc->height, &renderer->log);
+    if (result != NEBEL_OK) return result;
+    result = nb_geometry_place(geometry, frame->view.position);
+    if (result != NEBEL_OK) return nb_fail(&renderer->log, result, "frame: the surfaces could not be built");
+    nb_view_place(&frame->view, geometry->origin, geometry->bounds_min, geometry->bounds_max);
+    frame->width = desc->width;
+    frame->height = desc->height;
+    frame->samples = desc->samples != 0 ? desc->samples : 4;
+    frame->trace = (nebel_trace_desc){
+        .precision = NEBEL_PRECISION_FLOAT, .isa = renderer->fog_isa, .tolerance = desc->tolerance};
+    return NEBEL_OK;
+}
+
+/* ---- regions ------------------------------------------------------------------------------------------------------- */
+
+static nebel_result render_sample(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t index, nb_scratch *scratch)
+{
+    const nb_sample sample = nb_sample_make(index, frame->samples);
+    for (uint32_t y = 0; y < NB_REGION && top + y < frame->height; y += NB_TILE) {
+        for (uint32_t x = 0; x < NB_REGION && left + x < frame->width; x += NB_TILE) {
+            const nebel_result result = nb_batch_render(frame, left + x, top + y, &sample, scratch);
+            if (result != NEBEL_OK) return result;
+            nb_planes_add(frame, left + x, top + y, index == 0, scratch, scratch->hit_counts + y * NB_REGION + x);
+        }
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result render_region(const nb_frame *frame, size_t number, nb_scratch *scratch)
+{
+    const uint32_t columns = (frame->width + NB_REGION - 1) / NB_REGION;
+    const uint32_t left = (uint32_t)(number % columns) * NB_REGION, top = (uint32_t)(number / columns) * NB_REGION;
+    for (uint32_t index = 0; index < frame->samples; index++) {
+        const nebel_result result = render_sample(frame, left, top, index, scratch);
+        if (result != NEBEL_OK) return result;
+    }
+    nb_planes_finish(frame, left, top, scratch->hit_counts);
+    return NEBEL_OK;
+}
+
+/* One thread at a time. */
+static void count_region(nb_state *state, nebel_result result)
+{
+    state->done++;
+    if (result == NEBEL_OK && state->result == NEBEL_OK && state->desc->progress != NULL &&
+        (state->done % state->step == 0 || state->done == state->total) &&
+        state->desc->progress(state->done, state->total, state->desc->progress_user) != 0) {
+        result = NEBEL_ERROR_LIMIT;
+    }
+    if (result == NEBEL_OK || state->result != NEBEL_OK) return;
+    state->result = result;
+#pragma omp atomic write
+    state->stop = 1;
+}
+
+static void render_regions(const nb_frame *frame, nb_state *state)
+{
+#pragma omp parallel for schedule(dynamic, 1) num_threads(frame->renderer->threads)
+    for (size_t i = 0; i < state->total; i++) {
+        int stop;
+#pragma omp atomic read
+        stop = state->stop;
+        if (stop) continue;
+        const nebel_result result = render_region(frame, i, &frame->renderer->scratch[omp_get_thread_num()]);
+#pragma omp critical(nb_count_region)
+        count_region(state, result);
+    }
+}
+
+nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame)
+{
+    if (renderer == NULL || desc == NULL || frame == NULL) return NEBEL_ERROR_ARGUMENT;
+    nb_frame made = {.renderer = renderer, .planes = frame};
+    const nebel_result result = set_frame(&made, desc);
+    if (result != NEBEL_OK) return result;
+    const size_t columns = (made.width + NB_REGION - 1) / NB_REGION, rows = (made.height + NB_REGION - 1) / NB_REGION;
+    nb_state state = {.desc = desc, .total = columns * rows, .step = (columns * rows + 99) / 100};
+    render_regions(&made, &state);
+    if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");
+    if (state.result != NEBEL_OK) {
+        return nb_fail(&renderer->log, state.result, "frame: fog along a ray: %s", nebel_result_text(state.result));
+    }
+    return NEBEL_OK;
+}

@@ -1,0 +1,40 @@
+/* The meshes of a scene in one Embree scene, in float relative to an origin near the camera. */
+#ifndef NB_CPU_GEOMETRY_H
+#define NB_CPU_GEOMETRY_H
+
+#include "base/base.h"
+
+#include <nebel/scene.h>
+
+#include <embree3/rtcore.h>
+
+/* A mesh with its positions relative to the origin of the geometry. */
+typedef struct nb_surface {
+    const nebel_mesh *mesh;
+    float *positions; /* 3 per vertex, and one float more: Embree loads four */
+    float low[3], high[3]; /* corners of the mesh around its own origin */
+    float longest_edge;
+} nb_surface;
+
+typedef struct nb_geometry {
+    nebel_allocator allocator;
+    nebel_log log;
+    RTCDevice device;
+    RTCScene scene; /* NULL where there are no triangles */
+    double origin[3];
+    float bounds_min[3], bounds_max[3]; /* relative to origin; 0 where there are no triangles */
+    double largest_radius;              /* of a mesh around its own origin */
+    size_t surface_count;
+    nb_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
+} nb_geometry;
+
+/* Checks the meshes and makes the device; builds nothing yet. On an error the geometry is to be freed all the same.
+ * Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
+nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *scene, nebel_isa isa, int threads);
+
+/* Builds around `camera`, or keeps what is built where the camera is still close to the origin. Errors: MEMORY. */
+nebel_result nb_geometry_place(nb_geometry *geometry, const double camera[3]);
+
+void nb_geometry_free(nb_geometry *geometry);
+
+#endif

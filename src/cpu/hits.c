@@ -1,0 +1,97 @@
+#include "hits.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { ROW = NB_PACKET * sizeof(float) };
+
+static void fill(float *row, float value)
+{
+    for (int i = 0; i < NB_PACKET; i++) row[i] = value;
+}
+
+/* tnear, time, mask, flags and the identity of a ray are the same for all. */
+static void set_constants(struct RTCRay16 *ray)
+{
+    fill(ray->tnear, 0);
+    fill(ray->time, 0);
+    fill(ray->tfar, INFINITY);
+    memset(ray->mask, 0xff, sizeof ray->mask);
+    memset(ray->id, 0, sizeof ray->id);
+    memset(ray->flags, 0, sizeof ray->flags);
+}
+
+static struct RTCIntersectContext coherent_context(void)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    return context;
+}
+
+static int any(const int *active)
+{
+    int found = 0;
+    for (int i = 0; i < NB_PACKET; i++) found |= active[i];
+    return found;
+}
+
+static void set_packet(struct RTCRayHit16 *packet, const nb_rays *rays, int first)
+{
+    struct RTCRay16 *ray = &packet->ray;
+    set_constants(ray);
+    memcpy(ray->org_x, rays->start[0] + first, ROW);
+    memcpy(ray->org_y, rays->start[1] + first, ROW);
+    memcpy(ray->org_z, rays->start[2] + first, ROW);
+    memcpy(ray->dir_x, rays->unit[0] + first, ROW);
+    memcpy(ray->dir_y, rays->unit[1] + first, ROW);
+    memcpy(ray->dir_z, rays->unit[2] + first, ROW);
+    memset(packet->hit.geomID, 0xff, sizeof packet->hit.geomID);
+    memset(packet->hit.instID, 0xff, sizeof packet->hit.instID);
+}
+
+static void get_packet(const struct RTCRayHit16 *packet, nb_hits *hits, int first)
+{
+    memcpy(hits->surface + first, packet->hit.geomID, ROW);
+    memcpy(hits->triangle + first, packet->hit.primID, ROW);
+    memcpy(hits->t + first, packet->ray.tfar, ROW);
+    memcpy(hits->u + first, packet->hit.u, ROW);
+    memcpy(hits->v + first, packet->hit.v, ROW);
+    memcpy(hits->normal[0] + first, packet->hit.Ng_x, ROW);
+    memcpy(hits->normal[1] + first, packet->hit.Ng_y, ROW);
+    memcpy(hits->normal[2] + first, packet->hit.Ng_z, ROW);
+}
+
+void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_packets *packets, nb_hits *hits)
+{
+    struct RTCIntersectContext context = coherent_context();
+    for (int p = 0; p < NB_PACKETS; p++) {
+        const int first = p * NB_PACKET;
+        struct RTCRayHit16 *packet = &packets->rays[p];
+        set_packet(packet, rays, first);
+        if (scene != NULL && any(active + first)) rtcIntersect16(active + first, scene, &context, packet);
+        get_packet(packet, hits, first);
+    }
+}
+
+void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active, nb_packets *packets)
+{
+    struct RTCIntersectContext context = coherent_context();
+    struct RTCRay16 *ray = &packets->rays[0].ray;
+    set_constants(ray);
+    fill(ray->dir_x, direction[0]);
+    fill(ray->dir_y, direction[1]);
+    fill(ray->dir_z, direction[2]);
+    for (int p = 0; p < NB_PACKETS; p++) {
+        const int first = p * NB_PACKET;
+        if (!any(active + first)) continue;
+        memcpy(ray->org_x, start[0] + first, ROW);
+        memcpy(ray->org_y, start[1] + first, ROW);
+        memcpy(ray->org_z, start[2] + first, ROW);
+        fill(ray->tfar, INFINITY);
+        rtcOccluded16(active + first, scene, &context, ray);
+        for (int i = 0; i < NB_PACKET; i++) {
+            if (ray->tfar[i] < 0) active[first + i] = 0;
+        }
+    }
+}

@@ -1,0 +1,122 @@
+/* From batches in blocks of 4 x 4 to the rows of the caller's planes. */
+#include "renderer.h"
+
+#include <math.h>
+
+typedef struct nb_area {
+    uint32_t left, top, columns, rows;
+} nb_area;
+
+static uint32_t least(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+static nb_area area_of(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t size)
+{
+    return (nb_area){left, top, least(size, frame->width - left), least(size, frame->height - top)};
+}
+
+/* Lane of a pixel in its batch: the inverse of nb_lane_x and nb_lane_y. */
+static uint32_t lane_of(uint32_t x, uint32_t y)
+{
+    return (y / NB_BLOCK * (NB_TILE / NB_BLOCK) + x / NB_BLOCK) * NB_PACKET + y % NB_BLOCK * NB_BLOCK + x % NB_BLOCK;
+}
+
+static void add_vectors(float *plane, uint32_t width, const nb_area *area, int is_first, const float (*v)[NB_BATCH])
+{
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
+        for (uint32_t x = 0; x < area->columns; x++) {
+            const uint32_t i = lane_of(x, y);
+            for (uint32_t c = 0; c < 3; c++) row[3 * x + c] = is_first ? v[c][i] : row[3 * x + c] + v[c][i];
+        }
+    }
+}
+
+static void add_normals(float *plane, uint32_t width, const nb_area *area, int is_first, const nb_scratch *scratch)
+{
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
+        for (uint32_t x = 0; x < area->columns; x++) {
+            const uint32_t i = lane_of(x, y);
+            const int hit = scratch->hits.surface[i] != NB_NONE;
+            for (uint32_t c = 0; c < 3; c++) {
+                row[3 * x + c] = (is_first ? 0 : row[3 * x + c]) + (hit ? scratch->points.normal[c][i] : 0);
+            }
+        }
+    }
+}
+
+static void widen_errors(float *plane, uint32_t width, const nb_area *area, int is_first, const float *error)
+{
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = plane + (size_t)(area->top + y) * width + area->left;
+        for (uint32_t x = 0; x < area->columns; x++) {
+            const float e = error[lane_of(x, y)];
+            row[x] = is_first || e > row[x] ? e : row[x];
+        }
+    }
+}
+
+static void add_depths(const nb_frame *frame, const nb_area *area, int is_first, const nb_scratch *scratch,
+                       uint32_t *hit_counts)
+{
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = frame->planes->depth + (size_t)(area->top + y) * frame->width + area->left;
+        uint32_t *counts = hit_counts + (size_t)y * NB_REGION;
+        for (uint32_t x = 0; x < area->columns; x++) {
+            const uint32_t i = lane_of(x, y);
+            const int hit = scratch->hits.surface[i] != NB_NONE;
+            const float t = (float)(frame->view.advance * (double)scratch->rays.length[i]) + scratch->hits.t[i];
+            row[x] = (is_first ? 0 : row[x]) + (hit ? t : 0);
+            counts[x] = (is_first ? 0 : counts[x]) + (hit ? 1 : 0);
+        }
+    }
+}
+
+void nb_planes_add(const nb_frame *frame, uint32_t left, uint32_t top, int is_first, const nb_scratch *scratch,
+                   uint32_t *hit_counts)
+{
+    const nebel_frame *planes = frame->planes;
+    const nb_light_samples *samples = &scratch->samples;
+    const nb_area area = area_of(frame, left, top, NB_TILE);
+    const uint32_t width = frame->width;
+    if (planes->color != NULL) add_vectors(planes->color, width, &area, is_first, samples->color);
+    if (planes->transmittance != NULL) add_vectors(planes->transmittance, width, &area, is_first, samples->transmittance);
+    if (planes->in_scattering != NULL) add_vectors(planes->in_scattering, width, &area, is_first, samples->in_scattering);
+    if (planes->normal != NULL) add_normals(planes->normal, width, &area, is_first, scratch);
+    if (planes->error != NULL) widen_errors(planes->error, width, &area, is_first, samples->error);
+    if (planes->depth != NULL) add_depths(frame, &area, is_first, scratch, hit_counts);
+}
+
+static void scale(float *plane, uint32_t width, const nb_area *area, size_t channels, float factor)
+{
+    if (plane == NULL) return;
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = plane + channels * ((size_t)(area->top + y) * width + area->left);
+        for (size_t x = 0; x < channels * area->columns; x++) row[x] *= factor;
+    }
+}
+
+static void divide_depths(const nb_frame *frame, const nb_area *area, const uint32_t *hit_counts)
+{
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = frame->planes->depth + (size_t)(area->top + y) * frame->width + area->left;
+        const uint32_t *counts = hit_counts + (size_t)y * NB_REGION;
+        for (uint32_t x = 0; x < area->columns; x++) row[x] = counts[x] > 0 ? row[x] / (float)counts[x] : INFINITY;
+    }
+}
+
+void nb_planes_finish(const nb_frame *frame, uint32_t left, uint32_t top, const uint32_t *hit_counts)
+{
+    const nebel_frame *planes = frame->planes;
+    const nb_area area = area_of(frame, left, top, NB_REGION);
+    if (planes->depth != NULL) divide_depths(frame, &area, hit_counts);
+    if (frame->samples == 1) return;
+    const float factor = 1 / (float)frame->samples;
+    scale(planes->color, frame->width, &area, 3, factor);
+    scale(planes->transmittance, frame->width, &area, 3, factor);
+    scale(planes->in_scattering, frame->width, &area, 3, factor);
+    scale(planes->normal, frame->width, &area, 3, factor);
+}

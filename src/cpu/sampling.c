@@ -1,0 +1,62 @@
+#include "sampling.h"
+
+/* The bits of i mirrored: the van der Corput sequence in base 2. */
+static uint32_t mirror(uint32_t i)
+{
+    uint32_t digits = 0;
+    for (int bit = 0; bit < 32; bit++) digits |= (i >> bit & 1) << (31 - bit);
+    return digits;
+}
+
+/* The second dimension of the Sobol sequence: column k of its matrix is row k of Pascal's triangle modulo 2. */
+static uint32_t sobol(uint32_t i)
+{
+    uint32_t digits = 0;
+    for (uint32_t column = 1u << 31; i != 0; i >>= 1, column ^= column >> 1) {
+        if (i & 1) digits ^= column;
+    }
+    return digits;
+}
+
+nb_sample nb_sample_make(uint32_t index, uint32_t count)
+{
+    return (nb_sample){mirror(index), sobol(index), count == 1};
+}
+
+/* A mixing function of two multiplications, found by search for small bias (C. Wellons, "Prospecting for hash functions"). */
+static inline uint32_t mix(uint32_t h)
+{
+    h = (h ^ h >> 16) * 0x7feb352du;
+    h = (h ^ h >> 15) * 0x846ca68bu;
+    return h ^ h >> 16;
+}
+
+static inline float fraction(uint32_t digits)
+{
+    return (float)(digits >> 9) * 0x1p-23f;
+}
+
+NB_CLONES static void scrambled_points(const nb_sample *sample, uint32_t left, uint32_t top, float *restrict x,
+                                       float *restrict y)
+{
+    const uint32_t sample_x = sample->x, sample_y = sample->y;
+#pragma omp simd
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        const uint32_t column = left + nb_lane_x(i), row = top + nb_lane_y(i);
+        const uint32_t seed = mix(column | row << 16);
+        x[i] = (float)column + fraction(sample_x ^ seed);
+        y[i] = (float)row + fraction(sample_y ^ mix(seed + 0x9e3779b9u));
+    }
+}
+
+void nb_sample_points(const nb_sample *sample, uint32_t left, uint32_t top, float *x, float *y)
+{
+    if (!sample->centered) {
+        scrambled_points(sample, left, top, x, y);
+        return;
+    }
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        x[i] = (float)(left + nb_lane_x(i)) + .5f;
+        y[i] = (float)(top + nb_lane_y(i)) + .5f;
+    }
+}

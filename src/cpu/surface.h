@@ -1,0 +1,28 @@
+/* Surfaces where they are met: normals, reflectance, what the sun sees of them. */
+#ifndef NB_CPU_SURFACE_H
+#define NB_CPU_SURFACE_H
+
+#include "hits.h"
+
+/* sRGB to linear light, for each of the 256 values of a texture. */
+typedef struct nb_srgb_table {
+    float linear[256];
+} nb_srgb_table;
+
+typedef struct nb_points {
+    float normal[3][NB_BATCH];      /* shading normal, unit length, on the side of the camera */
+    float reflectance[3][NB_BATCH]; /* base color times texture */
+    float start[3][NB_BATCH];       /* of shadow rays: lifted off the surface on the side of the camera */
+    float cosine[NB_BATCH];         /* between shading normal and sun */
+    float side[3][NB_BATCH];        /* the triangle's normal, unit length, on the side of the camera */
+    float edge[NB_BATCH];           /* longest edge of the mesh */
+    int lit[NB_BATCH];              /* -1 where the sun is above shading normal and triangle, else 0 */
+} nb_points;
+
+void nb_srgb_table_set(nb_srgb_table *table);
+
+/* The points of all hits. `sun` is the unit direction towards the sun. Lanes without a hit are not lit. */
+void nb_surface_points(const nb_geometry *geometry, const nebel_scene_data *scene, const nb_srgb_table *table,
+                       const nb_rays *rays, const nb_hits *hits, const float sun[3], nb_points *points);
+
+#endif
