@@ -129,7 +129,7 @@ NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratc
         const float *restrict in_scattering = scratch->samples.in_scattering[c];
         const uint32_t *restrict surface = scratch->hits.surface;
         float *restrict color = scratch->samples.color[c];
-#pragma omp simd
+        NB_SIMD
         for (int i = 0; i < NB_BATCH; i++) {
             const float reflected = reflectance[i] * (color[i] + ambient);
             color[i] = transmittance[i] * (surface[i] != NB_NONE ? reflected : background) + in_scattering[i];

@@ -40,7 +40,7 @@ NB_CLONES static void scrambled_points(const nb_sample *sample, uint32_t left, u
                                        float *restrict y)
 {
     const uint32_t sample_x = sample->x, sample_y = sample->y;
-#pragma omp simd
+    NB_SIMD
     for (uint32_t i = 0; i < NB_BATCH; i++) {
         const uint32_t column = left + nb_lane_x(i), row = top + nb_lane_y(i);
         const uint32_t seed = mix(column | row << 16);

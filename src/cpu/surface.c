@@ -59,7 +59,7 @@ static void sample_texture(const nebel_texture *texture, const nb_srgb_table *ta
  * and large triangles leave the range of float. */
 NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_points *points)
 {
-#pragma omp simd
+    NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
         const float x = hits->normal[0][i], y = hits->normal[1][i], z = hits->normal[2][i];
         const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
@@ -132,7 +132,7 @@ static void fetch(const nb_geometry *geometry, const nebel_scene_data *scene, co
 NB_CLONES static void finish_normals(const float *restrict sun, nb_points *points)
 {
     const float sun_x = sun[0], sun_y = sun[1], sun_z = sun[2];
-#pragma omp simd
+    NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
         const float sx = points->side[0][i], sy = points->side[1][i], sz = points->side[2][i];
         const float x = points->normal[0][i], y = points->normal[1][i], z = points->normal[2][i];
@@ -154,7 +154,7 @@ NB_CLONES static void finish_normals(const float *restrict sun, nb_points *point
  * into it: the way to it, its coordinates, and the edges of the triangle. 2^-20 of their sum is on the safe side. */
 NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *points)
 {
-#pragma omp simd
+    NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
         const float t = hits->t[i];
         const float x = rays->start[0][i] + t * rays->unit[0][i];

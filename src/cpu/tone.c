@@ -53,7 +53,7 @@ static inline float encode(float x)
 
 NB_CLONES static void map(size_t count, const float *linear, float scale, float *srgb)
 {
-#pragma omp simd
+    NB_SIMD
     for (size_t i = 0; i < count; i++) {
         const float x = linear[i] * scale;
         const float positive = x > 0 ? x : 0;

@@ -149,7 +149,7 @@ NB_CLONES static void plane_points(const nb_view *view, const float *restrict x,
     for (int c = 0; c < 3; c++) {
         const double corner = view->corner[c], step_x = view->step_x[c], step_y = view->step_y[c];
         double *restrict out = v[c];
-#pragma omp simd
+        NB_SIMD
         for (int i = 0; i < NB_BATCH; i++) out[i] = corner + (double)x[i] * step_x + (double)y[i] * step_y;
     }
 }
@@ -176,7 +176,7 @@ static void panorama_directions(const nb_view *view, const float *x, const float
 
 NB_CLONES static void set_units(nb_rays *rays)
 {
-#pragma omp simd
+    NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
         const float x = (float)rays->direction[0][i], y = (float)rays->direction[1][i], z = (float)rays->direction[2][i];
         const float length = sqrtf(x * x + y * y + z * z);
@@ -196,10 +196,10 @@ NB_CLONES static void set_starts(const nb_view *view, nb_rays *rays)
         float *restrict out = rays->start[c];
         const double *restrict direction = rays->direction[c], *restrict offset = rays->offset[c];
         if (orthographic) {
-#pragma omp simd
+            NB_SIMD
             for (int i = 0; i < NB_BATCH; i++) out[i] = (float)(start + offset[i] + advance * direction[i]);
         } else {
-#pragma omp simd
+            NB_SIMD
             for (int i = 0; i < NB_BATCH; i++) out[i] = (float)(start + advance * direction[i]);
         }
     }
