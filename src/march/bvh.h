@@ -49,15 +49,15 @@ typedef struct nb_bvh_beam {
     int sign; /* of every lane's direction; 0: they differ, and the axis tells nothing */
 } nb_bvh_beam;
 
-/* A walk through the tree. About 1.5 KiB; lives on the stack of the caller; nothing to free. */
+/* A walk through the tree. Less than 2 KiB; lives on the stack of the caller; nothing to free. */
 typedef struct nb_bvh_cursor {
     const nb_bvh_node *nodes;
     int lane_count;
     int last_hit; /* the lane that hit last most likely hits again */
     int depth;
-    /* Per axis and active lane. A box is met from origin - padding below and origin + padding above: see bvh.c. */
     nb_bvh_beam beam[3];
     double beam_t_max;
+    /* Per axis and active lane: the origin as the lower and as the upper faces see it, moved by the padding of bvh.c. */
     double below[3][NB_BVH_LANES], above[3][NB_BVH_LANES], inverse[3][NB_BVH_LANES], t_max[NB_BVH_LANES];
     uint32_t stack[NB_BVH_DEPTH];
 } nb_bvh_cursor;

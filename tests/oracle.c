@@ -1,0 +1,580 @@
+#include "oracle.h"
+#include "oracle_shape.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef oracle_real real;
+
+#define REAL(x) ((real)(x))
+#define LONG(x) ((long double)(x))
+
+/* ---- Gauss-Legendre: nodes, weights, and integrals from 0 to each node, on [0, 1] ---- */
+
+enum { NODES = 16 };
+
+static double node[NODES], weight[NODES], until[NODES][NODES];
+static int tables_are_ready;
+
+/* Legendre polynomials 0 to n at x, by their recurrence. */
+static void legendre(long double x, int n, long double *p)
+{
+    p[0] = 1;
+    p[1] = x;
+    for (int k = 2; k <= n; k++) p[k] = ((2 * k - 1) * x * p[k - 1] - (k - 1) * p[k - 2]) / k;
+}
+
+/* until[i][j]: what the value at node j contributes to the integral up to node i. The interpolating polynomial is
+ * sum_k (2 k + 1) / 2 (sum_j w_j f_j P_k(x_j)) P_k, and the integral of P_k from -1 is (P_k+1 - P_k-1) / (2 k + 1). */
+static void fill_until(const long double x[NODES], const long double w[NODES])
+{
+    long double at[NODES][NODES + 1];
+    for (int i = 0; i < NODES; i++) legendre(x[i], NODES, at[i]);
+    for (int i = 0; i < NODES; i++)
+        for (int j = 0; j < NODES; j++) {
+            long double sum = w[j] / 2 * (x[i] + 1);
+            for (int k = 1; k < NODES; k++) sum += w[j] / 2 * at[j][k] * (at[i][k + 1] - at[i][k - 1]);
+            until[i][j] = (double)(sum / 2);
+        }
+}
+
+static void prepare_tables(void)
+{
+    long double x[NODES], w[NODES], p[NODES + 1];
+    for (int i = 0; i < NODES; i++) {
+        x[i] = -cosl(3.14159265358979323846L * (i + .75L) / (NODES + .5L));
+        long double slope = 0;
+        for (int step = 0; step < 20; step++) {
+            legendre(x[i], NODES, p);
+            slope = NODES * (p[NODES - 1] - x[i] * p[NODES]) / (1 - x[i] * x[i]);
+            x[i] -= p[NODES] / slope;
+        }
+        w[i] = 2 / ((1 - x[i] * x[i]) * slope * slope);
+        node[i] = (double)((1 + x[i]) / 2);
+        weight[i] = (double)(w[i] / 2);
+    }
+    fill_until(x, w);
+    tables_are_ready = 1;
+}
+
+/* ---- volumes on a ray ---- */
+
+/* A profile along the ray. Everything that varies is kept as a value at t = 0 and a slope, or as a closest approach, so
+ * that a short stretch can be evaluated in double from a starting value in long double. */
+typedef struct volume {
+    const nebel_volume_desc *desc;
+    oracle_spans spans;
+    long double start[3], slope[3]; /* height, linear: [0]; soft edge: position per axis */
+    long double nearest, square;    /* gaussian, radial: t of the closest approach, squared radius there */
+    long double speed;              /* radii per metre */
+    double light[3];                /* per metre at density 1 */
+} volume;
+
+typedef struct trace {
+    volume *volumes;
+    size_t count;
+    oracle_spans excluded;
+    real *cuts;
+    size_t cut_count, cut_capacity;
+    const volume **active;
+    size_t active_count;
+    int numeric;
+    double scale; /* of in-scattering */
+    long double depth[3], radiance[3];
+    long double uncertainty;
+} trace;
+
+static void add_cut(trace *tr, real t)
+{
+    tr->cuts = oracle_grow(tr->cuts, tr->cut_count, &tr->cut_capacity, sizeof *tr->cuts);
+    tr->cuts[tr->cut_count++] = t;
+}
+
+/* Where start + slope t passes a value at which the profile has a kink. */
+static void add_kink(trace *tr, real start, real slope, real value)
+{
+    if (slope != 0) add_cut(tr, (value - start) / slope);
+}
+
+static void set_line(volume *v, int axis, real start, real slope)
+{
+    v->start[axis] = LONG(start);
+    v->slope[axis] = LONG(slope);
+}
+
+static void set_approach(volume *v, const real p[3], const real d[3])
+{
+    const real square = oracle_dot(d, d), nearest = -oracle_dot(p, d) / square;
+    real q[3];
+    for (int k = 0; k < 3; k++) q[k] = p[k] + nearest * d[k];
+    v->nearest = LONG(nearest);
+    v->square = LONG(oracle_dot(q, q));
+    v->speed = LONG(oracle_sqrt(square));
+}
+
+static void place_height(trace *tr, volume *v, const oracle_line *ray)
+{
+    const nebel_density *const d = &v->desc->density;
+    const real start = (ray->o[1] - REAL(d->base)) / REAL(d->scale_height), slope = ray->d[1] / REAL(d->scale_height);
+    set_line(v, 0, start, slope);
+    if (d->below == NEBEL_BELOW_CONSTANT) add_kink(tr, start, slope, 0);
+}
+
+static void place_linear(trace *tr, volume *v, const oracle_line *ray)
+{
+    const nebel_density *const d = &v->desc->density;
+    real along[3], offset[3];
+    for (int k = 0; k < 3; k++) {
+        along[k] = REAL(d->to[k]) - REAL(d->from[k]);
+        offset[k] = ray->o[k] - REAL(d->from[k]);
+    }
+    const real square = oracle_dot(along, along);
+    const real start = oracle_dot(offset, along) / square, slope = oracle_dot(ray->d, along) / square;
+    set_line(v, 0, start, slope);
+    add_kink(tr, start, slope, 0);
+    add_kink(tr, start, slope, 1);
+}
+
+static void place_gaussian(volume *v, const oracle_line *ray)
+{
+    const nebel_density *const d = &v->desc->density;
+    real p[3], e[3];
+    for (int k = 0; k < 3; k++) {
+        p[k] = (ray->o[k] - REAL(d->center[k])) / REAL(d->sigma);
+        e[k] = ray->d[k] / REAL(d->sigma);
+    }
+    set_approach(v, p, e);
+}
+
+static void place_radial(volume *v, const oracle_line *ray)
+{
+    const nebel_shape *const shape = &v->desc->shape;
+    oracle_line l = oracle_to_local(&shape->transform, ray);
+    for (int k = 0; k < 3; k++) {
+        const real radius = REAL(shape->type == NEBEL_SHAPE_SPHERE ? shape->radius : shape->radii[k]);
+        l.o[k] = (l.o[k] - REAL(shape->center[k])) / radius;
+        l.d[k] /= radius;
+    }
+    set_approach(v, l.o, l.d);
+}
+
+/* Per axis: the distance from the middle; kinks where the edges begin and where the nearer face changes. */
+static void place_soft_edge(trace *tr, volume *v, const oracle_line *ray)
+{
+    const nebel_shape *const shape = &v->desc->shape;
+    const oracle_line l = oracle_to_local(&shape->transform, ray);
+    for (int k = 0; k < 3; k++) {
+        const real low = REAL(shape->min[k]), high = REAL(shape->max[k]), w = REAL(v->desc->density.distance);
+        const real start = l.o[k] - (low + high) / 2, flat = (high - low) / 2 - w;
+        set_line(v, k, start, l.d[k]);
+        add_kink(tr, start, l.d[k], 0);
+        add_kink(tr, start, l.d[k], flat);
+        add_kink(tr, start, l.d[k], -flat);
+    }
+}
+
+static void place_volume(trace *tr, volume *v, const oracle_line *ray)
+{
+    switch (v->desc->density.type) {
+    case NEBEL_DENSITY_HEIGHT:
+        place_height(tr, v, ray);
+        break;
+    case NEBEL_DENSITY_LINEAR:
+        place_linear(tr, v, ray);
+        break;
+    case NEBEL_DENSITY_GAUSSIAN:
+        place_gaussian(v, ray);
+        break;
+    case NEBEL_DENSITY_RADIAL:
+        place_radial(v, ray);
+        break;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        place_soft_edge(tr, v, ray);
+        break;
+    default:
+        break;
+    }
+}
+
+/* ---- densities at the nodes of a stretch ---- */
+
+static void soft_edge_at(const volume *v, long double a, double h, double density[NODES])
+{
+    const nebel_shape *const shape = &v->desc->shape;
+    for (int i = 0; i < NODES; i++) density[i] = 1;
+    for (int k = 0; k < 3; k++) {
+        const double start = (double)(v->start[k] + v->slope[k] * a), slope = (double)v->slope[k];
+        const double half = (shape->max[k] - shape->min[k]) / 2;
+        for (int i = 0; i < NODES; i++)
+            density[i] *= fmin(1, fmax(0, half - fabs(start + slope * (h * node[i]))) / v->desc->density.distance);
+    }
+}
+
+static double density_of_height(double u, nebel_below below)
+{
+    return exp(-(below == NEBEL_BELOW_CONSTANT ? fmax(u, 0) : u));
+}
+
+static void fill_density(const volume *v, long double a, double h, double density[NODES])
+{
+    const nebel_density *const d = &v->desc->density;
+    const double start = (double)(v->start[0] + v->slope[0] * a), slope = (double)v->slope[0];
+    const double offset = (double)((a - v->nearest) * v->speed), speed = (double)v->speed, square = (double)v->square;
+    for (int i = 0; i < NODES; i++) {
+        const double u = start + slope * (h * node[i]), r = offset + speed * (h * node[i]);
+        switch (d->type) {
+        case NEBEL_DENSITY_HEIGHT:
+            density[i] = density_of_height(u, d->below);
+            break;
+        case NEBEL_DENSITY_LINEAR:
+            density[i] = fmin(1, fmax(0, u));
+            break;
+        case NEBEL_DENSITY_GAUSSIAN:
+            density[i] = exp(-(square + r * r) / 2);
+            break;
+        case NEBEL_DENSITY_RADIAL:
+            density[i] = pow(fmax(0, 1 - square - r * r), d->power);
+            break;
+        default:
+            density[i] = 1;
+        }
+    }
+    if (d->type == NEBEL_DENSITY_SOFT_EDGE) soft_edge_at(v, a, h, density);
+}
+
+/* ---- integration ---- */
+
+/* Optical depth of a stretch and the radiance it sends to its near end. */
+typedef struct stretch {
+    double depth[3], radiance[3];
+} stretch;
+
+static stretch integrate(const trace *tr, long double a, double h)
+{
+    stretch result;
+    double extinction[3][NODES] = {{0}}, light[3][NODES] = {{0}};
+    for (size_t k = 0; k < tr->active_count; k++) {
+        const volume *const v = tr->active[k];
+        double density[NODES];
+        fill_density(v, a, h, density);
+        for (int c = 0; c < 3; c++)
+            for (int i = 0; i < NODES; i++) {
+                extinction[c][i] += v->desc->extinction[c] * density[i];
+                light[c][i] += v->light[c] * density[i];
+            }
+    }
+    for (int c = 0; c < 3; c++) {
+        double depth = 0, radiance = 0;
+        for (int i = 0; i < NODES; i++) {
+            double before = 0;
+            for (int j = 0; j < NODES; j++) before += until[i][j] * extinction[c][j];
+            depth += weight[i] * extinction[c][i];
+            if (light[c][i] > 0) radiance += weight[i] * light[c][i] * exp(-h * before);
+        }
+        result.depth[c] = h * depth;
+        result.radiance[c] = h * radiance;
+    }
+    return result;
+}
+
+static stretch join(const stretch *near, const stretch *far)
+{
+    stretch s;
+    for (int c = 0; c < 3; c++) {
+        s.depth[c] = near->depth[c] + far->depth[c];
+        s.radiance[c] = near->radiance[c] + exp(-near->depth[c]) * far->radiance[c];
+    }
+    return s;
+}
+
+static double transmittance(const trace *tr, int channel)
+{
+    return (double)expl(-tr->depth[channel]);
+}
+
+static int is_opaque(const trace *tr)
+{
+    return transmittance(tr, 0) + transmittance(tr, 1) + transmittance(tr, 2) < 1e-30;
+}
+
+/* How far two results differ as seen from the camera; HUGE_VAL when the stretch is too deep to be resolved. */
+static double difference(const trace *tr, const stretch *a, const stretch *b)
+{
+    double most = 0;
+    for (int c = 0; c < 3; c++) {
+        const double seen = transmittance(tr, c);
+        if (seen < 1e-30) continue;
+        if (!(a->depth[c] < 8) || !(b->depth[c] < 8)) return HUGE_VAL;
+        most = fmax(most, seen * fabs(a->depth[c] - b->depth[c]) * tr->scale);
+        most = fmax(most, seen * fabs(a->radiance[c] - b->radiance[c]));
+    }
+    return most;
+}
+
+static void accept(trace *tr, const stretch *s, double change)
+{
+    for (int c = 0; c < 3; c++) {
+        tr->radiance[c] += expl(-tr->depth[c]) * LONG(s->radiance[c]);
+        tr->depth[c] += LONG(s->depth[c]);
+    }
+    tr->uncertainty += LONG(change);
+}
+
+/* Two halves with 16 nodes each against the whole with 16; between kinks the halves are far better than the difference.
+ */
+static void refine(trace *tr, long double a, double h, const stretch *whole, int level)
+{
+    if (is_opaque(tr)) return;
+    const stretch near = integrate(tr, a, h / 2), far = integrate(tr, a + LONG(h) / 2, h / 2);
+    const stretch both = join(&near, &far);
+    const double change = difference(tr, whole, &both);
+    if (change <= 1e-12 * tr->scale) {
+        accept(tr, &both, change / 64);
+    } else if (level > 100) {
+        accept(tr, &both, change);
+    } else {
+        refine(tr, a, h / 2, &near, level + 1);
+        refine(tr, a + LONG(h) / 2, h / 2, &far, level + 1);
+    }
+}
+
+static void integrate_between(trace *tr, long double a, long double b)
+{
+    if (!(a < b)) return;
+    const double h = (double)(b - a);
+    const stretch whole = integrate(tr, a, h);
+    refine(tr, a, h, &whole, 0);
+}
+
+typedef struct marks {
+    size_t count, capacity;
+    long double *at;
+} marks;
+
+static void add_mark(marks *m, long double t, long double from, long double to)
+{
+    if (!(from < t && t < to)) return;
+    m->at = oracle_grow(m->at, m->count, &m->capacity, sizeof *m->at);
+    m->at[m->count++] = t;
+}
+
+static int marks_ascending(const void *a, const void *b)
+{
+    const long double x = *(const long double *)a, y = *(const long double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Sixteen nodes on a long piece can all miss where the fog is: so there are cuts at fixed numbers of scale heights from
+ * the dense end, and of sigmas from the middle. */
+static void add_guides(marks *m, const volume *v, long double from, long double to)
+{
+    static const long double heights[] = {2, 8, 30, 100, 400}, sigmas[] = {1, 3, 7, 15};
+    if (v->desc->density.type == NEBEL_DENSITY_HEIGHT && v->slope[0] != 0)
+        for (int i = 0; i < 5; i++) add_mark(m, (v->slope[0] > 0 ? from : to) + heights[i] / v->slope[0], from, to);
+    if (v->desc->density.type == NEBEL_DENSITY_GAUSSIAN)
+        for (int i = 0; i < 8; i++) add_mark(m, v->nearest + (i % 2 ? 1 : -1) * sigmas[i / 2] / v->speed, from, to);
+}
+
+static void integrate_piece(trace *tr, long double from, long double to)
+{
+    marks m = {0};
+    for (size_t i = 0; i < tr->active_count; i++) add_guides(&m, tr->active[i], from, to);
+    if (m.count > 0) qsort(m.at, m.count, sizeof *m.at, marks_ascending);
+    long double start = from;
+    for (size_t i = 0; i < m.count; i++) {
+        integrate_between(tr, start, m.at[i]);
+        start = m.at[i];
+    }
+    integrate_between(tr, start, to);
+    free(m.at);
+}
+
+static int is_even(const trace *tr)
+{
+    for (size_t i = 0; i < tr->active_count; i++)
+        if (tr->active[i]->desc->density.type != NEBEL_DENSITY_CONSTANT) return 0;
+    return !tr->numeric;
+}
+
+/* Extinction s and light j that do not change over h metres, perhaps without end: j h (1 - e^-sh) / (s h). */
+static void pass_even(trace *tr, long double h)
+{
+    for (int c = 0; c < 3; c++) {
+        long double extinction = 0, light = 0;
+        for (size_t i = 0; i < tr->active_count; i++) {
+            extinction += LONG(tr->active[i]->desc->extinction[c]);
+            light += LONG(tr->active[i]->light[c]);
+        }
+        const long double depth = extinction > 0 ? extinction * h : 0;
+        const long double reach = depth > 0 ? -expm1l(-depth) / extinction : h;
+        if (light > 0) tr->radiance[c] += expl(-tr->depth[c]) * light * reach;
+        tr->depth[c] += depth;
+    }
+}
+
+/* The density far behind the last cut. */
+static double final_density(const volume *v)
+{
+    const nebel_density *const d = &v->desc->density;
+    const double start = (double)v->start[0], slope = (double)v->slope[0];
+    switch (d->type) {
+    case NEBEL_DENSITY_CONSTANT:
+        return 1;
+    case NEBEL_DENSITY_HEIGHT:
+        return density_of_height(slope > 0 ? HUGE_VAL : slope < 0 ? -HUGE_VAL : start, d->below);
+    case NEBEL_DENSITY_LINEAR:
+        return slope > 0 ? 1 : slope < 0 ? 0 : fmin(1, fmax(0, start));
+    default:
+        return 0;
+    }
+}
+
+/* How far one has to go behind `from` until nothing happens any more. */
+static long double horizon(const volume *v, long double from)
+{
+    const nebel_density *const d = &v->desc->density;
+    const double final = final_density(v);
+    const long double u = v->start[0] + v->slope[0] * from;
+    if (final > 1e300) return fmaxl(0, u + 700) / -v->slope[0];
+    if (d->type == NEBEL_DENSITY_GAUSSIAN) return fmaxl(0, v->nearest - from) + 40 / v->speed;
+    if (d->type == NEBEL_DENSITY_HEIGHT && !(final > 0) && v->slope[0] > 0) return (80 + fmaxl(0, -u)) / v->slope[0];
+    long double furthest = 0;
+    for (int c = 0; c < 3; c++) {
+        const double extinction = v->desc->extinction[c] * final;
+        if (extinction > 0) furthest = fmaxl(furthest, 120 / LONG(extinction));
+    }
+    return furthest;
+}
+
+/* Light that nothing absorbs, without end. */
+static int is_endless_light(const trace *tr)
+{
+    for (int c = 0; c < 3; c++) {
+        double extinction = 0, light = 0;
+        for (size_t i = 0; i < tr->active_count; i++) {
+            const double final = final_density(tr->active[i]);
+            if (!(final > 0)) continue;
+            extinction += tr->active[i]->desc->extinction[c];
+            light += tr->active[i]->light[c];
+        }
+        if (light > 0 && !(extinction > 0)) return 1;
+    }
+    return 0;
+}
+
+static void pass_piece(trace *tr, real from, real to)
+{
+    tr->active_count = 0;
+    const real middle = oracle_between(from, to);
+    if (!(from < to) || oracle_contains(&tr->excluded, middle)) return;
+    for (size_t i = 0; i < tr->count; i++)
+        if (oracle_contains(&tr->volumes[i].spans, middle)) tr->active[tr->active_count++] = &tr->volumes[i];
+    if (tr->active_count == 0) return;
+    const int endless = !(to < REAL(HUGE_VAL));
+    if (endless && is_endless_light(tr)) tr->uncertainty = LONG(HUGE_VAL);
+    if (is_even(tr)) {
+        pass_even(tr, endless ? LONG(HUGE_VAL) : LONG(to - from));
+        return;
+    }
+    long double length = LONG(to - from);
+    if (endless) {
+        length = 0;
+        for (size_t i = 0; i < tr->active_count; i++) length = fmaxl(length, horizon(tr->active[i], LONG(from)));
+    }
+    integrate_piece(tr, LONG(from), LONG(from) + length);
+}
+
+/* ---- the whole ray ---- */
+
+static oracle_line line_of(const nebel_ray *ray)
+{
+    oracle_line l;
+    for (int k = 0; k < 3; k++) {
+        l.o[k] = REAL(ray->origin[k]);
+        l.d[k] = REAL(ray->direction[k]);
+    }
+    const real length = oracle_sqrt(oracle_dot(l.d, l.d));
+    for (int k = 0; k < 3; k++) l.d[k] /= length;
+    return l;
+}
+
+static void append_spans(oracle_spans *all, const oracle_spans *more)
+{
+    for (size_t i = 0; i < more->count; i++) {
+        all->at = oracle_grow(all->at, all->count, &all->capacity, sizeof *all->at);
+        all->at[all->count++] = more->at[i];
+    }
+}
+
+static void add_volume(trace *tr, const nebel_volume_desc *desc, const double ambient[3], const oracle_line *line,
+                       real end)
+{
+    volume *const v = &tr->volumes[tr->count];
+    int undecided = 0;
+    *v = (volume){.desc = desc, .spans = oracle_inside(&desc->shape, line, end, &undecided)};
+    if (undecided) tr->uncertainty = LONG(HUGE_VAL);
+    for (size_t i = 0; i < v->spans.count; i++) {
+        add_cut(tr, v->spans.at[i].from);
+        add_cut(tr, v->spans.at[i].to);
+    }
+    if (desc->operation == NEBEL_OPERATION_EXCLUDE) {
+        append_spans(&tr->excluded, &v->spans);
+        free(v->spans.at);
+        return;
+    }
+    for (int c = 0; c < 3; c++) {
+        const double radiance = desc->source[c] + desc->albedo[c] * ambient[c];
+        v->light[c] = radiance * desc->extinction[c] + desc->emission[c];
+        tr->scale = fmax(tr->scale, radiance);
+    }
+    if (v->spans.count > 0) place_volume(tr, v, line);
+    tr->count++;
+}
+
+static void pass_all(trace *tr, real end)
+{
+    add_cut(tr, 0);
+    add_cut(tr, end);
+    qsort(tr->cuts, tr->cut_count, sizeof *tr->cuts, oracle_ascending);
+    for (size_t i = 0; i + 1 < tr->cut_count; i++)
+        if (tr->cuts[i] >= 0 && tr->cuts[i + 1] <= end) pass_piece(tr, tr->cuts[i], tr->cuts[i + 1]);
+}
+
+static void run(const nebel_volume_desc *volumes, size_t n, const double ambient[3], const nebel_ray *ray, int numeric,
+                double T[3], double S[3], double *uncertainty)
+{
+    if (!tables_are_ready) prepare_tables();
+    trace tr = {.numeric = numeric, .scale = 1};
+    const oracle_line line = line_of(ray);
+    size_t capacity = 0;
+    while (capacity <= n) tr.volumes = oracle_grow(tr.volumes, capacity, &capacity, sizeof *tr.volumes);
+    size_t active_capacity = 0;
+    while (active_capacity <= n)
+        tr.active = oracle_grow(tr.active, active_capacity, &active_capacity, sizeof *tr.active);
+    for (size_t i = 0; i < n; i++) add_volume(&tr, &volumes[i], ambient, &line, REAL(ray->t_max));
+    pass_all(&tr, REAL(ray->t_max));
+    *uncertainty = (double)tr.uncertainty;
+    for (int c = 0; c < 3; c++) {
+        T[c] = (double)expl(-tr.depth[c]);
+        S[c] = (double)tr.radiance[c];
+        *uncertainty += 4e-16 * (T[c] + fabs(S[c]) + tr.scale);
+    }
+    for (size_t i = 0; i < tr.count; i++) free(tr.volumes[i].spans.at);
+    free(tr.volumes);
+    free(tr.active);
+    free(tr.excluded.at);
+    free(tr.cuts);
+}
+
+void oracle_trace(const nebel_volume_desc *volumes, size_t n, const double ambient[3], const nebel_ray *ray,
+                  double T[3], double S[3], double *uncertainty)
+{
+    run(volumes, n, ambient, ray, 0, T, S, uncertainty);
+}
+
+void oracle_trace_numerically(const nebel_volume_desc *volumes, size_t n, const double ambient[3], const nebel_ray *ray,
+                              double T[3], double S[3], double *uncertainty)
+{
+    run(volumes, n, ambient, ray, 1, T, S, uncertainty);
+}
