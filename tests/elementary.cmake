@@ -18,5 +18,5 @@ endforeach()
 add_elementary_level(reference "" NB_DOUBLE=1)
 
 if(TARGET test_elementary_gl)
-    target_sources(test_elementary_gl PRIVATE $<TARGET_OBJECTS:elementary_scalar>)
+    target_sources(test_elementary_gl PRIVATE $<TARGET_OBJECTS:elementary_scalar_fast>)
 endif()

@@ -10,11 +10,13 @@
 static nb_real evaluate(nb_elementary function, nb_real a, nb_real b)
 {
     switch (function) {
-#define CASE(name, expression)                                                                     \
-    case NB_ELEMENTARY_##name: return expression;
+#define CASE(name, expression)                                                                                         \
+    case NB_ELEMENTARY_##name:                                                                                         \
+        return expression;
         NB_ELEMENTARY_FUNCTIONS(CASE)
 #undef CASE
-    case NB_ELEMENTARY_COUNT: break;
+    case NB_ELEMENTARY_COUNT:
+        break;
     }
     return a;
 }

@@ -20,11 +20,14 @@ static const char *const function_names[] = {
 #undef NAME
 };
 
-/* ---- numbers to try ----------------------------------------------------------------------------------------------- */
+/* ---- numbers to try ---------------------------------------------------------------------------------------------- */
 
 static uint64_t random_state;
 
-static void seed_random(uint64_t seed) { random_state = seed * UINT64_C(0x9e3779b97f4a7c15) + 1; }
+static void seed_random(uint64_t seed)
+{
+    random_state = seed * UINT64_C(0x9e3779b97f4a7c15) + 1;
+}
 
 static uint64_t random_bits(void)
 {
@@ -34,23 +37,54 @@ static uint64_t random_bits(void)
     return random_state * UINT64_C(0x2545f4914f6cdd1d);
 }
 
-static double random_unit(void) { return (double)(random_bits() >> 11) * 0x1p-53; }
+static double random_unit(void)
+{
+    return (double)(random_bits() >> 11) * 0x1p-53;
+}
 
-/* ---- the truth ---------------------------------------------------------------------------------------------------- */
+/* ---- the truth --------------------------------------------------------------------------------------------------- */
 
 typedef long double truth(long double a, long double b);
 
-static long double true_exp(long double a, long double b) { return (void)b, expl(a); }
-static long double true_expm1(long double a, long double b) { return (void)b, expm1l(a); }
-static long double true_one_minus_exp(long double a, long double b) { return (void)b, -expm1l(-a); }
-static long double true_exp_ratio(long double a, long double b) { return (void)b, a == 0 ? 1 : -expm1l(-a) / a; }
-static long double true_log(long double a, long double b) { return (void)b, logl(a); }
-static long double true_log1p(long double a, long double b) { return (void)b, log1pl(a); }
-static long double true_erf(long double a, long double b) { return (void)b, erfl(a); }
-static long double true_erfc(long double a, long double b) { return (void)b, erfcl(a); }
-static long double true_exp_minus_square(long double a, long double b) { return (void)b, expl(-a * a); }
+static long double true_exp(long double a, long double b)
+{
+    return (void)b, expl(a);
+}
+static long double true_expm1(long double a, long double b)
+{
+    return (void)b, expm1l(a);
+}
+static long double true_one_minus_exp(long double a, long double b)
+{
+    return (void)b, -expm1l(-a);
+}
+static long double true_exp_ratio(long double a, long double b)
+{
+    return (void)b, a == 0 ? 1 : -expm1l(-a) / a;
+}
+static long double true_log(long double a, long double b)
+{
+    return (void)b, logl(a);
+}
+static long double true_log1p(long double a, long double b)
+{
+    return (void)b, log1pl(a);
+}
+static long double true_erf(long double a, long double b)
+{
+    return (void)b, erfl(a);
+}
+static long double true_erfc(long double a, long double b)
+{
+    return (void)b, erfcl(a);
+}
+static long double true_exp_minus_square(long double a, long double b)
+{
+    return (void)b, expl(-a * a);
+}
 
-/* Past 20 by the asymptotic series sum (-1)^n (2 n - 1)!! / (2 x^2)^n / (x sqrt(pi)), whose terms fall below 1e-30 there. */
+/* Past 20 by the asymptotic series sum (-1)^n (2 n - 1)!! / (2 x^2)^n / (x sqrt(pi)), whose terms fall below 1e-30
+ * there. */
 static long double true_erfcx(long double a, long double b)
 {
     (void)b;
@@ -113,7 +147,7 @@ static long double true_gauss_integral(long double a, long double b)
     return expl(-from * from) * one_sided_integral(from, to);
 }
 
-/* ---- exactness ---------------------------------------------------------------------------------------------------- */
+/* ---- exactness --------------------------------------------------------------------------------------------------- */
 
 /* One precision: both take and give doubles that it can hold. */
 typedef struct precision {
@@ -189,8 +223,8 @@ static void run_trial(const precision *p, const trial *t)
         }
         if (d != d) break;
     }
-    print_message("%-6s %-16s %8.3g to %8.3g: %.2f units at (%.17g, %.17g)\n", p->name, function_names[t->function], t->low,
-                  t->high, worst, a[at], b[at]);
+    print_message("%-6s %-16s %8.3g to %8.3g: %.2f units at (%.17g, %.17g)\n", p->name, function_names[t->function],
+                  t->low, t->high, worst, a[at], b[at]);
     assert_true(worst >= 0 && worst <= t->most);
 }
 
@@ -244,7 +278,7 @@ static void double_functions_are_exact_to_a_few_units(void **state)
     run_trials(&double_precision, -708.39, 709.08);
 }
 
-/* ---- hostile numbers ---------------------------------------------------------------------------------------------- */
+/* ---- hostile numbers --------------------------------------------------------------------------------------------- */
 
 static double once(const precision *p, nb_elementary function, double a, double b)
 {
@@ -312,7 +346,8 @@ static void check_limits(const precision *p)
     assert_value(p, NB_ELEMENTARY_sign_one, -0.0, 0, -1);
     assert_value(p, NB_ELEMENTARY_sign_one, 0, 0, 1);
     assert_value(p, NB_ELEMENTARY_rcp_bounded, -2, 0, -0.5);
-    assert_true(once(p, NB_ELEMENTARY_rcp_bounded, 0, 0) <= huge && once(p, NB_ELEMENTARY_rcp_bounded, 0, 0) > 0.999 * huge);
+    assert_true(once(p, NB_ELEMENTARY_rcp_bounded, 0, 0) <= huge &&
+                once(p, NB_ELEMENTARY_rcp_bounded, 0, 0) > 0.999 * huge);
     assert_true(once(p, NB_ELEMENTARY_rcp_bounded, -0.0, 0) == -once(p, NB_ELEMENTARY_rcp_bounded, 0, 0));
 }
 
@@ -349,7 +384,7 @@ static void exp_is_never_subnormal(void **state)
     }
 }
 
-/* ---- instruction sets --------------------------------------------------------------------------------------------- */
+/* ---- instruction sets -------------------------------------------------------------------------------------------- */
 
 typedef struct level {
     const char *name;
@@ -358,9 +393,11 @@ typedef struct level {
     int present;
 } level;
 
-#define LEVEL(name, present)                                                                       \
-    {#name, nb_elementary_##name, nb_elementary_##name##_fast, nb_elementary_lanes_##name,         \
-     nb_elementary_lanes_##name##_fast, (present)}
+#define LEVEL(name, present)                                                                                           \
+    {                                                                                                                  \
+#name, nb_elementary_##name, nb_elementary_##name##_fast, nb_elementary_lanes_##name,                          \
+            nb_elementary_lanes_##name##_fast, (present)                                                               \
+    }
 
 /* The levels of this build, scalar first; returns how many. */
 static size_t list_levels(level levels[4])
@@ -383,16 +420,19 @@ static size_t list_levels(level levels[4])
     };
     size_t count = 0;
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i) {
-        if (all[i].present) levels[count++] = all[i];
-        else print_message("this processor has no %s: not compared\n", all[i].name);
+        if (all[i].present)
+            levels[count++] = all[i];
+        else
+            print_message("this processor has no %s: not compared\n", all[i].name);
     }
     return count;
 }
 
 static const float special_numbers[] = {
-    0.0f, 1.0f, 0.5f, 2.0f, 3.0f, 1e-45f, 1e-40f, FLT_MIN, FLT_MAX, 1e18f, 1e30f, 1e-30f, FLT_EPSILON,
-    0.34657359f, 0.34657362f, 1.0397208f, 0.9999999f, 1.0000001f, 0.70710677f, 1.4142135f, 0.4f, 0.6f, 32.0f, 60.0f, 87.33654f,
-    87.33655f, 88.02968f, 88.0297f, 9.3f, 8388607.5f, 8388608.0f, 4194303.5f, 16777216.0f, 1e6f, INFINITY, NAN,
+    0.0f,        1.0f,       0.5f,       2.0f,        3.0f,        1e-45f,      1e-40f,     FLT_MIN,    FLT_MAX,
+    1e18f,       1e30f,      1e-30f,     FLT_EPSILON, 0.34657359f, 0.34657362f, 1.0397208f, 0.9999999f, 1.0000001f,
+    0.70710677f, 1.4142135f, 0.4f,       0.6f,        32.0f,       60.0f,       87.33654f,  87.33655f,  88.02968f,
+    88.0297f,    9.3f,       8388607.5f, 8388608.0f,  4194303.5f,  16777216.0f, 1e6f,       INFINITY,   NAN,
 };
 enum { SPECIAL_COUNT = sizeof special_numbers / sizeof *special_numbers };
 
@@ -424,7 +464,10 @@ static void fill_pairs(float a[SAMPLES], float b[SAMPLES])
     }
 }
 
-static int same_bits(float a, float b) { return (isnan(a) && isnan(b)) || memcmp(&a, &b, sizeof a) == 0; }
+static int same_bits(float a, float b)
+{
+    return (isnan(a) && isnan(b)) || memcmp(&a, &b, sizeof a) == 0;
+}
 
 static void compare(nb_elementary function, const char *name, nb_elementary_float *scalar, nb_elementary_float *other)
 {

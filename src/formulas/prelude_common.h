@@ -3,9 +3,13 @@
 #ifndef NB_PRELUDE_COMMON_H
 #define NB_PRELUDE_COMMON_H
 
+/* clang-format off: one line for each word of the vocabulary, to be read as a table. */
+
 /* A structure that formulas return: NB_STRUCT(name) members NB_STRUCT_END(name). GLSL has no typedef. */
 #define NB_STRUCT(name) typedef struct name {
-#define NB_STRUCT_END(name) } name;
+#define NB_STRUCT_END(name)                                                                                            \
+    }                                                                                                                  \
+    name;
 
 typedef struct nb_vec3 {
     nb_real x, y, z;
@@ -72,15 +76,15 @@ static inline nb_real nb_floor(nb_real x)
 }
 #endif
 
-/* x * 2^n for an integer n with a normal 2^n, -126 to 127 (float) or -1022 to 1023 (double). The addition leaves n + bias in the lowest
- * bits, the shift moves it to the exponent and everything above it out. */
+/* x * 2^n for an integer n with a normal 2^n, -126 to 127 (float) or -1022 to 1023 (double). The addition leaves n +
+ * bias in the lowest bits, the shift moves it to the exponent and everything above it out. */
 static inline nb_real nb_scale_pow2(nb_real x, nb_real n)
 {
     return x * nb_from_bits(nb_to_bits(n + (NB_INTEGER * NB_F(1.5) + NB_BIAS)) << NB_SHIFT);
 }
 
-/* x = significand * 2^exponent with the significand in [sqrt(1/2), sqrt(2)), for normal x > 0. The exponent is put below the leading
- * bit of NB_INTEGER, which makes it a number without a conversion. */
+/* x = significand * 2^exponent with the significand in [sqrt(1/2), sqrt(2)), for normal x > 0. The exponent is put
+ * below the leading bit of NB_INTEGER, which makes it a number without a conversion. */
 static inline nb_real nb_exponent(nb_real x)
 {
     const nb_bits shifted = (nb_to_bits(x) + (NB_ONE_BITS - NB_SQRT_HALF_BITS)) >> NB_SHIFT;

@@ -1,10 +1,14 @@
-/* NB_WIDTH numbers at a time, in GNU vector types: + - * / and comparisons are written as for one number. See prelude.h.
+/* NB_WIDTH numbers at a time, in GNU vector types: + - * / and comparisons are written as for one number. See
+ * prelude.h.
  *
  * Each instruction set names its registers and the few operations for which plain vector code is poor; everything
- * else follows from them. nb_min and nb_max are a < b ? a : b and a > b ? a : b to the bit, which is what minps and maxps do.
+ * else follows from them. nb_min and nb_max are a < b ? a : b and a > b ? a : b to the bit, which is what minps and
+ * maxps do.
  */
 #ifndef NB_PRELUDE_SIMD_H
 #define NB_PRELUDE_SIMD_H
+
+/* clang-format off: one line for each word of the vocabulary, to be read as a table. */
 
 #include <stdint.h>
 #include <string.h>
@@ -17,10 +21,10 @@
 
 #define NB_FUNCTION static inline
 
-/* ---- the instruction sets ----------------------------------------------------------------------------------------- */
+/* ---- the instruction sets ---------------------------------------------------------------------------------------- */
 
-/* NB_STORAGE floats in a register, of which NB_WIDTH count. SSE2 keeps two floats beside two doubles in the lower half of a register of four,
- * because compilers treat registers of two floats badly. */
+/* NB_STORAGE floats in a register, of which NB_WIDTH count. SSE2 keeps two floats beside two doubles in the lower half
+ * of a register of four, because compilers treat registers of two floats badly. */
 #if defined(NB_ISA_SSE2)
 #define NB_STORAGE 4
 #define NB_REAL_OP(name) _mm_##name##_ps
@@ -46,8 +50,8 @@
 #define NB_TO_WIDE(x) _mm256_cvtps_pd(x)
 #define NB_TO_REAL(x) _mm256_cvtpd_ps(x)
 #define NB_TO_WMASK(m) ((nb_wmask)_mm256_cvtepi32_epi64((__m128i)(m)))
-#define NB_TO_MASK(m)                                                                              \
-    ((nb_mask)_mm_shuffle_ps(_mm256_castps256_ps128((__m256)(m)), _mm256_extractf128_ps((__m256)(m), 1),        \
+#define NB_TO_MASK(m)                                                                                                  \
+    ((nb_mask)_mm_shuffle_ps(_mm256_castps256_ps128((__m256)(m)), _mm256_extractf128_ps((__m256)(m), 1),               \
                              _MM_SHUFFLE(2, 0, 2, 0)))
 #if defined(NB_FAST)
 #define NB_WIDTH 8
@@ -64,7 +68,7 @@
 #elif defined(NB_ISA_AVX512)
 #define NB_TERNARY_SELECT 0xca /* the truth table of m ? a : b */
 #define NB_WIDE_OP(name) _mm512_##name##_pd
-#define NB_WIDE_SELECT(m, a, b)                                                                    \
+#define NB_WIDE_SELECT(m, a, b)                                                                                        \
     ((nb_wide)_mm512_ternarylogic_epi64((__m512i)(m), (__m512i)(a), (__m512i)(b), NB_TERNARY_SELECT))
 #define NB_WIDE_SIGNS(m) ((unsigned)_mm512_movepi64_mask((__m512i)(m)))
 #define NB_TO_WIDE(x) _mm512_cvtps_pd(x)
@@ -74,13 +78,13 @@
 #if defined(NB_FAST)
 #define NB_WIDTH 16
 #define NB_REAL_OP(name) _mm512_##name##_ps
-#define NB_REAL_SELECT(m, a, b)                                                                    \
+#define NB_REAL_SELECT(m, a, b)                                                                                        \
     ((nb_real)_mm512_ternarylogic_epi32((__m512i)(m), (__m512i)(a), (__m512i)(b), NB_TERNARY_SELECT))
 #define NB_REAL_SIGNS(m) ((unsigned)_mm512_movepi32_mask((__m512i)(m)))
 #else
 #define NB_WIDTH 8
 #define NB_REAL_OP(name) _mm256_##name##_ps
-#define NB_REAL_SELECT(m, a, b)                                                                    \
+#define NB_REAL_SELECT(m, a, b)                                                                                        \
     ((nb_real)_mm256_ternarylogic_epi32((__m256i)(m), (__m256i)(a), (__m256i)(b), NB_TERNARY_SELECT))
 #define NB_REAL_SIGNS(m) ((unsigned)_mm256_movemask_ps((__m256)(m)))
 #endif
@@ -133,7 +137,7 @@
 #define NB_WIDE_MAX(a, b) NB_WIDE_OP(max)(a, b)
 #endif
 
-/* ---- types and literals ------------------------------------------------------------------------------------------- */
+/* ---- types and literals ------------------------------------------------------------------------------------------ */
 
 typedef float nb_scalar;
 typedef float nb_real __attribute__((vector_size(4 * NB_STORAGE)));
@@ -149,7 +153,7 @@ static inline nb_real nb_splat(float x) { return x - (nb_real){0}; }
 static inline nb_bits nb_to_bits(nb_real x) { return (nb_bits)x; }
 static inline nb_real nb_from_bits(nb_bits bits) { return (nb_real)bits; }
 
-/* ---- real --------------------------------------------------------------------------------------------------------- */
+/* ---- real -------------------------------------------------------------------------------------------------------- */
 
 #define nb_lane(v, i) ((v)[i])
 #define nb_mask_true (~(nb_mask){0})
@@ -176,7 +180,7 @@ static inline nb_real nb_load_lanes(const float *from)
 
 static inline void nb_store_lanes(float *to, nb_real x) { memcpy(to, &x, 4 * NB_WIDTH); }
 
-/* ---- wide --------------------------------------------------------------------------------------------------------- */
+/* ---- wide -------------------------------------------------------------------------------------------------------- */
 
 #if defined(NB_FAST)
 
