@@ -1,0 +1,47 @@
+/* Random fog and rays chosen to hurt, the same for the same seed everywhere. */
+#ifndef RANDOM_FOG_H
+#define RANDOM_FOG_H
+
+#include <nebel/nebel.h>
+
+#include <stdio.h>
+
+typedef enum random_fog_kind {
+    RANDOM_FOG_SINGLE,   /* one even volume of any shape */
+    RANDOM_FOG_OVERLAP,  /* six even volumes, one of them the world */
+    RANDOM_FOG_PROFILES, /* five volumes of any profile */
+    RANDOM_FOG_EXCLUDE,  /* profiles with exclusions */
+    RANDOM_FOG_MANY,     /* forty volumes of any shape and profile */
+    RANDOM_FOG_PARTS,    /* unions and intersections of shapes and of each other */
+    RANDOM_FOG_FAR,      /* any of the above, 1e7 m away */
+    RANDOM_FOG_OPAQUE,   /* extinctions from 1e-7 to 1e4 */
+    RANDOM_FOG_LEVEL,    /* height and linear fog, rays nearly level */
+    RANDOM_FOG_KIND_COUNT
+} random_fog_kind;
+
+enum { RANDOM_FOG_VOLUMES = 40, RANDOM_FOG_PLANES = 14, RANDOM_FOG_PARTS_EACH = 4 };
+
+/* The volumes point into the struct: fill it where it stays, do not copy it. */
+typedef struct random_fog {
+    random_fog_kind kind;
+    uint64_t seed;
+    double ambient[3];
+    double shift[3]; /* of everything */
+    size_t count;
+    nebel_volume_desc volumes[RANDOM_FOG_VOLUMES];
+    size_t part_count, plane_count;
+    nebel_shape parts[RANDOM_FOG_VOLUMES * RANDOM_FOG_PARTS_EACH * (RANDOM_FOG_PARTS_EACH + 1)];
+    nebel_plane planes[RANDOM_FOG_VOLUMES * RANDOM_FOG_PARTS_EACH * RANDOM_FOG_PARTS_EACH * RANDOM_FOG_PLANES];
+} random_fog;
+
+void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed);
+
+/* Past, through and from inside the volumes; along axes; in faces; tangent to spheres, cylinders and cones to 1e-3 ..
+ * 1e-15 of their size; through corners and along axes of shapes; t_max zero, tiny, ending on a surface, long, infinite;
+ * directions of any length. */
+nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed);
+
+/* The fog as a scene file and the ray as a line of `nebel trace`, every number exact. */
+void random_fog_print(FILE *to, const random_fog *fog, const nebel_ray *ray);
+
+#endif

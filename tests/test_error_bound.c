@@ -1,0 +1,185 @@
+/* Is the error that nebel_trace reports never smaller than the true one, and never larger than promised?
+ *
+ *     test_error_bound [cases [first]]        20000 from 0 unless said otherwise; a million take some minutes */
+#include "oracle.h"
+#include "random_fog.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { RAYS_PER_FOG = 20 };
+
+static size_t case_count = 20000, first_case;
+
+/* One way of asking, and what came of it. */
+typedef struct mode {
+    const char *name;
+    nebel_precision precision;
+    double tolerance, extra; /* error <= tolerance * radiance + extra */
+    double may_exceed;       /* by this share of the cases */
+    size_t cases, dishonest, excessive;
+    double worst_ratio, worst_excess; /* true error / reported; error / promised */
+    size_t worst_ratio_case, worst_excess_case;
+} mode;
+
+static mode modes[] = {
+    {"double 2e-3", NEBEL_PRECISION_DOUBLE, 2e-3, 1e-8, 0, 0, 0, 0, 0, 0, 0, 0},
+    {"double 1e-7", NEBEL_PRECISION_DOUBLE, 1e-7, 1e-8, 0, 0, 0, 0, 0, 0, 0, 0},
+    {"float  2e-3", NEBEL_PRECISION_FLOAT, 2e-3, 1e-4, 1e-3, 0, 0, 0, 0, 0, 0, 0},
+    {"float  1e-7", NEBEL_PRECISION_FLOAT, 1e-7, 1e-4, 1e-3, 0, 0, 0, 0, 0, 0, 0},
+};
+enum { MODES = sizeof modes / sizeof modes[0] };
+
+static size_t undecided;
+static double worst_uncertainty;
+
+/* Which fog and ray a case is: kinds in turn, some rays for each fog. */
+static random_fog_kind kind_of(size_t i)
+{
+    return (random_fog_kind)(i / RAYS_PER_FOG % RANDOM_FOG_KIND_COUNT);
+}
+
+static uint64_t seed_of(size_t i)
+{
+    return i / RAYS_PER_FOG / RANDOM_FOG_KIND_COUNT;
+}
+
+static nebel_snapshot *commit(const random_fog *fog)
+{
+    nebel_fog *now = NULL;
+    nebel_snapshot *snapshot = NULL;
+    nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]}};
+    assert_int_equal(nebel_create_fog(&desc, &now), NEBEL_OK);
+    for (size_t i = 0; i < fog->count; i++) assert_int_equal(nebel_add_volume(now, &fog->volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(now, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(now);
+    return snapshot;
+}
+
+static double largest_radiance(const random_fog *fog)
+{
+    double most = 1;
+    for (size_t i = 0; i < fog->count; i++)
+        for (int c = 0; c < 3; c++)
+            most = fmax(most, fog->volumes[i].source[c] + fog->volumes[i].albedo[c] * fog->ambient[c]);
+    return most;
+}
+
+static void keep_worst(double value, size_t i, double *worst, size_t *worst_case)
+{
+    if (!(value > *worst)) return;
+    *worst = value;
+    *worst_case = i;
+}
+
+static void judge(mode *m, size_t i, const nebel_light *light, const double T[3], const double S[3], double uncertainty,
+                  double radiance)
+{
+    double wrong = 0;
+    for (int c = 0; c < 3; c++) {
+        const double t = fabs(light->transmittance[c] - T[c]), s = fabs(light->in_scattering[c] - S[c]);
+        wrong = t <= wrong ? wrong : t; /* a NaN counts as wrong */
+        wrong = s <= wrong ? wrong : s;
+    }
+    const double surely = isfinite(wrong) ? wrong - uncertainty : HUGE_VAL;
+    const double promised = m->tolerance * radiance + m->extra;
+    m->cases++;
+    m->dishonest += !(light->error >= surely);
+    m->excessive += !(light->error <= promised);
+    keep_worst(surely / fmax(light->error, 1e-300), i, &m->worst_ratio, &m->worst_ratio_case);
+    keep_worst(isnan(light->error) ? HUGE_VAL : light->error / promised, i, &m->worst_excess, &m->worst_excess_case);
+}
+
+static void try_fog(size_t from, size_t to)
+{
+    static random_fog fog;
+    nebel_ray rays[RAYS_PER_FOG];
+    nebel_light lights[MODES][RAYS_PER_FOG];
+    random_fog_make(&fog, kind_of(from), seed_of(from));
+    for (size_t i = from; i < to; i++) rays[i - from] = random_fog_ray(&fog, i % RAYS_PER_FOG);
+    nebel_snapshot *const snapshot = commit(&fog);
+    for (int m = 0; m < MODES; m++) {
+        const nebel_trace_desc desc = {.precision = modes[m].precision, .tolerance = modes[m].tolerance};
+        const nebel_result result =
+            nebel_trace(snapshot, &desc, to - from, rays, sizeof *rays, lights[m], sizeof *lights[m]);
+        if (result != NEBEL_OK) print_message("case %zu, %s: %s\n", from, modes[m].name, nebel_result_text(result));
+        assert_int_equal(result, NEBEL_OK);
+    }
+    for (size_t i = from; i < to; i++) {
+        double T[3], S[3], uncertainty;
+        oracle_trace(fog.volumes, fog.count, fog.ambient, &rays[i - from], T, S, &uncertainty);
+        if (!isfinite(uncertainty)) {
+            undecided++;
+            continue;
+        }
+        worst_uncertainty = fmax(worst_uncertainty, uncertainty);
+        for (int m = 0; m < MODES; m++)
+            judge(&modes[m], i, &lights[m][i - from], T, S, uncertainty, largest_radiance(&fog));
+    }
+    nebel_release_snapshot(snapshot);
+}
+
+/* Everything that is needed to see a case again. */
+static void print_case(const char *why, const mode *m, size_t i)
+{
+    static random_fog fog;
+    random_fog_make(&fog, kind_of(i), seed_of(i));
+    const nebel_ray ray = random_fog_ray(&fog, i % RAYS_PER_FOG);
+    nebel_snapshot *const snapshot = commit(&fog);
+    nebel_light light;
+    double T[3], S[3], uncertainty;
+    const nebel_trace_desc desc = {.precision = m->precision, .tolerance = m->tolerance};
+    nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light);
+    oracle_trace(fog.volumes, fog.count, fog.ambient, &ray, T, S, &uncertainty);
+    nebel_release_snapshot(snapshot);
+    printf("\n%s, %s: case %zu (kind %d, seed %zu, ray %zu)\n", m->name, why, i, (int)kind_of(i), (size_t)seed_of(i),
+           i % RAYS_PER_FOG);
+    random_fog_print(stdout, &fog, &ray);
+    printf("trace  T %.17g %.17g %.17g S %.17g %.17g %.17g error %g\n", light.transmittance[0], light.transmittance[1],
+           light.transmittance[2], light.in_scattering[0], light.in_scattering[1], light.in_scattering[2], light.error);
+    printf("oracle T %.17g %.17g %.17g S %.17g %.17g %.17g uncertainty %g\n", T[0], T[1], T[2], S[0], S[1], S[2],
+           uncertainty);
+}
+
+static void print_mode(const mode *m)
+{
+    printf(
+        "%s: %zu cases; too small an error in %zu (worst: true error %.3g times the reported, case %zu); too large in "
+        "%zu (worst: %.3g times the promised, case %zu)\n",
+        m->name, m->cases, m->dishonest, m->worst_ratio, m->worst_ratio_case, m->excessive, m->worst_excess,
+        m->worst_excess_case);
+}
+
+static void test_reported_errors_bound_the_true_ones_and_keep_their_promise(void **unused)
+{
+    (void)unused;
+    for (size_t i = first_case; i < first_case + case_count; i += RAYS_PER_FOG) try_fog(i, i + RAYS_PER_FOG);
+    printf("%zu cases undecided; largest uncertainty of the truth %.2g\n", undecided, worst_uncertainty);
+    int failed = 0;
+    for (int m = 0; m < MODES; m++) print_mode(&modes[m]);
+    for (int m = 0; m < MODES; m++) {
+        const int excessive = (double)modes[m].excessive > modes[m].may_exceed * (double)modes[m].cases;
+        if (modes[m].dishonest > 0) print_case("true error larger than reported", &modes[m], modes[m].worst_ratio_case);
+        if (excessive) print_case("error larger than promised", &modes[m], modes[m].worst_excess_case);
+        failed = failed || excessive || modes[m].dishonest > 0;
+    }
+    assert_false(failed);
+    assert_true(undecided < case_count / 20);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) case_count = (size_t)strtoull(argv[1], NULL, 10);
+    if (argc > 2) first_case = (size_t)strtoull(argv[2], NULL, 10) / RAYS_PER_FOG * RAYS_PER_FOG;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_reported_errors_bound_the_true_ones_and_keep_their_promise),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
