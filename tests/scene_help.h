@@ -1,0 +1,88 @@
+/* What the tests of scenes share: a log that remembers, an allocator that counts and fails, a marker for places in a
+ * text. */
+#ifndef NB_TESTS_SCENE_HELP_H
+#define NB_TESTS_SCENE_HELP_H
+
+#include <nebel/scene.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+typedef struct journal {
+    int count;
+    nebel_result result;
+    char last[1024];
+} journal;
+
+static inline void remember(nebel_result result, const char *message, void *user)
+{
+    journal *kept = user;
+    kept->count++;
+    kept->result = result;
+    snprintf(kept->last, sizeof kept->last, "%s", message);
+}
+
+/* Every allocation is counted; number `fail_at` (from 0) and all later ones fail. */
+typedef struct meter {
+    long live, made, fail_at;
+} meter;
+
+static inline void *metered_allocate(size_t size, void *user)
+{
+    meter *m = user;
+    void *memory = m->made++ < m->fail_at ? malloc(size) : NULL;
+    m->live += memory != NULL;
+    return memory;
+}
+
+static inline void metered_release(void *memory, void *user)
+{
+    meter *m = user;
+    m->live--;
+    free(memory);
+}
+
+static inline nebel_scene_desc metered_desc(meter *m, journal *kept)
+{
+    *m = (meter){.fail_at = 1L << 40};
+    *kept = (journal){0};
+    return (nebel_scene_desc){{metered_allocate, metered_release, m}, {remember, kept}};
+}
+
+/* Takes the mark ` out of a text; its line and column go to `place` as "LINE:COLUMN", "" where there is none. */
+static inline char *unmark(const char *marked, char place[32])
+{
+    char *text = malloc(strlen(marked) + 1), *at = text;
+    int line = 1, column = 1;
+    place[0] = '\0';
+    for (; *marked != '\0'; marked++) {
+        if (*marked == '`') {
+            snprintf(place, 32, "%d:%d", line, column);
+            continue;
+        }
+        if (*marked == '\n')
+            line++, column = 1;
+        else if (((unsigned char)*marked & 0xC0) != 0x80)
+            column++;
+        *at++ = *marked;
+    }
+    *at = '\0';
+    return text;
+}
+
+static inline nebel_scene *parse_good(const char *text)
+{
+    journal kept = {0};
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    if (nebel_parse_scene(text, strlen(text), "test.json", &desc, &scene) != NEBEL_OK) fail_msg("%s", kept.last);
+    return scene;
+}
+
+#endif

@@ -1,0 +1,468 @@
+/* Every rule of the scene file, broken once. The mark ` stands where the message must point. */
+#include "scene_help.h"
+
+typedef struct rule {
+    nebel_result result;
+    const char *text;
+    const char *message; /* what must stand after the place */
+} rule;
+
+static void check_rules(const rule *rules, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        char place[32], expected[1024];
+        char *text = unmark(rules[i].text, place);
+        meter m;
+        journal kept;
+        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        nebel_scene *scene = (nebel_scene *)&m;
+        const nebel_result result = nebel_parse_scene(text, strlen(text), "dir/a.json", &desc, &scene);
+        snprintf(expected, sizeof expected, "dir/a.json:%s: %s", place, rules[i].message);
+        if (result != rules[i].result || strncmp(kept.last, expected, strlen(expected)) != 0)
+            fail_msg("%s\n gave %d: %s\n wanted %d: %s", text, result, kept.last, rules[i].result, expected);
+        assert_int_equal(kept.count, 1);
+        assert_int_equal(kept.result, result);
+        assert_null(scene);
+        assert_int_equal(m.live, 0);
+        free(text);
+    }
+}
+
+#define CHECK(rules) check_rules(rules, sizeof rules / sizeof *rules)
+#define FORMAT NEBEL_ERROR_FORMAT
+#define UNSUPPORTED NEBEL_ERROR_UNSUPPORTED
+#define LIMIT NEBEL_ERROR_LIMIT
+
+#define SCENE(members) "{\"nebel\": 1, \"fog\": [], " members "}"
+#define FOG(volume) "{\"nebel\": 1, \"fog\": [\n {\"name\": \"d\u00fcnn\", " volume "}]}"
+#define WORLD "\"shape\": {\"type\": \"world\"}"
+#define SHAPE(members) FOG("\"extinction\": 1, \"shape\": {" members "}")
+#define DENSITY(members) FOG(WORLD ", \"extinction\": 1, \"density\": {" members "}")
+#define CAMERA(members) SCENE("\"camera\": {" members "}")
+#define MODEL(members) SCENE("\"models\": [{" members "}]")
+#define LIGHT(members) SCENE("\"lights\": [`{" members "}]")
+#define BAD_LIGHT(members) SCENE("\"lights\": [{" members "}]")
+
+static void test_what_is_not_json(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, "`", "the file is empty; a scene holds at least"},
+        {FORMAT, " \n // only this\n`", "the file is empty"},
+        {FORMAT, "`\xEF\xBB\xBF{}", "the file starts with a byte order mark; save it as UTF-8 without one"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": []}\n `x", "not JSON: parse error: trailing garbage"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": []} `{}", "not JSON: parse error: trailing garbage"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [`", "not JSON: parse error: premature EOF"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": []`]}", "not JSON"},
+        {FORMAT, "{\"nebel\": 1 `\"fog\": []}", "not JSON: parse error: after key and value, inside map"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [], `}", "not JSON"},
+        {FORMAT, "{\"nebel\": 1, \"background\": [0`1, 0, 0]}", "not JSON"},
+        {FORMAT, "{\"nebel\": `.5, \"fog\": []}", "not JSON"},
+        {FORMAT, "{\"nebel\": `NaN, \"fog\": []}", "not JSON"},
+        {FORMAT, "{\"nebel\": `Infinity, \"fog\": []}", "not JSON"},
+        {FORMAT, "{\"nebel\": `'1', \"fog\": []}", "not JSON"},
+        {FORMAT, "{\"nebel\": `1e, \"fog\": []}", "not JSON"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": `\"\\x\"}]}", "not JSON"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": \"a`\xFF\"}]}", "this is not UTF-8 text"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": \"`\xC0\x80\"}]}", "this is not UTF-8 text"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": \"`\xED\xA0\x80\"}]}", "this is not UTF-8 text"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": \"`\xF4\x90\x80\x80\"}]}", "this is not UTF-8 text"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": `\"a\tb\"}]}", "not JSON"},
+        {FORMAT, "{\"nebel\": 1,`\v \"fog\": []}", "this is not UTF-8 text, or a control character"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": `\"\\ud800\"}]}", "an escape \\uD800 to \\uDFFF stands alone"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": `\"\\udc00\\ud800\"}]}",
+         "an escape \\uD800 to \\uDFFF stands alone"},
+        {FORMAT, "`[]", "a scene is an object"},
+        {FORMAT, "`12", "a scene is an object"},
+    };
+    CHECK(rules);
+}
+
+static void test_what_no_scene_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, "`{\"fog\": []}", "the key \"nebel\" is missing; a scene needs it"},
+        {FORMAT, "`{\"nebel\": 1}", "the key \"fog\" is missing; a scene needs it"},
+        {UNSUPPORTED, "{\"nebel\": `2, \"fog\": []}", "nebel: is 2; this program reads version 1"},
+        {FORMAT, "{\"nebel\": `\"1\", \"fog\": []}", "nebel: is a string; must be a number"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": `{}}", "fog: is an object; must be an array"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [], `\"fog\": []}", "fog: the key appears twice; remove one"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [], `\"f\\u006fg\": []}", "fog: the key appears twice; remove one"},
+        {FORMAT, SCENE("`\"ambiant\": 0"),
+         "ambiant: unknown key; a scene has: nebel, camera, background, sun, ambient, lights, models, fog; did you "
+         "mean "
+         "\"ambient\"?"},
+        {FORMAT, SCENE("`\"planet\": {}"), "planet: unknown key"},
+        {FORMAT, SCENE("`\"nebula\": {}"), "nebula: unknown key"},
+        {FORMAT, SCENE("\"background\": [0, `-1, 0]"), "background[1]: is -1; must be a number >= 0"},
+        {FORMAT, SCENE("\"background\": `[0, 1]"), "background: has 2 elements; must be an array of 3 numbers"},
+        {FORMAT, SCENE("\"background\": `\"red\""),
+         "background: is a string; must be a number or an array of 3 numbers"},
+        {FORMAT, SCENE("\"background\": `1e999"), "background: the number is too large; at most 1.797e308"},
+        {FORMAT, SCENE("\"ambient\": `-0.1"), "ambient: is -0.1; must be a number >= 0"},
+        {FORMAT, SCENE("\"ambient\": [0, 0, `null]"), "ambient[2]: is null; must be a number >= 0"},
+        {FORMAT, SCENE("\"sun\": {\"direction\": `[0, 0, 0], \"irradiance\": 1}"), "sun.direction: has no direction"},
+        {FORMAT, SCENE("\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": `-1}"), "sun.irradiance: is -1; must be"},
+        {FORMAT, SCENE("\"sun\": `{\"direction\": [0, 1, 0]}"),
+         "sun: the key \"irradiance\" is missing; a sun needs it"},
+        {FORMAT, SCENE("\"sun\": {`\"angle\": 1}"), "sun.angle: unknown key; a sun has: direction, irradiance"},
+        {FORMAT, SCENE("\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 1, `\"irradiance\": 1}"),
+         "sun.irradiance: the key appears twice"},
+        {FORMAT, SCENE("\"sun\": `true"), "sun: is true or false; must be an object"},
+    };
+    CHECK(rules);
+}
+
+static void test_what_no_camera_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, CAMERA("\"vertical_fov\": `0"),
+         "camera.vertical_fov: is 0; must be a number of degrees, > 0 and < 180"},
+        {FORMAT, CAMERA("\"vertical_fov\": `180"), "camera.vertical_fov: is 180; must be"},
+        {FORMAT, CAMERA("\"view_height\": `0"), "camera.view_height: is 0; must be a number > 0"},
+        {FORMAT, CAMERA("\"projection\": `\"fisheye\""),
+         "camera.projection: unknown; must be one of: perspective, orthographic, panorama"},
+        {FORMAT, CAMERA("\"projection\": `\"ortographic\""),
+         "camera.projection: unknown; must be one of: perspective, orthographic, panorama; did you mean "
+         "\"orthographic\"?"},
+        {FORMAT, CAMERA("\"projection\": `1"), "camera.projection: is a number; must be a string"},
+        {FORMAT, CAMERA("\"position\": [1, 2, 3], \"look_at\": `[1, 2, 3]"),
+         "camera.look_at: the camera looks at its own"},
+        {FORMAT, SCENE("\"camera\": `{\"position\": [1e300, 2, 1e300]}"),
+         "camera: the camera looks at its own position"},
+        {FORMAT, CAMERA("\"position\": [0, 9, 0], \"look_at\": `[0, 0, 0]"),
+         "camera.look_at: the view is along \"up\""},
+        {FORMAT, CAMERA("\"look_at\": [0, 1.7, 5], \"up\": `[0, 0, 2]"), "camera.up: the view is along \"up\""},
+        {FORMAT, CAMERA("\"up\": `[0, 0, 0]"), "camera.up: has no direction"},
+        {FORMAT, CAMERA("\"turntable\": {\"frames\": `0}"),
+         "camera.turntable.frames: is 0; must be a whole number from 1 to"},
+        {FORMAT, CAMERA("\"turntable\": {\"frames\": `2.5}"),
+         "camera.turntable.frames: is 2.5; must be a whole number"},
+        {FORMAT, CAMERA("\"turntable\": `{}"), "camera.turntable: the key \"frames\" is missing"},
+        {FORMAT, CAMERA("\"turntable\": {\"frames\": 9}, `\"keys\": [{\"frame\": 0}]"), "camera.keys: a camera has"},
+        {FORMAT, CAMERA("\"keys\": `[]"), "camera.keys: holds no key"},
+        {FORMAT, CAMERA("\"keys\": [{\"frame\": 1}, `{\"frame\": 1}]"),
+         "camera.keys[1]: its frame 1 is not after the key before it, 1; frames must ascend"},
+        {FORMAT, CAMERA("\"keys\": [`{}]"), "camera.keys[0]: the key \"frame\" is missing"},
+        {FORMAT, CAMERA("\"keys\": [{\"frame\": 1, `\"projection\": \"panorama\"}]"),
+         "camera.keys[0].projection: unknown key"},
+        {FORMAT, CAMERA("`\"frame\": 1"), "camera.frame: unknown key"},
+        {FORMAT, CAMERA("\"keys\": [{\"frame\": 1, \"vertical_fov\": `200}]"), "camera.keys[0].vertical_fov: is 200"},
+    };
+    CHECK(rules);
+}
+
+#define POINT "\"type\": \"point\", \"position\": [0, 3, 0], \"intensity\": [5, 4, 3]"
+#define SPOT "\"type\": \"spot\", \"position\": [0, 3, 0], \"intensity\": 5, \"direction\": [0, -1, 0], "
+
+static void test_lights_are_checked_and_then_refused(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {UNSUPPORTED, LIGHT(POINT), "lights[0]: this version cannot light with point lights; remove \"lights\""},
+        {UNSUPPORTED, LIGHT(SPOT "\"inner_angle\": 20, \"outer_angle\": 30"),
+         "lights[0]: this version cannot light with spot"},
+        {FORMAT, BAD_LIGHT(SPOT "\"inner_angle\": `31, \"outer_angle\": 30"), "lights[0].inner_angle: is 31; must be"},
+        {FORMAT, BAD_LIGHT(SPOT "\"outer_angle\": `180"), "lights[0].outer_angle: is 180; must be"},
+        {FORMAT, BAD_LIGHT(POINT ", `\"direction\": [1, 0, 0]"), "lights[0].direction: unknown key; a point light has"},
+        {FORMAT, BAD_LIGHT("\"type\": `\"laser\""), "lights[0].type: unknown; must be one of: point, spot"},
+        {FORMAT, BAD_LIGHT("\"type\": \"point\", \"position\": [0, 3, 0], \"intensity\": `-1"),
+         "lights[0].intensity: is -1"},
+        {FORMAT, SCENE("\"lights\": [`{}]"), "lights[0]: the key \"type\" is missing; must be one of: point, spot"},
+        {FORMAT, SCENE("\"lights\": [`1]"), "lights[0]: is a number; must be an object"},
+        {FORMAT, SCENE("\"lights\": `0"), "lights: is a number; must be an array"},
+    };
+    CHECK(rules);
+}
+
+#define HEIGHTS "\"heightfield\": {\"file\": \"a.png\", \"size\": [2, 2], \"height\": 1}"
+
+static void test_what_no_model_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, SCENE("\"models\": [`{}]"), "models[0]: is neither; a model has \"file\" or \"heightfield\""},
+        {FORMAT, MODEL(HEIGHTS ", `\"file\": \"a\""), "models[0].file: does not go with \"heightfield\""},
+        {FORMAT, MODEL(HEIGHTS ", `\"scale\": 2"), "models[0].scale: does not go with \"heightfield\""},
+        {FORMAT, MODEL("\"file\": `\"\""), "models[0].file: is empty; must be the path of a file"},
+        {FORMAT, MODEL("\"file\": `\"a\\u0000b\""), "models[0].file: holds a zero character"},
+        {FORMAT, MODEL("\"file\": `7"), "models[0].file: is a number; must be a string"},
+        {FORMAT, MODEL("\"file\": \"a\", \"scale\": `0"), "models[0].scale: a scale of 0 makes the transform singular"},
+        {FORMAT, MODEL("\"file\": \"a\", \"scale\": `[1, 0, 1]"), "models[0].scale: a scale of 0"},
+        {FORMAT, MODEL("\"file\": \"a\", \"rotation\": `[0, 0, 0, 0]"),
+         "models[0].rotation: a quaternion [x, y, z, w] of"},
+        {FORMAT, MODEL("\"file\": \"a\", \"rotation\": `[0, 0, 1]"),
+         "models[0].rotation: has 3 elements; must be an array of 4"},
+        {FORMAT, MODEL("\"file\": \"a\", \"color\": [0, `1.5, 0]"),
+         "models[0].color[1]: is 1.5; must be a number from 0 to 1"},
+        {FORMAT, MODEL("\"heightfield\": {\"file\": \"a.png\", \"size\": [2, `0], \"height\": 1}"),
+         "models[0].heightfield.size[1]: is 0; must be a number > 0"},
+        {FORMAT, MODEL("\"heightfield\": {\"file\": \"a.png\", \"size\": [2, 1], \"height\": `-1}"),
+         "models[0].heightfield.height: is -1; must be a number > 0"},
+        {FORMAT, MODEL("\"heightfield\": `{\"file\": \"a.png\"}"),
+         "models[0].heightfield: the key \"size\" is missing"},
+        {FORMAT, SCENE("\"models\": [{\"file\": \"a\"}, {\"file\": \"b\", `\"colour\": 1}]"),
+         "models[1].colour: unknown key; a model has: file, position, rotation, scale, heightfield, color; did you "
+         "mean "
+         "\"color\"?"},
+    };
+    CHECK(rules);
+}
+
+#define BOX "\"type\": \"box\", \"min\": [0, 0, 0], "
+#define AXIS "\"from\": [1, 0, 0], "
+
+static void test_what_no_shape_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, SHAPE("\"type\": `\"spheer\""),
+         "fog[0].shape.type: unknown; must be one of: world, half_space, box, sphere, "
+         "ellipsoid, cylinder, capsule, cone, convex, union, intersection; did you mean"},
+        {FORMAT, FOG("\"extinction\": 1, \"shape\": `{}"),
+         "fog[0].shape: the key \"type\" is missing; must be one of: world"},
+        {FORMAT, FOG("\"extinction\": 1, \"shape\": `[]"), "fog[0].shape: is an array; must be an object"},
+        {FORMAT, SHAPE(BOX "\"max\": [1, `0, 1]"),
+         "fog[0].shape.max[1]: is 0; must be greater than min[1], which is 0"},
+        {FORMAT, FOG("\"extinction\": 1, \"shape\": `{\"type\": \"box\", \"max\": [1, 1, 1]}"),
+         "fog[0].shape: the key \"min\" is missing; a box needs it"},
+        {FORMAT, SHAPE("\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": `0"),
+         "fog[0].shape.radius: is 0; must be"},
+        {FORMAT, SHAPE("\"type\": \"sphere\", `\"radii\": 1"),
+         "fog[0].shape.radii: unknown key; a sphere has: type, transform, center, radius"},
+        {FORMAT, SHAPE("\"type\": \"ellipsoid\", \"center\": [0, 0, 0], \"radii\": [1, 2, `-3]"),
+         "fog[0].shape.radii[2]: is -3; must be a number > 0"},
+        {FORMAT, SHAPE("\"type\": \"ellipsoid\", \"center\": [0, 0, 0], \"radii\": `1"),
+         "fog[0].shape.radii: is a number"},
+        {FORMAT, SHAPE("\"type\": \"half_space\", \"point\": [0, 0, 0], \"normal\": `[0, 0, 0]"),
+         "fog[0].shape.normal: has no direction"},
+        {FORMAT, SHAPE("\"type\": \"cylinder\", " AXIS "\"to\": `[1, 0, 0], \"radius\": 1"),
+         "fog[0].shape.to: is the same place as \"from\""},
+        {FORMAT, SHAPE("\"type\": \"cone\", " AXIS "\"to\": [2, 0, 0], \"radius_from\": 0, \"radius_to\": `0"),
+         "fog[0].shape.radius_to: both radii are 0; one must be > 0"},
+        {FORMAT, SHAPE("\"type\": \"cone\", " AXIS "\"to\": [2, 0, 0], \"radius_from\": `-1, \"radius_to\": 0"),
+         "fog[0].shape.radius_from: is -1; must be a number >= 0"},
+        {FORMAT, SHAPE("\"type\": \"convex\", \"planes\": `[]"),
+         "fog[0].shape.planes: holds 0 planes; must hold 1 to 1024"},
+        {FORMAT, SHAPE("\"type\": \"convex\", \"planes\": [[1, 0, 0, 1], `[0, 0, 0, 1]]"),
+         "fog[0].shape.planes[1]: has the normal 0"},
+        {FORMAT, SHAPE("\"type\": \"convex\", \"planes\": [`[1, 0, 1]]"),
+         "fog[0].shape.planes[0]: has 3 elements; must be"},
+        {FORMAT, SHAPE("\"type\": \"union\", \"shapes\": `[]"),
+         "fog[0].shape.shapes: holds 0 shapes; must hold 1 to 1024"},
+        {FORMAT,
+         SHAPE("\"type\": \"union\", \"shapes\": [{\"type\": \"world\"}, {\"type\": \"intersection\", \"shapes\": "
+               "[{\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": `\"1\"}]}]"),
+         "fog[0].shape.shapes[1].shapes[0].radius: is a string; must be a number > 0"},
+        {FORMAT, SHAPE("\"type\": \"world\", \"transform\": {\"scale\": `0}"),
+         "fog[0].shape.transform.scale: a scale of 0"},
+        {FORMAT, SHAPE("\"type\": \"world\", \"transform\": {\"rotation\": `[0, 0, 0, 0]}"),
+         "fog[0].shape.transform.rotation: a quaternion"},
+        {FORMAT, SHAPE("\"type\": \"world\", \"transform\": {`\"translate\": 0}"),
+         "fog[0].shape.transform.translate: unknown key; a transform has: position, rotation, scale"},
+    };
+    CHECK(rules);
+}
+
+static void test_what_no_density_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {UNSUPPORTED, DENSITY("\"type\": `\"grid\""), "fog[0].density.type: this version has no \"grid\" densities"},
+        {UNSUPPORTED, DENSITY("\"type\": `\"noise\""), "fog[0].density.type: this version has no \"noise\" densities"},
+        {FORMAT, DENSITY("\"type\": `\"radial\""),
+         "fog[0].density.type: \"radial\" does not fit this shape; it needs a sphere"},
+        {FORMAT, DENSITY("\"type\": `\"soft_edge\", \"distance\": 1"),
+         "fog[0].density.type: \"soft_edge\" does not fit this shape; it needs a box"},
+        {FORMAT, DENSITY("\"type\": \"height\", \"scale_height\": `0"), "fog[0].density.scale_height: is 0; must be"},
+        {FORMAT, DENSITY("\"type\": \"height\", \"scale_height\": 1, \"below\": `\"none\""),
+         "fog[0].density.below: unknown; must be one of: grow, constant"},
+        {FORMAT, DENSITY("\"type\": \"linear\", \"from\": [1, 2, 3], \"to\": `[1, 2, 3]"),
+         "fog[0].density.to: is the same place"},
+        {FORMAT, DENSITY("\"type\": \"gaussian\", \"center\": [1, 2, 3], \"sigma\": `-1"),
+         "fog[0].density.sigma: is -1"},
+        {FORMAT,
+         FOG("\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1}, \"density\": {\"type\": "
+             "\"radial\", \"power\": `4}"),
+         "fog[0].density.power: is 4; must be a whole number from 1 to 3"},
+        {FORMAT,
+         FOG("\"shape\": {" BOX "\"max\": [1, 1, 1]}, \"density\": {\"type\": \"soft_edge\", \"distance\": `0}"),
+         "fog[0].density.distance: is 0; must be a number > 0"},
+        {FORMAT, DENSITY("\"type\": \"constant\", `\"base\": 1"),
+         "fog[0].density.base: unknown key; a constant density has: type"},
+    };
+    CHECK(rules);
+}
+
+#define LIT(members) FOG(WORLD ", \"extinction\": 1, " members)
+
+static void test_what_no_volume_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, "{\"nebel\": 1, \"fog\": [`7]}", "fog[0]: is a number; must be a volume"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [`{\"extinction\": 1}]}",
+         "fog[0]: the key \"shape\" is missing; a volume needs it"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1}, `{" WORLD "}]}",
+         "fog[1]: the amount is missing; give one of extinction, mean_free_path, visibility"},
+        {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"visibility\": 2"), "fog[0].visibility: the amount is given twice"},
+        {FORMAT, FOG(WORLD ", \"extinction\": [1, 1, `-1]"), "fog[0].extinction[2]: is -1; must be a number >= 0"},
+        {FORMAT, FOG(WORLD ", \"mean_free_path\": `0"), "fog[0].mean_free_path: is 0; must be a number > 0"},
+        {FORMAT, FOG(WORLD ", \"mean_free_path\": `1e-320"), "fog[0].mean_free_path: "},
+        {FORMAT, FOG(WORLD ", \"visibility\": [1, `0, 1]"), "fog[0].visibility[1]: is 0; must be a number > 0"},
+        {FORMAT, FOG(WORLD ", \"visibility\": 1, \"contrast\": `1"),
+         "fog[0].contrast: is 1; must be a number > 0 and < 1"},
+        {FORMAT, FOG(WORLD ", \"visibility\": 1, \"contrast\": `0"),
+         "fog[0].contrast: is 0; must be a number > 0 and < 1"},
+        {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"contrast\": 0.1"), "fog[0].contrast: belongs to \"visibility\""},
+        {FORMAT, LIT("\"source\": 1, `\"albedo\": 1"),
+         "fog[0].albedo: a volume has \"source\" or \"albedo\", not both"},
+        {FORMAT, LIT("\"source\": `-1"), "fog[0].source: is -1; must be a number >= 0"},
+        {FORMAT, LIT("\"emission\": `-1"), "fog[0].emission: is -1; must be a number >= 0"},
+        {FORMAT, LIT("\"albedo\": [0, `1.1, 0]"), "fog[0].albedo[1]: is 1.1; must be a number from 0 to 1"},
+        {FORMAT, LIT("`\"phase\": {\"type\": \"rayleigh\"}"), "fog[0].phase: belongs to \"albedo\""},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": `\"mie\"}"),
+         "fog[0].phase.type: unknown; must be one of: isotropic, "
+         "henyey_greenstein, rayleigh, cornette_shanks, droplets"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"henyey_greenstein\", \"g\": `1}"),
+         "fog[0].phase.g: is 1; must be"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"cornette_shanks\", \"g\": `-1}"),
+         "fog[0].phase.g: is -1; must be"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": `{\"type\": \"cornette_shanks\"}"),
+         "fog[0].phase: the key \"g\" is missing"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"droplets\", \"diameter\": `0}"),
+         "fog[0].phase.diameter: is 0"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"rayleigh\", `\"g\": 0}"), "fog[0].phase.g: unknown key"},
+        {FORMAT, LIT("\"operation\": `\"subtract\""), "fog[0].operation: unknown; must be one of: add, exclude"},
+        {FORMAT, FOG(WORLD ", \"operation\": \"exclude\", `\"extinction\": 1"),
+         "fog[0].extinction: unknown key; a volume with \"operation\": \"exclude\" has: name, shape, operation"},
+        {FORMAT, LIT("`\"albdo\": 1"),
+         "fog[0].albdo: unknown key; a volume has: name, shape, operation, density, extinction, "
+         "mean_free_path, visibility, contrast, source, albedo, phase, emission; did you mean "
+         "\"albedo\"?"},
+        {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"name\": 1"), "fog[0].name: the key appears twice"},
+    };
+    CHECK(rules);
+}
+
+static void test_what_only_the_core_knows_is_reported_at_the_volume(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT,
+         "{\"nebel\": 1, \"fog\": [{" WORLD
+         ", \"extinction\": 1},\n  `{\"extinction\": 1, \"shape\": {\"type\": \"convex\", "
+         "\"planes\": [[1, 0, 0, -1], [-1, 0, 0, -1]]}}]}",
+         "fog[1]: "},
+    };
+    CHECK(rules);
+}
+
+#define SUN "\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": [0, 2, 0]}"
+
+static void test_sunlight_in_fog_is_refused_where_it_would_be_seen(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {UNSUPPORTED,
+         "{\"nebel\": 1, " SUN ", \"fog\": [{" WORLD ", \"extinction\": 1, \"albedo\": 0},\n{" WORLD
+         ", \"extinction\": 1, \"albedo\": `[0, 0.5, 0]}]}",
+         "fog[1].albedo: this version cannot light fog with the sun; give the volume a \"source\" instead, or remove "
+         "\"sun\""},
+        {UNSUPPORTED, "{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1, \"albedo\": `1}], " SUN "}",
+         "fog[0].albedo: "},
+    };
+    CHECK(rules);
+    nebel_destroy_scene(
+        parse_good("{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1, \"source\": 1}], " SUN "}"));
+    nebel_destroy_scene(parse_good("{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1, \"albedo\": 1}], \"sun\": "
+                                   "{\"direction\": [0, 1, 0], \"irradiance\": 0}}"));
+}
+
+static void test_nesting_has_a_limit(void **state)
+{
+    (void)state;
+    char text[400] = "{\"nebel\": 1, \"fog\": ";
+    for (int i = 0; i < 100; i++) strcat(text, i == 63 ? "`[" : "[");
+    const rule deep = {LIMIT, text, "nested too deeply; at most 64 levels"};
+    check_rules(&deep, 1);
+}
+
+static void test_numbers_have_a_longest_form(void **state)
+{
+    (void)state;
+    char text[2000] = "{\"nebel\": `1.";
+    memset(text + strlen(text), '0', 1200);
+    strcat(text, ", \"fog\": []}");
+    const rule lengthy = {LIMIT, text, "nebel: a number of 1202 characters; at most 1000"};
+    check_rules(&lengthy, 1);
+}
+
+static void test_one_volume_has_a_limit_of_leaves(void **state)
+{
+    (void)state;
+    char *text = malloc(100000), *at = text;
+    at += sprintf(at, "{\"nebel\": 1, \"fog\": [{\"extinction\": 1, \"shape\": {\"type\": \"union\", \"shapes\": [");
+    for (int i = 0; i < 2; i++) {
+        at += sprintf(at, "%s{\"type\": \"union\", \"shapes\": [", i > 0 ? ", " : "");
+        for (int k = 0; k < 513; k++)
+            at += sprintf(at, "%s%s{\"type\": \"world\"}", k > 0 ? "," : "", i == 1 && k == 511 ? "`" : "");
+        at += sprintf(at, "]}");
+    }
+    sprintf(at, "]}}]}");
+    const rule many = {LIMIT, text,
+                       "fog[0].shape.shapes[1].shapes[511]: one volume is made of too many shapes; at most 1024"};
+    check_rules(&many, 1);
+    free(text);
+}
+
+static void test_strange_keys_are_shown_safely(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, SCENE("`\"a\\nb\\u001b[31m\": 0"), "a?b?[31m: unknown key"},
+        {FORMAT, SCENE("`\"0123456789012345678901234567890123456789x\": 0"),
+         "0123456789012345678901234567890123456789...: unknown"},
+        {FORMAT, SCENE("`\"\": 0"), "unknown key"},
+    };
+    CHECK(rules);
+}
+
+static void test_arguments_are_checked(void **state)
+{
+    (void)state;
+    nebel_scene *scene = (nebel_scene *)state;
+    const nebel_scene_desc half = {.allocator = {.allocate = metered_allocate}};
+    assert_int_equal(nebel_parse_scene(NULL, 3, "a", &(nebel_scene_desc){0}, &scene), NEBEL_ERROR_ARGUMENT);
+    assert_null(scene);
+    assert_int_equal(nebel_parse_scene("{}", 2, NULL, &(nebel_scene_desc){0}, &scene), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_parse_scene("{}", 2, "a", NULL, &scene), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_parse_scene("{}", 2, "a", &(nebel_scene_desc){0}, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_parse_scene("{}", 2, "a", &half, &scene), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_parse_scene(NULL, 0, "a", &(nebel_scene_desc){0}, &scene), NEBEL_ERROR_FORMAT);
+    nebel_destroy_scene(NULL);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_what_is_not_json),
+        cmocka_unit_test(test_what_no_scene_has),
+        cmocka_unit_test(test_what_no_camera_has),
+        cmocka_unit_test(test_lights_are_checked_and_then_refused),
+        cmocka_unit_test(test_what_no_model_has),
+        cmocka_unit_test(test_what_no_shape_has),
+        cmocka_unit_test(test_what_no_density_has),
+        cmocka_unit_test(test_what_no_volume_has),
+        cmocka_unit_test(test_what_only_the_core_knows_is_reported_at_the_volume),
+        cmocka_unit_test(test_sunlight_in_fog_is_refused_where_it_would_be_seen),
+        cmocka_unit_test(test_nesting_has_a_limit),
+        cmocka_unit_test(test_numbers_have_a_longest_form),
+        cmocka_unit_test(test_one_volume_has_a_limit_of_leaves),
+        cmocka_unit_test(test_strange_keys_are_shown_safely),
+        cmocka_unit_test(test_arguments_are_checked),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
