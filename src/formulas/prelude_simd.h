@@ -41,6 +41,8 @@
 #define NB_WIDTH 4
 #else
 #define NB_WIDTH 2
+#define NB_REAL_LOAD(from) ((nb_real)_mm_loadl_epi64((const __m128i *)(const void *)(from)))
+#define NB_REAL_STORE(to, x) _mm_storel_epi64((__m128i *)(void *)(to), (__m128i)(x))
 #endif
 
 #elif defined(NB_ISA_AVX2)
@@ -171,14 +173,19 @@ static inline nb_real nb_min(nb_real a, nb_real b) { return NB_REAL_MIN(a, b); }
 static inline nb_real nb_max(nb_real a, nb_real b) { return NB_REAL_MAX(a, b); }
 static inline nb_real nb_sqrt(nb_real x) { return NB_REAL_SQRT(x); }
 
+#ifdef NB_REAL_LOAD
+static inline nb_real nb_load_lanes(const float *from) { return NB_REAL_LOAD(from); }
+static inline void nb_store_lanes(float *to, nb_real x) { NB_REAL_STORE(to, x); }
+#else
 static inline nb_real nb_load_lanes(const float *from)
 {
-    nb_real x = {0};
-    memcpy(&x, from, 4 * NB_WIDTH);
+    nb_real x;
+    memcpy(&x, from, sizeof x);
     return x;
 }
 
-static inline void nb_store_lanes(float *to, nb_real x) { memcpy(to, &x, 4 * NB_WIDTH); }
+static inline void nb_store_lanes(float *to, nb_real x) { memcpy(to, &x, sizeof x); }
+#endif
 
 /* ---- wide -------------------------------------------------------------------------------------------------------- */
 
