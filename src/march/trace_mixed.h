@@ -10,7 +10,7 @@
  * better for steps that hardly attenuate or hardly differ, may take a step before that. */
 
 #define NODE_COUNT 6
-#define MOST_STEPS 100000
+#define MOST_STEPS 4096
 
 /* Abscissas and weights on [0, 1]: Abramowitz and Stegun, table 25.4, n = 6. */
 #define NODES                                                                                                          \
@@ -20,19 +20,22 @@
     {NB_F(0.085662246189585173), NB_F(0.180380786524069304), NB_F(0.233956967286345524),                               \
      NB_F(0.233956967286345524), NB_F(0.180380786524069304), NB_F(0.085662246189585173)}
 
-/* The ellipse in units of half a step, and the factor of M h / 2 in the bound. */
-typedef struct ellipse {
-    nb_real along, across, factor;
-} ellipse;
+/* The parameter to begin with: so wide that a step over which the integrand hardly grows in the ellipse fits a budget
+ * relative to the radiance. A step that does not fit gets a wider ellipse as it gets shorter, so that any budget is met. */
+#define WIDEST_ELLIPSE 64.0
 
-/* A wider ellipse converges faster where it can be afforded; this one makes a step that doubles the integrand fit. */
-static ellipse choose_ellipse(double budget)
+static nb_real choose_ellipse(double budget)
 {
     const double wanted = budget < 1e-15 ? 1e-15 : budget > 0.1 ? 0.1 : budget;
-    double r = 1.5;
-    while (r < 64 && 16 / pow(r, 2 * NODE_COUNT) > wanted) r *= 1.1;
-    const double factor = 64 / (15 * (1 - 1 / (r * r)) * pow(r, 2 * NODE_COUNT));
-    return (ellipse){REAL((r + 1 / r) / 2), REAL((r - 1 / r) / 2), REAL(factor)};
+    return REAL(fmin(pow(120 / wanted, 0.5 / NODE_COUNT), WIDEST_ELLIPSE));
+}
+
+/* 64 / (15 (1 - r^-2) r^12) */
+static nb_real ellipse_factor(nb_real r)
+{
+    const nb_real square = r * r;
+    const nb_real sixth = square * square * square;
+    return NB_F(64.0) / (NB_F(15.0) * (NB_F(1.0) - NB_F(1.0) / square) * (sixth * sixth));
 }
 
 /* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. */
@@ -81,20 +84,22 @@ typedef struct step {
 } step;
 
 /* The bound of Gauss's rule: M of the integrand, from the ceilings of the densities. */
-static nb_real bound_gauss(const march *m, const step *s, const gathered *g, const ellipse *e)
+static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_real ellipse)
 {
     const nb_real radius = NB_F(0.5) * s->length;
     const nb_wide middle = s->start + nb_widen(radius);
+    const nb_real along = NB_F(0.5) * (ellipse + NB_F(1.0) / ellipse) * radius;
+    const nb_real across = NB_F(0.5) * (ellipse - NB_F(1.0) / ellipse) * radius;
     nb_real depth = NB_F(0.0), light = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
         if (!nb_any(k->inside)) continue;
-        const nb_real ceiling = density_ceiling(k, middle, e->along * radius, e->across * radius);
+        const nb_real ceiling = density_ceiling(k, middle, along, across);
         depth = depth + nb_select(k->inside, REAL(k->medium->densest) * ceiling, NB_F(0.0));
         light = light + nb_select(k->inside, REAL(k->medium->brightest) * ceiling, NB_F(0.0));
     }
-    const nb_real exponent = depth * (e->along * radius);
-    const nb_real bound = e->factor * radius * nb_min(light * nb_exp(exponent), NB_HUGE) * largest(g->transmittance);
+    const nb_real exponent = depth * along;
+    const nb_real bound = ellipse_factor(ellipse) * radius * nb_min(light * nb_exp(exponent), NB_HUGE) * largest(g->transmittance);
     return nb_select(nb_and(exponent < NB_F(60.0), bound < NB_HUGE), bound, NB_HUGE);
 }
 
@@ -118,7 +123,7 @@ static void bound_crude(const march *m, step *s, const gathered *g)
     s->crude_bound[1] = nb_select(emits, NB_HUGE, spread);
 }
 
-static step consider(const march *m, const gathered *g, const ellipse *e, nb_wide start, nb_real length)
+static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length)
 {
     step s = {start, length, no_sum(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, NB_F(0.0), NB_F(0.0), {NB_F(0.0), NB_F(0.0)}};
     for (size_t i = 0; i < m->contact_count; i++)
@@ -127,7 +132,7 @@ static step consider(const march *m, const gathered *g, const ellipse *e, nb_wid
         s.behind[c] = nb_exp(-(g->depth[c] + s.sum.depth[c]));
         s.drop = nb_max(s.drop, g->transmittance[c] - s.behind[c]);
     }
-    s.gauss_bound = bound_gauss(m, &s, g, e);
+    s.gauss_bound = bound_gauss(m, &s, g, ellipse);
     bound_crude(m, &s, g);
     return s;
 }
@@ -201,7 +206,7 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
  * piece's last step, so that a vanishing tail is not halved for ever. */
 typedef struct allowance {
     nb_real drop_share, length_share, last_share;
-    ellipse region;
+    nb_real ellipse;
 } allowance;
 
 static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
@@ -218,10 +223,10 @@ static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
 
 /* Halves the step in every lane until its bound fits. */
 static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, nb_wide start, nb_real length,
-                     nb_mask pending)
+                     nb_mask pending, nb_real *ellipse)
 {
     for (;;) {
-        const step s = consider(m, g, &may->region, start, length);
+        const step s = consider(m, g, *ellipse, start, length);
         const nb_mask last = length >= nb_narrow(p->end - start);
         const nb_real allowed = may->drop_share * s.drop + may->length_share * (length / p->length) +
                                 nb_select(last, may->last_share, NB_F(0.0));
@@ -229,6 +234,7 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
         pending = nb_and(pending, bound > allowed);
         if (!nb_any(pending)) return s;
         length = nb_select(pending, NB_F(0.5) * length, length);
+        *ellipse = nb_select(pending, nb_min(NB_F(1.25) * *ellipse, REAL(WIDEST_ELLIPSE)), *ellipse);
     }
 }
 
@@ -237,17 +243,18 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
 static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const allowance *may, gathered *g)
 {
     nb_wide t = p->start;
-    nb_real guess = p->length;
+    nb_real guess = p->length, ellipse = may->ellipse;
     for (int i = 0; i < MOST_STEPS && nb_any(lanes); i++) {
         const nb_wide stop = nearest_kink(m, t, p->end);
         const nb_real rest = nb_narrow(stop - t);
-        const step s = fit_step(m, g, may, p, t, nb_min(guess, rest), lanes);
+        const step s = fit_step(m, g, may, p, t, nb_min(guess, rest), lanes, &ellipse);
         take_step(m, &s, g, lanes);
         t = nb_wselect(nb_widen_mask(s.length >= rest), stop, t + nb_widen(s.length));
         guess = s.length + s.length;
+        ellipse = nb_max(NB_F(0.8) * ellipse, may->ellipse);
         lanes = nb_and(lanes, nb_narrow_mask(t < p->end));
     }
     if (!nb_any(lanes)) return;
-    const step s = consider(m, g, &may->region, t, nb_narrow(p->end - t));
+    const step s = consider(m, g, ellipse, t, nb_narrow(p->end - t));
     take_step(m, &s, g, lanes);
 }

@@ -256,20 +256,31 @@ static leaf_span clip_interval(const packet *rays, const contact *k, const nb_in
     return span;
 }
 
+/* Lanes that can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside them
+ * must not split the ray, or its bits would depend on whether its company brought the body here. */
+static nb_wmask touches_bounds(const packet *rays, const nb_volume *body)
+{
+    if (body->leaf_count == 1) return rays->t_max > NB_W(0.0);
+    const nb_interval box = nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
+    return nb_wand(box.enter <= box.leave, nb_wand(box.leave >= NB_W(0.0), box.enter <= rays->t_max));
+}
+
 /* Intervals of all leaves of one medium. Returns whether any lane is inside any of them. */
 static int meet_leaves(march *m, contact *k)
 {
     const nb_volume *body = &k->medium->body;
+    const nb_wmask near = touches_bounds(&m->rays, body);
     nb_real spread = NB_F(0.0);
     int hit = 0;
     for (size_t i = 0; i < body->leaf_count; i++) {
         const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
         nb_real own;
-        const leaf_span span = clip_interval(&m->rays, k, &raw, &own);
-        m->spans[k->first_span + i] = span;
-        spread = spread + own;
+        leaf_span span = clip_interval(&m->rays, k, &raw, &own);
+        span.leave = nb_wselect(near, span.leave, NB_W(0.0));
         const nb_wmask met = span.enter < span.leave;
+        m->spans[k->first_span + i] = span;
         m->event_count = m->event_count + nb_select(nb_narrow_mask(met), NB_F(2.0), NB_F(0.0));
+        spread = spread + nb_select(nb_narrow_mask(near), own, NB_F(0.0));
         hit = hit || nb_wany(met);
     }
     m->end_depth = m->end_depth + spread * REAL(k->medium->densest);

@@ -20,7 +20,8 @@ typedef struct piece {
 typedef struct piece_sum {
     nb_real depth[3], light[3]; /* optical depth; radiance it would add if nothing attenuated it */
     nb_real depth_error, light_error;
-    nb_mask mixed; /* the quotient of light and extinction changes along the piece: no closed form */
+    nb_mask present; /* some medium is there */
+    nb_mask mixed;   /* the quotient of light and extinction changes along the piece: no closed form */
 } piece_sum;
 
 /* The next event after t, NB_WFAR * 2 where there is none: the sentinel must lie beyond an endless ray's end. */
@@ -97,7 +98,7 @@ static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_real
 static piece_sum no_sum(void)
 {
     const nb_real zero = NB_F(0.0);
-    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, zero, zero, nb_mask_false};
+    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, zero, zero, nb_mask_false, nb_mask_false};
 }
 
 /* A piece is mixed where some density varies and not all media give the same light per extinction. */
@@ -121,6 +122,7 @@ static piece_sum sum_piece(const march *m, const piece *p)
         seen = nb_or(seen, k->inside);
         if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) varies = nb_or(varies, k->inside);
     }
+    sum.present = seen;
     sum.mixed = nb_and(uneven, varies);
     return sum;
 }
@@ -145,7 +147,8 @@ static void pass_piece(gathered *g, const piece_sum *sum)
         g->depth[c] = g->depth[c] + sum->depth[c];
         g->transmittance[c] = nb_exp(-g->depth[c]);
     }
-    g->depth_error = g->depth_error + sum->depth_error + largest(g->depth) * (NB_F(2.0) * NB_EPSILON);
+    const nb_real rounding = sum->depth_error + largest(g->depth) * (NB_F(2.0) * NB_EPSILON);
+    g->depth_error = g->depth_error + nb_select(sum->present, rounding, NB_F(0.0));
 }
 
 /* Endless light: the piece has no end, something in it shines, and nothing in it absorbs. */
