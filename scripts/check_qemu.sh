@@ -25,7 +25,7 @@ run_aarch64() {
     aarch64-linux-gnu-gcc -std=c11 -O2 -ffp-contract=off -fno-math-errno -static -DNEBEL_SOURCE="\"$source\"" \
         -I"$source/tests/cross" -I"$source/include" -I"$source/src" \
         "$source/tests/$name.c" "$cross/libnebel.a" -lm -o "$cross/$name"
-    qemu-aarch64 "$cross/$name"
+    qemu-aarch64 "$cross/$name" 10000
     ran "$name on aarch64"
 }
 
@@ -40,7 +40,7 @@ if ! build_aarch64; then
 fi
 run_aarch64 test_kernels
 for model in Conroe Nehalem Haswell; do
-    qemu-x86_64 -cpu "$model" "$build/tests/test_kernels"
+    qemu-x86_64 -cpu "$model" "$build/tests/test_kernels" 20000
     ran "test_kernels on $model"
 done
 echo "check_qemu: $passed passed, 0 failed"

@@ -90,17 +90,23 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     const nb_wide middle = s->start + nb_widen(radius);
     const nb_real along = NB_F(0.5) * (ellipse + NB_F(1.0) / ellipse) * radius;
     const nb_real across = NB_F(0.5) * (ellipse - NB_F(1.0) / ellipse) * radius;
-    nb_real depth = NB_F(0.0), light = NB_F(0.0);
+    nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, light[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
         if (!nb_any(k->inside)) continue;
-        const nb_real ceiling = density_ceiling(k, middle, along, across);
-        depth = depth + nb_select(k->inside, REAL(k->medium->densest) * ceiling, NB_F(0.0));
-        light = light + nb_select(k->inside, REAL(k->medium->brightest) * ceiling, NB_F(0.0));
+        const nb_real ceiling = nb_select(k->inside, density_ceiling(k, middle, along, across), NB_F(0.0));
+        for (int c = 0; c < 3; c++) {
+            depth[c] = depth[c] + k->extinction[c] * ceiling;
+            light[c] = light[c] + k->light[c] * ceiling;
+        }
     }
-    const nb_real exponent = depth * along;
-    const nb_real bound = ellipse_factor(ellipse) * radius * nb_min(light * nb_exp(exponent), NB_HUGE) * largest(g->transmittance);
-    return nb_select(nb_and(exponent < NB_F(60.0), bound < NB_HUGE), bound, NB_HUGE);
+    nb_real bound = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        const nb_real exponent = depth[c] * along;
+        const nb_real height = nb_min(light[c] * nb_exp(exponent), NB_HUGE) * g->transmittance[c];
+        bound = nb_max(bound, nb_select(exponent < NB_F(60.0), height, NB_HUGE * g->transmittance[c]));
+    }
+    return nb_min(ellipse_factor(ellipse) * radius * bound, NB_HUGE);
 }
 
 /* [0]: all light attenuated by something between the transmittances at both ends. [1]: light per extinction between the least and
