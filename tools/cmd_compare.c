@@ -35,8 +35,8 @@ static const char about[] = "Compares two pictures of the same size, PNG or EXR,
                             "                      EXR is the largest finite sample of A by magnitude\n"
                             "  largest difference  and where it is, counted from 0 at the top left\n"
                             "\n"
-                            "Samples that are both NaN, or the same infinity, are equal. Where only one of the\n"
-                            "two is NaN or infinite the difference is infinite, and so is the RMSE; such\n"
+                            "Samples that are both NaN, or the same infinity, are equal. Where only one of\n"
+                            "the two is NaN or infinite the difference is infinite, and so is the RMSE; such\n"
                             "samples are counted. In a difference picture they are white (PNG) or inf (EXR).\n";
 
 static const char examples[] = "Examples:\n"

@@ -326,6 +326,7 @@ static int render_frame(studio *all)
 
 static int make_picture(studio *all)
 {
+    if (nb_interrupt_is_requested()) return NB_DONE;
     int status = render_frame(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     char *const name = name_picture(all->wanted, all->frame);
@@ -362,14 +363,16 @@ static int render(const settings *wanted)
 {
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet)};
     int status = set_up(&all);
-    for (all.frame = wanted->first_frame; all.frame <= wanted->last_frame; all.frame++) {
-        if (status != NB_DONE || nb_interrupt_is_requested()) break;
+    all.frame = wanted->first_frame;
+    while (status == NB_DONE && all.frame <= wanted->last_frame) {
         status = make_picture(&all);
+        if (nb_interrupt_is_requested()) break;
+        all.frame++;
     }
     const double seconds = nb_meter_end(&all.meter);
     free_studio(&all);
-    if (nb_interrupt_is_requested() && all.frame <= wanted->last_frame) {
-        return nb_report_failure("render: %s: stopped; the picture in work was given up", wanted->output);
+    if (status == NB_DONE && all.frame <= wanted->last_frame) {
+        return nb_report_failure("render: %s: stopped", wanted->output);
     }
     if (status == NB_DONE && !wanted->quiet) summarize(wanted, seconds);
     return status;

@@ -5,6 +5,7 @@
 
 #include "report.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -87,7 +88,7 @@ void nb_meter_show(nb_meter *meter, double done, const char *label)
     const double spent = now - meter->started;
     if (spent > guessing_pause && share > 0) {
         const double remaining = spent * (1 - share) / share;
-        nb_meter_write_span(remaining < 1 ? 1 : remaining, span, sizeof span);
+        nb_meter_write_span(ceil(remaining), span, sizeof span);
         (void)snprintf(left, sizeof left, "%s left", span);
     }
     draw(share, label, left);

@@ -1,0 +1,661 @@
+#!/usr/bin/env python3
+"""The program as people and scripts meet it: exit statuses, what goes to which stream, options, input, pictures."""
+
+import fcntl
+import json
+import math
+import os
+import pathlib
+import pty
+import random
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import termios
+import time
+import unittest
+
+NEBEL = os.environ["NEBEL"]
+HEADER = "T_r,T_g,T_b,S_r,S_g,S_b,error\n"
+COMMANDS = ("render", "trace", "info", "compare")
+BOX = {"type": "box", "min": [-5, -5, -5], "max": [5, 5, 5]}
+FOG = {"shape": BOX, "extinction": 0.1, "source": [0.7, 0.7, 0.5]}
+RAY = "-9 0 0 1 0 0 100\n"
+
+OBJECT = """v -2 -2 -3
+v 2 -2 -3
+v 0 2 -3
+f 1 2 3
+"""
+
+
+def nebel(*words, text="", env=None, **more):
+    if "stdin" not in more:
+        more["input"] = text if isinstance(text, bytes) else text.encode()
+    done = subprocess.run([NEBEL, *map(str, words)], stdout=more.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE,
+                          env={**os.environ, **(env or {})}, timeout=120, **more)
+    done.out = (done.stdout or b"").decode()
+    done.err = done.stderr.decode()
+    return done
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="nebel-check-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.scene = self.write_scene("scene.json", [FOG])
+
+    def write_scene(self, name, fog, **more):
+        path = self.folder / name
+        path.write_text(json.dumps({"nebel": 1, "fog": fog, **more}))
+        return path
+
+    def assert_done(self, done):
+        self.assertEqual(done.returncode, 0, done.err)
+
+    def assert_failed(self, done, *words):
+        self.assert_error(done, 1, *words)
+
+    def assert_misused(self, done, *words):
+        self.assert_error(done, 2, *words)
+        self.assertIn("--help", done.err)
+
+    def assert_error(self, done, status, *words):
+        self.assertEqual(done.returncode, status, done.err)
+        self.assertEqual(done.out, "", "standard output must stay empty")
+        self.assertTrue(done.err.endswith("\n") and done.err.startswith("nebel: "), done.err)
+        for word in words:
+            self.assertIn(word, done.err)
+
+    def files(self):
+        return sorted(path.name for path in self.folder.iterdir())
+
+
+class CallingTest(Case):
+    def test_help_and_version_go_to_standard_output(self):
+        for words in (["--help"], ["-h"], ["--version"], *([command, "--help"] for command in COMMANDS),
+                      *([command, "-h"] for command in COMMANDS)):
+            done = nebel(*words)
+            self.assert_done(done)
+            self.assertEqual(done.err, "")
+            self.assertTrue(done.out.endswith("\n"))
+        self.assertRegex(nebel("--version").out, r"^nebel \d+\.\d+\.\d+\n$")
+
+    def test_help_pages_are_complete_and_fit_a_terminal(self):
+        overview = nebel("--help").out
+        for command in COMMANDS:
+            self.assertRegex(overview, rf"(?m)^  {command} ")
+            page = nebel(command, "--help").out
+            for part in (f"Usage: nebel {command} ", "Options:", "--help", "Examples:", "Exit status: 0"):
+                self.assertIn(part, page)
+            self.assertLessEqual(max(map(len, page.split("\n"))), 80, page)
+
+    def test_every_option_of_the_contract_is_on_the_help_page(self):
+        contract = {
+            "render": "output size device method tolerance samples exposure threads isa frames frame aov quiet",
+            "trace": "precision isa tolerance threads", "compare": "output amplify channel fail-above", "info": ""}
+        for command, names in contract.items():
+            page = nebel(command, "--help").out
+            for name in names.split():
+                self.assertRegex(page, rf"(?m)^  ....--{name}\b")
+
+    def test_help_wins_over_what_is_missing(self):
+        self.assert_done(nebel("render", "--size", "5x5", "--help"))
+
+    def test_no_command_is_misuse(self):
+        self.assert_misused(nebel())
+
+    def test_unknown_commands_get_the_nearest_name(self):
+        self.assert_misused(nebel("rendr"), "rendr", "did you mean render")
+        self.assert_misused(nebel("tarce"), "did you mean trace")
+        self.assert_misused(nebel("xyzzy"), "xyzzy")
+        self.assertNotIn("did you mean", nebel("xyzzy").err)
+        self.assert_misused(nebel("--verson"), "option")
+
+    def test_unknown_options_get_the_nearest_name(self):
+        self.assert_misused(nebel("trace", self.scene, "--tolerence", "1"), "--tolerence", "did you mean --tolerance")
+        self.assert_misused(nebel("trace", self.scene, "--presicion=float"), "did you mean --precision")
+        self.assert_misused(nebel("trace", self.scene, "-x"), "-x")
+        self.assert_misused(nebel("info", "--zzzz"), "--zzzz")
+        self.assert_misused(nebel("info", "--hlep"), "did you mean --help")
+
+    def test_the_viewer_is_not_in_this_version(self):
+        self.assert_failed(nebel("view", self.scene), "version")
+
+    def test_values_stand_apart_or_behind_an_equals_sign(self):
+        for words in (["--precision", "float"], ["--precision=float"], ["-p", "float"], ["-pfloat"]):
+            done = nebel("trace", *words, self.scene, text=RAY)
+            self.assert_done(done)
+            self.assertEqual(done.out, nebel("trace", self.scene, "-p", "float", text=RAY).out)
+
+    def test_two_dashes_end_the_options(self):
+        self.write_scene("--odd.json", [FOG])
+        self.assert_done(nebel("trace", "--", "--odd.json", text=RAY, cwd=self.folder))
+        self.assert_misused(nebel("trace", "--odd.json", text=RAY, cwd=self.folder))
+
+    def test_the_last_of_repeated_options_counts(self):
+        expected = nebel("trace", self.scene, "-p", "float", text=RAY).out
+        self.assertEqual(nebel("trace", self.scene, "-p", "double", "-p", "float", text=RAY).out, expected)
+
+    def test_values_that_are_missing_or_too_many(self):
+        self.assert_misused(nebel("trace", self.scene, "--tolerance"), "--tolerance", "value")
+        self.assert_misused(nebel("render", self.scene, "-o", "a.exr", "--aov=1"), "--aov", "no value")
+        self.assert_misused(nebel("trace"), "scene")
+        self.assert_misused(nebel("trace", self.scene, "other.json"), "other.json")
+        self.assert_misused(nebel("compare", "a.png"), "two pictures")
+
+    def test_numbers_have_a_range(self):
+        for value in ("0", "-1", "nan", "inf", "1e999", "0x1p-3", "", "1,5", "2", "0.1e", " 0.1"):
+            self.assert_misused(nebel("trace", self.scene, "--tolerance", value, text=RAY), "--tolerance")
+        for value in ("-1", "1.5", "many", "99999999999999999999", ""):
+            self.assert_misused(nebel("trace", self.scene, "--threads", value, text=RAY), "--threads")
+
+    def test_all_wrong_options_are_named_at_once(self):
+        self.assert_misused(nebel("trace", self.scene, "--threads", "x", "--tolerance", "y"), "--threads", "--tolerance")
+
+    def test_messages_cannot_steer_the_terminal(self):
+        done = nebel("trace", "no\x1b[2Jscene\n.json", text=RAY)
+        self.assert_failed(done)
+        self.assertNotIn("\x1b", done.err)
+        self.assertEqual(done.err.count("\n"), 1, done.err)
+
+    def test_help_to_a_full_disk_fails(self):
+        with open("/dev/full", "w") as full:
+            done = nebel("--help", stdout=full)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("standard output", done.err)
+
+
+class TraceTest(Case):
+    def trace(self, text, *words, scene=None, **more):
+        return nebel("trace", scene or self.scene, *words, text=text, **more)
+
+    def numbers(self, text, *words, **more):
+        done = self.trace(text, *words, **more)
+        self.assert_done(done)
+        self.assertTrue(done.out.startswith(HEADER))
+        return [[float(field) for field in line.split(",")] for line in done.out.splitlines()[1:]]
+
+    def test_a_box_of_constant_fog(self):
+        row = self.numbers(RAY)[0]
+        for i, source in enumerate((0.7, 0.7, 0.5)):
+            self.assertAlmostEqual(row[i], math.exp(-1), delta=1e-15)
+            self.assertAlmostEqual(row[3 + i], source * (1 - math.exp(-1)), delta=1e-15)
+        self.assertEqual(self.trace(RAY).err, "")
+
+    def test_directions_of_any_length_and_rays_of_any_length(self):
+        expected = self.trace(RAY).out
+        for ray in ("-9 0 0 1e-300 0 0 100", "-9 0 0 1e300 0 0 inf", "-9 0 0 5e-324 0 0 Infinity", "-9 0 0 2 0 0 +INF"):
+            self.assertEqual(self.trace(ray).out, expected, ray)
+        for zero in ("0", "-0", "0e5", ".0"):
+            self.assertEqual(self.numbers(f"0 0 0 1 0 0 {zero}")[0][:6], [1, 1, 1, 0, 0, 0])
+
+    def test_comments_blank_lines_and_line_ends(self):
+        expected = self.trace(RAY + RAY).out
+        plain = RAY.strip()
+        for text in (f"# rays\n\n{plain} # first\n   \n\t{plain}#second", f"{plain}\r\n{plain}\r\n",
+                     f"\ufeff{plain}\n{plain}", plain.replace(" ", "\t") + "\n" + plain.replace(" ", "   ") + "  \n"):
+            done = self.trace(text)
+            self.assert_done(done)
+            self.assertEqual(done.out, expected, text)
+
+    def test_no_rays_give_the_header(self):
+        for text in ("", "\n", "# nothing", "\n\n   \n# nothing\r\n"):
+            self.assertEqual(self.trace(text).out, HEADER)
+
+    def test_bad_lines_are_errors_with_their_number(self):
+        bad = {
+            "0 0 0 1 0 0": "6 numbers", "0 0 0 1 0 0 1 2": "more than 7", "0 0 0 0 0 0 1": "direction",
+            "0 0 0 0 -0 0e5 1": "direction", "0 0 0 1 0 0 -1": "tmax", "0 0 0 1 0 0 -inf": "tmax",
+            "0 0 0 1 0 0 nan": "tmax", "nan 0 0 1 0 0 1": "ox", "0 -nan 0 1 0 0 1": "oy", "inf 0 0 1 0 0 1": "ox",
+            "0 0 0 1 -inf 0 1": "dy", "0 0 1e999 1 0 0 1": "oz", "0 0 0 1 0 0 1e999": "tmax", "0 0 0 0x1 0 0 1": "dx",
+            "0,0,0,1,0,0,1": "ox", "0 0 0 1 0 0 1m": "tmax", "zero": "zero", "1e 0 0 1 0 0 1": "1e", ". 0 0 1 0 0 1": "ox",
+            "0 0 0 1 0 0 1 \r 1": "more than 7", "0 0 0 1 0 0 1\0": "tmax", "0" * 70000: "65536",
+            "1" * 500 + " 0 0 1 0 0 1": "ox", "2e15 0 0 1 0 0 1": "1e15",
+        }
+        for line, word in bad.items():
+            text = f"# first\n{RAY}{line}\n{RAY}"
+            done = self.trace(text)
+            self.assert_failed(done, "standard input:3: ", word)
+            self.assertEqual(done.err.count("\n"), 1, done.err)
+
+    def test_the_first_bad_line_is_named_after_many_good_ones(self):
+        self.assert_failed(self.trace(RAY * 20000 + "x\n" + RAY * 1000 + "y\n"), "standard input:20001: ")
+
+    def test_tiny_numbers_are_fine(self):
+        self.assert_done(self.trace("1e-320 4.9e-324 1e-999 1 0 0 1e-310"))
+
+    def test_endless_light_is_an_error_of_its_line(self):
+        glow = self.write_scene("glow.json", [{"shape": {"type": "world"}, "extinction": 0, "emission": 1}])
+        good = "0 0 0 1 0 0 5\n"
+        self.assert_done(self.trace(good, scene=glow))
+        for words in ((), ("-p", "float")):
+            for before in (1, 5000):
+                done = self.trace(good * before + "# endless\n0 0 0 1 0 0 inf\n" + good * 3000, *words, scene=glow)
+                self.assert_failed(done, f"standard input:{before + 2}: ")
+                self.assertEqual(done.err.count("\n"), 1, done.err)
+
+    def test_output_reads_back_and_is_shortest(self):
+        rng = random.Random(7)
+        rays = "".join("%r 0.1 0.2 1 %r 0 %r\n" % (rng.uniform(-9, 0), rng.uniform(-1, 1), rng.uniform(0, 20))
+                       for _ in range(500))
+        for line in self.trace(rays).out.splitlines()[1:]:
+            for field in line.split(","):
+                digits = repr(float(field)).split("e")[0].replace(".", "").strip("0")
+                self.assertEqual(field.split("e")[0].replace(".", "").strip("0"), digits)
+        for line in self.trace(rays, "--precision", "float").out.splitlines()[1:]:
+            for field in line.split(",")[:6]:
+                self.assertLessEqual(len(re.sub(r"^[0.]*|\.|e.*$", "", field)), 9, field)
+                self.assertEqual(struct.unpack("f", struct.pack("f", float(field)))[0],
+                                 struct.unpack("f", struct.pack("f", float("%.9g" % float(field))))[0])
+
+    def test_any_number_of_threads_gives_the_same_bytes(self):
+        rng = random.Random(3)
+        rays = "".join(" ".join("%.17g" % rng.uniform(-9, 9) for _ in range(6)) + " 30\n" for _ in range(12000))
+        for words in ((), ("-p", "float")):
+            outputs = {self.trace(rays, "--threads", count, *words).out for count in (0, 1, 2, 7, 1024)}
+            self.assertEqual(len(outputs), 1)
+            self.assertEqual(outputs.pop().count("\n"), 12001)
+
+    def test_instruction_sets(self):
+        available = next(line for line in nebel("info").out.splitlines() if line.startswith("instruction sets:"))
+        names = available.split(":")[1].split()
+        self.assertIn("scalar", names)
+        outputs = {self.trace(RAY, "--precision", "float", "--isa", name).out for name in names}
+        self.assertEqual(len(outputs), 1)
+        for name in {"scalar", "sse2", "avx2", "avx512", "neon"} - set(names):
+            self.assert_failed(self.trace(RAY, "--precision", "float", "--isa", name), name, "not available")
+        self.assert_misused(self.trace(RAY, "--isa", "scalar"), "--isa", "float")
+        self.assert_misused(self.trace(RAY, "-p", "float", "--isa", "avx3"), "avx3", "did you mean avx2")
+        self.assert_misused(self.trace(RAY, "-p", "half"), "half", "double, float")
+
+    def test_the_locale_changes_nothing(self):
+        done = self.trace("-9.5 0 0 1 0 0 1.5", env={"LC_ALL": "de_DE.UTF-8", "LC_NUMERIC": "de_DE.UTF-8"})
+        self.assertEqual(done.out, self.trace("-9.5 0 0 1 0 0 1.5", env={"LC_ALL": "C"}).out)
+
+    def test_scenes_that_cannot_be_read(self):
+        self.assert_failed(self.trace(RAY, scene=self.folder / "none.json"), "none.json")
+        self.assert_failed(self.trace(RAY, scene=self.folder))
+        broken = self.folder / "broken.json"
+        broken.write_text('{ "nebel": 1,\n  "fog": [ { "shape": { "type": "bocks" } } ] }\n')
+        self.assert_failed(self.trace(RAY, scene=broken), "broken.json:2:", "half_space")
+        broken.write_text('{ "nebel": 1,\n  "fog": [ ')
+        self.assert_failed(self.trace(RAY, scene=broken), "broken.json:")
+
+    def test_output_that_cannot_be_written(self):
+        with open("/dev/full", "w") as full:
+            done = self.trace(RAY, stdout=full)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("standard output", done.err)
+        done = subprocess.run(["sh", "-c", '"$0" trace "$1" >&-', NEBEL, str(self.scene)], input=RAY.encode(),
+                              stderr=subprocess.PIPE)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(b"standard output", done.stderr)
+
+    def test_a_closed_pipe_fails_quietly(self):
+        reader, writer = os.pipe()
+        os.close(reader)
+        done = self.trace(RAY, stdout=writer)
+        os.close(writer)
+        self.assertEqual((done.returncode, done.err), (1, ""))
+
+    def test_input_that_cannot_be_read(self):
+        done = subprocess.run(["sh", "-c", '"$0" trace "$1" < "$2"', NEBEL, str(self.scene), str(self.folder)],
+                              capture_output=True)
+        self.assertEqual((done.returncode, done.stdout), (1, b""))
+        self.assertIn(b"standard input", done.stderr)
+        done = subprocess.run(["sh", "-c", '"$0" trace "$1" <&-', NEBEL, str(self.scene)], capture_output=True)
+        self.assertEqual((done.returncode, done.stdout), (0, HEADER.encode()))
+
+
+class PictureCase(Case):
+    """A triangle in a box of fog."""
+
+    def setUp(self):
+        super().setUp()
+        (self.folder / "triangle.obj").write_text(OBJECT)
+        self.scene = self.write_scene("scene.json", [FOG], models=[{"file": "triangle.obj"}], background=[0.2, 0.4, 0.8],
+                                      ambient=[0.3, 0.3, 0.3], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        self.given = self.files()
+
+    def render(self, output, *words, **more):
+        return nebel("render", self.scene, "-o", output, "--size", "64x36", *words, cwd=self.folder, **more)
+
+
+class RenderTest(PictureCase):
+    def test_png(self):
+        done = self.render("a.png")
+        self.assert_done(done)
+        self.assertEqual(done.out, "")
+        self.assertRegex(done.err, r"^nebel: a\.png: 64 x 36, 4 samples, .*s\n$")
+        data = (self.folder / "a.png").read_bytes()
+        self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", data[16:24]), (64, 36))
+        self.assertEqual(self.files(), sorted(self.given + ["a.png"]))
+
+    def test_exr_and_its_layers(self):
+        self.assert_done(self.render("a.exr"))
+        data = (self.folder / "a.exr").read_bytes()
+        self.assertEqual(data[:4], b"\x76\x2f\x31\x01")
+        self.assertNotIn(b"depth.Z\0", data)
+        self.assert_done(self.render("b.exr", "--aov"))
+        data = (self.folder / "b.exr").read_bytes()
+        for name in ("R", "G", "B", "transmittance.R", "in_scattering.B", "depth.Z", "normal.X", "error"):
+            self.assertIn(name.encode() + b"\0", data)
+        for layer, place in (("transmittance.R", "a"), ("error", "a")):
+            done = nebel("compare", self.folder / "b.exr", self.folder / "b.exr", "--channel", layer)
+            self.assertIn("RMSE: 0\n", done.out, place)
+
+    def test_aov_layers_hold_what_they_say(self):
+        self.assert_done(self.render("b.exr", "--aov"))
+        self.assert_done(self.render("a.exr"))
+        self.assertIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
+
+    def test_quiet(self):
+        done = self.render("a.png", "--quiet")
+        self.assert_done(done)
+        self.assertEqual(done.err, "")
+
+    def test_any_number_of_threads_gives_the_same_picture(self):
+        pictures = set()
+        for count in (1, 2, 5):
+            self.assert_done(self.render("a.png", "--threads", count))
+            pictures.add((self.folder / "a.png").read_bytes())
+        self.assertEqual(len(pictures), 1)
+
+    def test_exposure_brightens(self):
+        for name, exposure in (("a.png", 0), ("b.png", 2)):
+            self.assert_done(self.render(name, "--exposure", exposure))
+        self.assertNotEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes())
+        self.assert_done(self.render("c.png", "--exposure", "-1.5"))
+        self.assert_misused(self.render("c.exr", "--exposure", "1"), "--exposure", "PNG")
+
+    def test_wrong_calls(self):
+        self.assert_misused(nebel("render", self.scene), "-o")
+        self.assert_misused(self.render("a.jpg"), "a.jpg", ".png", ".exr")
+        self.assert_misused(self.render(""), ".png")
+        self.assert_misused(self.render(".png"), ".png")
+        self.assert_misused(self.render("a.png", "--aov"), "--aov")
+        for size in ("0x5", "5x0", "5", "x5", "5x", "5x5x5", "-5x5", "5.0x5", "32769x1", "99999999999x99999999999",
+                     "4294967297x1", "32768x32768", "5 x5"):
+            self.assert_misused(self.render("a.png", "--size", size), "--size")
+        for samples in ("0", "4097", "2.5", "-1"):
+            self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
+        self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact")
+        self.assertEqual(self.files(), self.given)
+
+    def test_the_graphics_card_is_not_in_this_version(self):
+        self.assert_failed(self.render("a.png", "--device", "gl"), "gl", "version")
+
+    def test_places_that_cannot_be_written_are_found_before_the_work(self):
+        began = time.monotonic()
+        more = ("--size", "4000x4000", "--samples", "4096")
+        self.assert_failed(self.render("none/a.png", *more), "none")
+        (self.folder / "folder.png").mkdir()
+        self.assert_failed(self.render("folder.png", *more), "folder")
+        self.assert_failed(self.render("triangle.obj/a.png", *more), "triangle.obj")
+        if os.geteuid() != 0:
+            (self.folder / "locked").mkdir(mode=0o555)
+            self.assert_failed(self.render("locked/a.png", *more), "locked")
+        self.assertLess(time.monotonic() - began, 20)
+
+    def test_a_full_disk_leaves_nothing(self):
+        (self.folder / "full.png").symlink_to("/dev/full")
+        self.assert_failed(self.render("full.png"), "full.png")
+        self.assertTrue((self.folder / "full.png").is_symlink())
+        self.assertEqual(self.files(), sorted(self.given + ["full.png"]))
+
+    def test_a_failed_render_leaves_the_old_picture(self):
+        (self.folder / "a.png").write_text("old")
+        (self.folder / "triangle.obj").write_text("v 1\n")
+        self.assert_failed(self.render("a.png"), "triangle.obj")
+        self.assertEqual((self.folder / "a.png").read_text(), "old")
+
+    def test_a_model_that_is_missing(self):
+        (self.folder / "triangle.obj").unlink()
+        self.assert_failed(self.render("a.png"), "triangle.obj")
+        self.assertNotIn("a.png", self.files())
+
+    def test_frames(self):
+        done = self.render("f%%_%04d.png", "--frames", "8-10")
+        self.assert_done(done)
+        self.assertRegex(done.err, "3 pictures")
+        self.assertEqual(self.files(), sorted(self.given + [f"f%_{n:04d}.png" for n in (8, 9, 10)]))
+        self.assert_done(self.render("g%d.png", "--frames=7-7"))
+        self.assert_done(self.render("h%012d.png", "--frames=7-7"))
+        self.assertLessEqual({"g7.png", "h000000000007.png"}, set(self.files()))
+
+    def test_a_percent_sign_means_nothing_without_frames(self):
+        self.assert_done(self.render("100%s%n.png"))
+        self.assertIn("100%s%n.png", self.files())
+        self.assert_done(self.render("%04d.png", "--frame", "3"))
+        self.assertIn("%04d.png", self.files())
+
+    def test_frame_names_that_are_no_pattern(self):
+        for name in ("a.png", "a%s.png", "a%d%d.png", "a%n%d.png", "a%4d.png", "a%0d.png", "a%-4d.png", "a%099d.png",
+                     "a%ld.png", "a%%.png", "a%.png", "%0", "a%04d%.png", "a%*d.png", "a%1$d.png", "a%04i.png"):
+            self.assert_misused(self.render(name, "--frames", "0-1"), "--output")
+        for frames in ("1", "2-1", "-1-2", "a-b", "0-1000001", "1-2-3", "0-99999999999", ""):
+            self.assert_misused(self.render("a%d.png", "--frames", frames), "--frames")
+        self.assert_misused(self.render("a%d.png", "--frames", "0-1", "--frame", "0"), "--frame")
+        self.assert_misused(self.render("a.png", "--frame", "1.5"), "--frame")
+        self.assertEqual(self.files(), self.given)
+
+    def test_a_turntable_turns(self):
+        self.scene = self.write_scene("turn.json", [FOG], models=[{"file": "triangle.obj"}], background=1, camera={
+            "position": [0, 0, 6], "look_at": [0, 0, 0], "turntable": {"frames": 4}})
+        self.assert_done(self.render("t%d.png", "--frames", "0-4"))
+        pictures = [(self.folder / f"t{n}.png").read_bytes() for n in range(5)]
+        self.assertNotEqual(pictures[0], pictures[1])
+
+    def test_no_bar_without_a_terminal(self):
+        done = self.render("a.png", "--samples", "64")
+        self.assertNotIn("\r", done.err)
+        self.assertNotIn("%", done.err)
+
+    def run_on_terminal(self, output, *words, env=None, interrupt_after=None):
+        master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 70, 0, 0))
+        process = subprocess.Popen([NEBEL, "render", str(self.scene), "-o", output, *words], stderr=slave,
+                                   stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, cwd=self.folder,
+                                   env={**os.environ, "TERM": "xterm", **(env or {})})
+        os.close(slave)
+        seen = b""
+        while True:
+            try:
+                piece = os.read(master, 65536)
+            except OSError:
+                break
+            if not piece:
+                break
+            seen += piece
+            if interrupt_after is not None and re.search(interrupt_after, seen):
+                process.send_signal(signal.SIGINT)
+                interrupt_after = None
+        os.close(master)
+        process.stdout.close()
+        process.wait(60)
+        return process, seen.decode()
+
+    def test_a_bar_on_a_terminal(self):
+        process, seen = self.run_on_terminal("a.png", "--samples", "64", "--size", "640x360")
+        self.assertEqual(process.returncode, 0, seen)
+        self.assertRegex(seen, r"\[[#.]+\] +\d+ %")
+        self.assertNotIn("\x1b", seen)
+        for line in re.split(r"[\r\n]+", seen):
+            self.assertLess(len(line), 70)
+        self.assertRegex(seen, r"\r +\rnebel: a\.png: ")
+
+    def test_no_bar_where_it_is_not_wanted(self):
+        for words, env in ((["--quiet"], {}), ([], {"TERM": "dumb"})):
+            process, seen = self.run_on_terminal("a.png", "--size", "64x36", *words, env=env)
+            self.assertEqual(process.returncode, 0)
+            self.assertNotIn("%", seen)
+
+    def test_ctrl_c_stops_cleanly(self):
+        (self.folder / "a.png").write_text("old")
+        process, seen = self.run_on_terminal("a.png", "--samples", "4096", "--size", "1280x720", interrupt_after=b"%")
+        self.assertEqual(process.returncode, -signal.SIGINT, seen)
+        self.assertIn("stopped", seen)
+        self.assertEqual((self.folder / "a.png").read_text(), "old")
+        self.assertEqual(self.files(), sorted(self.given + ["a.png"]))
+
+    def test_complete_pictures_stay_after_ctrl_c(self):
+        process, seen = self.run_on_terminal("f%d.png", "--frames", "0-9999", "--size", "160x90",
+                                             interrupt_after=rb"frame ([4-9]|\d\d+) of")
+        self.assertEqual(process.returncode, -signal.SIGINT, seen)
+        pictures = [name for name in self.files() if name not in self.given]
+        self.assertGreaterEqual(len(pictures), 3)
+        for name in pictures:
+            self.assertTrue((self.folder / name).read_bytes().endswith(b"IEND\xaeB`\x82"), name)
+
+
+class CompareTest(PictureCase):
+    def setUp(self):
+        super().setUp()
+        self.assert_done(self.render("a.exr", "--aov"))
+        self.assert_done(self.render("a.png"))
+        self.scene = self.write_scene("empty.json", [], background=[0.2, 0.4, 0.8])
+        self.assert_done(self.render("b.exr", "--aov"))
+        self.assert_done(self.render("b.png"))
+
+    def compare(self, *words, **more):
+        return nebel("compare", *words, cwd=self.folder, **more)
+
+    def number(self, done, name):
+        return float(re.search(rf"(?m)^{name}: ([^ \n]+)", done.out)[1])
+
+    def test_equal_pictures(self):
+        for name in ("a.png", "a.exr"):
+            done = self.compare(name, name)
+            self.assert_done(done)
+            self.assertEqual(done.err, "")
+            for line in ("size: 64 x 36\n", "channels: R G B\n", "RMSE: 0\n", "PSNR: infinite", "largest difference: 0\n"):
+                self.assertIn(line, done.out)
+
+    def test_pictures_that_differ(self):
+        done = self.compare("a.png", "b.png")
+        self.assert_done(done)
+        rmse, largest = self.number(done, "RMSE"), self.number(done, "largest difference")
+        self.assertTrue(0 < rmse <= largest <= 1, done.out)
+        self.assertAlmostEqual(self.number(done, "PSNR"), -20 * math.log10(rmse), delta=1e-3)
+        self.assertIn("(peak 1)", done.out)
+        place = re.search(r"largest difference: (\S+) at x (\d+), y (\d+), channel ([RGB]): (\S+) and (\S+)\n", done.out)
+        self.assertTrue(int(place[2]) < 64 and int(place[3]) < 36)
+        self.assertAlmostEqual(abs(float(place[5]) - float(place[6])), largest, delta=1e-7)
+
+    def test_the_peak_of_exr_is_the_largest_sample(self):
+        self.assertRegex(self.compare("b.exr", "a.exr").out, r"PSNR: \S+ dB \(peak 0\.8")
+
+    def test_difference_pictures(self):
+        self.assert_done(self.compare("a.png", "b.png", "-o", "d.png"))
+        self.assert_done(self.compare("a.png", "b.png", "-o", "e.exr", "--amplify", "1"))
+        self.assert_done(self.compare("a.png", "a.png", "-o", "black.png"))
+        data = (self.folder / "d.png").read_bytes()
+        self.assertEqual(struct.unpack(">II", data[16:24]), (64, 36))
+        largest = self.number(self.compare("a.png", "b.png"), "largest difference")
+        black = self.compare("black.png", "d.png")
+        self.assertAlmostEqual(self.number(black, "largest difference"), min(1, 8 * largest), delta=1 / 255)
+        self.assertAlmostEqual(self.number(self.compare("e.exr", "e.exr"), "RMSE"), 0)
+
+    def test_channels(self):
+        done = self.compare("a.exr", "b.exr", "--channel", "transmittance.G")
+        self.assert_done(done)
+        self.assertIn("channels: transmittance.G\n", done.out)
+        self.assert_failed(self.compare("a.exr", "b.exr", "--channel", "Z"), "Z", "depth.Z")
+        self.assert_done(self.compare("a.exr", "b.exr", "-c", "depth.Z", "-o", "d.png"))
+
+    def test_infinite_samples(self):
+        same = self.compare("b.exr", "b.exr", "--channel", "depth.Z")
+        self.assertIn("RMSE: 0\n", same.out)
+        done = self.compare("a.exr", "b.exr", "--channel", "depth.Z")
+        self.assert_done(done)
+        self.assertEqual(self.number(done, "RMSE"), math.inf)
+        self.assertRegex(done.out, r"NaN or infinite in one picture only: [1-9]\d* samples\n")
+        self.assertIn("PSNR: none", done.out)
+        self.assertEqual(self.compare("a.exr", "b.exr", "-c", "depth.Z", "--fail-above", "1e9").returncode, 1)
+
+    def test_fail_above(self):
+        rmse = self.number(self.compare("a.png", "b.png"), "RMSE")
+        self.assert_done(self.compare("a.png", "b.png", "--fail-above", rmse * 1.01))
+        done = self.compare("a.png", "b.png", "--fail-above", rmse * 0.99)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("RMSE", done.out)
+        self.assertIn("above", done.err)
+        self.assert_done(self.compare("a.png", "a.png", "--fail-above", 0))
+
+    def test_sizes_must_agree(self):
+        self.assert_done(self.render("c.png", "--size", "36x64"))
+        self.assert_failed(self.compare("a.png", "c.png"), "64 x 36", "36 x 64")
+
+    def test_light_and_srgb_get_a_remark(self):
+        done = self.compare("a.png", "a.exr")
+        self.assert_done(done)
+        self.assertIn("sRGB", done.err)
+
+    def test_pictures_that_cannot_be_read_or_written(self):
+        self.assert_failed(self.compare("a.png", "none.png"), "none.png")
+        data = (self.folder / "a.png").read_bytes()
+        (self.folder / "cut.png").write_bytes(data[:len(data) // 2])
+        self.assert_failed(self.compare("a.png", "cut.png"), "cut.png")
+        (self.folder / "text.png").write_text("hello")
+        self.assert_failed(self.compare("text.png", "a.png"), "text.png")
+        self.assert_failed(self.compare("a.png", "b.png", "-o", "none/d.png"), "none")
+
+    def test_wrong_calls(self):
+        self.assert_misused(self.compare("a.png", "b.png", "-o", "d.gif"), "d.gif")
+        for value in ("0", "-1", "nan", "x", "1e7"):
+            self.assert_misused(self.compare("a.png", "b.png", "--amplify", value), "--amplify")
+        self.assert_misused(self.compare("a.png", "b.png", "--fail-above", "-1"), "--fail-above")
+        self.assert_misused(self.compare("a.png", "b.png", "c.png"), "c.png")
+
+
+class InfoTest(PictureCase):
+    def test_the_program(self):
+        done = nebel("info")
+        self.assert_done(done)
+        self.assertEqual(done.err, "")
+        for line in (r"nebel \d+\.\d+\.\d+", r"compiler: (gcc|clang) .+", r"build: .+", r"scene libraries: .*libpng.*",
+                     r"renderer libraries: .*Embree.*", r"processor: .+", r"instruction sets: scalar.*", r"chosen: \w+",
+                     r"threads: [1-9]\d*"):
+            self.assertRegex(done.out, rf"(?m)^{line}$")
+
+    def test_a_scene(self):
+        done = nebel("info", self.scene)
+        self.assert_done(done)
+        for line in ("camera: at 0 0 6, towards 0 0 0, perspective, vertical field of view 50 degrees",
+                     "models: 1 meshes, 1 triangles, 3 vertices, 0 textures", "bounds: -2 -2 -3 to 2 2 -3 (m)",
+                     "fog: 1 volume", "  1 x box, constant"):
+            self.assertIn(line + "\n", done.out)
+        self.assertNotIn("warning", done.out)
+
+    def test_visibility_from_the_camera(self):
+        scene = self.write_scene("clear.json", [{"shape": {"type": "world"}, "visibility": 60, "source": 1}])
+        self.assertIn("visibility: 60 m", nebel("info", scene).out)
+        self.assertIn("visibility: no end", nebel("info", self.write_scene("none.json", [])).out)
+
+    def test_what_looks_like_a_mistake(self):
+        scene = self.write_scene("odd.json", [
+            {"name": "ghost", "shape": BOX, "extinction": 0}, {"shape": BOX, "extinction": 5},
+            {"name": "unlit", "shape": BOX, "extinction": 1, "albedo": 0.9}], models=[{"file": "triangle.obj"}])
+        out = nebel("info", scene).out
+        for warning in ("fog[0] 'ghost' has no extinction", "fog[1] has neither", "fog[2] 'unlit' scatters",
+                        "less than 1 m", "the models are black"):
+            self.assertIn(warning, out)
+        self.assertIn("there is no fog", nebel("info", self.write_scene("none.json", [])).out)
+
+    def test_a_scene_or_a_model_that_is_wrong(self):
+        self.assert_failed(nebel("info", self.folder / "none.json"), "none.json")
+        (self.folder / "triangle.obj").unlink()
+        done = nebel("info", self.scene)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("fog: 1 volume", done.out)
+        self.assertIn("triangle.obj", done.err)
+
+
+if __name__ == "__main__":
+    unittest.main()
