@@ -306,8 +306,15 @@ static void remove_along(const double axis[3], double v[3])
     for (int k = 0; k < 3; k++) v[k] -= share * axis[k];
 }
 
-/* A point of the surface in the shape's coordinates, and the normal there. */
-static void surface_point(uint64_t *state, const nebel_shape *s, double p[3], double n[3])
+/* Whether numbers of the shape are numbers of the world. */
+static int is_in_place(const target *t)
+{
+    return t->depth == 1 && !is_moved(t->chain[0]);
+}
+
+/* A point of the surface in the shape's coordinates, and the normal there; also on edges of a box where rays along the
+ * axes can lie in them exactly. */
+static void surface_point(uint64_t *state, const nebel_shape *s, int edges, double p[3], double n[3])
 {
     random_unit(state, n);
     double axis[3];
@@ -353,7 +360,8 @@ static void surface_point(uint64_t *state, const nebel_shape *s, double p[3], do
         break;
     default: {
         for (int k = 0; k < 3; k++) {
-            p[k] = s->min[k] + (chance(state, .2) ? below(state, 2) : uniform(state, 0, 1)) * (s->max[k] - s->min[k]);
+            const double share = edges && chance(state, .2) ? below(state, 2) : uniform(state, 0, 1);
+            p[k] = s->min[k] + share * (s->max[k] - s->min[k]);
             n[k] = k == side;
         }
         p[side] = chance(state, .5) ? s->min[side] : s->max[side];
@@ -370,20 +378,30 @@ static void set_ray(nebel_ray *ray, const double through[3], const double direct
     }
 }
 
-/* In a face, or tangent but for 1e-3 to 1e-15 of ten metres, or exactly as far as rounding goes. */
+/* How far beside a surface. Where a plane is concerned a ray can be parallel to it only to 1e-16, so that closer than
+ * that times some metres the last bits of the input would decide where it crosses; but rays along the axes lie exactly
+ * in the faces of a box. Curved surfaces are touched to the last digit. */
+static double choose_offset(uint64_t *state, const target *t, int along_axis)
+{
+    const nebel_shape_type type = t->shape->type;
+    const int exact = along_axis && is_in_place(t);
+    const int flat = type == NEBEL_SHAPE_CONVEX || type == NEBEL_SHAPE_HALF_SPACE || type == NEBEL_SHAPE_BOX;
+    const double off = power_of_ten(state, flat ? -11 : -14, -2) * (chance(state, .5) ? 1 : -1);
+    return exact || (!flat && chance(state, .2)) ? 0 : off;
+}
+
+/* In a face, or tangent. */
 static void graze(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 {
     const target t = choose_target(fog, state);
     double p[3], n[3], d[3];
-    surface_point(state, t.shape, p, n);
+    surface_point(state, t.shape, is_in_place(&t), p, n);
     random_unit(state, d);
-    if (t.shape->type == NEBEL_SHAPE_BOX && chance(state, .5)) {
-        const int axis = below(state, 3);
-        for (int k = 0; k < 3; k++) d[k] = k == axis ? 1 : 0;
-    }
+    const int along_axis = t.shape->type == NEBEL_SHAPE_BOX && chance(state, .5), axis = below(state, 3);
+    for (int k = 0; k < 3 && along_axis; k++) d[k] = k == axis ? 1 : 0;
     remove_along(n, d);
     if (!(length_of(d) > 1e-3)) random_unit(state, d);
-    const double off = chance(state, .2) ? 0 : 10 * power_of_ten(state, -15, -3) * (chance(state, .5) ? 1 : -1);
+    const double off = choose_offset(state, &t, along_axis);
     const double size = length_of(n);
     for (int k = 0; k < 3; k++) p[k] += off * n[k] / size;
     to_world(&t, p, 1);

@@ -1,0 +1,400 @@
+/* What must hold whatever the answer is: the order of submission, cuts through volumes and rays, instruction sets and
+ * the way rays are grouped change nothing, nor does moving everything by 1e7 m. */
+#include "random_fog.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { RAYS = 37 }; /* no multiple of any number of lanes */
+
+static const nebel_precision precisions[] = {NEBEL_PRECISION_DOUBLE, NEBEL_PRECISION_FLOAT};
+
+static nebel_snapshot *commit(const double ambient[3], const nebel_volume_desc *volumes, size_t n)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    const nebel_fog_desc desc = {.ambient = {ambient[0], ambient[1], ambient[2]}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < n; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
+                  nebel_light *lights)
+{
+    memset(lights, 0, n * sizeof *lights);
+    assert_int_equal(nebel_trace(snapshot, desc, n, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
+static void trace_volumes(const random_fog *fog, const nebel_volume_desc *volumes, size_t n, nebel_precision precision,
+                          const nebel_ray rays[RAYS], nebel_light lights[RAYS])
+{
+    nebel_snapshot *const snapshot = commit(fog->ambient, volumes, n);
+    trace(snapshot, &(nebel_trace_desc){.precision = precision, .tolerance = 1e-5}, RAYS, rays, lights);
+    nebel_release_snapshot(snapshot);
+}
+
+static double difference(const nebel_light *a, const nebel_light *b)
+{
+    double most = 0;
+    for (int c = 0; c < 3; c++) {
+        const double t = fabs(a->transmittance[c] - b->transmittance[c]);
+        const double s = fabs(a->in_scattering[c] - b->in_scattering[c]);
+        most = t <= most ? most : t; /* a NaN is a difference */
+        most = s <= most ? most : s;
+    }
+    return most;
+}
+
+static void make(random_fog *fog, random_fog_kind kind, uint64_t seed, nebel_ray rays[RAYS])
+{
+    random_fog_make(fog, kind, seed);
+    for (uint64_t r = 0; r < RAYS; r++) rays[r] = random_fog_ray(fog, r);
+}
+
+/* Says what differs, so that it can be seen again. */
+static void report(const char *what, const random_fog *fog, const nebel_ray *ray, const nebel_light *a,
+                   const nebel_light *b)
+{
+    printf("\n%s: kind %d, seed %zu: differs by %g\n", what, (int)fog->kind, (size_t)fog->seed, difference(a, b));
+    random_fog_print(stdout, fog, ray);
+    for (int i = 0; i < 2; i++) {
+        const nebel_light *const l = i == 0 ? a : b;
+        printf("T %.17g %.17g %.17g S %.17g %.17g %.17g error %g\n", l->transmittance[0], l->transmittance[1],
+               l->transmittance[2], l->in_scattering[0], l->in_scattering[1], l->in_scattering[2], l->error);
+    }
+}
+
+static void assert_same_bits(const char *what, const random_fog *fog, const nebel_ray *rays, const nebel_light *a,
+                             const nebel_light *b)
+{
+    for (int i = 0; i < RAYS; i++) {
+        if (memcmp(&a[i], &b[i], sizeof a[i]) != 0) report(what, fog, &rays[i], &a[i], &b[i]);
+        assert_memory_equal(&a[i], &b[i], sizeof a[i]);
+    }
+}
+
+/* The volumes in another order. */
+static void shuffle(const random_fog *fog, uint64_t seed, nebel_volume_desc *volumes)
+{
+    memcpy(volumes, fog->volumes, fog->count * sizeof *volumes);
+    for (size_t i = fog->count; i > 1; i--) {
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        const size_t j = (size_t)(seed >> 33) % i;
+        const nebel_volume_desc swap = volumes[i - 1];
+        volumes[i - 1] = volumes[j];
+        volumes[j] = swap;
+    }
+}
+
+static random_fog fog; /* large, and points into itself */
+
+static void test_the_order_of_submission_changes_no_bit(void **unused)
+{
+    (void)unused;
+    for (int trial = 0; trial < RANDOM_FOG_KIND_COUNT * 12; trial++) {
+        nebel_ray rays[RAYS];
+        nebel_light lights[RAYS], again[RAYS];
+        nebel_volume_desc shuffled[RANDOM_FOG_VOLUMES];
+        make(&fog, (random_fog_kind)(trial % RANDOM_FOG_KIND_COUNT), 1000 + (uint64_t)trial, rays);
+        for (int p = 0; p < 2; p++) {
+            trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, lights);
+            for (uint64_t order = 0; order < 3; order++) {
+                shuffle(&fog, order + (uint64_t)trial * 3, shuffled);
+                trace_volumes(&fog, shuffled, fog.count, precisions[p], rays, again);
+                assert_same_bits("another order", &fog, rays, lights, again);
+            }
+        }
+    }
+}
+
+static void test_instruction_sets_and_grouping_change_no_bit(void **unused)
+{
+    (void)unused;
+    for (int trial = 0; trial < RANDOM_FOG_KIND_COUNT * 12; trial++) {
+        nebel_ray rays[RAYS];
+        nebel_light lights[RAYS], again[RAYS];
+        make(&fog, (random_fog_kind)(trial % RANDOM_FOG_KIND_COUNT), 2000 + (uint64_t)trial, rays);
+        nebel_snapshot *const snapshot = commit(fog.ambient, fog.volumes, fog.count);
+        for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
+            if (!nebel_isa_available((nebel_isa)isa)) continue;
+            const nebel_trace_desc desc = {NEBEL_PRECISION_FLOAT, (nebel_isa)isa, 1e-5, NULL};
+            trace(snapshot, &desc, RAYS, rays, isa == NEBEL_ISA_SCALAR ? lights : again);
+            if (isa != NEBEL_ISA_SCALAR) assert_same_bits(nebel_isa_name((nebel_isa)isa), &fog, rays, lights, again);
+            for (int i = 0; i < RAYS; i++) trace(snapshot, &desc, 1, &rays[i], &again[i]);
+            assert_same_bits("one by one", &fog, rays, lights, again);
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
+/* ---- a volume in two halves that touch ---- */
+
+/* The volume's shape and a half space on one side of a plane. */
+static void halve(const nebel_volume_desc *whole, const double point[3], const double normal[3],
+                  nebel_shape parts[2][2], nebel_volume_desc halves[2])
+{
+    for (int side = 0; side < 2; side++) {
+        parts[side][0] = whole->shape;
+        parts[side][1] = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE};
+        for (int k = 0; k < 3; k++) {
+            parts[side][1].point[k] = point[k];
+            parts[side][1].normal[k] = side == 0 ? normal[k] : -normal[k];
+        }
+        halves[side] = *whole;
+        halves[side].shape = (nebel_shape){.type = NEBEL_SHAPE_INTERSECTION, .parts = parts[side], .part_count = 2};
+    }
+}
+
+/* A box is also two boxes. */
+static void halve_box(const nebel_volume_desc *whole, int axis, double where, nebel_volume_desc halves[2])
+{
+    halves[0] = halves[1] = *whole;
+    halves[0].shape.max[axis] = where;
+    halves[1].shape.min[axis] = where;
+}
+
+static int can_be_halved(const nebel_volume_desc *v)
+{
+    return v->density.type != NEBEL_DENSITY_RADIAL && v->density.type != NEBEL_DENSITY_SOFT_EDGE;
+}
+
+/* Some rays run in the plane of the cut, exactly where it is across an axis. */
+static void run_in_plane(const double point[3], int axis, nebel_ray rays[RAYS])
+{
+    for (int i = 0; i < RAYS; i += 3) {
+        rays[i].origin[axis] = point[axis];
+        rays[i].direction[axis] = 0;
+        if (i % 2 == 0)
+            for (int k = 0; k < 3; k++) rays[i].direction[k] = k == (axis + 1) % 3 ? 1 : 0;
+        if (!(fabs(rays[i].direction[0]) + fabs(rays[i].direction[1]) + fabs(rays[i].direction[2]) > 0))
+            rays[i].direction[(axis + 2) % 3] = -1;
+    }
+}
+
+static void assert_cut_is_invisible(const char *what, size_t index, const nebel_volume_desc halves[2],
+                                    const nebel_ray rays[RAYS])
+{
+    static const double allowed[] = {1e-12, 1e-6};
+    nebel_volume_desc cut[RANDOM_FOG_VOLUMES + 1];
+    nebel_light lights[RAYS], again[RAYS];
+    memcpy(cut, fog.volumes, fog.count * sizeof *cut);
+    cut[index] = halves[0];
+    cut[fog.count] = halves[1];
+    for (int p = 0; p < 2; p++) {
+        trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, lights);
+        trace_volumes(&fog, cut, fog.count + 1, precisions[p], rays, again);
+        for (int i = 0; i < RAYS; i++) {
+            const double apart = difference(&lights[i], &again[i]);
+            if (!(apart <= allowed[p])) {
+                printf("%s, %s: volume %zu\n", what, p == 0 ? "double" : "float", index);
+                report("cut", &fog, &rays[i], &lights[i], &again[i]);
+            }
+            assert_true(apart <= allowed[p]);
+        }
+    }
+}
+
+/* One even volume or several, or a single one of any profile: what has a closed form. */
+static random_fog_kind closed_kind(int trial)
+{
+    return trial % 2 == 0 ? RANDOM_FOG_OVERLAP : RANDOM_FOG_PROFILES;
+}
+
+static void make_closed(int trial, nebel_ray rays[RAYS])
+{
+    make(&fog, closed_kind(trial), 3000 + (uint64_t)trial, rays);
+    if (closed_kind(trial) == RANDOM_FOG_PROFILES) {
+        fog.volumes[0] = fog.volumes[trial / 2 % (int)fog.count];
+        fog.count = 1;
+    }
+}
+
+static void test_cutting_a_volume_in_two_changes_nothing(void **unused)
+{
+    (void)unused;
+    int cuts = 0;
+    for (int trial = 0; trial < 400; trial++) {
+        nebel_ray rays[RAYS];
+        nebel_shape parts[2][2];
+        nebel_volume_desc halves[2];
+        make_closed(trial, rays);
+        const size_t index = (size_t)trial / 2 % fog.count;
+        if (!can_be_halved(&fog.volumes[index])) continue;
+        const int axis = trial % 3, tilted = trial % 5 == 0;
+        const double *const origin = rays[1].origin;
+        const double point[3] = {floor(origin[0] / 3), origin[1] / 4, floor(origin[2])};
+        const double normal[3] = {axis == 0 || tilted, axis == 1 || tilted ? 1 : 0, axis == 2 ? 1 : 0};
+        if (!tilted) run_in_plane(point, axis, rays);
+        halve(&fog.volumes[index], point, normal, parts, halves);
+        assert_cut_is_invisible("half spaces", index, halves, rays);
+        cuts++;
+    }
+    assert_true(cuts > 200);
+}
+
+static void test_cutting_a_box_into_two_boxes_changes_nothing(void **unused)
+{
+    (void)unused;
+    for (int trial = 0; trial < 200; trial++) {
+        nebel_ray rays[RAYS];
+        nebel_volume_desc halves[2];
+        make_closed(2 * trial, rays);
+        nebel_volume_desc *const v = &fog.volumes[1];
+        v->shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .min = {-7, -4.5, -3}, .max = {6, 5.25, 8}};
+        const int axis = trial % 3;
+        const double where[3] = {1.1, -.3, 2};
+        run_in_plane(where, axis, rays);
+        halve_box(v, axis, where[axis], halves);
+        assert_cut_is_invisible("boxes", 1, halves, rays);
+    }
+}
+
+/* ---- a ray in two pieces ---- */
+
+static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(void **unused)
+{
+    (void)unused;
+    for (int trial = 0; trial < RANDOM_FOG_KIND_COUNT * 20; trial++) {
+        nebel_ray rays[RAYS], near[RAYS], far[RAYS];
+        nebel_light whole[RAYS], first[RAYS], second[RAYS];
+        make(&fog, (random_fog_kind)(trial % RANDOM_FOG_FAR), 4000 + (uint64_t)trial, rays);
+        for (int i = 0; i < RAYS; i++) {
+            const double *const d = rays[i].direction;
+            const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), at = fmin(rays[i].t_max, 20) * .37;
+            near[i] = far[i] = rays[i];
+            near[i].t_max = at;
+            far[i].t_max = rays[i].t_max - at;
+            for (int k = 0; k < 3; k++) far[i].origin[k] += at * d[k] / length;
+        }
+        trace_volumes(&fog, fog.volumes, fog.count, NEBEL_PRECISION_DOUBLE, rays, whole);
+        trace_volumes(&fog, fog.volumes, fog.count, NEBEL_PRECISION_DOUBLE, near, first);
+        trace_volumes(&fog, fog.volumes, fog.count, NEBEL_PRECISION_DOUBLE, far, second);
+        for (int i = 0; i < RAYS; i++) {
+            nebel_light joined = {.error = first[i].error + 3 * second[i].error};
+            for (int c = 0; c < 3; c++) {
+                const double T = first[i].transmittance[c];
+                joined.transmittance[c] = T * second[i].transmittance[c];
+                joined.in_scattering[c] = first[i].in_scattering[c] + T * second[i].in_scattering[c];
+            }
+            /* The second origin is rounded: where the ray grazes a surface, 1e-15 beside it is 1e-7 along it. */
+            const double allowed = whole[i].error + joined.error + 1e-6;
+            if (!(difference(&whole[i], &joined) <= allowed)) report("ray cut", &fog, &rays[i], &whole[i], &joined);
+            assert_true(difference(&whole[i], &joined) <= allowed);
+        }
+    }
+}
+
+/* ---- everything 1e7 m away ---- */
+
+/* Coordinates that 1e7 can be added to without rounding. */
+static void snap(double v[3])
+{
+    for (int k = 0; k < 3; k++) v[k] = nearbyint(v[k] * 0x1p20) * 0x1p-20;
+}
+
+static void snap_volume(nebel_volume_desc *v)
+{
+    nebel_shape *const s = &v->shape;
+    double base[3] = {0, v->density.base, 0};
+    snap(base);
+    v->density.base = base[1];
+    snap(s->transform.position);
+    snap(s->min);
+    snap(s->max);
+    snap(s->center);
+    snap(s->from);
+    snap(s->to);
+    snap(s->point);
+    snap(v->density.from);
+    snap(v->density.to);
+    snap(v->density.center);
+}
+
+static void add(double v[3], const double by[3])
+{
+    for (int k = 0; k < 3; k++) v[k] += by[k];
+}
+
+/* Planes cannot be moved without rounding, but their transform can. */
+static void shift_volume(nebel_volume_desc *v, const double by[3])
+{
+    nebel_shape *const s = &v->shape;
+    const nebel_transform none = {{0}, {0}, {0}};
+    if (s->type == NEBEL_SHAPE_CONVEX || memcmp(&s->transform, &none, sizeof none) != 0) {
+        add(s->transform.position, by);
+    } else {
+        add(s->min, by);
+        add(s->max, by);
+        add(s->center, by);
+        add(s->from, by);
+        add(s->to, by);
+        add(s->point, by);
+    }
+    add(v->density.from, by);
+    add(v->density.to, by);
+    add(v->density.center, by);
+    v->density.base += by[1];
+}
+
+/* Rays through the volumes; those that only touch them have an answer of their own at every place. */
+static void make_near(random_fog_kind kind, uint64_t seed, nebel_ray rays[RAYS])
+{
+    random_fog_make(&fog, kind, seed);
+    for (size_t i = 0; i < fog.count; i++) snap_volume(&fog.volumes[i]);
+    for (int i = 0; i < RAYS; i++) {
+        rays[i] = random_fog_ray(&fog, (uint64_t)i);
+        snap(rays[i].origin);
+        for (int k = 0; k < 3; k++) rays[i].direction[k] = 2 * sin((double)(i + 1) * (k + 1.7)) - rays[i].origin[k];
+        if (rays[i].t_max > 1e3) rays[i].t_max = HUGE_VAL;
+    }
+}
+
+static void test_moving_everything_by_1e7_m_changes_only_rounding(void **unused)
+{
+    (void)unused;
+    static const double shift[3] = {1e7, -1e7, 5e6};
+    static const double allowed[] = {1e-9, 1e-5};
+    for (int trial = 0; trial < 400; trial++) {
+        nebel_ray rays[RAYS];
+        nebel_light here[2][RAYS], there[RAYS];
+        make_near((random_fog_kind)(trial % (RANDOM_FOG_EXCLUDE + 1)), 5000 + (uint64_t)trial, rays);
+        for (int p = 0; p < 2; p++) trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, here[p]);
+        for (size_t i = 0; i < fog.count; i++) shift_volume(&fog.volumes[i], shift);
+        for (int i = 0; i < RAYS; i++) add(rays[i].origin, shift);
+        for (int p = 0; p < 2; p++) {
+            trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, there);
+            for (int i = 0; i < RAYS; i++) {
+                const double apart = difference(&here[p][i], &there[i]);
+                /* Adaptive steps may fall differently: then both are within the tolerance. */
+                const double may = allowed[p] + (fog.count > 1 && fog.kind != RANDOM_FOG_OVERLAP ? 4e-5 : 0);
+                if (!(apart <= may)) {
+                    printf("%s\n", p == 0 ? "double" : "float");
+                    report("far away", &fog, &rays[i], &here[p][i], &there[i]);
+                }
+                assert_true(apart <= may);
+            }
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_the_order_of_submission_changes_no_bit),
+        cmocka_unit_test(test_instruction_sets_and_grouping_change_no_bit),
+        cmocka_unit_test(test_cutting_a_volume_in_two_changes_nothing),
+        cmocka_unit_test(test_cutting_a_box_into_two_boxes_changes_nothing),
+        cmocka_unit_test(test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors),
+        cmocka_unit_test(test_moving_everything_by_1e7_m_changes_only_rounding),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
