@@ -227,10 +227,10 @@ static void test_a_scene_may_come_through_a_pipe(void **state)
         const int file = open(path, O_WRONLY);
         const struct timespec nap = {0, 20000000};
         for (const char *at = rich; *at != '\0'; at += strlen(at) < 300 ? strlen(at) : 300) {
-            if (write(file, at, strlen(at) < 300 ? strlen(at) : 300) < 0) _exit(1);
+            if (write(file, at, strlen(at) < 300 ? strlen(at) : 300) < 0) quick_exit(1);
             nanosleep(&nap, NULL);
         }
-        _exit(0);
+        quick_exit(0);
     }
     assert_int_equal(load(path, &kept), NEBEL_OK);
     waitpid(child, NULL, 0);

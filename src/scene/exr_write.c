@@ -15,6 +15,7 @@ typedef struct encoder {
     exr_context_t exr;
     exr_encode_pipeline_t pipeline;
     bool pipeline_ready;
+    exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); /* OpenEXR's own */
     char message[200];
 } encoder;
 
@@ -30,13 +31,15 @@ static void on_error(exr_const_context_t exr, exr_result_t code, const char *mes
     if (out->message[0] == '\0') snprintf(out->message, sizeof out->message, "%s", message);
 }
 
+/* `error` must not be called: OpenEXR 3.1 holds the lock that it would take. */
 static int64_t on_write(exr_const_context_t exr, void *user, const void *data, uint64_t size, uint64_t offset,
                         exr_stream_error_func_ptr_t error)
 {
-    encoder *out = user;
-    if (nb_bytes_write(&out->codec->allocator, out->bytes, (size_t)offset, data, (size_t)size)) return (int64_t)size;
-    error(exr, EXR_ERR_OUT_OF_MEMORY, "out of memory");
-    return -1;
+    const encoder *out = user;
+    (void)exr;
+    (void)error;
+    if (!nb_bytes_write(&out->codec->allocator, out->bytes, (size_t)offset, data, (size_t)size)) return -1;
+    return (int64_t)size;
 }
 
 /* ---- encoding
@@ -73,6 +76,27 @@ static void aim_channels(encoder *out, size_t y)
     }
 }
 
+/* OpenEXR 3.1 takes a block that compresses to exactly its own size as compressed when it writes, as stored when it
+ * reads. Such a block is stored here. */
+static exr_result_t compress_smaller(exr_encode_pipeline_t *pipeline)
+{
+    const encoder *out = pipeline->encoding_user_data;
+    const exr_result_t result = out->compress(pipeline);
+    if (result == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes)
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    return result;
+}
+
+static bool start_pipeline(encoder *out)
+{
+    if (exr_encoding_choose_default_routines(out->exr, 0, &out->pipeline) != EXR_ERR_SUCCESS) return false;
+    out->compress = out->pipeline.compress_fn;
+    out->pipeline.compress_fn = compress_smaller;
+    out->pipeline.encoding_user_data = out;
+    out->pipeline_ready = true;
+    return true;
+}
+
 static bool write_block(encoder *out, uint32_t y)
 {
     exr_chunk_info_t chunk;
@@ -81,9 +105,7 @@ static bool write_block(encoder *out, uint32_t y)
                                                       : exr_encoding_initialize(out->exr, 0, &chunk, &out->pipeline);
     if (prepared != EXR_ERR_SUCCESS) return false;
     aim_channels(out, y);
-    if (!out->pipeline_ready && exr_encoding_choose_default_routines(out->exr, 0, &out->pipeline) != EXR_ERR_SUCCESS)
-        return false;
-    out->pipeline_ready = true;
+    if (!out->pipeline_ready && !start_pipeline(out)) return false;
     return exr_encoding_run(out->exr, 0, &out->pipeline) == EXR_ERR_SUCCESS;
 }
 
