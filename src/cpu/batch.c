@@ -3,10 +3,11 @@
 
 #include <math.h>
 
-static void set_inside(const nb_frame *frame, uint32_t left, uint32_t top, int *inside)
+NB_CLONES static void set_inside(const nb_frame *frame, uint32_t left, uint32_t top, int *inside)
 {
     const uint32_t columns = frame->width - left, rows = frame->height - top;
-    for (uint32_t i = 0; i < NB_BATCH; i++) inside[i] = nb_lane_x(i) < columns && nb_lane_y(i) < rows ? -1 : 0;
+    NB_SIMD
+    for (uint32_t i = 0; i < NB_BATCH; i++) inside[i] = -((nb_lane_x(i) < columns) & (nb_lane_y(i) < rows));
 }
 
 /* ---- fog on the way to the camera ------------------------------------------------------------------------------------ */
@@ -145,7 +146,7 @@ nebel_result nb_batch_render(const nb_frame *frame, uint32_t left, uint32_t top,
     const nb_lighting *lighting = &frame->lighting;
     set_inside(frame, left, top, scratch->inside);
     nb_sample_points(sample, left, top, scratch->x, scratch->y);
-    nb_view_rays(&frame->view, scratch->x, scratch->y, &scratch->rays);
+    nb_view_rays(&frame->view, left, top, scratch->x, scratch->y, &scratch->rays);
     nb_hits_trace(geometry->scene, &scratch->rays, scratch->inside, &scratch->packets, &scratch->hits);
     nebel_result result = trace_camera_fog(frame, scratch);
     if (result != NEBEL_OK) return result;

@@ -20,7 +20,7 @@ typedef struct nb_geometry {
     nebel_allocator allocator;
     nebel_log log;
     RTCDevice device;
-    RTCScene scene; /* NULL where there are no triangles */
+    RTCScene scene; /* NULL until there is a place, and where no triangle is finite */
     double origin[3];
     float bounds_min[3], bounds_max[3]; /* relative to origin; 0 where there are no triangles */
     double largest_radius;              /* of a mesh around its own origin */
@@ -32,7 +32,7 @@ typedef struct nb_geometry {
  * Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
 nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *scene, nebel_isa isa, int threads);
 
-/* Builds around `camera`, or keeps what is built where the camera is still close to the origin. Errors: MEMORY. */
+/* Builds for a camera at this place, or keeps what is built where that is good for it. Errors: MEMORY. */
 nebel_result nb_geometry_place(nb_geometry *geometry, const double camera[3]);
 
 void nb_geometry_free(nb_geometry *geometry);

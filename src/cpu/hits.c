@@ -88,7 +88,7 @@ void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direct
         memcpy(ray->org_x, start[0] + first, ROW);
         memcpy(ray->org_y, start[1] + first, ROW);
         memcpy(ray->org_z, start[2] + first, ROW);
-        fill(ray->tfar, INFINITY);
+        for (int i = 0; i < NB_PACKET; i++) ray->tfar[i] = active[first + i] ? INFINITY : -1;
         rtcOccluded16(active + first, scene, &context, ray);
         for (int i = 0; i < NB_PACKET; i++) {
             if (ray->tfar[i] < 0) active[first + i] = 0;

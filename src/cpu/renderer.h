@@ -21,7 +21,7 @@ typedef struct nb_light_samples {
 /* What a thread works in: allocated once, aligned to 64 bytes. */
 typedef struct nb_scratch {
     nb_packets packets;
-    float x[NB_BATCH], y[NB_BATCH]; /* points in the picture */
+    float x[NB_BATCH], y[NB_BATCH]; /* points, from the batch's first pixel */
     int inside[NB_BATCH];           /* -1 within the picture, else 0 */
     nb_rays rays;
     nb_hits hits;

@@ -31,9 +31,10 @@ static inline uint32_t mix(uint32_t h)
     return h ^ h >> 16;
 }
 
+/* As many digits as a float has beside those of a column of the batch, so that no point is rounded into the next pixel. */
 static inline float fraction(uint32_t digits)
 {
-    return (float)(digits >> 9) * 0x1p-23f;
+    return (float)(digits >> 12) * 0x1p-20f;
 }
 
 NB_CLONES static void scrambled_points(const nb_sample *sample, uint32_t left, uint32_t top, float *restrict x,
@@ -42,21 +43,28 @@ NB_CLONES static void scrambled_points(const nb_sample *sample, uint32_t left, u
     const uint32_t sample_x = sample->x, sample_y = sample->y;
     NB_SIMD
     for (uint32_t i = 0; i < NB_BATCH; i++) {
-        const uint32_t column = left + nb_lane_x(i), row = top + nb_lane_y(i);
-        const uint32_t seed = mix(column | row << 16);
+        const uint32_t column = nb_lane_x(i), row = nb_lane_y(i);
+        const uint32_t pixel = (left + column) | (top + row) << 16;
+        const uint32_t seed = mix(pixel ^ 0x85ebca6bu); /* mix(0) is 0: no shift at all */
         x[i] = (float)column + fraction(sample_x ^ seed);
         y[i] = (float)row + fraction(sample_y ^ mix(seed + 0x9e3779b9u));
     }
 }
 
+NB_CLONES static void centers(float *restrict x, float *restrict y)
+{
+    NB_SIMD
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        x[i] = (float)nb_lane_x(i) + .5f;
+        y[i] = (float)nb_lane_y(i) + .5f;
+    }
+}
+
 void nb_sample_points(const nb_sample *sample, uint32_t left, uint32_t top, float *x, float *y)
 {
-    if (!sample->centered) {
+    if (sample->centered) {
+        centers(x, y);
+    } else {
         scrambled_points(sample, left, top, x, y);
-        return;
-    }
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        x[i] = (float)(left + nb_lane_x(i)) + .5f;
-        y[i] = (float)(top + nb_lane_y(i)) + .5f;
     }
 }

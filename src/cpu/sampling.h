@@ -14,7 +14,7 @@ typedef struct nb_sample {
 /* Sample `index` of `count`. */
 nb_sample nb_sample_make(uint32_t index, uint32_t count);
 
-/* The points of a batch whose first pixel is (left, top), in pixels of the picture. Depends on pixel and sample only. */
+/* The points of a batch whose first pixel is (left, top), in pixels from there. Depends on pixel and sample only. */
 void nb_sample_points(const nb_sample *sample, uint32_t left, uint32_t top, float *x, float *y);
 
 #endif

@@ -163,10 +163,11 @@ NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *
         const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
         const float axy = ax > ay ? ax : ay, largest = axy > az ? axy : az;
         const float height = 0x1p-20f * (t + largest + points->edge[i]);
-        points->start[0][i] = x + height * points->side[0][i];
-        points->start[1][i] = y + height * points->side[1][i];
-        points->start[2][i] = z + height * points->side[2][i];
-        points->lit[i] = hits->surface[i] != NB_NONE ? points->lit[i] : 0;
+        const int hit = hits->surface[i] != NB_NONE;
+        points->start[0][i] = hit ? nb_clamp_coordinate(x + height * points->side[0][i]) : 0;
+        points->start[1][i] = hit ? nb_clamp_coordinate(y + height * points->side[1][i]) : 0;
+        points->start[2][i] = hit ? nb_clamp_coordinate(z + height * points->side[2][i]) : 0;
+        points->lit[i] = hit ? points->lit[i] : 0;
     }
 }
 

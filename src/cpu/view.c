@@ -142,15 +142,15 @@ void nb_view_place(nb_view *view, const double origin[3], const float bounds_min
     view->advance = distance > size ? distance - .01 * size : 0;
 }
 
-/* v = corner + x step_x + y step_y */
-NB_CLONES static void plane_points(const nb_view *view, const float *restrict x, const float *restrict y,
+/* v = base + x step_x + y step_y */
+NB_CLONES static void plane_points(const nb_view *view, const double *restrict base, const float *restrict x, const float *restrict y,
                                    double (*restrict v)[NB_BATCH])
 {
     for (int c = 0; c < 3; c++) {
-        const double corner = view->corner[c], step_x = view->step_x[c], step_y = view->step_y[c];
+        const double first = base[c], step_x = view->step_x[c], step_y = view->step_y[c];
         double *restrict out = v[c];
         NB_SIMD
-        for (int i = 0; i < NB_BATCH; i++) out[i] = corner + (double)x[i] * step_x + (double)y[i] * step_y;
+        for (int i = 0; i < NB_BATCH; i++) out[i] = first + (double)x[i] * step_x + (double)y[i] * step_y;
     }
 }
 
@@ -161,11 +161,11 @@ static void orthographic_directions(const nb_view *view, nb_rays *rays)
     }
 }
 
-static void panorama_directions(const nb_view *view, const float *x, const float *y, nb_rays *rays)
+static void panorama_directions(const nb_view *view, const double base[3], const float *x, const float *y, nb_rays *rays)
 {
     for (int i = 0; i < NB_BATCH; i++) {
-        const double longitude = view->corner[0] + (double)x[i] * view->step_x[0];
-        const double latitude = view->corner[1] + (double)y[i] * view->step_y[1];
+        const double longitude = base[0] + (double)x[i] * view->step_x[0];
+        const double latitude = base[1] + (double)y[i] * view->step_y[1];
         const double level = cos(latitude);
         const double along = level * cos(longitude), across = level * sin(longitude), above = sin(latitude);
         for (int c = 0; c < 3; c++) {
@@ -197,26 +197,32 @@ NB_CLONES static void set_starts(const nb_view *view, nb_rays *rays)
         const double *restrict direction = rays->direction[c], *restrict offset = rays->offset[c];
         if (orthographic) {
             NB_SIMD
-            for (int i = 0; i < NB_BATCH; i++) out[i] = (float)(start + offset[i] + advance * direction[i]);
+            for (int i = 0; i < NB_BATCH; i++) {
+                out[i] = nb_clamp_coordinate((float)(start + offset[i] + advance * direction[i]));
+            }
         } else {
             NB_SIMD
-            for (int i = 0; i < NB_BATCH; i++) out[i] = (float)(start + advance * direction[i]);
+            for (int i = 0; i < NB_BATCH; i++) {
+                out[i] = nb_clamp_coordinate((float)(start + advance * direction[i]));
+            }
         }
     }
 }
 
-void nb_view_rays(const nb_view *view, const float *x, const float *y, nb_rays *rays)
+void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays)
 {
+    double base[3];
+    for (int c = 0; c < 3; c++) base[c] = view->corner[c] + left * view->step_x[c] + top * view->step_y[c];
     switch (view->projection) {
     case NEBEL_PROJECTION_PERSPECTIVE:
-        plane_points(view, x, y, rays->direction);
+        plane_points(view, base, x, y, rays->direction);
         break;
     case NEBEL_PROJECTION_ORTHOGRAPHIC:
-        plane_points(view, x, y, rays->offset);
+        plane_points(view, base, x, y, rays->offset);
         orthographic_directions(view, rays);
         break;
     case NEBEL_PROJECTION_PANORAMA:
-        panorama_directions(view, x, y, rays);
+        panorama_directions(view, base, x, y, rays);
         break;
     }
     set_units(rays);

@@ -36,7 +36,7 @@ nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t wid
  * those of the long way. */
 void nb_view_place(nb_view *view, const double origin[3], const float bounds_min[3], const float bounds_max[3]);
 
-/* The rays through the points x, y. */
-void nb_view_rays(const nb_view *view, const float *x, const float *y, nb_rays *rays);
+/* The rays through the points left + x, top + y. */
+void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays);
 
 #endif

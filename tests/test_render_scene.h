@@ -1,0 +1,167 @@
+/* Small scenes in memory for the tests of the renderer. */
+#ifndef TEST_RENDER_SCENE_H
+#define TEST_RENDER_SCENE_H
+
+#include <nebel/render.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double test_pi = 3.14159265358979323846;
+
+/* A plane picture of everything that the renderer can give. */
+typedef struct test_picture {
+    uint32_t width, height;
+    nebel_frame planes;
+} test_picture;
+
+static inline test_picture test_picture_make(uint32_t width, uint32_t height)
+{
+    const size_t pixels = (size_t)width * height;
+    test_picture picture = {.width = width, .height = height};
+    picture.planes.color = malloc(pixels * 3 * sizeof(float));
+    picture.planes.transmittance = malloc(pixels * 3 * sizeof(float));
+    picture.planes.in_scattering = malloc(pixels * 3 * sizeof(float));
+    picture.planes.depth = malloc(pixels * sizeof(float));
+    picture.planes.normal = malloc(pixels * 3 * sizeof(float));
+    picture.planes.error = malloc(pixels * sizeof(float));
+    return picture;
+}
+
+static inline void test_picture_free(test_picture *picture)
+{
+    free(picture->planes.color);
+    free(picture->planes.transmittance);
+    free(picture->planes.in_scattering);
+    free(picture->planes.depth);
+    free(picture->planes.normal);
+    free(picture->planes.error);
+}
+
+static inline const float *test_color(const test_picture *picture, uint32_t x, uint32_t y)
+{
+    return picture->planes.color + 3 * ((size_t)y * picture->width + x);
+}
+
+static inline float test_depth(const test_picture *picture, uint32_t x, uint32_t y)
+{
+    return picture->planes.depth[(size_t)y * picture->width + x];
+}
+
+static inline nebel_camera test_camera(double x, double y, double z, double to_x, double to_y, double to_z)
+{
+    return (nebel_camera){.position = {x, y, z}, .look_at = {to_x, to_y, to_z}, .up = {0, 1, 0}, .vertical_fov = 50,
+                          .view_height = 10};
+}
+
+/* A snapshot of some volumes. */
+static inline nebel_snapshot *test_fog(size_t count, const nebel_volume_desc *volumes)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Fog everywhere. */
+static inline nebel_snapshot *test_world_fog(double extinction, double source)
+{
+    const nebel_volume_desc volume = {.extinction = {extinction, 2 * extinction, .5 * extinction},
+                                      .source = {source, .5 * source, 2 * source}};
+    return test_fog(1, &volume);
+}
+
+/* Renders with a renderer of its own. */
+static inline void test_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
+                               const nebel_camera *camera, uint32_t samples, test_picture *picture)
+{
+    nebel_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_renderer(scene, fog, desc, &renderer), NEBEL_OK);
+    const nebel_frame_desc frame = {
+        .camera = *camera, .width = picture->width, .height = picture->height, .samples = samples};
+    assert_int_equal(nebel_render_frame(renderer, &frame, &picture->planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+}
+
+/* ---- meshes -------------------------------------------------------------------------------------------------------- */
+
+/* A square of side 2 around (0, height, 0), facing up. */
+static const float test_square_positions[12] = {-1, 0, -1, -1, 0, 1, 1, 0, 1, 1, 0, -1};
+static const float test_square_uvs[8] = {0, 0, 0, 1, 1, 1, 1, 0};
+static const uint32_t test_square_indices[6] = {0, 1, 2, 0, 2, 3};
+
+static inline nebel_mesh test_square(void)
+{
+    return (nebel_mesh){.positions = test_square_positions, .indices = test_square_indices, .vertex_count = 4,
+                        .triangle_count = 2, .base_color = {.5f, .25f, .75f}, .texture = -1};
+}
+
+enum { TEST_RINGS = 24, TEST_SECTORS = 48 };
+
+/* A sphere with smooth normals, and under it a floor at -1; the memory is the caller's. */
+typedef struct test_ball {
+    float positions[(TEST_RINGS + 1) * (TEST_SECTORS + 1)][3], normals[(TEST_RINGS + 1) * (TEST_SECTORS + 1)][3];
+    uint32_t indices[TEST_RINGS * TEST_SECTORS * 2][3];
+    float floor[4][3];
+    nebel_mesh meshes[2];
+    nebel_scene_data scene;
+} test_ball;
+
+static inline void test_ball_set_vertices(test_ball *ball, float radius)
+{
+    for (uint32_t r = 0; r <= TEST_RINGS; r++) {
+        for (uint32_t s = 0; s <= TEST_SECTORS; s++) {
+            const double polar = test_pi * r / TEST_RINGS, azimuth = 2 * test_pi * (s % TEST_SECTORS) / TEST_SECTORS;
+            const double n[3] = {sin(polar) * cos(azimuth), cos(polar), sin(polar) * sin(azimuth)};
+            for (int i = 0; i < 3; i++) {
+                ball->normals[r * (TEST_SECTORS + 1) + s][i] = (float)n[i];
+                ball->positions[r * (TEST_SECTORS + 1) + s][i] = radius * (float)n[i];
+            }
+        }
+    }
+}
+
+static inline void test_ball_set_indices(test_ball *ball)
+{
+    for (uint32_t r = 0; r < TEST_RINGS; r++) {
+        for (uint32_t s = 0; s < TEST_SECTORS; s++) {
+            const uint32_t a = r * (TEST_SECTORS + 1) + s, b = a + TEST_SECTORS + 1, t = 2 * (r * TEST_SECTORS + s);
+            const uint32_t corners[6] = {a, a + 1, b, b, a + 1, b + 1};
+            memcpy(ball->indices[t], corners, sizeof corners);
+        }
+    }
+}
+
+/* Everything stands around `center`. */
+static inline void test_ball_make(test_ball *ball, const double center[3])
+{
+    memset(ball, 0, sizeof *ball);
+    test_ball_set_vertices(ball, 1);
+    test_ball_set_indices(ball);
+    ball->meshes[0] = (nebel_mesh){.positions = ball->positions[0], .normals = ball->normals[0],
+                                   .indices = ball->indices[0], .vertex_count = (TEST_RINGS + 1) * (TEST_SECTORS + 1),
+                                   .triangle_count = TEST_RINGS * TEST_SECTORS * 2, .base_color = {.8f, .3f, .2f},
+                                   .texture = -1};
+    for (int v = 0; v < 4; v++) {
+        for (int i = 0; i < 3; i++) ball->floor[v][i] = i == 1 ? -1 : 20 * test_square_positions[3 * v + i];
+    }
+    ball->meshes[1] = test_square();
+    ball->meshes[1].positions = ball->floor[0];
+    for (int m = 0; m < 2; m++) memcpy(ball->meshes[m].origin, center, 3 * sizeof(double));
+    ball->scene = (nebel_scene_data){.background = {.5, .6, .7}, .has_sun = 1, .sun_direction = {.36, .8, .48},
+                                     .sun_irradiance = {3, 2.9, 2.7}, .ambient = {.2, .25, .3}, .mesh_count = 2,
+                                     .meshes = ball->meshes};
+}
+
+#endif
