@@ -197,8 +197,9 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
         g->radiance[c] = g->radiance[c] + light;
         most = nb_max(most, light);
     }
-    const nb_real rounding = s->sum.light_error * largest(g->transmittance) +
-                             most * (g->depth_error + s->sum.depth_error + NB_F(32.0) * NB_EPSILON);
+    const nb_real thinnest = nb_min(nb_min(s->sum.depth[0], s->sum.depth[1]), s->sum.depth[2]);
+    const nb_real rounding = s->sum.light_error * largest(g->transmittance) * nb_exp_ratio(thinnest) +
+                             most * (g->depth_error + nb_min(s->sum.depth_error, s->sum.relative_error) + NB_F(32.0) * NB_EPSILON);
     g->radiance_error = g->radiance_error + nb_select(lanes, rounding + nb_min(s->gauss_bound, crude), NB_F(0.0));
     for (int c = 0; c < 3; c++) {
         g->depth[c] = g->depth[c] + nb_select(lanes, s->sum.depth[c], NB_F(0.0));

@@ -25,6 +25,7 @@ typedef struct leaf_span {
 typedef struct contact {
     const nb_medium *medium;
     size_t first_span;
+    leaf_span hull;         /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths */
@@ -53,11 +54,18 @@ typedef struct local_ray {
     nb_wide reach;
 } local_ray;
 
+static nb_wvec3 from_origin(const packet *rays, const nb_leaf *leaf)
+{
+#if defined(NB_DOUBLE)
+    return nb_wsub3(rays->origin, nb_wvec3(leaf->exact_origin[0], leaf->exact_origin[1], leaf->exact_origin[2]));
+#else
+    return nb_wsub3(nb_wsub3(rays->origin, wide_vector(leaf->origin)), wide_vector(leaf->origin_rest));
+#endif
+}
+
 static local_ray localize(const packet *rays, const nb_leaf *leaf)
 {
-    const nb_wvec3 origin =
-        nb_wvec3(WIDE(FRAME(leaf, origin)[0]), WIDE(FRAME(leaf, origin)[1]), WIDE(FRAME(leaf, origin)[2]));
-    const nb_wvec3 p = nb_wsub3(rays->origin, origin);
+    const nb_wvec3 p = from_origin(rays, leaf);
     local_ray local = {p, rays->direction, NB_W(0.0)};
     nb_wide distance = nb_wabs(p.x) + nb_wabs(p.y) + nb_wabs(p.z);
     if (!leaf->aligned) {
@@ -71,7 +79,7 @@ static local_ray localize(const packet *rays, const nb_leaf *leaf)
         distance = distance * WIDE(leaf->scale);
     }
     const nb_wide size = WIDE(1.0 + leaf->radius + leaf->length);
-    local.reach = (distance + size) * (NB_W(8.0) * NB_WEPSILON);
+    local.reach = (distance + size) * (NB_W(8.0) * NB_WEPSILON) + WIDE(leaf->origin_error * leaf->scale);
     return local;
 }
 
@@ -79,7 +87,7 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
 {
     double size = 0;
     for (int i = 0; i < 3; i++) size += fabs(leaf->low[i]) + fabs(leaf->high[i]);
-    const nb_wide reach = leaf->aligned ? NB_W(0.0) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
+    const nb_wide reach = leaf->aligned ? WIDE(leaf->origin_error) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
     return nb_interval_box(local->p, local->d, wide_vector(leaf->low), wide_vector(leaf->high), reach);
 }
 
@@ -241,50 +249,76 @@ static int grows_without_bound(const nebel_density *density)
 
 /* ---- meeting the fog ---------------------------------------------------------------------------------------------------- */
 
-/* Clips to the ray and says in `spread` by how much the ends that are left may be off, times the density there. */
-static leaf_span clip_interval(const packet *rays, const contact *k, const nb_interval *raw, nb_real *spread)
+/* How dense a medium may be at t, for what an uncertain end there may do: the profiles end at 1, but one grows. */
+static nb_real end_density(const contact *k, nb_wide t)
 {
-    const nb_wmask touched = nb_wand(raw->enter <= raw->leave, nb_wand(raw->leave > NB_W(0.0), raw->enter < rays->t_max));
-    const nb_wmask enters = nb_wand(touched, raw->enter > NB_W(0.0));
-    const nb_wmask leaves = nb_wand(touched, raw->leave < rays->t_max);
-    const leaf_span span = {nb_wmax(raw->enter, NB_W(0.0)), nb_wmin(raw->leave, rays->t_max)};
-    const nb_real first = nb_narrow(nb_wselect(enters, raw->enter_slack, NB_W(0.0)));
-    const nb_real last = nb_narrow(nb_wselect(leaves, raw->leave_slack, NB_W(0.0)));
-    *spread = first + last;
-    if (grows_without_bound(&k->medium->body.density))
-        *spread = first * contact_density(k, span.enter) + last * contact_density(k, span.leave);
-    return span;
+    return grows_without_bound(&k->medium->body.density) ? contact_density(k, t) : NB_F(1.0);
 }
 
-/* Lanes that can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside them
- * must not split the ray, or its bits would depend on whether its company brought the body here. */
-static nb_wmask touches_bounds(const packet *rays, const nb_volume *body)
+static void add_end_of(march *m, const contact *k, nb_wide t, nb_real slack)
 {
-    if (body->leaf_count == 1) return rays->t_max > NB_W(0.0);
-    const nb_interval box = nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
-    return nb_wand(box.enter <= box.leave, nb_wand(box.leave >= NB_W(0.0), box.enter <= rays->t_max));
+    const nb_real weight = slack * end_density(k, t);
+    m->end_depth = m->end_depth + weight * REAL(k->medium->densest);
+    m->end_light = m->end_light + weight * REAL(k->medium->brightest);
+}
+
+/* An end of a leaf may be off by slack. An exclusion's end moves the fog of every medium that is there; those were met
+ * before, as exclusions come last. */
+static void add_end(march *m, const contact *k, nb_wide t, nb_real slack)
+{
+    if (k->medium->body.operation == NEBEL_OPERATION_ADD) {
+        add_end_of(m, k, t, slack);
+        return;
+    }
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *other = &m->contacts[i];
+        if (other->medium->body.operation != NEBEL_OPERATION_ADD) continue;
+        const nb_wmask there = nb_wand(t >= other->hull.enter, t <= other->hull.leave);
+        add_end_of(m, other, t, nb_select(nb_narrow_mask(there), slack, NB_F(0.0)));
+    }
+}
+
+/* Where lanes can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside them
+ * must not split the ray, or its bits would depend on whether its company brought the body here. */
+static leaf_span span_of_bounds(const packet *rays, const nb_volume *body)
+{
+    const leaf_span whole = {NB_W(0.0), rays->t_max};
+    if (body->leaf_count == 1) return whole;
+    const nb_interval box =
+        nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
+    return (leaf_span){nb_wmax(box.enter, whole.enter), nb_wmin(box.leave, whole.leave)};
+}
+
+/* Clips a leaf's interval to the ray, and counts the ends that are left and may be off. */
+static leaf_span clip_interval(march *m, const contact *k, const nb_interval *raw, const leaf_span *bounds)
+{
+    const nb_wmask touched = nb_wand(nb_wand(raw->enter <= raw->leave, bounds->enter <= bounds->leave),
+                                     nb_wand(raw->leave > NB_W(0.0), raw->enter < m->rays.t_max));
+    const nb_wmask enters = nb_wand(touched, nb_wand(raw->enter > bounds->enter, raw->enter <= bounds->leave));
+    const nb_wmask leaves = nb_wand(touched, nb_wand(raw->leave < bounds->leave, raw->leave >= bounds->enter));
+    add_end(m, k, raw->enter, nb_narrow(nb_wselect(enters, raw->enter_slack, NB_W(0.0))));
+    add_end(m, k, raw->leave, nb_narrow(nb_wselect(leaves, raw->leave_slack, NB_W(0.0))));
+    const leaf_span span = {nb_wmax(raw->enter, NB_W(0.0)), nb_wmin(raw->leave, m->rays.t_max)};
+    return (leaf_span){span.enter, nb_wselect(touched, span.leave, NB_W(0.0))};
 }
 
 /* Intervals of all leaves of one medium. Returns whether any lane is inside any of them. */
 static int meet_leaves(march *m, contact *k)
 {
     const nb_volume *body = &k->medium->body;
-    const nb_wmask near = touches_bounds(&m->rays, body);
-    nb_real spread = NB_F(0.0);
+    const leaf_span bounds = span_of_bounds(&m->rays, body);
     int hit = 0;
+    k->hull = (leaf_span){NB_WFAR, NB_W(0.0)};
     for (size_t i = 0; i < body->leaf_count; i++) {
         const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
-        nb_real own;
-        leaf_span span = clip_interval(&m->rays, k, &raw, &own);
-        span.leave = nb_wselect(near, span.leave, NB_W(0.0));
+        const leaf_span span = clip_interval(m, k, &raw, &bounds);
         const nb_wmask met = span.enter < span.leave;
         m->spans[k->first_span + i] = span;
         m->event_count = m->event_count + nb_select(nb_narrow_mask(met), NB_F(2.0), NB_F(0.0));
-        spread = spread + nb_select(nb_narrow_mask(near), own, NB_F(0.0));
+        k->hull.enter = nb_wselect(met, nb_wmin(span.enter, k->hull.enter), k->hull.enter);
+        k->hull.leave = nb_wselect(met, nb_wmax(span.leave, k->hull.leave), k->hull.leave);
         hit = hit || nb_wany(met);
     }
-    m->end_depth = m->end_depth + spread * REAL(k->medium->densest);
-    m->end_light = m->end_light + spread * REAL(k->medium->brightest);
     return hit;
 }
 

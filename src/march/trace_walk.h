@@ -20,6 +20,7 @@ typedef struct piece {
 typedef struct piece_sum {
     nb_real depth[3], light[3]; /* optical depth; radiance it would add if nothing attenuated it */
     nb_real depth_error, light_error;
+    nb_real relative_error; /* of the worst integral, 1 at most */
     nb_mask present; /* some medium is there */
     nb_mask mixed;   /* the quotient of light and extinction changes along the piece: no closed form */
 } piece_sum;
@@ -93,12 +94,13 @@ static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_real
     }
     sum->depth_error = sum->depth_error + REAL(k->medium->densest) * error;
     sum->light_error = sum->light_error + REAL(k->medium->brightest) * error;
+    sum->relative_error = nb_max(sum->relative_error, nb_min(error / nb_max(length, NB_TINY), NB_F(1.0)));
 }
 
 static piece_sum no_sum(void)
 {
     const nb_real zero = NB_F(0.0);
-    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, zero, zero, nb_mask_false, nb_mask_false};
+    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, nb_mask_false, nb_mask_false};
 }
 
 /* A piece is mixed where some density varies and not all media give the same light per extinction. */
@@ -127,17 +129,19 @@ static piece_sum sum_piece(const march *m, const piece *p)
     return sum;
 }
 
-/* The closed form: light (1 - e^-depth) / depth, seen through what lies before. */
+/* The closed form: light (1 - e^-depth) / depth, seen through what lies before. An error of an integral counts for its light, and for the
+ * attenuation of the light by depth or, where all is opaque, by its relative size only. */
 static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
 {
+    const nb_real attenuation = g->depth_error + nb_min(sum->depth_error, sum->relative_error) + NB_F(16.0) * NB_EPSILON;
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        const nb_real light = nb_select(lanes, g->transmittance[c] * nb_medium_gather(sum->light[c], sum->depth[c]), NB_F(0.0));
+        const nb_real ratio = nb_select(lanes, g->transmittance[c] * nb_exp_ratio(sum->depth[c]), NB_F(0.0));
+        const nb_real light = ratio * sum->light[c];
         g->radiance[c] = g->radiance[c] + light;
-        most = nb_max(most, light);
+        most = nb_max(most, ratio * sum->light_error + light * attenuation);
     }
-    const nb_real error = sum->light_error * largest(g->transmittance) + most * (g->depth_error + sum->depth_error + NB_F(16.0) * NB_EPSILON);
-    g->radiance_error = g->radiance_error + nb_select(lanes, error, NB_F(0.0));
+    g->radiance_error = g->radiance_error + most;
 }
 
 /* Moves behind the piece. */

@@ -10,6 +10,13 @@ static void widen_point(const double v[3], long double out[3])
     for (int i = 0; i < 3; i++) out[i] = (long double)v[i];
 }
 
+static int is_unmoved(const nb_affine *world)
+{
+    for (int i = 0; i < 9; i++)
+        if (world->matrix[i] != (i % 4 == 0 ? 1 : 0)) return 0;
+    return world->offset[0] == 0 && world->offset[1] == 0 && world->offset[2] == 0;
+}
+
 /* The frame whose origin is `center` and whose axes are normalised by `shaping` (rows, in the shape's coordinates). */
 static int set_frame(nb_leaf *leaf, const nb_affine *world, const long double center[3], const long double shaping[9])
 {
@@ -23,8 +30,11 @@ static int set_frame(nb_leaf *leaf, const nb_affine *world, const long double ce
     nb_affine_point(world, center, leaf->exact_origin);
     leaf->aligned = 1;
     leaf->scale = 0;
+    const int rounds = !is_unmoved(world);
     for (int i = 0; i < 3; i++) {
         leaf->origin[i] = (double)leaf->exact_origin[i];
+        leaf->origin_rest[i] = (double)(leaf->exact_origin[i] - (long double)leaf->origin[i]);
+        leaf->origin_error += rounds ? fabs(leaf->origin[i]) * (double)LDBL_EPSILON : 0;
         const long double *row = &frame.matrix[3 * i];
         leaf->scale = fmax(leaf->scale, (double)sqrtl(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
     }

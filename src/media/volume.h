@@ -29,6 +29,8 @@ typedef struct nb_leaf {
     nb_leaf_type type;
     int aligned;             /* the matrix is the identity */
     double origin[3];        /* local = matrix (world - origin) */
+    double origin_rest[3];   /* what rounding to double took from the origin */
+    double origin_error;     /* what resolving may have lost of it */
     double matrix[9];        /* row by row */
     long double exact_origin[3], exact_matrix[9]; /* the same for the double reference */
     double scale;            /* largest row length of the matrix */
