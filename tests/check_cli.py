@@ -76,7 +76,7 @@ class Case(unittest.TestCase):
 
 class CallingTest(Case):
     def test_help_and_version_go_to_standard_output(self):
-        for words in (["--help"], ["-h"], ["--version"], *([command, "--help"] for command in COMMANDS),
+        for words in (["--help"], ["-h"], ["--version"], ["help"], ["help", "trace"], *([command, "--help"] for command in COMMANDS),
                       *([command, "-h"] for command in COMMANDS)):
             done = nebel(*words)
             self.assert_done(done)
@@ -415,6 +415,13 @@ class RenderTest(PictureCase):
         self.assert_failed(self.render("a.png"), "triangle.obj")
         self.assertEqual((self.folder / "a.png").read_text(), "old")
 
+    def test_endless_light_cannot_be_rendered(self):
+        self.scene = self.write_scene("glow.json", [{"shape": {"type": "world"}, "extinction": 0, "emission": 1}])
+        done = self.render("a.png")
+        self.assert_failed(done, "glow.json", "infinite")
+        self.assertEqual(done.err.count("\n"), 1, done.err)
+        self.assertNotIn("a.png", self.files())
+
     def test_a_model_that_is_missing(self):
         (self.folder / "triangle.obj").unlink()
         self.assert_failed(self.render("a.png"), "triangle.obj")
@@ -462,6 +469,7 @@ class RenderTest(PictureCase):
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 70, 0, 0))
         process = subprocess.Popen([NEBEL, "render", str(self.scene), "-o", output, *words], stderr=slave,
                                    stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, cwd=self.folder,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
                                    env={**os.environ, "TERM": "xterm", **(env or {})})
         os.close(slave)
         seen = b""
@@ -482,7 +490,7 @@ class RenderTest(PictureCase):
         return process, seen.decode()
 
     def test_a_bar_on_a_terminal(self):
-        process, seen = self.run_on_terminal("a.png", "--samples", "64", "--size", "640x360")
+        process, seen = self.run_on_terminal("a.png", "--samples", "16", "--size", "640x360")
         self.assertEqual(process.returncode, 0, seen)
         self.assertRegex(seen, r"\[[#.]+\] +\d+ %")
         self.assertNotIn("\x1b", seen)
@@ -498,7 +506,7 @@ class RenderTest(PictureCase):
 
     def test_ctrl_c_stops_cleanly(self):
         (self.folder / "a.png").write_text("old")
-        process, seen = self.run_on_terminal("a.png", "--samples", "4096", "--size", "1280x720", interrupt_after=b"%")
+        process, seen = self.run_on_terminal("a.png", "--samples", "512", "--size", "1280x720", interrupt_after=b"%")
         self.assertEqual(process.returncode, -signal.SIGINT, seen)
         self.assertIn("stopped", seen)
         self.assertEqual((self.folder / "a.png").read_text(), "old")

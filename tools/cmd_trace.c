@@ -140,16 +140,14 @@ static void trace_blocks(int worker, int count, void *user)
     }
 }
 
-/* Traces the ray alone once more, to hear what is wrong with it: what the library calls ray 0 is a line here. */
+/* Traces the ray alone once more, to hear what is wrong with it. */
 static int report_ray(const work *shared, size_t ray, nb_report_listener *listener)
 {
-    static const char subject[] = "ray 0: ";
     size_t failed;
     listener->mode = NB_REPORT_KEEP;
     const nebel_result result = trace(shared, ray, 1, &failed);
     const char *problem = nebel_result_text(result != NEBEL_OK ? result : NEBEL_ERROR_MEMORY);
     if (listener->kept[0] != '\0') problem = listener->kept;
-    if (strncmp(problem, subject, sizeof subject - 1) == 0) problem += sizeof subject - 1;
     return report_line(shared->rays->entries[ray].line, problem);
 }
 

@@ -53,6 +53,16 @@ static const nb_command *find_command(const char *name)
     return NULL;
 }
 
+/* "nebel help" and "nebel help COMMAND", for those who ask that way. */
+static int help_with(int count, char **words)
+{
+    if (count == 0) return print_help();
+    const nb_command *const command = find_command(words[0]);
+    if (command == NULL) return reject_command(words[0]);
+    nb_options_print_help(command);
+    return NB_DONE;
+}
+
 static int print_version(void)
 {
     (void)printf("nebel %s\n", nebel_version());
@@ -65,6 +75,7 @@ static int run(int count, char **words)
     const char *const word = words[0];
     if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) return print_help();
     if (strcmp(word, "--version") == 0) return print_version();
+    if (strcmp(word, "help") == 0) return help_with(count - 1, words + 1);
     if (strcmp(word, view_name) == 0) {
         return nb_report_failure("view: there is no viewer in this version; 'nebel render' makes pictures");
     }

@@ -75,11 +75,25 @@ int nb_report_misuse(const char *command, const char *format, ...)
     return NB_MISUSED;
 }
 
+/* What "ray 7: ..." goes on with. The numbers count rays of a single query, which nobody knows who reads the message.
+ */
+static const char *skip_ray(const char *message)
+{
+    static const char subject[] = "ray ";
+    const size_t size = sizeof subject - 1;
+    if (strncmp(message, subject, size) != 0) return message;
+    const size_t digits = strspn(message + size, "0123456789");
+    const char *const rest = message + size + digits;
+    return digits > 0 && strncmp(rest, ": ", 2) == 0 ? rest + 2 : message;
+}
+
 static void hand_on(nebel_result result, const char *message, void *user)
 {
     nb_report_listener *const listener = user;
     (void)result;
-    if (listener->mode == NB_REPORT_KEEP) (void)snprintf(listener->kept, sizeof listener->kept, "%s", message);
+    if (listener->mode == NB_REPORT_KEEP && atomic_fetch_add(&listener->kept_count, 1) == 0) {
+        (void)snprintf(listener->kept, sizeof listener->kept, "%s", skip_ray(message));
+    }
     if (listener->mode != NB_REPORT_PRINT) return;
     listener->printed++;
     nb_report_message("%s", message);

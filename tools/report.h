@@ -4,6 +4,8 @@
 
 #include <nebel/nebel.h>
 
+#include <stdatomic.h>
+
 #if defined(__GNUC__)
 #define NB_REPORT_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
@@ -30,17 +32,18 @@ int nb_report_misuse(const char *command, const char *format, ...) NB_REPORT_PRI
 typedef enum nb_report_mode {
     NB_REPORT_PRINT = 0,
     NB_REPORT_DROP, /* while threads work: the messages would come in any order */
-    NB_REPORT_KEEP  /* the last one stays in `kept` */
+    NB_REPORT_KEEP  /* the first one stays in `kept`, without the number of a ray that it may begin with */
 } nb_report_mode;
 
 typedef struct nb_report_listener {
     size_t printed; /* so that an error never passes in silence */
     nb_report_mode mode;
+    atomic_int kept_count;
     char kept[512];
 } nb_report_listener;
 
-/* A log callback that does with messages what the listener's mode says; `listener` must outlive what the log is given
- * to. */
+/* A log callback that does with messages what the listener's mode says, PRINT for one thread only; `listener` must
+ * outlive what the log is given to. */
 nebel_log nb_report_log(nb_report_listener *listener);
 
 /* Ends an error path of a library call: says what the result means if the library has not. Returns NB_FAILED. */
