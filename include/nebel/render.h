@@ -28,7 +28,7 @@ typedef struct nebel_renderer_desc {
 } nebel_renderer_desc;
 
 /* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else: the
- * snapshot is retained. Errors: ARGUMENT, MEMORY, UNSUPPORTED. */
+ * snapshot is retained. fog NULL: none. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
 nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
                                    nebel_renderer **renderer);
 void nebel_destroy_renderer(nebel_renderer *renderer);
@@ -59,8 +59,9 @@ typedef struct nebel_frame {
  * Errors: ARGUMENT, VALUE, MEMORY, UNBOUNDED, LIMIT (stopped by progress). */
 nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame);
 
-/* Exposure (stops; 0 leaves the light as it is), a filmic tone curve and the sRGB transfer function; n pixels of 3 floats,
- * out may be in. Result within 0..1; NaN gives 0. Any thread. */
+/* Exposure (stops; 0 leaves the light as it is), a filmic tone curve for each channel and the sRGB transfer function; n pixels
+ * of 3 floats, out may be in. Black stays 0, middle grey 0.18 stays 0.18, 1 comes out as 0.70 before the transfer function,
+ * the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
 void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
 
 /* The Embree version this build uses, "Embree 3.13.5". Never NULL. */
