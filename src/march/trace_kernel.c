@@ -192,8 +192,8 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
     march *m = &w->m;
     m->contact_count = 0;
     m->span_count = 0;
-    m->end_depth = NB_F(0.0);
-    m->end_light = NB_F(0.0);
+    m->all_ends = no_ends();
+    m->grazing_ends = m->all_ends;
     m->event_count = NB_F(0.0);
     if (snapshot->bounded_count <= FEW_MEDIA) {
         for (size_t i = 0; i < snapshot->medium_count; i++)
@@ -218,7 +218,7 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 static gathered nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
-    return (gathered){{zero, zero, zero}, {one, one, one}, {zero, zero, zero}, zero, zero};
+    return (gathered){{zero, zero, zero}, {one, one, one}, {zero, zero, zero}, {zero, zero, zero}, zero};
 }
 
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
@@ -243,6 +243,7 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
     gathered g = nothing_gathered();
     nb_wide t = NB_W(0.0);
     nb_wmask lanes = m->rays.t_max > NB_W(0.0);
+    const nb_mask watched = ends_matter(m);
     *unbounded = nb_mask_false;
     for (;;) {
         const nb_wide next = next_event(m, t);
@@ -255,18 +256,40 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
             lanes = nb_wand(lanes, nb_widen_mask(thinnest < OPAQUE_DEPTH));
         }
         t = nb_wselect(lanes, next, t);
+        if (nb_any(watched)) pass_ends(m, &g, t, nb_and(watched, nb_narrow_mask(lanes)));
     }
 }
 
-/* The bound of the absolute error of all six numbers: an error e of optical depth changes the light by a factor e^e at most. */
+/* No answer is further from the truth than the most radiant fog, unless something shines by itself. */
+static nb_real most_radiance(const march *m)
+{
+    nb_real most = NB_F(0.0);
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
+        const nb_real own = k->medium->emits ? NB_HUGE : largest(k->radiance);
+        most = nb_max(most, nb_select(met, own, NB_F(0.0)));
+    }
+    return most;
+}
+
+/* The bound of the absolute error of all six numbers. exp(-depth) is steepest on the thin side, so the transmittance errs
+ * most where the optical depth is less by its error. */
 static nb_real bound_error(const march *m, const gathered *g)
 {
-    const nb_real ends = nb_expm1(nb_min(m->end_depth, NB_F(2.0)));
-    const nb_real rounding = nb_expm1(nb_min(g->depth_error, NB_F(2.0)));
+    const nb_mask watched = ends_matter(m);
     const nb_real pieces = m->event_count + NB_F(4.0);
-    const nb_real transmittance = nb_min(largest(g->transmittance) * (ends + rounding + NB_F(4.0) * NB_EPSILON), NB_F(1.0));
-    const nb_real radiance = g->radiance_error + m->end_light + largest(g->radiance) * (ends + pieces * NB_EPSILON);
-    return nb_max(transmittance, radiance);
+    nb_real transmittance = NB_F(0.0), radiance = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        const nb_real end_depth = nb_select(watched, m->grazing_ends.depth[c], m->all_ends.depth[c]);
+        const nb_real end_light = nb_select(watched, m->grazing_ends.light[c], m->all_ends.light[c]);
+        const nb_real error = end_depth + g->depth_error[c];
+        const nb_real rise = nb_exp(-nb_max(g->depth[c] - error, NB_F(0.0))) - g->transmittance[c];
+        const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
+        transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + NB_F(4.0) * NB_EPSILON * g->transmittance[c]);
+        radiance = nb_max(radiance, end_light + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
+    }
+    return nb_max(transmittance, nb_min(radiance + g->radiance_error, most_radiance(m)));
 }
 
 static void store_light(const march *m, const gathered *g, nebel_light *lights, size_t stride, size_t count)

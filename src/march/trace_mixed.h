@@ -194,19 +194,15 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real light = nb_select(lanes, nb_select(fine, by_nodes[c], by_ends[c]), NB_F(0.0));
+        const nb_real rounding = s->sum.light_error[c] * g->transmittance[c] * nb_exp_ratio(s->sum.depth[c]);
+        most = nb_max(most, rounding + light * attenuation_error(g, &s->sum, c));
         g->radiance[c] = g->radiance[c] + light;
-        most = nb_max(most, light);
-    }
-    const nb_real thinnest = nb_min(nb_min(s->sum.depth[0], s->sum.depth[1]), s->sum.depth[2]);
-    const nb_real rounding = s->sum.light_error * largest(g->transmittance) * nb_exp_ratio(thinnest) +
-                             most * (g->depth_error + nb_min(s->sum.depth_error, s->sum.relative_error) + NB_F(32.0) * NB_EPSILON);
-    g->radiance_error = g->radiance_error + nb_select(lanes, rounding + nb_min(s->gauss_bound, crude), NB_F(0.0));
-    for (int c = 0; c < 3; c++) {
         g->depth[c] = g->depth[c] + nb_select(lanes, s->sum.depth[c], NB_F(0.0));
-        g->transmittance[c] = nb_select(lanes, nb_exp(-g->depth[c]), g->transmittance[c]);
+        g->transmittance[c] = nb_select(lanes, s->behind[c], g->transmittance[c]);
+        const nb_real depth_rounding = s->sum.depth_error[c] + g->depth[c] * (NB_F(2.0) * NB_EPSILON);
+        g->depth_error[c] = g->depth_error[c] + nb_select(lanes, depth_rounding, NB_F(0.0));
     }
-    const nb_real depth_rounding = s->sum.depth_error + largest(g->depth) * (NB_F(2.0) * NB_EPSILON);
-    g->depth_error = g->depth_error + nb_select(lanes, depth_rounding, NB_F(0.0));
+    g->radiance_error = g->radiance_error + nb_select(lanes, most + nb_min(s->gauss_bound, crude), NB_F(0.0));
 }
 
 /* What the whole march may spend, and how it is shared out: by the loss of transmittance, by length, and a little for each

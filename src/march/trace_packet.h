@@ -19,19 +19,26 @@ typedef struct packet {
 
 typedef struct leaf_span {
     nb_wide enter, leave; /* clipped to [0, t_max]; enter >= leave where there is nothing */
+    nb_real enter_slack, leave_slack; /* by how much they may be off */
 } leaf_span;
 
 /* A medium as the packet meets it. */
 typedef struct contact {
     const nb_medium *medium;
     size_t first_span;
-    leaf_span hull;         /* from the first entry to the last exit */
+    nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths */
     nb_real level;          /* gaussian: m; radial: c */
+    nb_real noise;          /* of the density, from the rounding of the frame */
     nb_mask inside;         /* within the current piece of the ray */
 } contact;
+
+/* What ends that may be off can do to optical depth and to radiance. */
+typedef struct ends {
+    nb_real depth[3], light[3];
+} ends;
 
 typedef struct march {
     packet rays;
@@ -39,7 +46,8 @@ typedef struct march {
     contact *contacts;
     leaf_span *spans;
     nb_real event_count;          /* two for every leaf that the lane's ray meets, whatever its company meets */
-    nb_real end_depth, end_light; /* what the uncertainty of the ends may do to optical depth and to radiance */
+    ends all_ends;                /* what the ends may do if nothing attenuates it, */
+    ends grazing_ends;            /* and those of them that are no events */
 } march;
 
 static nb_wvec3 wide_vector(const double v[3])
@@ -93,12 +101,13 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
 
 static nb_interval planes_interval(const nb_volume *body, const nb_leaf *leaf, const local_ray *local)
 {
+    const nb_wide lean = WIDE(leaf->aligned ? 2.0 : 8.0 * leaf->scale) * NB_WEPSILON;
     nb_interval meet = nb_interval_all();
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
         const nb_wide reach = local->reach * NB_W(3.0) + WIDE(fabs(face->distance)) * (NB_W(4.0) * NB_WEPSILON);
         meet = nb_interval_meet(meet, nb_interval_half_space(local->p, local->d, wide_vector(face->normal),
-                                                             WIDE(face->distance), WIDE(face->tie), reach));
+                                                             WIDE(face->distance), WIDE(face->tie), reach, lean));
     }
     return meet;
 }
@@ -159,6 +168,7 @@ static void radial_contact(contact *k, const packet *rays, const nb_leaf *leaf)
     k->slope.x = speed * inverse;
     k->offset.x = -closest * k->slope.x;
     k->level = nb_narrow(NB_W(1.0) - nb_wmin(nb_wdot3(q, q), NB_W(1e9)));
+    k->noise = nb_narrow(local.reach * inverse) * REAL(2 * k->medium->body.density.power);
 }
 
 static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
@@ -170,6 +180,7 @@ static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *lea
     k->offset = nb_wscale3(nb_wsub3(local.p, middle), inverse);
     k->slope = nb_wscale3(local.d, inverse);
     k->size = nb_wscale3(nb_wsub3(high, low), NB_W(0.5) * inverse);
+    k->noise = nb_narrow(local.reach * inverse) * NB_F(3.0);
 }
 
 static void profile_contact(contact *k, const packet *rays)
@@ -207,6 +218,12 @@ static nb_real contact_density(const contact *k, nb_wide t)
     }
 }
 
+static nb_estimate blur(nb_estimate estimate, nb_real noise, nb_real h)
+{
+    estimate.error = estimate.error + noise * h;
+    return estimate;
+}
+
 /* The density integrated from start over h metres. */
 static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
 {
@@ -220,9 +237,10 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
     case NEBEL_DENSITY_LINEAR: return nb_linear_integral(u, slope, h);
     case NEBEL_DENSITY_GAUSSIAN:
         return nb_gaussian_integral(k->level, u, coordinate(k, start + nb_widen(h)), slope);
-    case NEBEL_DENSITY_RADIAL: return nb_radial_integral(k->level, u, slope, h, density->power);
+    case NEBEL_DENSITY_RADIAL: return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
     case NEBEL_DENSITY_SOFT_EDGE:
-        return nb_soft_edge_integral(nb_wadd3(k->offset, nb_wscale3(k->slope, start)), k->slope, k->size, nb_widen(h));
+        return blur(nb_soft_edge_integral(nb_wadd3(k->offset, nb_wscale3(k->slope, start)), k->slope, k->size, nb_widen(h)),
+                    k->noise, h);
     default: return nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON));
     }
 }
@@ -255,68 +273,92 @@ static nb_real end_density(const contact *k, nb_wide t)
     return grows_without_bound(&k->medium->body.density) ? contact_density(k, t) : NB_F(1.0);
 }
 
-static void add_end_of(march *m, const contact *k, nb_wide t, nb_real slack)
+static ends no_ends(void)
+{
+    const nb_real zero = NB_F(0.0);
+    return (ends){{zero, zero, zero}, {zero, zero, zero}};
+}
+
+static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
 {
     const nb_real weight = slack * end_density(k, t);
-    m->end_depth = m->end_depth + weight * REAL(k->medium->densest);
-    m->end_light = m->end_light + weight * REAL(k->medium->brightest);
+    for (int c = 0; c < 3; c++) {
+        sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
+        sum->light[c] = sum->light[c] + weight * k->light[c];
+    }
 }
 
 /* An end of a leaf may be off by slack. An exclusion's end moves the fog of every medium that is there; those were met
  * before, as exclusions come last. */
-static void add_end(march *m, const contact *k, nb_wide t, nb_real slack)
+static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_real slack)
 {
     if (k->medium->body.operation == NEBEL_OPERATION_ADD) {
-        add_end_of(m, k, t, slack);
+        add_end_of(sum, k, t, slack);
         return;
     }
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *other = &m->contacts[i];
         if (other->medium->body.operation != NEBEL_OPERATION_ADD) continue;
-        const nb_wmask there = nb_wand(t >= other->hull.enter, t <= other->hull.leave);
-        add_end_of(m, other, t, nb_select(nb_narrow_mask(there), slack, NB_F(0.0)));
+        const nb_wmask there = nb_wand(t >= other->hull_enter, t <= other->hull_leave);
+        add_end_of(sum, other, t, nb_select(nb_narrow_mask(there), slack, NB_F(0.0)));
     }
 }
 
 /* Where lanes can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside them
  * must not split the ray, or its bits would depend on whether its company brought the body here. */
-static leaf_span span_of_bounds(const packet *rays, const nb_volume *body)
+static nb_interval span_of_bounds(const packet *rays, const nb_volume *body)
 {
-    const leaf_span whole = {NB_W(0.0), rays->t_max};
-    if (body->leaf_count == 1) return whole;
-    const nb_interval box =
-        nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
-    return (leaf_span){nb_wmax(box.enter, whole.enter), nb_wmin(box.leave, whole.leave)};
+    nb_interval span = nb_interval_all();
+    if (body->leaf_count > 1)
+        span = nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
+    span.enter = nb_wmax(span.enter, NB_W(0.0));
+    span.leave = nb_wmin(span.leave, rays->t_max);
+    return span;
 }
 
-/* Clips a leaf's interval to the ray, and counts the ends that are left and may be off. */
-static leaf_span clip_interval(march *m, const contact *k, const nb_interval *raw, const leaf_span *bounds)
+static nb_real slack_of(nb_wmask counts, nb_wide slack)
+{
+    return nb_narrow(nb_wselect(counts, slack, NB_W(0.0)));
+}
+
+/* Clips a leaf's interval to the ray; ends that are cut off, or lie where the body is not, have no slack. */
+static leaf_span clip_interval(const march *m, const nb_interval *raw, const nb_interval *bounds)
 {
     const nb_wmask touched = nb_wand(nb_wand(raw->enter <= raw->leave, bounds->enter <= bounds->leave),
                                      nb_wand(raw->leave > NB_W(0.0), raw->enter < m->rays.t_max));
     const nb_wmask enters = nb_wand(touched, nb_wand(raw->enter > bounds->enter, raw->enter <= bounds->leave));
     const nb_wmask leaves = nb_wand(touched, nb_wand(raw->leave < bounds->leave, raw->leave >= bounds->enter));
-    add_end(m, k, raw->enter, nb_narrow(nb_wselect(enters, raw->enter_slack, NB_W(0.0))));
-    add_end(m, k, raw->leave, nb_narrow(nb_wselect(leaves, raw->leave_slack, NB_W(0.0))));
-    const leaf_span span = {nb_wmax(raw->enter, NB_W(0.0)), nb_wmin(raw->leave, m->rays.t_max)};
-    return (leaf_span){span.enter, nb_wselect(touched, span.leave, NB_W(0.0))};
+    const nb_wide leave = nb_wmin(raw->leave, m->rays.t_max);
+    return (leaf_span){nb_wmax(raw->enter, NB_W(0.0)), nb_wselect(touched, leave, NB_W(0.0)),
+                       slack_of(enters, raw->enter_slack), slack_of(leaves, raw->leave_slack)};
+}
+
+static void count_ends(march *m, const contact *k, const leaf_span *span)
+{
+    const nb_mask grazes = nb_narrow_mask(span->enter >= span->leave);
+    add_end(m, &m->all_ends, k, span->enter, span->enter_slack);
+    add_end(m, &m->all_ends, k, span->leave, span->leave_slack);
+    const nb_real slack = nb_select(grazes, span->enter_slack + span->leave_slack, NB_F(0.0));
+    if (nb_any(slack > NB_F(0.0))) add_end(m, &m->grazing_ends, k, span->enter, slack);
 }
 
 /* Intervals of all leaves of one medium. Returns whether any lane is inside any of them. */
 static int meet_leaves(march *m, contact *k)
 {
     const nb_volume *body = &k->medium->body;
-    const leaf_span bounds = span_of_bounds(&m->rays, body);
+    const nb_interval bounds = span_of_bounds(&m->rays, body);
     int hit = 0;
-    k->hull = (leaf_span){NB_WFAR, NB_W(0.0)};
+    k->hull_enter = NB_WFAR;
+    k->hull_leave = NB_W(0.0);
     for (size_t i = 0; i < body->leaf_count; i++) {
         const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
-        const leaf_span span = clip_interval(m, k, &raw, &bounds);
+        const leaf_span span = clip_interval(m, &raw, &bounds);
         const nb_wmask met = span.enter < span.leave;
+        count_ends(m, k, &span);
         m->spans[k->first_span + i] = span;
         m->event_count = m->event_count + nb_select(nb_narrow_mask(met), NB_F(2.0), NB_F(0.0));
-        k->hull.enter = nb_wselect(met, nb_wmin(span.enter, k->hull.enter), k->hull.enter);
-        k->hull.leave = nb_wselect(met, nb_wmax(span.leave, k->hull.leave), k->hull.leave);
+        k->hull_enter = nb_wselect(met, nb_wmin(span.enter, k->hull_enter), k->hull_enter);
+        k->hull_leave = nb_wselect(met, nb_wmax(span.leave, k->hull_leave), k->hull_leave);
         hit = hit || nb_wany(met);
     }
     return hit;
@@ -328,13 +370,13 @@ static void meet_medium(march *m, const nb_medium *medium)
     contact *k = &m->contacts[m->contact_count];
     k->medium = medium;
     k->first_span = m->span_count;
-    if (medium->body.operation == NEBEL_OPERATION_ADD) profile_contact(k, &m->rays);
-    if (!meet_leaves(m, k)) return;
     for (int c = 0; c < 3; c++) {
         k->extinction[c] = REAL(medium->body.extinction[c]);
         k->light[c] = REAL(medium->light[c]);
         k->radiance[c] = REAL(medium->radiance[c]);
     }
+    if (medium->body.operation == NEBEL_OPERATION_ADD) profile_contact(k, &m->rays);
+    if (!meet_leaves(m, k)) return;
     m->contact_count++;
     m->span_count += medium->body.leaf_count;
 }

@@ -5,8 +5,8 @@ typedef struct gathered {
     nb_real depth[3];         /* optical depth from the camera */
     nb_real transmittance[3]; /* exp(-depth) */
     nb_real radiance[3];
-    nb_real depth_error;      /* rounding, of the worst channel */
-    nb_real radiance_error;   /* rounding and the bound of adaptive integration */
+    nb_real depth_error[3];
+    nb_real radiance_error;   /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
 } gathered;
 
 /* A piece between two neighbouring events. */
@@ -19,7 +19,7 @@ typedef struct piece {
 /* What the media of a piece add up to. */
 typedef struct piece_sum {
     nb_real depth[3], light[3]; /* optical depth; radiance it would add if nothing attenuated it */
-    nb_real depth_error, light_error;
+    nb_real depth_error[3], light_error[3];
     nb_real relative_error; /* of the worst integral, 1 at most */
     nb_mask present; /* some medium is there */
     nb_mask mixed;   /* the quotient of light and extinction changes along the piece: no closed form */
@@ -91,16 +91,17 @@ static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_real
     for (int c = 0; c < 3; c++) {
         sum->depth[c] = sum->depth[c] + k->extinction[c] * length;
         sum->light[c] = sum->light[c] + k->light[c] * length;
+        sum->depth_error[c] = sum->depth_error[c] + k->extinction[c] * error;
+        sum->light_error[c] = sum->light_error[c] + k->light[c] * error;
     }
-    sum->depth_error = sum->depth_error + REAL(k->medium->densest) * error;
-    sum->light_error = sum->light_error + REAL(k->medium->brightest) * error;
     sum->relative_error = nb_max(sum->relative_error, nb_min(error / nb_max(length, NB_TINY), NB_F(1.0)));
 }
 
 static piece_sum no_sum(void)
 {
     const nb_real zero = NB_F(0.0);
-    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, nb_mask_false, nb_mask_false};
+    return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero,
+                       nb_mask_false,      nb_mask_false};
 }
 
 /* A piece is mixed where some density varies and not all media give the same light per extinction. */
@@ -129,17 +130,22 @@ static piece_sum sum_piece(const march *m, const piece *p)
     return sum;
 }
 
-/* The closed form: light (1 - e^-depth) / depth, seen through what lies before. An error of an integral counts for its light, and for the
- * attenuation of the light by depth or, where all is opaque, by its relative size only. */
+/* By what factor the light of a piece may be off through the optical depth before it and in it; where all is opaque only the relative
+ * error of the latter counts. */
+static nb_real attenuation_error(const gathered *g, const piece_sum *sum, int c)
+{
+    return nb_min(g->depth_error[c] + nb_min(sum->depth_error[c], sum->relative_error), NB_F(1.0)) + NB_F(32.0) * NB_EPSILON;
+}
+
+/* The closed form: light (1 - e^-depth) / depth, seen through what lies before. */
 static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
 {
-    const nb_real attenuation = g->depth_error + nb_min(sum->depth_error, sum->relative_error) + NB_F(16.0) * NB_EPSILON;
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real ratio = nb_select(lanes, g->transmittance[c] * nb_exp_ratio(sum->depth[c]), NB_F(0.0));
         const nb_real light = ratio * sum->light[c];
         g->radiance[c] = g->radiance[c] + light;
-        most = nb_max(most, ratio * sum->light_error + light * attenuation);
+        most = nb_max(most, ratio * sum->light_error[c] + light * attenuation_error(g, sum, c));
     }
     g->radiance_error = g->radiance_error + most;
 }
@@ -150,9 +156,39 @@ static void pass_piece(gathered *g, const piece_sum *sum)
     for (int c = 0; c < 3; c++) {
         g->depth[c] = g->depth[c] + sum->depth[c];
         g->transmittance[c] = nb_exp(-g->depth[c]);
+        const nb_real rounding = sum->depth_error[c] + g->depth[c] * (NB_F(2.0) * NB_EPSILON);
+        g->depth_error[c] = g->depth_error[c] + nb_select(sum->present, rounding, NB_F(0.0));
     }
-    const nb_real rounding = sum->depth_error + largest(g->depth) * (NB_F(2.0) * NB_EPSILON);
-    g->depth_error = g->depth_error + nb_select(sum->present, rounding, NB_F(0.0));
+}
+
+/* Lanes in which the ends may matter: there they are counted where they are, seen through the fog before them; elsewhere their
+ * plain sum is small enough to report. */
+static nb_mask ends_matter(const march *m)
+{
+    return largest(m->all_ends.depth) + largest(m->all_ends.light) > NB_F(16.0) * NB_EPSILON;
+}
+
+static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
+{
+    ends here = no_ends();
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
+            const leaf_span *span = &m->spans[k->first_span + j];
+            const nb_wmask event = nb_wand(nb_widen_mask(lanes), span->enter < span->leave);
+            const nb_mask enters = nb_narrow_mask(nb_wand(event, span->enter == t));
+            const nb_mask leaves = nb_narrow_mask(nb_wand(event, span->leave == t));
+            if (!nb_any(nb_or(enters, leaves))) continue;
+            add_end(m, &here, k, t, nb_select(enters, span->enter_slack, NB_F(0.0)) +
+                                        nb_select(leaves, span->leave_slack, NB_F(0.0)));
+        }
+    }
+    nb_real most = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        g->depth_error[c] = g->depth_error[c] + here.depth[c];
+        most = nb_max(most, here.light[c] * g->transmittance[c]);
+    }
+    g->radiance_error = g->radiance_error + most;
 }
 
 /* Endless light: the piece has no end, something in it shines, and nothing in it absorbs. */
