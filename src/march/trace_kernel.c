@@ -267,7 +267,7 @@ static nb_real most_radiance(const march *m)
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
-        const nb_real own = k->medium->emits ? NB_HUGE : largest(k->radiance);
+        const nb_real own = k->medium->emits ? NB_HUGE : largest(k->radiance) * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON);
         most = nb_max(most, nb_select(met, own, NB_F(0.0)));
     }
     return most;

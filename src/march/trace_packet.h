@@ -101,7 +101,7 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
 
 static nb_interval planes_interval(const nb_volume *body, const nb_leaf *leaf, const local_ray *local)
 {
-    const nb_wide lean = WIDE(leaf->aligned ? 2.0 : 8.0 * leaf->scale) * NB_WEPSILON;
+    const nb_wide lean = WIDE(leaf->aligned ? 4.0 : 16.0) * NB_WEPSILON;
     nb_interval meet = nb_interval_all();
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
@@ -284,7 +284,8 @@ static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
     const nb_real weight = slack * end_density(k, t);
     for (int c = 0; c < 3; c++) {
         sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
-        sum->light[c] = sum->light[c] + weight * k->light[c];
+        const nb_real seen = nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
+        sum->light[c] = sum->light[c] + seen * k->light[c];
     }
 }
 
