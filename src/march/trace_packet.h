@@ -65,7 +65,9 @@ typedef struct local_ray {
 static nb_wvec3 from_origin(const packet *rays, const nb_leaf *leaf)
 {
 #if defined(NB_DOUBLE)
-    return nb_wsub3(rays->origin, nb_wvec3(leaf->exact_origin[0], leaf->exact_origin[1], leaf->exact_origin[2]));
+    const nb_wvec3 origin = nb_wvec3(leaf->exact_origin[0], leaf->exact_origin[1], leaf->exact_origin[2]);
+    const nb_wvec3 rest = nb_wvec3(leaf->exact_rest[0], leaf->exact_rest[1], leaf->exact_rest[2]);
+    return nb_wsub3(nb_wsub3(rays->origin, origin), rest);
 #else
     return nb_wsub3(nb_wsub3(rays->origin, wide_vector(leaf->origin)), wide_vector(leaf->origin_rest));
 #endif

@@ -10,11 +10,25 @@ static void widen_point(const double v[3], long double out[3])
     for (int i = 0; i < 3; i++) out[i] = (long double)v[i];
 }
 
-static int is_unmoved(const nb_affine *world)
+/* origin + rest = `local` after the world's matrix, plus its offset: the sum in two parts (Knuth's two-sum), because at 1e7 m even a
+ * long double would round it by more than a silhouette forgives. Offsets that are doubles came from the caller unrounded. */
+static void set_origin(nb_leaf *leaf, const nb_affine *world, const long double local[3])
 {
-    for (int i = 0; i < 9; i++)
-        if (world->matrix[i] != (i % 4 == 0 ? 1 : 0)) return 0;
-    return world->offset[0] == 0 && world->offset[1] == 0 && world->offset[2] == 0;
+    long double turned[3];
+    nb_affine_direction(world, local, turned);
+    int unturned = 1;
+    for (int i = 0; i < 9; i++) unturned = unturned && world->matrix[i] == (i % 4 == 0 ? 1 : 0);
+    leaf->origin_error = 0;
+    for (int i = 0; i < 3; i++) {
+        const long double offset = world->offset[i], sum = turned[i] + offset, part = sum - turned[i];
+        leaf->exact_origin[i] = sum;
+        leaf->exact_rest[i] = (turned[i] - (sum - part)) + (offset - part);
+        leaf->origin[i] = (double)sum;
+        leaf->origin_rest[i] = (double)((sum - (long double)leaf->origin[i]) + leaf->exact_rest[i]);
+        const int exact = (long double)(double)offset == offset;
+        const double rounded = (unturned ? 0 : fabs((double)turned[i])) + (exact ? 0 : fabs((double)offset));
+        leaf->origin_error += rounded * (double)LDBL_EPSILON;
+    }
 }
 
 /* The frame whose origin is `center` and whose axes are normalised by `shaping` (rows, in the shape's coordinates). */
@@ -27,14 +41,10 @@ static int set_frame(nb_leaf *leaf, const nb_affine *world, const long double ce
     nb_affine back = nb_affine_identity();
     for (int i = 0; i < 9; i++) back.matrix[i] = inverse[i];
     const nb_affine frame = nb_affine_compose(&shape, &back);
-    nb_affine_point(world, center, leaf->exact_origin);
+    set_origin(leaf, world, center);
     leaf->aligned = 1;
     leaf->scale = 0;
-    const int rounds = !is_unmoved(world);
     for (int i = 0; i < 3; i++) {
-        leaf->origin[i] = (double)leaf->exact_origin[i];
-        leaf->origin_rest[i] = (double)(leaf->exact_origin[i] - (long double)leaf->origin[i]);
-        leaf->origin_error += rounds ? fabs(leaf->origin[i]) * (double)LDBL_EPSILON : 0;
         const long double *row = &frame.matrix[3 * i];
         leaf->scale = fmax(leaf->scale, (double)sqrtl(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
     }

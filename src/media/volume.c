@@ -194,6 +194,7 @@ static int compare_leaf(const nb_leaf *a, const nb_leaf *b)
 {
     int order = (a->type > b->type) - (a->type < b->type);
     if (order == 0) order = compare_exact(a->exact_origin, b->exact_origin, 3);
+    if (order == 0) order = compare_exact(a->exact_rest, b->exact_rest, 3);
     if (order == 0) order = compare_exact(a->exact_matrix, b->exact_matrix, 9);
     if (order == 0) order = compare_numbers(a->low, b->low, 3);
     if (order == 0) order = compare_numbers(a->high, b->high, 3);

@@ -32,7 +32,7 @@ typedef struct nb_leaf {
     double origin_rest[3];   /* what rounding to double took from the origin */
     double origin_error;     /* what resolving may have lost of it */
     double matrix[9];        /* row by row */
-    long double exact_origin[3], exact_matrix[9]; /* the same for the double reference */
+    long double exact_origin[3], exact_rest[3], exact_matrix[9]; /* the same for the double reference */
     double scale;            /* largest row length of the matrix */
     double low[3], high[3];  /* box */
     double radius, slope;    /* ball, cone */
