@@ -450,25 +450,23 @@ static void test_background_behind_endless_fog(void **state)
 static void test_samples_are_stratified(void **state)
 {
     (void)state;
-    float x[NB_BATCH], y[NB_BATCH];
-    uint8_t columns[NB_BATCH][64] = {{0}}, rows[NB_BATCH][64] = {{0}}, cells[NB_BATCH][64] = {{0}};
+    enum { PIXELS = NB_REGION * NB_REGION };
+    static nb_region_points points;
+    static uint8_t columns[PIXELS][64], rows[PIXELS][64], cells[PIXELS][64];
     for (uint32_t s = 0; s < 64; s++) {
-        const nb_sample sample = nb_sample_make(s, 64);
-        nb_sample_points(&sample, 160, 320, x, y);
-        for (uint32_t i = 0; i < NB_BATCH; i++) {
-            const double px = (double)x[i] - nb_lane_x(i), py = (double)y[i] - nb_lane_y(i);
-            assert_true(px >= 0 && px < 1 && py >= 0 && py < 1);
-            columns[i][(int)(px * 64)]++;
-            rows[i][(int)(py * 64)]++;
-            cells[i][(int)(px * 8) + 8 * (int)(py * 8)]++;
+        nb_sample_region(s, 64, 128, 320, &points);
+        for (int i = 0; i < PIXELS; i++) {
+            const double x = (double)points.x[i] - i % NB_REGION, y = (double)points.y[i] - i / NB_REGION;
+            assert_true(x >= points.low && x < points.high && y >= points.low && y < points.high);
+            columns[i][(int)(x * 64)]++;
+            rows[i][(int)(y * 64)]++;
+            cells[i][(int)(x * 8) + 8 * (int)(y * 8)]++;
         }
     }
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        for (int k = 0; k < 64; k++) {
-            assert_int_equal(columns[i][k], 1);
-            assert_int_equal(rows[i][k], 1);
-            assert_int_equal(cells[i][k], 1);
-        }
+    for (int i = 0; i < PIXELS * 64; i++) {
+        assert_int_equal(columns[i / 64][i % 64], 1);
+        assert_int_equal(rows[i / 64][i % 64], 1);
+        assert_int_equal(cells[i / 64][i % 64], 1);
     }
 }
 

@@ -2,6 +2,7 @@
 #include "renderer.h"
 
 #include <math.h>
+#include <string.h>
 
 NB_CLONES static void set_inside(const nb_frame *frame, uint32_t left, uint32_t top, int *inside)
 {
@@ -138,16 +139,36 @@ NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratc
     }
 }
 
-nebel_result nb_batch_render(const nb_frame *frame, uint32_t left, uint32_t top, const nb_sample *sample,
-                             nb_scratch *scratch)
+static void set_points(const nb_place *place, nb_scratch *scratch)
+{
+    const uint32_t x = place->left - place->region_left, y = place->top - place->region_top;
+    for (uint32_t i = 0; i < NB_BATCH; i += NB_BLOCK) {
+        const uint32_t from = (y + nb_lane_y(i)) * NB_REGION + x + nb_lane_x(i);
+        memcpy(scratch->x + i, scratch->region.x + from, NB_BLOCK * sizeof(float));
+        memcpy(scratch->y + i, scratch->region.y + from, NB_BLOCK * sizeof(float));
+    }
+}
+
+static void find_hits(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+{
+    const nb_geometry *geometry = &frame->renderer->geometry;
+    set_points(place, scratch);
+    nb_view_rays(&frame->view, place->region_left, place->region_top, scratch->x, scratch->y, &scratch->rays);
+    if (frame->rasters) {
+        nb_raster_hits(geometry, &scratch->seen, place->left - place->region_left, place->top - place->region_top,
+                       &scratch->rays, &scratch->hits);
+    } else {
+        nb_hits_trace(geometry->scene, &scratch->rays, scratch->inside, &scratch->packets, &scratch->hits);
+    }
+}
+
+nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
     const nb_lighting *lighting = &frame->lighting;
-    set_inside(frame, left, top, scratch->inside);
-    nb_sample_points(sample, left, top, scratch->x, scratch->y);
-    nb_view_rays(&frame->view, left, top, scratch->x, scratch->y, &scratch->rays);
-    nb_hits_trace(geometry->scene, &scratch->rays, scratch->inside, &scratch->packets, &scratch->hits);
+    set_inside(frame, place->left, place->top, scratch->inside);
+    find_hits(frame, place, scratch);
     nebel_result result = trace_camera_fog(frame, scratch);
     if (result != NEBEL_OK) return result;
     nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,

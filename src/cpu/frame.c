@@ -69,6 +69,10 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     result = nb_geometry_place(geometry, frame->view.position);
     if (result != NEBEL_OK) return nb_fail(&renderer->log, result, "frame: the surfaces could not be built");
     nb_view_place(&frame->view, geometry->origin, geometry->bounds_min, geometry->bounds_max);
+    frame->rasters = nb_raster_is_apt(geometry, frame->view.projection, desc->width, desc->height);
+    if (frame->rasters) {
+        nb_raster_set(&frame->raster, geometry, &frame->view, desc->width, desc->height, renderer->threads);
+    }
     frame->width = desc->width;
     frame->height = desc->height;
     frame->samples = desc->samples != 0 ? desc->samples : 4;
@@ -81,10 +85,12 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
 
 static nebel_result render_sample(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t index, nb_scratch *scratch)
 {
-    const nb_sample sample = nb_sample_make(index, frame->samples);
+    nb_sample_region(index, frame->samples, left, top, &scratch->region);
+    if (frame->rasters) nb_raster_region(&frame->raster, left, top, &scratch->region, &scratch->seen);
     for (uint32_t y = 0; y < NB_REGION && top + y < frame->height; y += NB_TILE) {
         for (uint32_t x = 0; x < NB_REGION && left + x < frame->width; x += NB_TILE) {
-            const nebel_result result = nb_batch_render(frame, left + x, top + y, &sample, scratch);
+            const nb_place place = {left + x, top + y, left, top};
+            const nebel_result result = nb_batch_render(frame, &place, scratch);
             if (result != NEBEL_OK) return result;
             nb_planes_add(frame, left + x, top + y, index == 0, scratch, scratch->hit_counts + y * NB_REGION + x);
         }

@@ -155,6 +155,32 @@ static nebel_result make_device(nb_geometry *geometry, nebel_isa isa, int thread
     return NEBEL_OK;
 }
 
+static size_t clusters_of(const nb_surface *surface)
+{
+    return (surface->mesh->triangle_count + (size_t)NB_CLUSTER - 1) / NB_CLUSTER;
+}
+
+static nebel_result make_clusters(nb_geometry *geometry)
+{
+    size_t count = 0;
+    for (size_t s = 0; s < geometry->surface_count; s++) count += clusters_of(&geometry->surfaces[s]);
+    if (count >= UINT32_MAX / NB_CLUSTER) {
+        return nb_fail(&geometry->log, NEBEL_ERROR_ARGUMENT, "scene: more than 4 billion triangles");
+    }
+    geometry->clusters = nb_allocate(&geometry->allocator, count, sizeof *geometry->clusters);
+    geometry->groups = nb_allocate(&geometry->allocator, count / NB_GROUP + 1, sizeof *geometry->groups);
+    if (geometry->clusters == NULL || geometry->groups == NULL) return NEBEL_ERROR_MEMORY;
+    for (uint32_t s = 0; s < geometry->surface_count; s++) {
+        const uint32_t triangles = geometry->surfaces[s].mesh->triangle_count;
+        for (uint32_t c = 0; c < clusters_of(&geometry->surfaces[s]); c++) {
+            const uint32_t first = c * NB_CLUSTER, left = triangles - first;
+            geometry->clusters[geometry->cluster_count++] =
+                (nb_cluster){.surface = s, .first = first, .count = left < NB_CLUSTER ? left : NB_CLUSTER};
+        }
+    }
+    return NEBEL_OK;
+}
+
 nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *scene, nebel_isa isa, int threads)
 {
     const nebel_result result = check_scene(scene, &geometry->log);
@@ -170,7 +196,8 @@ nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *sce
         memset(surface->positions + 3 * (size_t)surface->mesh->vertex_count, 0, 3 * sizeof(float));
         measure(geometry, surface);
     }
-    return make_device(geometry, isa, threads);
+    const nebel_result clusters = make_clusters(geometry);
+    return clusters == NEBEL_OK ? make_device(geometry, isa, threads) : clusters;
 }
 
 /* ---- building ------------------------------------------------------------------------------------------------------- */
@@ -189,6 +216,7 @@ static void world_bounds(const nb_geometry *geometry, double low[3], double high
     }
 }
 
+/* What is too far out for Embree becomes no number, which it leaves out with its triangles, as rasterizing does. */
 static void move_positions(const double origin[3], nb_surface *surface)
 {
     const nebel_mesh *mesh = surface->mesh;
@@ -196,9 +224,26 @@ static void move_positions(const double origin[3], nb_surface *surface)
     for (int i = 0; i < 3; i++) shift[i] = mesh->origin[i] - origin[i];
     for (size_t v = 0; v < mesh->vertex_count; v++) {
         for (size_t i = 0; i < 3; i++) {
-            surface->positions[3 * v + i] = (float)((double)mesh->positions[3 * v + i] + shift[i]);
+            const float moved = (float)((double)mesh->positions[3 * v + i] + shift[i]);
+            surface->positions[3 * v + i] = fabsf(moved) < 1e18f ? moved : NAN;
         }
     }
+}
+
+/* Corners that are not finite are left out. */
+static void bound_cluster(const nb_surface *surface, nb_cluster *cluster)
+{
+    const uint32_t *index = surface->mesh->indices + 3 * (size_t)cluster->first;
+    float low[3] = {1e18f, 1e18f, 1e18f}, high[3] = {-1e18f, -1e18f, -1e18f};
+    for (uint32_t k = 0; k < 3 * cluster->count; k++) {
+        const float *p = surface->positions + 3 * (size_t)index[k];
+        for (int i = 0; i < 3; i++) {
+            low[i] = p[i] < low[i] ? p[i] : low[i];
+            high[i] = p[i] > high[i] ? p[i] : high[i];
+        }
+    }
+    memcpy(cluster->low, low, sizeof low);
+    memcpy(cluster->high, high, sizeof high);
 }
 
 static nebel_result attach(nb_geometry *geometry, size_t number)
@@ -227,6 +272,9 @@ static nebel_result build(nb_geometry *geometry)
     for (size_t i = 0; i < geometry->surface_count && result == NEBEL_OK; i++) {
         move_positions(geometry->origin, &geometry->surfaces[i]);
         result = attach(geometry, i);
+    }
+    for (size_t i = 0; i < geometry->cluster_count; i++) {
+        bound_cluster(&geometry->surfaces[geometry->clusters[i].surface], &geometry->clusters[i]);
     }
     if (result == NEBEL_OK) {
         rtcCommitScene(geometry->scene);
@@ -271,5 +319,7 @@ void nb_geometry_free(nb_geometry *geometry)
     if (geometry->scene != NULL) rtcReleaseScene(geometry->scene);
     if (geometry->device != NULL) rtcReleaseDevice(geometry->device);
     for (size_t i = 0; i < geometry->surface_count; i++) nb_release(&geometry->allocator, geometry->surfaces[i].positions);
+    nb_release(&geometry->allocator, geometry->groups);
+    nb_release(&geometry->allocator, geometry->clusters);
     nb_release(&geometry->allocator, geometry->surfaces);
 }

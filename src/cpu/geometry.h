@@ -3,6 +3,7 @@
 #define NB_CPU_GEOMETRY_H
 
 #include "base/base.h"
+#include "lanes.h"
 
 #include <nebel/scene.h>
 
@@ -16,6 +17,18 @@ typedef struct nb_surface {
     float longest_edge;
 } nb_surface;
 
+/* Up to NB_CLUSTER triangles of a mesh that follow each other. */
+typedef struct nb_cluster {
+    uint32_t surface, first, count;
+    float low[3], high[3]; /* relative to the origin of the geometry */
+    float from[2], to[2];  /* in pixels of the picture that is being rasterized; empty where to[0] < 0 */
+} nb_cluster;
+
+/* NB_GROUP clusters that follow each other, the last group fewer. */
+typedef struct nb_group {
+    float from[2], to[2]; /* around those of the clusters */
+} nb_group;
+
 typedef struct nb_geometry {
     nebel_allocator allocator;
     nebel_log log;
@@ -25,6 +38,9 @@ typedef struct nb_geometry {
     float bounds_min[3], bounds_max[3]; /* relative to origin; 0 where there are no triangles */
     double largest_radius;              /* of a mesh around its own origin */
     size_t surface_count;
+    size_t cluster_count;
+    nb_cluster *clusters;
+    nb_group *groups;
     nb_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
 } nb_geometry;
 

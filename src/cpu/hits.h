@@ -18,7 +18,7 @@ typedef struct nb_packets {
     struct RTCRayHit16 rays[NB_PACKETS];
 } nb_packets;
 
-/* The first hit of every ray with active[i] == -1 (else 0). */
+/* The first hit of every ray with active[i] == -1 (else 0). `active` is aligned to 64 bytes. */
 void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_packets *packets, nb_hits *hits);
 
 /* Clears active[i] where something lies between start i and infinity. All rays go in one direction. */

@@ -10,7 +10,9 @@ enum {
     NB_TILE = 16,                      /* width and height of a batch in pixels */
     NB_BATCH = NB_TILE * NB_TILE,      /* rays in a batch */
     NB_PACKETS = NB_BATCH / NB_PACKET, /* packets in a batch */
-    NB_REGION = 64                     /* width and height of what a thread renders at a time */
+    NB_REGION = 64,                    /* width and height of what a thread renders at a time */
+    NB_CLUSTER = 16,                   /* neighbouring triangles that are rasterized together */
+    NB_GROUP = 16                      /* neighbouring clusters that are looked at together */
 };
 
 #define NB_NONE UINT32_MAX

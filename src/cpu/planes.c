@@ -23,13 +23,30 @@ static uint32_t lane_of(uint32_t x, uint32_t y)
     return (y / NB_BLOCK * (NB_TILE / NB_BLOCK) + x / NB_BLOCK) * NB_PACKET + y % NB_BLOCK * NB_BLOCK + x % NB_BLOCK;
 }
 
-static void add_vectors(float *plane, uint32_t width, const nb_area *area, int is_first, const float (*v)[NB_BATCH])
+static void set_vectors(float *plane, uint32_t width, const nb_area *area, const float (*v)[NB_BATCH])
 {
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
+        const uint32_t first = lane_of(0, y);
         for (uint32_t x = 0; x < area->columns; x++) {
-            const uint32_t i = lane_of(x, y);
-            for (uint32_t c = 0; c < 3; c++) row[3 * x + c] = is_first ? v[c][i] : row[3 * x + c] + v[c][i];
+            const uint32_t i = first + x / NB_BLOCK * NB_PACKET + x % NB_BLOCK;
+            row[3 * x] = v[0][i];
+            row[3 * x + 1] = v[1][i];
+            row[3 * x + 2] = v[2][i];
+        }
+    }
+}
+
+static void add_vectors(float *plane, uint32_t width, const nb_area *area, int is_first, const float (*v)[NB_BATCH])
+{
+    if (is_first) {
+        set_vectors(plane, width, area, v);
+        return;
+    }
+    for (uint32_t y = 0; y < area->rows; y++) {
+        float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
+        for (uint32_t x = 0; x < area->columns; x++) {
+            for (uint32_t c = 0; c < 3; c++) row[3 * x + c] += v[c][lane_of(x, y)];
         }
     }
 }

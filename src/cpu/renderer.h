@@ -4,6 +4,7 @@
 
 #include "geometry.h"
 #include "hits.h"
+#include "raster.h"
 #include "sampling.h"
 #include "surface.h"
 #include "view.h"
@@ -21,8 +22,9 @@ typedef struct nb_light_samples {
 /* What a thread works in: allocated once, aligned to 64 bytes. */
 typedef struct nb_scratch {
     nb_packets packets;
-    float x[NB_BATCH], y[NB_BATCH]; /* points, from the batch's first pixel */
-    int inside[NB_BATCH];           /* -1 within the picture, else 0 */
+    nb_region_points region;
+    float x[NB_BATCH], y[NB_BATCH]; /* of these points those of the batch */
+    _Alignas(64) int inside[NB_BATCH]; /* -1 within the picture, else 0 */
     nb_rays rays;
     nb_hits hits;
     nb_points points;
@@ -30,6 +32,7 @@ typedef struct nb_scratch {
     uint32_t lanes[NB_BATCH]; /* of the rays below */
     nebel_ray fog_rays[NB_BATCH];
     nebel_light fog_lights[NB_BATCH];
+    nb_seen seen;
     uint32_t hit_counts[NB_REGION * NB_REGION]; /* samples of a pixel that met a surface */
 } nb_scratch;
 
@@ -58,14 +61,21 @@ typedef struct nb_frame {
     nebel_renderer *renderer;
     const nebel_frame *planes;
     nb_view view;
+    nb_raster raster;
+    int rasters; /* first hits come from `raster`, not from Embree */
     nb_lighting lighting;
     nebel_trace_desc trace;
     uint32_t width, height, samples;
 } nb_frame;
 
-/* Renders one sample of the batch whose first pixel is (left, top) into scratch->samples. */
-nebel_result nb_batch_render(const nb_frame *frame, uint32_t left, uint32_t top, const nb_sample *sample,
-                             nb_scratch *scratch);
+/* A batch of a region: both first pixels are in pixels of the picture. */
+typedef struct nb_place {
+    uint32_t left, top, region_left, region_top;
+} nb_place;
+
+/* Renders one sample of a batch into scratch->samples. scratch->region holds the points of its region and, where the frame is
+ * rasterized, scratch->seen what is seen there. */
+nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
 
 /* Adds the samples of a batch to the planes: the first sample replaces what is there. `hit_counts` belongs to the batch's first
  * pixel; its rows are NB_REGION long. */

@@ -18,11 +18,6 @@ static uint32_t sobol(uint32_t i)
     return digits;
 }
 
-nb_sample nb_sample_make(uint32_t index, uint32_t count)
-{
-    return (nb_sample){mirror(index), sobol(index), count == 1};
-}
-
 /* A mixing function of two multiplications, found by search for small bias (C. Wellons, "Prospecting for hash functions"). */
 static inline uint32_t mix(uint32_t h)
 {
@@ -31,40 +26,46 @@ static inline uint32_t mix(uint32_t h)
     return h ^ h >> 16;
 }
 
-/* As many digits as a float has beside those of a column of the batch, so that no point is rounded into the next pixel. */
+/* As many digits as a float has beside those of a column of a region, so that no point is rounded, and none into the next
+ * pixel. */
 static inline float fraction(uint32_t digits)
 {
-    return (float)(digits >> 12) * 0x1p-20f;
+    return (float)(digits >> 14) * 0x1p-18f;
 }
 
-NB_CLONES static void scrambled_points(const nb_sample *sample, uint32_t left, uint32_t top, float *restrict x,
-                                       float *restrict y)
+/* Digits of the sample before the shift, then of pixels row after row. */
+NB_CLONES static void shift_points(uint32_t digits_x, uint32_t digits_y, uint32_t left, uint32_t top, float *restrict x,
+                                   float *restrict y)
 {
-    const uint32_t sample_x = sample->x, sample_y = sample->y;
-    NB_SIMD
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        const uint32_t column = nb_lane_x(i), row = nb_lane_y(i);
-        const uint32_t pixel = (left + column) | (top + row) << 16;
-        const uint32_t seed = mix(pixel ^ 0x85ebca6bu); /* mix(0) is 0: no shift at all */
-        x[i] = (float)column + fraction(sample_x ^ seed);
-        y[i] = (float)row + fraction(sample_y ^ mix(seed + 0x9e3779b9u));
+    for (uint32_t row = 0; row < NB_REGION; row++) {
+        NB_SIMD
+        for (uint32_t column = 0; column < NB_REGION; column++) {
+            const uint32_t pixel = (left + column) | (top + row) << 16;
+            const uint32_t seed = mix(pixel ^ 0x85ebca6bu); /* mix(0) is 0: no shift at all */
+            x[row * NB_REGION + column] = (float)column + fraction(digits_x ^ seed);
+            y[row * NB_REGION + column] = (float)row + fraction(digits_y ^ mix(seed + 0x9e3779b9u));
+        }
     }
 }
 
-NB_CLONES static void centers(float *restrict x, float *restrict y)
+static void center_points(float *restrict x, float *restrict y)
 {
-    NB_SIMD
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        x[i] = (float)nb_lane_x(i) + .5f;
-        y[i] = (float)nb_lane_y(i) + .5f;
+    for (int row = 0; row < NB_REGION; row++) {
+        for (int column = 0; column < NB_REGION; column++) {
+            x[row * NB_REGION + column] = (float)column + .5f;
+            y[row * NB_REGION + column] = (float)row + .5f;
+        }
     }
 }
 
-void nb_sample_points(const nb_sample *sample, uint32_t left, uint32_t top, float *x, float *y)
+void nb_sample_region(uint32_t index, uint32_t count, uint32_t left, uint32_t top, nb_region_points *points)
 {
-    if (sample->centered) {
-        centers(x, y);
+    if (count == 1) {
+        center_points(points->x, points->y);
+        points->low = points->high = .5;
     } else {
-        scrambled_points(sample, left, top, x, y);
+        shift_points(mirror(index), sobol(index), left, top, points->x, points->y);
+        points->low = 0;
+        points->high = 1;
     }
 }

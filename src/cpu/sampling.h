@@ -5,16 +5,14 @@
 
 #include "lanes.h"
 
-/* One sample of all pixels of a picture. */
-typedef struct nb_sample {
-    uint32_t x, y; /* digits of the point before the shift */
-    int centered;  /* the only sample of a pixel is its centre */
-} nb_sample;
+/* One point in every pixel of a region, row after row, in pixels from the region's first. */
+typedef struct nb_region_points {
+    float x[NB_REGION * NB_REGION], y[NB_REGION * NB_REGION];
+    double low, high; /* how far from the corners of their pixels they lie */
+} nb_region_points;
 
-/* Sample `index` of `count`. */
-nb_sample nb_sample_make(uint32_t index, uint32_t count);
-
-/* The points of a batch whose first pixel is (left, top), in pixels from there. Depends on pixel and sample only. */
-void nb_sample_points(const nb_sample *sample, uint32_t left, uint32_t top, float *x, float *y);
+/* Sample `index` of `count` for the region whose first pixel is (left, top) of the picture. Depends on pixel and sample only.
+ * The only sample of a pixel is its centre. */
+void nb_sample_region(uint32_t index, uint32_t count, uint32_t left, uint32_t top, nb_region_points *points);
 
 #endif

@@ -16,7 +16,7 @@ typedef struct nb_points {
     float cosine[NB_BATCH];         /* between shading normal and sun */
     float side[3][NB_BATCH];        /* the triangle's normal, unit length, on the side of the camera */
     float edge[NB_BATCH];           /* longest edge of the mesh */
-    int lit[NB_BATCH];              /* -1 where the sun is above shading normal and triangle, else 0 */
+    _Alignas(64) int lit[NB_BATCH]; /* -1 where the sun is above shading normal and triangle, else 0 */
 } nb_points;
 
 void nb_srgb_table_set(nb_srgb_table *table);
