@@ -260,8 +260,8 @@ static stretch integrate(const trace *tr, long double a, double h)
         fill_density(v, a, h, density);
         for (int c = 0; c < 3; c++)
             for (int i = 0; i < NODES; i++) {
-                extinction[c][i] += v->desc->extinction[c] * density[i];
-                light[c][i] += v->light[c] * density[i];
+                if (v->desc->extinction[c] > 0) extinction[c][i] += v->desc->extinction[c] * density[i];
+                if (v->light[c] > 0) light[c][i] += v->light[c] * density[i];
             }
     }
     for (int c = 0; c < 3; c++) {
@@ -293,21 +293,37 @@ static double transmittance(const trace *tr, int channel)
     return (double)expl(-tr->depth[channel]);
 }
 
-static int is_opaque(const trace *tr)
+/* Whether fog in this channel could still be seen. */
+static int is_visible(const trace *tr, int channel)
 {
-    return transmittance(tr, 0) + transmittance(tr, 1) + transmittance(tr, 2) < 1e-30;
+    for (size_t i = 0; i < tr->active_count; i++)
+        if (tr->active[i]->desc->extinction[channel] > 0 || tr->active[i]->light[channel] > 0)
+            return transmittance(tr, channel) > 1e-30;
+    return 0;
 }
 
-/* How far two results differ as seen from the camera; HUGE_VAL when the stretch is too deep to be resolved. */
-static double difference(const trace *tr, const stretch *a, const stretch *b)
+static int is_opaque(const trace *tr)
 {
-    double most = 0;
+    return !is_visible(tr, 0) && !is_visible(tr, 1) && !is_visible(tr, 2);
+}
+
+/* How far two results differ as seen from the camera, and what of that may be rounding. */
+typedef struct comparison {
+    double change, rounding;
+} comparison;
+
+/* The change is HUGE_VAL when the stretch is too deep to be resolved. */
+static comparison compare(const trace *tr, const stretch *a, const stretch *b)
+{
+    comparison most = {0, 0};
     for (int c = 0; c < 3; c++) {
         const double seen = transmittance(tr, c);
-        if (seen < 1e-30) continue;
-        if (!(a->depth[c] < 8) || !(b->depth[c] < 8)) return HUGE_VAL;
-        most = fmax(most, seen * fabs(a->depth[c] - b->depth[c]) * tr->scale);
-        most = fmax(most, seen * fabs(a->radiance[c] - b->radiance[c]));
+        if (!is_visible(tr, c)) continue;
+        if (!(a->depth[c] < 8) || !(b->depth[c] < 8)) return (comparison){HUGE_VAL, 0};
+        const double depth = seen * fabs(a->depth[c] - b->depth[c]) * tr->scale;
+        const double radiance = seen * fabs(a->radiance[c] - b->radiance[c]);
+        most.change = fmax(most.change, fmax(depth, radiance));
+        most.rounding = fmax(most.rounding, 1e-15 * seen * (b->depth[c] * tr->scale + b->radiance[c]));
     }
     return most;
 }
@@ -328,11 +344,11 @@ static void refine(trace *tr, long double a, double h, const stretch *whole, int
     if (is_opaque(tr)) return;
     const stretch near = integrate(tr, a, h / 2), far = integrate(tr, a + LONG(h) / 2, h / 2);
     const stretch both = join(&near, &far);
-    const double change = difference(tr, whole, &both);
-    if (change <= 1e-12 * tr->scale) {
-        accept(tr, &both, change / 64);
+    const comparison c = compare(tr, whole, &both);
+    if (c.change <= 1e-12 * tr->scale + c.rounding) {
+        accept(tr, &both, c.change / 64 + c.rounding);
     } else if (level > 100) {
-        accept(tr, &both, change);
+        accept(tr, &both, c.change);
     } else {
         refine(tr, a, h / 2, &near, level + 1);
         refine(tr, a + LONG(h) / 2, h / 2, &far, level + 1);
@@ -472,7 +488,10 @@ static void pass_piece(trace *tr, real from, real to)
         if (oracle_contains(&tr->volumes[i].spans, middle)) tr->active[tr->active_count++] = &tr->volumes[i];
     if (tr->active_count == 0) return;
     const int endless = !(to < REAL(HUGE_VAL));
-    if (endless && is_endless_light(tr)) tr->uncertainty = LONG(HUGE_VAL);
+    if (endless && is_endless_light(tr)) {
+        tr->uncertainty = LONG(HUGE_VAL);
+        return;
+    }
     if (is_even(tr)) {
         pass_even(tr, endless ? LONG(HUGE_VAL) : LONG(to - from));
         return;
