@@ -5,7 +5,6 @@
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 
-#include <stdio.h>
 #include <threads.h>
 
 /* Edges sharper than this stay edges where a model has no normals of its own. */
@@ -26,22 +25,44 @@ static void prepare_lock(void)
 /* ---- import
  * ---------------------------------------------------------------------------------------------------------- */
 
-static const struct aiScene *import(const char *file, char *reason, size_t size)
+static void configure(struct aiPropertyStore *properties)
 {
-    const unsigned flags = aiProcess_ValidateDataStructure | aiProcess_RemoveComponent | aiProcess_Triangulate |
-                           aiProcess_GenSmoothNormals | aiProcess_JoinIdenticalVertices | aiProcess_FlipUVs;
     const int dropped = aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS | aiComponent_BONEWEIGHTS |
                         aiComponent_ANIMATIONS | aiComponent_LIGHTS | aiComponent_CAMERAS;
-    struct aiPropertyStore *properties = aiCreatePropertyStore();
     aiSetImportPropertyInteger(properties, AI_CONFIG_PP_RVC_FLAGS, dropped);
     aiSetImportPropertyFloat(properties, AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, smoothing_angle);
+}
+
+/* Reads the file as it is, checks it, and only then has it worked on. Assimp's own validation belongs to the reading: a
+ * scene that fails in the second step is freed twice. */
+static nebel_result import_locked(nb_assimp *in, const struct aiPropertyStore *properties)
+{
+    const unsigned flags = aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_GenSmoothNormals |
+                           aiProcess_JoinIdenticalVertices | aiProcess_FlipUVs;
+    const char *file = in->load->source->file;
+    const struct aiScene *raw = aiImportFileExWithProperties(file, aiProcess_ValidateDataStructure, NULL, properties);
+    const nebel_result result = raw != NULL ? nb_assimp_check_meshes(in, raw) : NEBEL_OK;
+    if (result != NEBEL_OK) {
+        aiReleaseImport(raw);
+        return result;
+    }
+    in->scene = raw != NULL ? aiApplyPostProcessing(raw, flags) : NULL;
+    if (in->scene != NULL) return NEBEL_OK;
+    const char *reason = aiGetErrorString();
+    return nb_model_fail(in->load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: %s", file,
+                         raw == NULL && reason[0] != '\0' ? reason : "its parts contradict each other");
+}
+
+static nebel_result import(nb_assimp *in)
+{
+    struct aiPropertyStore *properties = aiCreatePropertyStore();
+    configure(properties);
     call_once(&import_once, prepare_lock);
     mtx_lock(&import_lock);
-    const struct aiScene *scene = aiImportFileExWithProperties(file, flags, NULL, properties);
-    if (scene == NULL) snprintf(reason, size, "%s", aiGetErrorString());
+    const nebel_result result = import_locked(in, properties);
     mtx_unlock(&import_lock);
     aiReleasePropertyStore(properties);
-    return scene;
+    return result;
 }
 
 /* ---- transforms
@@ -152,16 +173,13 @@ static nebel_result convert(nb_assimp *in)
 
 nebel_result nb_assimp_load(const nb_model_load *load)
 {
-    char reason[400] = "";
-    const char *file = load->source->file;
-    nebel_result result = nb_file_check(&load->log, load->source->where, "model", file);
-    if (result != NEBEL_OK) return result;
     nb_assimp in = {.load = load, .scratch = {.allocator = load->allocator}};
-    in.scene = import(file, reason, sizeof reason);
-    if (in.scene == NULL)
-        return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: %s", file, reason);
+    nebel_result result = nb_file_check(&load->log, load->source->where, "model", load->source->file);
+    if (result == NEBEL_OK) result = nb_assimp_check_file(load);
+    if (result == NEBEL_OK) result = import(&in);
+    if (result != NEBEL_OK) return result;
     if (in.scene->mRootNode == NULL)
-        result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", file);
+        result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", load->source->file);
     else
         result = convert(&in);
     aiReleaseImport(in.scene);

@@ -35,6 +35,11 @@ typedef struct nb_assimp {
     uint64_t left_out_faces, left_out_triangles; /* points and lines; triangles with bad corners */
 } nb_assimp;
 
+/* Refuse, or mend, what Assimp would not survive: before it reads the file, and before it works on what it read.
+ * Errors: FORMAT, MEMORY. */
+nebel_result nb_assimp_check_file(const nb_model_load *load);
+nebel_result nb_assimp_check_meshes(nb_assimp *in, const struct aiScene *scene);
+
 /* Adds one mesh of the model at a place. A mesh without triangles adds nothing. */
 nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
 

@@ -82,7 +82,7 @@ static void place_uvs(const struct aiVector3D *source, nebel_mesh *mesh)
     }
 }
 
-/* A mirror turns triangles inside out; two corners change places to undo it. */
+/* A mirror turns triangles inside out; two corners change places to undo it. Triangles without an area are left out. */
 static void place_triangles(const builder *out, nebel_mesh *mesh)
 {
     uint32_t *indices = (uint32_t *)mesh->indices;
@@ -93,6 +93,7 @@ static void place_triangles(const builder *out, nebel_mesh *mesh)
         if (face->mNumIndices != 3) continue;
         for (int k = 0; k < 3; k++)
             good = good && face->mIndices[k] < mesh->vertex_count && !out->bad[face->mIndices[k]];
+        if (face->mIndices[0] == face->mIndices[1] || face->mIndices[1] == face->mIndices[2]) continue;
         if (!good) {
             out->in->left_out_triangles++;
             continue;

@@ -18,6 +18,7 @@ typedef struct decoder {
     int bits, channel_count;
     size_t row_size;
     unsigned char *pixels;
+    bool out_of_memory; /* libpng was refused some: then that is why it fails */
     nebel_result result;
     char message[200];
 } decoder;
@@ -33,7 +34,7 @@ bool nb_png_is(const nb_bytes *bytes)
 static void on_error(png_structp png, png_const_charp message)
 {
     decoder *in = png_get_error_ptr(png);
-    if (in->result == NEBEL_OK) in->result = NEBEL_ERROR_FORMAT;
+    if (in->result == NEBEL_OK) in->result = in->out_of_memory ? NEBEL_ERROR_MEMORY : NEBEL_ERROR_FORMAT;
     snprintf(in->message, sizeof in->message, "%s", message);
     png_longjmp(png, 1);
 }
@@ -46,8 +47,10 @@ static void on_warning(png_structp png, png_const_charp message)
 
 static png_voidp on_allocate(png_structp png, png_alloc_size_t size)
 {
-    const decoder *in = png_get_mem_ptr(png);
-    return nb_allocate(&in->codec->allocator, size, 1);
+    decoder *in = png_get_mem_ptr(png);
+    void *memory = nb_allocate(&in->codec->allocator, size, 1);
+    if (memory == NULL) in->out_of_memory = true;
+    return memory;
 }
 
 static void on_release(png_structp png, png_voidp memory)

@@ -1,0 +1,417 @@
+/* Models and height fields. Those of Debian's assimp-testmodels are looked at where they are installed. */
+#define _GNU_SOURCE
+#include "scene_help.h"
+
+#include <math.h>
+#include <unistd.h>
+#include <png.h>
+
+#define MODELS "/usr/share/assimp/models/"
+
+static char folder[] = "/tmp/nebel_model_XXXXXX";
+
+static const char *in_folder(const char *name)
+{
+    static char path[4][200];
+    static int next;
+    next = (next + 1) % 4;
+    snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
+    return path[next];
+}
+
+static void write_text(const char *name, const char *text)
+{
+    FILE *file = fopen(in_folder(name), "w");
+    fputs(text, file);
+    fclose(file);
+}
+
+/* A scene with one model of these members, loaded; its result in *result, its last message in *kept. */
+static nebel_scene *load(const char *members, nebel_result *result, journal *kept)
+{
+    char text[1000];
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = {.log = {remember, kept}};
+    *kept = (journal){0};
+    snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": [], \"models\": [{%s}]}", members);
+    if (nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, &scene) != NEBEL_OK)
+        fail_msg("%s", kept->last);
+    *result = nebel_load_scene_models(scene);
+    return scene;
+}
+
+static nebel_scene *load_good(const char *members)
+{
+    journal kept;
+    nebel_result result;
+    nebel_scene *scene = load(members, &result, &kept);
+    if (result != NEBEL_OK) fail_msg("%s", kept.last);
+    return scene;
+}
+
+static void assert_broken(const char *members, nebel_result wanted, const char *message)
+{
+    journal kept;
+    nebel_result result;
+    nebel_scene *scene = load(members, &result, &kept);
+    if (result != wanted || strstr(kept.last, message) == NULL) fail_msg("gave %d: %s", result, kept.last);
+    assert_non_null(strstr(kept.last, "scene.json:1:"));
+    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
+    nebel_destroy_scene(scene);
+}
+
+static void assert_near(const float *got, double x, double y, double z)
+{
+    const double wanted[3] = {x, y, z};
+    for (int i = 0; i < 3; i++)
+        if (!(fabs((double)got[i] - wanted[i]) < 1e-5))
+            fail_msg("(%g, %g, %g) should be (%g, %g, %g)", (double)got[0], (double)got[1], (double)got[2], x, y, z);
+}
+
+/* Every mesh is what the header promises; the number of triangles in all. */
+static size_t check_meshes(const nebel_scene *scene)
+{
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    size_t count = 0;
+    for (size_t m = 0; m < data->mesh_count; m++) {
+        const nebel_mesh *mesh = &data->meshes[m];
+        count += mesh->triangle_count;
+        for (size_t i = 0; i < 3 * (size_t)mesh->triangle_count; i++) {
+            assert_true(mesh->indices[i] < mesh->vertex_count);
+            const float *n = mesh->normals + 3 * (size_t)mesh->indices[i],
+                        *p = mesh->positions + 3 * (size_t)mesh->indices[i];
+            assert_true(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]));
+            assert_true(fabsf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1) < 1e-4f);
+        }
+        assert_true(mesh->texture >= -1 && mesh->texture < (int32_t)data->texture_count);
+        assert_true((mesh->texture < 0) == (mesh->uvs == NULL));
+        for (int i = 0; i < 3; i++) assert_true(mesh->base_color[i] >= 0 && mesh->base_color[i] <= 1);
+    }
+    return count;
+}
+
+/* The normal that the order of a triangle's corners gives. */
+static void face_normal(const nebel_mesh *mesh, size_t triangle, double normal[3])
+{
+    const float *p[3];
+    for (int k = 0; k < 3; k++) p[k] = mesh->positions + 3 * (size_t)mesh->indices[3 * triangle + (size_t)k];
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        normal[i] = (double)((p[1][j] - p[0][j]) * (p[2][k] - p[0][k]) - (p[1][k] - p[0][k]) * (p[2][j] - p[0][j]));
+    }
+}
+
+static const char triangle_obj[] = "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";
+
+/* ---- places ---- */
+
+static void test_scale_comes_first_then_rotation_then_position(void **state)
+{
+    (void)state;
+    write_text("t.obj", triangle_obj);
+    write_text("t.mtl", "newmtl red\nKd 0.5 0.25 0.125\n");
+    nebel_scene *scene =
+        load_good("\"file\": \"t.obj\", \"position\": [10, 20, 30], \"rotation\": [0, 0, 1, 1], \"scale\": [2, 3, 4]");
+    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    assert_int_equal(check_meshes(scene), 1);
+    assert_true(mesh->origin[0] == 10 && mesh->origin[1] == 20 && mesh->origin[2] == 30);
+    assert_near(mesh->positions + 3 * (size_t)mesh->indices[1], 0, 2, 0);
+    assert_near(mesh->positions + 3 * (size_t)mesh->indices[2], -6, 0, 0);
+    assert_near(mesh->normals, 0, 0, 1);
+    assert_near(mesh->base_color, .5, .25, .125);
+    nebel_destroy_scene(scene);
+}
+
+static void test_a_mirrored_model_is_not_inside_out(void **state)
+{
+    (void)state;
+    write_text("t.obj", triangle_obj);
+    const char *const scales[] = {"[1, 1, 1]", "[-1, 1, 1]", "[1, -2, 3]", "[1, 1, -1]", "[-1, -1, -1]", "[-1, -1, 1]"};
+    for (int i = 0; i < 6; i++) {
+        char members[200];
+        double normal[3];
+        snprintf(members, sizeof members, "\"file\": \"t.obj\", \"scale\": %s, \"rotation\": [0.1, 0.2, 0.3, 1]",
+                 scales[i]);
+        nebel_scene *scene = load_good(members);
+        const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+        face_normal(mesh, 0, normal);
+        const float *n = mesh->normals + 3 * (size_t)mesh->indices[0];
+        assert_true(normal[0] * (double)n[0] + normal[1] * (double)n[1] + normal[2] * (double)n[2] > 0);
+        nebel_destroy_scene(scene);
+    }
+}
+
+static void test_a_model_far_away_stays_precise(void **state)
+{
+    (void)state;
+    write_text("t.obj", triangle_obj);
+    nebel_scene *scene = load_good("\"file\": \"t.obj\", \"position\": [1e7, 0, -1e9], \"scale\": 0.001");
+    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    assert_true(mesh->origin[2] == -1e9);
+    assert_near(mesh->positions + 3 * (size_t)mesh->indices[1], .001, 0, 0);
+    nebel_destroy_scene(scene);
+}
+
+static void test_loading_twice_changes_nothing(void **state)
+{
+    (void)state;
+    write_text("t.obj", triangle_obj);
+    nebel_scene *scene = load_good("\"file\": \"t.obj\", \"color\": [1, 0.5, 0]");
+    const nebel_mesh *meshes = nebel_scene_contents(scene)->meshes;
+    assert_near(meshes->base_color, 1, .5, 0);
+    assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
+    assert_ptr_equal(nebel_scene_contents(scene)->meshes, meshes);
+    nebel_destroy_scene(scene);
+}
+
+/* ---- broken models ---- */
+
+static void test_broken_models_are_named_with_the_reason(void **state)
+{
+    (void)state;
+    write_text("empty.obj", "");
+    write_text("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\nl 1 2\n");
+    write_text("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    write_text("text.glb", "glTF is not what this is");
+    write_text("no.format", "hello");
+    assert_broken("\"file\": \"none.obj\"", NEBEL_ERROR_FILE, "No such file or directory");
+    assert_broken("\"file\": \"/dev/zero\"", NEBEL_ERROR_FILE, "cannot read the model");
+    assert_broken("\"file\": \".\"", NEBEL_ERROR_FILE, "Is a directory");
+    assert_broken("\"file\": \"empty.obj\"", NEBEL_ERROR_FORMAT, "empty.obj\" cannot be read: ");
+    assert_broken("\"file\": \"points.obj\"", NEBEL_ERROR_FORMAT, "holds no triangle");
+    assert_broken("\"file\": \"bad.obj\"", NEBEL_ERROR_FORMAT, "bad.obj\" ");
+    assert_broken("\"file\": \"text.glb\"", NEBEL_ERROR_FORMAT, "text.glb\" cannot be read: ");
+    assert_broken("\"file\": \"no.format\"", NEBEL_ERROR_FORMAT, "no.format\" cannot be read: ");
+}
+
+static void test_corners_that_are_no_numbers_are_left_out(void **state)
+{
+    (void)state;
+    journal kept;
+    nebel_result result;
+    const float corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, NAN, 1, 1};
+    const unsigned char faces[2][13] = {{3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0},
+                                        {3, 1, 0, 0, 0, 3, 0, 0, 0, 2, 0, 0, 0}};
+    FILE *file = fopen(in_folder("nan.ply"), "wb");
+    fputs(
+        "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n",
+        file);
+    fwrite(corners, sizeof corners, 1, file);
+    fwrite(faces, sizeof faces, 1, file);
+    fclose(file);
+    nebel_scene *scene = load("\"file\": \"nan.ply\"", &result, &kept);
+    assert_int_equal(result, NEBEL_OK);
+    assert_int_equal(kept.result, NEBEL_OK);
+    assert_non_null(strstr(kept.last, "1 triangles of"));
+    assert_int_equal(check_meshes(scene), 1);
+    nebel_destroy_scene(scene);
+}
+
+static void test_every_truncated_model_is_survived(void **state)
+{
+    (void)state;
+    static const char ply[] =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    for (size_t cut = 0; cut < sizeof ply; cut++) {
+        char text[sizeof ply];
+        journal kept;
+        nebel_result result;
+        memcpy(text, ply, sizeof ply);
+        text[cut] = '\0';
+        write_text("cut.ply", text);
+        nebel_scene *scene = load("\"file\": \"cut.ply\"", &result, &kept);
+        if (result == NEBEL_OK)
+            check_meshes(scene);
+        else
+            assert_true(kept.last[0] != '\0');
+        nebel_destroy_scene(scene);
+    }
+}
+
+/* ---- height fields ---- */
+
+static void write_heights(const char *name, uint32_t width, uint32_t height, const uint16_t *values)
+{
+    FILE *file = fopen(in_folder(name), "wb");
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+    png_infop info = png_create_info_struct(png);
+    png_init_io(png, file);
+    png_set_IHDR(png, info, width, height, 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    png_write_info(png, info);
+    png_bytep rows[16];
+    unsigned char bytes[16][64];
+    for (uint32_t y = 0; y < height; y++) {
+        rows[y] = bytes[y];
+        for (uint32_t x = 0; x < width; x++) {
+            bytes[y][2 * x] = (unsigned char)(values[y * width + x] >> 8);
+            bytes[y][2 * x + 1] = (unsigned char)values[y * width + x];
+        }
+    }
+    png_write_image(png, rows);
+    png_write_end(png, info);
+    png_destroy_write_struct(&png, &info);
+    fclose(file);
+}
+
+#define HEIGHTS(name) "\"heightfield\": {\"file\": \"" name "\", \"size\": [6, 2], \"height\": 10}"
+
+static void test_a_height_map_becomes_terrain(void **state)
+{
+    (void)state;
+    const uint16_t values[12] = {0, 0, 0, 0, 65535, 0, 0, 13107, 0, 0, 0, 1};
+    write_heights("h.png", 4, 3, values);
+    nebel_scene *scene = load_good(HEIGHTS("h.png") ", \"position\": [5, 6, 7], \"color\": [0.25, 0.5, 1]");
+    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 1);
+    assert_int_equal(mesh->vertex_count, 12);
+    assert_int_equal(mesh->triangle_count, 12);
+    assert_int_equal(check_meshes(scene), 12);
+    assert_near(mesh->positions, -3, 0, -1);
+    assert_near(mesh->positions + 3 * 4, -3, 10, 0);
+    assert_near(mesh->positions + 3 * 7, 3, 2, 0);
+    assert_near(mesh->positions + 3 * 11, 3, 10.0 / 65535, 1);
+    assert_near(mesh->base_color, .25, .5, 1);
+    assert_true(mesh->origin[0] == 5 && mesh->origin[1] == 6 && mesh->origin[2] == 7);
+    for (size_t i = 0; i < 12; i++) {
+        double normal[3];
+        face_normal(mesh, i, normal);
+        assert_true(normal[1] > 0);
+    }
+    nebel_destroy_scene(scene);
+}
+
+static void test_a_slope_has_the_normal_of_its_plane(void **state)
+{
+    (void)state;
+    uint16_t values[5 * 4];
+    for (uint32_t y = 0; y < 4; y++)
+        for (uint32_t x = 0; x < 5; x++) values[y * 5 + x] = (uint16_t)(x * 6000 + y * 3000);
+    write_heights("h.png", 5, 4, values);
+    nebel_scene *scene = load_good(HEIGHTS("h.png"));
+    const nebel_mesh *mesh = nebel_scene_contents(scene)->meshes;
+    const double dx = 10 * 6000 / 65535.0 / 1.5, dz = 10 * 3000 / 65535.0 / (2.0 / 3),
+                 length = sqrt(dx * dx + 1 + dz * dz);
+    for (size_t i = 0; i < 20; i++) assert_near(mesh->normals + 3 * i, -dx / length, 1 / length, -dz / length);
+    nebel_destroy_scene(scene);
+}
+
+static void test_what_is_no_height_map(void **state)
+{
+    (void)state;
+    const uint16_t one[2] = {1, 2};
+    write_heights("thin.png", 2, 1, one);
+    write_text("text.png", "hello");
+    png_image color = {.version = PNG_IMAGE_VERSION, .width = 2, .height = 2, .format = PNG_FORMAT_RGB};
+    const unsigned char pixels[12] = {0};
+    assert_true(png_image_write_to_file(&color, in_folder("color.png"), 0, pixels, 0, NULL));
+    assert_broken(HEIGHTS("thin.png"), NEBEL_ERROR_FORMAT, "has 2 x 1 pixels; a height map needs 2 x 2");
+    assert_broken(HEIGHTS("text.png"), NEBEL_ERROR_FORMAT, "is not a PNG picture");
+    assert_broken(HEIGHTS("color.png"), NEBEL_ERROR_FORMAT, "a height map must be grey");
+    assert_broken(HEIGHTS("none.png"), NEBEL_ERROR_FILE, "No such file or directory");
+}
+
+/* ---- memory ---- */
+
+static void test_every_failing_allocation_is_survived(void **state)
+{
+    (void)state;
+    const uint16_t values[4] = {0, 1, 2, 3};
+    char text[300];
+    write_text("t.obj", triangle_obj);
+    write_heights("h.png", 2, 2, values);
+    snprintf(text, sizeof text,
+             "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"t.obj\"}, {" HEIGHTS("h.png") "}]}");
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (long k = 0; result != NEBEL_OK; k++) {
+        meter m;
+        journal kept;
+        nebel_scene *scene = NULL;
+        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        assert_int_equal(nebel_parse_scene(text, strlen(text), in_folder("s.json"), &desc, &scene), NEBEL_OK);
+        m.fail_at = m.made + k;
+        result = nebel_load_scene_models(scene);
+        if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        if (result != NEBEL_OK) assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
+        nebel_destroy_scene(scene);
+        assert_int_equal(m.live, 0);
+        assert_true(k < 500);
+    }
+}
+
+/* ---- models of others ---- */
+
+typedef struct known {
+    const char *file;
+    size_t triangles, textures;
+} known;
+
+static void test_models_of_many_formats(void **state)
+{
+    (void)state;
+    static const known models[] = {{"glTF2/BoxTextured-glTF/BoxTextured.gltf", 12, 1},
+                                   {"glTF2/BoxTextured-glTF-Embedded/BoxTextured.gltf", 12, 1},
+                                   {"glTF2/BoxTextured-glTF-Binary/BoxTextured.glb", 12, 1},
+                                   {"glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb", 115328, 0},
+                                   {"OBJ/spider.obj", 1340, 4},
+                                   {"OBJ/WusonOBJ.obj", 3732, 0},
+                                   {"PLY/Wuson.ply", 3732, 0},
+                                   {"PLY/cube.ply", 12, 0},
+                                   {"FBX/box.fbx", 12, 0},
+                                   {"FBX/huesitos.fbx", 0, 0}};
+    if (access(MODELS "OBJ/spider.obj", R_OK) != 0) {
+        print_message("assimp-testmodels is not installed\n");
+        skip();
+    }
+    for (size_t i = 0; i < sizeof models / sizeof *models; i++) {
+        char members[300];
+        snprintf(members, sizeof members, "\"file\": \"" MODELS "%s\"", models[i].file);
+        nebel_scene *scene = load_good(members);
+        const size_t triangles = check_meshes(scene), textures = nebel_scene_contents(scene)->texture_count;
+        if ((models[i].triangles != 0 && triangles != models[i].triangles) || textures != models[i].textures)
+            fail_msg("%s: %zu triangles, %zu textures", models[i].file, triangles, textures);
+        for (size_t t = 0; t < textures; t++) {
+            const nebel_texture *texture = &nebel_scene_contents(scene)->textures[t];
+            assert_true(texture->width > 0 && texture->height > 0);
+            assert_int_equal(texture->rgba[3], 255);
+        }
+        nebel_destroy_scene(scene);
+    }
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) == NULL;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"t.obj",    "t.mtl",     "empty.obj", "points.obj", "bad.obj",
+                                        "text.glb", "no.format", "nan.ply",   "cut.ply",    "h.png",
+                                        "thin.png", "text.png",  "color.png"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) unlink(in_folder(names[i]));
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_scale_comes_first_then_rotation_then_position),
+        cmocka_unit_test(test_a_mirrored_model_is_not_inside_out),
+        cmocka_unit_test(test_a_model_far_away_stays_precise),
+        cmocka_unit_test(test_loading_twice_changes_nothing),
+        cmocka_unit_test(test_broken_models_are_named_with_the_reason),
+        cmocka_unit_test(test_corners_that_are_no_numbers_are_left_out),
+        cmocka_unit_test(test_every_truncated_model_is_survived),
+        cmocka_unit_test(test_a_height_map_becomes_terrain),
+        cmocka_unit_test(test_a_slope_has_the_normal_of_its_plane),
+        cmocka_unit_test(test_what_is_no_height_map),
+        cmocka_unit_test(test_every_failing_allocation_is_survived),
+        cmocka_unit_test(test_models_of_many_formats),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
