@@ -15,7 +15,8 @@ static void assert_pixel(const float *color, const double surface[3], const doub
     }
 }
 
-/* ---- surfaces in fog ------------------------------------------------------------------------------------------------ */
+/* ---- surfaces in fog ------------------------------------------------------------------------------------------------
+ */
 
 static void test_wall_in_constant_fog(void **state)
 {
@@ -51,11 +52,12 @@ static void test_sun_through_fog_onto_ground(void **state)
 {
     (void)state;
     nebel_mesh ground = test_square();
-    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &ground, .has_sun = 1, .sun_direction = {.6, .8, 0},
-                                    .sun_irradiance = {3, 2, 1}};
+    const nebel_scene_data scene = {
+        .mesh_count = 1, .meshes = &ground, .has_sun = 1, .sun_direction = {.6, .8, 0}, .sun_irradiance = {3, 2, 1}};
     /* A layer from the ground to 5 m: 5 m of it on the way to the camera, 5 / 0.8 m on the way to the sun. */
     const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-100, -1, -100}, .max = {100, 5, 100}},
-                                     .extinction = {.1, .2, .3}, .source = {.6, .5, .4}};
+                                     .extinction = {.1, .2, .3},
+                                     .source = {.6, .5, .4}};
     nebel_snapshot *fog = test_fog(1, &layer);
     nebel_camera camera = test_camera(0, 10, 0, 0, 0, 0);
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
@@ -80,8 +82,11 @@ static void test_shadow_leaves_the_ambient_light(void **state)
     nebel_mesh meshes[2] = {test_square(), test_square()};
     meshes[1].origin[0] = .5; /* from x = -0.5 to 1.5, one metre above the ground */
     meshes[1].origin[1] = 1;
-    const nebel_scene_data scene = {.mesh_count = 2, .meshes = meshes, .has_sun = 1,
-                                    .sun_direction = {sqrt(.5), sqrt(.5), 0}, .sun_irradiance = {1, 1, 1},
+    const nebel_scene_data scene = {.mesh_count = 2,
+                                    .meshes = meshes,
+                                    .has_sun = 1,
+                                    .sun_direction = {sqrt(.5), sqrt(.5), 0},
+                                    .sun_irradiance = {1, 1, 1},
                                     .ambient = {.1, .1, .1}};
     /* From below the upper square, so that it does not hide the ground: its shadow reaches from x = -1.5 to 0.5. */
     nebel_camera camera = test_camera(0, .5, 0, 0, 0, 0);
@@ -105,8 +110,8 @@ static void test_surfaces_have_two_sides(void **state)
 {
     (void)state;
     nebel_mesh square = test_square();
-    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &square, .has_sun = 1, .sun_direction = {0, 1, 0},
-                                    .sun_irradiance = {1, 1, 1}};
+    const nebel_scene_data scene = {
+        .mesh_count = 1, .meshes = &square, .has_sun = 1, .sun_direction = {0, 1, 0}, .sun_irradiance = {1, 1, 1}};
     const float lit = .5f / (float)test_pi;
     test_picture picture = test_picture_make(1, 1);
     const nebel_camera above = test_camera(0, 3, 0, 0, 0, 0), below = test_camera(0, -3, 0, 0, 0, 0);
@@ -149,8 +154,8 @@ static void test_textures_are_linear_bilinear_and_repeat(void **state)
     square.uvs = test_square_uvs;
     square.texture = 0;
     for (int c = 0; c < 3; c++) square.base_color[c] = 1;
-    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &square, .texture_count = 1, .textures = &texture,
-                                    .ambient = {1, 1, 1}};
+    const nebel_scene_data scene = {
+        .mesh_count = 1, .meshes = &square, .texture_count = 1, .textures = &texture, .ambient = {1, 1, 1}};
     /* u = (x + 1) / 2: texel centres at x = -0.5 and 0.5; halfway both between them and across the seam. */
     const double places[4] = {-.5, .5, 0, -.999999}, red[4] = {1, 0, .5, .5};
     const double grey = pow((188 / 255.0 + .055) / 1.055, 2.4);
@@ -165,7 +170,8 @@ static void test_textures_are_linear_bilinear_and_repeat(void **state)
     test_picture_free(&picture);
 }
 
-/* ---- cameras --------------------------------------------------------------------------------------------------------- */
+/* ---- cameras
+ * --------------------------------------------------------------------------------------------------------- */
 
 static uint32_t next_random(uint32_t *seed)
 {
@@ -188,9 +194,9 @@ static void test_same_segment_same_light_for_every_camera(void **state)
     for (int p = 0; p < 3; p++) pictures[p] = test_picture_make(1, 1);
     uint32_t seed = 7;
     for (int i = 0; i < 60; i++) {
-        nebel_camera camera = test_camera(random_within(&seed, -3, 3), random_within(&seed, 1.5, 4),
-                                          random_within(&seed, -3, 3), random_within(&seed, -4, 4), -1,
-                                          random_within(&seed, -4, 4));
+        nebel_camera camera =
+            test_camera(random_within(&seed, -3, 3), random_within(&seed, 1.5, 4), random_within(&seed, -3, 3),
+                        random_within(&seed, -4, 4), -1, random_within(&seed, -4, 4));
         for (int p = 0; p < 3; p++) {
             camera.projection = (nebel_projection)p;
             test_render(&ball.scene, fog, &plain, &camera, 1, &pictures[p]);
@@ -211,9 +217,10 @@ static void test_pixels_look_where_they_should(void **state)
 {
     (void)state;
     const double extinction = .1;
-    nebel_snapshot *fog = test_fog(1, &(nebel_volume_desc){
-        .shape = {.type = NEBEL_SHAPE_ELLIPSOID, .center = {4, 3, -9}, .radii = {6, 3, 5}},
-        .extinction = {extinction, extinction, extinction}, .source = {1, 1, 1}});
+    nebel_snapshot *fog = test_fog(
+        1, &(nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_ELLIPSOID, .center = {4, 3, -9}, .radii = {6, 3, 5}},
+                                .extinction = {extinction, extinction, extinction},
+                                .source = {1, 1, 1}});
     const nebel_scene_data scene = {.background = {0, 0, 0}};
     test_picture picture = test_picture_make(24, 12);
     for (int p = 0; p < 3; p++) {
@@ -227,7 +234,9 @@ static void test_pixels_look_where_they_should(void **state)
             const nebel_ray rays[3] = {
                 {{0, 0, 0}, {t * x, t * y, -1}, HUGE_VAL},
                 {{x, y, 0}, {0, 0, -1}, HUGE_VAL},
-                {{0, 0, 0}, {cos(latitude) * sin(longitude), sin(latitude), -cos(latitude) * cos(longitude)}, HUGE_VAL}};
+                {{0, 0, 0},
+                 {cos(latitude) * sin(longitude), sin(latitude), -cos(latitude) * cos(longitude)},
+                 HUGE_VAL}};
             nebel_light light;
             assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &rays[p], sizeof *rays, &light, sizeof light),
                              NEBEL_OK);
@@ -255,7 +264,8 @@ static void test_camera_inside_a_closed_mesh(void **state)
     test_picture_free(&picture);
 }
 
-/* ---- bits ------------------------------------------------------------------------------------------------------------ */
+/* ---- bits
+ * ------------------------------------------------------------------------------------------------------------ */
 
 static void assert_same_bytes(const test_picture *a, const test_picture *b)
 {
@@ -336,7 +346,8 @@ static void test_earlier_frames_change_no_byte(void **state)
     test_picture_free(&later);
 }
 
-/* ---- places far away ------------------------------------------------------------------------------------------------- */
+/* ---- places far away
+ * ------------------------------------------------------------------------------------------------- */
 
 /* How many pixels differ by more than a rounding error would let them. */
 static size_t count_different(const test_picture *a, const test_picture *b, float tolerance)
@@ -356,9 +367,10 @@ static void test_far_from_the_origin_is_as_good(void **state)
     for (int i = 0; i < 2; i++) {
         const double *m = centers[i];
         test_ball_make(&ball, m);
-        nebel_snapshot *fog = test_fog(1, &(nebel_volume_desc){
-            .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {m[0], m[1], m[2]}, .radius = 3},
-            .extinction = {.3, .3, .3}, .source = {.7, .7, .7}});
+        nebel_snapshot *fog = test_fog(
+            1, &(nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {m[0], m[1], m[2]}, .radius = 3},
+                                    .extinction = {.3, .3, .3},
+                                    .source = {.7, .7, .7}});
         const nebel_camera camera = test_camera(m[0] + 2, m[1] + 2, m[2] + 5, m[0], m[1], m[2]);
         test_render(&ball.scene, fog, &plain, &camera, 1, &pictures[i]);
         nebel_release_snapshot(fog);
@@ -388,7 +400,8 @@ static void test_telescope_sees_what_a_parallel_camera_sees(void **state)
     test_picture_free(&far_picture);
 }
 
-/* ---- what may be missing ---------------------------------------------------------------------------------------------- */
+/* ---- what may be missing
+ * ---------------------------------------------------------------------------------------------- */
 
 static void assert_background_only(const nebel_scene_data *scene)
 {
@@ -414,16 +427,16 @@ static void test_nothing_to_see(void **state)
     const float none_finite[9] = {NAN, 0, 0, INFINITY, 0, 0, NAN, 0, 0};
     const float *bodies[5] = {point, nan_corner, line, huge, none_finite};
     const uint32_t indices[3] = {0, 1, 2};
-    nebel_scene_data scene = {.background = {.5, .6, .7}, .has_sun = 1, .sun_direction = {0, 1, 0},
-                              .sun_irradiance = {1, 1, 1}};
+    nebel_scene_data scene = {
+        .background = {.5, .6, .7}, .has_sun = 1, .sun_direction = {0, 1, 0}, .sun_irradiance = {1, 1, 1}};
     assert_background_only(&scene);
     nebel_mesh mesh = {.texture = -1};
     scene.mesh_count = 1;
     scene.meshes = &mesh;
     assert_background_only(&scene);
     for (int i = 0; i < 5; i++) {
-        mesh = (nebel_mesh){.positions = bodies[i], .indices = indices, .vertex_count = 3, .triangle_count = 1,
-                            .texture = -1};
+        mesh = (nebel_mesh){
+            .positions = bodies[i], .indices = indices, .vertex_count = 3, .triangle_count = 1, .texture = -1};
         assert_background_only(&scene);
     }
 }
@@ -445,7 +458,8 @@ static void test_background_behind_endless_fog(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* ---- samples ---------------------------------------------------------------------------------------------------------- */
+/* ---- samples
+ * ---------------------------------------------------------------------------------------------------------- */
 
 static void test_samples_are_stratified(void **state)
 {
@@ -498,7 +512,8 @@ static void test_means_of_planes_add_up(void **state)
     ball.scene.has_sun = 0;
     ball.scene.mesh_count = 1;
     ball.scene.ambient[0] = 1;
-    ball.scene.background[0] = .8; /* ball and background are equally bright, so that T * surface is known in the mean */
+    ball.scene.background[0] =
+        .8; /* ball and background are equally bright, so that T * surface is known in the mean */
     nebel_snapshot *fog = test_world_fog(.1, .5);
     const nebel_camera camera = test_camera(2, 2, 5, 0, 0, 0);
     test_picture picture = test_picture_make(50, 40);

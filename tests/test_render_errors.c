@@ -15,7 +15,8 @@ static void write_log(nebel_result result, const char *message, void *user)
     strncpy(log->text, message, sizeof log->text - 1);
 }
 
-/* ---- descriptions ------------------------------------------------------------------------------------------------------ */
+/* ---- descriptions
+ * ------------------------------------------------------------------------------------------------------ */
 
 static void assert_not_created(const nebel_scene_data *scene, const nebel_renderer_desc *desc, nebel_result expected)
 {
@@ -73,7 +74,7 @@ static void test_bad_meshes(void **state)
     mesh.texture = 0;
     assert_bad_mesh(&mesh, NEBEL_ERROR_ARGUMENT);
     mesh = test_square();
-    mesh.origin[1] = NAN;
+    mesh.origin[1] = (double)NAN;
     assert_bad_mesh(&mesh, NEBEL_ERROR_VALUE);
     mesh = test_square();
     mesh.base_color[2] = INFINITY;
@@ -128,7 +129,8 @@ static void test_bad_frames(void **state)
     assert_bad_frame(&(nebel_scene_data){.background = {-1, 0, 0}}, &good);
     assert_bad_frame(&(nebel_scene_data){.ambient = {0, (double)NAN, 0}}, &good);
     assert_bad_frame(&(nebel_scene_data){.has_sun = 1, .sun_irradiance = {1, 1, 1}}, &good);
-    assert_bad_frame(&(nebel_scene_data){.has_sun = 1, .sun_irradiance = {HUGE_VAL, 1, 1}, .sun_direction = {0, 1, 0}}, &good);
+    assert_bad_frame(&(nebel_scene_data){.has_sun = 1, .sun_irradiance = {HUGE_VAL, 1, 1}, .sun_direction = {0, 1, 0}},
+                     &good);
 }
 
 static void test_missing_arguments_of_a_frame(void **state)
@@ -180,7 +182,8 @@ static void test_light_without_end_is_an_error(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* ---- progress ----------------------------------------------------------------------------------------------------------- */
+/* ---- progress
+ * ----------------------------------------------------------------------------------------------------------- */
 
 typedef struct test_progress {
     size_t calls, last, total, stop_at;
@@ -216,7 +219,8 @@ static void test_progress_rises_and_ends(void **state)
     nebel_destroy_renderer(renderer);
 }
 
-/* ---- memory ------------------------------------------------------------------------------------------------------------- */
+/* ---- memory
+ * ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct test_memory {
     int live, countdown;

@@ -58,8 +58,8 @@ static inline float test_depth(const test_picture *picture, uint32_t x, uint32_t
 
 static inline nebel_camera test_camera(double x, double y, double z, double to_x, double to_y, double to_z)
 {
-    return (nebel_camera){.position = {x, y, z}, .look_at = {to_x, to_y, to_z}, .up = {0, 1, 0}, .vertical_fov = 50,
-                          .view_height = 10};
+    return (nebel_camera){
+        .position = {x, y, z}, .look_at = {to_x, to_y, to_z}, .up = {0, 1, 0}, .vertical_fov = 50, .view_height = 10};
 }
 
 /* A snapshot of some volumes. */
@@ -94,7 +94,8 @@ static inline void test_render(const nebel_scene_data *scene, nebel_snapshot *fo
     nebel_destroy_renderer(renderer);
 }
 
-/* ---- meshes -------------------------------------------------------------------------------------------------------- */
+/* ---- meshes --------------------------------------------------------------------------------------------------------
+ */
 
 /* A square of side 2 around (0, height, 0), facing up. */
 static const float test_square_positions[12] = {-1, 0, -1, -1, 0, 1, 1, 0, 1, 1, 0, -1};
@@ -103,8 +104,12 @@ static const uint32_t test_square_indices[6] = {0, 1, 2, 0, 2, 3};
 
 static inline nebel_mesh test_square(void)
 {
-    return (nebel_mesh){.positions = test_square_positions, .indices = test_square_indices, .vertex_count = 4,
-                        .triangle_count = 2, .base_color = {.5f, .25f, .75f}, .texture = -1};
+    return (nebel_mesh){.positions = test_square_positions,
+                        .indices = test_square_indices,
+                        .vertex_count = 4,
+                        .triangle_count = 2,
+                        .base_color = {.5f, .25f, .75f},
+                        .texture = -1};
 }
 
 enum { TEST_RINGS = 24, TEST_SECTORS = 48 };
@@ -149,9 +154,12 @@ static inline void test_ball_make(test_ball *ball, const double center[3])
     memset(ball, 0, sizeof *ball);
     test_ball_set_vertices(ball, 1);
     test_ball_set_indices(ball);
-    ball->meshes[0] = (nebel_mesh){.positions = ball->positions[0], .normals = ball->normals[0],
-                                   .indices = ball->indices[0], .vertex_count = (TEST_RINGS + 1) * (TEST_SECTORS + 1),
-                                   .triangle_count = TEST_RINGS * TEST_SECTORS * 2, .base_color = {.8f, .3f, .2f},
+    ball->meshes[0] = (nebel_mesh){.positions = ball->positions[0],
+                                   .normals = ball->normals[0],
+                                   .indices = ball->indices[0],
+                                   .vertex_count = (TEST_RINGS + 1) * (TEST_SECTORS + 1),
+                                   .triangle_count = TEST_RINGS * TEST_SECTORS * 2,
+                                   .base_color = {.8f, .3f, .2f},
                                    .texture = -1};
     for (int v = 0; v < 4; v++) {
         for (int i = 0; i < 3; i++) ball->floor[v][i] = i == 1 ? -1 : 20 * test_square_positions[3 * v + i];
@@ -159,8 +167,12 @@ static inline void test_ball_make(test_ball *ball, const double center[3])
     ball->meshes[1] = test_square();
     ball->meshes[1].positions = ball->floor[0];
     for (int m = 0; m < 2; m++) memcpy(ball->meshes[m].origin, center, 3 * sizeof(double));
-    ball->scene = (nebel_scene_data){.background = {.5, .6, .7}, .has_sun = 1, .sun_direction = {.36, .8, .48},
-                                     .sun_irradiance = {3, 2.9, 2.7}, .ambient = {.2, .25, .3}, .mesh_count = 2,
+    ball->scene = (nebel_scene_data){.background = {.5, .6, .7},
+                                     .has_sun = 1,
+                                     .sun_direction = {.36, .8, .48},
+                                     .sun_irradiance = {3, 2.9, 2.7},
+                                     .ambient = {.2, .25, .3},
+                                     .mesh_count = 2,
                                      .meshes = ball->meshes};
 }
 

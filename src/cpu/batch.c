@@ -8,10 +8,14 @@ NB_CLONES static void set_inside(const nb_frame *frame, uint32_t left, uint32_t 
 {
     const uint32_t columns = frame->width - left, rows = frame->height - top;
     NB_SIMD
-    for (uint32_t i = 0; i < NB_BATCH; i++) inside[i] = -((nb_lane_x(i) < columns) & (nb_lane_y(i) < rows));
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        const int in_row = nb_lane_x(i) < columns, in_column = nb_lane_y(i) < rows;
+        inside[i] = -(in_row & in_column);
+    }
 }
 
-/* ---- fog on the way to the camera ------------------------------------------------------------------------------------ */
+/* ---- fog on the way to the camera
+ * ------------------------------------------------------------------------------------ */
 
 static void set_clear(nb_light_samples *samples)
 {
@@ -78,7 +82,8 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     return NEBEL_OK;
 }
 
-/* ---- surfaces -------------------------------------------------------------------------------------------------------- */
+/* ---- surfaces
+ * -------------------------------------------------------------------------------------------------------- */
 
 static size_t set_sun_rays(const nb_frame *frame, nb_scratch *scratch)
 {

@@ -13,7 +13,8 @@ typedef struct nb_state {
     nebel_result result; /* of the first that failed */
 } nb_state;
 
-/* ---- checks -------------------------------------------------------------------------------------------------------- */
+/* ---- checks --------------------------------------------------------------------------------------------------------
+ */
 
 static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *log)
 {
@@ -25,8 +26,8 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
         return nb_fail(log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)desc->samples);
     }
     if (!(desc->tolerance >= 0) || isinf(desc->tolerance)) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: tolerance is %g, it must be above 0, or 0 for %g", desc->tolerance,
-                       NEBEL_DEFAULT_TOLERANCE);
+        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: tolerance is %g, it must be above 0, or 0 for %g",
+                       desc->tolerance, NEBEL_DEFAULT_TOLERANCE);
     }
     return NEBEL_OK;
 }
@@ -64,7 +65,8 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     nb_geometry *geometry = &renderer->geometry;
     nebel_result result = check_desc(desc, &renderer->log);
     if (result == NEBEL_OK) result = set_lighting(renderer->scene, &frame->lighting, &renderer->log);
-    if (result == NEBEL_OK) result = nb_view_set(&frame->view, &desc->camera, desc->width, desc->height, &renderer->log);
+    if (result == NEBEL_OK)
+        result = nb_view_set(&frame->view, &desc->camera, desc->width, desc->height, &renderer->log);
     if (result != NEBEL_OK) return result;
     result = nb_geometry_place(geometry, frame->view.position);
     if (result != NEBEL_OK) return nb_fail(&renderer->log, result, "frame: the surfaces could not be built");
@@ -76,14 +78,16 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     frame->width = desc->width;
     frame->height = desc->height;
     frame->samples = desc->samples != 0 ? desc->samples : 4;
-    frame->trace = (nebel_trace_desc){
-        .precision = NEBEL_PRECISION_FLOAT, .isa = renderer->fog_isa, .tolerance = desc->tolerance};
+    frame->trace =
+        (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = renderer->fog_isa, .tolerance = desc->tolerance};
     return NEBEL_OK;
 }
 
-/* ---- regions ------------------------------------------------------------------------------------------------------- */
+/* ---- regions -------------------------------------------------------------------------------------------------------
+ */
 
-static nebel_result render_sample(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t index, nb_scratch *scratch)
+static nebel_result render_sample(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t index,
+                                  nb_scratch *scratch)
 {
     nb_sample_region(index, frame->samples, left, top, &scratch->region);
     if (frame->rasters) nb_raster_region(&frame->raster, left, top, &scratch->region, &scratch->seen);

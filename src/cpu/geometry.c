@@ -4,15 +4,16 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The origin lies on a grid of cells of this size around the scene's centre, in the cell of the camera: it follows from scene and
- * camera alone, not from frames before. Within a cell floats are exact to 0.03 mm, at one metre from the eye a twentieth
- * of a pixel of a picture 1280 wide. */
+/* The origin lies on a grid of cells of this size around the scene's centre, in the cell of the camera: it follows from
+ * scene and camera alone, not from frames before. Within a cell floats are exact to 0.03 mm, at one metre from the eye
+ * a twentieth of a pixel of a picture 1280 wide. */
 static const double smallest_cell = 1024;
 
 /* Positions of a mesh have themselves no more digits than its radius allows: finer cells would gain nothing. */
 static const double cell_in_radii = 8;
 
-/* ---- checks ------------------------------------------------------------------------------------------------------- */
+/* ---- checks -------------------------------------------------------------------------------------------------------
+ */
 
 static nebel_result check_texture(const nebel_scene_data *scene, size_t number, const nebel_log *log)
 {
@@ -64,7 +65,8 @@ static nebel_result check_scene(const nebel_scene_data *scene, const nebel_log *
     return result;
 }
 
-/* ---- measures ------------------------------------------------------------------------------------------------------ */
+/* ---- measures ------------------------------------------------------------------------------------------------------
+ */
 
 static float longest_edge(const nebel_mesh *mesh)
 {
@@ -106,7 +108,8 @@ static void measure(nb_geometry *geometry, nb_surface *surface)
     }
 }
 
-/* ---- Embree -------------------------------------------------------------------------------------------------------- */
+/* ---- Embree --------------------------------------------------------------------------------------------------------
+ */
 
 static void report(void *user, enum RTCError code, const char *text)
 {
@@ -191,7 +194,8 @@ nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *sce
         if (scene->meshes[i].triangle_count == 0) continue;
         nb_surface *surface = &geometry->surfaces[geometry->surface_count++];
         surface->mesh = &scene->meshes[i];
-        surface->positions = nb_allocate(&geometry->allocator, surface->mesh->vertex_count + (size_t)1, 3 * sizeof(float));
+        surface->positions =
+            nb_allocate(&geometry->allocator, surface->mesh->vertex_count + (size_t)1, 3 * sizeof(float));
         if (surface->positions == NULL) return NEBEL_ERROR_MEMORY;
         memset(surface->positions + 3 * (size_t)surface->mesh->vertex_count, 0, 3 * sizeof(float));
         measure(geometry, surface);
@@ -200,7 +204,8 @@ nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *sce
     return clusters == NEBEL_OK ? make_device(geometry, isa, threads) : clusters;
 }
 
-/* ---- building ------------------------------------------------------------------------------------------------------- */
+/* ---- building -------------------------------------------------------------------------------------------------------
+ */
 
 /* The corners of all meshes in world coordinates. */
 static void world_bounds(const nb_geometry *geometry, double low[3], double high[3])
@@ -287,8 +292,8 @@ static nebel_result build(nb_geometry *geometry)
 }
 
 /* The centre of the cell in which the part of the scene lies that is nearest to the camera. */
-static void choose_origin(const nb_geometry *geometry, const double camera[3], const double low[3], const double high[3],
-                          double origin[3])
+static void choose_origin(const nb_geometry *geometry, const double camera[3], const double low[3],
+                          const double high[3], double origin[3])
 {
     const double cell = fmax(smallest_cell, cell_in_radii * geometry->largest_radius);
     for (int i = 0; i < 3; i++) {
@@ -318,7 +323,8 @@ void nb_geometry_free(nb_geometry *geometry)
 {
     if (geometry->scene != NULL) rtcReleaseScene(geometry->scene);
     if (geometry->device != NULL) rtcReleaseDevice(geometry->device);
-    for (size_t i = 0; i < geometry->surface_count; i++) nb_release(&geometry->allocator, geometry->surfaces[i].positions);
+    for (size_t i = 0; i < geometry->surface_count; i++)
+        nb_release(&geometry->allocator, geometry->surfaces[i].positions);
     nb_release(&geometry->allocator, geometry->groups);
     nb_release(&geometry->allocator, geometry->clusters);
     nb_release(&geometry->allocator, geometry->surfaces);

@@ -12,7 +12,7 @@
 /* A mesh with its positions relative to the origin of the geometry. */
 typedef struct nb_surface {
     const nebel_mesh *mesh;
-    float *positions; /* 3 per vertex, and one float more: Embree loads four */
+    float *positions;      /* 3 per vertex, and one float more: Embree loads four */
     float low[3], high[3]; /* corners of the mesh around its own origin */
     float longest_edge;
 } nb_surface;

@@ -74,7 +74,8 @@ void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_pa
     }
 }
 
-void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active, nb_packets *packets)
+void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active,
+                    nb_packets *packets)
 {
     struct RTCIntersectContext context = coherent_context();
     struct RTCRay16 *ray = &packets->rays[0].ray;

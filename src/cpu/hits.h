@@ -8,9 +8,9 @@
 typedef struct nb_hits {
     uint32_t surface[NB_BATCH]; /* NB_NONE: nothing is met, the other members are undefined */
     uint32_t triangle[NB_BATCH];
-    float t[NB_BATCH];    /* m from the ray's start in the geometry */
+    float t[NB_BATCH];              /* m from the ray's start in the geometry */
     float u[NB_BATCH], v[NB_BATCH]; /* weights of the second and third vertex */
-    float normal[3][NB_BATCH]; /* of the triangle, not of unit length, either side */
+    float normal[3][NB_BATCH];      /* of the triangle, not of unit length, either side */
 } nb_hits;
 
 /* Memory for the packets of a batch, aligned as Embree wants it. */
@@ -22,6 +22,7 @@ typedef struct nb_packets {
 void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_packets *packets, nb_hits *hits);
 
 /* Clears active[i] where something lies between start i and infinity. All rays go in one direction. */
-void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active, nb_packets *packets);
+void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active,
+                    nb_packets *packets);
 
 #endif

@@ -17,22 +17,25 @@ enum {
 
 #define NB_NONE UINT32_MAX
 
-/* Embree takes coordinates up to 1.8e18 and may stop the program at larger ones, also in rays that are not to be traced. */
+/* Embree takes coordinates up to 1.8e18 and may stop the program at larger ones, also in rays that are not to be
+ * traced. */
 static inline float nb_clamp_coordinate(float x)
 {
     const float low = x > -1e18f ? x : -1e18f;
     return low < 1e18f ? low : 1e18f;
 }
 
-/* Loops over whole batches are compiled for several instruction sets; the loader takes the best one. All give the same bits,
- * because nothing is contracted or reordered. For static functions only: clang 14 gives the symbols of others a wrong name. */
+/* Loops over whole batches are compiled for several instruction sets; the loader takes the best one. All give the same
+ * bits, because nothing is contracted or reordered. For static functions only: clang 14 gives the symbols of others a
+ * wrong name. */
 #if defined(__x86_64__) && defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
 #define NB_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define NB_CLONES
 #endif
 
-/* The next loop has no dependence between its rounds. clang finds out by itself, and warns of the pragma where it does not. */
+/* The next loop has no dependence between its rounds. clang finds out by itself, and warns of the pragma where it does
+ * not. */
 #if defined(__clang__)
 #define NB_SIMD
 #else

@@ -100,8 +100,10 @@ void nb_planes_add(const nb_frame *frame, uint32_t left, uint32_t top, int is_fi
     const nb_area area = area_of(frame, left, top, NB_TILE);
     const uint32_t width = frame->width;
     if (planes->color != NULL) add_vectors(planes->color, width, &area, is_first, samples->color);
-    if (planes->transmittance != NULL) add_vectors(planes->transmittance, width, &area, is_first, samples->transmittance);
-    if (planes->in_scattering != NULL) add_vectors(planes->in_scattering, width, &area, is_first, samples->in_scattering);
+    if (planes->transmittance != NULL)
+        add_vectors(planes->transmittance, width, &area, is_first, samples->transmittance);
+    if (planes->in_scattering != NULL)
+        add_vectors(planes->in_scattering, width, &area, is_first, samples->in_scattering);
     if (planes->normal != NULL) add_normals(planes->normal, width, &area, is_first, scratch);
     if (planes->error != NULL) widen_errors(planes->error, width, &area, is_first, samples->error);
     if (planes->depth != NULL) add_depths(frame, &area, is_first, scratch, hit_counts);

@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-/* Triangles grow by this many pixels on every side: more than the rounding errors of their edge functions in float, which leave
- * a gap where many triangles meet in one point of the picture; far less than anybody sees. */
+/* Triangles grow by this many pixels on every side: more than the rounding errors of their edge functions in float,
+ * which leave a gap where many triangles meet in one point of the picture; far less than anybody sees. */
 static const double growth = 0x1p-14;
 
 /* Rectangles grow by more. */
@@ -15,7 +15,8 @@ int nb_raster_is_apt(const nb_geometry *geometry, nebel_projection projection, u
     return geometry->cluster_count * NB_CLUSTER <= (size_t)width * height;
 }
 
-/* ---- the view ------------------------------------------------------------------------------------------------------- */
+/* ---- the view -------------------------------------------------------------------------------------------------------
+ */
 
 static void cross(const double a[3], const double b[3], double out[3])
 {
@@ -126,7 +127,8 @@ void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view
     }
 }
 
-/* ---- triangles of a cluster ------------------------------------------------------------------------------------------- */
+/* ---- triangles of a cluster
+ * ------------------------------------------------------------------------------------------- */
 
 typedef struct nb_projected {
     float corner[3][3][NB_CLUSTER];
@@ -185,8 +187,8 @@ NB_CLONES static void project(const nb_raster *raster, nb_projected *projected)
     }
 }
 
-/* Which pixels of the window have points of the triangles' rectangles; all of them where a triangle crosses the camera's plane
- * or is no number. */
+/* Which pixels of the window have points of the triangles' rectangles; all of them where a triangle crosses the
+ * camera's plane or is no number. */
 NB_CLONES static void set_ranges(const nb_window *window, nb_projected *projected)
 {
     for (int axis = 0; axis < 2; axis++) {
@@ -209,7 +211,8 @@ NB_CLONES static void set_ranges(const nb_window *window, nb_projected *projecte
     }
 }
 
-/* ---- triangles that a region may show ----------------------------------------------------------------------------------- */
+/* ---- triangles that a region may show
+ * ----------------------------------------------------------------------------------- */
 
 enum { PENDING = 64, STRIP = 8 };
 
@@ -295,17 +298,25 @@ typedef struct nb_functions {
 
 static inline nb_functions functions_of(const nb_pending *pending, int k, int orthographic)
 {
-    return (nb_functions){
-        pending->edge[0][0][k], pending->edge[0][1][k], pending->edge[0][2][k], pending->edge[1][0][k],
-        pending->edge[1][1][k], pending->edge[1][2][k], pending->edge[2][0][k], pending->edge[2][1][k],
-        pending->edge[2][2][k], pending->nearness[0][k], pending->nearness[1][k], pending->nearness[2][k],
-        orthographic ? 0 : INFINITY, /* nothing before the plane of an orthographic camera */
-        pending->id[k]};
+    return (nb_functions){pending->edge[0][0][k],
+                          pending->edge[0][1][k],
+                          pending->edge[0][2][k],
+                          pending->edge[1][0][k],
+                          pending->edge[1][1][k],
+                          pending->edge[1][2][k],
+                          pending->edge[2][0][k],
+                          pending->edge[2][1][k],
+                          pending->edge[2][2][k],
+                          pending->nearness[0][k],
+                          pending->nearness[1][k],
+                          pending->nearness[2][k],
+                          orthographic ? 0 : INFINITY, /* nothing before the plane of an orthographic camera */
+                          pending->id[k]};
 }
 
 /* A row of STRIP pixels. Points outside the triangle fail its edges. */
-static inline void fill_strip(nb_functions f, const float *restrict xs, const float *restrict ys, float *restrict nearest,
-                              uint32_t *restrict shown)
+static inline void fill_strip(nb_functions f, const float *restrict xs, const float *restrict ys,
+                              float *restrict nearest, uint32_t *restrict shown)
 {
     NB_SIMD
     for (int i = 0; i < STRIP; i++) {
@@ -341,7 +352,8 @@ static void flush(const nb_raster *raster, const nb_window *window, nb_pending *
     pending->count = 0;
 }
 
-/* ---- regions ------------------------------------------------------------------------------------------------------------ */
+/* ---- regions
+ * ------------------------------------------------------------------------------------------------------------ */
 
 /* The pixels of a region, as rectangles have them. */
 typedef struct nb_region_rectangle {
@@ -389,7 +401,8 @@ void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, cons
     flush(raster, &window, &pending, points, seen);
 }
 
-/* ---- hits ------------------------------------------------------------------------------------------------------------ */
+/* ---- hits
+ * ------------------------------------------------------------------------------------------------------------ */
 
 typedef struct nb_corners {
     float corner[3][3][NB_BATCH];
@@ -433,14 +446,17 @@ static void gather_corners(const nb_geometry *geometry, const nb_seen *seen, uin
     }
 }
 
-/* Where the rays meet the planes of their triangles (Moeller and Trumbore 1997), and the weights of the corners there. */
+/* Where the rays meet the planes of their triangles (Moeller and Trumbore 1997), and the weights of the corners there.
+ */
 NB_CLONES static void intersect(const nb_corners *corners, const nb_rays *rays, nb_hits *hits)
 {
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
         const float ax = corners->corner[0][0][i], ay = corners->corner[0][1][i], az = corners->corner[0][2][i];
-        const float bx = corners->corner[1][0][i] - ax, by = corners->corner[1][1][i] - ay, bz = corners->corner[1][2][i] - az;
-        const float cx = corners->corner[2][0][i] - ax, cy = corners->corner[2][1][i] - ay, cz = corners->corner[2][2][i] - az;
+        const float bx = corners->corner[1][0][i] - ax, by = corners->corner[1][1][i] - ay,
+                    bz = corners->corner[1][2][i] - az;
+        const float cx = corners->corner[2][0][i] - ax, cy = corners->corner[2][1][i] - ay,
+                    cz = corners->corner[2][2][i] - az;
         const float ox = rays->start[0][i] - ax, oy = rays->start[1][i] - ay, oz = rays->start[2][i] - az;
         const float dx = rays->unit[0][i], dy = rays->unit[1][i], dz = rays->unit[2][i];
         const float nx = by * cz - bz * cy, ny = bz * cx - bx * cz, nz = bx * cy - by * cx;

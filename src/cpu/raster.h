@@ -1,9 +1,9 @@
 /* Which triangle a picture shows at each point of a region: the first hits of rays that form a plane, found triangle by
  * triangle instead of ray by ray. Faster than a ray tracer where triangles are not more than pixels.
  *
- * A triangle is prepared by the cross products of its corners in homogeneous coordinates of the picture (Olano and Greer 1997):
- * edge functions and depth are linear there, so that nothing needs clipping at the camera's plane. They are made in double,
- * because products of distant corners cancel. */
+ * A triangle is prepared by the cross products of its corners in homogeneous coordinates of the picture (Olano and
+ * Greer 1997): edge functions and depth are linear there, so that nothing needs clipping at the camera's plane. They
+ * are made in double, because products of distant corners cancel. */
 #ifndef NB_CPU_RASTER_H
 #define NB_CPU_RASTER_H
 
@@ -14,14 +14,15 @@
 typedef struct nb_raster {
     const nb_geometry *geometry;
     int orthographic;
-    double rows[3][3];  /* from a point relative to the geometry's origin to homogeneous coordinates, after adding shift */
+    double rows[3]
+               [3]; /* from a point relative to the geometry's origin to homogeneous coordinates, after adding shift */
     double shift[3];
     uint32_t width, height;
 } nb_raster;
 
 /* What is seen at the points of a region. */
 typedef struct nb_seen {
-    float nearness[NB_REGION * NB_REGION];   /* grows towards the camera */
+    float nearness[NB_REGION * NB_REGION];    /* grows towards the camera */
     uint32_t triangle[NB_REGION * NB_REGION]; /* cluster * NB_CLUSTER + place in it; NB_NONE: background */
 } nb_seen;
 
@@ -33,7 +34,8 @@ void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view
                    int threads);
 
 /* What is seen at the points of the region whose first pixel is (left, top). */
-void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, const nb_region_points *points, nb_seen *seen);
+void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, const nb_region_points *points,
+                      nb_seen *seen);
 
 /* The hits of a batch, whose first pixel is (x, y) of the region. */
 void nb_raster_hits(const nb_geometry *geometry, const nb_seen *seen, uint32_t x, uint32_t y, const nb_rays *rays,

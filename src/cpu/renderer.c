@@ -18,8 +18,8 @@ static nebel_result check(const nebel_scene_data *scene, const nebel_renderer_de
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: the allocator needs both functions or neither");
     }
     if (desc->threads < 0 || desc->threads > MOST_THREADS) {
-        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: %d threads; 0 (all) to %d are possible", desc->threads,
-                       MOST_THREADS);
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "renderer: %d threads; 0 (all) to %d are possible",
+                       desc->threads, MOST_THREADS);
     }
     if (desc->isa != NEBEL_ISA_DEFAULT && !nebel_isa_available(desc->isa)) {
         return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "renderer: instruction set %s is not available here",
@@ -75,7 +75,8 @@ nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot
     nb_srgb_table_set(&made->table);
     result = set_up(made, desc->isa);
     if (result != NEBEL_OK) {
-        if (result == NEBEL_ERROR_MEMORY) nb_fail(&desc->log, result, "renderer: out of memory; use fewer triangles or threads");
+        if (result == NEBEL_ERROR_MEMORY)
+            nb_fail(&desc->log, result, "renderer: out of memory; use fewer triangles or threads");
         nebel_destroy_renderer(made);
         return result;
     }

@@ -23,7 +23,7 @@ typedef struct nb_light_samples {
 typedef struct nb_scratch {
     nb_packets packets;
     nb_region_points region;
-    float x[NB_BATCH], y[NB_BATCH]; /* of these points those of the batch */
+    float x[NB_BATCH], y[NB_BATCH];    /* of these points those of the batch */
     _Alignas(64) int inside[NB_BATCH]; /* -1 within the picture, else 0 */
     nb_rays rays;
     nb_hits hits;
@@ -73,12 +73,12 @@ typedef struct nb_place {
     uint32_t left, top, region_left, region_top;
 } nb_place;
 
-/* Renders one sample of a batch into scratch->samples. scratch->region holds the points of its region and, where the frame is
- * rasterized, scratch->seen what is seen there. */
+/* Renders one sample of a batch into scratch->samples. scratch->region holds the points of its region and, where the
+ * frame is rasterized, scratch->seen what is seen there. */
 nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
 
-/* Adds the samples of a batch to the planes: the first sample replaces what is there. `hit_counts` belongs to the batch's first
- * pixel; its rows are NB_REGION long. */
+/* Adds the samples of a batch to the planes: the first sample replaces what is there. `hit_counts` belongs to the
+ * batch's first pixel; its rows are NB_REGION long. */
 void nb_planes_add(const nb_frame *frame, uint32_t left, uint32_t top, int is_first, const nb_scratch *scratch,
                    uint32_t *hit_counts);
 

@@ -18,7 +18,8 @@ static uint32_t sobol(uint32_t i)
     return digits;
 }
 
-/* A mixing function of two multiplications, found by search for small bias (C. Wellons, "Prospecting for hash functions"). */
+/* A mixing function of two multiplications, found by search for small bias (C. Wellons, "Prospecting for hash
+ * functions"). */
 static inline uint32_t mix(uint32_t h)
 {
     h = (h ^ h >> 16) * 0x7feb352du;
@@ -26,8 +27,8 @@ static inline uint32_t mix(uint32_t h)
     return h ^ h >> 16;
 }
 
-/* As many digits as a float has beside those of a column of a region, so that no point is rounded, and none into the next
- * pixel. */
+/* As many digits as a float has beside those of a column of a region, so that no point is rounded, and none into the
+ * next pixel. */
 static inline float fraction(uint32_t digits)
 {
     return (float)(digits >> 14) * 0x1p-18f;

@@ -11,7 +11,8 @@ void nb_srgb_table_set(nb_srgb_table *table)
     }
 }
 
-/* ---- textures ------------------------------------------------------------------------------------------------------ */
+/* ---- textures ------------------------------------------------------------------------------------------------------
+ */
 
 /* The part of a texture coordinate after the point; 0 for what has none. */
 static float wrap(float x)
@@ -45,18 +46,19 @@ static void sample_texture(const nebel_texture *texture, const nb_srgb_table *ta
     const uint8_t *top = texture->rgba + 4 * (size_t)y.first * texture->width;
     const uint8_t *bottom = texture->rgba + 4 * (size_t)y.second * texture->width;
     for (size_t c = 0; c < 3; c++) {
-        const float above = mix(table->linear[top[4 * (size_t)x.first + c]], table->linear[top[4 * (size_t)x.second + c]],
-                                x.weight);
+        const float above =
+            mix(table->linear[top[4 * (size_t)x.first + c]], table->linear[top[4 * (size_t)x.second + c]], x.weight);
         const float below = mix(table->linear[bottom[4 * (size_t)x.first + c]],
                                 table->linear[bottom[4 * (size_t)x.second + c]], x.weight);
         color[c] = mix(above, below, y.weight);
     }
 }
 
-/* ---- points -------------------------------------------------------------------------------------------------------- */
+/* ---- points --------------------------------------------------------------------------------------------------------
+ */
 
-/* Unit normals of the triangles, turned to the camera. Scaled by the largest component first: squares of the areas of small
- * and large triangles leave the range of float. */
+/* Unit normals of the triangles, turned to the camera. Scaled by the largest component first: squares of the areas of
+ * small and large triangles leave the range of float. */
 NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_points *points)
 {
     NB_SIMD
@@ -150,8 +152,9 @@ NB_CLONES static void finish_normals(const float *restrict sun, nb_points *point
     }
 }
 
-/* Starts of shadow rays. A hit lies off the plane of its triangle by a few rounding errors (2^-24) of the numbers that went
- * into it: the way to it, its coordinates, and the edges of the triangle. 2^-20 of their sum is on the safe side. */
+/* Starts of shadow rays. A hit lies off the plane of its triangle by a few rounding errors (2^-24) of the numbers that
+ * went into it: the way to it, its coordinates, and the edges of the triangle. 2^-20 of their sum is on the safe side.
+ */
 NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *points)
 {
     NB_SIMD

@@ -6,12 +6,14 @@
 #include <math.h>
 #include <string.h>
 
-/* Brighter than this differs from white by less than the last bit of a channel; keeps infinities out of the quotients. */
+/* Brighter than this differs from white by less than the last bit of a channel; keeps infinities out of the quotients.
+ */
 static const float brightest = 65504;
 
 /* f(x) = x (x + a) / (x^2 + b x + c), our own. Black stays 0, the limit is 1, and f rises everywhere, because b > a:
- * f' = ((b - a) x^2 + 2 c x + a c) / (x^2 + b x + c)^2. The constants follow from three wishes: middle grey 0.18 stays 0.18;
- * there contrast is 1.15 (d ln f / d ln x); the slope in black, a / c, is 0.6. White paper, 1, comes out as 0.70. */
+ * f' = ((b - a) x^2 + 2 c x + a c) / (x^2 + b x + c)^2. The constants follow from three wishes: middle grey 0.18 stays
+ * 0.18; there contrast is 1.15 (d ln f / d ln x); the slope in black, a / c, is 0.6. White paper, 1, comes out as 0.70.
+ */
 static inline float curve(float x)
 {
     const float a = 0.114967742f, b = 0.394193548f, c = 0.191612903f;

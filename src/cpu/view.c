@@ -75,8 +75,8 @@ static void set_plane(nb_view *view, double plane_height, int through_camera, ui
     for (int i = 0; i < 3; i++) {
         view->step_x[i] = pixel * view->right[i];
         view->step_y[i] = -pixel * view->up[i];
-        view->corner[i] = (through_camera ? 0 : view->forward[i]) - .5 * width * view->step_x[i] -
-                          .5 * height * view->step_y[i];
+        view->corner[i] =
+            (through_camera ? 0 : view->forward[i]) - .5 * width * view->step_x[i] - .5 * height * view->step_y[i];
     }
 }
 
@@ -90,7 +90,8 @@ static void set_panorama(nb_view *view, uint32_t width, uint32_t height)
     }
 }
 
-nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log)
+nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t width, uint32_t height,
+                         const nebel_log *log)
 {
     const nebel_result result = set_axes(view, camera, log);
     if (result != NEBEL_OK) return result;
@@ -98,7 +99,8 @@ nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t wid
     switch (camera->projection) {
     case NEBEL_PROJECTION_PERSPECTIVE:
         if (!(camera->vertical_fov > 0 && camera->vertical_fov < 180)) {
-            return nb_fail(log, NEBEL_ERROR_VALUE, "camera: vertical_fov is %g, it must be above 0 and below 180 degrees",
+            return nb_fail(log, NEBEL_ERROR_VALUE,
+                           "camera: vertical_fov is %g, it must be above 0 and below 180 degrees",
                            camera->vertical_fov);
         }
         set_plane(view, 2 * tan(camera->vertical_fov * (pi / 360)), 0, width, height);
@@ -143,8 +145,8 @@ void nb_view_place(nb_view *view, const double origin[3], const float bounds_min
 }
 
 /* v = base + x step_x + y step_y */
-NB_CLONES static void plane_points(const nb_view *view, const double *restrict base, const float *restrict x, const float *restrict y,
-                                   double (*restrict v)[NB_BATCH])
+NB_CLONES static void plane_points(const nb_view *view, const double *restrict base, const float *restrict x,
+                                   const float *restrict y, double (*restrict v)[NB_BATCH])
 {
     for (int c = 0; c < 3; c++) {
         const double first = base[c], step_x = view->step_x[c], step_y = view->step_y[c];
@@ -161,7 +163,8 @@ static void orthographic_directions(const nb_view *view, nb_rays *rays)
     }
 }
 
-static void panorama_directions(const nb_view *view, const double base[3], const float *x, const float *y, nb_rays *rays)
+static void panorama_directions(const nb_view *view, const double base[3], const float *x, const float *y,
+                                nb_rays *rays)
 {
     for (int i = 0; i < NB_BATCH; i++) {
         const double longitude = base[0] + (double)x[i] * view->step_x[0];
@@ -178,7 +181,8 @@ NB_CLONES static void set_units(nb_rays *rays)
 {
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
-        const float x = (float)rays->direction[0][i], y = (float)rays->direction[1][i], z = (float)rays->direction[2][i];
+        const float x = (float)rays->direction[0][i], y = (float)rays->direction[1][i],
+                    z = (float)rays->direction[2][i];
         const float length = sqrtf(x * x + y * y + z * z);
         const float scale = 1 / length;
         rays->length[i] = length;

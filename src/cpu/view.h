@@ -29,11 +29,12 @@ typedef struct nb_rays {
 } nb_rays;
 
 /* Checks a camera and makes it ready. Errors: VALUE. */
-nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log);
+nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t width, uint32_t height,
+                         const nebel_log *log);
 
-/* Places the view in a geometry around `origin` whose points lie within bounds (relative to origin). A camera far outside
- * lets its rays start near the bounds: their starts then have the small rounding errors of the geometry's coordinates and not
- * those of the long way. */
+/* Places the view in a geometry around `origin` whose points lie within bounds (relative to origin). A camera far
+ * outside lets its rays start near the bounds: their starts then have the small rounding errors of the geometry's
+ * coordinates and not those of the long way. */
 void nb_view_place(nb_view *view, const double origin[3], const float bounds_min[3], const float bounds_max[3]);
 
 /* The rays through the points left + x, top + y. */

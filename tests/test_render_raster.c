@@ -1,0 +1,204 @@
+/* Two ways to the first hit: triangle by triangle and ray by ray. */
+#include "test_render_scene.h"
+
+#include "cpu/renderer.h"
+
+enum { SIDE = NB_REGION, PIXELS = SIDE * SIDE };
+
+/* Both answers for one region. */
+typedef struct test_both {
+    nb_region_points points;
+    nb_seen seen;
+    nb_rays rays;
+    nb_packets packets;
+    nb_hits raster, ray;
+    int hits, differences, misses;
+    float largest;
+} test_both;
+
+static test_both *make_both(void)
+{
+    test_both *both = aligned_alloc(64, (sizeof *both + 63) / 64 * 64);
+    assert_non_null(both);
+    memset(both, 0, sizeof *both);
+    return both;
+}
+
+static void compare_batch(test_both *both)
+{
+    for (int i = 0; i < NB_BATCH; i++) {
+        const int seen = both->raster.surface[i] != NB_NONE, met = both->ray.surface[i] != NB_NONE;
+        both->hits += seen;
+        both->misses += !seen;
+        both->differences += seen != met;
+        if (!seen || !met) continue;
+        const float error = fabsf(both->raster.t[i] - both->ray.t[i]) / both->ray.t[i];
+        if (both->raster.triangle[i] != both->ray.triangle[i]) {
+            both->differences += error > 1e-3f;
+            continue;
+        }
+        both->largest = fmaxf(both->largest, error);
+        assert_float_equal(both->raster.u[i], both->ray.u[i], 1e-3);
+        assert_float_equal(both->raster.v[i], both->ray.v[i], 1e-3);
+    }
+}
+
+static void compare_region(nebel_renderer *renderer, const nebel_camera *camera, uint32_t samples, test_both *both)
+{
+    static _Alignas(64) int active[NB_BATCH];
+    for (int i = 0; i < NB_BATCH; i++) active[i] = -1;
+    nb_view view;
+    nb_raster raster;
+    nb_geometry *geometry = &renderer->geometry;
+    assert_int_equal(nb_view_set(&view, camera, SIDE, SIDE, &renderer->log), NEBEL_OK);
+    assert_int_equal(nb_geometry_place(geometry, view.position), NEBEL_OK);
+    nb_view_place(&view, geometry->origin, geometry->bounds_min, geometry->bounds_max);
+    nb_raster_set(&raster, geometry, &view, SIDE, SIDE, 1);
+    nb_sample_region(0, samples, 0, 0, &both->points);
+    nb_raster_region(&raster, 0, 0, &both->points, &both->seen);
+    for (uint32_t y = 0; y < SIDE; y += NB_TILE) {
+        for (uint32_t x = 0; x < SIDE; x += NB_TILE) {
+            float px[NB_BATCH], py[NB_BATCH];
+            for (uint32_t i = 0; i < NB_BATCH; i++) {
+                px[i] = both->points.x[(y + nb_lane_y(i)) * SIDE + x + nb_lane_x(i)];
+                py[i] = both->points.y[(y + nb_lane_y(i)) * SIDE + x + nb_lane_x(i)];
+            }
+            nb_view_rays(&view, 0, 0, px, py, &both->rays);
+            nb_raster_hits(geometry, &both->seen, x, y, &both->rays, &both->raster);
+            nb_hits_trace(geometry->scene, &both->rays, active, &both->packets, &both->ray);
+            compare_batch(both);
+        }
+    }
+}
+
+static double random_within(uint32_t *seed, double low, double high)
+{
+    *seed = *seed * 1664525u + 1013904223u;
+    return low + (high - low) * (*seed >> 8) / 0x1p24;
+}
+
+static nebel_renderer *make_renderer(const nebel_scene_data *scene)
+{
+    nebel_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_renderer(scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    return renderer;
+}
+
+/* Cameras around, above, below and inside the ball, where triangles cross the camera's plane. */
+static void test_raster_and_rays_agree(void **state)
+{
+    (void)state;
+    static test_ball ball;
+    test_ball_make(&ball, (const double[3]){0, 0, 0});
+    nebel_renderer *renderer = make_renderer(&ball.scene);
+    test_both *both = make_both();
+    uint32_t seed = 11;
+    for (int i = 0; i < 200; i++) {
+        nebel_camera camera =
+            test_camera(random_within(&seed, -3, 3), random_within(&seed, -3, 3), random_within(&seed, -3, 3),
+                        random_within(&seed, -1, 1), random_within(&seed, -1, 1), random_within(&seed, -1, 1));
+        camera.vertical_fov = random_within(&seed, 5, 150);
+        camera.view_height = random_within(&seed, .1, 30);
+        camera.projection = i % 2 ? NEBEL_PROJECTION_ORTHOGRAPHIC : NEBEL_PROJECTION_PERSPECTIVE;
+        compare_region(renderer, &camera, i % 3 ? 1 : 4, both);
+    }
+    assert_true(both->hits > 200 * PIXELS / 2);
+    assert_in_range(both->differences, 0, 20); /* points on an outline */
+    assert_true(both->largest < 1e-3f);
+    free(both);
+    nebel_destroy_renderer(renderer);
+}
+
+static void test_nothing_slips_through_a_closed_ball(void **state)
+{
+    (void)state;
+    static test_ball ball;
+    test_ball_make(&ball, (const double[3]){0, 0, 0});
+    ball.scene.mesh_count = 1;
+    nebel_renderer *renderer = make_renderer(&ball.scene);
+    test_both *both = make_both();
+    uint32_t seed = 5;
+    for (int i = 0; i < 100; i++) {
+        nebel_camera camera = test_camera(random_within(&seed, -.3, .3), random_within(&seed, -.3, .3),
+                                          random_within(&seed, -.3, .3), 0, i % 2 ? 1 : -1, 0);
+        camera.up[1] = 0;
+        camera.up[2] = 1;
+        camera.vertical_fov = random_within(&seed, 1, 170);
+        compare_region(renderer, &camera, i % 3 ? 1 : 4, both);
+    }
+    assert_int_equal(both->misses, 0);
+    free(both);
+    nebel_destroy_renderer(renderer);
+}
+
+enum { GRID = SIDE + 2 };
+
+/* Every sample lies exactly on a corner where six triangles meet. */
+static void test_nothing_slips_through_corners_under_samples(void **state)
+{
+    (void)state;
+    static float positions[GRID * GRID][3];
+    static uint32_t indices[(GRID - 1) * (GRID - 1)][6];
+    for (uint32_t i = 0; i < GRID * GRID; i++) {
+        positions[i][0] = .1f * ((float)(i % GRID) - .5f * SIDE - .5f);
+        positions[i][1] = .01f * (float)(i * 7 % 13);
+        positions[i][2] = .1f * ((float)(i / GRID) - .5f * SIDE - .5f);
+    }
+    for (uint32_t i = 0; i < (GRID - 1) * (GRID - 1); i++) {
+        const uint32_t a = i / (GRID - 1) * GRID + i % (GRID - 1);
+        const uint32_t corners[6] = {a, a + GRID, a + 1, a + 1, a + GRID, a + GRID + 1};
+        memcpy(indices[i], corners, sizeof corners);
+    }
+    const nebel_mesh mesh = {.positions = positions[0],
+                             .indices = indices[0],
+                             .vertex_count = GRID * GRID,
+                             .triangle_count = 2 * (GRID - 1) * (GRID - 1),
+                             .texture = -1};
+    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
+    nebel_renderer *renderer = make_renderer(&scene);
+    test_both *both = make_both();
+    nebel_camera camera = test_camera(0, 5, 0, 0, 0, 0);
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.view_height = .1 * SIDE;
+    compare_region(renderer, &camera, 1, both);
+    assert_int_equal(both->misses, 0);
+    free(both);
+    nebel_destroy_renderer(renderer);
+}
+
+/* The nearer of two squares wins, in whatever order they come; of equal ones the first. */
+static void test_nearer_surfaces_hide_farther_ones(void **state)
+{
+    (void)state;
+    nebel_mesh meshes[2] = {test_square(), test_square()};
+    const nebel_scene_data scene = {.mesh_count = 2, .meshes = meshes};
+    const double heights[3][2] = {{0, .001}, {.001, 0}, {0, 0}};
+    const uint32_t expected[3] = {1, 0, 0};
+    test_both *both = make_both();
+    for (int i = 0; i < 6; i++) {
+        meshes[0].origin[1] = heights[i / 2][0];
+        meshes[1].origin[1] = heights[i / 2][1];
+        nebel_renderer *renderer = make_renderer(&scene);
+        nebel_camera camera = test_camera(0, 3, 0, 0, 0, 0);
+        camera.vertical_fov = 20;
+        camera.view_height = 1;
+        camera.projection = i % 2 ? NEBEL_PROJECTION_ORTHOGRAPHIC : NEBEL_PROJECTION_PERSPECTIVE;
+        compare_region(renderer, &camera, 1, both);
+        for (int k = 0; k < NB_BATCH; k++) assert_int_equal(both->raster.surface[k], expected[i / 2]);
+        nebel_destroy_renderer(renderer);
+    }
+    free(both);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_raster_and_rays_agree),
+        cmocka_unit_test(test_nothing_slips_through_a_closed_ball),
+        cmocka_unit_test(test_nothing_slips_through_corners_under_samples),
+        cmocka_unit_test(test_nearer_surfaces_hide_farther_ones),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
