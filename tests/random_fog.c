@@ -451,20 +451,22 @@ static void cross_along_axis(const random_fog *fog, uint64_t *state, nebel_ray *
 }
 
 /* Nearly level, so that the height hardly changes over the ray. */
-static void run_level(const random_fog *fog, uint64_t *state, nebel_ray *ray)
+static double run_level(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 {
     cross(fog, state, ray);
     const double steepness = chance(state, .1) ? 0 : power_of_ten(state, -18, -1);
     ray->direction[1] = steepness * length_of(ray->direction) * (chance(state, .5) ? 1 : -1);
+    return steepness;
 }
 
-static void choose_end(uint64_t *state, int far, nebel_ray *ray)
+/* No endless rays that reach another height only after more metres than there are. */
+static void choose_end(uint64_t *state, int far, double steepness, nebel_ray *ray)
 {
     const int style = below(state, 20);
     ray->t_max = far ? power_of_ten(state, 1, 6) : uniform(state, 5, 80);
     if (style == 0) ray->t_max = 0;
     if (style == 1) ray->t_max = power_of_ten(state, -12, 0);
-    if (style >= 2 && style < 6) ray->t_max = HUGE_VAL;
+    if (style >= 2 && style < 6 && (steepness == 0 || steepness > 1e-9)) ray->t_max = HUGE_VAL;
     if (style == 6) ray->t_max = floor(ray->t_max);
 }
 
@@ -474,8 +476,9 @@ nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed)
     nebel_ray ray = {{0}, {0}, 0};
     next(&state);
     const int style = below(&state, 10), level = fog->kind == RANDOM_FOG_LEVEL && style < 8;
+    double steepness = 1;
     if (level)
-        run_level(fog, &state, &ray);
+        steepness = run_level(fog, &state, &ray);
     else if (style < 4)
         cross(fog, &state, &ray);
     else if (style < 5)
@@ -485,7 +488,7 @@ nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed)
     else
         aim(fog, &state, &ray);
     if (!(length_of(ray.direction) > 0)) ray.direction[0] = 1;
-    choose_end(&state, level, &ray);
+    choose_end(&state, level, steepness, &ray);
     if (chance(&state, .3)) {
         const double stretch = power_of_ten(&state, -3, 3);
         for (int k = 0; k < 3; k++) ray.direction[k] *= stretch;
