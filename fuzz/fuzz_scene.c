@@ -1,0 +1,60 @@
+/* Any bytes as a scene file: a scene or an error with a message, and every byte of memory back. */
+#include <nebel/scene.h>
+
+#include <stdint.h>
+#include <stdlib.h>
+
+typedef struct witness {
+    size_t messages, allocations;
+} witness;
+
+static void count_message(nebel_result result, const char *message, void *user)
+{
+    witness *seen = user;
+    if (result == NEBEL_OK || message[0] == '\0') abort();
+    seen->messages++;
+}
+
+static void *allocate(size_t size, void *user)
+{
+    witness *seen = user;
+    void *memory = size < (size_t)1 << 30 ? malloc(size) : NULL;
+    seen->allocations += memory != NULL;
+    return memory;
+}
+
+static void release(void *memory, void *user)
+{
+    witness *seen = user;
+    seen->allocations--;
+    free(memory);
+}
+
+/* What a scene promises to its users. */
+static void check_scene(const nebel_scene *scene)
+{
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    for (size_t i = 0; i < data->volume_count; i++)
+        if (data->volume_names[i] == NULL) abort();
+    const nebel_camera camera = nebel_scene_camera(scene, 12.5);
+    if (!(camera.vertical_fov > 0 && camera.vertical_fov < 180 && camera.view_height > 0)) abort();
+    nebel_snapshot *fog = NULL;
+    if (nebel_commit_scene_fog(scene, &fog) != NEBEL_OK) abort();
+    nebel_release_snapshot(fog);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    witness seen = {0};
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = {{allocate, release, &seen}, {count_message, &seen}};
+    const nebel_result result = nebel_parse_scene((const char *)data, size, "fuzz.json", &desc, &scene);
+    if ((result == NEBEL_OK) != (scene != NULL)) abort();
+    if ((result == NEBEL_OK) != (seen.messages == 0)) abort();
+    if (scene != NULL) check_scene(scene);
+    nebel_destroy_scene(scene);
+    if (seen.allocations != 0) abort();
+    return 0;
+}

@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""Checks that the reader, the schema and the manual of the scene file speak of the same keys, and, where python3-jsonschema is
+installed, that good scenes conform to the schema and bad ones do not."""
+
+import json
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+READERS = ["scene", "read_camera", "read_density", "read_light", "read_model", "read_shape", "read_volume"]
+TABLE = re.compile(r"static const char \*const (?:\w+_)?(?:names|types|projections)\[\] = \{(.*?)\}", re.S)
+COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
+REFUSED = {"grid", "noise"}  # known to the reader only to be refused
+
+BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "visibility": 2}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "source": 1, "albedo": 1}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world", "radius": 1}, "extinction": 1}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 0}, "extinction": 1}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "operation": "exclude", "extinction": 1}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "contrast": 0.1}]}',
+       '{"nebel": 1, "fog": [], "camera": {"vertical_fov": 180}}',
+       '{"nebel": 1, "fog": [], "models": [{"file": "a", "scale": 0}]}',
+       '{"nebel": 1, "fog": [], "models": [{}]}']
+
+
+def reader_names():
+    """Every key and every choice that the reader's tables hold."""
+    found = set()
+    for name in READERS:
+        for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
+            found |= set(re.findall(r'"([a-z_]+)"', table))
+    return found - REFUSED
+
+
+def schema_names(node):
+    """Every key and every choice that the schema allows."""
+    found = set()
+    if isinstance(node, list):
+        for item in node:
+            found |= schema_names(item)
+    elif isinstance(node, dict):
+        found |= set(node.get("properties", {}))
+        found |= {v for v in [node.get("const"), *node.get("enum", [])] if isinstance(v, str)}
+        for key, item in node.items():
+            if key not in ("const", "enum", "required", "dependentRequired"):
+                found |= schema_names(item)
+    return found
+
+
+def without_comments(text):
+    return COMMENT.sub(lambda match: match[1] or " ", text)
+
+
+def judge(schema, faults):
+    try:
+        import jsonschema
+    except ImportError:
+        print("check_scene_schema: python3-jsonschema is not installed; scenes are not tried")
+        return
+    validator = jsonschema.Draft202012Validator(schema)
+    validator.check_schema(schema)
+    for path in sorted([*ROOT.glob("fuzz/corpus/scene/*.json"), *ROOT.glob("examples/scenes/*.json")]):
+        for error in validator.iter_errors(json.loads(without_comments(path.read_text()))):
+            faults.append(f"{path.relative_to(ROOT)}: {error.json_path}: {error.message[:200]}")
+    for text in BAD:
+        if validator.is_valid(json.loads(text)):
+            faults.append(f"the schema lets this pass: {text}")
+
+
+def main():
+    schema = json.loads((ROOT / "docs/scene.schema.json").read_text())
+    manual = set(re.findall(r"`([a-z_]+)`", (ROOT / "docs/scene-file.md").read_text()))
+    names = reader_names()
+    faults = [f"not in docs/scene.schema.json: {name}" for name in sorted(names - schema_names(schema))]
+    faults += [f"not read by src/scene: {name}" for name in sorted(schema_names(schema) - names)]
+    faults += [f"not in docs/scene-file.md: {name}" for name in sorted(names - manual)]
+    if len(names) < 50:
+        faults.append(f"only {len(names)} keys found in src/scene: this check needs mending")
+    judge(schema, faults)
+    for fault in faults:
+        print(fault)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
