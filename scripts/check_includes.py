@@ -23,6 +23,7 @@ ROOMS = {
     "scene": {"base"},
     "cpu": {"base"},
     "gl": {"base", "formulas"},
+    "tools": {"bench"},
 }
 
 # Everything outside src/ uses the public face and its own folder. Tests and fuzzers may enter every room.
@@ -63,7 +64,7 @@ def is_foreign_allowed(place, name):
 
 def own_target(path, name):
     """The file of ours that a quoted include means, or None."""
-    for folder in (path.parent, ROOT / "src", ROOT / "include"):
+    for folder in (path.parent, ROOT, ROOT / "src", ROOT / "include"):
         target = (folder / name).resolve()
         if target.is_file():
             return target

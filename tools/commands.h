@@ -8,5 +8,8 @@ extern const nb_command nb_commands_render;
 extern const nb_command nb_commands_trace;
 extern const nb_command nb_commands_info;
 extern const nb_command nb_commands_compare;
+#if defined(NEBEL_HAVE_BENCH)
+extern const nb_command nb_commands_bench;
+#endif
 
 #endif

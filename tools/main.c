@@ -9,7 +9,11 @@
 #include <string.h>
 
 static const nb_command *const commands[] = {&nb_commands_render, &nb_commands_trace, &nb_commands_info,
-                                             &nb_commands_compare};
+                                             &nb_commands_compare,
+#if defined(NEBEL_HAVE_BENCH)
+                                             &nb_commands_bench,
+#endif
+};
 
 enum { COMMANDS = sizeof commands / sizeof *commands };
 

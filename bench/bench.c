@@ -1,0 +1,19 @@
+#include "groups.h"
+
+#include <string.h>
+
+typedef const char *group_fn(const nb_bench_desc *desc, nb_figures *figures);
+
+const char *const nb_bench_groups[] = {"segments", NULL};
+
+static group_fn *const functions[] = {nb_bench_segments};
+
+int nb_bench_run(const nb_bench_desc *desc, nb_figures *figures, const char **fault)
+{
+    for (size_t i = 0; nb_bench_groups[i] != NULL; i++) {
+        if (desc->group != NULL && strcmp(desc->group, nb_bench_groups[i]) != 0) continue;
+        *fault = functions[i](desc, figures);
+        if (*fault != NULL) return -1;
+    }
+    return 0;
+}

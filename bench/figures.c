@@ -1,0 +1,125 @@
+#include "figures.h"
+
+#include <nebel/nebel.h>
+
+#include <string.h>
+
+#if defined(__clang__)
+#define COMPILER "clang " __clang_version__
+#elif defined(__GNUC__)
+#define COMPILER "gcc " __VERSION__
+#else
+#define COMPILER "unknown"
+#endif
+
+double nb_figure_ratio(const nb_figure *figure)
+{
+    return figure->floor_name != NULL ? figure->value / figure->floor : figure->value;
+}
+
+static int has_target(const nb_figure *figure)
+{
+    return figure->at_least > 0 || figure->at_most > 0;
+}
+
+static int is_met(const nb_figure *figure)
+{
+    const double ratio = nb_figure_ratio(figure);
+    return figure->at_least > 0 ? ratio >= figure->at_least : ratio <= figure->at_most;
+}
+
+static void print_target(const nb_figure *figure, FILE *file)
+{
+    if (!has_target(figure)) return;
+    (void)fprintf(file, "  %s %g: %s", figure->at_least > 0 ? "at least" : "at most",
+                  figure->at_least > 0 ? figure->at_least : figure->at_most, is_met(figure) ? "met" : "NOT MET");
+}
+
+static void print_line(const nb_figures *figures, const nb_figure *figure)
+{
+    FILE *const file = figures->table;
+    const size_t before = figures->count - 1;
+    if (before == 0 || strcmp(figures->list[before - 1].group, figure->group) != 0) {
+        (void)fprintf(file, "\n%s\n", figure->group);
+    }
+    (void)fprintf(file, "  %-46s %9.4g %-13s", figure->name, figure->value, figure->unit);
+    if (figure->floor_name != NULL) {
+        (void)fprintf(file, " %6.3g x %s (%.4g)", nb_figure_ratio(figure), figure->floor_name, figure->floor);
+    }
+    print_target(figure, file);
+    (void)fprintf(file, "\n");
+    (void)fflush(file);
+}
+
+void nb_figures_add(nb_figures *figures, const nb_figure *figure)
+{
+    if (figures->count >= sizeof figures->list / sizeof *figures->list) return;
+    figures->list[figures->count++] = *figure;
+    if (figures->table != NULL) print_line(figures, figure);
+}
+
+static void write_text(const char *text, FILE *file)
+{
+    (void)fputc('"', file);
+    for (const unsigned char *c = (const unsigned char *)text; *c != '\0'; c++) {
+        if (*c == '"' || *c == '\\') {
+            (void)fprintf(file, "\\%c", *c);
+        } else if (*c >= ' ' && *c < 127) {
+            (void)fputc(*c, file);
+        }
+    }
+    (void)fputc('"', file);
+}
+
+static void write_figure(const nb_figure *figure, FILE *file)
+{
+    (void)fprintf(file, "    {\"group\": ");
+    write_text(figure->group, file);
+    (void)fprintf(file, ", \"name\": ");
+    write_text(figure->name, file);
+    (void)fprintf(file, ", \"unit\": ");
+    write_text(figure->unit, file);
+    (void)fprintf(file, ", \"value\": %.6g", figure->value);
+    if (figure->floor_name != NULL) {
+        (void)fprintf(file, ", \"floor\": {\"name\": ");
+        write_text(figure->floor_name, file);
+        (void)fprintf(file, ", \"value\": %.6g}, \"ratio\": %.6g", figure->floor, nb_figure_ratio(figure));
+    }
+    if (figure->at_least > 0) (void)fprintf(file, ", \"at_least\": %g", figure->at_least);
+    if (figure->at_most > 0) (void)fprintf(file, ", \"at_most\": %g", figure->at_most);
+    if (has_target(figure)) (void)fprintf(file, ", \"met\": %s", is_met(figure) ? "true" : "false");
+    (void)fprintf(file, "}");
+}
+
+void nb_figures_write_json(const nb_figures *figures, int quick, FILE *file)
+{
+    char processor[256];
+    nb_figures_read_processor(processor, sizeof processor);
+    (void)fprintf(file, "{\n  \"nebel\": \"%s\",\n  \"processor\": ", nebel_version());
+    write_text(processor, file);
+    (void)fprintf(file, ",\n  \"compiler\": ");
+    write_text(COMPILER, file);
+    (void)fprintf(file, ",\n  \"quick\": %s,\n  \"figures\": [\n", quick ? "true" : "false");
+    for (size_t i = 0; i < figures->count; i++) {
+        if (i > 0) (void)fprintf(file, ",\n");
+        write_figure(&figures->list[i], file);
+    }
+    (void)fprintf(file, "\n  ]\n}\n");
+}
+
+void nb_figures_read_processor(char *name, size_t size)
+{
+    static const char key[] = "model name";
+    (void)snprintf(name, size, "unknown");
+    FILE *const file = fopen("/proc/cpuinfo", "r");
+    if (file == NULL) return;
+    char line[512];
+    while (fgets(line, sizeof line, file) != NULL) {
+        const char *const colon = strchr(line, ':');
+        if (colon == NULL || strncmp(line, key, sizeof key - 1) != 0) continue;
+        line[strcspn(line, "\n")] = '\0';
+        (void)snprintf(name, size, "%s", colon + 1 + strspn(colon + 1, " \t"));
+        break;
+    }
+    (void)fclose(file);
+}

@@ -1,0 +1,9 @@
+/* The groups of benchmarks. Each returns NULL, or what failed. */
+#ifndef NB_BENCH_GROUPS_H
+#define NB_BENCH_GROUPS_H
+
+#include "bench.h"
+
+const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures);
+
+#endif

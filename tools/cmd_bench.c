@@ -1,0 +1,100 @@
+/* nebel bench: how fast this build is on this processor. */
+#define _POSIX_C_SOURCE 200809L
+
+#include "commands.h"
+#include "report.h"
+
+#include "bench/bench.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { OPTION_GROUP, OPTION_JSON, OPTION_QUICK };
+
+static const char about[] = "Measures, and prints each figure beside a floor measured in the same run: what\n"
+                            "memory, Embree or older code need for the same work. The ratios compare from one\n"
+                            "machine to another, the absolute figures do not. Keep the machine quiet meanwhile;\n"
+                            "bench/NOTES.md says what to expect.\n";
+
+static const nb_option options[] = {
+    {"group", 'g', "NAME", "only one group:\nsegments"},
+    {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
+    {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
+};
+
+static const char examples[] = "Examples:\n"
+                               "  nebel bench\n"
+                               "  nebel bench --group segments --json figures.json\n"
+                               "\n"
+                               "A target that is missed is no failure: the exit status says whether it ran.\n"
+                               "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
+
+/* The path of this program; NULL where the system does not tell. */
+static const char *find_program(char *path, size_t size)
+{
+    const ssize_t length = readlink("/proc/self/exe", path, size - 1);
+    if (length <= 0) return NULL;
+    path[length] = '\0';
+    return path;
+}
+
+static void print_head(void)
+{
+    char processor[256];
+    nb_figures_read_processor(processor, sizeof processor);
+    (void)printf("nebel %s on %s\n", nebel_version(), processor);
+    (void)printf("A line: what, how much, how many times its floor, the floor, the target of that ratio.\n");
+}
+
+static int write_json(const nb_figures *figures, int quick, FILE *file, const char *path)
+{
+    nb_figures_write_json(figures, quick, file);
+    const int broken = ferror(file);
+    if (fclose(file) != 0 || broken) return nb_report_failure("bench: %s: could not be written", path);
+    return NB_DONE;
+}
+
+static int bench(const nb_bench_desc *desc, const char *json)
+{
+    nb_figures figures = {.table = stdout};
+    const char *fault = NULL;
+    FILE *const file = json != NULL ? fopen(json, "w") : NULL;
+    if (json != NULL && file == NULL) return nb_report_failure("bench: %s: %s", json, strerror(errno));
+    print_head();
+    int status = NB_DONE;
+    if (nb_bench_run(desc, &figures, &fault) != 0) status = nb_report_failure("bench: %s", fault);
+    if (file != NULL) {
+        const int written = write_json(&figures, desc->quick, file, json);
+        if (status == NB_DONE) status = written;
+    }
+    return status;
+}
+
+static int run(int count, char **words)
+{
+    nb_arguments arguments;
+    const int status = nb_options_parse(&nb_commands_bench, count, words, &arguments);
+    if (status >= 0) return status;
+    char path[4096];
+    nb_bench_desc desc = {.quick = arguments.values[OPTION_QUICK] != NULL, .program = find_program(path, sizeof path)};
+    if (arguments.values[OPTION_GROUP] != NULL) {
+        const int group = nb_options_choice(&arguments, OPTION_GROUP, nb_bench_groups, 0);
+        if (arguments.misused) return NB_MISUSED;
+        desc.group = nb_bench_groups[group];
+    }
+    return bench(&desc, arguments.values[OPTION_JSON]);
+}
+
+const nb_command nb_commands_bench = {
+    .name = "bench",
+    .summary = "how fast this build is here",
+    .synopsis = "[options]",
+    .about = about,
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .operands = "nothing",
+    .examples = examples,
+    .run = run,
+};
