@@ -38,17 +38,18 @@ static double distance_of(const nb_frame *frame, const nb_scratch *scratch, uint
 static size_t set_camera_rays(const nb_frame *frame, nb_scratch *scratch)
 {
     const nb_rays *rays = &scratch->rays;
-    const int moves = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    const double *position = frame->view.position;
     size_t count = 0;
     for (uint32_t i = 0; i < NB_BATCH; i++) {
         if (!scratch->inside[i]) continue;
-        nebel_ray *ray = &scratch->fog_rays[count];
+        scratch->fog_rays[count] = (nebel_ray){{position[0], position[1], position[2]},
+                                               {rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]},
+                                               distance_of(frame, scratch, i)};
         scratch->lanes[count++] = i;
-        for (int c = 0; c < 3; c++) {
-            ray->origin[c] = frame->view.position[c] + (moves ? rays->offset[c][i] : 0);
-            ray->direction[c] = rays->direction[c][i];
-        }
-        ray->t_max = distance_of(frame, scratch, i);
+    }
+    if (frame->view.projection != NEBEL_PROJECTION_ORTHOGRAPHIC) return count;
+    for (size_t k = 0; k < count; k++) {
+        for (int c = 0; c < 3; c++) scratch->fog_rays[k].origin[c] += rays->offset[c][scratch->lanes[k]];
     }
     return count;
 }
@@ -73,10 +74,12 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     for (size_t k = 0; k < count; k++) {
         const uint32_t i = scratch->lanes[k];
         const nebel_light *light = &scratch->fog_lights[k];
-        for (int c = 0; c < 3; c++) {
-            samples->transmittance[c][i] = (float)light->transmittance[c];
-            samples->in_scattering[c][i] = (float)light->in_scattering[c];
-        }
+        samples->transmittance[0][i] = (float)light->transmittance[0];
+        samples->transmittance[1][i] = (float)light->transmittance[1];
+        samples->transmittance[2][i] = (float)light->transmittance[2];
+        samples->in_scattering[0][i] = (float)light->in_scattering[0];
+        samples->in_scattering[1][i] = (float)light->in_scattering[1];
+        samples->in_scattering[2][i] = (float)light->in_scattering[2];
         samples->error[i] = (float)light->error;
     }
     return NEBEL_OK;
@@ -87,41 +90,50 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
 
 static size_t set_sun_rays(const nb_frame *frame, nb_scratch *scratch)
 {
-    const double *origin = frame->renderer->geometry.origin;
+    const double *origin = frame->renderer->geometry.origin, *sun = frame->lighting.sun_direction;
+    float(*start)[NB_BATCH] = scratch->points.start;
     size_t count = 0;
     for (uint32_t i = 0; i < NB_BATCH; i++) {
         if (!scratch->points.lit[i]) continue;
-        nebel_ray *ray = &scratch->fog_rays[count];
+        scratch->fog_rays[count] = (nebel_ray){
+            {origin[0] + (double)start[0][i], origin[1] + (double)start[1][i], origin[2] + (double)start[2][i]},
+            {sun[0], sun[1], sun[2]},
+            HUGE_VAL};
         scratch->lanes[count++] = i;
-        for (int c = 0; c < 3; c++) {
-            ray->origin[c] = origin[c] + (double)scratch->points.start[c][i];
-            ray->direction[c] = frame->lighting.sun_direction[c];
-        }
-        ray->t_max = HUGE_VAL;
     }
     return count;
 }
 
-/* Irradiance of the sun over pi, in samples->color. */
-static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
+/* Irradiance of the sun over pi, before fog, in samples->color. */
+NB_CLONES static void set_clear_sunlight(const float *irradiance, nb_scratch *scratch)
 {
-    static const float inverse_pi = 0.318309886f;
-    nb_light_samples *samples = &scratch->samples;
-    const float *irradiance = frame->lighting.irradiance;
+    const int *lit = scratch->points.lit;
+    const float *cosine = scratch->points.cosine;
     for (int c = 0; c < 3; c++) {
+        const float head_on = irradiance[c] * 0.318309886f;
+        float *restrict color = scratch->samples.color[c];
+        NB_SIMD
         for (int i = 0; i < NB_BATCH; i++) {
-            const float light = irradiance[c] * inverse_pi * scratch->points.cosine[i];
-            samples->color[c][i] = scratch->points.lit[i] ? light : 0;
+            const float light = head_on * cosine[i];
+            color[i] = lit[i] ? light : 0;
         }
     }
+}
+
+static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
+{
+    set_clear_sunlight(frame->lighting.irradiance, scratch);
     if (frame->renderer->fog == NULL) return NEBEL_OK;
     const size_t count = set_sun_rays(frame, scratch);
     const nebel_result result = trace_fog(frame, scratch, count);
     if (result != NEBEL_OK) return result;
+    float(*color)[NB_BATCH] = scratch->samples.color;
     for (size_t k = 0; k < count; k++) {
-        for (int c = 0; c < 3; c++) {
-            samples->color[c][scratch->lanes[k]] *= (float)scratch->fog_lights[k].transmittance[c];
-        }
+        const double *transmittance = scratch->fog_lights[k].transmittance;
+        const uint32_t i = scratch->lanes[k];
+        color[0][i] *= (float)transmittance[0];
+        color[1][i] *= (float)transmittance[1];
+        color[2][i] *= (float)transmittance[2];
     }
     return NEBEL_OK;
 }

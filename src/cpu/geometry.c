@@ -76,7 +76,8 @@ static float longest_edge(const nebel_mesh *mesh)
             const float *a = mesh->positions + 3 * (size_t)mesh->indices[3 * t + (size_t)k];
             const float *b = mesh->positions + 3 * (size_t)mesh->indices[3 * t + (size_t)(k + 1) % 3];
             const float x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
-            longest2 = fmaxf(longest2, x * x + y * y + z * z);
+            const float length2 = x * x + y * y + z * z;
+            longest2 = length2 > longest2 ? length2 : longest2;
         }
     }
     return sqrtf(longest2);
