@@ -44,7 +44,7 @@ static void test_a_turntable_keeps_its_distance_and_comes_back(void **state)
         assert_near(fabs(remainder(angle - 2 * pi * i / 8, 2 * pi)), 0);
     }
     assert_memory_equal(nebel_scene_camera(scene, 24).position, start.position, sizeof start.position);
-    assert_memory_equal(nebel_scene_camera(scene, NAN).position, start.position, sizeof start.position);
+    assert_memory_equal(nebel_scene_camera(scene, (double)NAN).position, start.position, sizeof start.position);
     nebel_destroy_scene(scene);
 }
 
@@ -67,8 +67,8 @@ static void test_keys_are_met_and_the_ends_are_still(void **state)
         assert_near(now.vertical_fov, data->camera_keys[i].camera.vertical_fov);
     }
     assert_near(nebel_scene_camera(scene, -1e9).position[0], 0);
-    assert_near(nebel_scene_camera(scene, NAN).position[0], 0);
-    assert_near(nebel_scene_camera(scene, INFINITY).position[2], 9);
+    assert_near(nebel_scene_camera(scene, (double)NAN).position[0], 0);
+    assert_near(nebel_scene_camera(scene, (double)INFINITY).position[2], 9);
     assert_near(nebel_scene_camera(scene, 10).vertical_fov, 40);
     nebel_destroy_scene(scene);
 }

@@ -72,6 +72,8 @@ static void test_what_is_not_json(void **state)
         {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": `\"\\ud800\"}]}", "an escape \\uD800 to \\uDFFF stands alone"},
         {FORMAT, "{\"nebel\": 1, \"fog\": [{\"name\": `\"\\udc00\\ud800\"}]}",
          "an escape \\uD800 to \\uDFFF stands alone"},
+        {FORMAT, "{\"nebel\": 1, \"fog\": []} /* open`", "the file ends within a comment; close it with */"},
+        {FORMAT, "/* open`", "not JSON: parse error: premature EOF"},
         {FORMAT, "`[]", "a scene is an object"},
         {FORMAT, "`12", "a scene is an object"},
     };
@@ -418,6 +420,16 @@ static void test_one_volume_has_a_limit_of_leaves(void **state)
     free(text);
 }
 
+static void test_text_has_a_largest_size(void **state)
+{
+    (void)state;
+    journal kept = {0};
+    nebel_scene *scene;
+    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    assert_int_equal(nebel_parse_scene("{}", ((size_t)1 << 30) + 1, "a.json", &desc, &scene), NEBEL_ERROR_LIMIT);
+    assert_string_equal(kept.last, "a.json: larger than 1073741824 bytes, the most that is read");
+}
+
 static void test_strange_keys_are_shown_safely(void **state)
 {
     (void)state;
@@ -461,6 +473,7 @@ int main(void)
         cmocka_unit_test(test_nesting_has_a_limit),
         cmocka_unit_test(test_numbers_have_a_longest_form),
         cmocka_unit_test(test_one_volume_has_a_limit_of_leaves),
+        cmocka_unit_test(test_text_has_a_largest_size),
         cmocka_unit_test(test_strange_keys_are_shown_safely),
         cmocka_unit_test(test_arguments_are_checked),
     };

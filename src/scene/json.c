@@ -19,6 +19,7 @@ typedef struct reader {
 /* ---- where tokens are
  * ------------------------------------------------------------------------------------------------ */
 
+/* The end of a comment; size + 1 where it has none. */
 static size_t skip_comment(const char *text, size_t size, size_t at)
 {
     const bool line = text[at + 1] == '/';
@@ -26,7 +27,7 @@ static size_t skip_comment(const char *text, size_t size, size_t at)
         if (line && text[at] == '\n') return at + 1;
         if (!line && text[at] == '/' && text[at - 1] == '*') return at + 1;
     }
-    return size;
+    return line ? size : size + 1;
 }
 
 /* The first byte of the token after `at`: yajl tells only where tokens end. */
@@ -290,7 +291,8 @@ static void report_syntax(reader *in, bool at_end)
     const size_t room = sizeof text - used - 1;
     memcpy(text + used, message, size < room ? size : room);
     yajl_free_error(in->parser, (unsigned char *)message);
-    fail_at(json, NEBEL_ERROR_FORMAT, at_end ? json->desc.size : find_token(json, in->end), text);
+    const size_t place = at_end ? json->desc.size : find_token(json, in->end);
+    fail_at(json, NEBEL_ERROR_FORMAT, place < json->desc.size ? place : json->desc.size, text);
 }
 
 /* Between setjmp and here nothing is held but yajl's memory, which is given back as a whole. */
@@ -306,7 +308,10 @@ static void run_parser(reader *in)
     yajl_status status = yajl_parse(in->parser, (const unsigned char *)json->desc.text, json->desc.size);
     const bool at_end = status == yajl_status_ok;
     if (at_end) status = yajl_complete_parse(in->parser);
-    if (status == yajl_status_error) report_syntax(in, at_end);
+    if (status == yajl_status_error)
+        report_syntax(in, at_end);
+    else if (status == yajl_status_ok && find_token(json, in->end) > json->desc.size)
+        fail_at(json, NEBEL_ERROR_FORMAT, json->desc.size, "the file ends within a comment; close it with */");
 }
 
 static void read_text(nb_json *json)
