@@ -109,6 +109,30 @@ static void test_raster_and_rays_agree(void **state)
     nebel_destroy_renderer(renderer);
 }
 
+static void test_scale_does_not_matter(void **state)
+{
+    (void)state;
+    static test_ball ball;
+    test_both *both = make_both();
+    int hits = 0;
+    for (int power = -5; power <= 9; power += 7) {
+        const double scale = pow(10, power);
+        test_ball_make(&ball, (const double[3]){0, 0, 0});
+        test_ball_set_vertices(&ball, (float)scale);
+        ball.scene.mesh_count = 1;
+        nebel_renderer *renderer = make_renderer(&ball.scene);
+        const nebel_camera camera = test_camera(scale, 2 * scale, 2 * scale, 0, 0, 0);
+        both->hits = 0;
+        compare_region(renderer, &camera, 1, both);
+        if (power == -5) hits = both->hits;
+        assert_in_range(both->hits, hits - 2, hits + 2);
+        nebel_destroy_renderer(renderer);
+    }
+    assert_in_range(both->differences, 0, 4);
+    assert_true(hits > PIXELS / 8);
+    free(both);
+}
+
 static void test_nothing_slips_through_a_closed_ball(void **state)
 {
     (void)state;
@@ -212,6 +236,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_raster_and_rays_agree),
+        cmocka_unit_test(test_scale_does_not_matter),
         cmocka_unit_test(test_nothing_slips_through_a_closed_ball),
         cmocka_unit_test(test_nothing_slips_through_corners_under_samples),
         cmocka_unit_test(test_nearer_surfaces_hide_farther_ones),

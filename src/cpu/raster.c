@@ -260,14 +260,16 @@ static inline nb_plane cross_points(double (*a)[PENDING], double (*b)[PENDING], 
                       a[0][k] * b[1][k] - a[1][k] * b[0][k]};
 }
 
-/* Stores n * sign, seen from the region's first pixel. Both signs of n give the same bits but for the sign, before the
- * growth. */
+/* Stores n * sign, seen from the region's first pixel and scaled so that one is about a pixel. Both signs of n give the
+ * same bits but for the sign, before the growth. */
 static inline void store_edge(const nb_window *window, nb_plane n, double sign, float (*edge)[PENDING], int k)
 {
-    const double x = n.x * sign, y = n.y * sign, c = n.c * sign;
+    const double steepness = (n.x < 0 ? -n.x : n.x) + (n.y < 0 ? -n.y : n.y);
+    const double scale = sign / (steepness > 0 ? steepness : 1);
+    const double x = n.x * scale, y = n.y * scale;
     edge[0][k] = (float)x;
     edge[1][k] = (float)y;
-    edge[2][k] = (float)(c + (x * window->x0 + y * window->y0) + growth * ((x < 0 ? -x : x) + (y < 0 ? -y : y)));
+    edge[2][k] = (float)(n.c * scale + (x * window->x0 + y * window->y0) + growth);
 }
 
 NB_CLONES static void set_functions(const nb_window *window, nb_pending *pending)
