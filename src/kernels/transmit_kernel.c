@@ -1,7 +1,8 @@
 /* Segments through boxes of constant density: the hot path of per-vertex fog, compiled once per instruction set.
  *
- * In float throughout: coordinates are relative to an origin near the viewer, and boxes are well conditioned. Per segment 24 to 28 bytes
- * come and 4 go; per box about 30 operations, of which only the slab test is done where every lane misses. */
+ * In float throughout: coordinates are relative to an origin near the viewer, and boxes are well conditioned. Per segment 12 or
+ * 24 bytes come and 4 go; 20 operations for the way, 22 per box and 20 for the exponential, which is left out where every
+ * lane misses. */
 #define NB_FAST
 
 #include "transmit.h"
@@ -9,6 +10,12 @@
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
+
+#include <math.h>
+#include <string.h>
+
+/* Packets travel in registers only inside one function. */
+#define INLINE static inline __attribute__((always_inline))
 
 #define JOIN_NAMES(a, b) a##b
 #define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
@@ -31,7 +38,7 @@ static nb_vec3 load_points(const float *base, size_t stride, size_t first, size_
 
 /* The same for a full packet of points that lie one after the other: three loads and shuffles instead of 3 NB_WIDTH loads. */
 #if NB_WIDTH == 4
-static nb_vec3 load_packed(const float *p)
+INLINE nb_vec3 load_packed(const float *p)
 {
     const nb_real a = nb_load_lanes(p), b = nb_load_lanes(p + 4), c = nb_load_lanes(p + 8);
     const nb_real xy = __builtin_shufflevector(a, b, 0, 3, 6, 1), yz = __builtin_shufflevector(a, b, 1, 4, 7, 2);
@@ -40,18 +47,28 @@ static nb_vec3 load_packed(const float *p)
                    __builtin_shufflevector(z, c, 0, 1, 4, 7));
 }
 #elif NB_WIDTH == 8
-static nb_vec3 load_packed(const float *p)
+typedef float half __attribute__((vector_size(16)));
+
+/* Two halves of a register, so that what follows stays within halves: crossing them costs three times as much. */
+INLINE nb_real load_halves(const float *low, const float *high)
 {
-    const nb_real a = nb_load_lanes(p), b = nb_load_lanes(p + 8), c = nb_load_lanes(p + 16);
-    const nb_real x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 0, 0);
-    const nb_real y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, 0, 0, 0);
-    const nb_real z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, 0, 0, 0);
-    return nb_vec3(__builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13),
-                   __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14),
-                   __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15));
+    half a, b;
+    memcpy(&a, low, sizeof a);
+    memcpy(&b, high, sizeof b);
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+INLINE nb_vec3 load_packed(const float *p)
+{
+    const nb_real a = load_halves(p, p + 12), b = load_halves(p + 4, p + 16), c = load_halves(p + 8, p + 20);
+    const nb_real xy = __builtin_shufflevector(b, c, 2, 3, 9, 10, 6, 7, 13, 14);
+    const nb_real yz = __builtin_shufflevector(a, b, 1, 2, 8, 9, 5, 6, 12, 13);
+    return nb_vec3(__builtin_shufflevector(a, xy, 0, 3, 8, 10, 4, 7, 12, 14),
+                   __builtin_shufflevector(yz, xy, 0, 2, 9, 11, 4, 6, 13, 15),
+                   __builtin_shufflevector(yz, c, 1, 3, 8, 11, 5, 7, 12, 15));
 }
 #elif NB_WIDTH == 16
-static nb_vec3 load_packed(const float *p)
+INLINE nb_vec3 load_packed(const float *p)
 {
     const nb_real a = nb_load_lanes(p), b = nb_load_lanes(p + 16), c = nb_load_lanes(p + 32);
     const nb_real x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
@@ -62,52 +79,83 @@ static nb_vec3 load_packed(const float *p)
                    __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31));
 }
 #else
-static nb_vec3 load_packed(const float *p)
+INLINE nb_vec3 load_packed(const float *p)
 {
     return nb_vec3(nb_splat(p[0]), nb_splat(p[1]), nb_splat(p[2]));
 }
 #endif
 
-/* A packet of segments, from + s way, 0 <= s <= 1. */
+/* ---- a packet --------------------------------------------------------------------------------------------------------- */
+
+/* A box before it meets a packet. Where all segments start at one place, low and high are relative to it. */
+typedef struct slabs {
+    float low[3], high[3];
+    float octaves; /* minus how many times a unit of length halves the light */
+} slabs;
+
+/* A packet of segments: from + s way, 0 <= s <= 1. */
 typedef struct segment {
-    nb_vec3 from, inverse; /* bounded reciprocals of the way */
-    nb_real length;
+    nb_vec3 from, inverse; /* from is 0 where the slabs are relative to it */
+    nb_real square;        /* of the length */
 } segment;
 
-static segment make_segment(nb_vec3 from, nb_vec3 to)
+INLINE segment make_segment(nb_vec3 from, nb_vec3 way)
 {
-    const nb_vec3 way = nb_sub3(to, from);
-    return (segment){from, nb_vec3(nb_rcp_bounded(way.x), nb_rcp_bounded(way.y), nb_rcp_bounded(way.z)), nb_length3(way)};
+    return (segment){from, nb_vec3(NB_F(1.0) / way.x, NB_F(1.0) / way.y, NB_F(1.0) / way.z), nb_dot3(way, way)};
 }
 
-/* The optical depth over a packet. Faces belong to one side as in nb_interval_slab. */
-static nb_real box_depth(const nb_transmit_job *job, const segment *s)
+/* Where the ways cross two planes. A segment within a plane gets a NaN there, which nb_min and nb_max pass on as their second
+ * argument and lose as their first: such a segment counts as inside the lower face and outside the upper one, so that faces belong to one
+ * side as in nb_interval_slab. */
+typedef struct crossing {
+    nb_real near, far;
+} crossing;
+
+INLINE crossing cross(nb_real low, nb_real high, nb_real inverse)
 {
-    nb_real depth = NB_F(0.0);
-    for (size_t i = 0; i < job->box_count; i++) {
-        const nb_fog_box *box = &job->boxes[i];
-        const nb_real x0 = (nb_splat(box->low[0]) - s->from.x) * s->inverse.x;
-        const nb_real x1 = (nb_splat(box->high[0]) - s->from.x) * s->inverse.x;
-        const nb_real y0 = (nb_splat(box->low[1]) - s->from.y) * s->inverse.y;
-        const nb_real y1 = (nb_splat(box->high[1]) - s->from.y) * s->inverse.y;
-        const nb_real z0 = (nb_splat(box->low[2]) - s->from.z) * s->inverse.z;
-        const nb_real z1 = (nb_splat(box->high[2]) - s->from.z) * s->inverse.z;
-        const nb_real enter = nb_max(nb_max(nb_min(x0, x1), nb_min(y0, y1)), nb_max(nb_min(z0, z1), NB_F(0.0)));
-        const nb_real leave = nb_min(nb_min(nb_max(x0, x1), nb_max(y0, y1)), nb_min(nb_max(z0, z1), NB_F(1.0)));
-        const nb_mask hit = enter < leave;
-        if (!nb_any(hit)) continue;
-        const nb_real inside = (leave - enter) * s->length * nb_splat(box->extinction);
-        depth = depth + nb_select(hit, inside, NB_F(0.0));
-    }
-    return depth;
+    const nb_real a = low * inverse, b = high * inverse;
+    return (crossing){nb_min(b, a), nb_max(b, a)};
 }
 
-static nb_real transmit_packet(const nb_transmit_job *job, nb_vec3 from, nb_vec3 to)
+/* What part of each way is inside. Never a NaN. */
+INLINE nb_real part_inside(const slabs *box, const segment *s)
 {
-    const segment s = make_segment(from, to);
-    const nb_real depth = box_depth(job, &s);
-    return nb_select(depth >= NB_F(0.0), nb_exp(-depth), NB_F(1.0));
+    const crossing x = cross(nb_splat(box->low[0]) - s->from.x, nb_splat(box->high[0]) - s->from.x, s->inverse.x);
+    const crossing y = cross(nb_splat(box->low[1]) - s->from.y, nb_splat(box->high[1]) - s->from.y, s->inverse.y);
+    const crossing z = cross(nb_splat(box->low[2]) - s->from.z, nb_splat(box->high[2]) - s->from.z, s->inverse.z);
+    const nb_real enter = nb_max(x.near, nb_max(y.near, nb_max(z.near, NB_F(0.0))));
+    const nb_real leave = nb_min(x.far, nb_min(y.far, nb_min(z.far, NB_F(1.0))));
+    return nb_max(leave - enter, NB_F(0.0));
 }
+
+/* 2^x for x <= 0, 0 below -126.5 and 1 for a NaN: 2^n as an exponent times 2^f, |f| <= 1/2, by the weighted minimax polynomial that
+ * scripts/fit_elementary.py finds; relative error 3e-7. The lowest bits of `shifted` are n + bias, whatever else it holds is
+ * shifted out. */
+INLINE nb_real power_of_half(nb_real x)
+{
+    const nb_real shifter = NB_INTEGER * NB_F(1.5) + NB_BIAS;
+    const nb_real y = nb_max(nb_min(x, NB_F(0.0)), -NB_BIAS);
+    const nb_real shifted = y + shifter;
+    const nb_real f = y - (shifted - shifter);
+    nb_real p = NB_F(0.00132645981);
+    p = p * f + NB_F(0.00967161926);
+    p = p * f + NB_F(0.05550735);
+    p = p * f + NB_F(0.240222405);
+    p = p * f + NB_F(0.693146976);
+    p = p * f + NB_F(1.0);
+    return nb_from_bits(nb_to_bits(shifted) << NB_SHIFT) * p;
+}
+
+INLINE nb_real transmit_packet(const slabs *boxes, size_t count, nb_vec3 from, nb_vec3 way)
+{
+    const segment s = make_segment(from, way);
+    nb_real octaves = NB_F(0.0);
+    for (size_t i = 0; i < count; i++) octaves = octaves + part_inside(&boxes[i], &s) * nb_splat(boxes[i].octaves);
+    if (!nb_any(octaves < NB_F(0.0))) return nb_splat(1);
+    return power_of_half(octaves * nb_sqrt(s.square));
+}
+
+/* ---- streams ---------------------------------------------------------------------------------------------------------- */
 
 static void store_points(const nb_transmit_job *job, size_t first, size_t count, nb_real value)
 {
@@ -117,19 +165,56 @@ static void store_points(const nb_transmit_job *job, size_t first, size_t count,
         *(float *)(void *)((char *)job->out + (first + i) * job->out_stride) = lane[i];
 }
 
+/* A copy, which no store to the output can change; relative to the start where all segments share it. */
+static void set_slabs(const nb_transmit_job *job, slabs *boxes)
+{
+    const float ln2 = 0.693147181f, most = 1e30f; /* 0 times it is 0 */
+    for (size_t i = 0; i < job->box_count; i++) {
+        for (int c = 0; c < 3; c++) {
+            const float start = job->from_stride == 0 ? job->from[c] : 0;
+            boxes[i].low[c] = job->boxes[i].low[c] - start;
+            boxes[i].high[c] = job->boxes[i].high[c] - start;
+        }
+        boxes[i].octaves = -fminf(job->boxes[i].extinction, most) / ln2;
+    }
+}
+
+/* Neighbouring packets without gaps in memory: full packets only. Returns how many segments are done. `fans` is a constant, so
+ * that each way of use gets a loop of its own. */
+INLINE size_t transmit_packed(const nb_transmit_job *job, const slabs *boxes, int fans)
+{
+    const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
+    nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
+    size_t i = 0;
+    for (; i + NB_WIDTH <= job->count; i += NB_WIDTH) {
+        if (!fans) from = load_packed(job->from + 3 * i);
+        const nb_vec3 way = nb_sub3(load_packed(job->to + 3 * i), from);
+        nb_store_lanes(job->out + i, transmit_packet(boxes, job->box_count, fans ? zero : from, way));
+    }
+    return i;
+}
+
+/* Any strides, any number. */
+static void transmit_spread(const nb_transmit_job *job, const slabs *boxes, size_t first)
+{
+    const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
+    for (size_t i = first; i < job->count; i += NB_WIDTH) {
+        const size_t count = job->count - i < NB_WIDTH ? job->count - i : NB_WIDTH;
+        const nb_vec3 from = load_points(job->from, job->from_stride, i, count);
+        const nb_vec3 way = nb_sub3(load_points(job->to, job->to_stride, i, count), from);
+        store_points(job, i, count, transmit_packet(boxes, job->box_count, job->from_stride == 0 ? zero : from, way));
+    }
+}
+
 void SUFFIXED(nb_transmit_, NB_SUFFIX)(const nb_transmit_job *job)
 {
     const size_t packed = 3 * sizeof(float);
-    nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
-    size_t i = 0;
-    if (job->to_stride == packed && job->out_stride == sizeof(float) && (job->from_stride == 0 || job->from_stride == packed))
-        for (; i + NB_WIDTH <= job->count; i += NB_WIDTH) {
-            if (job->from_stride != 0) from = load_packed(job->from + 3 * i);
-            nb_store_lanes(job->out + i, transmit_packet(job, from, load_packed(job->to + 3 * i)));
-        }
-    for (; i < job->count; i += NB_WIDTH) {
-        const size_t count = job->count - i < NB_WIDTH ? job->count - i : NB_WIDTH;
-        from = load_points(job->from, job->from_stride, i, count);
-        store_points(job, i, count, transmit_packet(job, from, load_points(job->to, job->to_stride, i, count)));
+    slabs boxes[NB_TRANSMIT_BOXES];
+    size_t done = 0;
+    set_slabs(job, boxes);
+    if (job->to_stride == packed && job->out_stride == sizeof(float)) {
+        if (job->from_stride == 0) done = transmit_packed(job, boxes, 1);
+        if (job->from_stride == packed) done = transmit_packed(job, boxes, 0);
     }
+    transmit_spread(job, boxes, done);
 }

@@ -33,9 +33,6 @@ static nb_transmit_fn *kernel_for(nebel_isa isa)
     return found;
 }
 
-/* More boxes than this are better asked through the tree. */
-#define MOST_BOXES 64
-
 static int is_plain_box(const nb_volume *body)
 {
     return body->operation == NEBEL_OPERATION_ADD && body->density.type == NEBEL_DENSITY_CONSTANT &&
@@ -45,7 +42,7 @@ static int is_plain_box(const nb_volume *body)
 /* The fog as boxes relative to `origin`; 0 when it is something else. */
 static int list_boxes(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes)
 {
-    if (snapshot->medium_count > MOST_BOXES) return 0;
+    if (snapshot->medium_count > NB_TRANSMIT_BOXES) return 0; /* more are better asked through the tree */
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         if (!is_plain_box(body)) return 0;
@@ -120,7 +117,7 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
     nebel_segments s = *segments;
     if (s.to_stride == 0) s.to_stride = 3 * sizeof(float);
     const size_t stride = out_stride == 0 ? sizeof(float) : out_stride;
-    nb_fog_box boxes[MOST_BOXES];
+    nb_fog_box boxes[NB_TRANSMIT_BOXES];
     if (!list_boxes(snapshot, s.origin, channel, boxes)) return trace_segments(snapshot, isa, channel, n, &s, out, stride);
     kernel(&(nb_transmit_job){boxes, snapshot->medium_count, n, s.from, s.to, s.from_stride, s.to_stride, stride, out});
     return NEBEL_OK;
