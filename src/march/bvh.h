@@ -57,7 +57,8 @@ typedef struct nb_bvh_cursor {
     int depth;
     nb_bvh_beam beam[3];
     double beam_t_max;
-    /* Per axis and active lane: the origin as the lower and as the upper faces see it, moved by the padding of bvh.c. */
+    /* Per axis and active lane: the origin as the lower and as the upper faces see it, moved by the padding of bvh.c.
+     */
     double below[3][NB_BVH_LANES], above[3][NB_BVH_LANES], inverse[3][NB_BVH_LANES], t_max[NB_BVH_LANES];
     uint32_t stack[NB_BVH_DEPTH];
 } nb_bvh_cursor;
