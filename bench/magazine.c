@@ -43,8 +43,8 @@ static int intersect_box(const nb_old_box *box, const nb_old_vector *origin, con
 /* How much of the way to the vertex is inside, when the ray is inside from `in` to `out`. */
 static float distance_in_fog(float in, float out, float vertex)
 {
-    if (out <= 0) return 0;      /* fog behind the camera */
-    if (in >= vertex) return 0;  /* fog behind the vertex */
+    if (out <= 0) return 0;                      /* fog behind the camera */
+    if (in >= vertex) return 0;                  /* fog behind the vertex */
     if (in <= 0 && out >= vertex) return vertex; /* both inside */
     if (in <= 0) return out;                     /* camera inside */
     if (out >= vertex) return vertex - in;       /* vertex inside */

@@ -1,4 +1,5 @@
-/* Fog per vertex as programs had it around 2000: one vertex after the other, by cases. What the kernels are measured against. */
+/* Fog per vertex as programs had it around 2000: one vertex after the other, by cases. What the kernels are measured
+ * against. */
 #ifndef NB_BENCH_MAGAZINE_H
 #define NB_BENCH_MAGAZINE_H
 

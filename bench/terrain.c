@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A number from 0 to 1 for each point of the lattice. Multiplications and shifts that let every bit of the input reach every
- * bit of the result. */
+/* A number from 0 to 1 for each point of the lattice. Multiplications and shifts that let every bit of the input reach
+ * every bit of the result. */
 static float lattice(uint32_t x, uint32_t z, uint32_t octave)
 {
     uint32_t bits = x * 0x9e3779b1u ^ z * 0x85ebca77u ^ octave * 0xc2b2ae3du;

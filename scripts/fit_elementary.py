@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Derives the polynomial coefficients of src/formulas/elementary.inc.
+"""Derives the polynomial coefficients of src/formulas/elementary.inc and src/kernels/octaves.h.
 
 Each table is the weighted minimax polynomial found by the Remez exchange in 60-digit arithmetic: the polynomial p of
 the given degree for which max |weight * (f - p)| over the interval is smallest. Deterministic; needs mpmath.
 
     fit_elementary.py                  print the tables with the error of each
-    fit_elementary.py --check FILE     exit 1 unless every coefficient stands in FILE as printed
+    fit_elementary.py --check FILE...  exit 1 unless every coefficient stands in one of the files as printed
 """
 import sys
 
@@ -128,15 +128,21 @@ def erfcx_mapped(t):
     return (x + ERFCX_POLE) * erfcx(x)
 
 
+def exp2_tail(f):
+    """(2^f - 1) / f."""
+    return fill(f, 0, log(mpf(2)), lambda f: expm1(f * log(mpf(2))) / f)
+
+
 HALF_LN2 = log(mpf(2)) / 2 * mpf("1.001")
 LOG_Z = ((sqrt(mpf(2)) - 1) / (sqrt(mpf(2)) + 1)) ** 2 * mpf("1.001")
 
 TABLES = [
-    # name, function, weight (so that the error is that of the final function, relative), interval, degrees
+    # name, function, weight (so that the error is that of the final function, relative), interval, degrees in float and double (None: not used)
     ("exp: (e^r - 1 - r - r^2/2) / r^3", exp_tail, lambda r: abs(r) ** 3 + mpf(10) ** -9, (-HALF_LN2, HALF_LN2), 3, 8),
     ("log: (log((1+s)/(1-s))/s - 2) / s^2 in s^2", log_tail, lambda z: z / 2 + mpf(10) ** -9, (0, LOG_Z), 2, 6),
     ("erf: erf(x)/x - 1 in x^2", erf_tail, lambda z: 1 / (1 + erf_tail(z)), (0, mpf("1.001")), 6, 11),
     ("erfcx: (x + 2) erfcx(x) in t = (x - 2)/(x + 2)", erfcx_mapped, lambda t: 1 / erfcx_mapped(t), (-1, 1), 11, 26),
+    ("octaves: (2^f - 1) / f", exp2_tail, lambda f: abs(f) / 2 ** f + mpf(10) ** -9, (mpf("-0.5005"), mpf("0.5005")), 4, None),
 ]
 
 CONSTANTS = [
@@ -155,6 +161,8 @@ def literals():
     """(heading, [literal, ...]) for every table, float then double."""
     for name, f, weight, (lo, hi), single, double in TABLES:
         for kind, degree, count in (("float", single, 9), ("double", double, 17)):
+            if degree is None:
+                continue
             coefficients, worst = remez(f, weight, lo, hi, degree)
             heading = "%s, %s, degree %d, weighted error %s" % (name, kind, degree, mp.nstr(worst, 3))
             yield heading, ["NB_F(%s)" % digits(c, count) for c in coefficients]
@@ -162,7 +170,7 @@ def literals():
 
 
 def main(arguments):
-    text = open(arguments[1]).read() if arguments[:1] == ["--check"] else None
+    text = "".join(open(path).read() for path in arguments[1:]) if arguments[:1] == ["--check"] else None
     missing = 0
     for heading, values in literals():
         print(heading)

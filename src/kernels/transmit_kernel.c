@@ -11,11 +11,10 @@
 
 #include "formulas/elementary.inc"
 
+#include "octaves.h"
+
 #include <math.h>
 #include <string.h>
-
-/* Packets travel in registers only inside one function. */
-#define INLINE static inline __attribute__((always_inline))
 
 #define JOIN_NAMES(a, b) a##b
 #define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
@@ -38,7 +37,7 @@ static nb_vec3 load_points(const float *base, size_t stride, size_t first, size_
 
 /* The same for a full packet of points that lie one after the other: three loads and shuffles instead of 3 NB_WIDTH loads. */
 #if NB_WIDTH == 4
-INLINE nb_vec3 load_packed(const float *p)
+NB_INLINE nb_vec3 load_packed(const float *p)
 {
     const nb_real a = nb_load_lanes(p), b = nb_load_lanes(p + 4), c = nb_load_lanes(p + 8);
     const nb_real xy = __builtin_shufflevector(a, b, 0, 3, 6, 1), yz = __builtin_shufflevector(a, b, 1, 4, 7, 2);
@@ -50,7 +49,7 @@ INLINE nb_vec3 load_packed(const float *p)
 typedef float half __attribute__((vector_size(16)));
 
 /* Two halves of a register, so that what follows stays within halves: crossing them costs three times as much. */
-INLINE nb_real load_halves(const float *low, const float *high)
+NB_INLINE nb_real load_halves(const float *low, const float *high)
 {
     half a, b;
     memcpy(&a, low, sizeof a);
@@ -58,7 +57,7 @@ INLINE nb_real load_halves(const float *low, const float *high)
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-INLINE nb_vec3 load_packed(const float *p)
+NB_INLINE nb_vec3 load_packed(const float *p)
 {
     const nb_real a = load_halves(p, p + 12), b = load_halves(p + 4, p + 16), c = load_halves(p + 8, p + 20);
     const nb_real xy = __builtin_shufflevector(b, c, 2, 3, 9, 10, 6, 7, 13, 14);
@@ -68,7 +67,7 @@ INLINE nb_vec3 load_packed(const float *p)
                    __builtin_shufflevector(yz, c, 1, 3, 8, 11, 5, 7, 12, 15));
 }
 #elif NB_WIDTH == 16
-INLINE nb_vec3 load_packed(const float *p)
+NB_INLINE nb_vec3 load_packed(const float *p)
 {
     const nb_real a = nb_load_lanes(p), b = nb_load_lanes(p + 16), c = nb_load_lanes(p + 32);
     const nb_real x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
@@ -79,7 +78,7 @@ INLINE nb_vec3 load_packed(const float *p)
                    __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31));
 }
 #else
-INLINE nb_vec3 load_packed(const float *p)
+NB_INLINE nb_vec3 load_packed(const float *p)
 {
     return nb_vec3(nb_splat(p[0]), nb_splat(p[1]), nb_splat(p[2]));
 }
@@ -90,7 +89,8 @@ INLINE nb_vec3 load_packed(const float *p)
 /* A box before it meets a packet. Where all segments start at one place, low and high are relative to it. */
 typedef struct slabs {
     float low[3], high[3];
-    float octaves; /* minus how many times a unit of length halves the light */
+    float octaves;        /* minus how many times a unit of length halves the light */
+    float least[3], most[3]; /* a way that is less or more on some axis misses; for a shared start only */
 } slabs;
 
 /* A packet of segments: from + s way, 0 <= s <= 1. */
@@ -99,7 +99,7 @@ typedef struct segment {
     nb_real square;        /* of the length */
 } segment;
 
-INLINE segment make_segment(nb_vec3 from, nb_vec3 way)
+NB_INLINE segment make_segment(nb_vec3 from, nb_vec3 way)
 {
     return (segment){from, nb_vec3(NB_F(1.0) / way.x, NB_F(1.0) / way.y, NB_F(1.0) / way.z), nb_dot3(way, way)};
 }
@@ -111,14 +111,14 @@ typedef struct crossing {
     nb_real near, far;
 } crossing;
 
-INLINE crossing cross(nb_real low, nb_real high, nb_real inverse)
+NB_INLINE crossing cross(nb_real low, nb_real high, nb_real inverse)
 {
     const nb_real a = low * inverse, b = high * inverse;
     return (crossing){nb_min(b, a), nb_max(b, a)};
 }
 
 /* What part of each way is inside. Never a NaN. */
-INLINE nb_real part_inside(const slabs *box, const segment *s)
+NB_INLINE nb_real part_inside(const slabs *box, const segment *s)
 {
     const crossing x = cross(nb_splat(box->low[0]) - s->from.x, nb_splat(box->high[0]) - s->from.x, s->inverse.x);
     const crossing y = cross(nb_splat(box->low[1]) - s->from.y, nb_splat(box->high[1]) - s->from.y, s->inverse.y);
@@ -128,31 +128,17 @@ INLINE nb_real part_inside(const slabs *box, const segment *s)
     return nb_max(leave - enter, NB_F(0.0));
 }
 
-/* 2^x for x <= 0, 0 below -126.5 and 1 for a NaN: 2^n as an exponent times 2^f, |f| <= 1/2, by the weighted minimax polynomial that
- * scripts/fit_elementary.py finds; relative error 3e-7. The lowest bits of `shifted` are n + bias, whatever else it holds is
- * shifted out. */
-INLINE nb_real power_of_half(nb_real x)
-{
-    const nb_real shifter = NB_INTEGER * NB_F(1.5) + NB_BIAS;
-    const nb_real y = nb_max(nb_min(x, NB_F(0.0)), -NB_BIAS);
-    const nb_real shifted = y + shifter;
-    const nb_real f = y - (shifted - shifter);
-    nb_real p = NB_F(0.00132645981);
-    p = p * f + NB_F(0.00967161926);
-    p = p * f + NB_F(0.05550735);
-    p = p * f + NB_F(0.240222405);
-    p = p * f + NB_F(0.693146976);
-    p = p * f + NB_F(1.0);
-    return nb_from_bits(nb_to_bits(shifted) << NB_SHIFT) * p;
-}
-
-INLINE nb_real transmit_packet(const slabs *boxes, size_t count, nb_vec3 from, nb_vec3 way)
+/* Light over the ways through the boxes named in `list`. */
+NB_INLINE nb_real transmit_packet(const slabs *boxes, const unsigned char *list, size_t count, nb_vec3 from, nb_vec3 way)
 {
     const segment s = make_segment(from, way);
     nb_real octaves = NB_F(0.0);
-    for (size_t i = 0; i < count; i++) octaves = octaves + part_inside(&boxes[i], &s) * nb_splat(boxes[i].octaves);
+    for (size_t i = 0; i < count; i++) {
+        const slabs *box = &boxes[list[i]];
+        octaves = octaves + part_inside(box, &s) * nb_splat(box->octaves);
+    }
     if (!nb_any(octaves < NB_F(0.0))) return nb_splat(1);
-    return power_of_half(octaves * nb_sqrt(s.square));
+    return nb_light_after(octaves * nb_sqrt(s.square));
 }
 
 /* ---- streams ---------------------------------------------------------------------------------------------------------- */
@@ -165,6 +151,15 @@ static void store_points(const nb_transmit_job *job, size_t first, size_t count,
         *(float *)(void *)((char *)job->out + (first + i) * job->out_stride) = lane[i];
 }
 
+/* A start outside two planes is left behind by them where the other end is so, too. The margin covers the roundings of `cross`:
+ * beyond it a crossing comes out at 1 or more, or at 0 or less, so that leaving a box out changes no bit. */
+static void set_limits(slabs *box, int c)
+{
+    const float margin = 1 - 0x1p-20f;
+    box->least[c] = box->low[c] > 0 ? box->low[c] * margin : -HUGE_VALF;
+    box->most[c] = box->high[c] < 0 ? box->high[c] * margin : HUGE_VALF;
+}
+
 /* A copy, which no store to the output can change; relative to the start where all segments share it. */
 static void set_slabs(const nb_transmit_job *job, slabs *boxes)
 {
@@ -174,22 +169,101 @@ static void set_slabs(const nb_transmit_job *job, slabs *boxes)
             const float start = job->from_stride == 0 ? job->from[c] : 0;
             boxes[i].low[c] = job->boxes[i].low[c] - start;
             boxes[i].high[c] = job->boxes[i].high[c] - start;
+            set_limits(&boxes[i], c);
         }
         boxes[i].octaves = -fminf(job->boxes[i].extinction, most) / ln2;
     }
 }
 
-/* Neighbouring packets without gaps in memory: full packets only. Returns how many segments are done. `fans` is a constant, so
- * that each way of use gets a loop of its own. */
-INLINE size_t transmit_packed(const nb_transmit_job *job, const slabs *boxes, int fans)
+/* ---- from one place ---------------------------------------------------------------------------------------------------- */
+
+/* Boxes are left out for whole blocks, because asking costs half as much as the box. With few boxes blocks are short, so that memory and
+ * arithmetic overlap. */
+enum { PACKETS = 8, FEW_BOXES = 4 };
+
+typedef struct block {
+    nb_vec3 way[PACKETS];
+    nb_vec3 low, high; /* over the packets, lane by lane */
+} block;
+
+NB_INLINE nb_vec3 least3(nb_vec3 a, nb_vec3 b)
+{
+    return nb_vec3(nb_min(a.x, b.x), nb_min(a.y, b.y), nb_min(a.z, b.z));
+}
+
+NB_INLINE nb_vec3 most3(nb_vec3 a, nb_vec3 b)
+{
+    return nb_vec3(nb_max(a.x, b.x), nb_max(a.y, b.y), nb_max(a.z, b.z));
+}
+
+NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *made)
+{
+    made->low = made->high = made->way[0] = nb_sub3(load_packed(to), from);
+    for (size_t k = 1; k < packets; k++) {
+        const nb_vec3 way = nb_sub3(load_packed(to + 3 * NB_WIDTH * k), from);
+        made->low = least3(way, made->low);
+        made->high = most3(way, made->high);
+        made->way[k] = way;
+    }
+}
+
+/* Whether every way of the block stays on one side of the box. */
+NB_INLINE int is_missed(const slabs *box, const block *b)
+{
+    const nb_mask x = nb_or(b->high.x < nb_splat(box->least[0]), b->low.x > nb_splat(box->most[0]));
+    const nb_mask y = nb_or(b->high.y < nb_splat(box->least[1]), b->low.y > nb_splat(box->most[1]));
+    const nb_mask z = nb_or(b->high.z < nb_splat(box->least[2]), b->low.z > nb_splat(box->most[2]));
+    return nb_all(nb_or(nb_or(x, y), z));
+}
+
+NB_INLINE size_t list_boxes(const slabs *boxes, size_t count, const block *b, unsigned char *list)
+{
+    size_t found = 0;
+    for (size_t i = 0; i < count; i++) {
+        list[found] = (unsigned char)i;
+        found += !is_missed(&boxes[i], b);
+    }
+    return found;
+}
+
+/* Blocks of at most `most` packets, full packets only. Returns how many segments are done. */
+NB_INLINE size_t transmit_fan(const nb_transmit_job *job, const slabs *boxes, size_t most)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
-    nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
+    const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
+    const size_t all = job->count / NB_WIDTH;
+    unsigned char list[NB_TRANSMIT_BOXES];
+    block b;
+    for (size_t first = 0; first < all; first += most) {
+        const size_t packets = all - first < most ? all - first : most;
+        load_block(job->to + 3 * NB_WIDTH * first, from, packets, &b);
+        const size_t count = list_boxes(boxes, job->box_count, &b, list);
+        float *const out = job->out + NB_WIDTH * first;
+        for (size_t k = 0; k < packets; k++) {
+            const nb_real light = count == 0 ? nb_splat(1) : transmit_packet(boxes, list, count, zero, b.way[k]);
+            nb_store_lanes(out + NB_WIDTH * k, light);
+        }
+    }
+    return NB_WIDTH * all;
+}
+
+/* ---- any segments ------------------------------------------------------------------------------------------------------ */
+
+static void list_all(unsigned char *list)
+{
+    for (int i = 0; i < NB_TRANSMIT_BOXES; i++) list[i] = (unsigned char)i;
+}
+
+/* Both ends one after the other: full packets only. Returns how many segments are done. */
+static size_t transmit_pairs(const nb_transmit_job *job, const slabs *boxes)
+{
+    unsigned char list[NB_TRANSMIT_BOXES];
+    list_all(list);
     size_t i = 0;
     for (; i + NB_WIDTH <= job->count; i += NB_WIDTH) {
-        if (!fans) from = load_packed(job->from + 3 * i);
+        const nb_vec3 from = load_packed(job->from + 3 * i);
         const nb_vec3 way = nb_sub3(load_packed(job->to + 3 * i), from);
-        nb_store_lanes(job->out + i, transmit_packet(boxes, job->box_count, fans ? zero : from, way));
+        nb_store_lanes(job->out + i, transmit_packet(boxes, list, job->box_count, from, way));
     }
     return i;
 }
@@ -198,11 +272,14 @@ INLINE size_t transmit_packed(const nb_transmit_job *job, const slabs *boxes, in
 static void transmit_spread(const nb_transmit_job *job, const slabs *boxes, size_t first)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
+    unsigned char list[NB_TRANSMIT_BOXES];
+    list_all(list);
     for (size_t i = first; i < job->count; i += NB_WIDTH) {
         const size_t count = job->count - i < NB_WIDTH ? job->count - i : NB_WIDTH;
         const nb_vec3 from = load_points(job->from, job->from_stride, i, count);
         const nb_vec3 way = nb_sub3(load_points(job->to, job->to_stride, i, count), from);
-        store_points(job, i, count, transmit_packet(boxes, job->box_count, job->from_stride == 0 ? zero : from, way));
+        const nb_vec3 start = job->from_stride == 0 ? zero : from;
+        store_points(job, i, count, transmit_packet(boxes, list, job->box_count, start, way));
     }
 }
 
@@ -213,8 +290,9 @@ void SUFFIXED(nb_transmit_, NB_SUFFIX)(const nb_transmit_job *job)
     size_t done = 0;
     set_slabs(job, boxes);
     if (job->to_stride == packed && job->out_stride == sizeof(float)) {
-        if (job->from_stride == 0) done = transmit_packed(job, boxes, 1);
-        if (job->from_stride == packed) done = transmit_packed(job, boxes, 0);
+        if (job->from_stride == 0 && job->box_count < FEW_BOXES) done = transmit_fan(job, boxes, 1);
+        if (job->from_stride == 0 && job->box_count >= FEW_BOXES) done = transmit_fan(job, boxes, PACKETS);
+        if (job->from_stride == packed) done = transmit_pairs(job, boxes);
     }
     transmit_spread(job, boxes, done);
 }
