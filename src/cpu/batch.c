@@ -54,10 +54,10 @@ static size_t set_camera_rays(const nb_frame *frame, nb_scratch *scratch)
     return count;
 }
 
-static nebel_result trace_fog(const nb_frame *frame, nb_scratch *scratch, size_t count)
+static nebel_result trace_fog(const nb_frame *frame, const nebel_trace_desc *trace, nb_scratch *scratch, size_t count)
 {
     if (count == 0) return NEBEL_OK;
-    return nebel_trace(frame->renderer->fog, &frame->trace, count, scratch->fog_rays, sizeof(nebel_ray),
+    return nebel_trace(frame->renderer->fog, trace, count, scratch->fog_rays, sizeof(nebel_ray),
                        scratch->fog_lights, sizeof(nebel_light));
 }
 
@@ -69,7 +69,7 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
         return NEBEL_OK;
     }
     const size_t count = set_camera_rays(frame, scratch);
-    const nebel_result result = trace_fog(frame, scratch, count);
+    const nebel_result result = trace_fog(frame, &frame->trace, scratch, count);
     if (result != NEBEL_OK) return result;
     for (size_t k = 0; k < count; k++) {
         const uint32_t i = scratch->lanes[k];
@@ -125,7 +125,9 @@ static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
     set_clear_sunlight(frame->lighting.irradiance, scratch);
     if (frame->renderer->fog == NULL) return NEBEL_OK;
     const size_t count = set_sun_rays(frame, scratch);
-    const nebel_result result = trace_fog(frame, scratch, count);
+    nebel_trace_desc trace = frame->trace;
+    trace.transmittance_only = 1;
+    const nebel_result result = trace_fog(frame, &trace, scratch, count);
     if (result != NEBEL_OK) return result;
     float(*color)[NB_BATCH] = scratch->samples.color;
     for (size_t k = 0; k < count; k++) {

@@ -65,13 +65,24 @@ static const char *fault_of_ray(const nebel_ray *ray)
     return ray->t_max >= 0 ? NULL : "t_max must be 0 or more";
 }
 
+/* The same in one expression without a branch, for the many rays that are right. */
+static int is_valid(const nebel_ray *ray)
+{
+    const double *o = ray->origin, *d = ray->direction;
+    const double far = fmax(fmax(fabs(o[0]), fabs(o[1])), fabs(o[2]));
+    const double steepest = fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
+    return (far <= LARGEST_COORDINATE) & (steepest > 0) & (steepest < HUGE_VAL) & (ray->t_max >= 0) &
+           (o[0] == o[0]) & (o[1] == o[1]) & (o[2] == o[2]);
+}
+
 static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const nebel_ray *rays, size_t stride,
                                size_t *failed)
 {
     if (snapshot == NULL || (n > 0 && rays == NULL)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
         const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * stride);
-        const char *fault = fault_of_ray(ray);
+        if (is_valid(ray)) continue;
+        const char *fault = fault_of_ray(ray); /* NULL for a direction so long that only its sum overflows */
         if (fault == NULL) continue;
         if (failed != NULL) *failed = i;
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "ray %zu: %s", i, fault);
@@ -104,6 +115,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(desc->isa));
     nb_trace_job job = {.snapshot = snapshot,
                         .budget = tolerance * fmax(1, snapshot->largest_radiance),
+                        .transmittance_only = desc->transmittance_only,
                         .count = n,
                         .rays = rays,
                         .ray_stride = ray_stride,

@@ -224,6 +224,10 @@ static gathered nothing_gathered(void)
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
 {
     const piece_sum sum = sum_piece(m, p);
+    if (may->transmittance_only) {
+        pass_piece(g, &sum);
+        return;
+    }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
@@ -237,6 +241,22 @@ static void gather_piece(const march *m, const piece *p, const allowance *may, g
     pass_piece(g, &sum);
 }
 
+/* One leaf of fog is one piece: the walk below would find the same. */
+static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *unbounded)
+{
+    const leaf_span *span = &m->spans[0];
+    const nb_mask lanes = nb_narrow_mask(span->enter < span->leave);
+    const piece p = {span->enter, span->leave, nb_narrow(span->leave - span->enter), lanes};
+    m->contacts[0].inside = lanes;
+    gather_piece(m, &p, may, g, unbounded);
+}
+
+static int is_single(const march *m)
+{
+    return m->contact_count == 1 && m->span_count == 1 &&
+           m->contacts[0].medium->body.operation == NEBEL_OPERATION_ADD && !nb_any(ends_matter(m));
+}
+
 /* From event to event along all rays at once. */
 static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
 {
@@ -245,6 +265,11 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
     nb_wmask lanes = m->rays.t_max > NB_W(0.0);
     const nb_mask watched = ends_matter(m);
     *unbounded = nb_mask_false;
+    if (m->contact_count == 0) return g;
+    if (is_single(m)) {
+        gather_single(m, may, &g, unbounded);
+        return g;
+    }
     for (;;) {
         const nb_wide next = next_event(m, t);
         lanes = nb_wand(lanes, next <= NB_WFAR);
@@ -275,7 +300,7 @@ static nb_real most_radiance(const march *m)
 
 /* The bound of the absolute error of all six numbers. exp(-depth) is steepest on the thin side, so the transmittance errs
  * most where the optical depth is less by its error. */
-static nb_real bound_error(const march *m, const gathered *g)
+static nb_real bound_error(const march *m, const gathered *g, int transmittance_only)
 {
     const nb_mask watched = ends_matter(m);
     const nb_real pieces = m->event_count + NB_F(4.0);
@@ -289,19 +314,20 @@ static nb_real bound_error(const march *m, const gathered *g)
         transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + NB_F(4.0) * NB_EPSILON * g->transmittance[c]);
         radiance = nb_max(radiance, end_light + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
+    if (transmittance_only) return transmittance;
     return nb_max(transmittance, nb_min(radiance + g->radiance_error, most_radiance(m)));
 }
 
-static void store_light(const march *m, const gathered *g, nebel_light *lights, size_t stride, size_t count)
+static void store_light(const nb_trace_job *job, const march *m, const gathered *g, size_t first, size_t count)
 {
     nb_scalar lane[7][NB_WIDTH];
     for (int c = 0; c < 3; c++) {
         nb_store_lanes(lane[c], g->transmittance[c]);
         nb_store_lanes(lane[3 + c], g->radiance[c]);
     }
-    nb_store_lanes(lane[6], bound_error(m, g));
+    nb_store_lanes(lane[6], bound_error(m, g, job->transmittance_only));
     for (size_t i = 0; i < count; i++) {
-        nebel_light *light = (nebel_light *)(void *)((char *)lights + i * stride);
+        nebel_light *light = (nebel_light *)(void *)((char *)job->lights + (first + i) * job->light_stride);
         for (int c = 0; c < 3; c++) {
             light->transmittance[c] = (double)lane[c][i];
             light->in_scattering[c] = (double)lane[3 + c][i];
@@ -312,10 +338,11 @@ static void store_light(const march *m, const gathered *g, nebel_light *lights, 
 
 /* Where the budget goes: most by loss of transmittance and by length, a tenth to the last steps of the pieces, of which
  * there are at most two per leaf. */
-static allowance share_budget(const nebel_snapshot *snapshot, double budget)
+static allowance share_budget(const nb_trace_job *job)
 {
-    const double radiance = snapshot->largest_radiance > 1 ? snapshot->largest_radiance : 1;
-    return (allowance){REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget), choose_ellipse(budget / radiance)};
+    const double budget = job->budget, most = job->snapshot->largest_radiance;
+    const double radiance = most > 1 ? most : 1;
+    return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget), choose_ellipse(budget / radiance)};
 }
 
 static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
@@ -335,8 +362,7 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
             job->failed = first + i;
             return NEBEL_ERROR_UNBOUNDED;
         }
-    nebel_light *lights = (nebel_light *)(void *)((char *)job->lights + first * job->light_stride);
-    store_light(&w->m, &g, lights, job->light_stride, count);
+    store_light(job, &w->m, &g, first, count);
     return NEBEL_OK;
 }
 
@@ -344,7 +370,7 @@ nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
 {
     workspace w;
     open_workspace(&w);
-    const allowance may = share_budget(job->snapshot, job->budget);
+    const allowance may = share_budget(job);
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < job->count && result == NEBEL_OK; i += NB_WIDTH) result = trace_packet(job, &w, &may, i);
     close_workspace(&w, &job->snapshot->allocator);

@@ -7,6 +7,7 @@
 typedef struct nb_trace_job {
     const nebel_snapshot *snapshot;
     double budget; /* what adaptive integration may add to the error of in-scattering, absolute */
+    int transmittance_only;
     size_t count;
     const nebel_ray *rays; /* checked; strides in bytes */
     size_t ray_stride, light_stride;

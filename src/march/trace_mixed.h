@@ -208,6 +208,7 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
 /* What the whole march may spend, and how it is shared out: by the loss of transmittance, by length, and a little for each
  * piece's last step, so that a vanishing tail is not halved for ever. */
 typedef struct allowance {
+    int transmittance_only; /* nothing to spend it on */
     nb_real drop_share, length_share, last_share;
     nb_real ellipse;
 } allowance;

@@ -182,7 +182,7 @@ static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *lea
     k->offset = nb_wscale3(nb_wsub3(local.p, middle), inverse);
     k->slope = nb_wscale3(local.d, inverse);
     k->size = nb_wscale3(nb_wsub3(high, low), NB_W(0.5) * inverse);
-    k->noise = nb_narrow(local.reach * inverse) * NB_F(3.0);
+    k->noise = nb_narrow(local.reach * inverse) * NB_F(6.0) + NB_F(64.0) * nb_narrow(NB_WEPSILON * (k->size.x + k->size.y + k->size.z));
 }
 
 static void profile_contact(contact *k, const packet *rays)
@@ -269,10 +269,27 @@ static int grows_without_bound(const nebel_density *density)
 
 /* ---- meeting the fog ---------------------------------------------------------------------------------------------------- */
 
-/* How dense a medium may be at t, for what an uncertain end there may do: the profiles end at 1, but one grows. */
-static nb_real end_density(const contact *k, nb_wide t)
+/* The steepest change of the density along the ray, per metre, of the profiles that stay below 1. */
+static nb_real steepness(const contact *k)
 {
-    return grows_without_bound(&k->medium->body.density) ? contact_density(k, t) : NB_F(1.0);
+    const nebel_density *density = &k->medium->body.density;
+    const nb_real slope = nb_abs(nb_narrow(k->slope.x));
+    switch (density->type) {
+    case NEBEL_DENSITY_CONSTANT: return NB_F(0.0);
+    case NEBEL_DENSITY_RADIAL: return slope * REAL(2 * density->power);
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return slope + nb_abs(nb_narrow(k->slope.y)) + nb_abs(nb_narrow(k->slope.z));
+    default: return slope;
+    }
+}
+
+/* How dense a medium may be within slack of t, for what an uncertain end there may do. */
+static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
+{
+    const nb_real density = contact_density(k, t);
+    if (grows_without_bound(&k->medium->body.density))
+        return nb_min(density * nb_exp(nb_min(steepness(k) * slack, NB_F(80.0))), NB_FAR);
+    return nb_min(density + steepness(k) * slack + k->noise, NB_F(1.0));
 }
 
 static ends no_ends(void)
@@ -283,7 +300,7 @@ static ends no_ends(void)
 
 static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
 {
-    const nb_real weight = slack * end_density(k, t);
+    const nb_real weight = slack * end_density(k, t, slack);
     for (int c = 0; c < 3; c++) {
         sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
         const nb_real seen = nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
@@ -373,6 +390,7 @@ static void meet_medium(march *m, const nb_medium *medium)
     contact *k = &m->contacts[m->contact_count];
     k->medium = medium;
     k->first_span = m->span_count;
+    k->noise = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         k->extinction[c] = REAL(medium->body.extinction[c]);
         k->light[c] = REAL(medium->light[c]);
