@@ -4,9 +4,9 @@
 
 typedef const char *group_fn(const nb_bench_desc *desc, nb_figures *figures);
 
-const char *const nb_bench_groups[] = {"segments", NULL};
+const char *const nb_bench_groups[] = {"segments", "frame", NULL};
 
-static group_fn *const functions[] = {nb_bench_segments};
+static group_fn *const functions[] = {nb_bench_segments, nb_bench_frame};
 
 int nb_bench_run(const nb_bench_desc *desc, nb_figures *figures, const char **fault)
 {

@@ -1,0 +1,35 @@
+/* The benchmark scenes: one landscape, camera and sun, and a fog of choice. In memory, and as files for the program. */
+#ifndef NB_BENCH_SCENES_H
+#define NB_BENCH_SCENES_H
+
+#include "terrain.h"
+
+#include <nebel/nebel.h>
+#include <nebel/scene.h>
+
+typedef enum nb_bench_fog {
+    NB_FOG_NONE = 0,
+    NB_FOG_BOX,   /* scene A1 */
+    NB_FOG_SPHERE /* scene B1 */
+} nb_bench_fog;
+
+enum { NB_BENCH_WIDTH = 1280, NB_BENCH_HEIGHT = 720 };
+
+typedef struct nb_bench_scene {
+    nb_terrain terrain;
+    nebel_mesh mesh;
+    nebel_scene_data data;
+} nb_bench_scene;
+
+/* The landscape without fog, of quads x quads quads, to be seen in a picture `aspect` times as wide as high. Returns 0,
+ * or -1 without memory. The scene must not move. */
+int nb_bench_scene_make(uint32_t quads, double aspect, nb_bench_scene *scene);
+void nb_bench_scene_free(nb_bench_scene *scene);
+
+/* NULL for no fog and on an error. */
+nebel_snapshot *nb_bench_fog_commit(nb_bench_fog fog);
+
+/* Writes the scene with the fog of A1 as scene.json and terrain.ply into a folder. Returns 0 or -1. */
+int nb_bench_scene_write(const nb_bench_scene *scene, const char *folder);
+
+#endif
