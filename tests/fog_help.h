@@ -1,0 +1,120 @@
+/* What the tests of the core's public face share: memory that keeps accounts, messages that can be read, fog in one
+ * call. Include after <cmocka.h>. */
+#ifndef FOG_HELP_H
+#define FOG_HELP_H
+
+#include <nebel/nebel.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- memory that counts, fails when told to, and poisons what it takes back ---- */
+
+enum { FOG_MEMORY_HEADER = 64, FOG_MEMORY_FRESH = 0xa5, FOG_MEMORY_STALE = 0xdd };
+
+typedef struct fog_memory {
+    size_t calls, live;
+    size_t bytes, most_bytes; /* held now, and at the worst */
+    size_t fail_first;        /* 1 for the next call, 2 for the one after it, ...; 0: none fails */
+    size_t fail_count;        /* how many in a row */
+} fog_memory;
+
+static inline void *fog_memory_allocate(size_t size, void *user)
+{
+    fog_memory *const memory = user;
+    memory->calls++;
+    if (memory->fail_first > 1) {
+        memory->fail_first--;
+    } else if (memory->fail_first == 1) {
+        if (--memory->fail_count == 0) memory->fail_first = 0;
+        return NULL;
+    }
+    assert_true(size > 0);
+    assert_true(size <= SIZE_MAX - FOG_MEMORY_HEADER);
+    char *const block = malloc(FOG_MEMORY_HEADER + size);
+    if (block == NULL) return NULL;
+    memcpy(block, &size, sizeof size);
+    memset(block + FOG_MEMORY_HEADER, FOG_MEMORY_FRESH, size);
+    memory->live++;
+    memory->bytes += size;
+    if (memory->bytes > memory->most_bytes) memory->most_bytes = memory->bytes;
+    return block + FOG_MEMORY_HEADER;
+}
+
+static inline void fog_memory_release(void *block, void *user)
+{
+    fog_memory *const memory = user;
+    assert_non_null(block);
+    char *const start = (char *)block - FOG_MEMORY_HEADER;
+    size_t size;
+    memcpy(&size, start, sizeof size);
+    memory->live--;
+    memory->bytes -= size;
+    memset(block, FOG_MEMORY_STALE, size);
+    free(start);
+}
+
+static inline nebel_allocator fog_memory_allocator(fog_memory *memory)
+{
+    return (nebel_allocator){fog_memory_allocate, fog_memory_release, memory};
+}
+
+/* ---- messages ---- */
+
+typedef struct fog_messages {
+    size_t count;
+    nebel_result result; /* of the last one */
+    char text[512];
+} fog_messages;
+
+static inline void fog_messages_write(nebel_result result, const char *message, void *user)
+{
+    fog_messages *const messages = user;
+    assert_non_null(message);
+    assert_true(message[0] != 0);
+    assert_null(strchr(message, '\n'));
+    messages->count++;
+    messages->result = result;
+    snprintf(messages->text, sizeof messages->text, "%s", message);
+}
+
+static inline nebel_log fog_messages_log(fog_messages *messages)
+{
+    return (nebel_log){fog_messages_write, messages};
+}
+
+/* ---- fog in one call ---- */
+
+static inline nebel_snapshot *fog_commit(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t n)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < n; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* ---- numbers: splitmix64 ---- */
+
+static inline uint64_t dice_next(uint64_t *state)
+{
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+
+static inline double dice(uint64_t *state, double from, double to)
+{
+    return from + (to - from) * (double)(dice_next(state) >> 11) * 0x1p-53;
+}
+
+static inline int dice_below(uint64_t *state, int n)
+{
+    return (int)(dice_next(state) % (uint64_t)n);
+}
+
+#endif
