@@ -5,6 +5,7 @@
 #include <embree3/rtcore.h>
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,6 +26,7 @@ struct nb_embree_floor {
     float position[3], corner[3], step_x[3], step_y[3]; /* of the camera's rays */
     float sun[3];
     strip *strip;
+    atomic_llong bytes;
 };
 
 static void cross(const double a[3], const double b[3], double out[3])
@@ -56,10 +58,19 @@ static void set_view(const nebel_camera *camera, nb_embree_floor *floor)
     }
 }
 
+static bool count_bytes(void *user, ssize_t bytes, bool post)
+{
+    nb_embree_floor *const floor = user;
+    (void)post;
+    (void)atomic_fetch_add(&floor->bytes, bytes);
+    return true;
+}
+
 static int build(const nb_terrain *terrain, nb_embree_floor *floor)
 {
     floor->device = rtcNewDevice(NULL);
     if (floor->device == NULL) return -1;
+    rtcSetDeviceMemoryMonitorFunction(floor->device, count_bytes, floor);
     floor->scene = rtcNewScene(floor->device);
     const RTCGeometry triangles = rtcNewGeometry(floor->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     float *const positions = rtcSetNewGeometryBuffer(triangles, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -98,8 +109,13 @@ void nb_embree_floor_free(nb_embree_floor *floor)
     free(floor);
 }
 
-/* ---- rays
- * ---------------------------------------------------------------------------------------------------------------- */
+size_t nb_embree_floor_bytes(const nb_embree_floor *floor)
+{
+    const long long bytes = atomic_load(&floor->bytes);
+    return bytes > 0 ? (size_t)bytes : 0;
+}
+
+/* ---- rays ------------------------------------------------------------------------------------------------------ */
 
 static void set_ray(const nb_embree_floor *floor, uint32_t packet, int lane, struct RTCRayHit16 *rays, int *valid)
 {

@@ -12,6 +12,9 @@ typedef struct nb_embree_floor nb_embree_floor;
 nb_embree_floor *nb_embree_floor_make(const nb_bench_scene *scene, uint32_t width, uint32_t height);
 void nb_embree_floor_free(nb_embree_floor *floor);
 
+/* What Embree has allocated. */
+size_t nb_embree_floor_bytes(const nb_embree_floor *floor);
+
 /* CPU seconds of one ray for each pixel and of the sun's rays, in this thread. */
 typedef struct nb_embree_rays {
     double primary_seconds, shadow_seconds;

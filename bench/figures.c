@@ -12,27 +12,29 @@
 #define COMPILER "unknown"
 #endif
 
-double nb_figure_ratio(const nb_figure *figure)
+static double ratio_of(const nb_figure *figure)
 {
-    return figure->floor_name != NULL ? figure->value / figure->floor : figure->value;
+    return figure->value / figure->floor;
 }
 
 static int has_target(const nb_figure *figure)
 {
-    return figure->at_least > 0 || figure->at_most > 0;
+    return figure->at_least > 0 || figure->at_most > 0 || figure->value_at_most > 0;
 }
 
 static int is_met(const nb_figure *figure)
 {
-    const double ratio = nb_figure_ratio(figure);
-    return figure->at_least > 0 ? ratio >= figure->at_least : ratio <= figure->at_most;
+    if (figure->value_at_most > 0) return figure->value <= figure->value_at_most;
+    return figure->at_least > 0 ? ratio_of(figure) >= figure->at_least : ratio_of(figure) <= figure->at_most;
 }
 
 static void print_target(const nb_figure *figure, FILE *file)
 {
     if (!has_target(figure)) return;
-    (void)fprintf(file, "  %s %g: %s", figure->at_least > 0 ? "at least" : "at most",
-                  figure->at_least > 0 ? figure->at_least : figure->at_most, is_met(figure) ? "met" : "NOT MET");
+    if (figure->at_least > 0) (void)fprintf(file, "  at least %g x", figure->at_least);
+    if (figure->at_most > 0) (void)fprintf(file, "  at most %g x", figure->at_most);
+    if (figure->value_at_most > 0) (void)fprintf(file, "  at most %g %s", figure->value_at_most, figure->unit);
+    (void)fprintf(file, ": %s", is_met(figure) ? "met" : "NOT MET");
 }
 
 static void print_line(const nb_figures *figures, const nb_figure *figure)
@@ -44,7 +46,7 @@ static void print_line(const nb_figures *figures, const nb_figure *figure)
     }
     (void)fprintf(file, "  %-46s %9.4g %-13s", figure->name, figure->value, figure->unit);
     if (figure->floor_name != NULL) {
-        (void)fprintf(file, " %6.3g x %s (%.4g)", nb_figure_ratio(figure), figure->floor_name, figure->floor);
+        (void)fprintf(file, " %6.3g x %s (%.4g)", ratio_of(figure), figure->floor_name, figure->floor);
     }
     print_target(figure, file);
     (void)fprintf(file, "\n");
@@ -54,8 +56,10 @@ static void print_line(const nb_figures *figures, const nb_figure *figure)
 void nb_figures_add(nb_figures *figures, const nb_figure *figure)
 {
     if (figures->count >= sizeof figures->list / sizeof *figures->list) return;
-    figures->list[figures->count++] = *figure;
-    if (figures->table != NULL) print_line(figures, figure);
+    nb_figure *const added = &figures->list[figures->count++];
+    *added = *figure;
+    if (figures->quick) added->at_least = added->at_most = added->value_at_most = 0;
+    if (figures->table != NULL) print_line(figures, added);
 }
 
 static void write_text(const char *text, FILE *file)
@@ -83,15 +87,16 @@ static void write_figure(const nb_figure *figure, FILE *file)
     if (figure->floor_name != NULL) {
         (void)fprintf(file, ", \"floor\": {\"name\": ");
         write_text(figure->floor_name, file);
-        (void)fprintf(file, ", \"value\": %.6g}, \"ratio\": %.6g", figure->floor, nb_figure_ratio(figure));
+        (void)fprintf(file, ", \"value\": %.6g}, \"ratio\": %.6g", figure->floor, ratio_of(figure));
     }
     if (figure->at_least > 0) (void)fprintf(file, ", \"at_least\": %g", figure->at_least);
     if (figure->at_most > 0) (void)fprintf(file, ", \"at_most\": %g", figure->at_most);
+    if (figure->value_at_most > 0) (void)fprintf(file, ", \"value_at_most\": %g", figure->value_at_most);
     if (has_target(figure)) (void)fprintf(file, ", \"met\": %s", is_met(figure) ? "true" : "false");
     (void)fprintf(file, "}");
 }
 
-void nb_figures_write_json(const nb_figures *figures, int quick, FILE *file)
+void nb_figures_write_json(const nb_figures *figures, FILE *file)
 {
     char processor[256];
     nb_figures_read_processor(processor, sizeof processor);
@@ -99,7 +104,7 @@ void nb_figures_write_json(const nb_figures *figures, int quick, FILE *file)
     write_text(processor, file);
     (void)fprintf(file, ",\n  \"compiler\": ");
     write_text(COMPILER, file);
-    (void)fprintf(file, ",\n  \"quick\": %s,\n  \"figures\": [\n", quick ? "true" : "false");
+    (void)fprintf(file, ",\n  \"quick\": %s,\n  \"figures\": [\n", figures->quick ? "true" : "false");
     for (size_t i = 0; i < figures->count; i++) {
         if (i > 0) (void)fprintf(file, ",\n");
         write_figure(&figures->list[i], file);

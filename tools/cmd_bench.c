@@ -19,7 +19,7 @@ static const char about[] = "Measures, and prints each figure beside a floor mea
                             "bench/NOTES.md says what to expect.\n";
 
 static const nb_option options[] = {
-    {"group", 'g', "NAME", "only one group:\nsegments"},
+    {"group", 'g', "NAME", "only one group: process, segments or frame"},
     {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
     {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
 };
@@ -48,9 +48,9 @@ static void print_head(void)
     (void)printf("A line: what, how much, how many times its floor, the floor, the target of that ratio.\n");
 }
 
-static int write_json(const nb_figures *figures, int quick, FILE *file, const char *path)
+static int write_json(const nb_figures *figures, FILE *file, const char *path)
 {
-    nb_figures_write_json(figures, quick, file);
+    nb_figures_write_json(figures, file);
     const int broken = ferror(file);
     if (fclose(file) != 0 || broken) return nb_report_failure("bench: %s: could not be written", path);
     return NB_DONE;
@@ -58,7 +58,7 @@ static int write_json(const nb_figures *figures, int quick, FILE *file, const ch
 
 static int bench(const nb_bench_desc *desc, const char *json)
 {
-    nb_figures figures = {.table = stdout};
+    nb_figures figures = {.table = stdout, .quick = desc->quick};
     const char *fault = NULL;
     FILE *const file = json != NULL ? fopen(json, "w") : NULL;
     if (json != NULL && file == NULL) return nb_report_failure("bench: %s: %s", json, strerror(errno));
@@ -66,7 +66,7 @@ static int bench(const nb_bench_desc *desc, const char *json)
     int status = NB_DONE;
     if (nb_bench_run(desc, &figures, &fault) != 0) status = nb_report_failure("bench: %s", fault);
     if (file != NULL) {
-        const int written = write_json(&figures, desc->quick, file, json);
+        const int written = write_json(&figures, file, json);
         if (status == NB_DONE) status = written;
     }
     return status;
