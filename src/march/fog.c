@@ -23,7 +23,9 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     *fog = NULL;
-    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (!nb_allocator_is_valid(&desc->allocator))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
     const nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NB_LARGEST_AMOUNT);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
@@ -71,9 +73,15 @@ static void use_slot(nebel_fog *fog, nb_slot *slot, const nb_volume *volume)
     slot->volume = *volume;
 }
 
+static nebel_result lacks_description(const nebel_fog *fog)
+{
+    return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume: the description must not be NULL");
+}
+
 nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, nebel_volume_id *id)
 {
-    if (fog == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL) return lacks_description(fog);
     nb_volume volume;
     const nebel_result result = nb_volume_resolve(&fog->allocator, &fog->log, desc, &volume);
     if (result != NEBEL_OK) return result;
@@ -89,7 +97,8 @@ nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, neb
 
 nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc)
 {
-    if (fog == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL) return lacks_description(fog);
     nb_slot *slot = slot_of(fog, id);
     if (slot == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume volume;
@@ -116,7 +125,8 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id)
 
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3])
 {
-    if (fog == NULL || ambient == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (ambient == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "ambient: must not be NULL");
     const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NB_LARGEST_AMOUNT);
     if (result == NEBEL_OK) memcpy(fog->ambient, ambient, sizeof fog->ambient);
     return result;

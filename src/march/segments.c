@@ -70,7 +70,7 @@ static nebel_ray ray_of_segment(const nebel_segments *segments, const float *fro
         way[c] = (double)to[c] - (double)from[c];
         square += way[c] * way[c];
     }
-    if (!(square > 0 && square < 1e30)) return ray;
+    if (!(square > 0 && square < HUGE_VAL)) return ray;
     for (int c = 0; c < 3; c++) {
         ray.origin[c] += (double)from[c];
         ray.direction[c] = way[c];
@@ -79,19 +79,28 @@ static nebel_ray ray_of_segment(const nebel_segments *segments, const float *fro
     return ray;
 }
 
+static int starts_too_far(const nebel_ray *ray)
+{
+    return !(fabs(ray->origin[0]) <= 1e15 && fabs(ray->origin[1]) <= 1e15 && fabs(ray->origin[2]) <= 1e15);
+}
+
 /* Through the march, a few rays at a time. */
 static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
                                    const nebel_segments *segments, float *out, size_t out_stride)
 {
     enum { BATCH = 64 };
-    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa};
+    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa, .transmittance_only = 1};
     for (size_t first = 0; first < n; first += BATCH) {
         nebel_ray rays[BATCH];
         nebel_light lights[BATCH];
         const size_t count = n - first < BATCH ? n - first : BATCH;
-        for (size_t i = 0; i < count; i++)
+        for (size_t i = 0; i < count; i++) {
             rays[i] = ray_of_segment(segments, point_at(segments->from, segments->from_stride, first + i),
                                      point_at(segments->to, segments->to_stride, first + i));
+            if (starts_too_far(&rays[i]))
+                return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segment %zu: must start at most 1e15 m away",
+                               first + i);
+        }
         const nebel_result result = nebel_trace(snapshot, &desc, count, rays, sizeof *rays, lights, sizeof *lights);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < count; i++)
@@ -103,8 +112,9 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
 nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
                                      const nebel_segments *segments, float *out, size_t out_stride)
 {
-    if (snapshot == NULL || segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))
-        return NEBEL_ERROR_ARGUMENT;
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: from, to and out must not be NULL");
     if (channel < 0 || channel > 2)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     for (int c = 0; c < 3; c++)

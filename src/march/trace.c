@@ -78,7 +78,7 @@ static int is_valid(const nebel_ray *ray)
 static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const nebel_ray *rays, size_t stride,
                                size_t *failed)
 {
-    if (snapshot == NULL || (n > 0 && rays == NULL)) return NEBEL_ERROR_ARGUMENT;
+    if (n > 0 && rays == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "rays: must not be NULL");
     for (size_t i = 0; i < n; i++) {
         const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * stride);
         if (is_valid(ray)) continue;
@@ -103,7 +103,9 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
                          size_t ray_stride, nebel_light *lights, size_t light_stride)
 {
-    if (desc == NULL || (n > 0 && lights == NULL)) return NEBEL_ERROR_ARGUMENT;
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || (n > 0 && lights == NULL))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: description and lights must not be NULL");
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
     if (valid != NEBEL_OK) return valid;
     const double tolerance = desc->tolerance == 0 ? NEBEL_DEFAULT_TOLERANCE : desc->tolerance;
@@ -127,7 +129,9 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
 nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                       const nebel_ray *rays, size_t ray_stride, double *distances)
 {
-    if (n > 0 && distances == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (n > 0 && distances == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "distances: must not be NULL");
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, NULL);
     if (valid != NEBEL_OK) return valid;
     if (!(transmittance > 0 && transmittance < 1))
@@ -135,5 +139,6 @@ nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double tra
     if (channel < 0 || channel > 2)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     nb_find_job job = {snapshot, -log(transmittance), channel, n, rays, ray_stride, distances};
-    return nb_find_double(&job);
+    const nebel_result result = nb_find_double(&job);
+    return result == NEBEL_OK ? result : nb_fail(&snapshot->log, result, "rays: out of memory for the fog they meet");
 }
