@@ -1,0 +1,17 @@
+# The levels of formula_level.h, for the tests that ask shapes and profiles by name.
+
+foreach(level IN ITEMS float double fast)
+    add_library(formula_${level} OBJECT formula_level.c)
+    nebel_set_options(formula_${level})
+    target_include_directories(formula_${level} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+    target_compile_definitions(formula_${level} PRIVATE NB_LEVEL=${level})
+endforeach()
+target_compile_definitions(formula_double PRIVATE NB_DOUBLE=1)
+target_compile_definitions(formula_fast PRIVATE NB_FAST=1)
+
+foreach(test IN ITEMS test_shapes test_profiles test_formulas_gl)
+    if(TARGET ${test})
+        target_sources(${test} PRIVATE formula_inputs.c formula_truth.c
+            $<TARGET_OBJECTS:formula_float> $<TARGET_OBJECTS:formula_double> $<TARGET_OBJECTS:formula_fast>)
+    endif()
+endforeach()
