@@ -275,13 +275,14 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
         lanes = nb_wand(lanes, next <= NB_WFAR);
         if (!nb_wany(lanes)) return g;
         const piece p = {t, next, nb_narrow(next - t), nb_narrow_mask(lanes)};
-        if (mark_inside(m, &p)) {
-            gather_piece(m, &p, may, &g, unbounded);
+        const int foggy = mark_inside(m, &p);
+        if (foggy) gather_piece(m, &p, may, &g, unbounded);
+        if (nb_any(watched)) pass_ends(m, &g, next, nb_and(watched, p.lanes));
+        if (foggy) {
             const nb_real thinnest = nb_min(nb_min(g.depth[0], g.depth[1]), g.depth[2]);
             lanes = nb_wand(lanes, nb_widen_mask(thinnest < OPAQUE_DEPTH));
         }
         t = nb_wselect(lanes, next, t);
-        if (nb_any(watched)) pass_ends(m, &g, t, nb_and(watched, nb_narrow_mask(lanes)));
     }
 }
 
@@ -308,7 +309,7 @@ static nb_real bound_error(const march *m, const gathered *g, int transmittance_
     for (int c = 0; c < 3; c++) {
         const nb_real end_depth = nb_select(watched, m->grazing_ends.depth[c], m->all_ends.depth[c]);
         const nb_real end_light = nb_select(watched, m->grazing_ends.light[c], m->all_ends.light[c]);
-        const nb_real error = end_depth + g->depth_error[c];
+        const nb_real error = (end_depth + g->depth_error[c]) * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON);
         const nb_real rise = nb_exp(-nb_max(g->depth[c] - error, NB_F(0.0))) - g->transmittance[c];
         const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
         transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + NB_F(4.0) * NB_EPSILON * g->transmittance[c]);

@@ -336,21 +336,24 @@ static nb_interval span_of_bounds(const packet *rays, const nb_volume *body)
     return span;
 }
 
-static nb_real slack_of(nb_wmask counts, nb_wide slack)
+/* How far an end with slack may be from where it is, both within the bounds. */
+static nb_real slack_within(nb_wide end, nb_wide slack, const nb_interval *bounds, nb_wmask counts)
 {
-    return nb_narrow(nb_wselect(counts, slack, NB_W(0.0)));
+    const nb_wide here = nb_wclamp(end, bounds->enter, bounds->leave);
+    const nb_wide before = here - nb_wclamp(end - slack, bounds->enter, bounds->leave);
+    const nb_wide behind = nb_wclamp(end + slack, bounds->enter, bounds->leave) - here;
+    return nb_narrow(nb_wselect(counts, nb_wmax(before, behind), NB_W(0.0)));
 }
 
-/* Clips a leaf's interval to the ray; ends that are cut off, or lie where the body is not, have no slack. */
+/* Clips a leaf's interval to the ray. Ends have slack as far as they may move where the ray and the body are. */
 static leaf_span clip_interval(const march *m, const nb_interval *raw, const nb_interval *bounds)
 {
-    const nb_wmask touched = nb_wand(nb_wand(raw->enter <= raw->leave, bounds->enter <= bounds->leave),
-                                     nb_wand(raw->leave > NB_W(0.0), raw->enter < m->rays.t_max));
-    const nb_wmask enters = nb_wand(touched, nb_wand(raw->enter > bounds->enter, raw->enter <= bounds->leave));
-    const nb_wmask leaves = nb_wand(touched, nb_wand(raw->leave < bounds->leave, raw->leave >= bounds->enter));
+    const nb_wmask some = raw->enter - raw->enter_slack <= raw->leave + raw->leave_slack;
+    const nb_wmask counts = nb_wand(some, bounds->enter < bounds->leave);
     const nb_wide leave = nb_wmin(raw->leave, m->rays.t_max);
-    return (leaf_span){nb_wmax(raw->enter, NB_W(0.0)), nb_wselect(touched, leave, NB_W(0.0)),
-                       slack_of(enters, raw->enter_slack), slack_of(leaves, raw->leave_slack)};
+    return (leaf_span){nb_wmax(raw->enter, NB_W(0.0)), nb_wselect(counts, leave, NB_W(0.0)),
+                       slack_within(raw->enter, raw->enter_slack, bounds, counts),
+                       slack_within(raw->leave, raw->leave_slack, bounds, counts)};
 }
 
 static void count_ends(march *m, const contact *k, const leaf_span *span)
