@@ -15,13 +15,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static const char group_name[] = "The whole program for scene A1: nebel render scene.json -o picture.png --samples 1";
+static const char group_name[] = "The whole program for scene A1: nebel render, one sample, 1280x720";
 static const char failed[] = "process: the program or Embree failed, or could not be started";
 static const char no_files[] = "process: the scene could not be written to a temporary folder";
 
 typedef struct nb_call {
     const char *program, *threads, *size;
-    char folder[4096], scene[4128], picture[4128];
+    char scene[4128], picture[4128];
     double megabytes; /* largest resident set of all runs */
 } nb_call;
 
@@ -80,85 +80,93 @@ static double run_embree(void *user)
     return seconds;
 }
 
-/* ---- files ----------------------------------------------------------------------------------------------------- */
-
-static int make_files(const nb_bench_scene *scene, nb_call *call)
-{
-    const char *const place = getenv("TMPDIR");
-    (void)snprintf(call->folder, sizeof call->folder, "%s/nebel-bench-XXXXXX", place != NULL ? place : "/tmp");
-    if (mkdtemp(call->folder) == NULL) {
-        call->folder[0] = '\0';
-        return -1;
-    }
-    (void)snprintf(call->scene, sizeof call->scene, "%s/scene.json", call->folder);
-    (void)snprintf(call->picture, sizeof call->picture, "%s/picture.png", call->folder);
-    return nb_bench_scene_write(scene, call->folder);
-}
-
-static void remove_files(const nb_call *call)
-{
-    if (call->folder[0] == '\0') return;
-    char terrain[4128];
-    (void)snprintf(terrain, sizeof terrain, "%s/terrain.ply", call->folder);
-    (void)unlink(call->scene);
-    (void)unlink(call->picture);
-    (void)unlink(terrain);
-    (void)rmdir(call->folder);
-}
-
 /* ---- figures --------------------------------------------------------------------------------------------------- */
 
-static void add_figures(nb_figures *figures, const nb_call *all, const nb_contest contests[3], const nb_bare *bare)
+enum { CALLS = 3 };
+
+static const struct {
+    const char *scene, *threads, *name;
+} variants[CALLS] = {{"map.json", "0", "terrain as a height map"},
+                     {"map.json", "1", "terrain as a height map, one thread"},
+                     {"mesh.json", "0", "terrain as a PLY model"}};
+
+static void add_figures(nb_figures *figures, const nb_call *call, const char *name, double seconds, double megabytes,
+                        const nb_contest *embree)
 {
-    const char *const build = "Embree built, rays on one thread";
-    nb_figures_add(figures, &(nb_figure){.group = group_name,
-                                         .name = "all threads",
-                                         .unit = "s",
-                                         .value = contests[1].seconds,
-                                         .floor_name = build,
-                                         .floor = contests[0].seconds,
-                                         .value_at_most = .5});
-    nb_figures_add(figures, &(nb_figure){.group = group_name,
-                                         .name = "one thread",
-                                         .unit = "s",
-                                         .value = contests[2].seconds,
-                                         .floor_name = build,
-                                         .floor = contests[0].seconds});
-    nb_figures_add(figures, &(nb_figure){.group = group_name,
-                                         .name = "memory, all threads",
-                                         .unit = "MiB",
-                                         .value = all->megabytes,
-                                         .floor_name = "Embree, model and picture",
-                                         .floor = bare->megabytes,
-                                         .value_at_most = 130});
+    const nb_bare *const bare = embree->user;
+    nb_figure time = {.group = group_name,
+                      .unit = "s",
+                      .value = seconds,
+                      .floor_name = "Embree built, rays on one thread",
+                      .floor = embree->seconds};
+    nb_figure memory = {.group = group_name,
+                        .unit = "MiB",
+                        .value = megabytes,
+                        .floor_name = "Embree, model and picture",
+                        .floor = bare->megabytes};
+    if (strcmp(call->threads, "0") == 0) {
+        time.value_at_most = .5;
+        memory.value_at_most = 130;
+    }
+    (void)snprintf(time.name, sizeof time.name, "%s", name);
+    (void)snprintf(memory.name, sizeof memory.name, "%s", name);
+    nb_figures_add(figures, &time);
+    nb_figures_add(figures, &memory);
 }
 
-static const char *measure(nb_call *all, nb_bare *bare, int repetitions, nb_figures *figures)
+/* Memory comes from the first runs, before this process has taken any. */
+static const char *measure(nb_call *calls, nb_bare *bare, int repetitions, nb_figures *figures)
 {
-    nb_call one = *all;
-    one.threads = "1";
-    if (run_program(all) < 0) return failed;
-    const double megabytes = all->megabytes;
-    nb_contest contests[] = {
-        {.run = run_embree, .user = bare}, {.run = run_program, .user = all}, {.run = run_program, .user = &one}};
-    if (nb_measure(contests, 3, repetitions) != 0) return failed;
-    all->megabytes = megabytes; /* before Embree took memory here */
-    add_figures(figures, all, contests, bare);
+    nb_contest contests[CALLS + 1] = {{.run = run_embree, .user = bare}};
+    double megabytes[CALLS];
+    for (int i = 0; i < CALLS; i++) {
+        if (run_program(&calls[i]) < 0) return failed;
+        megabytes[i] = calls[i].megabytes;
+        contests[i + 1] = (nb_contest){.run = run_program, .user = &calls[i]};
+    }
+    if (nb_measure(contests, CALLS + 1, repetitions) != 0) return failed;
+    for (int i = 0; i < CALLS; i++) {
+        add_figures(figures, &calls[i], variants[i].name, contests[i + 1].seconds, megabytes[i], &contests[0]);
+    }
     return NULL;
+}
+
+static void set_calls(const nb_bench_desc *desc, const char *folder, nb_call *calls)
+{
+    for (int i = 0; i < CALLS; i++) {
+        calls[i] = (nb_call){
+            .program = desc->program, .threads = variants[i].threads, .size = desc->quick ? "160x88" : "1280x720"};
+        (void)snprintf(calls[i].scene, sizeof calls[i].scene, "%s/%s", folder, variants[i].scene);
+        (void)snprintf(calls[i].picture, sizeof calls[i].picture, "%s/picture.png", folder);
+    }
+}
+
+/* In a folder of its own, which is gone afterwards. */
+static const char *measure_in_folder(const nb_bench_desc *desc, nb_bare *bare, nb_figures *figures)
+{
+    char folder[4096];
+    const char *const place = getenv("TMPDIR");
+    const int length = snprintf(folder, sizeof folder, "%s/nebel-bench-XXXXXX", place != NULL ? place : "/tmp");
+    if (length < 0 || (size_t)length >= sizeof folder || mkdtemp(folder) == NULL) return no_files;
+    nb_call calls[CALLS];
+    set_calls(desc, folder, calls);
+    const char *fault = no_files;
+    if (nb_bench_scene_write(bare->scene, folder) == 0) fault = measure(calls, bare, desc->quick ? 1 : 7, figures);
+    nb_bench_scene_remove(folder);
+    (void)unlink(calls[0].picture);
+    (void)rmdir(folder);
+    return fault;
 }
 
 const char *nb_bench_process(const nb_bench_desc *desc, nb_figures *figures)
 {
     if (desc->program == NULL) return NULL;
     nb_bench_scene scene;
-    nb_call call = {.program = desc->program, .threads = "0", .size = desc->quick ? "160x88" : "1280x720"};
     nb_bare bare = {
         .scene = &scene, .width = desc->quick ? 160 : NB_BENCH_WIDTH, .height = desc->quick ? 88 : NB_BENCH_HEIGHT};
     const double aspect = (double)bare.width / bare.height;
     if (nb_bench_scene_make(desc->quick ? 64 : 512, aspect, &scene) != 0) return "process: out of memory";
-    const char *fault = no_files;
-    if (make_files(&scene, &call) == 0) fault = measure(&call, &bare, desc->quick ? 1 : 7, figures);
-    remove_files(&call);
+    const char *const fault = measure_in_folder(desc, &bare, figures);
     nb_bench_scene_free(&scene);
     return fault;
 }

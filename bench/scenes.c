@@ -1,5 +1,7 @@
 #include "scenes.h"
 
+#include "height_map.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -88,9 +90,9 @@ static void write_vector(FILE *file, const char *key, const double v[3])
     (void)fprintf(file, "\"%s\": [%.9g, %.9g, %.9g]", key, v[0], v[1], v[2]);
 }
 
-static int write_description(const nb_bench_scene *scene, const char *folder)
+static int write_description(const nb_bench_scene *scene, const char *folder, const char *name, const char *model)
 {
-    FILE *const file = open_in(folder, "scene.json");
+    FILE *const file = open_in(folder, name);
     if (file == NULL) return -1;
     const nebel_scene_data *const data = &scene->data;
     const nebel_shape *const box = &fogs[NB_FOG_BOX].shape;
@@ -104,9 +106,9 @@ static int write_description(const nb_bench_scene *scene, const char *folder)
     write_vector(file, "ambient", data->ambient);
     (void)fprintf(file, ",\n  \"sun\": { ");
     write_vector(file, "direction", data->sun_direction);
-    (void)fprintf(file, ", \"irradiance\": %.9g },\n", data->sun_irradiance[0]);
-    (void)fprintf(file,
-                  "  \"models\": [ { \"file\": \"terrain.ply\" } ],\n  \"fog\": [ { \"shape\": { \"type\": \"box\", ");
+    (void)fprintf(file, ", \"irradiance\": %.9g },\n  \"models\": [ { %s, ", data->sun_irradiance[0], model);
+    write_vector(file, "color", (const double[]){(double)albedo[0], (double)albedo[1], (double)albedo[2]});
+    (void)fprintf(file, " } ],\n  \"fog\": [ { \"shape\": { \"type\": \"box\", ");
     write_vector(file, "min", box->min);
     (void)fprintf(file, ", ");
     write_vector(file, "max", box->max);
@@ -135,7 +137,32 @@ static int write_terrain(const nb_terrain *terrain, const char *folder)
     return close_written(file);
 }
 
+static int write_height_map(const nb_terrain *terrain, const char *folder)
+{
+    FILE *const file = open_in(folder, "terrain.png");
+    if (file == NULL) return -1;
+    const int status = nb_height_map_write(terrain, file);
+    return close_written(file) == 0 ? status : -1;
+}
+
 int nb_bench_scene_write(const nb_bench_scene *scene, const char *folder)
 {
-    return write_description(scene, folder) == 0 && write_terrain(&scene->terrain, folder) == 0 ? 0 : -1;
+    if (write_description(scene, folder, "mesh.json", "\"file\": \"terrain.ply\"") != 0) return -1;
+    if (write_terrain(&scene->terrain, folder) != 0) return -1;
+    if (write_description(scene, folder, "map.json",
+                          "\"heightfield\": { \"file\": \"terrain.png\", \"size\": [100, 100], \"height\": 14 }, "
+                          "\"position\": [0, -2, 0]") != 0) {
+        return -1;
+    }
+    return write_height_map(&scene->terrain, folder);
+}
+
+void nb_bench_scene_remove(const char *folder)
+{
+    static const char *const names[] = {"mesh.json", "map.json", "terrain.ply", "terrain.png"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char path[4352];
+        (void)snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        (void)remove(path);
+    }
 }

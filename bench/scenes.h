@@ -29,7 +29,11 @@ void nb_bench_scene_free(nb_bench_scene *scene);
 /* NULL for no fog and on an error. */
 nebel_snapshot *nb_bench_fog_commit(nb_bench_fog fog);
 
-/* Writes the scene with the fog of A1 as scene.json and terrain.ply into a folder. Returns 0 or -1. */
+/* Writes the scene with the fog of A1 into a folder: mesh.json takes the terrain as a PLY model, map.json as a height
+ * map. Returns 0 or -1. */
 int nb_bench_scene_write(const nb_bench_scene *scene, const char *folder);
+
+/* Removes what nb_bench_scene_write has written. */
+void nb_bench_scene_remove(const char *folder);
 
 #endif
