@@ -7,4 +7,4 @@ import sys
 root = os.environ["NEBEL_SOURCE"]
 sys.exit(subprocess.call([sys.executable, os.path.join(root, "scripts", "fit_elementary.py"), "--check",
                           os.path.join(root, "src", "formulas", "elementary.inc"),
-                          os.path.join(root, "src", "kernels", "octaves.h")]))
+                          os.path.join(root, "src", "kernels", "packet.h")]))

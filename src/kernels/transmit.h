@@ -2,18 +2,13 @@
 #ifndef NB_KERNELS_TRANSMIT_H
 #define NB_KERNELS_TRANSMIT_H
 
+#include "fog_box.h"
+
 #include <stddef.h>
-
-typedef struct nb_fog_box {
-    float low[3], high[3]; /* relative to the segments' origin */
-    float extinction;      /* of the channel asked for, 1/m */
-} nb_fog_box;
-
-enum { NB_TRANSMIT_BOXES = 64 };
 
 typedef struct nb_transmit_job {
     const nb_fog_box *boxes;
-    size_t box_count; /* 0 to NB_TRANSMIT_BOXES */
+    size_t box_count; /* 0 to NB_FOG_BOXES */
     size_t count;
     const float *from, *to; /* three floats each; strides in bytes */
     size_t from_stride, to_stride, out_stride;

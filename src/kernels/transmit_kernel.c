@@ -11,13 +11,9 @@
 
 #include "formulas/elementary.inc"
 
-#include "octaves.h"
+#include "packet.h"
 
-#include <math.h>
 #include <string.h>
-
-#define JOIN_NAMES(a, b) a##b
-#define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
 
 static const float *at(const float *base, size_t stride, size_t i)
 {
@@ -86,59 +82,17 @@ NB_INLINE nb_vec3 load_packed(const float *p)
 
 /* ---- a packet --------------------------------------------------------------------------------------------------------- */
 
-/* A box before it meets a packet. Where all segments start at one place, low and high are relative to it. */
-typedef struct slabs {
-    float low[3], high[3];
-    float octaves;        /* minus how many times a unit of length halves the light */
-    float least[3], most[3]; /* a way that is less or more on some axis misses; for a shared start only */
-} slabs;
-
-/* A packet of segments: from + s way, 0 <= s <= 1. */
-typedef struct segment {
-    nb_vec3 from, inverse; /* from is 0 where the slabs are relative to it */
-    nb_real square;        /* of the length */
-} segment;
-
-NB_INLINE segment make_segment(nb_vec3 from, nb_vec3 way)
-{
-    return (segment){from, nb_vec3(NB_F(1.0) / way.x, NB_F(1.0) / way.y, NB_F(1.0) / way.z), nb_dot3(way, way)};
-}
-
-/* Where the ways cross two planes. A segment within a plane gets a NaN there, which nb_min and nb_max pass on as their second
- * argument and lose as their first: such a segment counts as inside the lower face and outside the upper one, so that faces belong to one
- * side as in nb_interval_slab. */
-typedef struct crossing {
-    nb_real near, far;
-} crossing;
-
-NB_INLINE crossing cross(nb_real low, nb_real high, nb_real inverse)
-{
-    const nb_real a = low * inverse, b = high * inverse;
-    return (crossing){nb_min(b, a), nb_max(b, a)};
-}
-
-/* What part of each way is inside. Never a NaN. */
-NB_INLINE nb_real part_inside(const slabs *box, const segment *s)
-{
-    const crossing x = cross(nb_splat(box->low[0]) - s->from.x, nb_splat(box->high[0]) - s->from.x, s->inverse.x);
-    const crossing y = cross(nb_splat(box->low[1]) - s->from.y, nb_splat(box->high[1]) - s->from.y, s->inverse.y);
-    const crossing z = cross(nb_splat(box->low[2]) - s->from.z, nb_splat(box->high[2]) - s->from.z, s->inverse.z);
-    const nb_real enter = nb_max(x.near, nb_max(y.near, nb_max(z.near, NB_F(0.0))));
-    const nb_real leave = nb_min(x.far, nb_min(y.far, nb_min(z.far, NB_F(1.0))));
-    return nb_max(leave - enter, NB_F(0.0));
-}
-
 /* Light over the ways through the boxes named in `list`. */
-NB_INLINE nb_real transmit_packet(const slabs *boxes, const unsigned char *list, size_t count, nb_vec3 from, nb_vec3 way)
+NB_INLINE nb_real transmit_packet(const nb_slabs *boxes, const unsigned char *list, size_t count, nb_vec3 from, nb_vec3 way)
 {
-    const segment s = make_segment(from, way);
+    const nb_packet p = nb_make_packet(from, way);
     nb_real octaves = NB_F(0.0);
     for (size_t i = 0; i < count; i++) {
-        const slabs *box = &boxes[list[i]];
-        octaves = octaves + part_inside(box, &s) * nb_splat(box->octaves);
+        const nb_slabs *box = &boxes[list[i]];
+        octaves = octaves + nb_part_inside(box, &p, nb_splat(1)) * nb_splat(box->octaves);
     }
     if (!nb_any(octaves < NB_F(0.0))) return nb_splat(1);
-    return nb_light_after(octaves * nb_sqrt(s.square));
+    return nb_light_after(octaves * nb_sqrt(p.square));
 }
 
 /* ---- streams ---------------------------------------------------------------------------------------------------------- */
@@ -151,28 +105,12 @@ static void store_points(const nb_transmit_job *job, size_t first, size_t count,
         *(float *)(void *)((char *)job->out + (first + i) * job->out_stride) = lane[i];
 }
 
-/* A start outside two planes is left behind by them where the other end is so, too. The margin covers the roundings of `cross`:
- * beyond it a crossing comes out at 1 or more, or at 0 or less, so that leaving a box out changes no bit. */
-static void set_limits(slabs *box, int c)
+/* Copies, which no store to the output can change; relative to the start where all segments share it. */
+static void set_slabs(const nb_transmit_job *job, nb_slabs *boxes)
 {
-    const float margin = 1 - 0x1p-20f;
-    box->least[c] = box->low[c] > 0 ? box->low[c] * margin : -HUGE_VALF;
-    box->most[c] = box->high[c] < 0 ? box->high[c] * margin : HUGE_VALF;
-}
-
-/* A copy, which no store to the output can change; relative to the start where all segments share it. */
-static void set_slabs(const nb_transmit_job *job, slabs *boxes)
-{
-    const float ln2 = 0.693147181f, most = 1e30f; /* 0 times it is 0 */
-    for (size_t i = 0; i < job->box_count; i++) {
-        for (int c = 0; c < 3; c++) {
-            const float start = job->from_stride == 0 ? job->from[c] : 0;
-            boxes[i].low[c] = job->boxes[i].low[c] - start;
-            boxes[i].high[c] = job->boxes[i].high[c] - start;
-            set_limits(&boxes[i], c);
-        }
-        boxes[i].octaves = -fminf(job->boxes[i].extinction, most) / ln2;
-    }
+    const float zero[3] = {0, 0, 0};
+    for (size_t i = 0; i < job->box_count; i++)
+        boxes[i] = nb_make_slabs(&job->boxes[i], job->from_stride == 0 ? job->from : zero);
 }
 
 /* ---- from one place ---------------------------------------------------------------------------------------------------- */
@@ -180,6 +118,24 @@ static void set_slabs(const nb_transmit_job *job, slabs *boxes)
 /* Boxes are left out for whole blocks, because asking costs half as much as the box. With few boxes blocks are short, so that memory and
  * arithmetic overlap. */
 enum { PACKETS = 8, FEW_BOXES = 4 };
+
+/* A way that is less or more on some axis misses the box. */
+typedef struct fence {
+    float least[3], most[3];
+} fence;
+
+/* A start outside two planes is left behind by them where the other end is so, too. The margin covers the roundings of
+ * nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so that leaving a box out changes no bit. */
+static fence make_fence(const nb_slabs *box)
+{
+    const float margin = 1 - 0x1p-20f;
+    fence made;
+    for (int c = 0; c < 3; c++) {
+        made.least[c] = box->low[c] > 0 ? box->low[c] * margin : -HUGE_VALF;
+        made.most[c] = box->high[c] < 0 ? box->high[c] * margin : HUGE_VALF;
+    }
+    return made;
+}
 
 typedef struct block {
     nb_vec3 way[PACKETS];
@@ -208,36 +164,38 @@ NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *
 }
 
 /* Whether every way of the block stays on one side of the box. */
-NB_INLINE int is_missed(const slabs *box, const block *b)
+NB_INLINE int is_missed(const fence *f, const block *b)
 {
-    const nb_mask x = nb_or(b->high.x < nb_splat(box->least[0]), b->low.x > nb_splat(box->most[0]));
-    const nb_mask y = nb_or(b->high.y < nb_splat(box->least[1]), b->low.y > nb_splat(box->most[1]));
-    const nb_mask z = nb_or(b->high.z < nb_splat(box->least[2]), b->low.z > nb_splat(box->most[2]));
+    const nb_mask x = nb_or(b->high.x < nb_splat(f->least[0]), b->low.x > nb_splat(f->most[0]));
+    const nb_mask y = nb_or(b->high.y < nb_splat(f->least[1]), b->low.y > nb_splat(f->most[1]));
+    const nb_mask z = nb_or(b->high.z < nb_splat(f->least[2]), b->low.z > nb_splat(f->most[2]));
     return nb_all(nb_or(nb_or(x, y), z));
 }
 
-NB_INLINE size_t list_boxes(const slabs *boxes, size_t count, const block *b, unsigned char *list)
+NB_INLINE size_t list_boxes(const fence *fences, size_t count, const block *b, unsigned char *list)
 {
     size_t found = 0;
     for (size_t i = 0; i < count; i++) {
         list[found] = (unsigned char)i;
-        found += !is_missed(&boxes[i], b);
+        found += !is_missed(&fences[i], b);
     }
     return found;
 }
 
 /* Blocks of at most `most` packets, full packets only. Returns how many segments are done. */
-NB_INLINE size_t transmit_fan(const nb_transmit_job *job, const slabs *boxes, size_t most)
+NB_INLINE size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, size_t most)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
     const size_t all = job->count / NB_WIDTH;
-    unsigned char list[NB_TRANSMIT_BOXES];
+    unsigned char list[NB_FOG_BOXES];
+    fence fences[NB_FOG_BOXES];
     block b;
+    for (size_t i = 0; i < job->box_count; i++) fences[i] = make_fence(&boxes[i]);
     for (size_t first = 0; first < all; first += most) {
         const size_t packets = all - first < most ? all - first : most;
         load_block(job->to + 3 * NB_WIDTH * first, from, packets, &b);
-        const size_t count = list_boxes(boxes, job->box_count, &b, list);
+        const size_t count = list_boxes(fences, job->box_count, &b, list);
         float *const out = job->out + NB_WIDTH * first;
         for (size_t k = 0; k < packets; k++) {
             const nb_real light = count == 0 ? nb_splat(1) : transmit_packet(boxes, list, count, zero, b.way[k]);
@@ -251,13 +209,13 @@ NB_INLINE size_t transmit_fan(const nb_transmit_job *job, const slabs *boxes, si
 
 static void list_all(unsigned char *list)
 {
-    for (int i = 0; i < NB_TRANSMIT_BOXES; i++) list[i] = (unsigned char)i;
+    for (int i = 0; i < NB_FOG_BOXES; i++) list[i] = (unsigned char)i;
 }
 
 /* Both ends one after the other: full packets only. Returns how many segments are done. */
-static size_t transmit_pairs(const nb_transmit_job *job, const slabs *boxes)
+static size_t transmit_pairs(const nb_transmit_job *job, const nb_slabs *boxes)
 {
-    unsigned char list[NB_TRANSMIT_BOXES];
+    unsigned char list[NB_FOG_BOXES];
     list_all(list);
     size_t i = 0;
     for (; i + NB_WIDTH <= job->count; i += NB_WIDTH) {
@@ -269,10 +227,10 @@ static size_t transmit_pairs(const nb_transmit_job *job, const slabs *boxes)
 }
 
 /* Any strides, any number. */
-static void transmit_spread(const nb_transmit_job *job, const slabs *boxes, size_t first)
+static void transmit_spread(const nb_transmit_job *job, const nb_slabs *boxes, size_t first)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
-    unsigned char list[NB_TRANSMIT_BOXES];
+    unsigned char list[NB_FOG_BOXES];
     list_all(list);
     for (size_t i = first; i < job->count; i += NB_WIDTH) {
         const size_t count = job->count - i < NB_WIDTH ? job->count - i : NB_WIDTH;
@@ -283,10 +241,10 @@ static void transmit_spread(const nb_transmit_job *job, const slabs *boxes, size
     }
 }
 
-void SUFFIXED(nb_transmit_, NB_SUFFIX)(const nb_transmit_job *job)
+void NB_SUFFIXED(nb_transmit_, NB_SUFFIX)(const nb_transmit_job *job)
 {
     const size_t packed = 3 * sizeof(float);
-    slabs boxes[NB_TRANSMIT_BOXES];
+    nb_slabs boxes[NB_FOG_BOXES];
     size_t done = 0;
     set_slabs(job, boxes);
     if (job->to_stride == packed && job->out_stride == sizeof(float)) {

@@ -1,4 +1,5 @@
 /* Segments in, transmittances out: a few boxes take the stream kernel, everything else the march. */
+#include "boxes.h"
 #include "snapshot.h"
 
 #include "base/cpu.h"
@@ -31,29 +32,6 @@ static nb_transmit_fn *kernel_for(nebel_isa isa)
     for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
         if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa)) found = kernels[i].transmit;
     return found;
-}
-
-static int is_plain_box(const nb_volume *body)
-{
-    return body->operation == NEBEL_OPERATION_ADD && body->density.type == NEBEL_DENSITY_CONSTANT &&
-           body->step_count == 1 && body->leaves[0].type == NB_LEAF_BOX && body->leaves[0].aligned;
-}
-
-/* The fog as boxes relative to `origin`; 0 when it is something else. */
-static int list_boxes(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes)
-{
-    if (snapshot->medium_count > NB_TRANSMIT_BOXES) return 0; /* more are better asked through the tree */
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *body = &snapshot->media[i].body;
-        if (!is_plain_box(body)) return 0;
-        const nb_leaf *leaf = &body->leaves[0];
-        for (int c = 0; c < 3; c++) {
-            boxes[i].low[c] = (float)(leaf->low[c] + (leaf->origin[c] - origin[c]));
-            boxes[i].high[c] = (float)(leaf->high[c] + (leaf->origin[c] - origin[c]));
-        }
-        boxes[i].extinction = (float)body->extinction[channel];
-    }
-    return 1;
 }
 
 static const float *point_at(const float *base, size_t stride, size_t i)
@@ -127,8 +105,8 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
     nebel_segments s = *segments;
     if (s.to_stride == 0) s.to_stride = 3 * sizeof(float);
     const size_t stride = out_stride == 0 ? sizeof(float) : out_stride;
-    nb_fog_box boxes[NB_TRANSMIT_BOXES];
-    if (!list_boxes(snapshot, s.origin, channel, boxes)) return trace_segments(snapshot, isa, channel, n, &s, out, stride);
+    nb_fog_box boxes[NB_FOG_BOXES];
+    if (!nb_boxes_list(snapshot, s.origin, channel, boxes)) return trace_segments(snapshot, isa, channel, n, &s, out, stride);
     kernel(&(nb_transmit_job){boxes, snapshot->medium_count, n, s.from, s.to, s.from_stride, s.to_stride, stride, out});
     return NEBEL_OK;
 }

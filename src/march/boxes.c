@@ -1,0 +1,35 @@
+#include "boxes.h"
+
+static int is_plain_box(const nb_volume *body)
+{
+    return body->operation == NEBEL_OPERATION_ADD && body->density.type == NEBEL_DENSITY_CONSTANT &&
+           body->step_count == 1 && body->leaves[0].type == NB_LEAF_BOX && body->leaves[0].aligned;
+}
+
+int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes)
+{
+    if (snapshot->medium_count > NB_FOG_BOXES) return 0; /* more are better asked through the tree */
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *body = &snapshot->media[i].body;
+        if (!is_plain_box(body)) return 0;
+        const nb_leaf *leaf = &body->leaves[0];
+        for (int c = 0; c < 3; c++) {
+            boxes[i].low[c] = (float)(leaf->low[c] + (leaf->origin[c] - origin[c]));
+            boxes[i].high[c] = (float)(leaf->high[c] + (leaf->origin[c] - origin[c]));
+        }
+        boxes[i].extinction = (float)body->extinction[channel];
+    }
+    return 1;
+}
+
+int nb_boxes_have_one_color(const nebel_snapshot *snapshot)
+{
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_medium *medium = &snapshot->media[i];
+        const double *extinction = medium->body.extinction;
+        if (medium->emits || extinction[0] != extinction[1] || extinction[1] != extinction[2]) return 0;
+        for (int c = 0; c < 3; c++)
+            if (medium->radiance[c] != snapshot->media[0].radiance[c]) return 0;
+    }
+    return 1;
+}
