@@ -126,7 +126,8 @@ static void test_instruction_sets_and_grouping_change_no_bit(void **unused)
         nebel_snapshot *const snapshot = commit(fog.ambient, fog.volumes, fog.count);
         for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
             if (!nebel_isa_available((nebel_isa)isa)) continue;
-            const nebel_trace_desc desc = {NEBEL_PRECISION_FLOAT, (nebel_isa)isa, 1e-5, NULL};
+            const nebel_trace_desc desc = {
+                .precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa, .tolerance = 1e-5};
             trace(snapshot, &desc, RAYS, rays, isa == NEBEL_ISA_SCALAR ? lights : again);
             if (isa != NEBEL_ISA_SCALAR) assert_same_bits(nebel_isa_name((nebel_isa)isa), &fog, rays, lights, again);
             for (int i = 0; i < RAYS; i++) trace(snapshot, &desc, 1, &rays[i], &again[i]);
