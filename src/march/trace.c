@@ -65,14 +65,17 @@ static const char *fault_of_ray(const nebel_ray *ray)
     return ray->t_max >= 0 ? NULL : "t_max must be 0 or more";
 }
 
+static int is_near(double x)
+{
+    return fabs(x) <= LARGEST_COORDINATE;
+}
+
 /* The same in one expression without a branch, for the many rays that are right. */
 static int is_valid(const nebel_ray *ray)
 {
     const double *o = ray->origin, *d = ray->direction;
-    const double far = fmax(fmax(fabs(o[0]), fabs(o[1])), fabs(o[2]));
     const double steepest = fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
-    return (far <= LARGEST_COORDINATE) & (steepest > 0) & (steepest < HUGE_VAL) & (ray->t_max >= 0) &
-           (o[0] == o[0]) & (o[1] == o[1]) & (o[2] == o[2]);
+    return is_near(o[0]) & is_near(o[1]) & is_near(o[2]) & (steepest > 0) & (steepest < HUGE_VAL) & (ray->t_max >= 0);
 }
 
 static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const nebel_ray *rays, size_t stride,

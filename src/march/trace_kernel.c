@@ -312,8 +312,9 @@ static nb_real bound_error(const march *m, const gathered *g, int transmittance_
         const nb_real error = (end_depth + g->depth_error[c]) * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON);
         const nb_real rise = nb_exp(-nb_max(g->depth[c] - error, NB_F(0.0))) - g->transmittance[c];
         const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
-        transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + NB_F(4.0) * NB_EPSILON * g->transmittance[c]);
-        radiance = nb_max(radiance, end_light + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
+        const nb_real other = (NB_F(4.0) * NB_EPSILON + m->event_count * LEAST_DOUBT) * g->transmittance[c];
+        transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + other);
+        radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
     if (transmittance_only) return transmittance;
     return nb_max(transmittance, nb_min(radiance + g->radiance_error, most_radiance(m)));

@@ -28,6 +28,7 @@ typedef struct contact {
     size_t first_span;
     nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];
+    double least_slack; /* the length over which the medium's extinction and light come to 1 */
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths */
     nb_real level;          /* gaussian: m; radial: c */
@@ -345,19 +346,34 @@ static nb_real slack_within(nb_wide end, nb_wide slack, const nb_interval *bound
     return nb_narrow(nb_wselect(counts, nb_wmax(before, behind), NB_W(0.0)));
 }
 
-/* Clips a leaf's interval to the ray. Ends have slack as far as they may move where the ray and the body are. */
-static leaf_span clip_interval(const march *m, const nb_interval *raw, const nb_interval *bounds)
+/* Slack that changes the light by less than this is left out, and counted once for all in bound_error. */
+#define LEAST_DOUBT (NB_F(0.015625) * NB_EPSILON)
+
+/* The slack of an end where it may matter: nearly never in float, whose ends are doubles. */
+static nb_wide slack_that_matters(const contact *k, nb_wide slack)
 {
-    const nb_wmask some = raw->enter - raw->enter_slack <= raw->leave + raw->leave_slack;
+    if (grows_without_bound(&k->medium->body.density)) return slack;
+    const nb_wide least = nb_widen(LEAST_DOUBT) * WIDE(k->medium->body.operation == NEBEL_OPERATION_ADD ? k->least_slack : 0);
+    return nb_wselect(slack < least, NB_W(0.0), slack);
+}
+
+/* Clips a leaf's interval to the ray. Ends have slack as far as they may move where the ray and the body are. */
+static leaf_span clip_interval(const march *m, const contact *k, const nb_interval *raw, const nb_interval *bounds)
+{
+    const nb_wide first = slack_that_matters(k, raw->enter_slack), last = slack_that_matters(k, raw->leave_slack);
+    const nb_wmask some = raw->enter - first <= raw->leave + last;
     const nb_wmask counts = nb_wand(some, bounds->enter < bounds->leave);
-    const nb_wide leave = nb_wmin(raw->leave, m->rays.t_max);
-    return (leaf_span){nb_wmax(raw->enter, NB_W(0.0)), nb_wselect(counts, leave, NB_W(0.0)),
-                       slack_within(raw->enter, raw->enter_slack, bounds, counts),
-                       slack_within(raw->leave, raw->leave_slack, bounds, counts)};
+    leaf_span span = {nb_wmax(raw->enter, NB_W(0.0)), nb_wselect(counts, nb_wmin(raw->leave, m->rays.t_max), NB_W(0.0)),
+                      NB_F(0.0), NB_F(0.0)};
+    if (!nb_wany(first + last > NB_W(0.0))) return span;
+    span.enter_slack = slack_within(raw->enter, first, bounds, counts);
+    span.leave_slack = slack_within(raw->leave, last, bounds, counts);
+    return span;
 }
 
 static void count_ends(march *m, const contact *k, const leaf_span *span)
 {
+    if (!nb_any(span->enter_slack + span->leave_slack > NB_F(0.0))) return;
     const nb_mask grazes = nb_narrow_mask(span->enter >= span->leave);
     add_end(m, &m->all_ends, k, span->enter, span->enter_slack);
     add_end(m, &m->all_ends, k, span->leave, span->leave_slack);
@@ -375,7 +391,7 @@ static int meet_leaves(march *m, contact *k)
     k->hull_leave = NB_W(0.0);
     for (size_t i = 0; i < body->leaf_count; i++) {
         const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
-        const leaf_span span = clip_interval(m, &raw, &bounds);
+        const leaf_span span = clip_interval(m, k, &raw, &bounds);
         const nb_wmask met = span.enter < span.leave;
         count_ends(m, k, &span);
         m->spans[k->first_span + i] = span;
@@ -399,6 +415,7 @@ static void meet_medium(march *m, const nb_medium *medium)
         k->light[c] = REAL(medium->light[c]);
         k->radiance[c] = REAL(medium->radiance[c]);
     }
+    k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
     if (medium->body.operation == NEBEL_OPERATION_ADD) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;
     m->contact_count++;
