@@ -103,31 +103,48 @@ static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
     return (const nebel_ray *)(const void *)((const char *)rays + i * stride);
 }
 
-/* Unit length. The largest component is taken out first, so that no square overflows or vanishes; adding +0 makes every zero
- * positive, on which the ownership of faces rests. */
+/* Unit length; adding +0 makes every zero positive, on which the ownership of faces rests. */
 static nb_wvec3 normalized(nb_wvec3 d)
 {
-    const nb_wide size = nb_wmax(nb_wmax(nb_wabs(d.x), nb_wabs(d.y)), nb_wabs(d.z));
-    const nb_wvec3 scaled = nb_wvec3(d.x / size, d.y / size, d.z / size);
-    const nb_wide inverse = NB_W(1.0) / nb_wlength3(scaled);
-    return nb_wvec3(scaled.x * inverse + NB_W(0.0), scaled.y * inverse + NB_W(0.0), scaled.z * inverse + NB_W(0.0));
+    const nb_wide inverse = NB_W(1.0) / nb_wlength3(d);
+    return nb_wvec3(d.x * inverse + NB_W(0.0), d.y * inverse + NB_W(0.0), d.z * inverse + NB_W(0.0));
+}
+
+/* Directions so long or short that their squares overflow or vanish, taken near 1 by a power of two: which is exact, so that
+ * ordinary lanes keep their bits. */
+static void tame_directions(double (*direction)[NB_WIDTH])
+{
+    for (int i = 0; i < NB_WIDTH; i++) {
+        int exponent;
+        frexp(fmax(fmax(fabs(direction[0][i]), fabs(direction[1][i])), fabs(direction[2][i])), &exponent);
+        for (int c = 0; c < 3; c++) direction[c][i] = ldexp(direction[c][i], -exponent);
+    }
+}
+
+static nb_wvec3 load_directions(double (*direction)[NB_WIDTH])
+{
+    const nb_wvec3 d = nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2]));
+    const nb_wide square = nb_wdot3(d, d);
+    if (nb_wall(nb_wand(square > NB_W(1e-200), square < NB_W(1e200)))) return normalized(d);
+    tame_directions(direction);
+    return normalized(
+        nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2])));
 }
 
 /* Lanes beyond `count` get a ray of no length. */
 static packet load_packet(const nebel_ray *rays, size_t stride, size_t count)
 {
-    double lane[7][NB_WIDTH];
+    double origin[3][NB_WIDTH], direction[3][NB_WIDTH], t_max[NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++) {
         const nebel_ray *ray = ray_at(rays, stride, i < count ? i : 0);
         for (int c = 0; c < 3; c++) {
-            lane[c][i] = ray->origin[c];
-            lane[3 + c][i] = ray->direction[c];
+            origin[c][i] = ray->origin[c];
+            direction[c][i] = ray->direction[c];
         }
-        lane[6][i] = i >= count ? 0 : ray->t_max > 1e18 ? 1e18 : ray->t_max;
+        t_max[i] = i >= count ? 0 : ray->t_max > 1e18 ? 1e18 : ray->t_max;
     }
-    const nb_wvec3 direction = nb_wvec3(nb_wload_lanes(lane[3]), nb_wload_lanes(lane[4]), nb_wload_lanes(lane[5]));
-    return (packet){nb_wvec3(nb_wload_lanes(lane[0]), nb_wload_lanes(lane[1]), nb_wload_lanes(lane[2])),
-                    normalized(direction), nb_wload_lanes(lane[6])};
+    return (packet){nb_wvec3(nb_wload_lanes(origin[0]), nb_wload_lanes(origin[1]), nb_wload_lanes(origin[2])),
+                    load_directions(direction), nb_wload_lanes(t_max)};
 }
 
 /* Below this it is quicker to ask every medium than to walk the tree. */
