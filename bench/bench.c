@@ -5,9 +5,9 @@
 /* The process first: see bench/process.c. */
 typedef const char *group_fn(const nb_bench_desc *desc, nb_figures *figures);
 
-const char *const nb_bench_groups[] = {"process", "segments", "frame", NULL};
+const char *const nb_bench_groups[] = {"process", "segments", "frame", "pass", NULL};
 
-static group_fn *const functions[] = {nb_bench_process, nb_bench_segments, nb_bench_frame};
+static group_fn *const functions[] = {nb_bench_process, nb_bench_segments, nb_bench_frame, nb_bench_pass};
 
 int nb_bench_run(const nb_bench_desc *desc, nb_figures *figures, const char **fault)
 {

@@ -19,7 +19,7 @@ static const char about[] = "Measures, and prints each figure beside a floor mea
                             "bench/NOTES.md says what to expect.\n";
 
 static const nb_option options[] = {
-    {"group", 'g', "NAME", "only one group: process, segments or frame"},
+    {"group", 'g', "NAME", "only one group: process, segments, frame or\npass"},
     {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
     {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
 };

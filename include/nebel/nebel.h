@@ -321,6 +321,36 @@ typedef struct nebel_segments {
 nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
                                      const nebel_segments *segments, float *out, size_t out_stride);
 
+/* ---- pixels in, pixels out: fog over a finished picture -------------------------------------------------------------- */
+
+typedef enum nebel_depth {
+    NEBEL_DEPTH_AXIS = 0, /* how many times the pixel's way at depth 1: for a camera, the distance along its axis */
+    NEBEL_DEPTH_RAY       /* m along the pixel's ray */
+} nebel_depth;
+
+/* A picture in caller memory, its depth, and the rays it was seen along. Rows `pitch` bytes apart, 0: without gaps. */
+typedef struct nebel_pixels {
+    double eye[3];                         /* m, where all rays start */
+    float corner[3], step_x[3], step_y[3]; /* the way from the eye to depth 1 through pixel (x, y), x and y counted from 0:
+                                              corner + x step_x + y step_y */
+    nebel_depth depth_type;
+    uint32_t width, height; /* 1 to 65536 */
+    const float *depth;     /* one per pixel; INFINITY where nothing is */
+    size_t depth_pitch;
+    const uint8_t *color;   /* red, green, blue, alpha */
+    size_t color_pitch;
+    uint8_t *out;           /* may be color, with the same pitch */
+    size_t out_pitch;
+    uint32_t first_row, row_count; /* the rows to be done, for threads that share a picture; row_count 0: to the last */
+} nebel_pixels;
+
+/* out = transmittance * color + in-scattering, rounded to nearest, alpha as it is, in float throughout. Radiance 1 is 255, in
+ * whatever encoding the picture has: physics asks for a linear one, old hardware blended sRGB as it stood. Boxes of constant
+ * density that take all colours alike and have one source take the shortest way; everything else goes through nebel_trace in
+ * float with the default tolerance. A pixel whose depth is a NaN or negative stays as it is. Same bits for every isa and for every way of
+ * splitting the rows. Any thread. Errors as nebel_trace. */
+nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
+
 /* ---- standard fog factors ------------------------------------------------------------------------------------------ */
 
 /* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +

@@ -1,0 +1,123 @@
+/* Fog over a finished picture, compiled once per instruction set.
+ *
+ * Per pixel 8 bytes come and 4 go; 15 operations, three divisions and a square root for the ray, 22 operations per box, and 45 for
+ * exponential and blending, which are left out where no lane meets fog. */
+#define NB_FAST
+
+#include "pixels.h"
+
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+#include "packet.h"
+
+#include <string.h>
+
+/* ---- light -------------------------------------------------------------------------------------------------------------- */
+
+/* From the eye to depth 1. */
+NB_INLINE nb_vec3 way_of(const float row[3], const float step[3], nb_real x)
+{
+    return nb_vec3(nb_splat(row[0]) + x * nb_splat(step[0]), nb_splat(row[1]) + x * nb_splat(step[1]),
+                   nb_splat(row[2]) + x * nb_splat(step[2]));
+}
+
+NB_INLINE nb_real octaves_of(const nb_slabs *boxes, size_t count, const nb_packet *packet, nb_real limit)
+{
+    nb_real octaves = NB_F(0.0);
+    for (size_t i = 0; i < count; i++)
+        octaves = octaves + nb_part_inside(&boxes[i], packet, limit) * nb_splat(boxes[i].octaves);
+    return octaves;
+}
+
+/* ---- blending ----------------------------------------------------------------------------------------------------------- */
+
+/* light * color + (1 - light) * radiance. Colours have 8 more bits than the picture, light has 15: every product is below
+ * 2^31, and differences may wrap around because their sum does not. Exact for a light of 0 and 1, rounded to nearest
+ * otherwise, but for light's own rounding, 1 / 65536. */
+NB_INLINE nb_bits mix(nb_bits color, uint32_t radiance, nb_bits light)
+{
+    const uint32_t rest = radiance * 32768u + (1u << 22); /* and half a step of the picture, which is 2^23 */
+    return (color - radiance) * light + rest;
+}
+
+NB_INLINE nb_bits blend(nb_bits pixel, const uint32_t radiance[3], nb_real light)
+{
+    const nb_bits weight = nb_to_bits(light * NB_F(32768.0) + NB_INTEGER) - NB_INTEGER_BITS;
+    const nb_bits red = mix((pixel << 8) & 0xff00u, radiance[0], weight);
+    const nb_bits green = mix(pixel & 0xff00u, radiance[1], weight);
+    const nb_bits blue = mix((pixel >> 8) & 0xff00u, radiance[2], weight);
+    return (red >> 23) | ((green >> 15) & 0xff00u) | ((blue >> 7) & 0xff0000u) | (pixel & 0xff000000u);
+}
+
+/* ---- rows --------------------------------------------------------------------------------------------------------------- */
+
+/* What stays the same for a whole call, copied so that no store to the picture can change it. */
+typedef struct scene {
+    nb_slabs boxes[NB_FOG_BOXES];
+    size_t box_count;
+    uint32_t radiance[3];
+    float step[3];
+} scene;
+
+NB_INLINE nb_bits fog_packet(const scene *s, const float row[3], nb_real x, nb_real depth, nb_bits pixels, int along_ray)
+{
+    const nb_vec3 none = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
+    const nb_packet packet = nb_make_packet(none, way_of(row, s->step, x));
+    const nb_real limit = along_ray ? depth / nb_sqrt(packet.square) : depth;
+    const nb_real octaves = octaves_of(s->boxes, s->box_count, &packet, limit);
+    if (!nb_any(octaves < NB_F(0.0))) return pixels;
+    return blend(pixels, s->radiance, nb_light_after(octaves * nb_sqrt(packet.square)));
+}
+
+/* `along_ray` is a constant. */
+NB_INLINE void fog_row(const scene *s, const float row[3], uint32_t width, const unsigned char *depth,
+                       const unsigned char *color, unsigned char *out, int along_ray)
+{
+    const size_t packet = 4 * NB_WIDTH;
+    float lanes[NB_WIDTH];
+    nb_bits pixels;
+    for (uint32_t i = 0; i < NB_WIDTH; i++) lanes[i] = (float)i;
+    nb_real x = nb_load_lanes(lanes);
+    uint32_t left = width;
+    for (; left >= NB_WIDTH; left -= NB_WIDTH, depth += packet, color += packet, out += packet) {
+        memcpy(lanes, depth, sizeof lanes);
+        memcpy(&pixels, color, sizeof pixels);
+        pixels = fog_packet(s, row, x, nb_load_lanes(lanes), pixels, along_ray);
+        memcpy(out, &pixels, sizeof pixels);
+        x = x + nb_splat(NB_WIDTH);
+    }
+    if (left == 0) return;
+    memset(lanes, 0, sizeof lanes);
+    memset(&pixels, 0, sizeof pixels);
+    memcpy(lanes, depth, 4 * (size_t)left);
+    memcpy(&pixels, color, 4 * (size_t)left);
+    pixels = fog_packet(s, row, x, nb_load_lanes(lanes), pixels, along_ray);
+    memcpy(out, &pixels, 4 * (size_t)left);
+}
+
+static void set_scene(const nb_pixels_job *job, scene *s)
+{
+    const float zero[3] = {0, 0, 0};
+    s->box_count = job->box_count;
+    for (size_t i = 0; i < job->box_count; i++) s->boxes[i] = nb_make_slabs(&job->boxes[i], zero);
+    memcpy(s->radiance, job->radiance, sizeof s->radiance);
+    memcpy(s->step, job->step_x, sizeof s->step);
+}
+
+void NB_SUFFIXED(nb_pixels_, NB_SUFFIX)(const nb_pixels_job *job)
+{
+    scene s;
+    set_scene(job, &s);
+    for (uint32_t y = job->first_row; y < job->first_row + job->row_count; y++) {
+        const unsigned char *depth = job->depth + y * job->depth_pitch, *color = job->color + y * job->color_pitch;
+        unsigned char *out = job->out + y * job->out_pitch;
+        float row[3];
+        for (int c = 0; c < 3; c++) row[c] = job->corner[c] + (float)y * job->step_y[c];
+        if (job->along_ray)
+            fog_row(&s, row, job->width, depth, color, out, 1);
+        else
+            fog_row(&s, row, job->width, depth, color, out, 0);
+    }
+}
