@@ -323,9 +323,11 @@ static long double draw_slope(nb_formula_dice *dice, long double low, long doubl
 
 static void draw_height(nb_formula_dice *dice, long double *in)
 {
-    in[0] = between(dice, -20, 60);
+    in[0] = nb_formula_pick(dice, 8) ? between(dice, -20, 60) : decade(dice, 1, 5);
     in[1] = draw_slope(dice, -9, 1);
     in[2] = nb_formula_pick(dice, 8) ? decade(dice, -3, 4) : 1e18L;
+    const int ends_in_fog = in[0] > 0 && in[1] < 0 && nb_formula_pick(dice, 2);
+    if (ends_in_fog) in[2] = (in[0] + between(dice, 0, 20)) / -in[1];
 }
 
 /* Near the ramp, exactly on its ends, and far enough away for digits to be lost. */

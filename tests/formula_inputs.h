@@ -17,8 +17,8 @@ typedef enum nb_formula_digits { NB_DIGITS_FLOAT, NB_DIGITS_DOUBLE, NB_DIGITS_LO
 long double nb_formula_unit(nb_formula_digits digits);
 long double nb_formula_round(nb_formula_digits digits, long double x);
 
-/* Fills in[], rounded to the wide type: rays that hit, graze, miss, start inside and 1e7 m away, run along an axis, a side or
- * through an apex; profiles level, steep, thin, endless. `reach` is what the march gives such a shape. */
+/* Fills in[], rounded to the wide type: rays that hit, graze, miss, start inside and 1e7 m away, run along an axis, a
+ * side or through an apex; profiles level, steep, thin, endless. `reach` is what the march gives such a shape. */
 void nb_formula_draw(nb_formula_dice *dice, nb_formula formula, nb_formula_digits digits,
                      long double in[NB_FORMULA_INPUTS]);
 

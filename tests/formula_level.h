@@ -7,8 +7,9 @@
 
 enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
 
-/* X(name, expression): C and GLSL at once. a0 ... are the inputs, r0 ... the same narrowed, v0 = (a0, a1, a2) and so on;
- * of_... puts a result into the outputs: an interval as enter, leave and their slacks, an estimate as value, error. */
+/* X(name, expression): C and GLSL at once. a0 ... are the inputs, r0 ... the same narrowed, v0 = (a0, a1, a2) and so
+ * on; of_... puts a result into the outputs: an interval as enter, leave and their slacks, an estimate as value, error.
+ */
 #define NB_FORMULA_INTERVALS(X)                                                                                        \
     X(all, of_interval(nb_interval_all()))                                                                             \
     X(meet, of_interval(nb_interval_meet(interval(a0, a1, a2, a3), interval(a4, a5, a6, a7))))                         \

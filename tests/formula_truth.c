@@ -176,7 +176,7 @@ long double nb_truth_density(nb_formula integral, const long double *in, long do
         for (int i = 0; i < 3; ++i) product *= soft_axis(in[i] + in[3 + i] * s, in[6 + i]);
         return product;
     default:
-        return powl(in[0] - (in[1] + in[2] * s) * (in[1] + in[2] * s), power_of(integral));
+        return powl(fmaxl(in[0] - (in[1] + in[2] * s) * (in[1] + in[2] * s), 0), power_of(integral));
     }
 }
 
@@ -245,7 +245,8 @@ static kinks kinks_of(nb_formula integral, const long double *in, long double h)
     return list;
 }
 
-/* The part of the piece that is not e^-50 times smaller than the densest part; the rest adds less than any digit here. */
+/* The part of the piece that is not e^-50 times smaller than the densest part; the rest adds less than any digit here.
+ */
 static void clip_exponential(long double k, long double *from, long double *to)
 {
     const long double reach = 50 / fabsl(k);
@@ -253,13 +254,14 @@ static void clip_exponential(long double k, long double *from, long double *to)
     if (k < 0) *from = fmaxl(*from, *to - reach);
 }
 
-static void clip_gaussian(const long double *in, long double *from, long double *to)
+/* e^(-m - x^2) from where it counts: a start far away would cost digits of x. */
+static long double gaussian_piece(const long double *in)
 {
-    const long double nearest = fminl(fmaxl(0, in[1]), in[2]), k = in[3];
+    const long double nearest = fminl(fmaxl(0, in[1]), in[2]);
     const long double reach = 50 / (fabsl(nearest) + sqrtl(nearest * nearest + 50));
-    const long double start = in[1];
-    *from = fmaxl(*from, (nearest - reach - start) / k);
-    *to = fminl(*to, (nearest + reach - start) / k);
+    const long double from = fmaxl(in[1], nearest - reach), to = fminl(in[2], nearest + reach);
+    const long double clipped[] = {in[0], from, to, in[3]};
+    return quadrature(NB_FORMULA_gaussian_integral, clipped, 0, (to - from) / in[3], PANELS);
 }
 
 static long double piece(nb_formula integral, const long double *in, long double from, long double to)
@@ -267,20 +269,18 @@ static long double piece(nb_formula integral, const long double *in, long double
     const int height = integral == NB_FORMULA_height_integral || integral == NB_FORMULA_height_capped_integral;
     const int flat = integral == NB_FORMULA_height_capped_integral && in[0] + in[1] * (from + (to - from) / 2) < 0;
     if (height && !flat && in[1] != 0) clip_exponential(in[1], &from, &to);
-    if (integral == NB_FORMULA_gaussian_integral) clip_gaussian(in, &from, &to);
-    const int smooth = height || integral == NB_FORMULA_gaussian_integral;
-    return quadrature(integral, in, from, to, smooth ? PANELS : 1);
+    return quadrature(integral, in, from, to, height ? PANELS : 1);
 }
 
 static long double length_of(nb_formula integral, const long double *in)
 {
-    if (integral == NB_FORMULA_gaussian_integral) return (in[2] - in[1]) / in[3];
     if (integral == NB_FORMULA_soft_edge_integral) return in[9];
     return integral >= NB_FORMULA_radial_1_integral && integral <= NB_FORMULA_radial_3_integral ? in[3] : in[2];
 }
 
 long double nb_truth_integral(nb_formula integral, const long double *in)
 {
+    if (integral == NB_FORMULA_gaussian_integral) return gaussian_piece(in);
     const long double h = length_of(integral, in);
     const kinks list = kinks_of(integral, in, h);
     long double sum = 0, from = 0;

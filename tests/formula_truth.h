@@ -1,5 +1,6 @@
-/* What the formulas of formula_level.h should give, written the plain way: intervals from where a ray meets each surface
- * and which pieces between are inside, integrals by quadrature between kinks. In twice the digits of a double or more. */
+/* What the formulas of formula_level.h should give, written the plain way: intervals from where a ray meets each
+ * surface and which pieces between are inside, integrals by quadrature between kinks. In twice the digits of a double
+ * or more. */
 #ifndef NB_FORMULA_TRUTH_H
 #define NB_FORMULA_TRUTH_H
 

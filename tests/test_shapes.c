@@ -83,8 +83,7 @@ static long double clipped(const interval *i, long double t_max)
 static void expect(const char *what, long double got, long double wanted, long double tolerance)
 {
     const long double error = fabsl(got - wanted);
-    if (!(error <= tolerance * fabsl(wanted)))
-        fail_msg("%s: %.20Lg instead of %.20Lg", what, got, wanted);
+    if (!(error <= tolerance * fabsl(wanted))) fail_msg("%s: %.20Lg instead of %.20Lg", what, got, wanted);
 }
 
 /* ---- closed forms ------------------------------------------------------------------------------------------------ */
@@ -233,8 +232,8 @@ static quad_ray ray_before_rounding(nb_formula_dice *dice, nb_formula formula, n
     quad_ray ray = exact_ray(in);
     for (int i = 0; i < 3; ++i) {
         ray.p[i] += (nb_quad)(nb_formula_between(dice, -3, 3) * unit * distance);
-        ray.d[i] += (nb_quad)(nb_formula_between(dice, -2, 2) * unit *
-                              (formula == NB_FORMULA_half_space ? in[3 + i] : speed));
+        ray.d[i] +=
+            (nb_quad)(nb_formula_between(dice, -2, 2) * unit * (formula == NB_FORMULA_half_space ? in[3 + i] : speed));
     }
     return ray;
 }
@@ -253,7 +252,7 @@ static void truth_agrees_with_membership(void **state)
             for (int k = 0; k < 20; ++k) {
                 const nb_quad t = (nb_quad)(nb_formula_pick(&dice, 2) && span.hit
                                                 ? (long double)span.enter + nb_formula_between(&dice, -.5L, 1.5L) *
-                                                                               (long double)(span.leave - span.enter)
+                                                                                (long double)(span.leave - span.enter)
                                                 : nb_formula_between(&dice, -10, 10));
                 const nb_quad x[] = {ray.p[0] + t * ray.d[0], ray.p[1] + t * ray.d[1], ray.p[2] + t * ray.d[2]};
                 const int between = span.hit && t > span.enter && t < span.leave;
@@ -277,7 +276,8 @@ static void note(worst *w, const long double *in, long double error, long double
     }
 }
 
-/* A true interval is found with both ends within their slack; where there is none, what is found is no longer than both. */
+/* A true interval is found with both ends within their slack; where there is none, what is found is no longer than
+ * both. */
 static void note_interval(worst *w, const long double *in, const interval *got, const nb_quad_interval *truth)
 {
     const long double *v = got->v;
@@ -318,7 +318,8 @@ static void check_slack(const char *what, int rounded)
             for (int i = 0; i < RAYS; ++i) {
                 long double in[NB_FORMULA_INPUTS];
                 nb_formula_draw(&dice, shapes[s], levels[l].digits, in);
-                const quad_ray ray = rounded ? ray_before_rounding(&dice, shapes[s], levels[l].digits, in) : exact_ray(in);
+                const quad_ray ray =
+                    rounded ? ray_before_rounding(&dice, shapes[s], levels[l].digits, in) : exact_ray(in);
                 const nb_quad_interval truth = nb_truth_interval(shapes[s], in, ray.p, ray.d);
                 const interval got = ask(&levels[l], shapes[s], in);
                 if (!is_level(shapes[s], in)) note_interval(&w, in, &got, &truth);
