@@ -36,18 +36,28 @@ NB_INLINE nb_real octaves_of(const nb_slabs *boxes, size_t count, const nb_packe
 /* light * color + (1 - light) * radiance. Colours have 8 more bits than the picture, light has 15: every product is below
  * 2^31, and differences may wrap around because their sum does not. Exact for a light of 0 and 1, rounded to nearest
  * otherwise, but for light's own rounding, 1 / 65536. */
-NB_INLINE nb_bits mix(nb_bits color, uint32_t radiance, nb_bits light)
+typedef struct glow {
+    nb_bits radiance;
+    nb_bits opaque; /* the result for a light of 0, and half a step of the picture, which is 2^23 */
+} glow;
+
+static glow make_glow(uint32_t radiance)
 {
-    const uint32_t rest = radiance * 32768u + (1u << 22); /* and half a step of the picture, which is 2^23 */
-    return (color - radiance) * light + rest;
+    const nb_bits none = nb_to_bits(nb_splat(0));
+    return (glow){none + radiance, none + (radiance * 32768u + (1u << 22))};
 }
 
-NB_INLINE nb_bits blend(nb_bits pixel, const uint32_t radiance[3], nb_real light)
+NB_INLINE nb_bits mix(nb_bits color, const glow *fog, nb_bits light)
+{
+    return (color - fog->radiance) * light + fog->opaque;
+}
+
+NB_INLINE nb_bits blend(nb_bits pixel, const glow fog[3], nb_real light)
 {
     const nb_bits weight = nb_to_bits(light * NB_F(32768.0) + NB_INTEGER) - NB_INTEGER_BITS;
-    const nb_bits red = mix((pixel << 8) & 0xff00u, radiance[0], weight);
-    const nb_bits green = mix(pixel & 0xff00u, radiance[1], weight);
-    const nb_bits blue = mix((pixel >> 8) & 0xff00u, radiance[2], weight);
+    const nb_bits red = mix((pixel << 8) & 0xff00u, &fog[0], weight);
+    const nb_bits green = mix(pixel & 0xff00u, &fog[1], weight);
+    const nb_bits blue = mix((pixel >> 8) & 0xff00u, &fog[2], weight);
     return (red >> 23) | ((green >> 15) & 0xff00u) | ((blue >> 7) & 0xff0000u) | (pixel & 0xff000000u);
 }
 
@@ -57,7 +67,7 @@ NB_INLINE nb_bits blend(nb_bits pixel, const uint32_t radiance[3], nb_real light
 typedef struct scene {
     nb_slabs boxes[NB_FOG_BOXES];
     size_t box_count;
-    uint32_t radiance[3];
+    glow fog[3];
     float step[3];
 } scene;
 
@@ -68,7 +78,7 @@ NB_INLINE nb_bits fog_packet(const scene *s, const float row[3], nb_real x, nb_r
     const nb_real limit = along_ray ? depth / nb_sqrt(packet.square) : depth;
     const nb_real octaves = octaves_of(s->boxes, s->box_count, &packet, limit);
     if (!nb_any(octaves < NB_F(0.0))) return pixels;
-    return blend(pixels, s->radiance, nb_light_after(octaves * nb_sqrt(packet.square)));
+    return blend(pixels, s->fog, nb_light_after(octaves * nb_sqrt(packet.square)));
 }
 
 /* `along_ray` is a constant. */
@@ -77,23 +87,24 @@ NB_INLINE void fog_row(const scene *s, const float row[3], uint32_t width, const
 {
     const size_t packet = 4 * NB_WIDTH;
     float lanes[NB_WIDTH];
+    nb_real depths;
     nb_bits pixels;
     for (uint32_t i = 0; i < NB_WIDTH; i++) lanes[i] = (float)i;
     nb_real x = nb_load_lanes(lanes);
     uint32_t left = width;
     for (; left >= NB_WIDTH; left -= NB_WIDTH, depth += packet, color += packet, out += packet) {
-        memcpy(lanes, depth, sizeof lanes);
+        memcpy(&depths, depth, sizeof depths);
         memcpy(&pixels, color, sizeof pixels);
-        pixels = fog_packet(s, row, x, nb_load_lanes(lanes), pixels, along_ray);
+        pixels = fog_packet(s, row, x, depths, pixels, along_ray);
         memcpy(out, &pixels, sizeof pixels);
         x = x + nb_splat(NB_WIDTH);
     }
     if (left == 0) return;
-    memset(lanes, 0, sizeof lanes);
+    memset(&depths, 0, sizeof depths);
     memset(&pixels, 0, sizeof pixels);
-    memcpy(lanes, depth, 4 * (size_t)left);
+    memcpy(&depths, depth, 4 * (size_t)left);
     memcpy(&pixels, color, 4 * (size_t)left);
-    pixels = fog_packet(s, row, x, nb_load_lanes(lanes), pixels, along_ray);
+    pixels = fog_packet(s, row, x, depths, pixels, along_ray);
     memcpy(out, &pixels, 4 * (size_t)left);
 }
 
@@ -102,7 +113,7 @@ static void set_scene(const nb_pixels_job *job, scene *s)
     const float zero[3] = {0, 0, 0};
     s->box_count = job->box_count;
     for (size_t i = 0; i < job->box_count; i++) s->boxes[i] = nb_make_slabs(&job->boxes[i], zero);
-    memcpy(s->radiance, job->radiance, sizeof s->radiance);
+    for (int c = 0; c < 3; c++) s->fog[c] = make_glow(job->radiance[c]);
     memcpy(s->step, job->step_x, sizeof s->step);
 }
 
