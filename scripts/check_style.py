@@ -23,7 +23,7 @@ CODE = {".c", ".h", ".inc", ".cpp", ".glsl"}
 TEXT = CODE | {".py", ".sh", ".cmake", ".md", ".json", ".txt", ".in", ".map"}
 
 # Reserved names that belong to the compiler, the C library or an interface we call.
-GIVEN = re.compile(r"""_Static_assert|_Alignas|_Alignof|_Noreturn|_Generic|_Thread_local|_Bool|_Atomic|_Pragma|_OPENMP
+GIVEN = re.compile(r"""_Static_assert|_exit|_Alignas|_Alignof|_Noreturn|_Generic|_Thread_local|_Bool|_Atomic|_Pragma|_OPENMP
     |_POSIX_C_SOURCE|_XOPEN_SOURCE|_GNU_SOURCE|_DEFAULT_SOURCE|_FILE_OFFSET_BITS|_WIN32|_MSC_VER
     |__[A-Za-z0-9_]+__|__cplusplus|__VA_ARGS__|__builtin_\w+|__has_\w+|__VERSION__
     |__m(64|128|256|512)[id]?|__mmask\d+|_mm\d*_\w+|_SC_\w+|_MM_\w+|_CMP_\w+|__get_cpuid\w*|__cpuid\w*|__u?int128|__float128""", re.X)
