@@ -1,0 +1,157 @@
+/* One snapshot, four threads: the same bits as from one, and the last owner frees it. By hand under -fsanitize=thread.
+ */
+#include "random_fog.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "fog_help.h"
+
+enum { THREADS = 4, ROUNDS = 20, RAYS = 53 };
+
+typedef struct answers {
+    nebel_light exact[RAYS], lights[RAYS];
+    double distances[RAYS];
+    float transmittances[RAYS];
+    size_t failures;
+} answers;
+
+typedef struct question {
+    nebel_snapshot *snapshot; /* the thread owns one share of it */
+    nebel_ray rays[RAYS];
+    float to[RAYS][3];
+    answers *results;
+} question;
+
+static void ask(const nebel_snapshot *snapshot, const question *q, answers *a)
+{
+    const float from[3] = {0, 0, 0};
+    const nebel_segments segments = {.from = from, .to = &q->to[0][0], .to_stride = sizeof q->to[0]};
+    const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
+    const nebel_result results[] = {
+        nebel_trace(snapshot, &(nebel_trace_desc){0}, RAYS, q->rays, sizeof(nebel_ray), a->exact, sizeof(nebel_light)),
+        nebel_trace(snapshot, &in_float, RAYS, q->rays, sizeof(nebel_ray), a->lights, sizeof(nebel_light)),
+        nebel_find_transmittance(snapshot, .5, 1, RAYS, q->rays, sizeof(nebel_ray), a->distances),
+        nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 2, RAYS, &segments, a->transmittances, 0)};
+    for (size_t i = 0; i < sizeof results / sizeof results[0]; i++) a->failures += results[i] != NEBEL_OK;
+}
+
+/* Asks, takes and gives back shares, and gives back the own one last. */
+static void *work(void *user)
+{
+    question *const q = user;
+    for (int round = 0; round < ROUNDS; round++) {
+        nebel_snapshot *const again = nebel_retain_snapshot(q->snapshot);
+        ask(again, q, q->results);
+        nebel_release_snapshot(again);
+    }
+    nebel_release_snapshot(q->snapshot);
+    return NULL;
+}
+
+/* ---- memory that threads may use at once, as nebel calls it from the thread that calls nebel ---- */
+
+static atomic_size_t live;
+
+static void *allocate(size_t size, void *user)
+{
+    (void)user;
+    atomic_fetch_add(&live, 1);
+    return malloc(size);
+}
+
+static void release(void *memory, void *user)
+{
+    (void)user;
+    atomic_fetch_sub(&live, 1);
+    free(memory);
+}
+
+static question make_question(const random_fog *fog)
+{
+    question q = {.snapshot = NULL};
+    for (int i = 0; i < RAYS; i++) {
+        q.rays[i] = random_fog_ray(fog, (uint64_t)i);
+        for (int k = 0; k < 3; k++) q.to[i][k] = (float)(20 * sin(1 + i * (k + 1.3)));
+    }
+    return q;
+}
+
+static void query_with_threads(random_fog *fog, uint64_t seed)
+{
+    static answers alone, results[THREADS];
+    question questions[THREADS];
+    pthread_t threads[THREADS];
+    random_fog_make(fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), 300 + seed);
+    const question q = make_question(fog);
+    const nebel_fog_desc desc = {.allocator = {allocate, release, NULL}, .ambient = {.1, .2, .3}};
+    nebel_snapshot *const snapshot = fog_commit(&desc, fog->volumes, fog->count);
+    memset(&alone, 0, sizeof alone);
+    ask(snapshot, &q, &alone);
+    assert_int_equal(alone.failures, 0);
+    for (int i = 0; i < THREADS; i++) {
+        memset(&results[i], 0, sizeof results[i]);
+        questions[i] = q;
+        questions[i].snapshot = nebel_retain_snapshot(snapshot);
+        questions[i].results = &results[i];
+    }
+    for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_create(&threads[i], NULL, work, &questions[i]), 0);
+    nebel_release_snapshot(snapshot); /* some thread is the last owner */
+    for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
+    for (int i = 0; i < THREADS; i++) assert_memory_equal(&alone, &results[i], sizeof alone);
+    assert_int_equal(atomic_load(&live), 0);
+}
+
+static void test_threads_get_the_same_bits_from_one_snapshot(void **unused)
+{
+    (void)unused;
+    static random_fog fog;
+    for (uint64_t seed = 0; seed < 2 * RANDOM_FOG_KIND_COUNT; seed++) query_with_threads(&fog, seed);
+}
+
+/* Fogs of different threads have nothing in common. */
+static void *edit(void *user)
+{
+    size_t *const count = user;
+    nebel_fog *fog = NULL;
+    if (nebel_create_fog(&(nebel_fog_desc){.allocator = {allocate, release, NULL}}, &fog) != NEBEL_OK) return NULL;
+    for (int i = 0; i < 300; i++) {
+        const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {i, 0, 0}, .radius = 1}};
+        nebel_volume_id id;
+        nebel_snapshot *snapshot = NULL;
+        if (nebel_add_volume(fog, &ball, &id) != NEBEL_OK) break;
+        if (i % 3 == 0 && nebel_remove_volume(fog, id) != NEBEL_OK) break;
+        if (i % 20 == 0 && nebel_commit_fog(fog, &snapshot) != NEBEL_OK) break;
+        if (snapshot != NULL) *count = nebel_snapshot_volume_count(snapshot);
+        nebel_release_snapshot(snapshot);
+    }
+    nebel_destroy_fog(fog);
+    return NULL;
+}
+
+static void test_threads_edit_fogs_of_their_own(void **unused)
+{
+    (void)unused;
+    pthread_t threads[THREADS];
+    size_t counts[THREADS] = {0};
+    for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_create(&threads[i], NULL, edit, &counts[i]), 0);
+    for (int i = 0; i < THREADS; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
+    for (int i = 0; i < THREADS; i++) assert_int_equal(counts[i], 187); /* of 281 every third is gone */
+    assert_int_equal(atomic_load(&live), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_threads_get_the_same_bits_from_one_snapshot),
+        cmocka_unit_test(test_threads_edit_fogs_of_their_own),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
