@@ -341,6 +341,224 @@ static void slack_covers_the_rounding_of_the_ray_too(void **state)
     check_slack("rounded rays", 1);
 }
 
+/* Slack that covered everything would be honest and useless: a ray that passes a ball well inside knows its ends to
+ * some roundings of its coordinates. */
+static void slack_is_small_where_rays_do_not_graze(void **state)
+{
+    (void)state;
+    nb_formula_dice dice = {77};
+    for (int l = 0; l < LEVELS; ++l)
+        for (int i = 0; i < 2000; ++i) {
+            const long double far = powl(10, nb_formula_between(&dice, 0, 6));
+            const long double x = nb_formula_between(&dice, -.6L, .6L), y = nb_formula_between(&dice, -.6L, .6L);
+            const long double unit = nb_formula_unit(levels[l].digits), reach = 8 * unit * (far + 4);
+            const long double in[NB_FORMULA_INPUTS] = {x, -far, y, 0, 1, 0, 1, 0, 0, 0, 0, 0, reach};
+            if (reach > .01L) continue;
+            const interval got = ask(&levels[l], NB_FORMULA_ball, in);
+            assert_true(is_hit(&got) && got.v[ENTER_SLACK] <= 10 * reach && got.v[LEAVE_SLACK] <= 10 * reach);
+        }
+}
+
+/* ---- the bad cases ----------------------------------------------------------------------------------------------- */
+
+typedef struct span_case {
+    long double p[3], d[3], shape[6], enter, leave; /* a miss leaves first */
+} span_case;
+
+/* To 64 roundings; through an apex, where both roots are one, to the square root of one. */
+static int is_near(const level *l, const interval *got, int end, long double wanted)
+{
+    const long double unit = nb_formula_unit(l->digits), slack = got->v[end + ENTER_SLACK];
+    const long double tolerance = fmaxl(64 * unit * fmaxl(1, fabsl(wanted)), fminl(slack, 16 * sqrtl(unit)));
+    return fabsl(got->v[end] - wanted) <= tolerance;
+}
+
+static void expect_span(const level *l, const char *what, size_t i, const interval *got, const span_case *wanted)
+{
+    const long double length = got->v[LEAVE] - got->v[ENTER], slack = got->v[ENTER_SLACK] + got->v[LEAVE_SLACK];
+    const int good = wanted->leave < wanted->enter
+                         ? length <= slack
+                         : is_near(l, got, ENTER, wanted->enter) && is_near(l, got, LEAVE, wanted->leave);
+    if (!good) fail_msg("%s %zu in %s: %.20Lg to %.20Lg", what, i, l->name, got->v[ENTER], got->v[LEAVE]);
+}
+
+static void expect_spans(const char *what, nb_formula formula, const span_case *cases, size_t count)
+{
+    for (int l = 0; l < LEVELS; ++l)
+        for (size_t i = 0; i < count; ++i) {
+            const interval got = ask_ray(&levels[l], formula, cases[i].p, cases[i].d, cases[i].shape, 6);
+            expect_span(&levels[l], what, i, &got, &cases[i]);
+        }
+}
+
+#define EXPECT_SPANS(what, formula, cases) expect_spans(what, formula, cases, sizeof(cases) / sizeof(cases)[0])
+
+/* Of two boxes that touch, exactly one owns a ray in the common face, whatever the sign of the zero in its direction.
+ */
+static void touching_boxes_share_rays_in_the_face(void **state)
+{
+    (void)state;
+    for (int l = 0; l < LEVELS; ++l)
+        for (int axis = 0; axis < 3; ++axis)
+            for (int negative = 0; negative < 2; ++negative) {
+                long double p[3] = {.5L, .5L, .5L}, d[3] = {0, 0, 0},
+                            box[2][6] = {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}};
+                p[axis] = 1, d[axis] = negative ? -0.0L : 0;
+                p[(axis + 1) % 3] = -2, d[(axis + 1) % 3] = 1;
+                box[1][axis] = 1, box[1][3 + axis] = 2;
+                const interval a = ask_ray(&levels[l], NB_FORMULA_box, p, d, box[0], 6);
+                const interval b = ask_ray(&levels[l], NB_FORMULA_box, p, d, box[1], 6);
+                assert_int_equal(is_hit(&a) + is_hit(&b), 1);
+                assert_int_equal(is_hit(&b), !negative);
+                assert_true(chord(is_hit(&a) ? &a : &b) == 1);
+            }
+}
+
+static int covers(const interval *i, long double from, long double to)
+{
+    return i->v[ENTER] <= from && i->v[LEAVE] >= to;
+}
+
+/* The same for half spaces that touch; beside the face a level ray is inside or outside all the way. */
+static void touching_half_spaces_share_rays_in_the_face(void **state)
+{
+    (void)state;
+    for (int l = 0; l < LEVELS; ++l)
+        for (int negative = 0; negative < 2; ++negative)
+            for (int side = -1; side <= 1; ++side) {
+                const long double below[] = {0, 1, 0, 2, 1}, above[] = {0, -1, 0, -2, -1};
+                const long double p[] = {0, 2 + side * .25L, 0}, d[] = {.6L, negative ? -0.0L : 0, -.8L};
+                const interval a = ask_ray(&levels[l], NB_FORMULA_half_space, p, d, below, 5);
+                const interval b = ask_ray(&levels[l], NB_FORMULA_half_space, p, d, above, 5);
+                const int in_a = covers(&a, -1e6L, 1e6L), in_b = covers(&b, -1e6L, 1e6L);
+                assert_int_equal(in_a, side < 0);
+                assert_int_equal(in_b, side >= 0);
+                assert_true(in_a || !(a.v[ENTER] < 1e6L && a.v[LEAVE] > -1e6L));
+                assert_true(in_b || !(b.v[ENTER] < 1e6L && b.v[LEAVE] > -1e6L));
+            }
+}
+
+/* The interval is that of the whole line: a camera inside has its start behind it, a shape behind ends before 0, and a
+ * ray of no length meets nothing. */
+static void cameras_inside_behind_and_of_no_length(void **state)
+{
+    (void)state;
+    const long double inside[] = {.25L, .25L, .5L}, behind[] = {.25L, .25L, 9}, up[] = {0, 0, 1};
+    const long double box[] = {-1, -1, 0, 1, 1, 1}, cone[] = {1, -.5L}, one = 1;
+    const struct {
+        nb_formula formula;
+        const long double *shape;
+        size_t size;
+    } bodies[] = {{NB_FORMULA_box, box, 6},
+                  {NB_FORMULA_ball, &one, 1},
+                  {NB_FORMULA_tube, &one, 0},
+                  {NB_FORMULA_cone, cone, 2},
+                  {NB_FORMULA_capsule, &one, 1}};
+    for (int l = 0; l < LEVELS; ++l)
+        for (size_t i = 0; i < sizeof bodies / sizeof bodies[0]; ++i) {
+            const interval in = ask_ray(&levels[l], bodies[i].formula, inside, up, bodies[i].shape, bodies[i].size);
+            const interval out = ask_ray(&levels[l], bodies[i].formula, behind, up, bodies[i].shape, bodies[i].size);
+            assert_true(in.v[ENTER] < 0 && in.v[LEAVE] > 0 && clipped(&in, 0) == 0);
+            assert_true(is_hit(&out) && out.v[LEAVE] < 0 && clipped(&out, 1e18L) == 0);
+            assert_true(fabsl(chord(&in) - chord(&out)) <= 64 * nb_formula_unit(levels[l].digits));
+        }
+}
+
+/* Parallel to the axis exactly, and by less than any digit: 1e-15 is where squares meet the bound of the reciprocal. */
+static void tubes_along_their_axis(void **state)
+{
+    (void)state;
+    const span_case cases[] = {
+        {{.5L, .5L, -5}, {0, 0, 1}, {0}, 5, 6},
+        {{.5L, .5L, -5}, {0, -0.0L, 2}, {0}, 2.5L, 3},
+        {{0, 0, -5}, {0, 0, 1}, {0}, 5, 6},
+        {{.9L, .5L, -5}, {0, 0, 1}, {0}, 1, 0},
+        {{.9L, .5L, -5}, {5e-16L, 0, 1}, {0}, 1, 0},
+        {{.5L, .5L, -5}, {5e-16L, 0, 1}, {0}, 5, 6},
+        {{-.9L, .5L, -5}, {7e-17L, 3e-16L, 1}, {0}, 1, 0},
+        {{-.5L, .5L, 5}, {9e-16L, 2e-16L, -1}, {0}, 4, 5},
+    };
+    EXPECT_SPANS("tube", NB_FORMULA_tube, cases);
+}
+
+/* Of length 0 a ball; along the axis and beside it; across one end. */
+static void capsules_long_and_of_no_length(void **state)
+{
+    (void)state;
+    const span_case cases[] = {
+        {{-5, 0, 0}, {1, 0, 0}, {0}, 4, 6},
+        {{-5, .6L, 0}, {1, 0, 0}, {0}, 5 - .8L, 5 + .8L},
+        {{0, 0, -5}, {0, 0, 1}, {0}, 4, 6},
+        {{-5, 1.5L, 0}, {1, 0, 0}, {0}, 1, 0},
+        {{.6L, 0, -5}, {0, 0, 1}, {4}, 5 - .8L, 9 + .8L},
+        {{0, 0, -5}, {0, -0.0L, 1}, {4}, 4, 10},
+        {{1.5L, 0, -5}, {0, 0, 1}, {4}, 1, 0},
+        {{1.5L, 0, -5}, {5e-16L, 0, 1}, {4}, 1, 0},
+        {{-5, 0, 4.6L}, {1, 0, 0}, {4}, 5 - .8L, 5 + .8L},
+        {{-5, .6L, 2}, {1, 0, 0}, {4}, 5 - .8L, 5 + .8L},
+    };
+    EXPECT_SPANS("capsule", NB_FORMULA_capsule, cases);
+}
+
+/* Radius z: along the axis, through the apex, parallel to a side (the square term is 0) both ways, parallel to the axis
+ * past the other nappe both ways; radius 1 - z the other way round; slope 0 a tube. */
+static void cones_through_apex_and_along_sides(void **state)
+{
+    (void)state;
+    const span_case cases[] = {
+        {{0, 0, -1}, {0, 0, 1}, {0, 1}, 1, 2},
+        {{-.5L, 0, -1}, {.5L, 0, 1}, {0, 1}, 1, 2},
+        {{2, 0, 1}, {-2, 0, -1}, {0, 1}, 1, 0},
+        {{-2, 0, 0}, {1, 0, 0}, {0, 1}, 1, 0},
+        {{0, 0, .5L}, {1, 0, 1}, {0, 1}, -.25L, .5L},
+        {{0, .5L, .5L}, {1, 0, 1}, {0, 1}, 0, .5L},
+        {{0, .5L, .5L}, {-1, 0, -1}, {0, 1}, -.5L, 0},
+        {{.5L, 0, -3}, {0, 0, 1}, {0, 1}, 3.5L, 4},
+        {{.5L, 0, 3}, {0, 0, -1}, {0, 1}, 2, 2.5L},
+        {{.5L, 0, -3}, {0, 0, 1}, {1, -1}, 3, 3.5L},
+        {{0, 0, .5L}, {1, 0, -1}, {1, -1}, -.25L, .5L},
+        {{-3, 0, .5L}, {1, 0, 0}, {0, 1}, 2.5L, 3.5L},
+        {{-3, 0, .5L}, {1, 0, 0}, {.5L, .5L}, 2.25L, 3.75L},
+        {{.5L, 0, -3}, {0, 0, 1}, {1, 0}, 3, 4},
+        {{-3, .6L, .5L}, {1, 0, 0}, {1, 0}, 2.2L, 3.8L},
+        {{-3, 0, -.5L}, {1, 0, 0}, {0, 1}, 1, 0},
+    };
+    EXPECT_SPANS("cone", NB_FORMULA_cone, cases);
+}
+
+static interval combine(const level *l, nb_formula formula, const long double a[4], const long double b[4])
+{
+    long double in[NB_FORMULA_INPUTS];
+    memcpy(in, a, 4 * sizeof in[0]);
+    memcpy(in + 4, b, 4 * sizeof in[0]);
+    return ask(l, formula, in);
+}
+
+/* Meets and hulls, with slacks as far as any part may pull the end: 4.75 +- .5 reaches beyond 5 +- .125 by .25. */
+static void meets_and_hulls_carry_the_slack_of_both(void **state)
+{
+    (void)state;
+    const long double a[] = {5, 9, .125L, .125L}, b[] = {4.75L, 8, .5L, .25L}, apart[] = {10, 11, 0, 0};
+    const long double miss[] = {1e18L, -1e18L, 0, 0}, doubtful[] = {10, 10, .25L, .25L};
+    for (int l = 0; l < LEVELS; ++l) {
+        const interval both = combine(&levels[l], NB_FORMULA_meet, a, b);
+        assert_true(both.v[ENTER] == 5 && both.v[LEAVE] == 8);
+        assert_true(both.v[ENTER_SLACK] == .25L && both.v[LEAVE_SLACK] == .25L);
+        const interval none = combine(&levels[l], NB_FORMULA_meet, a, apart);
+        assert_false(is_hit(&none));
+        const interval hull = combine(&levels[l], NB_FORMULA_hull, a, b);
+        assert_true(hull.v[ENTER] == 4.75L && hull.v[LEAVE] == 9);
+        assert_true(hull.v[ENTER_SLACK] == .5L && hull.v[LEAVE_SLACK] == .125L);
+        for (int order = 0; order < 2; ++order) {
+            const interval one = combine(&levels[l], NB_FORMULA_hull, order ? a : miss, order ? miss : a);
+            assert_true(one.v[ENTER] == 5 && one.v[LEAVE] == 9 && one.v[LEAVE_SLACK] == .125L);
+            const interval may = combine(&levels[l], NB_FORMULA_hull, order ? a : doubtful, order ? doubtful : a);
+            assert_true(may.v[ENTER] == 5 && may.v[LEAVE] == 10);
+            assert_true(may.v[LEAVE_SLACK] == 1.125L); /* it may as well end at 9 - .125 */
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -351,6 +569,14 @@ int main(void)
         cmocka_unit_test(truth_agrees_with_membership),
         cmocka_unit_test(slack_covers_the_error_of_the_arithmetic),
         cmocka_unit_test(slack_covers_the_rounding_of_the_ray_too),
+        cmocka_unit_test(slack_is_small_where_rays_do_not_graze),
+        cmocka_unit_test(touching_boxes_share_rays_in_the_face),
+        cmocka_unit_test(touching_half_spaces_share_rays_in_the_face),
+        cmocka_unit_test(cameras_inside_behind_and_of_no_length),
+        cmocka_unit_test(tubes_along_their_axis),
+        cmocka_unit_test(capsules_long_and_of_no_length),
+        cmocka_unit_test(cones_through_apex_and_along_sides),
+        cmocka_unit_test(meets_and_hulls_carry_the_slack_of_both),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
