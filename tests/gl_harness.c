@@ -5,6 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <stdint.h>
 #include <string.h>
 
 enum { MOST_VECTORS = 16, NAME_SIZE = 16 };
@@ -230,7 +231,8 @@ static void bind_inputs(unsigned buffer, unsigned inputs, size_t count, const fl
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(count * stride), values, GL_STATIC_DRAW);
     for (unsigned i = 0; i < inputs; ++i) {
         glEnableVertexAttribArray(i);
-        glVertexAttribPointer(i, 4, GL_FLOAT, GL_FALSE, (GLsizei)stride, (const char *)0 + i * 4 * sizeof *values);
+        const uintptr_t offset = i * 4 * sizeof *values; /* into the bound buffer, dressed as a pointer */
+        glVertexAttribPointer(i, 4, GL_FLOAT, GL_FALSE, (GLsizei)stride, (const void *)offset);
     }
 }
 
