@@ -186,7 +186,7 @@ static void test_wrong_arguments_are_refused(void **state)
     bad[3].height = 70000;
     bad[4].color_pitch = 4 * WIDTH - 1;
     bad[5].row_count = HEIGHT + 1;
-    bad[6].eye[1] = NAN;
+    bad[6].eye[1] = HUGE_VAL;
     bad[7].step_y[2] = HUGE_VALF;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &bad[i]), NEBEL_ERROR_ARGUMENT);
