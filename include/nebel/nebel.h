@@ -281,9 +281,9 @@ typedef struct nebel_trace_desc {
     nebel_isa isa;        /* float only */
     double tolerance;     /* > 0: absolute on transmittance; relative to max(1, largest source radiance) on in-scattering.
                              0: 0.002. Closed forms stay exact whatever it is. */
+    size_t *failed_ray;   /* NULL, or where the index of a ray that is an error is written */
     int transmittance_only; /* nonzero: in-scattering is not asked for and comes back 0; `error` is that of transmittance. Much
                              cheaper where fog of different light varies along the ray; same bits of transmittance. */
-    size_t *failed_ray;   /* NULL, or where the index of a ray that is an error is written */
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002

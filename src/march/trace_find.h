@@ -17,10 +17,19 @@ static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real 
     return depth;
 }
 
-/* The h within `length` at which the depth is `wanted`. */
+/* Between bounds many magnitudes apart the middle that halves the search is the geometric one. */
+static nb_real middle_of(nb_real low, nb_real high)
+{
+    if (low > 0 && high > NB_F(4.0) * low) return nb_sqrt(low * high);
+    const nb_real middle = NB_F(0.5) * (low + high);
+    return low == 0 && high > NB_F(1.0) ? nb_min(NB_F(1.0), middle) : middle;
+}
+
+/* The h within `length` at which the depth is `wanted`. A step of Newton's that is not half the one before would come too late:
+ * down an exponential it moves by one scale height each time. */
 static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real length, nb_real wanted)
 {
-    nb_real low = NB_F(0.0), high = length, h = NB_F(0.5) * length;
+    nb_real low = NB_F(0.0), high = length, h = NB_F(0.5) * length, last = length;
     for (int i = 0; i < 400 && high - low > NB_F(2.0) * NB_EPSILON * high; i++) {
         nb_real extinction;
         const nb_real excess = depth_within(m, channel, start, h, &extinction) - wanted;
@@ -28,12 +37,12 @@ static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real
         if (excess > 0) high = h;
         else low = h;
         const nb_real newton = h - excess / extinction;
-        const int trusted = newton > low && newton < high;
-        /* between bounds many magnitudes apart the middle that halves the search is the geometric one */
-        const nb_real middle = low > 0 && high > NB_F(4.0) * low ? nb_sqrt(low * high) : NB_F(0.5) * (low + high);
-        const nb_real first = low == 0 && high > NB_F(1.0) ? nb_min(NB_F(1.0), middle) : middle;
-        if (trusted && nb_abs(newton - h) <= NB_EPSILON * h) return newton;
-        h = trusted ? newton : first;
+        const int trusted = newton > low && newton < high && nb_abs(newton - h) <= NB_F(0.5) * last;
+        const int close = nb_abs(excess) <= NB_F(1e-3) * wanted;
+        if (trusted && close && nb_abs(newton - h) <= NB_EPSILON * h) return newton;
+        const nb_real next = trusted ? newton : middle_of(low, high);
+        last = nb_abs(next - h);
+        h = next;
     }
     return h;
 }

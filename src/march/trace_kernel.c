@@ -303,17 +303,22 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
     }
 }
 
-/* No answer is further from the truth than the most radiant fog, unless something shines by itself. */
-static nb_real most_radiance(const march *m)
+/* The radiance of the brightest fog on the ray: what any answer is below, unless something shines by itself. */
+static nb_real most_radiance(const march *m, int c)
 {
     nb_real most = NB_F(0.0);
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
-        const nb_real own = k->medium->emits ? NB_HUGE : largest(k->radiance) * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON);
-        most = nb_max(most, nb_select(met, own, NB_F(0.0)));
+        most = nb_max(most, nb_select(met, k->medium->emits ? NB_HUGE : k->radiance[c], NB_F(0.0)));
     }
     return most;
+}
+
+/* Rounding may lift opaque fog above its own source; the truth never is, so this only mends. */
+static void limit_radiance(const march *m, gathered *g)
+{
+    for (int c = 0; c < 3; c++) g->radiance[c] = nb_min(g->radiance[c], most_radiance(m, c));
 }
 
 /* The bound of the absolute error of all six numbers. exp(-depth) is steepest on the thin side, so the transmittance errs
@@ -334,7 +339,8 @@ static nb_real bound_error(const march *m, const gathered *g, int transmittance_
         radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
     if (transmittance_only) return transmittance;
-    return nb_max(transmittance, nb_min(radiance + g->radiance_error, most_radiance(m)));
+    const nb_real most = nb_max(nb_max(most_radiance(m, 0), most_radiance(m, 1)), most_radiance(m, 2));
+    return nb_max(transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON)));
 }
 
 static void store_light(const nb_trace_job *job, const march *m, const gathered *g, size_t first, size_t count)
@@ -375,7 +381,8 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
     share.last_share = share.last_share / pieces;
     share.length_share = share.length_share / pieces;
     nb_mask unbounded;
-    const gathered g = gather_light(&w->m, &share, &unbounded);
+    gathered g = gather_light(&w->m, &share, &unbounded);
+    limit_radiance(&w->m, &g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)
         if (nb_lane(unbounded, i)) {
             job->failed = first + i;

@@ -195,8 +195,8 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
     for (int c = 0; c < 3; c++) {
         const nb_real light = nb_select(lanes, nb_select(fine, by_nodes[c], by_ends[c]), NB_F(0.0));
         const nb_real rounding = s->sum.light_error[c] * g->transmittance[c] * nb_exp_ratio(s->sum.depth[c]);
-        most = nb_max(most, rounding + light * attenuation_error(g, &s->sum, c));
         g->radiance[c] = g->radiance[c] + light;
+        most = nb_max(most, rounding + light * attenuation_error(g, &s->sum, c) + g->radiance[c] * NB_EPSILON);
         g->depth[c] = g->depth[c] + nb_select(lanes, s->sum.depth[c], NB_F(0.0));
         g->transmittance[c] = nb_select(lanes, s->behind[c], g->transmittance[c]);
         const nb_real depth_rounding = s->sum.depth_error[c] + g->depth[c] * (NB_F(2.0) * NB_EPSILON);
@@ -251,11 +251,13 @@ static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const al
     for (int i = 0; i < MOST_STEPS && nb_any(lanes); i++) {
         const nb_wide stop = nearest_kink(m, t, p->end);
         const nb_real rest = nb_narrow(stop - t);
-        const step s = fit_step(m, g, may, p, t, nb_min(guess, rest), lanes, &ellipse);
+        const nb_real wish = nb_min(guess, rest);
+        const step s = fit_step(m, g, may, p, t, wish, lanes, &ellipse);
         take_step(m, &s, g, lanes);
         t = nb_wselect(nb_widen_mask(s.length >= rest), stop, t + nb_widen(s.length));
         guess = s.length + s.length;
-        ellipse = nb_max(NB_F(0.8) * ellipse, may->ellipse);
+        /* Only where the wish was granted: else the next step would be halved again, and none would ever grow. */
+        ellipse = nb_select(s.length >= wish, nb_max(NB_F(0.8) * ellipse, may->ellipse), ellipse);
         lanes = nb_and(lanes, nb_narrow_mask(t < p->end));
     }
     if (!nb_any(lanes)) return;

@@ -102,15 +102,29 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
     return nb_interval_box(local->p, local->d, wide_vector(leaf->low), wide_vector(leaf->high), reach);
 }
 
+/* A turned direction is off by roundings of its length, not of its components: far crossings of a plane it nearly runs along move by
+ * more than the formula, which sees exact components, can tell. */
+static nb_interval turned_half_space(nb_interval half_space, nb_wvec3 n, nb_wvec3 d)
+{
+    const nb_wide lengths = (nb_wabs(n.x) + nb_wabs(n.y) + nb_wabs(n.z)) * (nb_wabs(d.x) + nb_wabs(d.y) + nb_wabs(d.z));
+    const nb_wide doubt = lengths * (NB_W(8.0) * NB_WEPSILON) * nb_wabs(nb_wrcp_bounded(nb_wdot3(n, d)));
+    const nb_wide enter = nb_wabs(half_space.enter), leave = nb_wabs(half_space.leave);
+    half_space.enter_slack = half_space.enter_slack + nb_wselect(enter < NB_WFAR, enter * doubt, NB_W(0.0));
+    half_space.leave_slack = half_space.leave_slack + nb_wselect(leave < NB_WFAR, leave * doubt, NB_W(0.0));
+    return half_space;
+}
+
 static nb_interval planes_interval(const nb_volume *body, const nb_leaf *leaf, const local_ray *local)
 {
     const nb_wide lean = WIDE(leaf->aligned ? 4.0 : 16.0) * NB_WEPSILON;
     nb_interval meet = nb_interval_all();
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
+        const nb_wvec3 normal = wide_vector(face->normal);
         const nb_wide reach = local->reach * NB_W(3.0) + WIDE(fabs(face->distance)) * (NB_W(4.0) * NB_WEPSILON);
-        meet = nb_interval_meet(meet, nb_interval_half_space(local->p, local->d, wide_vector(face->normal),
-                                                             WIDE(face->distance), WIDE(face->tie), reach, lean));
+        const nb_interval half_space =
+            nb_interval_half_space(local->p, local->d, normal, WIDE(face->distance), WIDE(face->tie), reach, lean);
+        meet = nb_interval_meet(meet, leaf->aligned ? half_space : turned_half_space(half_space, normal, local->d));
     }
     return meet;
 }
