@@ -21,7 +21,6 @@ run_aarch64() {
         -I"$source/tests/cross" -I"$source/include" -I"$source/src" \
         "$source/tests/$name.c" "$cross/libnebel.a" -lm -o "$cross/$name"
     qemu-aarch64 "$cross/$name" $segments 10000
-    ran "$name on aarch64"
 }
 
 if [ ! -e "$source/tests/test_kernels.c" ]; then
