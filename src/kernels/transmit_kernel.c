@@ -115,33 +115,6 @@ static void set_slabs(const nb_transmit_job *job, nb_slabs *boxes)
 
 /* ---- from one place ---------------------------------------------------------------------------------------------------- */
 
-/* Boxes are left out for whole blocks, because asking costs half as much as the box. With few boxes blocks are short, so that memory and
- * arithmetic overlap. */
-enum { PACKETS = 8, FEW_BOXES = 4 };
-
-/* A way that is less or more on some axis misses the box. */
-typedef struct fence {
-    float least[3], most[3];
-} fence;
-
-/* A start outside two planes is left behind by them where the other end is so, too. The margin covers the roundings of
- * nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so that leaving a box out changes no bit. */
-static fence make_fence(const nb_slabs *box)
-{
-    const float margin = 1 - 0x1p-20f;
-    fence made;
-    for (int c = 0; c < 3; c++) {
-        made.least[c] = box->low[c] > 0 ? box->low[c] * margin : -HUGE_VALF;
-        made.most[c] = box->high[c] < 0 ? box->high[c] * margin : HUGE_VALF;
-    }
-    return made;
-}
-
-typedef struct block {
-    nb_vec3 way[PACKETS];
-    nb_vec3 low, high; /* over the packets, lane by lane */
-} block;
-
 NB_INLINE nb_vec3 least3(nb_vec3 a, nb_vec3 b)
 {
     return nb_vec3(nb_min(a.x, b.x), nb_min(a.y, b.y), nb_min(a.z, b.z));
@@ -151,6 +124,73 @@ NB_INLINE nb_vec3 most3(nb_vec3 a, nb_vec3 b)
 {
     return nb_vec3(nb_max(a.x, b.x), nb_max(a.y, b.y), nb_max(a.z, b.z));
 }
+
+/* A start outside two planes is left behind by them where the other end is so, too: where on some axis sign * way is less than
+ * bound. The sign is 0 where the start is between the planes. */
+typedef struct fence {
+    float sign[3], bound[3];
+} fence;
+
+/* The margin covers the roundings of nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so that
+ * leaving a box out changes no bit. */
+static fence make_fence(const nb_slabs *box)
+{
+    const float margin = 1 - 0x1p-20f;
+    fence made;
+    for (int c = 0; c < 3; c++) {
+        const int below = box->low[c] > 0, above = box->high[c] < 0;
+        made.sign[c] = (float)(below - above);
+        made.bound[c] = below ? box->low[c] * margin : above ? -box->high[c] * margin : -HUGE_VALF;
+    }
+    return made;
+}
+
+/* Whether all ways between low and high, lane by lane, miss the box; low and high are the same packet where `one` says so, a constant.
+ * A lane that holds a NaN may count as one that misses: its light is 1 in any case. */
+NB_INLINE int is_missed(const fence *f, nb_vec3 low, nb_vec3 high, int one)
+{
+    const nb_vec3 sign = nb_vec3(nb_splat(f->sign[0]), nb_splat(f->sign[1]), nb_splat(f->sign[2]));
+    const nb_vec3 bound = nb_vec3(nb_splat(f->bound[0]), nb_splat(f->bound[1]), nb_splat(f->bound[2]));
+    const nb_vec3 reach = one ? nb_mul3(sign, low) : most3(nb_mul3(sign, low), nb_mul3(sign, high));
+    const nb_vec3 short_of = nb_sub3(bound, reach);
+    return nb_all(nb_max(nb_max(short_of.x, short_of.y), short_of.z) > NB_F(0.0));
+}
+
+/* The boxes that are not missed. Returns how many. */
+NB_INLINE size_t list_boxes(const fence *fences, size_t count, nb_vec3 low, nb_vec3 high, int one, unsigned char *list)
+{
+    size_t found = 0;
+    for (size_t i = 0; i < count; i++) {
+        list[found] = (unsigned char)i;
+        found += !is_missed(&fences[i], low, high, one);
+    }
+    return found;
+}
+
+/* Full packets only, as below. Returns how many segments are done. */
+static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, const fence *fences)
+{
+    const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
+    const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
+    const size_t box_count = job->box_count, count = job->count;
+    unsigned char list[NB_FOG_BOXES];
+    size_t i = 0;
+    for (; i + NB_WIDTH <= count; i += NB_WIDTH) {
+        const nb_vec3 way = nb_sub3(load_packed(job->to + 3 * i), from);
+        const size_t found = list_boxes(fences, box_count, way, way, 1, list);
+        nb_store_lanes(job->out + i, found == 0 ? nb_splat(1) : transmit_packet(boxes, list, found, zero, way));
+    }
+    return i;
+}
+
+/* Asking costs half as much as a box itself. With many boxes it is done for blocks of packets at once; with few, blocks would
+ * keep memory waiting while arithmetic is done. */
+enum { PACKETS = 8, FEW_BOXES = 4 };
+
+typedef struct block {
+    nb_vec3 way[PACKETS];
+    nb_vec3 low, high; /* over the packets, lane by lane */
+} block;
 
 NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *made)
 {
@@ -163,39 +203,17 @@ NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *
     }
 }
 
-/* Whether every way of the block stays on one side of the box. */
-NB_INLINE int is_missed(const fence *f, const block *b)
-{
-    const nb_mask x = nb_or(b->high.x < nb_splat(f->least[0]), b->low.x > nb_splat(f->most[0]));
-    const nb_mask y = nb_or(b->high.y < nb_splat(f->least[1]), b->low.y > nb_splat(f->most[1]));
-    const nb_mask z = nb_or(b->high.z < nb_splat(f->least[2]), b->low.z > nb_splat(f->most[2]));
-    return nb_all(nb_or(nb_or(x, y), z));
-}
-
-NB_INLINE size_t list_boxes(const fence *fences, size_t count, const block *b, unsigned char *list)
-{
-    size_t found = 0;
-    for (size_t i = 0; i < count; i++) {
-        list[found] = (unsigned char)i;
-        found += !is_missed(&fences[i], b);
-    }
-    return found;
-}
-
-/* Blocks of at most `most` packets, full packets only. Returns how many segments are done. */
-NB_INLINE size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, size_t most)
+static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes, const fence *fences)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
     const size_t all = job->count / NB_WIDTH;
     unsigned char list[NB_FOG_BOXES];
-    fence fences[NB_FOG_BOXES];
     block b;
-    for (size_t i = 0; i < job->box_count; i++) fences[i] = make_fence(&boxes[i]);
-    for (size_t first = 0; first < all; first += most) {
-        const size_t packets = all - first < most ? all - first : most;
+    for (size_t first = 0; first < all; first += PACKETS) {
+        const size_t packets = all - first < PACKETS ? all - first : PACKETS;
         load_block(job->to + 3 * NB_WIDTH * first, from, packets, &b);
-        const size_t count = list_boxes(fences, job->box_count, &b, list);
+        const size_t count = list_boxes(fences, job->box_count, b.low, b.high, 0, list);
         float *const out = job->out + NB_WIDTH * first;
         for (size_t k = 0; k < packets; k++) {
             const nb_real light = count == 0 ? nb_splat(1) : transmit_packet(boxes, list, count, zero, b.way[k]);
@@ -203,6 +221,13 @@ NB_INLINE size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes,
         }
     }
     return NB_WIDTH * all;
+}
+
+static size_t transmit_from_one_place(const nb_transmit_job *job, const nb_slabs *boxes)
+{
+    fence fences[NB_FOG_BOXES];
+    for (size_t i = 0; i < job->box_count; i++) fences[i] = make_fence(&boxes[i]);
+    return job->box_count < FEW_BOXES ? transmit_fan(job, boxes, fences) : transmit_blocks(job, boxes, fences);
 }
 
 /* ---- any segments ------------------------------------------------------------------------------------------------------ */
@@ -248,8 +273,7 @@ void NB_SUFFIXED(nb_transmit_, NB_SUFFIX)(const nb_transmit_job *job)
     size_t done = 0;
     set_slabs(job, boxes);
     if (job->to_stride == packed && job->out_stride == sizeof(float)) {
-        if (job->from_stride == 0 && job->box_count < FEW_BOXES) done = transmit_fan(job, boxes, 1);
-        if (job->from_stride == 0 && job->box_count >= FEW_BOXES) done = transmit_fan(job, boxes, PACKETS);
+        if (job->from_stride == 0) done = transmit_from_one_place(job, boxes);
         if (job->from_stride == packed) done = transmit_pairs(job, boxes);
     }
     transmit_spread(job, boxes, done);
