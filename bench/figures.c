@@ -4,14 +4,6 @@
 
 #include <string.h>
 
-#if defined(__clang__)
-#define COMPILER "clang " __clang_version__
-#elif defined(__GNUC__)
-#define COMPILER "gcc " __VERSION__
-#else
-#define COMPILER "unknown"
-#endif
-
 static double ratio_of(const nb_figure *figure)
 {
     return figure->value / figure->floor;
@@ -98,33 +90,14 @@ static void write_figure(const nb_figure *figure, FILE *file)
 
 void nb_figures_write_json(const nb_figures *figures, FILE *file)
 {
-    char processor[256];
-    nb_figures_read_processor(processor, sizeof processor);
     (void)fprintf(file, "{\n  \"nebel\": \"%s\",\n  \"processor\": ", nebel_version());
-    write_text(processor, file);
+    write_text(figures->processor, file);
     (void)fprintf(file, ",\n  \"compiler\": ");
-    write_text(COMPILER, file);
+    write_text(figures->compiler, file);
     (void)fprintf(file, ",\n  \"quick\": %s,\n  \"figures\": [\n", figures->quick ? "true" : "false");
     for (size_t i = 0; i < figures->count; i++) {
         if (i > 0) (void)fprintf(file, ",\n");
         write_figure(&figures->list[i], file);
     }
     (void)fprintf(file, "\n  ]\n}\n");
-}
-
-void nb_figures_read_processor(char *name, size_t size)
-{
-    static const char key[] = "model name";
-    (void)snprintf(name, size, "unknown");
-    FILE *const file = fopen("/proc/cpuinfo", "r");
-    if (file == NULL) return;
-    char line[512];
-    while (fgets(line, sizeof line, file) != NULL) {
-        const char *const colon = strchr(line, ':');
-        if (colon == NULL || strncmp(line, key, sizeof key - 1) != 0) continue;
-        line[strcspn(line, "\n")] = '\0';
-        (void)snprintf(name, size, "%s", colon + 1 + strspn(colon + 1, " \t"));
-        break;
-    }
-    (void)fclose(file);
 }

@@ -19,8 +19,9 @@ typedef struct nb_figure {
 typedef struct nb_figures {
     nb_figure list[96];
     size_t count;
-    int quick;   /* the figures mean little: targets are not judged */
-    FILE *table; /* every figure is printed when it is known; NULL: none */
+    const char *processor, *compiler; /* what they are measured with */
+    int quick;                        /* the figures mean little: targets are not judged */
+    FILE *table;                      /* every figure is printed when it is known; NULL: none */
 } nb_figures;
 
 /* Adds a figure and prints its line. */
@@ -28,8 +29,5 @@ void nb_figures_add(nb_figures *figures, const nb_figure *figure);
 
 /* Writes the figures, and what they were measured with, as JSON. */
 void nb_figures_write_json(const nb_figures *figures, FILE *file);
-
-/* The name that Linux gives the processor; "unknown" elsewhere. */
-void nb_figures_read_processor(char *name, size_t size);
 
 #endif

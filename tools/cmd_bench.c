@@ -2,6 +2,7 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "commands.h"
+#include "machine.h"
 #include "report.h"
 
 #include "bench/bench.h"
@@ -40,10 +41,8 @@ static const char *find_program(char *path, size_t size)
     return path;
 }
 
-static void print_head(void)
+static void print_head(const char *processor)
 {
-    char processor[256];
-    nb_figures_read_processor(processor, sizeof processor);
     (void)printf("nebel %s on %s\n", nebel_version(), processor);
     (void)printf("A line: what, how much, how many times its floor, the floor, the target of that ratio.\n");
 }
@@ -58,11 +57,14 @@ static int write_json(const nb_figures *figures, FILE *file, const char *path)
 
 static int bench(const nb_bench_desc *desc, const char *json)
 {
-    nb_figures figures = {.table = stdout, .quick = desc->quick};
+    char processor[256];
+    nb_machine_read_processor(processor, sizeof processor);
+    nb_figures figures = {
+        .table = stdout, .processor = processor, .compiler = nb_machine_compiler(), .quick = desc->quick};
     const char *fault = NULL;
     FILE *const file = json != NULL ? fopen(json, "w") : NULL;
     if (json != NULL && file == NULL) return nb_report_failure("bench: %s: %s", json, strerror(errno));
-    print_head();
+    print_head(processor);
     int status = NB_DONE;
     if (nb_bench_run(desc, &figures, &fault) != 0) status = nb_report_failure("bench: %s", fault);
     if (file != NULL) {

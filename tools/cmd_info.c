@@ -2,6 +2,7 @@
 #include "commands.h"
 #include "info_scene.h"
 #include "isa.h"
+#include "machine.h"
 #include "report.h"
 #include "workers.h"
 
@@ -10,7 +11,6 @@
 #include <nebel/scene.h>
 
 #include <stdio.h>
-#include <string.h>
 
 static const char about[] = "Without SCENE: version, compiler, libraries, processor, instruction sets and\n"
                             "threads, as bug reports need them.\n"
@@ -24,14 +24,6 @@ static const char examples[] = "Examples:\n"
                                "  nebel info mist.json\n"
                                "\n"
                                "Exit status: 0 done, 1 the scene or a model is wrong, 2 the call was wrong.\n";
-
-#if defined(__clang__)
-#define COMPILER "clang " __clang_version__
-#elif defined(__GNUC__)
-#define COMPILER "gcc " __VERSION__
-#else
-#define COMPILER "unknown"
-#endif
 
 #if defined(__x86_64__)
 #define ARCHITECTURE "x86-64"
@@ -64,24 +56,6 @@ static const char examples[] = "Examples:\n"
 #define SANITIZER ""
 #endif
 
-/* The name that Linux gives the processor; "unknown" elsewhere. */
-static void read_processor(char *name, size_t size)
-{
-    static const char key[] = "model name";
-    (void)snprintf(name, size, "unknown");
-    FILE *const file = fopen("/proc/cpuinfo", "r");
-    if (file == NULL) return;
-    char line[512];
-    while (fgets(line, sizeof line, file) != NULL) {
-        const char *const colon = strchr(line, ':');
-        if (colon == NULL || strncmp(line, key, sizeof key - 1) != 0) continue;
-        line[strcspn(line, "\n")] = '\0';
-        (void)snprintf(name, size, "%s", colon + 1 + strspn(colon + 1, " \t"));
-        break;
-    }
-    (void)fclose(file);
-}
-
 static void print_instruction_sets(void)
 {
     (void)printf("instruction sets:");
@@ -94,9 +68,9 @@ static void print_instruction_sets(void)
 static int print_program(void)
 {
     char processor[256];
-    read_processor(processor, sizeof processor);
+    nb_machine_read_processor(processor, sizeof processor);
     (void)printf("nebel %s\n", nebel_version());
-    (void)printf("compiler: %s\n", COMPILER);
+    (void)printf("compiler: %s\n", nb_machine_compiler());
     (void)printf("build: %s, %s, %s%s\n", ARCHITECTURE, OPTIMIZATION, ASSERTIONS, SANITIZER);
     (void)printf("scene libraries: %s\n", nebel_scene_libraries());
     (void)printf("renderer libraries: %s\n", nebel_renderer_libraries());
