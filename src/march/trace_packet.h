@@ -248,9 +248,14 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
     const nb_real u = coordinate(k, start);
     const nb_real slope = nb_narrow(k->slope.x);
     switch (density->type) {
-    case NEBEL_DENSITY_HEIGHT:
-        return density->below == NEBEL_BELOW_GROW ? nb_height_integral(u, slope, h)
-                                                  : nb_height_capped_integral(u, slope, h);
+    case NEBEL_DENSITY_HEIGHT: {
+        /* from the dense end, where a ray comes down from so far that its start has lost the digits of the height */
+        const nb_real u_end = coordinate(k, start + nb_widen(h));
+        const nb_mask down = nb_and(slope < NB_F(0.0), nb_abs(u_end) < nb_abs(u));
+        const nb_real from = nb_select(down, u_end, u), rise = nb_select(down, -slope, slope);
+        return density->below == NEBEL_BELOW_GROW ? nb_height_integral(from, rise, h)
+                                                  : nb_height_capped_integral(from, rise, h);
+    }
     case NEBEL_DENSITY_LINEAR: return nb_linear_integral(u, slope, h);
     case NEBEL_DENSITY_GAUSSIAN:
         return nb_gaussian_integral(k->level, u, coordinate(k, start + nb_widen(h)), slope);
