@@ -339,7 +339,10 @@ static nb_real bound_error(const march *m, const gathered *g, int transmittance_
         radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
     if (transmittance_only) return transmittance;
-    const nb_real most = nb_max(nb_max(most_radiance(m, 0), most_radiance(m, 1)), most_radiance(m, 2));
+    /* fog that the ray may only graze is not among what it met */
+    const nb_mask grazes = largest(m->grazing_ends.light) > NB_F(0.0);
+    const nb_real met = nb_max(nb_max(most_radiance(m, 0), most_radiance(m, 1)), most_radiance(m, 2));
+    const nb_real most = nb_select(grazes, NB_HUGE, met);
     return nb_max(transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON)));
 }
 
@@ -350,7 +353,8 @@ static void store_light(const nb_trace_job *job, const march *m, const gathered 
         nb_store_lanes(lane[c], g->transmittance[c]);
         nb_store_lanes(lane[3 + c], g->radiance[c]);
     }
-    nb_store_lanes(lane[6], bound_error(m, g, job->transmittance_only));
+    const nb_real own_rounding = NB_F(1.0) + NB_F(16.0) * NB_EPSILON;
+    nb_store_lanes(lane[6], bound_error(m, g, job->transmittance_only) * own_rounding);
     for (size_t i = 0; i < count; i++) {
         nebel_light *light = (nebel_light *)(void *)((char *)job->lights + (first + i) * job->light_stride);
         for (int c = 0; c < 3; c++) {
