@@ -53,7 +53,6 @@ static int copy_media(const nebel_fog *fog, nebel_snapshot *s)
         if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
         s->medium_count++;
         light_medium(medium, fog->ambient);
-        s->most_leaves += medium->body.leaf_count;
         for (int c = 0; c < 3; c++) s->largest_radiance = fmax(s->largest_radiance, medium->radiance[c]);
     }
     return 1;

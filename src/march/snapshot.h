@@ -29,7 +29,6 @@ struct nebel_snapshot {
     nb_bvh bvh;              /* over the others */
     uint32_t *bounded;       /* the media that the tree's boxes stand for */
     size_t bounded_count;
-    size_t most_leaves;      /* in all media */
 };
 
 #endif
