@@ -351,6 +351,29 @@ typedef struct nebel_pixels {
  * splitting the rows. Any thread. Errors as nebel_trace. */
 nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
 
+/* ---- transparent surfaces in fog ------------------------------------------------------------------------------------ */
+
+/* What a surface does to the light L behind it. `color` and `alpha` are the surface's own, without fog. */
+typedef enum nebel_blend_mode {
+    NEBEL_BLEND_OVER = 0,      /* alpha color + (1 - alpha) L */
+    NEBEL_BLEND_PREMULTIPLIED, /* color + (1 - alpha) L */
+    NEBEL_BLEND_ADDITIVE,      /* color + L */
+    NEBEL_BLEND_MULTIPLY,      /* color L */
+    NEBEL_BLEND_SCREEN,        /* color + (1 - color) L */
+    NEBEL_BLEND_COUNT
+} nebel_blend_mode;
+
+/* The pixel becomes source + factor * pixel. In OpenGL: the first and second colour of glBlendFunc(GL_ONE, GL_SRC1_COLOR). */
+typedef struct nebel_blend {
+    double source[3], factor[3];
+} nebel_blend;
+
+/* How to draw a transparent surface over a pixel that has its fog already: `fog` is the light of the way from the eye to the
+ * surface. Exact for every mode, RGB transmittance, any fog behind and any stack of surfaces drawn from the back to the front,
+ * as long as all of them and the pixel were fogged by the same fog. alpha is read by OVER and PREMULTIPLIED alone. An unknown mode leaves the
+ * pixel as it is. Linear light. Source of the formulas: src/formulas/blend.inc. Any thread. */
+nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_light *fog);
+
 /* ---- standard fog factors ------------------------------------------------------------------------------------------ */
 
 /* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +
