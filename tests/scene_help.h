@@ -85,4 +85,37 @@ static inline nebel_scene *parse_good(const char *text)
     return scene;
 }
 
+/* A text with a mark ` where the message must point. */
+typedef struct rule {
+    nebel_result result;
+    const char *text;
+    const char *message; /* what must stand after the place */
+} rule;
+
+static inline void check_rules(const rule *rules, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        char place[32], expected[1024];
+        char *text = unmark(rules[i].text, place);
+        meter m;
+        journal kept;
+        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        nebel_scene *scene = (nebel_scene *)&m;
+        const nebel_result result = nebel_parse_scene(text, strlen(text), "dir/a.json", &desc, &scene);
+        snprintf(expected, sizeof expected, "dir/a.json:%s: %s", place, rules[i].message);
+        if (result != rules[i].result || strncmp(kept.last, expected, strlen(expected)) != 0)
+            fail_msg("%s\n gave %d: %s\n wanted %d: %s", text, result, kept.last, rules[i].result, expected);
+        assert_int_equal(kept.count, 1);
+        assert_int_equal(kept.result, result);
+        assert_null(scene);
+        assert_int_equal(m.live, 0);
+        free(text);
+    }
+}
+
+#define CHECK(rules) check_rules(rules, sizeof rules / sizeof *rules)
+#define FORMAT NEBEL_ERROR_FORMAT
+#define UNSUPPORTED NEBEL_ERROR_UNSUPPORTED
+#define LIMIT NEBEL_ERROR_LIMIT
+
 #endif

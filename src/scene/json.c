@@ -2,6 +2,7 @@
 #include "scene/json.h"
 
 #include "scene/json_memory.h"
+#include "scene/json_syntax.h"
 #include "scene/number.h"
 
 #include <math.h>
@@ -13,43 +14,26 @@ typedef struct reader {
     nb_json_memory memory;
     yajl_handle parser;
     locale_t c_locale;
-    size_t end; /* of the last token: where the search for the next one starts */
+    size_t end;  /* of the last token: where the search for the next one starts */
+    bool at_end; /* the whole text has been seen: a number at its very end comes now */
 } reader;
 
 /* ---- where tokens are
  * ------------------------------------------------------------------------------------------------ */
 
-/* The end of a comment; size + 1 where it has none. */
-static size_t skip_comment(const char *text, size_t size, size_t at)
-{
-    const bool line = text[at + 1] == '/';
-    for (at += line ? 2 : 3; at < size; at++) {
-        if (line && text[at] == '\n') return at + 1;
-        if (!line && text[at] == '/' && text[at - 1] == '*') return at + 1;
-    }
-    return line ? size : size + 1;
-}
-
 /* The first byte of the token after `at`: yajl tells only where tokens end. */
 static size_t find_token(const nb_json *json, size_t at)
 {
-    const char *text = json->desc.text;
-    const size_t size = json->desc.size;
-    while (at < size) {
-        if (memchr(" \t\r\n,:", text[at], 6) != NULL)
-            at++;
-        else if (text[at] == '/' && at + 1 < size && (text[at + 1] == '/' || text[at + 1] == '*'))
-            at = skip_comment(text, size, at);
-        else
-            break;
-    }
+    at = nb_json_skip_blanks(json, at, NULL);
+    while (at < json->desc.size && (json->desc.text[at] == ',' || json->desc.text[at] == ':'))
+        at = nb_json_skip_blanks(json, at + 1, NULL);
     return at;
 }
 
 static uint32_t take_token(reader *in)
 {
     const size_t start = find_token(in->json, in->end);
-    in->end = yajl_get_bytes_consumed(in->parser);
+    in->end = in->at_end ? in->json->desc.size : yajl_get_bytes_consumed(in->parser);
     return (uint32_t)start;
 }
 
@@ -266,35 +250,6 @@ static const yajl_callbacks callbacks = {
 /* ---- reading
  * --------------------------------------------------------------------------------------------------------- */
 
-static bool check_text(nb_json *json)
-{
-    const char *text = json->desc.text;
-    const size_t size = json->desc.size;
-    size_t offset;
-    if (size >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0)
-        return fail_at(json, NEBEL_ERROR_FORMAT, 0,
-                       "the file starts with a byte order mark; save it as UTF-8 without one");
-    if (!nb_text_is_clean(text, size, &offset))
-        return fail_at(json, NEBEL_ERROR_FORMAT, offset, "this is not UTF-8 text, or a control character in it");
-    if (find_token(json, 0) == size)
-        return fail_at(json, NEBEL_ERROR_FORMAT, size,
-                       "the file is empty; a scene holds at least {\"nebel\": 1, \"fog\": []}");
-    return true;
-}
-
-static void report_syntax(reader *in, bool at_end)
-{
-    nb_json *json = in->json;
-    char *message = (char *)yajl_get_error(in->parser, 0, NULL, 0);
-    char text[160] = "not JSON: ";
-    const size_t used = strlen(text), size = strcspn(message, "\n");
-    const size_t room = sizeof text - used - 1;
-    memcpy(text + used, message, size < room ? size : room);
-    yajl_free_error(in->parser, (unsigned char *)message);
-    const size_t place = at_end ? json->desc.size : find_token(json, in->end);
-    fail_at(json, NEBEL_ERROR_FORMAT, place < json->desc.size ? place : json->desc.size, text);
-}
-
 /* Between setjmp and here nothing is held but yajl's memory, which is given back as a whole. */
 static void run_parser(reader *in)
 {
@@ -306,12 +261,11 @@ static void run_parser(reader *in)
     in->parser = yajl_alloc(&callbacks, &in->memory.functions, in);
     yajl_config(in->parser, yajl_allow_comments, 1);
     yajl_status status = yajl_parse(in->parser, (const unsigned char *)json->desc.text, json->desc.size);
-    const bool at_end = status == yajl_status_ok;
-    if (at_end) status = yajl_complete_parse(in->parser);
-    if (status == yajl_status_error)
-        report_syntax(in, at_end);
-    else if (status == yajl_status_ok && find_token(json, in->end) > json->desc.size)
-        fail_at(json, NEBEL_ERROR_FORMAT, json->desc.size, "the file ends within a comment; close it with */");
+    in->at_end = status == yajl_status_ok;
+    if (in->at_end) status = yajl_complete_parse(in->parser);
+    const bool refused = status == yajl_status_error;
+    if (refused || (status == yajl_status_ok && nb_json_skip_blanks(json, in->end, NULL) > json->desc.size))
+        nb_json_explain(json, in->end);
 }
 
 static void read_text(nb_json *json)
@@ -331,7 +285,7 @@ nebel_result nb_json_read(nb_json *json, const nb_json_desc *desc)
 {
     *json = (nb_json){.desc = *desc, .place = NB_TEXT_START};
     json->strings.allocator = json->section_keys.allocator = desc->allocator;
-    if (check_text(json)) read_text(json);
+    if (nb_json_check_text(json)) read_text(json);
     nb_arena_release(&json->strings);
     nb_arena_release(&json->section_keys);
     nb_release(&desc->allocator, json->nodes);

@@ -47,6 +47,8 @@ static const nb_keys shape_keys[NEBEL_SHAPE_COUNT] = {
     SHAPE_KEYS(NB_BIT(SHAPES), "an intersection"),
 };
 
+static const nebel_transform no_transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
+
 static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
 {
     enum { POSITION, ROTATION, SCALE, COUNT };
@@ -103,7 +105,9 @@ static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_sha
     }
     shape->planes = planes;
     shape->plane_count = node->count;
-    return true;
+    nebel_volume_desc body = {.operation = NEBEL_OPERATION_EXCLUDE, .shape = *shape};
+    body.shape.transform = no_transform;
+    return nb_read_try(in, node, "convex: ", &body);
 }
 
 /* leaf_count is that of the volume so far. */
@@ -151,7 +155,7 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
     nb_json *json = in->json;
     const int type = nb_value_type(json, node, type_names, NEBEL_SHAPE_COUNT);
     if (type < 0 || !nb_value_members(json, node, &shape_keys[type], found)) return false;
-    *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}}};
+    *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = no_transform};
     if (!read_members(json, found, shape)) return false;
     if (found[SHAPES] != NULL) return read_parts(in, found[SHAPES], shape, leaf_count);
     return count_leaf(json, node, leaf_count) && (found[MAX] == NULL || check_box(json, found[MAX], shape)) &&

@@ -2,6 +2,7 @@
 #include "scene/scene_internal.h"
 
 #include <math.h>
+#include <string.h>
 
 enum {
     NAME,
@@ -124,9 +125,7 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
 /* ---- volume
  * ---------------------------------------------------------------------------------------------------------- */
 
-/* The core sees every volume once, since it knows more than the file's rules: whether a convex body is empty, for one.
- */
-static bool try_volume(nb_scene_reader *in, const nb_json_node *node, const nebel_volume_desc *volume)
+bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume)
 {
     nebel_volume_id id;
     in->core_message[0] = '\0';
@@ -135,6 +134,8 @@ static bool try_volume(nb_scene_reader *in, const nb_json_node *node, const nebe
     if (result == NEBEL_OK) return true;
     const bool kept = result == NEBEL_ERROR_MEMORY || result == NEBEL_ERROR_LIMIT || result == NEBEL_ERROR_UNSUPPORTED;
     const char *text = in->core_message[0] != '\0' ? in->core_message : nebel_result_text(result);
+    const size_t known = strlen(subject);
+    if (strncmp(text, subject, known) == 0) text += known;
     return nb_json_fail(in->json, kept ? result : NEBEL_ERROR_FORMAT, node, "%s", text);
 }
 
@@ -171,5 +172,5 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
          !read_amount(json, node, found, volume.extinction) || !read_light(in, found, &volume)))
         return false;
-    return try_volume(in, node, &volume) && keep_volume(in, node, &volume, name);
+    return nb_read_try(in, node, "", &volume) && keep_volume(in, node, &volume, name);
 }

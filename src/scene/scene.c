@@ -9,7 +9,7 @@
 /* The longest scene file. */
 #define TEXT_LIMIT ((size_t)1 << 30)
 
-enum { NEBEL, CAMERA, BACKGROUND, SUN, AMBIENT, LIGHTS, MODELS, FOG, SECTION_COUNT };
+enum { NEBEL, CAMERA, BACKGROUND, SUN, AMBIENT, LIGHTS, MODELS, FOG, SECTION_COUNT = NB_SCENE_SECTIONS };
 
 static const char *const section_names[] = {"nebel",   "camera", "background", "sun",
                                             "ambient", "lights", "models",     "fog"};
@@ -33,9 +33,9 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     nebel_scene_data *data = &in->scene->data;
     const int section = nb_value_find_key(in->json, node, &section_keys);
     if (section < 0) return false;
-    if ((in->seen & NB_BIT(section)) != 0)
-        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node, "the key appears twice; remove one");
+    if ((in->seen & NB_BIT(section)) != 0) return nb_value_fail_repeated(in->json, node, in->section_offsets[section]);
     in->seen |= NB_BIT(section);
+    in->section_offsets[section] = node->key_offset;
     switch (section) {
     case NEBEL:
         return read_version(in->json, node);

@@ -43,14 +43,18 @@ struct nebel_scene {
     bool models_loaded;
 };
 
+/* The keys that a scene may have. */
+enum { NB_SCENE_SECTIONS = 8 };
+
 /* What reading needs beside the scene itself. */
 typedef struct nb_scene_reader {
     nb_json *json;
     nebel_scene *scene;
-    nebel_fog *trial;       /* takes every volume once, for the core's own checks */
-    char core_message[512]; /* what the core said about the last one */
-    uint32_t seen;          /* sections */
-    size_t lit_offset;      /* of the first albedo that is not 0; 0: none */
+    nebel_fog *trial;                          /* takes every volume once, for the core's own checks */
+    char core_message[512];                    /* what the core said about the last one */
+    uint32_t seen;                             /* sections */
+    size_t section_offsets[NB_SCENE_SECTIONS]; /* of the keys of those seen */
+    size_t lit_offset;                         /* of the first albedo that is not 0; 0: none */
     char lit_path[NB_JSON_PATH];
 } nb_scene_reader;
 
@@ -62,6 +66,10 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
 bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
+
+/* Shows a volume to the core, which knows more than the file's rules: whether a convex body is empty, for one. Where
+ * its message begins with `subject`, which the node's path says already, that is left out. */
+bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume);
 
 nebel_camera nb_camera_default(void);
 

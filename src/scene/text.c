@@ -69,6 +69,11 @@ static int32_t escaped_unit(const char *raw, size_t size, size_t at)
     return unit;
 }
 
+bool nb_text_is_unicode_escape(const char *raw, size_t size, size_t at)
+{
+    return escaped_unit(raw, size, at) >= 0;
+}
+
 bool nb_text_has_lone_surrogate(const char *raw, size_t size)
 {
     for (size_t at = 0; at < size;) {

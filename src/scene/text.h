@@ -23,6 +23,9 @@ size_t nb_text_sequence(const char *text, size_t size, size_t at);
  * True when there is none; otherwise *offset says where. */
 bool nb_text_is_clean(const char *text, size_t size, size_t *offset);
 
+/* True when \uXXXX, with four hexadecimal digits, stands at `at`. */
+bool nb_text_is_unicode_escape(const char *raw, size_t size, size_t at);
+
 /* True when the JSON string between the quotes escapes a lone half of a surrogate pair. */
 bool nb_text_has_lone_surrogate(const char *raw, size_t size);
 

@@ -75,6 +75,14 @@ static bool fail_missing(nb_json *json, const nb_json_node *object, const nb_key
                         keys->owner);
 }
 
+bool nb_value_fail_repeated(nb_json *json, const nb_json_node *node, size_t first)
+{
+    const nb_text_place place = nb_json_place(json, first);
+    return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, node,
+                            "the key appears twice, first at line %zu, column %zu; remove one", place.line,
+                            place.column);
+}
+
 bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found)
 {
     uint32_t seen = 0;
@@ -83,8 +91,7 @@ bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node)) {
         const int key = nb_value_find_key(json, node, keys);
         if (key < 0) return false;
-        if ((seen & NB_BIT(key)) != 0)
-            return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, node, "the key appears twice; remove one");
+        if (found[key] != NULL) return nb_value_fail_repeated(json, node, found[key]->key_offset);
         seen |= NB_BIT(key);
         found[key] = node;
     }

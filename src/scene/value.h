@@ -19,6 +19,9 @@ typedef struct nb_keys {
  * errors. */
 bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found);
 
+/* Fails because of the node's key, which was there before, at `first`. Returns false. */
+bool nb_value_fail_repeated(nb_json *json, const nb_json_node *node, size_t first);
+
 /* Where `key` is among names: its index; otherwise an error at the key that lists the allowed ones and returns -1. */
 int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys);
 
