@@ -17,6 +17,7 @@ ROOMS = {
     "kernels": {"base", "formulas"},
     "media": {"base", "formulas"},
     "march": {"base", "formulas", "media", "kernels"},
+    "shader": {"base", "formulas", "media", "march"},
     "classic": {"base", "march", "media"},
     "nebula": {"base", "march", "media"},
     "planet": {"base", "march", "media"},

@@ -25,6 +25,14 @@
  *     vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first, int count);
  *         Transmittance alone.
  *
+ * With NEBEL_VIEW defined before it, the text also declares, in every dialect:
+ *
+ *     struct nebel_sight { vec3 origin; vec3 direction; float t_max; };
+ *     nebel_sight nebel_see(vec2 pixel, float depth);
+ *         The ray of a pixel (gl_FragCoord.xy) up to the surface at `depth`, ready for nebel_trace; 1e18 where there is none.
+ *         See nebel_view_rays. It reads NEBEL_RAY(i), a vec4 of nebel_rays; GLSL 3.30 and ES 3.00 declare
+ *         `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];` unless the host defines NEBEL_RAY itself.
+ *
  * Where the words come from: NEBEL_WORD(i), a vec4. By default (GLSL 3.30 and ES 3.00) the text declares
  *
  *     layout(std140) uniform nebel_fog_block { vec4 nebel_words[1024]; };
@@ -79,6 +87,56 @@ typedef struct nebel_view {
     double clip_from_eye[16];
     uint32_t width, height;     /* pixels, 1 to 65536 */
 } nebel_view;
+
+/* What a texel of the host's depth picture holds. */
+typedef enum nebel_depth_kind {
+    NEBEL_DEPTH_KIND_WINDOW = 0, /* what a depth buffer holds */
+    NEBEL_DEPTH_KIND_LOGARITHM,  /* log(1 + c w) / log(1 + c far), w from clip space: the logarithmic depth of large worlds */
+    NEBEL_DEPTH_KIND_AXIS,       /* metres along the camera's axis */
+    NEBEL_DEPTH_KIND_DISTANCE,   /* metres along the ray, from where rays start by default */
+    NEBEL_DEPTH_KIND_COUNT
+} nebel_depth_kind;
+
+/* Which depth says that nothing was hit, so that the ray has no end. */
+typedef enum nebel_sky {
+    NEBEL_SKY_FAR = 0, /* WINDOW, LOGARITHM: the farther end of the range, whichever that is; AXIS, DISTANCE: 0 or less,
+                          1e18 or more, NaN */
+    NEBEL_SKY_VALUE,   /* sky_depth alone, compared as float */
+    NEBEL_SKY_NONE     /* no depth: the farther end of the range is a wall */
+} nebel_sky;
+
+typedef enum nebel_start {
+    NEBEL_START_EYE = 0, /* where the rays of a projection meet; parallel rays: the plane across them through the eye */
+    NEBEL_START_NEAR     /* the near plane: for a mirror whose near plane is its surface, for parallel rays that begin
+                            behind the eye */
+} nebel_start;
+
+/* The convention of the host's depth. {0} is OpenGL's own: clip z from -1 to 1, a depth range from 0 to 1. Reversed depth and
+ * infinite far planes need no word here: the matrix tells. */
+typedef struct nebel_depth_desc {
+    nebel_depth_kind kind;
+    int zero_to_one;          /* nonzero: clip z reaches from 0 to 1 (glClipControl, Vulkan, Direct3D), not from -1 */
+    double range[2];          /* what glDepthRange was given, apart; both 0: 0 and 1 */
+    double log_scale, log_far; /* LOGARITHM: c [1/m] and far [m], > 0; log_scale 0: 1 */
+    nebel_sky sky;
+    double sky_depth;
+    nebel_start start;
+} nebel_depth_desc;
+
+#define NEBEL_RAY_WORDS 10
+
+/* The rays of a view as the text's nebel_see takes them, and the eye that they count from. */
+typedef struct nebel_rays {
+    double eye[3]; /* [m]: pack the fog for it */
+    nebel_word words[NEBEL_RAY_WORDS];
+} nebel_rays;
+
+/* Computes, in double, what makes rays of pixels and lengths of depths. Pixel (x, y) counts from the lower left corner, as
+ * gl_FragCoord does; its centre is at (x + .5, y + .5). A host whose rows count from the top negates the second row of
+ * clip_from_eye. Parallel rays go along -z of eye space, others to where w is positive in clip space. `depth` NULL: {0}.
+ * O(1). Any thread. Errors: ARGUMENT (a number that is not finite, a matrix that cannot be inverted, one whose rays neither
+ * meet in a point nor are parallel with constant w; a size, a range, a kind that is none). */
+nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays);
 
 /* ---- tiles ----------------------------------------------------------------------------------------------------------- */
 

@@ -1,0 +1,67 @@
+/* Rays of pixels and lengths of depths, from the words of nebel_view_rays; see src/shader/view.c for what they are.
+ * Part of the shader text where NEBEL_VIEW is defined. */
+#ifdef NEBEL_VIEW
+#ifndef NEBEL_RAY
+uniform vec4 nebel_rays[10];
+#define NEBEL_RAY(i) nebel_rays[i]
+#endif
+
+struct nebel_sight {
+    nb_vec3 origin;
+    nb_vec3 direction;
+    float t_max;
+};
+
+/* A word is linear in the pixel: its xyz at (0, 0), and its growth in x and y in the two words behind it. */
+nb_vec3 nb_view_vector(int i, vec2 pixel)
+{
+    return NEBEL_RAY(i).xyz + pixel.x * NEBEL_RAY(i + 1).xyz + pixel.y * NEBEL_RAY(i + 2).xyz;
+}
+
+/* The same for one number: at (0, 0), growth in x, growth in y. */
+float nb_view_number(int i, vec2 pixel)
+{
+    return NEBEL_RAY(i).x + pixel.x * NEBEL_RAY(i).y + pixel.y * NEBEL_RAY(i).z;
+}
+
+/* Where the plane meets the ray, in steps; `never` where it is not in front. */
+float nb_view_divide(float above, float below, float never)
+{
+    return below > 0.0 ? above / below : never;
+}
+
+bool nb_view_is_sky(float kind, float depth)
+{
+    float sky = NEBEL_RAY(8).w;
+    float test = NEBEL_RAY(9).w;
+    if (test == 1.0) return depth == sky;
+    if (test == 2.0) return false;
+    return !(depth > 0.0 && depth < 1e18);
+}
+
+/* How far, in steps of the ray's own length, before division by that of a distance. */
+float nb_view_steps(float kind, float depth, vec2 pixel)
+{
+    float above = nb_view_number(6, pixel);
+    float below = nb_view_number(7, pixel);
+    float value = depth;
+    if (kind == 0.0) value = NEBEL_RAY(1).w - depth;
+    if (kind == 1.0) value = nb_expm1(depth * NEBEL_RAY(1).w) * NEBEL_RAY(2).w;
+    return nb_view_divide(above + value * NEBEL_RAY(6).w, below + value * NEBEL_RAY(7).w, 1e18);
+}
+
+nebel_sight nebel_see(vec2 pixel, float depth)
+{
+    nebel_sight sight;
+    float kind = NEBEL_RAY(0).w;
+    nb_vec3 way = nb_view_vector(3, pixel);
+    float size = sqrt(dot(way, way));
+    float start = size * nb_view_divide(nb_view_number(8, pixel), nb_view_number(9, pixel), 0.0);
+    float end = kind == 3.0 ? depth : size * nb_view_steps(kind, depth, pixel);
+    if (nb_view_is_sky(kind, depth)) end = 1e18;
+    sight.direction = way / size;
+    sight.origin = nb_view_vector(0, pixel) + start * sight.direction;
+    sight.t_max = end < 1e18 ? max(end - start, 0.0) : 1e18;
+    return sight;
+}
+#endif
