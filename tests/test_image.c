@@ -40,12 +40,36 @@ static nebel_image make_image(uint32_t width, uint32_t height, uint32_t channel_
     return image;
 }
 
+static size_t file_count(void)
+{
+    char command[200];
+    snprintf(command, sizeof command, "ls -A %s | wc -l", folder);
+    FILE *pipe = popen(command, "r");
+    size_t count = 0;
+    assert_int_equal(fscanf(pipe, "%zu", &count), 1);
+    pclose(pipe);
+    return count;
+}
+
 static nebel_result write_image(const char *path, const nebel_image *image, journal *kept)
 {
     meter m;
     const nebel_scene_desc desc = metered_desc(&m, kept);
     const nebel_result result = nebel_write_image(path, &desc, image);
     assert_int_equal(m.live, 0);
+    return result;
+}
+
+/* The same from the question that is asked before the work, after which nothing has changed. */
+static nebel_result check_path(const char *path, journal *kept)
+{
+    meter m;
+    const size_t files = file_count();
+    const nebel_scene_desc desc = metered_desc(&m, kept);
+    const nebel_result result = nebel_check_image_path(path, &desc);
+    assert_int_equal(m.live, 0);
+    assert_int_equal(file_count(), files);
+    assert_int_equal(kept->count, result != NEBEL_OK);
     return result;
 }
 
@@ -58,17 +82,6 @@ static nebel_result read_image(const char *path, nebel_image *image, journal *ke
 static void free_image(nebel_image *image)
 {
     nebel_free_image(&(nebel_scene_desc){0}, image);
-}
-
-static size_t file_count(void)
-{
-    char command[200];
-    snprintf(command, sizeof command, "ls -A %s | wc -l", folder);
-    FILE *pipe = popen(command, "r");
-    size_t count = 0;
-    assert_int_equal(fscanf(pipe, "%zu", &count), 1);
-    pclose(pipe);
-    return count;
 }
 
 static void write_bytes(const char *path, const void *data, size_t size)
@@ -488,6 +501,9 @@ static void test_a_link_stays_and_its_target_is_replaced(void **state)
     assert_int_equal(symlink("link.png", in_folder("second.png")), 0);
     assert_int_equal(symlink("new.png", in_folder("dangling.png")), 0);
     assert_int_equal(symlink("loop.png", in_folder("loop.png")), 0);
+    assert_int_equal(check_path(in_folder("second.png"), &kept), NEBEL_OK);
+    assert_int_equal(check_path(in_folder("dangling.png"), &kept), NEBEL_OK);
+    assert_int_equal(check_path(in_folder("loop.png"), &kept), NEBEL_ERROR_FILE);
     assert_int_equal(write_image(in_folder("second.png"), &image, &kept), NEBEL_OK);
     assert_int_equal(write_image(in_folder("dangling.png"), &image, &kept), NEBEL_OK);
     assert_int_equal(write_image(in_folder("loop.png"), &image, &kept), NEBEL_ERROR_FILE);
@@ -519,10 +535,13 @@ static void test_devices_and_pipes_are_written_and_stay(void **state)
     assert_int_equal(write_image(in_folder("full.png"), &image, &kept), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, "No space left on device"));
     assert_int_equal(symlink("/dev/null", in_folder("null.exr")), 0);
+    assert_int_equal(check_path(in_folder("null.exr"), &kept), NEBEL_OK);
+    assert_int_equal(check_path(in_folder("null.jpg"), &kept), NEBEL_ERROR_FORMAT);
     assert_int_equal(write_image(in_folder("null.exr"), &image, &kept), NEBEL_OK);
     stat("/dev/null", &status);
     assert_true(S_ISCHR(status.st_mode));
     assert_int_equal(mkfifo(in_folder("pipe.exr"), 0600), 0);
+    assert_int_equal(check_path(in_folder("pipe.exr"), &kept), NEBEL_OK); /* without waiting for a reader */
     const int reader = open(in_folder("pipe.exr"), O_RDONLY | O_NONBLOCK);
     assert_int_equal(write_image(in_folder("pipe.exr"), &image, &kept), NEBEL_OK);
     unsigned char start[4];
@@ -543,13 +562,22 @@ static void test_a_failure_leaves_everything_as_it_was(void **state)
     (void)state;
     journal kept;
     nebel_image image = make_image(2, 2, 3, rgb_names);
-    assert_int_equal(write_image(in_folder("none/a.png"), &image, &kept), NEBEL_ERROR_FILE);
-    assert_non_null(strstr(kept.last, "No such file or directory"));
     assert_int_equal(mkdir(in_folder("folder.png"), 0700), 0);
-    assert_int_equal(write_image(in_folder("folder.png"), &image, &kept), NEBEL_ERROR_FILE);
-    assert_non_null(strstr(kept.last, "Is a directory"));
+    write_bytes(in_folder("file"), "", 0);
+    const struct {
+        const char *path, *reason;
+    } bad[] = {{in_folder("none/a.png"), "there is no folder"},
+               {in_folder("folder.png"), "it is a folder; name a file in it"},
+               {in_folder("file/a.png"), "Not a directory"},
+               {"/proc/nebel.png", "no file can be made in \"/proc/\""}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(write_image(bad[i].path, &image, &kept), NEBEL_ERROR_FILE);
+        assert_non_null(strstr(kept.last, bad[i].reason));
+        assert_int_equal(check_path(bad[i].path, &kept), NEBEL_ERROR_FILE);
+        assert_non_null(strstr(kept.last, bad[i].reason));
+    }
     rmdir(in_folder("folder.png"));
-    assert_int_equal(write_image("/proc/nebel.png", &image, &kept), NEBEL_ERROR_FILE);
+    unlink(in_folder("file"));
     assert_int_equal(file_count(), 0);
     free(image.samples);
 }
@@ -561,6 +589,7 @@ static void test_a_folder_without_permission_is_an_error(void **state)
     if (geteuid() == 0) skip(); /* root may write everywhere */
     nebel_image image = make_image(2, 2, 3, rgb_names);
     mkdir(in_folder("closed"), 0500);
+    assert_int_equal(check_path(in_folder("closed/a.png"), &kept), NEBEL_ERROR_FILE);
     assert_int_equal(write_image(in_folder("closed/a.png"), &image, &kept), NEBEL_ERROR_FILE);
     assert_non_null(strstr(kept.last, "Permission denied"));
     rmdir(in_folder("closed"));

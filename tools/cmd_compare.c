@@ -296,7 +296,7 @@ static int read_pictures(const settings *wanted, pair *both, nb_report_listener 
 static int compare(const settings *wanted, pair *both)
 {
     nb_report_listener listener = {0};
-    int status = wanted->output != NULL ? nb_target_check("compare", wanted->output) : NB_DONE;
+    int status = wanted->output != NULL ? nb_target_check(wanted->output) : NB_DONE;
     if (status == NB_DONE) status = read_pictures(wanted, both, &listener);
     if (status != NB_DONE) return status;
     const findings found = measure(both);

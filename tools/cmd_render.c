@@ -180,8 +180,9 @@ static char *name_picture(const settings *wanted, uint32_t frame)
 static int check_targets(const settings *wanted)
 {
     for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
+        if (nb_interrupt_is_requested()) break;
         char *const name = name_picture(wanted, frame);
-        const int status = name != NULL ? nb_target_check("render", name) : NB_FAILED;
+        const int status = name != NULL ? nb_target_check(name) : NB_FAILED;
         free(name);
         if (status != NB_DONE) return status;
     }
@@ -335,11 +336,21 @@ static int make_picture(studio *all)
     return status;
 }
 
+static void note_stillness(const nebel_scene *scene, const settings *wanted)
+{
+    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    if (data->turntable_frames > 0 || data->camera_key_count > 1) return;
+    nb_report_message("note: %s: nothing moves, all frames are the same picture; "
+                      "the camera turns with \"turntable\", or moves with \"keys\"",
+                      wanted->scene);
+}
+
 static int set_up(studio *all)
 {
     const settings *const wanted = all->wanted;
     int status = nb_load_scene(wanted->scene, 1, &all->listener, &all->loaded);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
+    if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
     status = allocate_planes(all);
     if (status != NB_DONE) return status;
     nebel_renderer_desc desc = wanted->renderer;
@@ -385,10 +396,9 @@ static int run(int count, char **words)
     int status = nb_options_parse(&nb_commands_render, count, words, &arguments);
     if (status < 0) status = read_settings(&arguments, &wanted);
     if (status >= 0) return status;
-    status = check_targets(&wanted);
-    if (status != NB_DONE) return status;
     nb_interrupt_listen();
-    status = render(&wanted);
+    status = check_targets(&wanted);
+    if (status == NB_DONE) status = render(&wanted);
     nb_interrupt_obey();
     return status;
 }

@@ -8,10 +8,10 @@
 #include <stdio.h>
 #include <string.h>
 
-static const nb_command *const commands[] = {&nb_commands_render, &nb_commands_trace, &nb_commands_info,
-                                             &nb_commands_compare,
+static const nb_command *const commands[] = {
+    &nb_commands_render, &nb_commands_trace, &nb_commands_info, &nb_commands_compare,
 #if defined(NEBEL_HAVE_BENCH)
-                                             &nb_commands_bench,
+    &nb_commands_bench,
 #endif
 };
 
@@ -19,6 +19,8 @@ enum { COMMANDS = sizeof commands / sizeof *commands };
 
 /* Named in the plan, not in this version. */
 static const char view_name[] = "view";
+
+static const char help_option[] = "--help", version_option[] = "--version";
 
 static int print_help(void)
 {
@@ -40,13 +42,12 @@ static int print_help(void)
 
 static int reject_command(const char *word)
 {
-    const char *names[COMMANDS + 1];
-    for (int i = 0; i < COMMANDS; i++) names[i] = commands[i]->name;
-    names[COMMANDS] = view_name;
+    const char *names[COMMANDS + 3] = {view_name, help_option, version_option};
+    for (int i = 0; i < COMMANDS; i++) names[i + 3] = commands[i]->name;
     const char *const kind = word[0] == '-' ? "option" : "command";
-    const char *const nearest = nb_options_nearest(word, names, COMMANDS + 1);
+    const char *const nearest = nb_options_nearest(word, names, COMMANDS + 3);
     if (nearest == NULL) return nb_report_misuse(NULL, "there is no %s '%s'", kind, word);
-    return nb_report_misuse(NULL, "there is no %s '%s'; did you mean %s", kind, word, nearest);
+    return nb_report_misuse(NULL, "there is no %s '%s'; did you mean '%s'?", kind, word, nearest);
 }
 
 static const nb_command *find_command(const char *name)
@@ -57,7 +58,7 @@ static const nb_command *find_command(const char *name)
     return NULL;
 }
 
-/* "nebel help" and "nebel help COMMAND", for those who ask that way. */
+/* "nebel help", "nebel help COMMAND", and the same with --help. */
 static int help_with(int count, char **words)
 {
     if (count == 0) return print_help();
@@ -77,9 +78,9 @@ static int run(int count, char **words)
 {
     if (count == 0) return nb_report_misuse(NULL, "a command is missing");
     const char *const word = words[0];
-    if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) return print_help();
-    if (strcmp(word, "--version") == 0) return print_version();
-    if (strcmp(word, "help") == 0) return help_with(count - 1, words + 1);
+    const int wants_help = strcmp(word, help_option) == 0 || strcmp(word, "-h") == 0 || strcmp(word, "help") == 0;
+    if (wants_help) return help_with(count - 1, words + 1);
+    if (strcmp(word, version_option) == 0) return print_version();
     if (strcmp(word, view_name) == 0) {
         return nb_report_failure("view: there is no viewer in this version; 'nebel render' makes pictures");
     }

@@ -91,10 +91,10 @@ static int reject_unknown(const nb_command *command, const char *word, size_t si
     for (size_t i = 0; i < command->option_count; i++) names[i + 1] = command->options[i].name;
     const char *const nearest = nb_options_nearest(name, names, command->option_count + 1);
     if (nearest == NULL) {
-        return nb_report_misuse(command->name, "%s: there is no option %.*s", command->name, (int)size, word);
+        return nb_report_misuse(command->name, "%s: there is no option '%.*s'", command->name, (int)size, word);
     }
-    return nb_report_misuse(command->name, "%s: there is no option %.*s; did you mean --%s", command->name, (int)size,
-                            word, nearest);
+    return nb_report_misuse(command->name, "%s: there is no option '%.*s'; did you mean '--%s'?", command->name,
+                            (int)size, word, nearest);
 }
 
 /* Sets an option; `inline_value` is what stands after = or after the letter, or NULL. */
@@ -174,8 +174,8 @@ int nb_options_parse(const nb_command *command, int count, char **words_given, n
         if (status >= 0) return status;
     }
     if (arguments->operand_count < command->fewest_operands) {
-        return nb_report_misuse(command->name, "%s: something is missing; it takes %s", command->name,
-                                command->operands);
+        return nb_report_misuse(command->name, "%s: it takes %s: nebel %s %s", command->name, command->operands,
+                                command->name, command->synopsis);
     }
     return -1;
 }
@@ -231,7 +231,7 @@ int nb_options_choice(nb_arguments *arguments, int option, const char *const *na
         used += wrote > 0 && (size_t)wrote < sizeof problem - used ? (size_t)wrote : 0;
     }
     const char *const nearest = nb_options_nearest(text, names, (size_t)count);
-    if (nearest != NULL) (void)snprintf(problem + used, sizeof problem - used, "; did you mean %s", nearest);
+    if (nearest != NULL) (void)snprintf(problem + used, sizeof problem - used, "; did you mean '%s'?", nearest);
     nb_options_reject(arguments, option, problem);
     return fallback;
 }

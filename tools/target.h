@@ -11,8 +11,8 @@ typedef enum nb_target_kind {
 /* By the ending, in any case. */
 nb_target_kind nb_target_find_kind(const char *path);
 
-/* NB_DONE when a picture can likely be written there: the folder exists and may be written to, the path is no folder.
- * Otherwise NB_FAILED after a message that begins with `command`. */
-int nb_target_check(const char *command, const char *path);
+/* NB_DONE when a picture can likely be written there: a file can be made in the folder, which is tried, and the path is
+ * no folder. Otherwise NB_FAILED after a message. */
+int nb_target_check(const char *path);
 
 #endif

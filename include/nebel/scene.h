@@ -137,6 +137,11 @@ void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image);
  * changed and no temporary file is left. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image);
 
+/* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a temporary
+ * file can be made beside the target (it is made, and removed) or the device is open to writing. The target does not change.
+ * Thread safe. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
+nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc);
+
 /* What this build of libnebel_scene has: "Assimp 5.2.5, libpng 1.6.39, OpenEXR 3.1.5, yajl 2.1.0". Never NULL. */
 const char *nebel_scene_libraries(void);
 

@@ -25,6 +25,10 @@ nebel_result nb_file_check(const nebel_log *log, const char *where, const char *
 nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *log, const char *path,
                            const nb_bytes *bytes);
 
+/* Whether nb_file_write is likely to do it: whether a file can be made in the folder, which is tried, or the device is
+ * open to writing. What is at the path does not change. Errors: FILE, MEMORY. */
+nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log, const char *path);
+
 /* Appends, growing; false when memory is out. */
 int nb_bytes_write(const nebel_allocator *allocator, nb_bytes *bytes, size_t offset, const void *data, size_t size);
 

@@ -103,15 +103,6 @@ static int fill_and_rename(int file, const char *temporary, const char *path, co
     return error;
 }
 
-static int replace(nb_arena *arena, const char *path, const struct stat *replaced, const nb_bytes *bytes)
-{
-    const char *temporary = NULL;
-    if (replaced != NULL && access(path, W_OK) != 0) return errno;
-    const int file = create_beside(arena, path, &temporary);
-    if (file < 0) return errno;
-    return fill_and_rename(file, temporary, path, replaced, bytes);
-}
-
 /* Names of files that are open already: what they stand for may be a regular file, but it is the open one that is
  * meant. */
 static bool is_open_file(const char *path)
@@ -122,24 +113,83 @@ static bool is_open_file(const char *path)
     return false;
 }
 
+/* What is at a path, and where its bytes go. */
+typedef struct target {
+    const char *path; /* symbolic links followed, unless it is written directly */
+    bool exists, is_direct;
+    struct stat status; /* where it exists */
+} target;
+
+/* 0 or an error number. */
+static int find_target(nb_arena *arena, const char *path, target *found)
+{
+    *found = (target){.path = path};
+    found->exists = stat(path, &found->status) == 0;
+    if (!found->exists && errno != ENOENT) return errno;
+    if (found->exists && S_ISDIR(found->status.st_mode)) return EISDIR;
+    found->is_direct = found->exists && (!S_ISREG(found->status.st_mode) || is_open_file(path));
+    if (!found->is_direct) found->path = follow_links(arena, path);
+    if (found->path == NULL) return errno;
+    return found->exists && access(found->path, W_OK) != 0 ? errno : 0;
+}
+
 static int write_file(nb_arena *arena, const char *path, const nb_bytes *bytes)
 {
+    target found;
+    const char *temporary = NULL;
+    const int error = find_target(arena, path, &found);
+    if (error != 0) return error;
+    if (found.is_direct) return write_directly(path, bytes);
+    const int file = create_beside(arena, found.path, &temporary);
+    if (file < 0) return errno;
+    return fill_and_rename(file, temporary, found.path, found.exists ? &found.status : NULL, bytes);
+}
+
+static int try_file(nb_arena *arena, const char *path)
+{
+    target found;
+    const char *temporary = NULL;
+    const int error = find_target(arena, path, &found);
+    if (error != 0 || found.is_direct) return error;
+    const int file = create_beside(arena, found.path, &temporary);
+    if (file < 0) return errno;
+    close(file);
+    return unlink(temporary) == 0 ? 0 : errno;
+}
+
+/* ---- what went wrong
+ * ------------------------------------------------------------------------------------------------- */
+
+static nebel_result fail(nb_arena *arena, const nebel_log *log, const char *path, int error)
+{
+    if (error == 0) return NEBEL_OK;
+    if (error == ENOMEM) return nb_fail(log, NEBEL_ERROR_MEMORY, "cannot write \"%s\": out of memory", path);
+    if (error == EISDIR)
+        return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": it is a folder; name a file in it", path);
+    const char *folder = nb_path_folder(arena, path);
     struct stat status;
-    const bool exists = stat(path, &status) == 0;
-    if (!exists && errno != ENOENT) return errno;
-    if (exists && S_ISDIR(status.st_mode)) return EISDIR;
-    if (exists && (!S_ISREG(status.st_mode) || is_open_file(path))) return write_directly(path, bytes);
-    const char *target = follow_links(arena, path);
-    return target != NULL ? replace(arena, target, exists ? &status : NULL, bytes) : errno;
+    if (error == ENOENT && path[0] != '\0' && folder != NULL && folder[0] != '\0') {
+        const bool is_there = stat(folder, &status) == 0;
+        return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": %s \"%s\"%s", path,
+                       is_there ? "no file can be made in" : "there is no folder", folder,
+                       is_there ? "" : "; make it first");
+    }
+    return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": %s", path, strerror(error));
 }
 
 nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *log, const char *path,
                            const nb_bytes *bytes)
 {
     nb_arena arena = {.allocator = *allocator};
-    const int error = write_file(&arena, path, bytes);
+    const nebel_result result = fail(&arena, log, path, write_file(&arena, path, bytes));
     nb_arena_release(&arena);
-    if (error == 0) return NEBEL_OK;
-    const nebel_result result = error == ENOMEM ? NEBEL_ERROR_MEMORY : NEBEL_ERROR_FILE;
-    return nb_fail(log, result, "cannot write \"%s\": %s", path, strerror(error));
+    return result;
+}
+
+nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log, const char *path)
+{
+    nb_arena arena = {.allocator = *allocator};
+    const nebel_result result = fail(&arena, log, path, try_file(&arena, path));
+    nb_arena_release(&arena);
+    return result;
 }

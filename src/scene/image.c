@@ -140,12 +140,27 @@ static nebel_result check_image(const nb_codec *codec, const nebel_image *image)
     return nb_codec_check_size(codec, image->width, image->height, image->channel_count);
 }
 
+static nebel_result fail_ending(const nb_codec *codec)
+{
+    return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
+                   codec->name);
+}
+
 static nebel_result encode(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes)
 {
     if (ends_in(codec->name, ".png")) return nb_png_write_image(codec, image, bytes);
     if (ends_in(codec->name, ".exr")) return nb_exr_write_image(codec, image, bytes);
-    return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: unknown picture format; the name must end in .png or .exr",
-                   codec->name);
+    return fail_ending(codec);
+}
+
+nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc)
+{
+    if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result result = check_desc(desc);
+    if (result != NEBEL_OK) return result;
+    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
+    if (!ends_in(path, ".png") && !ends_in(path, ".exr")) return fail_ending(&codec);
+    return nb_file_try(&codec.allocator, &codec.log, path);
 }
 
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image)
