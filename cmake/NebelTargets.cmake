@@ -58,7 +58,7 @@ function(nebel_add_library name sources extra_objects)
 endfunction()
 
 function(nebel_add_core)
-    nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c)
+    nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c)
     nebel_add_kernels(kernel_objects definitions)
     list(REMOVE_ITEM sources ${nebel_kernel_files})
     nebel_add_library(nebel "${sources}" "${kernel_objects}")

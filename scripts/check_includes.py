@@ -19,7 +19,7 @@ ROOMS = {
     "march": {"base", "formulas", "media", "kernels"},
     "shader": {"base", "formulas", "media", "march"},
     "classic": {"base", "march", "media"},
-    "nebula": {"base", "march", "media"},
+    "nebula": {"base", "formulas", "march", "media"},
     "planet": {"base", "march", "media"},
     "scene": {"base"},
     "cpu": {"base"},

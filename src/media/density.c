@@ -1,0 +1,133 @@
+#include "density.h"
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+#include "formulas/shapes.inc"
+#include "formulas/profiles.inc"
+
+static nb_wvec3 to_leaf(const nb_leaf *leaf, const double place[3])
+{
+    double offset[3], local[3];
+    for (int i = 0; i < 3; i++) offset[i] = (place[i] - leaf->origin[i]) - leaf->origin_rest[i];
+    for (int i = 0; i < 3; i++) {
+        const double *row = &leaf->matrix[3 * i];
+        local[i] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
+    }
+    return nb_wvec3((nb_wide)local[0], (nb_wide)local[1], (nb_wide)local[2]);
+}
+
+static int is_within(double x, double low, double high)
+{
+    return low <= x && x < high;
+}
+
+static int is_behind_faces(const nb_volume *volume, const nb_leaf *leaf, const double p[3])
+{
+    for (size_t i = 0; i < leaf->face_count; i++) {
+        const nb_face *face = &volume->faces[leaf->first_face + i];
+        if (!(face->normal[0] * p[0] + face->normal[1] * p[1] + face->normal[2] * p[2] <= face->distance)) return 0;
+    }
+    return 1;
+}
+
+static int is_in_leaf(const nb_volume *volume, const nb_leaf *leaf, const double place[3])
+{
+    const nb_wvec3 local = to_leaf(leaf, place);
+    const double p[3] = {(double)local.x, (double)local.y, (double)local.z};
+    const double across = p[0] * p[0] + p[1] * p[1];
+    switch (leaf->type) {
+    case NB_LEAF_WORLD:
+        return 1;
+    case NB_LEAF_PLANES:
+        return is_behind_faces(volume, leaf, p);
+    case NB_LEAF_BOX:
+        return is_within(p[0], leaf->low[0], leaf->high[0]) && is_within(p[1], leaf->low[1], leaf->high[1]) &&
+               is_within(p[2], leaf->low[2], leaf->high[2]);
+    case NB_LEAF_BALL:
+        return across + p[2] * p[2] <= leaf->radius * leaf->radius;
+    case NB_LEAF_TUBE:
+        return across <= 1 && is_within(p[2], 0, 1);
+    case NB_LEAF_CONE: {
+        const double radius = leaf->radius + leaf->slope * p[2];
+        return across <= radius * radius && is_within(p[2], 0, 1);
+    }
+    default: {
+        const double beyond = p[2] - fmin(fmax(p[2], 0), leaf->length);
+        return across + beyond * beyond <= 1;
+    }
+    }
+}
+
+static int is_in_body(const nb_volume *volume, const double place[3])
+{
+    int stack[NB_STEP_STACK], top = 0;
+    size_t leaf = 0;
+    for (size_t i = 0; i < volume->step_count; i++) {
+        if (volume->steps[i] == NB_STEP_LEAF) {
+            stack[top++] = is_in_leaf(volume, &volume->leaves[leaf++], place);
+            continue;
+        }
+        top--;
+        stack[top - 1] = volume->steps[i] == NB_STEP_ANY ? stack[top - 1] || stack[top] : stack[top - 1] && stack[top];
+    }
+    return stack[0];
+}
+
+static double square_distance(const double a[3], const double b[3])
+{
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
+static double linear_density(const nebel_density *density, const double place[3])
+{
+    double along = 0, square = 0;
+    for (int i = 0; i < 3; i++) {
+        const double axis = density->to[i] - density->from[i];
+        along += (place[i] - density->from[i]) * axis;
+        square += axis * axis;
+    }
+    return nb_linear_density(along / square);
+}
+
+static double radial_density(const nb_volume *volume, const double place[3])
+{
+    const nb_leaf *ball = &volume->leaves[0];
+    const nb_wvec3 p = nb_wscale3(to_leaf(ball, place), 1 / (nb_wide)ball->radius);
+    return nb_radial_density(nb_narrow(1 - nb_wdot3(p, p)), 0, volume->density.power);
+}
+
+static double soft_edge_density(const nb_volume *volume, const double place[3])
+{
+    const nb_leaf *box = &volume->leaves[0];
+    const nb_wide inverse = 1 / (nb_wide)volume->density.distance;
+    const nb_wvec3 p = to_leaf(box, place);
+    const double *low = box->low, *high = box->high;
+    const nb_wvec3 middle = nb_wvec3((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+    const nb_wvec3 half = nb_wvec3((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2);
+    return nb_soft_edge_density(nb_wscale3(nb_wsub3(p, middle), inverse), nb_wscale3(half, inverse));
+}
+
+double nb_density_at(const nb_volume *volume, const double place[3])
+{
+    const nebel_density *density = &volume->density;
+    if (!is_in_body(volume, place)) return 0;
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT: {
+        const double u = (place[1] - density->base) / density->scale_height;
+        return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
+    }
+    case NEBEL_DENSITY_LINEAR:
+        return linear_density(density, place);
+    case NEBEL_DENSITY_RADIAL:
+        return radial_density(volume, place);
+    case NEBEL_DENSITY_GAUSSIAN:
+        return nb_gaussian_density(square_distance(place, density->center) / (2 * density->sigma * density->sigma), 0);
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return soft_edge_density(volume, place);
+    default:
+        return 1;
+    }
+}

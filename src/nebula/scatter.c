@@ -1,0 +1,191 @@
+#include <nebel/nebula.h>
+
+#include "base/base.h"
+#include "eddies.h"
+#include "media/density.h"
+
+#include <math.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+/* What is drawn for a particle, each from a sequence of its own. */
+enum { STREAM_PLACE, STREAM_SIZE, STREAM_COLOR, STREAM_COLOR_FIELD, STREAM_EDDIES };
+
+/* Shapes that fill less of their bounding box than one part in this have no place for us. */
+#define MOST_TRIES 100000
+
+/* How much of a particle's place in the colours is its own; the rest belongs to where it is. */
+#define OWN_COLOR 0.3
+
+typedef struct cloud {
+    const nebel_nebula_desc *desc;
+    nebel_allocator allocator;
+    nb_volume volume;
+    double size[2];
+    double eddy; /* m */
+} cloud;
+
+nebel_volume_desc nebel_particle_volume(const nebel_particle *particle)
+{
+    nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = particle->radius}};
+    if (particle->profile == NEBEL_PARTICLE_SOFT) {
+        volume.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 2};
+    } else if (particle->profile == NEBEL_PARTICLE_GAUSSIAN) {
+        volume.density = (nebel_density){.type = NEBEL_DENSITY_GAUSSIAN, .sigma = particle->radius / 3};
+    }
+    for (int c = 0; c < 3; c++) {
+        volume.shape.center[c] = volume.density.center[c] = particle->center[c];
+        volume.extinction[c] = particle->extinction[c];
+        volume.emission[c] = particle->emission[c];
+    }
+    return volume;
+}
+
+/* ---- checks
+ * ----------------------------------------------------------------------------------------------------------- */
+
+static nebel_result check_amounts(const nebel_nebula_desc *desc)
+{
+    for (int c = 0; c < 3; c++) {
+        if (!(desc->absorption[c] >= 0 && isfinite(desc->absorption[c])))
+            return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: absorption must be finite and not negative");
+        if (!(desc->emission[c] >= 0 && isfinite(desc->emission[c])))
+            return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: emission must be finite and not negative");
+    }
+    for (size_t i = 0; i < desc->color_count; i++)
+        for (int c = 0; c < 3; c++)
+            if (!(desc->colors[i][c] >= 0 && isfinite(desc->colors[i][c])))
+                return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: color %zu must be finite and not negative", i);
+    return NEBEL_OK;
+}
+
+static nebel_result check_desc(const nebel_nebula_desc *desc)
+{
+    if (!nb_allocator_is_valid(&desc->allocator))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+                       "nebula: the allocator needs allocate and release, or neither");
+    const int default_size = desc->size[0] == 0 && desc->size[1] == 0;
+    if (!default_size && !(desc->size[0] > 0 && desc->size[0] <= desc->size[1] && isfinite(desc->size[1])))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                       "nebula: sizes are %g to %g m; the smaller must come first and be above 0", desc->size[0],
+                       desc->size[1]);
+    if (!(desc->turbulence >= 0 && isfinite(desc->turbulence)) ||
+        !(desc->turbulence_size >= 0 && isfinite(desc->turbulence_size)))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                       "nebula: turbulence and its size must be finite and not negative");
+    if (desc->profile < 0 || desc->profile >= NEBEL_PARTICLE_COUNT)
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: %d is no profile of a particle", (int)desc->profile);
+    return check_amounts(desc);
+}
+
+static nebel_result open_cloud(const nebel_nebula_desc *desc, cloud *made)
+{
+    const nebel_volume_desc body = {.shape = desc->shape, .density = desc->density};
+    *made = (cloud){.desc = desc,
+                    .allocator = nb_resolve_allocator(&desc->allocator),
+                    .size = {desc->size[0], desc->size[1]},
+                    .eddy = desc->turbulence_size};
+    const nebel_result result = nb_volume_resolve(&made->allocator, &desc->log, &body, &made->volume);
+    if (result != NEBEL_OK) return result;
+    const double *low = made->volume.low, *high = made->volume.high;
+    double extent = 0;
+    for (int i = 0; i < 3; i++) extent = fmax(extent, high[i] - low[i]);
+    if (!isfinite(extent)) {
+        nb_volume_free(&made->allocator, &made->volume);
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                       "nebula: its shape has no bounds; particles need a place to be in");
+    }
+    if (made->size[1] == 0) made->size[0] = 0.05, made->size[1] = 0.2;
+    if (made->eddy == 0) made->eddy = extent / 4;
+    return NEBEL_OK;
+}
+
+/* ---- one particle
+ * ------------------------------------------------------------------------------------------------------ */
+
+static double chance(const cloud *from, int stream, size_t particle, uint64_t i)
+{
+    const uint64_t seed = from->desc->seed + UINT64_C(0x100000001b3) * (uint64_t)stream;
+    return nb_chance(seed, (uint64_t)particle * (MOST_TRIES * 4) + i);
+}
+
+/* Tries places in the bounding box, each taken with the chance that the density there says. */
+static int find_place(const cloud *from, size_t particle, double place[3])
+{
+    const double *low = from->volume.low, *high = from->volume.high;
+    for (uint64_t n = 0; n < MOST_TRIES; n++) {
+        for (uint64_t i = 0; i < 3; i++)
+            place[i] = low[i] + (high[i] - low[i]) * chance(from, STREAM_PLACE, particle, 4 * n + i);
+        if (chance(from, STREAM_PLACE, particle, 4 * n + 3) < nb_density_at(&from->volume, place)) return 1;
+    }
+    return 0;
+}
+
+static void stir(const cloud *from, const double place[3], double stirred[3])
+{
+    const double p[3] = {place[0] / from->eddy, place[1] / from->eddy, place[2] / from->eddy};
+    for (int i = 0; i < 3; i++) {
+        const uint64_t seed = from->desc->seed + UINT64_C(0x51) * (uint64_t)(STREAM_EDDIES + i) + 1;
+        stirred[i] = place[i] + from->desc->turbulence * nb_eddies(seed, p);
+    }
+}
+
+static double pick_size(const cloud *from, size_t particle)
+{
+    const double octaves = nb_log(from->size[1] / from->size[0]);
+    return fmin(from->size[0] * nb_exp(octaves * chance(from, STREAM_SIZE, particle, 0)), from->size[1]);
+}
+
+/* Eddies rarely reach their limits: three times their value, clamped, uses all colours. */
+static void pick_color(const cloud *from, size_t particle, const double place[3], double color[3])
+{
+    const nebel_nebula_desc *desc = from->desc;
+    color[0] = color[1] = color[2] = 1;
+    if (desc->color_count == 0) return;
+    const double p[3] = {place[0] / from->eddy, place[1] / from->eddy, place[2] / from->eddy};
+    const double drift = 0.5 + 1.5 * nb_eddies(desc->seed + STREAM_COLOR_FIELD, p);
+    const double own = chance(from, STREAM_COLOR, particle, 0);
+    const double mixed = fmin(fmax((1 - OWN_COLOR) * drift + OWN_COLOR * own, 0), 1) * (double)(desc->color_count - 1);
+    const size_t first = (size_t)mixed;
+    const size_t second = first + 1 < desc->color_count ? first + 1 : first;
+    for (int c = 0; c < 3; c++) {
+        const double a = desc->colors[first][c], b = desc->colors[second][c];
+        color[c] = a + (b - a) * (mixed - (double)first);
+    }
+}
+
+static int make_particle(const cloud *from, size_t number, nebel_particle *particle)
+{
+    double place[3], color[3];
+    if (!find_place(from, number, place)) return 0;
+    *particle = (nebel_particle){.radius = pick_size(from, number), .profile = from->desc->profile};
+    pick_color(from, number, place, color);
+    stir(from, place, particle->center);
+    for (int c = 0; c < 3; c++) {
+        particle->extinction[c] = from->desc->absorption[c];
+        particle->emission[c] = from->desc->emission[c] * color[c];
+    }
+    return 1;
+}
+
+nebel_result nebel_scatter_nebula(const nebel_nebula_desc *desc, nebel_particle *particles)
+{
+    if (desc == NULL || (particles == NULL && desc->count > 0) || (desc->colors == NULL && desc->color_count > 0))
+        return NEBEL_ERROR_ARGUMENT;
+    cloud from;
+    nebel_result result = check_desc(desc);
+    if (result == NEBEL_OK) result = open_cloud(desc, &from);
+    if (result != NEBEL_OK) return result;
+    for (size_t i = 0; i < desc->count && result == NEBEL_OK; i++) {
+        if (!make_particle(&from, i, &particles[i]))
+            result = nb_fail(
+                &desc->log, NEBEL_ERROR_VALUE,
+                "nebula: no place for particle %zu in %d tries; its shape is empty or thin, or its density nearly 0", i,
+                MOST_TRIES);
+    }
+    nb_volume_free(&from.allocator, &from.volume);
+    return result;
+}

@@ -1,0 +1,222 @@
+/* Particles of nebulae: where they are, what they are, and that they are fog like any other. */
+#include <nebel/nebula.h>
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "fog_help.h"
+
+enum { COUNT = 20000 };
+
+static nebel_particle particles[COUNT], again[COUNT];
+
+static const double violet[2][3] = {{1, 0, 0}, {0, 0, 1}};
+
+static nebel_nebula_desc a_nebula(void)
+{
+    return (nebel_nebula_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1e3, 5, -7}, .radius = 10},
+                               .count = COUNT,
+                               .seed = 11,
+                               .size = {.1, .8},
+                               .absorption = {.1, .2, .3},
+                               .emission = {1, 1, 1},
+                               .colors = violet,
+                               .color_count = 2};
+}
+
+static double distance(const nebel_particle *p, const double center[3])
+{
+    return sqrt(pow(p->center[0] - center[0], 2) + pow(p->center[1] - center[1], 2) + pow(p->center[2] - center[2], 2));
+}
+
+static void test_fills_its_shape_evenly(void **unused)
+{
+    (void)unused;
+    const nebel_nebula_desc desc = a_nebula();
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    int within_half = 0, in_lower_octave[3] = {0};
+    for (int i = 0; i < COUNT; i++) {
+        const double r = distance(&particles[i], desc.shape.center);
+        assert_true(r <= 10);
+        within_half += r < 5;
+        assert_true(particles[i].radius >= .1 && particles[i].radius <= .8);
+        in_lower_octave[particles[i].radius < .2 ? 0 : particles[i].radius < .4 ? 1 : 2]++;
+        for (int c = 0; c < 3; c++) assert_true(particles[i].extinction[c] == desc.absorption[c]);
+        assert_true(fabs(particles[i].emission[0] + particles[i].emission[2] - 1) < 1e-12);
+        assert_true(particles[i].emission[1] == 0);
+    }
+    /* an eighth of the volume, a third of the octaves; five standard deviations */
+    assert_true(fabs(within_half - COUNT / 8.0) < 5 * sqrt(COUNT * 7 / 64.0));
+    for (int i = 0; i < 3; i++) assert_true(fabs(in_lower_octave[i] - COUNT / 3.0) < 5 * sqrt(COUNT * 2 / 9.0));
+}
+
+static void test_is_strewn_as_its_density_says(void **unused)
+{
+    (void)unused;
+    nebel_nebula_desc desc = a_nebula();
+    desc.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1};
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    int within_half = 0;
+    for (int i = 0; i < COUNT; i++) within_half += distance(&particles[i], desc.shape.center) < 5;
+    const double share = (1 / 24.0 - 1 / 160.0) / (1 / 3.0 - 1 / 5.0); /* of the integral of (1 - r^2) r^2 */
+    assert_true(fabs(within_half - COUNT * share) < 5 * sqrt(COUNT * share * (1 - share)));
+}
+
+static void test_every_shape_holds_its_particles(void **unused)
+{
+    (void)unused;
+    const nebel_shape parts[2] = {{.type = NEBEL_SHAPE_BOX, .min = {-9, -1, -1}, .max = {9, 1, 1}},
+                                  {.type = NEBEL_SHAPE_SPHERE, .radius = 4}};
+    const nebel_plane planes[4] = {{{1, 1, 1}, 2}, {{-1, 0, 0}, 1}, {{0, -1, 0}, 1}, {{0, 0, -1}, 1}};
+    const nebel_transform turned = {.position = {3, 4, 5}, .rotation = {.1, .5, .2, .8}, .scale = {1, 2, .5}};
+    const nebel_shape shapes[] = {
+        {.type = NEBEL_SHAPE_BOX, .min = {-1, -2, -3}, .max = {4, 5, 6}, .transform = turned},
+        {.type = NEBEL_SHAPE_ELLIPSOID, .radii = {3, 2, 1}, .transform = turned},
+        {.type = NEBEL_SHAPE_CYLINDER, .from = {1, 2, 3}, .to = {4, 4, 4}, .radius = 2},
+        {.type = NEBEL_SHAPE_CAPSULE, .from = {1, 2, 3}, .to = {4, 4, 4}, .radius = 2, .transform = turned},
+        {.type = NEBEL_SHAPE_CONE, .from = {1, 2, 3}, .to = {4, 4, 9}, .radius_from = 2, .radius_to = .5},
+        {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 4, .transform = turned},
+        {.type = NEBEL_SHAPE_UNION, .parts = parts, .part_count = 2},
+        {.type = NEBEL_SHAPE_INTERSECTION, .parts = parts, .part_count = 2, .transform = turned},
+    };
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++) {
+        nebel_nebula_desc desc = {.shape = shapes[s], .count = 500, .seed = s};
+        assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+        const nebel_volume_desc body = {.shape = shapes[s], .extinction = {1e4, 1e4, 1e4}};
+        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &body, 1);
+        for (size_t i = 0; i < desc.count; i++) { /* the march must find fog where a particle is */
+            nebel_ray ray = {.direction = {0, 0, 1}, .t_max = 2e-3};
+            for (int c = 0; c < 3; c++) ray.origin[c] = particles[i].center[c];
+            ray.origin[2] -= 1e-3;
+            nebel_light light;
+            assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light),
+                             NEBEL_OK);
+            assert_true(light.transmittance[0] < .9999);
+        }
+        nebel_release_snapshot(fog);
+    }
+}
+
+static void test_the_same_seed_gives_the_same_particles(void **unused)
+{
+    (void)unused;
+    nebel_nebula_desc desc = a_nebula();
+    desc.turbulence = 2;
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_memory_equal(particles, again, sizeof particles);
+    desc.count = 10; /* a particle does not depend on how many there are */
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_memory_equal(particles, again, 10 * sizeof *particles);
+    desc.seed++;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    for (int i = 0; i < 10; i++) assert_true(particles[i].center[0] != again[i].center[0]);
+}
+
+static void test_eddies_carry_no_farther_than_told(void **unused)
+{
+    (void)unused;
+    nebel_nebula_desc desc = a_nebula();
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    desc.turbulence = 3;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    double farthest = 0;
+    for (int i = 0; i < COUNT; i++)
+        for (int c = 0; c < 3; c++) farthest = fmax(farthest, fabs(again[i].center[c] - particles[i].center[c]));
+    assert_true(farthest <= 3);
+    assert_true(farthest > 1);
+}
+
+/* Through the centre: 16/15 of the radius for (1 - r^2)^2, the whole chord for a ball, erf for a Gaussian. */
+static void test_a_particle_is_exact_fog(void **unused)
+{
+    (void)unused;
+    const double chords[NEBEL_PARTICLE_COUNT] = {16 / 15.0, sqrt(2 * acos(-1)) / 3 * erf(3 / sqrt(2)), 2};
+    for (int p = 0; p < NEBEL_PARTICLE_COUNT; p++) {
+        const nebel_particle particle = {{1, 2, 3}, .5, {.7, .8, .9}, {2, 3, 4}, (nebel_particle_profile)p};
+        const nebel_volume_desc volume = nebel_particle_volume(&particle);
+        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
+        const nebel_ray ray = {{1, 2, -3}, {0, 0, 1}, INFINITY};
+        nebel_light light;
+        assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            const double depth = particle.extinction[c] * particle.radius * chords[p];
+            assert_true(fabs(light.transmittance[c] - exp(-depth)) < 1e-12);
+            assert_true(fabs(light.in_scattering[c] + particle.emission[c] / particle.extinction[c] * expm1(-depth)) <
+                        1e-12);
+        }
+        nebel_release_snapshot(fog);
+    }
+}
+
+static void expect(nebel_result result, nebel_nebula_desc desc)
+{
+    fog_messages messages = {0};
+    desc.log = fog_messages_log(&messages);
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), result);
+    assert_int_equal(messages.count, 1);
+}
+
+static void test_refuses_what_is_not_a_nebula(void **unused)
+{
+    (void)unused;
+    nebel_nebula_desc desc = a_nebula();
+    assert_int_equal(nebel_scatter_nebula(NULL, particles), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_scatter_nebula(&desc, NULL), NEBEL_ERROR_ARGUMENT);
+    desc.shape.type = NEBEL_SHAPE_WORLD;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.shape.radius = -1;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.size[0] = 2, desc.size[1] = 1;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.size[1] = NAN;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.turbulence = INFINITY;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.absorption[1] = -1;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.emission[2] = NAN;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(), desc.profile = NEBEL_PARTICLE_COUNT;
+    expect(NEBEL_ERROR_VALUE, desc);
+    desc = a_nebula(); /* a Gaussian elsewhere: no particle will ever be taken */
+    desc.density = (nebel_density){.type = NEBEL_DENSITY_GAUSSIAN, .center = {0, 0, 0}, .sigma = 1};
+    expect(NEBEL_ERROR_VALUE, desc);
+}
+
+static void test_memory_may_fail(void **unused)
+{
+    (void)unused;
+    for (size_t k = 1;; k++) {
+        fog_memory memory = {.fail_first = k, .fail_count = 1};
+        nebel_nebula_desc desc = a_nebula();
+        desc.count = 3;
+        desc.allocator = fog_memory_allocator(&memory);
+        const nebel_result result = nebel_scatter_nebula(&desc, particles);
+        assert_int_equal(memory.live, 0);
+        if (memory.fail_first > 0) {
+            assert_int_equal(result, NEBEL_OK);
+            return;
+        }
+        assert_int_equal(result, NEBEL_ERROR_MEMORY);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_fills_its_shape_evenly),
+        cmocka_unit_test(test_is_strewn_as_its_density_says),
+        cmocka_unit_test(test_every_shape_holds_its_particles),
+        cmocka_unit_test(test_the_same_seed_gives_the_same_particles),
+        cmocka_unit_test(test_eddies_carry_no_farther_than_told),
+        cmocka_unit_test(test_a_particle_is_exact_fog),
+        cmocka_unit_test(test_refuses_what_is_not_a_nebula),
+        cmocka_unit_test(test_memory_may_fail),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
