@@ -1,25 +1,37 @@
-# A thin face over CMake. `make` leaves the program at build/nebel.
+# A thin face over CMake. `make` leaves the program at build/nebel; `make V=1` shows every step.
 
 BUILD ?= build
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
-CONFIGURE = cmake -S . -DNEBEL_WERROR=ON
+V ?= 0
 SOURCES = $(shell git ls-files '*.c' '*.h' '*.cpp')
+LANDSCAPE = examples/scenes/models/landscape.png
+
+MAKEFLAGS += --no-print-directory
+ifeq ($(V),0)
+CONFIGURE = cmake -S . -DNEBEL_WERROR=ON -DCMAKE_RULE_MESSAGES=OFF -DCMAKE_TARGET_MESSAGES=OFF >/dev/null
+else
+CONFIGURE = cmake -S . -DNEBEL_WERROR=ON -DCMAKE_RULE_MESSAGES=ON -DCMAKE_TARGET_MESSAGES=ON
+endif
 
 .PHONY: all demo test bench asan lint format clean
 
-all:
+all: $(LANDSCAPE)
 	@scripts/install_packages.sh build
+	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=OFF
 	@cmake --build $(BUILD) -j $(JOBS)
+	@echo "nebel: the program is $(BUILD)/nebel"
 
-demo:
+demo: $(LANDSCAPE)
 	@scripts/install_packages.sh build demo
+	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=OFF
 	@cmake --build $(BUILD) -j $(JOBS) --target nebel_tool
 	@scripts/demo.sh $(BUILD)
 
 test:
 	@scripts/install_packages.sh build demo test
+	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=ON
 	@cmake --build $(BUILD) -j $(JOBS)
 	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error -j 2
@@ -29,6 +41,7 @@ bench: all
 
 asan:
 	@scripts/install_packages.sh build demo test
+	@echo "nebel: building with sanitizers"
 	@$(CONFIGURE) -B $(BUILD)-asan -DCMAKE_BUILD_TYPE=Debug -DNEBEL_SANITIZE=ON
 	@cmake --build $(BUILD)-asan -j $(JOBS)
 	@ctest --test-dir $(BUILD)-asan --output-on-failure --no-tests=error -j 2
@@ -46,3 +59,8 @@ format:
 
 clean:
 	@rm -rf $(BUILD) $(BUILD)-asan
+
+# The height map of an example, which is made and not kept.
+$(LANDSCAPE): examples/make_landscape.py
+	@scripts/install_packages.sh example
+	@python3 $< $@

@@ -4,6 +4,7 @@
 Hills of fractal value noise around a winding valley; no dependencies, the same bytes everywhere.
 """
 import math
+import os
 import struct
 import sys
 import zlib
@@ -72,8 +73,10 @@ def chunk(name, data):
 def write_png(path, rows):
     raw = b"".join(b"\0" + struct.pack(f">{SIZE}H", *(round(65535 * h) for h in row)) for row in rows)
     header = struct.pack(">IIBBBBB", SIZE, SIZE, 16, 0, 0, 0, 0)
-    with open(path, "wb") as out:
+    part = f"{path}.{os.getpid()}.tmp"  # nobody shall see half of it
+    with open(part, "wb") as out:
         out.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw, 6)) + chunk(b"IEND", b""))
+    os.replace(part, path)
 
 
 if __name__ == "__main__":

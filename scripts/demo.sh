@@ -13,9 +13,6 @@ if [ ${#scenes[@]} -eq 0 ]; then
     exit 1
 fi
 
-landscape=$source/examples/scenes/models/landscape.png
-[ -e "$landscape" ] || python3 "$source/examples/make_landscape.py" "$landscape"
-
 mkdir -p "$pictures"
 for scene in "${scenes[@]}"; do
     name=$(basename "$scene" .json)

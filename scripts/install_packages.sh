@@ -42,10 +42,12 @@ if [ "$(id -u)" -ne 0 ]; then
     as_root=(sudo)
 fi
 
-echo "nebel: installing ${missing[*]}"
+echo "nebel: installing ${missing[*]}; this may take minutes"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
 apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=900 -q -y)
-"${apt[@]}" update
-if ! "${apt[@]}" install --no-install-recommends "${missing[@]}"; then
+if ! { "${apt[@]}" update && "${apt[@]}" install --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
+    cat "$log" >&2
     echo "nebel: apt-get could not install ${missing[*]}; its message is above" >&2
     exit 1
 fi
