@@ -169,19 +169,59 @@ static void test_loading_twice_changes_nothing(void **state)
 static void test_broken_models_are_named_with_the_reason(void **state)
 {
     (void)state;
-    write_text("empty.obj", "");
     write_text("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\nl 1 2\n");
     write_text("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
-    write_text("text.glb", "glTF is not what this is");
-    write_text("no.format", "hello");
     assert_broken("\"file\": \"none.obj\"", NEBEL_ERROR_FILE, "No such file or directory");
     assert_broken("\"file\": \"/dev/zero\"", NEBEL_ERROR_FILE, "cannot read the model");
     assert_broken("\"file\": \".\"", NEBEL_ERROR_FILE, "Is a directory");
-    assert_broken("\"file\": \"empty.obj\"", NEBEL_ERROR_FORMAT, "empty.obj\" cannot be read: ");
     assert_broken("\"file\": \"points.obj\"", NEBEL_ERROR_FORMAT, "holds no triangle");
     assert_broken("\"file\": \"bad.obj\"", NEBEL_ERROR_FORMAT, "bad.obj\" ");
-    assert_broken("\"file\": \"text.glb\"", NEBEL_ERROR_FORMAT, "text.glb\" cannot be read: ");
-    assert_broken("\"file\": \"no.format\"", NEBEL_ERROR_FORMAT, "no.format\" cannot be read: ");
+}
+
+static void test_files_that_are_no_models_are_told_what_they_are(void **state)
+{
+    (void)state;
+    write_text("empty.obj", "");
+    write_text("empty.glb", "");
+    write_text("cut.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
+    write_text("text.glb", "hello");
+    write_text("no.format", "hello");
+    assert_broken("\"file\": \"empty.obj\"", NEBEL_ERROR_FORMAT, "empty.obj\" is empty; copy or export it again");
+    assert_broken("\"file\": \"empty.glb\"", NEBEL_ERROR_FORMAT, "empty.glb\" is empty; copy or export it again");
+    assert_broken("\"file\": \"cut.ply\"", NEBEL_ERROR_FORMAT, "begins like PLY, but its header does not end");
+    assert_broken("\"file\": \"text.glb\"", NEBEL_ERROR_FORMAT,
+                  "text.glb\" cannot be read: its content is not what .glb in its name promises");
+    assert_broken("\"file\": \"no.format\"", NEBEL_ERROR_FORMAT,
+                  "no.format\" cannot be read: neither its name nor its content tells a known format; names may end in "
+                  ".glb, .gltf, .obj, .ply");
+}
+
+/* The first `size` bytes of a binary glTF that says it is 300 bytes long. */
+static void write_glb(const char *name, unsigned char version, size_t size)
+{
+    const unsigned char header[12] = {'g', 'l', 'T', 'F', version, 0, 0, 0, 300 % 256, 300 / 256, 0, 0};
+    unsigned char bytes[300] = {0};
+    memcpy(bytes, header, sizeof header);
+    FILE *file = fopen(in_folder(name), "wb");
+    fwrite(bytes, 1, size, file);
+    fclose(file);
+}
+
+static void test_binary_gltf_that_is_cut_short_is_told_how_much_is_missing(void **state)
+{
+    (void)state;
+    write_glb("cut.glb", 2, 11);
+    assert_broken("\"file\": \"cut.glb\"", NEBEL_ERROR_FORMAT, "ends after 11 bytes, inside its header");
+    write_glb("cut.glb", 2, 12);
+    assert_broken("\"file\": \"cut.glb\"", NEBEL_ERROR_FORMAT, "announces 300 bytes, 288 are missing; copy or export");
+    write_glb("cut.glb", 2, 299);
+    assert_broken("\"file\": \"cut.glb\"", NEBEL_ERROR_FORMAT, "announces 300 bytes, 1 are missing; copy or export");
+    write_glb("cut.glb", 2, 300);
+    assert_broken("\"file\": \"cut.glb\"", NEBEL_ERROR_FORMAT, "cut.glb\" cannot be read: ");
+    write_glb("cut.glb", 9, 300);
+    assert_broken("\"file\": \"cut.glb\"", NEBEL_ERROR_FORMAT, "of version 9; versions 1 and 2 are read");
+    write_glb("glb.obj", 2, 300);
+    assert_broken("\"file\": \"glb.obj\"", NEBEL_ERROR_FORMAT, "is binary glTF; give it a name that ends in .glb");
 }
 
 static void test_corners_that_are_no_numbers_are_left_out(void **state)
@@ -390,9 +430,9 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"t.obj",    "t.mtl",     "empty.obj", "points.obj", "bad.obj",
-                                        "text.glb", "no.format", "nan.ply",   "cut.ply",    "h.png",
-                                        "thin.png", "text.png",  "color.png"};
+    static const char *const names[] = {"t.obj",     "t.mtl",     "empty.obj", "points.obj", "bad.obj",  "text.glb",
+                                        "no.format", "nan.ply",   "cut.ply",   "h.png",      "thin.png", "text.png",
+                                        "color.png", "empty.glb", "cut.glb",   "glb.obj"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) unlink(in_folder(names[i]));
     return rmdir(folder);
 }
@@ -405,6 +445,8 @@ int main(void)
         cmocka_unit_test(test_a_model_far_away_stays_precise),
         cmocka_unit_test(test_loading_twice_changes_nothing),
         cmocka_unit_test(test_broken_models_are_named_with_the_reason),
+        cmocka_unit_test(test_files_that_are_no_models_are_told_what_they_are),
+        cmocka_unit_test(test_binary_gltf_that_is_cut_short_is_told_how_much_is_missing),
         cmocka_unit_test(test_corners_that_are_no_numbers_are_left_out),
         cmocka_unit_test(test_every_truncated_model_is_survived),
         cmocka_unit_test(test_a_height_map_becomes_terrain),

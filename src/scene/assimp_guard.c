@@ -1,29 +1,145 @@
+#define _POSIX_C_SOURCE 200809L
 /* What Assimp 5.2 does not survive, looked at before it does: it reads an unfinished PLY header for ever, and stops the
- * process where its own post-processing meets faces that cannot be. */
+ * process where its own post-processing meets faces that cannot be. And what it says too little about. */
 #include "scene/assimp_load.h"
+#include "scene/path.h"
 
+#include <assimp/cimport.h>
+
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
+
+/* ---- the file before it is read
+ * -------------------------------------------------------------------------------------- */
 
 /* A PLY header longer than this is not believed. */
-enum { HEADER_SIZE = 1 << 16 };
+enum { HEAD_SIZE = 1 << 16 };
+
+/* Magic, version and length of the whole file, four bytes each, the lowest first. */
+enum { GLB_HEADER = 12 };
+
+typedef struct file_head {
+    unsigned char *bytes;
+    size_t size;
+    unsigned long long file_size;
+} file_head;
+
+static nebel_result read_head(const nb_model_load *load, file_head *head)
+{
+    FILE *stream = fopen(load->source->file, "rb");
+    const int error = errno;
+    if (stream == NULL)
+        return nb_model_fail(load, NEBEL_ERROR_FILE, "cannot read the model \"%s\": %s", load->source->file,
+                             strerror(error));
+    head->size = fread(head->bytes, 1, HEAD_SIZE, stream);
+    const long end = fseek(stream, 0, SEEK_END) == 0 ? ftell(stream) : -1;
+    head->file_size = end >= 0 ? (unsigned long long)end : head->size;
+    fclose(stream);
+    return NEBEL_OK;
+}
+
+static bool begins_with(const file_head *head, const char *magic)
+{
+    return head->size >= strlen(magic) && memcmp(head->bytes, magic, strlen(magic)) == 0;
+}
+
+static nebel_result check_ply(const nb_model_load *load, const file_head *head)
+{
+    static const char end[] = "end_header";
+    for (size_t i = 0; i + sizeof end - 1 <= head->size; i++)
+        if (memcmp(head->bytes + i, end, sizeof end - 1) == 0) return NEBEL_OK;
+    return nb_model_fail(load, NEBEL_ERROR_FORMAT,
+                         "the model \"%s\" begins like PLY, but its header does not end; is the file complete?",
+                         load->source->file);
+}
+
+static uint32_t read_word(const unsigned char *bytes)
+{
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+}
+
+/* "" where there is none. */
+static const char *suffix_of(const char *file)
+{
+    const char *dot = strrchr(nb_path_name(file), '.');
+    return dot != NULL ? dot : "";
+}
+
+/* Assimp takes a file for binary glTF by its name alone, and one that is cut short for no model at all. */
+static nebel_result check_glb(const nb_model_load *load, const file_head *head)
+{
+    const char *file = load->source->file;
+    if (head->size < GLB_HEADER)
+        return nb_model_fail(
+            load, NEBEL_ERROR_FORMAT,
+            "the model \"%s\" begins like binary glTF, but ends after %zu bytes, inside its header; copy "
+            "or export it again",
+            file, head->size);
+    const unsigned long long version = read_word(head->bytes + 4), length = read_word(head->bytes + 8);
+    if (version < 1 || version > 2)
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT,
+                             "the model \"%s\" begins like binary glTF, but of version %llu; versions 1 and 2 are read",
+                             file, version);
+    if (length > head->file_size)
+        return nb_model_fail(
+            load, NEBEL_ERROR_FORMAT,
+            "the model \"%s\" is cut short: its glTF header announces %llu bytes, %llu are missing; copy "
+            "or export it again",
+            file, length, length - head->file_size);
+    if (strcasecmp(suffix_of(file), ".glb") == 0) return NEBEL_OK;
+    return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" is binary glTF; give it a name that ends in .glb",
+                         file);
+}
+
+static nebel_result check_head(const nb_model_load *load, const file_head *head)
+{
+    if (head->file_size == 0)
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" is empty; copy or export it again",
+                             load->source->file);
+    if (begins_with(head, "ply") || begins_with(head, "PLY")) return check_ply(load, head);
+    return begins_with(head, "glTF") ? check_glb(load, head) : NEBEL_OK;
+}
 
 nebel_result nb_assimp_check_file(const nb_model_load *load)
 {
-    static const char end[] = "end_header";
-    const char *file = load->source->file;
-    char *header = nb_allocate(&load->allocator, HEADER_SIZE, 1);
-    FILE *stream = header != NULL ? fopen(file, "rb") : NULL;
-    const size_t size = stream != NULL ? fread(header, 1, HEADER_SIZE, stream) : 0;
-    bool good = header != NULL && (size < 3 || (memcmp(header, "ply", 3) != 0 && memcmp(header, "PLY", 3) != 0));
-    for (size_t i = 0; !good && i + sizeof end - 1 <= size; i++) good = memcmp(header + i, end, sizeof end - 1) == 0;
-    if (stream != NULL) fclose(stream);
-    nb_release(&load->allocator, header);
-    if (header == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
-    if (good) return NEBEL_OK;
-    return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: its header does not end", file);
+    file_head head = {.bytes = nb_allocate(&load->allocator, HEAD_SIZE, 1)};
+    if (head.bytes == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    nebel_result result = read_head(load, &head);
+    if (result == NEBEL_OK) result = check_head(load, &head);
+    nb_release(&load->allocator, head.bytes);
+    return result;
 }
+
+/* ---- what went wrong when it was read
+ * ------------------------------------------------------------------------------ */
+
+nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason)
+{
+    static const char unknown[] = "No suitable reader";
+    const char *file = load->source->file, *suffix = suffix_of(file);
+    if (reason == NULL || reason[0] == '\0') reason = "its parts contradict each other";
+    size_t size = strlen(reason);
+    while (size > 0 && (reason[size - 1] == '.' || reason[size - 1] == '\n')) size--;
+    if (strncmp(reason, unknown, sizeof unknown - 1) != 0)
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: %.*s; is it complete?", file,
+                             size < 512 ? (int)size : 512, reason);
+    if (suffix[0] != '\0' && aiIsExtensionSupported(suffix) == AI_TRUE)
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT,
+                             "the model \"%s\" cannot be read: its content is not what %s in its name promises; is it "
+                             "complete?",
+                             file, suffix);
+    return nb_model_fail(
+        load, NEBEL_ERROR_FORMAT,
+        "the model \"%s\" cannot be read: neither its name nor its content tells a known format; names "
+        "may end in .glb, .gltf, .obj, .ply, .stl, .fbx, .dae, .3ds and others",
+        file);
+}
+
+/* ---- the meshes before they are worked on
+ * -------------------------------------------------------------------------- */
 
 static bool is_finite(const struct aiVector3D *v)
 {

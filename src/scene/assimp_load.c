@@ -48,9 +48,7 @@ static nebel_result import_locked(nb_assimp *in, const struct aiPropertyStore *p
     }
     in->scene = raw != NULL ? aiApplyPostProcessing(raw, flags) : NULL;
     if (in->scene != NULL) return NEBEL_OK;
-    const char *reason = aiGetErrorString();
-    return nb_model_fail(in->load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: %s", file,
-                         raw == NULL && reason[0] != '\0' ? reason : "its parts contradict each other");
+    return nb_assimp_refuse(in->load, raw == NULL ? aiGetErrorString() : NULL);
 }
 
 static nebel_result import(nb_assimp *in)

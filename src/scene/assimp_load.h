@@ -40,6 +40,9 @@ typedef struct nb_assimp {
 nebel_result nb_assimp_check_file(const nb_model_load *load);
 nebel_result nb_assimp_check_meshes(nb_assimp *in, const struct aiScene *scene);
 
+/* Says why a file could not be read, given Assimp's reason, NULL where it gives none. Returns FORMAT. */
+nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason);
+
 /* Adds one mesh of the model at a place. A mesh without triangles adds nothing. */
 nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
 
