@@ -2,13 +2,9 @@
 #include "scene/path.h"
 
 #include <assimp/cimport.h>
-#include <assimp/config.h>
 #include <assimp/postprocess.h>
 
 #include <threads.h>
-
-/* Edges sharper than this stay edges where a model has no normals of its own. */
-static const float smoothing_angle = 60;
 
 /* Nodes seen but not yet visited; larger scene graphs are refused. */
 enum { MAX_NODES_WAITING = 1 << 20 };
@@ -25,41 +21,36 @@ static void prepare_lock(void)
 /* ---- import
  * ---------------------------------------------------------------------------------------------------------- */
 
-static void configure(struct aiPropertyStore *properties)
+static bool has_polygons(const struct aiScene *scene)
 {
-    const int dropped = aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS | aiComponent_BONEWEIGHTS |
-                        aiComponent_ANIMATIONS | aiComponent_LIGHTS | aiComponent_CAMERAS;
-    aiSetImportPropertyInteger(properties, AI_CONFIG_PP_RVC_FLAGS, dropped);
-    aiSetImportPropertyFloat(properties, AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, smoothing_angle);
+    bool found = false;
+    for (unsigned i = 0; i < scene->mNumMeshes; i++)
+        found = found || (scene->mMeshes[i]->mPrimitiveTypes & aiPrimitiveType_POLYGON) != 0;
+    return found;
 }
 
 /* Reads the file as it is, checks it, and only then has it worked on. Assimp's own validation belongs to the reading: a
- * scene that fails in the second step is freed twice. */
-static nebel_result import_locked(nb_assimp *in, const struct aiPropertyStore *properties)
+ * scene that fails in the second step is freed twice. What Assimp could do beyond that takes it more memory and time
+ * than reading, and is done on our copy. */
+static nebel_result import_locked(nb_assimp *in)
 {
-    const unsigned flags = aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_GenSmoothNormals |
-                           aiProcess_JoinIdenticalVertices | aiProcess_FlipUVs;
-    const char *file = in->load->source->file;
-    const struct aiScene *raw = aiImportFileExWithProperties(file, aiProcess_ValidateDataStructure, NULL, properties);
-    const nebel_result result = raw != NULL ? nb_assimp_check_meshes(in, raw) : NEBEL_OK;
+    const struct aiScene *raw = aiImportFile(in->load->source->file, aiProcess_ValidateDataStructure);
+    if (raw == NULL) return nb_assimp_refuse(in->load, aiGetErrorString());
+    const nebel_result result = nb_assimp_check_meshes(in, raw);
     if (result != NEBEL_OK) {
         aiReleaseImport(raw);
         return result;
     }
-    in->scene = raw != NULL ? aiApplyPostProcessing(raw, flags) : NULL;
-    if (in->scene != NULL) return NEBEL_OK;
-    return nb_assimp_refuse(in->load, raw == NULL ? aiGetErrorString() : NULL);
+    in->scene = has_polygons(raw) ? aiApplyPostProcessing(raw, aiProcess_Triangulate) : raw;
+    return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in->load, NULL);
 }
 
 static nebel_result import(nb_assimp *in)
 {
-    struct aiPropertyStore *properties = aiCreatePropertyStore();
-    configure(properties);
     call_once(&import_once, prepare_lock);
     mtx_lock(&import_lock);
-    const nebel_result result = import_locked(in, properties);
+    const nebel_result result = import_locked(in);
     mtx_unlock(&import_lock);
-    aiReleasePropertyStore(properties);
     return result;
 }
 

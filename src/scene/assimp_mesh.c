@@ -1,3 +1,4 @@
+#include "scene/assimp_draft.h"
 #include "scene/assimp_load.h"
 
 #include <math.h>
@@ -5,11 +6,10 @@
 
 typedef struct builder {
     nb_assimp *in;
-    const struct aiMesh *mesh;
+    nb_draft draft;
     nb_affine place;
     double normal_matrix[3][3];
     bool mirrored;
-    bool *bad; /* vertices that are not numbers */
 } builder;
 
 /* Normals turn by the inverse of the transpose. Its direction is that of the cofactors, with the determinant's sign;
@@ -29,15 +29,12 @@ static void find_normal_matrix(builder *out)
         for (int j = 0; j < 3; j++) out->normal_matrix[i][j] = -out->normal_matrix[i][j];
 }
 
-static bool place_position(const builder *out, const struct aiVector3D *v, float *position)
+static void place_position(const builder *out, const struct aiVector3D *v, float *position)
 {
     for (int i = 0; i < 3; i++) {
         const double *row = out->place.m[i];
         position[i] = (float)(row[0] * (double)v->x + row[1] * (double)v->y + row[2] * (double)v->z + row[3]);
     }
-    if (isfinite(position[0]) && isfinite(position[1]) && isfinite(position[2])) return true;
-    memset(position, 0, 3 * sizeof *position);
-    return false;
 }
 
 static void store_unit(double vector[3], float *result)
@@ -61,47 +58,67 @@ static void place_normal(const builder *out, const struct aiVector3D *n, float *
     store_unit(turned, normal);
 }
 
-static void place_vertices(const builder *out, nebel_mesh *mesh)
+/* Vertex i of the mesh is vertex kept[i] of the draft; without `kept`, i. */
+static uint32_t number_in_draft(const uint32_t *kept, uint32_t i)
 {
+    return kept != NULL ? kept[i] : i;
+}
+
+static void place_vertices(const builder *out, const uint32_t *kept, nebel_mesh *mesh)
+{
+    const nb_draft *draft = &out->draft;
     float *positions = (float *)mesh->positions, *normals = (float *)mesh->normals;
     for (uint32_t i = 0; i < mesh->vertex_count; i++) {
-        out->bad[i] = !place_position(out, &out->mesh->mVertices[i], positions + 3 * (size_t)i);
-        if (out->mesh->mNormals != NULL)
-            place_normal(out, &out->mesh->mNormals[i], normals + 3 * (size_t)i);
-        else
-            memset(normals + 3 * (size_t)i, 0, 3 * sizeof *normals);
+        const uint32_t vertex = number_in_draft(kept, i);
+        place_position(out, &draft->positions[nb_draft_origin(draft, vertex)], positions + 3 * (size_t)i);
+        place_normal(out, &draft->normals[vertex], normals + 3 * (size_t)i);
     }
 }
 
-static void place_uvs(const struct aiVector3D *source, nebel_mesh *mesh)
+static void place_uvs(const nb_draft *draft, const uint32_t *kept, nebel_mesh *mesh)
 {
     float *uvs = (float *)mesh->uvs;
     for (uint32_t i = 0; i < mesh->vertex_count; i++) {
-        uvs[2 * (size_t)i] = isfinite(source[i].x) ? source[i].x : 0;
-        uvs[2 * (size_t)i + 1] = isfinite(source[i].y) ? source[i].y : 0;
+        const struct aiVector3D *uv = &draft->uvs[nb_draft_origin(draft, number_in_draft(kept, i))];
+        uvs[2 * (size_t)i] = isfinite(uv->x) ? uv->x : 0;
+        uvs[2 * (size_t)i + 1] = isfinite(uv->y) ? 1 - uv->y : 0; /* Assimp counts from the bottom */
     }
 }
 
-/* A mirror turns triangles inside out; two corners change places to undo it. Triangles without an area are left out. */
+static bool is_finite(const float *v)
+{
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+static bool is_same(const float *a, const float *b)
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/* A mirror turns triangles inside out; two corners change places to undo it. Triangles with two corners at one place
+ * are left out, and those with a corner that was taken beyond the floats. */
 static void place_triangles(const builder *out, nebel_mesh *mesh)
 {
-    uint32_t *indices = (uint32_t *)mesh->indices;
-    mesh->triangle_count = 0;
-    for (unsigned i = 0; i < out->mesh->mNumFaces; i++) {
-        const struct aiFace *face = &out->mesh->mFaces[i];
-        bool good = true;
-        if (face->mNumIndices != 3) continue;
-        for (int k = 0; k < 3; k++)
-            good = good && face->mIndices[k] < mesh->vertex_count && !out->bad[face->mIndices[k]];
-        if (face->mIndices[0] == face->mIndices[1] || face->mIndices[1] == face->mIndices[2]) continue;
-        if (!good) {
+    uint32_t *indices = (uint32_t *)mesh->indices, count = 0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        const uint32_t corner[3] = {indices[3 * i], indices[3 * i + (out->mirrored ? 2 : 1)],
+                                    indices[3 * i + (out->mirrored ? 1 : 2)]};
+        const float *p[3];
+        for (int k = 0; k < 3; k++) p[k] = mesh->positions + 3 * (size_t)corner[k];
+        if (!is_finite(p[0]) || !is_finite(p[1]) || !is_finite(p[2]))
             out->in->left_out_triangles++;
-            continue;
-        }
-        uint32_t *corner = indices + 3 * (size_t)mesh->triangle_count++;
-        corner[0] = face->mIndices[0];
-        corner[1] = face->mIndices[out->mirrored ? 2 : 1];
-        corner[2] = face->mIndices[out->mirrored ? 1 : 2];
+        else if (!is_same(p[0], p[1]) && !is_same(p[1], p[2]) && !is_same(p[2], p[0]))
+            memcpy(indices + 3 * (size_t)count++, corner, sizeof corner);
+    }
+    mesh->triangle_count = count;
+}
+
+/* No triangle uses them any more. */
+static void clear_broken_positions(nebel_mesh *mesh)
+{
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        float *position = (float *)mesh->positions + 3 * i;
+        if (!is_finite(position)) memset(position, 0, 3 * sizeof *position);
     }
 }
 
@@ -129,11 +146,18 @@ static void mend_normals(nebel_mesh *mesh)
     }
 }
 
+static bool is_triangle(const struct aiMesh *mesh, const struct aiFace *face)
+{
+    bool good = face->mNumIndices == 3;
+    for (int k = 0; k < 3 && good; k++) good = face->mIndices[k] < mesh->mNumVertices;
+    return good;
+}
+
 static uint32_t count_triangles(nb_assimp *in, const struct aiMesh *mesh)
 {
     uint32_t count = 0;
     for (unsigned i = 0; i < mesh->mNumFaces; i++) {
-        if (mesh->mFaces[i].mNumIndices == 3)
+        if (is_triangle(mesh, &mesh->mFaces[i]))
             count++;
         else
             in->left_out_faces++;
@@ -150,12 +174,32 @@ static const struct aiVector3D *find_uvs(const struct aiMesh *mesh, nb_surface *
     return uvs;
 }
 
-static void fill(const builder *out, const nb_surface *surface, const struct aiVector3D *uvs, nebel_mesh *mesh)
+static void collect_triangles(const struct aiMesh *mesh, uint32_t *corner)
 {
-    place_vertices(out, mesh);
+    for (unsigned i = 0; i < mesh->mNumFaces; i++) {
+        const struct aiFace *face = &mesh->mFaces[i];
+        for (int k = 0; k < 3 && is_triangle(mesh, face); k++) *corner++ = face->mIndices[k];
+    }
+}
+
+/* Makes normals where there are none. Then joins vertices: all where no two triangles have one in common, otherwise the
+ * copies that sharp edges made. */
+static bool find_vertices(nb_draft *draft, uint32_t **kept, uint32_t *count)
+{
+    *count = draft->given_count;
+    if (draft->normals == NULL && !nb_draft_smooth(draft)) return false;
+    const bool is_indexed = draft->given_count < 3 * (uint64_t)draft->triangle_count;
+    if (is_indexed && draft->copy_count == 0) return true;
+    return nb_draft_join(draft, is_indexed ? draft->given_count : 0, kept, count);
+}
+
+static void fill(const builder *out, const nb_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
+{
+    place_vertices(out, kept, mesh);
+    if (out->draft.uvs != NULL) place_uvs(&out->draft, kept, mesh);
     place_triangles(out, mesh);
+    clear_broken_positions(mesh);
     mend_normals(mesh);
-    if (uvs != NULL) place_uvs(uvs, mesh);
     mesh->texture = surface->texture;
     for (int i = 0; i < 3; i++) {
         mesh->base_color[i] = surface->base_color[i];
@@ -163,26 +207,47 @@ static void fill(const builder *out, const nb_surface *surface, const struct aiV
     }
 }
 
+static bool build(builder *out, const struct aiMesh *source, const nb_surface *surface, nebel_mesh *mesh)
+{
+    nb_draft *draft = &out->draft;
+    uint32_t *kept = NULL, vertex_count = 0;
+    draft->corners = nb_allocate(&draft->allocator, draft->triangle_count, 3 * sizeof *draft->corners);
+    if (draft->corners == NULL) return false;
+    *mesh = (nebel_mesh){.indices = draft->corners, .triangle_count = draft->triangle_count};
+    collect_triangles(source, draft->corners);
+    const bool good = find_vertices(draft, &kept, &vertex_count) &&
+                      nb_mesh_allocate_vertices(&draft->allocator, vertex_count, draft->uvs != NULL, mesh);
+    if (good)
+        fill(out, surface, kept, mesh);
+    else
+        nb_mesh_release(&draft->allocator, mesh);
+    nb_release(&draft->allocator, kept);
+    nb_release(&draft->allocator, draft->copied);
+    nb_release(&draft->allocator, draft->made_normals);
+    return good;
+}
+
 nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *source, const nb_affine *place)
 {
-    const nebel_allocator *allocator = &in->load->allocator;
-    builder out = {.in = in, .mesh = source, .place = *place};
+    const nb_model_load *load = in->load;
     nb_surface surface;
     nebel_mesh mesh;
     const uint32_t triangle_count = count_triangles(in, source);
     if (triangle_count == 0 || source->mVertices == NULL) return NEBEL_OK;
+    if (triangle_count > NB_MAX_TRIANGLES) return nb_model_refuse_triangles(load);
     const nebel_result result = nb_assimp_find_surface(in, source->mMaterialIndex, &surface);
     if (result != NEBEL_OK) return result;
-    const struct aiVector3D *uvs = find_uvs(source, &surface);
-    out.bad = nb_allocate(allocator, source->mNumVertices, sizeof *out.bad);
-    if (out.bad == NULL || !nb_mesh_allocate(allocator, source->mNumVertices, triangle_count, uvs != NULL, &mesh)) {
-        nb_release(allocator, out.bad);
-        return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
-    }
+    builder out = {.in = in,
+                   .draft = {.allocator = load->allocator,
+                             .positions = source->mVertices,
+                             .normals = source->mNormals,
+                             .uvs = find_uvs(source, &surface),
+                             .given_count = source->mNumVertices,
+                             .triangle_count = triangle_count},
+                   .place = *place};
     find_normal_matrix(&out);
-    fill(&out, &surface, uvs, &mesh);
-    nb_release(allocator, out.bad);
-    if (mesh.triangle_count > 0) return nb_model_add_mesh(in->load, &mesh);
-    nb_mesh_release(allocator, &mesh);
+    if (!build(&out, source, &surface, &mesh)) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    if (mesh.triangle_count > 0) return nb_model_add_mesh(load, &mesh);
+    nb_mesh_release(&load->allocator, &mesh);
     return NEBEL_OK;
 }

@@ -56,12 +56,16 @@ static nebel_result build(const nb_model_load *load, const nb_heights *map)
 {
     const nb_model_source *source = load->source;
     const uint64_t triangle_count = 2 * (uint64_t)(map->width - 1) * (map->height - 1);
-    nebel_mesh mesh;
     if (triangle_count > NB_MAX_TRIANGLES)
         return nb_model_fail(load, NEBEL_ERROR_LIMIT, "the height map makes %llu triangles; at most %llu",
                              (unsigned long long)triangle_count, (unsigned long long)NB_MAX_TRIANGLES);
-    if (!nb_mesh_allocate(&load->allocator, map->width * map->height, (uint32_t)triangle_count, false, &mesh))
+    nebel_mesh mesh = {.triangle_count = (uint32_t)triangle_count,
+                       .texture = -1,
+                       .indices = nb_allocate(&load->allocator, triangle_count, 3 * sizeof(uint32_t))};
+    if (mesh.indices == NULL || !nb_mesh_allocate_vertices(&load->allocator, map->width * map->height, false, &mesh)) {
+        nb_mesh_release(&load->allocator, &mesh);
         return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    }
     place_vertices(map, source, (float *)mesh.positions);
     place_normals(map, source, (float *)mesh.normals);
     place_triangles(map, (uint32_t *)mesh.indices);

@@ -27,18 +27,13 @@ nebel_log nb_note_log(nb_note *note)
 /* ---- meshes
  * ---------------------------------------------------------------------------------------------------------- */
 
-bool nb_mesh_allocate(const nebel_allocator *allocator, uint32_t vertex_count, uint32_t triangle_count, bool has_uvs,
-                      nebel_mesh *mesh)
+bool nb_mesh_allocate_vertices(const nebel_allocator *allocator, uint32_t count, bool has_uvs, nebel_mesh *mesh)
 {
-    *mesh = (nebel_mesh){.vertex_count = vertex_count, .triangle_count = triangle_count, .texture = -1};
-    mesh->positions = nb_allocate(allocator, vertex_count, 3 * sizeof(float));
-    mesh->normals = nb_allocate(allocator, vertex_count, 3 * sizeof(float));
-    mesh->indices = nb_allocate(allocator, triangle_count, 3 * sizeof(uint32_t));
-    if (has_uvs) mesh->uvs = nb_allocate(allocator, vertex_count, 2 * sizeof(float));
-    if (mesh->positions != NULL && mesh->normals != NULL && mesh->indices != NULL && (!has_uvs || mesh->uvs != NULL))
-        return true;
-    nb_mesh_release(allocator, mesh);
-    return false;
+    mesh->vertex_count = count;
+    mesh->positions = nb_allocate(allocator, count, 3 * sizeof(float));
+    mesh->normals = nb_allocate(allocator, count, 3 * sizeof(float));
+    mesh->uvs = has_uvs ? nb_allocate(allocator, count, 2 * sizeof(float)) : NULL;
+    return mesh->positions != NULL && mesh->normals != NULL && (!has_uvs || mesh->uvs != NULL);
 }
 
 void nb_mesh_release(const nebel_allocator *allocator, nebel_mesh *mesh)
@@ -50,14 +45,19 @@ void nb_mesh_release(const nebel_allocator *allocator, nebel_mesh *mesh)
     *mesh = (nebel_mesh){0};
 }
 
+nebel_result nb_model_refuse_triangles(const nb_model_load *load)
+{
+    return nb_model_fail(load, NEBEL_ERROR_LIMIT, "the models have more than %llu triangles together",
+                         (unsigned long long)NB_MAX_TRIANGLES);
+}
+
 nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh)
 {
     nb_model_set *set = load->set;
     void *meshes = set->meshes;
     nebel_result result = NEBEL_OK;
     if (set->triangle_count + mesh->triangle_count > NB_MAX_TRIANGLES)
-        result = nb_model_fail(load, NEBEL_ERROR_LIMIT, "the models have more than %llu triangles together",
-                               (unsigned long long)NB_MAX_TRIANGLES);
+        result = nb_model_refuse_triangles(load);
     else if (!nb_grow(&load->allocator, &meshes, sizeof *mesh, set->mesh_count, &set->mesh_capacity,
                       set->mesh_count + 1))
         result = nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");

@@ -19,14 +19,16 @@ typedef struct nb_model_load {
 nebel_result nb_heightfield_load(const nb_model_load *load);
 nebel_result nb_assimp_load(const nb_model_load *load);
 
-/* Memory for a mesh: positions and normals, uvs where wanted, indices. False, with nothing held, when memory is out. */
-bool nb_mesh_allocate(const nebel_allocator *allocator, uint32_t vertex_count, uint32_t triangle_count, bool has_uvs,
-                      nebel_mesh *mesh);
+/* Memory for positions and normals, uvs where wanted. False when memory is out; release the mesh also then. */
+bool nb_mesh_allocate_vertices(const nebel_allocator *allocator, uint32_t count, bool has_uvs, nebel_mesh *mesh);
 void nb_mesh_release(const nebel_allocator *allocator, nebel_mesh *mesh);
 
 /* Hand over a mesh or a texture, also its memory on failure. Errors: LIMIT, MEMORY. */
 nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh);
 nebel_result nb_model_add_texture(const nb_model_load *load, const nebel_texture *texture, int32_t *index);
+
+/* LIMIT, and says that there are more than NB_MAX_TRIANGLES. */
+nebel_result nb_model_refuse_triangles(const nb_model_load *load);
 
 /* Logs "FILE:LINE:COLUMN: models[0].file: message" and returns the result. */
 nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const char *format, ...) NB_PRINTF(3, 4);
