@@ -303,6 +303,43 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
 nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                       const nebel_ray *rays, size_t ray_stride, double *distances);
 
+/* ---- planes of rays in, planes of light out: the hot path of a renderer ---------------------------------------------- */
+
+/* n rays in caller memory, a plane for each coordinate. Neighbours in a plane are a stride apart, in bytes, a multiple of the
+ * number's size; 0: without gaps. What all rays share costs nothing: those of a camera need no offset, those to the sun no planes
+ * of directions. Planes of three are given all or none. */
+typedef struct nebel_ray_planes {
+    double origin[3];                  /* m */
+    const float *offset[3];            /* m, from `origin` to where a ray starts; NULL: all start at `origin` */
+    size_t offset_stride;
+    double direction[3];               /* of all rays, any length but 0; not read where one of the next two is given */
+    const float *direction_float[3];   /* of each ray, any length but 0; NULL: see `direction` */
+    const double *direction_double[3]; /* the same, for fog so far away that a float's rounding of the way there shows */
+    size_t direction_stride;
+    const float *t_max;                /* m, >= 0; INFINITY is legal; NULL: rays without end. 0 masks a ray: nothing is asked, and its
+                                          other numbers may be anything */
+    size_t t_max_stride;
+} nebel_ray_planes;
+
+/* Light in caller memory: planes like those of the rays, whose elements beyond n stay as they are. Every plane may be NULL: not
+ * wanted. What is not wanted is not computed as far as possible; the error in particular costs more than the light of a box. */
+typedef struct nebel_light_planes {
+    float *transmittance[3]; /* RGB, 0..1 */
+    size_t transmittance_stride;
+    float *in_scattering[3]; /* RGB radiance, >= 0 */
+    size_t in_scattering_stride;
+    float *error;            /* bound of the absolute error: of all six numbers where a plane of in_scattering is given, else of
+                                transmittance */
+    size_t error_stride;
+} nebel_light_planes;
+
+/* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of transmittance and
+ * in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero) `isa`, `tolerance` and
+ * `failed_ray` are read. rays and lights must not overlap. Same bits for every isa and for every way of splitting the rays into
+ * calls; a few hundred rays are enough for a call to be worth it. Any thread. Errors as nebel_trace. */
+nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
+                                const nebel_ray_planes *rays, const nebel_light_planes *lights);
+
 /* ---- segments in, transmittances out: the hot path of an engine ----------------------------------------------------- */
 
 /* n segments in caller memory, from[i] to to[i], three floats each, relative to `origin` (so that floats suffice far from

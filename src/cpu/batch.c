@@ -28,37 +28,41 @@ static void set_clear(nb_light_samples *samples)
     for (int i = 0; i < NB_BATCH; i++) samples->error[i] = 0;
 }
 
-/* From the ray's start, before it was advanced, to the hit or to infinity. */
-static double distance_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t i)
+/* From the ray's start, before it was advanced, to the hit or to infinity; 0 outside the picture, where nothing is asked. */
+NB_CLONES static void set_distances(double advance, const nb_rays *rays, const nb_hits *hits, const int *inside,
+                                    float *restrict distance)
 {
-    if (scratch->hits.surface[i] == NB_NONE) return HUGE_VAL;
-    return frame->view.advance * (double)scratch->rays.length[i] + (double)scratch->hits.t[i];
+    NB_SIMD
+    for (int i = 0; i < NB_BATCH; i++) {
+        const float to_hit = (float)(advance * (double)rays->length[i] + (double)hits->t[i]);
+        const float way = hits->surface[i] == NB_NONE ? HUGE_VALF : to_hit;
+        distance[i] = inside[i] ? way : 0;
+    }
 }
 
-static size_t set_camera_rays(const nb_frame *frame, nb_scratch *scratch)
+/* All from one place, or all in one direction. */
+static nebel_ray_planes camera_rays(const nb_frame *frame, nb_scratch *scratch)
 {
-    const nb_rays *rays = &scratch->rays;
-    const double *position = frame->view.position;
-    size_t count = 0;
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        if (!scratch->inside[i]) continue;
-        scratch->fog_rays[count] = (nebel_ray){{position[0], position[1], position[2]},
-                                               {rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]},
-                                               distance_of(frame, scratch, i)};
-        scratch->lanes[count++] = i;
+    nebel_ray_planes planes = {.t_max = scratch->distance};
+    const int parallel = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    for (int c = 0; c < 3; c++) {
+        planes.origin[c] = frame->view.position[c];
+        planes.direction[c] = frame->view.forward[c];
+        if (parallel) planes.offset[c] = scratch->offset[c];
+        else planes.direction_double[c] = scratch->rays.direction[c];
+        for (int i = 0; i < NB_BATCH && parallel; i++) scratch->offset[c][i] = (float)scratch->rays.offset[c][i];
     }
-    if (frame->view.projection != NEBEL_PROJECTION_ORTHOGRAPHIC) return count;
-    for (size_t k = 0; k < count; k++) {
-        for (int c = 0; c < 3; c++) scratch->fog_rays[k].origin[c] += rays->offset[c][scratch->lanes[k]];
-    }
-    return count;
+    return planes;
 }
 
-static nebel_result trace_fog(const nb_frame *frame, const nebel_trace_desc *trace, nb_scratch *scratch, size_t count)
+static nebel_light_planes light_samples(const nb_frame *frame, nb_light_samples *samples)
 {
-    if (count == 0) return NEBEL_OK;
-    return nebel_trace(frame->renderer->fog, trace, count, scratch->fog_rays, sizeof(nebel_ray),
-                       scratch->fog_lights, sizeof(nebel_light));
+    nebel_light_planes planes = {.error = frame->planes->error != NULL ? samples->error : NULL};
+    for (int c = 0; c < 3; c++) {
+        planes.transmittance[c] = samples->transmittance[c];
+        planes.in_scattering[c] = samples->in_scattering[c];
+    }
+    return planes;
 }
 
 static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
@@ -68,41 +72,14 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
         set_clear(samples);
         return NEBEL_OK;
     }
-    const size_t count = set_camera_rays(frame, scratch);
-    const nebel_result result = trace_fog(frame, &frame->trace, scratch, count);
-    if (result != NEBEL_OK) return result;
-    for (size_t k = 0; k < count; k++) {
-        const uint32_t i = scratch->lanes[k];
-        const nebel_light *light = &scratch->fog_lights[k];
-        samples->transmittance[0][i] = (float)light->transmittance[0];
-        samples->transmittance[1][i] = (float)light->transmittance[1];
-        samples->transmittance[2][i] = (float)light->transmittance[2];
-        samples->in_scattering[0][i] = (float)light->in_scattering[0];
-        samples->in_scattering[1][i] = (float)light->in_scattering[1];
-        samples->in_scattering[2][i] = (float)light->in_scattering[2];
-        samples->error[i] = (float)light->error;
-    }
-    return NEBEL_OK;
+    set_distances(frame->view.advance, &scratch->rays, &scratch->hits, scratch->inside, scratch->distance);
+    const nebel_ray_planes rays = camera_rays(frame, scratch);
+    const nebel_light_planes lights = light_samples(frame, samples);
+    return nebel_trace_planes(frame->renderer->fog, &frame->trace, NB_BATCH, &rays, &lights);
 }
 
 /* ---- surfaces
  * -------------------------------------------------------------------------------------------------------- */
-
-static size_t set_sun_rays(const nb_frame *frame, nb_scratch *scratch)
-{
-    const double *origin = frame->renderer->geometry.origin, *sun = frame->lighting.sun_direction;
-    float(*start)[NB_BATCH] = scratch->points.start;
-    size_t count = 0;
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        if (!scratch->points.lit[i]) continue;
-        scratch->fog_rays[count] = (nebel_ray){
-            {origin[0] + (double)start[0][i], origin[1] + (double)start[1][i], origin[2] + (double)start[2][i]},
-            {sun[0], sun[1], sun[2]},
-            HUGE_VAL};
-        scratch->lanes[count++] = i;
-    }
-    return count;
-}
 
 /* Irradiance of the sun over pi, before fog, in samples->color. */
 NB_CLONES static void set_clear_sunlight(const float *irradiance, nb_scratch *scratch)
@@ -120,24 +97,36 @@ NB_CLONES static void set_clear_sunlight(const float *irradiance, nb_scratch *sc
     }
 }
 
+/* What fog leaves of the sun's light where it is lit at all. */
+static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, float (*transmittance)[NB_BATCH])
+{
+    nebel_ray_planes rays = {.t_max = scratch->distance};
+    nebel_light_planes lights = {.error = NULL};
+    for (int c = 0; c < 3; c++) {
+        rays.origin[c] = frame->renderer->geometry.origin[c];
+        rays.offset[c] = scratch->points.start[c];
+        rays.direction[c] = frame->lighting.sun_direction[c];
+        lights.transmittance[c] = transmittance[c];
+    }
+    for (int i = 0; i < NB_BATCH; i++) scratch->distance[i] = scratch->points.lit[i] ? HUGE_VALF : 0;
+    return nebel_trace_planes(frame->renderer->fog, &frame->trace, NB_BATCH, &rays, &lights);
+}
+
+NB_CLONES static void dim(const float (*restrict transmittance)[NB_BATCH], float (*restrict color)[NB_BATCH])
+{
+    for (int c = 0; c < 3; c++) {
+        NB_SIMD
+        for (int i = 0; i < NB_BATCH; i++) color[c][i] *= transmittance[c][i];
+    }
+}
+
 static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
     set_clear_sunlight(frame->lighting.irradiance, scratch);
-    if (frame->renderer->fog == NULL) return NEBEL_OK;
-    const size_t count = set_sun_rays(frame, scratch);
-    nebel_trace_desc trace = frame->trace;
-    trace.transmittance_only = 1;
-    const nebel_result result = trace_fog(frame, &trace, scratch, count);
-    if (result != NEBEL_OK) return result;
-    float(*color)[NB_BATCH] = scratch->samples.color;
-    for (size_t k = 0; k < count; k++) {
-        const double *transmittance = scratch->fog_lights[k].transmittance;
-        const uint32_t i = scratch->lanes[k];
-        color[0][i] *= (float)transmittance[0];
-        color[1][i] *= (float)transmittance[1];
-        color[2][i] *= (float)transmittance[2];
-    }
-    return NEBEL_OK;
+    if (frame->renderer->fog == NULL || !frame->lighting.has_sun) return NEBEL_OK;
+    const nebel_result result = trace_sun_fog(frame, scratch, scratch->sun_transmittance);
+    if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->sun_transmittance, scratch->samples.color);
+    return result;
 }
 
 /* color = transmittance * surface + in_scattering; Lambert's surface = reflectance * (irradiance / pi + ambient). */

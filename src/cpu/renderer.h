@@ -29,9 +29,9 @@ typedef struct nb_scratch {
     nb_hits hits;
     nb_points points;
     nb_light_samples samples;
-    uint32_t lanes[NB_BATCH]; /* of the rays below */
-    nebel_ray fog_rays[NB_BATCH];
-    nebel_light fog_lights[NB_BATCH];
+    float distance[NB_BATCH];             /* m, over which fog is asked for */
+    float offset[3][NB_BATCH];            /* of the rays' starts from the camera's position; orthographic only */
+    float sun_transmittance[3][NB_BATCH]; /* of the way to the sun */
     nb_seen seen;
     uint32_t hit_counts[NB_REGION * NB_REGION]; /* samples of a pixel that met a surface */
 } nb_scratch;

@@ -50,14 +50,11 @@ const char *nebel_isa_name(nebel_isa isa)
     }
 }
 
-/* Squares of distances stay finite in every target. */
-#define LARGEST_COORDINATE 1e15
-
 static const char *fault_of_ray(const nebel_ray *ray)
 {
     int zero = 1;
     for (int i = 0; i < 3; i++) {
-        if (!(fabs(ray->origin[i]) <= LARGEST_COORDINATE)) return "origin must be finite and at most 1e15 m away";
+        if (!(fabs(ray->origin[i]) <= NB_LARGEST_COORDINATE)) return "origin must be finite and at most 1e15 m away";
         if (!isfinite(ray->direction[i])) return "direction must be finite";
         zero = zero && ray->direction[i] == 0;
     }
@@ -67,7 +64,7 @@ static const char *fault_of_ray(const nebel_ray *ray)
 
 static int is_near(double x)
 {
-    return fabs(x) <= LARGEST_COORDINATE;
+    return fabs(x) <= NB_LARGEST_COORDINATE;
 }
 
 /* The same in one expression without a branch, for the many rays that are right. */
@@ -93,14 +90,63 @@ static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const n
     return NEBEL_OK;
 }
 
+static double element(const void *plane, size_t size, size_t stride, size_t i)
+{
+    const char *at = (const char *)plane + i * stride;
+    return size == sizeof(double) ? *(const double *)(const void *)at : (double)*(const float *)(const void *)at;
+}
+
+static nebel_ray ray_in_planes(const nebel_ray_planes *planes, size_t i)
+{
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    for (int c = 0; c < 3; c++) {
+        ray.origin[c] = planes->origin[c];
+        ray.direction[c] = planes->direction[c];
+        if (planes->offset[c] != NULL) ray.origin[c] += element(planes->offset[c], sizeof(float), planes->offset_stride, i);
+        if (planes->direction_float[c] != NULL)
+            ray.direction[c] = element(planes->direction_float[c], sizeof(float), planes->direction_stride, i);
+        if (planes->direction_double[c] != NULL)
+            ray.direction[c] = element(planes->direction_double[c], sizeof(double), planes->direction_stride, i);
+    }
+    if (planes->t_max != NULL) ray.t_max = element(planes->t_max, sizeof(float), planes->t_max_stride, i);
+    return ray;
+}
+
+size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count)
+{
+    for (size_t i = first; i < first + count; i++) {
+        const nebel_ray ray = ray_in_planes(rays, i);
+        if (ray.t_max != 0 && fault_of_ray(&ray) != NULL) return i;
+    }
+    return first + count;
+}
+
 static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t *failed)
 {
     if (result == NEBEL_OK) return result;
     if (failed != NULL) *failed = job->failed;
+    if (result == NEBEL_ERROR_ARGUMENT) {
+        const nebel_ray ray = ray_in_planes(job->ray_planes, job->failed);
+        return nb_fail(&job->snapshot->log, result, "ray %zu: %s", job->failed, fault_of_ray(&ray));
+    }
     if (result == NEBEL_ERROR_UNBOUNDED)
         return nb_fail(&job->snapshot->log, result,
                        "ray %zu: gathers infinite light; fog that emits without end must absorb, or t_max be finite", job->failed);
     return nb_fail(&job->snapshot->log, result, "ray %zu: out of memory for the fog it meets", job->failed);
+}
+
+/* Asks `kernel`, NULL where there is none, about a job that says where rays and lights are. */
+static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, nb_trace_fn *kernel, nb_trace_job *job)
+{
+    const double tolerance = desc->tolerance == 0 ? NEBEL_DEFAULT_TOLERANCE : desc->tolerance;
+    if (!(tolerance > 0 && isfinite(tolerance)))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "tolerance: must be finite and more than 0");
+    if (kernel == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(desc->isa));
+    job->snapshot = snapshot;
+    job->budget = tolerance * fmax(1, snapshot->largest_radiance);
+    job->count = n;
+    return explain(job, kernel(job), desc->failed_ray);
 }
 
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
@@ -111,23 +157,68 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: description and lights must not be NULL");
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
     if (valid != NEBEL_OK) return valid;
-    const double tolerance = desc->tolerance == 0 ? NEBEL_DEFAULT_TOLERANCE : desc->tolerance;
-    if (!(tolerance > 0 && isfinite(tolerance)))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "tolerance: must be finite and more than 0");
     const int is_float = desc->precision == NEBEL_PRECISION_FLOAT;
-    nb_trace_fn *kernel = is_float ? kernel_for(desc->isa) : nb_trace_double;
-    if (kernel == NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(desc->isa));
-    nb_trace_job job = {.snapshot = snapshot,
-                        .budget = tolerance * fmax(1, snapshot->largest_radiance),
-                        .transmittance_only = desc->transmittance_only,
-                        .count = n,
+    nb_trace_job job = {.transmittance_only = desc->transmittance_only,
+                        .wants_error = 1,
                         .rays = rays,
                         .ray_stride = ray_stride,
                         .lights = lights,
                         .light_stride = light_stride};
-    return explain(&job, kernel(&job), desc->failed_ray);
+    return run(snapshot, desc, n, is_float ? kernel_for(desc->isa) : nb_trace_double, &job);
 }
+
+/* ---- planes ------------------------------------------------------------------------------------------------------ */
+
+/* Planes of three are given all or none. */
+static int is_broken(const void *x, const void *y, const void *z)
+{
+    return (x != NULL) != (y != NULL) || (y != NULL) != (z != NULL);
+}
+
+static const char *fault_of_planes(const nebel_ray_planes *rays)
+{
+    const float *const *offset = rays->offset, *const *direction = rays->direction_float;
+    const double *const *fine = rays->direction_double;
+    if (is_broken(offset[0], offset[1], offset[2])) return "offset: all three planes or none";
+    if (is_broken(direction[0], direction[1], direction[2])) return "direction_float: all three planes or none";
+    if (is_broken(fine[0], fine[1], fine[2])) return "direction_double: all three planes or none";
+    if (direction[0] != NULL && fine[0] != NULL) return "direction_float and direction_double: one of them";
+    const int shared = direction[0] == NULL && fine[0] == NULL;
+    const nebel_ray common = {.origin = {rays->origin[0], rays->origin[1], rays->origin[2]},
+                              .direction = {shared ? rays->direction[0] : 1, rays->direction[1], rays->direction[2]}};
+    return fault_of_ray(&common);
+}
+
+static void set_stride(size_t *stride, size_t packed)
+{
+    if (*stride == 0) *stride = packed;
+}
+
+nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
+                                const nebel_ray_planes *rays, const nebel_light_planes *lights)
+{
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (rays == NULL || lights == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: rays and lights must not be NULL");
+    const char *fault = fault_of_planes(rays);
+    if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "planes: %s", fault);
+    nebel_ray_planes from = *rays;
+    nebel_light_planes to = *lights;
+    set_stride(&from.offset_stride, sizeof(float));
+    set_stride(&from.direction_stride, from.direction_double[0] != NULL ? sizeof(double) : sizeof(float));
+    set_stride(&from.t_max_stride, sizeof(float));
+    set_stride(&to.transmittance_stride, sizeof(float));
+    set_stride(&to.in_scattering_stride, sizeof(float));
+    set_stride(&to.error_stride, sizeof(float));
+    const int wants_light = to.in_scattering[0] != NULL || to.in_scattering[1] != NULL || to.in_scattering[2] != NULL;
+    const nebel_trace_desc plain = {0};
+    const nebel_trace_desc *asked = desc != NULL ? desc : &plain;
+    nb_trace_job job = {
+        .transmittance_only = !wants_light, .wants_error = to.error != NULL, .ray_planes = &from, .light_planes = &to};
+    return run(snapshot, asked, n, kernel_for(asked->isa), &job);
+}
+
+/* ---- visibility -------------------------------------------------------------------------------------------------- */
 
 nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                       const nebel_ray *rays, size_t ray_stride, double *distances)

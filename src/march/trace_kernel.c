@@ -112,23 +112,25 @@ static nb_wvec3 normalized(nb_wvec3 d)
 
 /* Directions so long or short that their squares overflow or vanish, taken near 1 by a power of two: which is exact, so that
  * ordinary lanes keep their bits. */
-static void tame_directions(double (*direction)[NB_WIDTH])
+static nb_wvec3 tamed(nb_wvec3 d)
 {
+    double lane[3][NB_WIDTH];
+    nb_wstore_lanes(lane[0], d.x);
+    nb_wstore_lanes(lane[1], d.y);
+    nb_wstore_lanes(lane[2], d.z);
     for (int i = 0; i < NB_WIDTH; i++) {
         int exponent;
-        frexp(fmax(fmax(fabs(direction[0][i]), fabs(direction[1][i])), fabs(direction[2][i])), &exponent);
-        for (int c = 0; c < 3; c++) direction[c][i] = ldexp(direction[c][i], -exponent);
+        frexp(fmax(fmax(fabs(lane[0][i]), fabs(lane[1][i])), fabs(lane[2][i])), &exponent);
+        for (int c = 0; c < 3; c++) lane[c][i] = ldexp(lane[c][i], -exponent);
     }
+    return nb_wvec3(nb_wload_lanes(lane[0]), nb_wload_lanes(lane[1]), nb_wload_lanes(lane[2]));
 }
 
-static nb_wvec3 load_directions(double (*direction)[NB_WIDTH])
+static nb_wvec3 unit_vector(nb_wvec3 d)
 {
-    const nb_wvec3 d = nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2]));
     const nb_wide square = nb_wdot3(d, d);
     if (nb_wall(nb_wand(square > NB_W(1e-200), square < NB_W(1e200)))) return normalized(d);
-    tame_directions(direction);
-    return normalized(
-        nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2])));
+    return normalized(tamed(d));
 }
 
 /* Lanes beyond `count` get a ray of no length. */
@@ -143,8 +145,9 @@ static packet load_packet(const nebel_ray *rays, size_t stride, size_t count)
         }
         t_max[i] = i >= count ? 0 : ray->t_max > 1e18 ? 1e18 : ray->t_max;
     }
+    const nb_wvec3 way = nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2]));
     return (packet){nb_wvec3(nb_wload_lanes(origin[0]), nb_wload_lanes(origin[1]), nb_wload_lanes(origin[2])),
-                    load_directions(direction), nb_wload_lanes(t_max)};
+                    unit_vector(way), nb_wload_lanes(t_max)};
 }
 
 /* Below this it is quicker to ask every medium than to walk the tree. */
@@ -346,6 +349,12 @@ static nb_real bound_error(const march *m, const gathered *g, int transmittance_
     return nb_max(transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON)));
 }
 
+/* With room for the rounding of the bound's own arithmetic. */
+static nb_real reported_error(const march *m, const gathered *g, int transmittance_only)
+{
+    return bound_error(m, g, transmittance_only) * (NB_F(1.0) + NB_F(16.0) * NB_EPSILON);
+}
+
 static void store_light(const nb_trace_job *job, const march *m, const gathered *g, size_t first, size_t count)
 {
     nb_scalar lane[7][NB_WIDTH];
@@ -353,8 +362,7 @@ static void store_light(const nb_trace_job *job, const march *m, const gathered 
         nb_store_lanes(lane[c], g->transmittance[c]);
         nb_store_lanes(lane[3 + c], g->radiance[c]);
     }
-    const nb_real own_rounding = NB_F(1.0) + NB_F(16.0) * NB_EPSILON;
-    nb_store_lanes(lane[6], bound_error(m, g, job->transmittance_only) * own_rounding);
+    nb_store_lanes(lane[6], reported_error(m, g, job->transmittance_only));
     for (size_t i = 0; i < count; i++) {
         nebel_light *light = (nebel_light *)(void *)((char *)job->lights + (first + i) * job->light_stride);
         for (int c = 0; c < 3; c++) {
@@ -363,6 +371,11 @@ static void store_light(const nb_trace_job *job, const march *m, const gathered 
         }
         light->error = (double)lane[6][i];
     }
+}
+
+static size_t packet_size(const nb_trace_job *job, size_t first)
+{
+    return job->count - first < NB_WIDTH ? job->count - first : NB_WIDTH;
 }
 
 /* Where the budget goes: most by loss of transmittance and by length, a tenth to the last steps of the pieces, of which
@@ -374,10 +387,9 @@ static allowance share_budget(const nb_trace_job *job)
     return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget), choose_ellipse(budget / radiance)};
 }
 
-static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
+/* The light along the rays of w->m, of which `count` count, the first of them by the number `first`. */
+static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first, size_t count, gathered *g)
 {
-    const size_t count = job->count - first < NB_WIDTH ? job->count - first : NB_WIDTH;
-    w->m.rays = load_packet(ray_at(job->rays, job->ray_stride, first), job->ray_stride, count);
     job->failed = first;
     if (!meet_fog(w, job->snapshot)) return NEBEL_ERROR_MEMORY;
     allowance share = *may;
@@ -385,24 +397,50 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
     share.last_share = share.last_share / pieces;
     share.length_share = share.length_share / pieces;
     nb_mask unbounded;
-    gathered g = gather_light(&w->m, &share, &unbounded);
-    limit_radiance(&w->m, &g);
+    *g = gather_light(&w->m, &share, &unbounded);
+    limit_radiance(&w->m, g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)
         if (nb_lane(unbounded, i)) {
             job->failed = first + i;
             return NEBEL_ERROR_UNBOUNDED;
         }
-    store_light(job, &w->m, &g, first, count);
     return NEBEL_OK;
 }
 
+static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
+{
+    const size_t count = packet_size(job, first);
+    gathered g;
+    w->m.rays = load_packet(ray_at(job->rays, job->ray_stride, first), job->ray_stride, count);
+    const nebel_result result = answer_packet(job, w, may, first, count, &g);
+    if (result == NEBEL_OK) store_light(job, &w->m, &g, first, count);
+    return result;
+}
+
+static nebel_result trace_structures(nb_trace_job *job, workspace *w, const allowance *may)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < job->count && result == NEBEL_OK; i += NB_WIDTH) result = trace_packet(job, w, may, i);
+    return result;
+}
+
+#if !defined(NB_DOUBLE)
+#include "trace_planes.h"
+#endif
+
 nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
 {
+#if !defined(NB_DOUBLE)
+    if (job->ray_planes != NULL && is_straight(job)) return trace_all_straight(job);
+#endif
     workspace w;
     open_workspace(&w);
     const allowance may = share_budget(job);
-    nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < job->count && result == NEBEL_OK; i += NB_WIDTH) result = trace_packet(job, &w, &may, i);
+#if defined(NB_DOUBLE)
+    const nebel_result result = trace_structures(job, &w, &may);
+#else
+    const nebel_result result = job->ray_planes == NULL ? trace_structures(job, &w, &may) : trace_planes(job, &w, &may);
+#endif
     close_workspace(&w, &job->snapshot->allocator);
     return result;
 }

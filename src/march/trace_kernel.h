@@ -4,20 +4,31 @@
 
 #include "snapshot.h"
 
+/* Squares of distances stay finite in every target. */
+#define NB_LARGEST_COORDINATE 1e15
+
+/* Rays and lights are structures or, in float, planes. */
 typedef struct nb_trace_job {
     const nebel_snapshot *snapshot;
     double budget; /* what adaptive integration may add to the error of in-scattering, absolute */
     int transmittance_only;
+    int wants_error;
     size_t count;
     const nebel_ray *rays; /* checked; strides in bytes */
     size_t ray_stride, light_stride;
     nebel_light *lights;
+    const nebel_ray_planes *ray_planes; /* NULL: structures. What all rays share is checked, no stride is 0 */
+    const nebel_light_planes *light_planes;
     size_t failed; /* out: the ray that was an error */
 } nb_trace_job;
 
 typedef nebel_result nb_trace_fn(nb_trace_job *job);
 
 nb_trace_fn nb_trace_scalar, nb_trace_sse2, nb_trace_avx2, nb_trace_avx512, nb_trace_neon, nb_trace_double;
+
+/* The first of `count` rays in planes that is none; first + count where all are right. A ray of no length is, whatever
+ * else it says. */
+size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count);
 
 /* Distances to a transmittance; only the double kernel has it. */
 typedef struct nb_find_job {

@@ -1,0 +1,362 @@
+/* Rays and light in planes of floats. Included by the float kernels only.
+ *
+ * A packet is loaded, asked and stored in registers. Where the whole fog is one convex body of constant density, and
+ * nobody asks for the error, its packets go a straight way: no contacts, no events, no slack, and no division for rays
+ * that miss the body's bounds. It is made of the formulas that the march uses, in their order, and gives the bits that
+ * the march would give. */
+
+#define FORCE_INLINE static inline __attribute__((always_inline))
+
+/* ---- planes ------------------------------------------------------------------------------------------------------ */
+
+static nb_real load_floats(const float *plane, size_t stride, size_t first, size_t count)
+{
+    if (stride == sizeof *plane && count == NB_WIDTH) return nb_load_lanes(plane + first);
+    float lane[NB_WIDTH];
+    for (size_t i = 0; i < NB_WIDTH; i++)
+        lane[i] = *(const float *)(const void *)((const char *)plane + (first + (i < count ? i : 0)) * stride);
+    return nb_load_lanes(lane);
+}
+
+static nb_wide load_doubles(const double *plane, size_t stride, size_t first, size_t count)
+{
+    if (stride == sizeof *plane && count == NB_WIDTH) return nb_wload_lanes(plane + first);
+    double lane[NB_WIDTH];
+    for (size_t i = 0; i < NB_WIDTH; i++)
+        lane[i] = *(const double *)(const void *)((const char *)plane + (first + (i < count ? i : 0)) * stride);
+    return nb_wload_lanes(lane);
+}
+
+static nb_wvec3 load_float_vectors(const float *const plane[3], size_t stride, size_t first, size_t count)
+{
+    return nb_wvec3(nb_widen(load_floats(plane[0], stride, first, count)),
+                    nb_widen(load_floats(plane[1], stride, first, count)),
+                    nb_widen(load_floats(plane[2], stride, first, count)));
+}
+
+static nb_wvec3 load_double_vectors(const double *const plane[3], size_t stride, size_t first, size_t count)
+{
+    return nb_wvec3(load_doubles(plane[0], stride, first, count), load_doubles(plane[1], stride, first, count),
+                    load_doubles(plane[2], stride, first, count));
+}
+
+/* A plane of NULL is not wanted. */
+static void store_floats(float *plane, size_t stride, size_t first, size_t count, nb_real x)
+{
+    if (plane == NULL) return;
+    if (stride == sizeof *plane && count == NB_WIDTH) {
+        nb_store_lanes(plane + first, x);
+        return;
+    }
+    float lane[NB_WIDTH];
+    nb_store_lanes(lane, x);
+    for (size_t i = 0; i < count; i++) *(float *)(void *)((char *)plane + (first + i) * stride) = lane[i];
+}
+
+static void store_colors(float *const plane[3], size_t stride, size_t first, size_t count, const nb_real color[3])
+{
+    for (int c = 0; c < 3; c++) store_floats(plane[c], stride, first, count, color[c]);
+}
+
+/* ---- rays -------------------------------------------------------------------------------------------------------- */
+
+/* What the rays of a call share. */
+typedef struct stream {
+    const nebel_ray_planes *rays;
+    const nebel_light_planes *lights;
+    nb_wvec3 origin;
+    nb_wvec3 direction; /* of unit length; any where rays have their own */
+    int has_offsets, has_directions;
+} stream;
+
+static void open_stream(stream *s, const nb_trace_job *job)
+{
+    s->rays = job->ray_planes;
+    s->lights = job->light_planes;
+    s->origin = wide_vector(s->rays->origin);
+    s->has_offsets = s->rays->offset[0] != NULL;
+    s->has_directions = s->rays->direction_float[0] != NULL || s->rays->direction_double[0] != NULL;
+    const double any[3] = {1, 0, 0};
+    s->direction = unit_vector(wide_vector(s->has_directions ? any : s->rays->direction));
+}
+
+static nb_wvec3 load_starts(const stream *s, size_t first, size_t count)
+{
+    const nebel_ray_planes *rays = s->rays;
+    if (!s->has_offsets) return s->origin;
+    return nb_wadd3(s->origin, load_float_vectors(rays->offset, rays->offset_stride, first, count));
+}
+
+/* Of any length. */
+static nb_wvec3 load_ways(const stream *s, size_t first, size_t count)
+{
+    const nebel_ray_planes *rays = s->rays;
+    if (rays->direction_float[0] == NULL)
+        return load_double_vectors(rays->direction_double, rays->direction_stride, first, count);
+    return load_float_vectors(rays->direction_float, rays->direction_stride, first, count);
+}
+
+/* NB_WFAR at most; 0 in lanes beyond `count`. */
+static nb_wide load_ends(const stream *s, size_t first, size_t count)
+{
+    nb_wide t_max = NB_WFAR;
+    if (s->rays->t_max != NULL)
+        t_max = nb_wmin(NB_WFAR, nb_widen(load_floats(s->rays->t_max, s->rays->t_max_stride, first, count)));
+    if (count == NB_WIDTH) return t_max;
+    double lane[NB_WIDTH];
+    nb_wstore_lanes(lane, t_max);
+    for (size_t i = count; i < NB_WIDTH; i++) lane[i] = 0;
+    return nb_wload_lanes(lane);
+}
+
+static nb_wmask are_near(nb_wvec3 p)
+{
+    const nb_wide most = NB_W(NB_LARGEST_COORDINATE);
+    return nb_wand(nb_wand(nb_wabs(p.x) <= most, nb_wabs(p.y) <= most), nb_wabs(p.z) <= most);
+}
+
+/* A packet as it was loaded; its ways are not of unit length unless all rays share one. */
+typedef struct loaded {
+    nb_wvec3 start, way;
+    nb_wide t_max;
+    nb_wide square; /* of the way's length */
+} loaded;
+
+/* Lanes that are rays without a doubt. */
+static nb_wmask are_sound(const loaded *p)
+{
+    const nb_wmask moderate = nb_wand(p->square > NB_W(1e-200), p->square < NB_W(1e200));
+    return nb_wand(nb_wand(moderate, p->t_max >= NB_W(0.0)), are_near(p->start));
+}
+
+/* A way whose square overflows or vanishes is right, too, but for 0; and a ray of no length may be anything. */
+static nebel_result mend_rays(nb_trace_job *job, const stream *s, loaded *p, size_t first, size_t count)
+{
+    job->failed = nb_trace_first_fault(job->ray_planes, first, count);
+    if (job->failed < first + count) return NEBEL_ERROR_ARGUMENT;
+    const nb_wmask asked = p->t_max > NB_W(0.0);
+    const double any[3] = {1, 0, 0};
+    p->start = nb_wselect3(asked, p->start, s->origin);
+    p->way = tamed(nb_wselect3(asked, p->way, wide_vector(any)));
+    p->square = nb_wdot3(p->way, p->way);
+    return NEBEL_OK;
+}
+
+FORCE_INLINE nebel_result load_rays(nb_trace_job *job, const stream *s, size_t first, size_t count, loaded *p)
+{
+    p->start = load_starts(s, first, count);
+    p->t_max = load_ends(s, first, count);
+    p->way = s->has_directions ? load_ways(s, first, count) : s->direction;
+    p->square = nb_wdot3(p->way, p->way);
+    return nb_wall(are_sound(p)) ? NEBEL_OK : mend_rays(job, s, p, first, count);
+}
+
+/* ---- the march --------------------------------------------------------------------------------------------------- */
+
+static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowance *may, const stream *s, size_t first,
+                                 size_t count)
+{
+    loaded p;
+    const nebel_result valid = load_rays(job, s, first, count, &p);
+    if (valid != NEBEL_OK) return valid;
+    w->m.rays = (packet){p.start, s->has_directions ? normalized(p.way) : p.way, p.t_max};
+    gathered g;
+    const nebel_result result = answer_packet(job, w, may, first, count, &g);
+    if (result != NEBEL_OK) return result;
+    const nebel_light_planes *to = s->lights;
+    store_colors(to->transmittance, to->transmittance_stride, first, count, g.transmittance);
+    store_colors(to->in_scattering, to->in_scattering_stride, first, count, g.radiance);
+    if (job->wants_error)
+        store_floats(to->error, to->error_stride, first, count, reported_error(&w->m, &g, job->transmittance_only));
+    return NEBEL_OK;
+}
+
+/* ---- the straight way -------------------------------------------------------------------------------------------- */
+
+/* Within how many times the size of the scene two ways of computing a crossing agree: far more than they are apart. */
+#define SCENE_MARGIN 1e-5
+
+typedef struct straight {
+    const nb_medium *medium;
+    const nb_leaf *leaf;
+    nb_wvec3 low, high; /* of a box */
+    nb_wvec3 from_leaf; /* `origin` in the frame of an aligned leaf */
+    nb_wvec3 inverse;   /* of the common direction */
+    nb_wvec3 nearest,
+        farthest; /* bounds relative to `origin`, with their margin; all of them finite, or nothing is left out */
+    int is_box, may_miss;
+    int gray, wants_light;
+    nb_real extinction[3], light[3], radiance[3];
+} straight;
+
+static int is_straight(const nb_trace_job *job)
+{
+    const nebel_snapshot *snapshot = job->snapshot;
+    if (snapshot->medium_count != 1 || job->wants_error) return 0;
+    const nb_medium *medium = &snapshot->media[0];
+    return medium->body.operation == NEBEL_OPERATION_ADD && medium->body.leaf_count == 1 && !medium->emits &&
+           medium->body.density.type == NEBEL_DENSITY_CONSTANT;
+}
+
+static nb_wvec3 reciprocals(nb_wvec3 d)
+{
+    return nb_wvec3(nb_wrcp_bounded(d.x), nb_wrcp_bounded(d.y), nb_wrcp_bounded(d.z));
+}
+
+/* Bounds within which a ray must come near to be asked further. The margin covers the rounding of every crossing:
+ * distances times roundings, more by its shape's proportions in a frame that scales, and by the square root where a ray
+ * grazes. */
+static void set_bounds(straight *way, const stream *s)
+{
+    const nb_volume *body = &way->medium->body;
+    const double *origin = s->rays->origin;
+    double distance = 0, extent = 0;
+    for (int c = 0; c < 3; c++) {
+        distance += fabs(body->low[c] - origin[c]) + fabs(body->high[c] - origin[c]);
+        extent += body->high[c] - body->low[c];
+    }
+    const double proportion = way->leaf->aligned ? 1 : fmax(1, way->leaf->scale * extent);
+    const double margin = SCENE_MARGIN * proportion * distance;
+    way->may_miss = s->has_directions && !s->has_offsets && isfinite(margin);
+    way->nearest = nb_wvec3(WIDE(body->low[0] - origin[0] - margin), WIDE(body->low[1] - origin[1] - margin),
+                            WIDE(body->low[2] - origin[2] - margin));
+    way->farthest = nb_wvec3(WIDE(body->high[0] - origin[0] + margin), WIDE(body->high[1] - origin[1] + margin),
+                             WIDE(body->high[2] - origin[2] + margin));
+}
+
+static void open_straight(straight *way, const nb_trace_job *job, const stream *s)
+{
+    const nb_medium *medium = &job->snapshot->media[0];
+    const double *extinction = medium->body.extinction;
+    way->medium = medium;
+    way->leaf = &medium->body.leaves[0];
+    way->is_box = way->leaf->type == NB_LEAF_BOX && way->leaf->aligned;
+    way->low = wide_vector(way->leaf->low);
+    way->high = wide_vector(way->leaf->high);
+    way->gray = extinction[0] == extinction[1] && extinction[1] == extinction[2];
+    way->wants_light = !job->transmittance_only;
+    const packet common = {s->origin, s->direction, NB_WFAR};
+    way->from_leaf = from_origin(&common, way->leaf);
+    way->inverse = reciprocals(s->direction);
+    for (int c = 0; c < 3; c++) {
+        way->extinction[c] = REAL(extinction[c]);
+        way->light[c] = REAL(medium->light[c]);
+        way->radiance[c] = REAL(medium->radiance[c]);
+    }
+    set_bounds(way, s);
+}
+
+/* Whether a slab lies before the start or beyond the end of ways that go `reach` across it, both times the way's
+ * length. */
+FORCE_INLINE nb_wmask passes_slab(nb_wide reach, nb_wide nearest, nb_wide farthest, nb_wide length)
+{
+    return nb_wor(nb_wmax(reach, NB_W(0.0)) < nearest * length, nb_wmin(reach, NB_W(0.0)) > farthest * length);
+}
+
+FORCE_INLINE int all_miss(const straight *way, const loaded *p, nb_wide length)
+{
+    const nb_wmask x = passes_slab(p->way.x * p->t_max, way->nearest.x, way->farthest.x, length);
+    const nb_wmask y = passes_slab(p->way.y * p->t_max, way->nearest.y, way->farthest.y, length);
+    const nb_wmask z = passes_slab(p->way.z * p->t_max, way->nearest.z, way->farthest.z, length);
+    return nb_wall(nb_wor(nb_wor(x, y), nb_wor(z, p->t_max == NB_W(0.0))));
+}
+
+/* leaf_interval for one caller, so that what computes slack falls away. */
+__attribute__((flatten)) static void cross_leaf(const packet *rays, const nb_volume *body, nb_wide *enter,
+                                                nb_wide *leave)
+{
+    const nb_interval raw = leaf_interval(rays, body, &body->leaves[0]);
+    *enter = raw.enter;
+    *leave = raw.leave;
+}
+
+/* Where the rays are inside, clipped to them; enter >= leave where they are not. */
+FORCE_INLINE void cross_body(const straight *way, const stream *s, const loaded *p, nb_wvec3 direction, nb_wide *enter,
+                             nb_wide *leave)
+{
+    const packet rays = {p->start, direction, p->t_max};
+    if (way->is_box) {
+        const nb_wvec3 from = s->has_offsets ? from_origin(&rays, way->leaf) : way->from_leaf;
+        const nb_wvec3 inverse = s->has_directions ? reciprocals(direction) : way->inverse;
+        const nb_interval raw = nb_interval_box_across(from, inverse, way->low, way->high, NB_W(0.0));
+        *enter = raw.enter;
+        *leave = raw.leave;
+    } else {
+        cross_leaf(&rays, &way->medium->body, enter, leave);
+    }
+    *enter = nb_wmax(*enter, NB_W(0.0));
+    *leave = nb_wmin(*leave, p->t_max);
+}
+
+/* gather_closed, pass_piece and limit_radiance for a first and only piece, of length 0 in lanes outside. */
+FORCE_INLINE void light_piece(const straight *way, nb_real length, nb_real transmittance[3], nb_real radiance[3])
+{
+    nb_real ratio = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        if (c > 0 && way->gray) {
+            transmittance[c] = transmittance[0];
+        } else {
+            const nb_real depth = way->extinction[c] * length;
+            transmittance[c] = nb_exp(-depth);
+            if (way->wants_light) ratio = nb_exp_ratio(depth);
+        }
+        radiance[c] = nb_min(ratio * (way->light[c] * length), way->radiance[c]);
+    }
+}
+
+static void store_clear(const nebel_light_planes *to, size_t first, size_t count)
+{
+    const nb_real none[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, all[3] = {NB_F(1.0), NB_F(1.0), NB_F(1.0)};
+    store_colors(to->transmittance, to->transmittance_stride, first, count, all);
+    store_colors(to->in_scattering, to->in_scattering_stride, first, count, none);
+}
+
+FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way, const stream *s, size_t first,
+                                         size_t count)
+{
+    const nebel_light_planes *to = s->lights;
+    loaded p;
+    const nebel_result valid = load_rays(job, s, first, count, &p);
+    if (valid != NEBEL_OK) return valid;
+    const nb_wide speed = nb_wsqrt(p.square);
+    if (way->may_miss && all_miss(way, &p, speed)) {
+        store_clear(to, first, count);
+        return NEBEL_OK;
+    }
+    nb_wide enter, leave;
+    cross_body(way, s, &p, s->has_directions ? normalized(p.way) : p.way, &enter, &leave);
+    const nb_mask inside = nb_narrow_mask(enter < leave);
+    if (!nb_any(inside)) {
+        store_clear(to, first, count);
+        return NEBEL_OK;
+    }
+    nb_real transmittance[3], radiance[3];
+    light_piece(way, nb_select(inside, nb_narrow(leave - enter), NB_F(0.0)), transmittance, radiance);
+    store_colors(to->transmittance, to->transmittance_stride, first, count, transmittance);
+    store_colors(to->in_scattering, to->in_scattering_stride, first, count, radiance);
+    return NEBEL_OK;
+}
+
+/* ---- all rays ---------------------------------------------------------------------------------------------------- */
+
+static nebel_result trace_planes(nb_trace_job *job, workspace *w, const allowance *may)
+{
+    stream s;
+    open_stream(&s, job);
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < job->count && result == NEBEL_OK; i += NB_WIDTH)
+        result = march_planes(job, w, may, &s, i, packet_size(job, i));
+    return result;
+}
+
+static nebel_result trace_all_straight(nb_trace_job *job)
+{
+    stream s;
+    straight way;
+    open_stream(&s, job);
+    open_straight(&way, job, &s);
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < job->count && result == NEBEL_OK; i += NB_WIDTH)
+        result = trace_straight(job, &way, &s, i, packet_size(job, i));
+    return result;
+}
