@@ -152,6 +152,7 @@ class CallingTest(Case):
         self.assert_misused(nebel("render", self.scene, "-o", "a.exr", "--aov=1"), "--aov", "no value")
         self.assert_misused(nebel("trace"), "it takes one scene file: nebel trace SCENE")
         self.assert_misused(nebel("trace", self.scene, "other.json"), "other.json")
+        self.assert_misused(nebel("render", self.scene, "a.png"), "a.png", "nebel render SCENE -o FILE")
         self.assert_misused(nebel("compare", "a.png"), "two pictures")
 
     def test_numbers_have_a_range(self):

@@ -126,7 +126,7 @@ static void test_comments(void **state)
     (void)state;
     const rule rules[] = {
         {FORMAT, "{\"nebel\": 1, `# one\n \"fog\": []}", "a comment begins with // here, not with #"},
-        {FORMAT, "`# one\n{}", "a comment begins with // here, not with #"},
+        {FORMAT, "`# one\n{}", "found '#'; a scene is an object and begins with {, a comment with //"},
         {FORMAT, FOG("]}\n`# end"), "a comment begins with // here, not with #"},
         {FORMAT, "{\"nebel\": 1, `/ one\n \"fog\": []}", "a comment begins with // or /*; this is one / alone"},
     };
@@ -145,7 +145,8 @@ static void test_what_is_no_scene_at_all(void **state)
         {FORMAT, "`nebel: 1", "found 'n'; a scene is an object and begins with {"},
         {FORMAT, "\n `<scene>", "found '<'; a scene is an object and begins with {"},
         {FORMAT, "`\xEF\xBB\xBF{}", "the file starts with a byte order mark; save it as UTF-8 without one"},
-        {FORMAT, "`\x89PNG\r\n", "the byte 0x89 is not UTF-8 here; a scene is a text, saved as UTF-8"},
+        {FORMAT, "`\x89PNG\r\n", "this is no text; a scene is a JSON text, saved as UTF-8"},
+        {FORMAT, "glTF`\x02", "this is no text; a scene is a JSON text, saved as UTF-8"},
         {FORMAT, FOG("{\"name\": \"d`\xFCnn\"}]}"), "the byte 0xFC is not UTF-8 here"},
         {FORMAT, FOG("{\"name\": \"`\xC0\x80\"}]}"), "the byte 0xC0 is not UTF-8 here"},
         {FORMAT, FOG("{\"name\": \"`\xED\xA0\x80\"}]}"), "the byte 0xED is not UTF-8 here"},

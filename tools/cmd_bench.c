@@ -83,7 +83,7 @@ static int run(int count, char **words)
     nb_bench_desc desc = {.quick = arguments.values[OPTION_QUICK] != NULL, .program = find_program(path, sizeof path)};
     if (arguments.values[OPTION_GROUP] != NULL) {
         const int group = nb_options_choice(&arguments, OPTION_GROUP, nb_bench_groups, 0);
-        if (arguments.misused) return NB_MISUSED;
+        if (arguments.misused) return nb_report_misuse("bench", "bench: nothing was done");
         desc.group = nb_bench_groups[group];
     }
     return bench(&desc, arguments.values[OPTION_JSON]);

@@ -146,8 +146,8 @@ static int take_operand(nb_arguments *arguments, const char *word)
 {
     const nb_command *const command = arguments->command;
     if (arguments->operand_count == command->most_operands) {
-        return nb_report_misuse(command->name, "%s: '%s' is one too many; it takes %s", command->name, word,
-                                command->operands);
+        return nb_report_misuse(command->name, "%s: '%s' is one too many; it takes %s: nebel %s %s", command->name,
+                                word, command->operands, command->name, command->synopsis);
     }
     arguments->operands[arguments->operand_count++] = word;
     return -1;

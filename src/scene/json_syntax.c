@@ -251,7 +251,10 @@ static void explain_character(const spot *wrong, const char *wanted)
 
 static void explain_scene(const spot *wrong)
 {
-    explain_character(wrong, "a scene is an object and begins with {");
+    if (wrong->text[wrong->at] == '#')
+        FAIL(wrong, wrong->at, "found '#'; a scene is an object and begins with {, a comment with //");
+    else
+        explain_character(wrong, "a scene is an object and begins with {");
 }
 
 static void explain_rest(const spot *wrong)
@@ -451,10 +454,13 @@ bool nb_json_check_text(nb_json *json)
         return fail_text(json, 0, "the file starts with a byte order mark; save it as UTF-8 without one");
     if (is_utf16(byte, size)) return fail_text(json, 0, "the file is UTF-16; save it as UTF-8");
     if (!nb_text_is_clean(json->desc.text, size, &offset)) {
+        const size_t start = nb_json_skip_blanks(json, 0, NULL);
+        if (start >= size || byte[start] != '{')
+            return fail_text(json, offset, "this is no text; a scene is a JSON text, saved as UTF-8");
         const bool control = byte[offset] < 0x20 || byte[offset] == 0x7F;
         return nb_json_fail_at(json, NEBEL_ERROR_FORMAT, offset, "",
                                control ? "the control character 0x%02X is not possible in JSON; remove it"
-                                       : "the byte 0x%02X is not UTF-8 here; a scene is a text, saved as UTF-8",
+                                       : "the byte 0x%02X is not UTF-8 here; save the file as UTF-8",
                                byte[offset]);
     }
     size_t comment = 0;
