@@ -51,6 +51,7 @@ lint: all
 	@python3 scripts/check_includes.py
 	@python3 scripts/check_style.py
 	@scripts/check_formulas.sh
+	@scripts/check_shaders.sh
 	@scripts/check_symbols.sh $(BUILD)
 
 format:

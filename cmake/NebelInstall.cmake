@@ -35,13 +35,15 @@ function(nebel_write_pkgconfig name description requires private_requires privat
     install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()
 
-function(nebel_install_library name header)
+function(nebel_install_library name)
     install(TARGETS ${name} EXPORT ${name}_targets)
-    install(FILES ${PROJECT_SOURCE_DIR}/include/nebel/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/nebel)
+    foreach(header IN LISTS ARGN)
+        install(FILES ${PROJECT_SOURCE_DIR}/include/nebel/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/nebel)
+    endforeach()
     install(EXPORT ${name}_targets NAMESPACE nebel:: DESTINATION ${nebel_package_dir})
 endfunction()
 
-nebel_install_library(nebel nebel.h)
+nebel_install_library(nebel nebel.h shader.h)
 nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
     nebel_install_library(nebel_scene scene.h)

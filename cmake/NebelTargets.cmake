@@ -57,8 +57,21 @@ function(nebel_add_library name sources extra_objects)
     endif()
 endfunction()
 
+# The texts of src/shader as a C file; see NebelShaderText.cmake.
+function(nebel_add_shader_text result)
+    set(script ${PROJECT_SOURCE_DIR}/cmake/NebelShaderText.cmake)
+    set(output ${PROJECT_BINARY_DIR}/shader_text.c)
+    nebel_glob(parts ${PROJECT_SOURCE_DIR}/src/formulas/* ${PROJECT_SOURCE_DIR}/src/shader/*.glsl)
+    add_custom_command(OUTPUT ${output}
+        COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUTPUT=${output} -P ${script}
+        DEPENDS ${script} ${parts} ${PROJECT_SOURCE_DIR}/src/shader/layout.h VERBATIM)
+    set(${result} ${output} PARENT_SCOPE)
+endfunction()
+
 function(nebel_add_core)
     nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c)
+    nebel_add_shader_text(text)
+    list(APPEND sources ${text})
     nebel_add_kernels(kernel_objects definitions)
     list(REMOVE_ITEM sources ${nebel_kernel_files})
     nebel_add_library(nebel "${sources}" "${kernel_objects}")

@@ -53,14 +53,18 @@ try_c() {
     done
 }
 
+# try_glsl VERSION PRELUDE...
 try_glsl() {
+    local version=$1
+    shift
     {
-        cat "$formulas/$1" "$formulas/prelude_glsl.glsl"
+        echo "#version $version"
+        for file in "$@" prelude_glsl.glsl prelude_shader.glsl; do cat "$formulas/$file"; done
         for file in "${order[@]}"; do cat "$formulas/$file"; done
         echo "out vec4 color;"
         echo "void main() { color = vec4(0.0); }"
     } >"$work/formulas.frag"
-    verdict "GLSL, $1" glslangValidator -S frag "$work/formulas.frag"
+    verdict "GLSL $version" glslangValidator -S frag "$work/formulas.frag"
 }
 
 for compiler in gcc clang; do
@@ -73,8 +77,8 @@ for compiler in gcc clang; do
     fi
 done
 try_c aarch64-linux-gnu-gcc neon -DNB_ISA_NEON=1
-try_glsl prelude_330.glsl
-try_glsl prelude_300es.glsl
+try_glsl "330 core"
+try_glsl "300 es" prelude_300es.glsl
 
 echo "check_formulas: ${#order[@]} files, $passed targets passed, $failed failed"
 [ "$failed" -eq 0 ]

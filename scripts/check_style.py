@@ -19,7 +19,7 @@ LONG_SHARE = 0.02
 LONGEST_LINES = 120
 FILE_LINES = 800
 
-CODE = {".c", ".h", ".inc", ".cpp", ".glsl"}
+CODE = {".c", ".h", ".inc", ".cpp", ".glsl", ".hlsl"}
 TEXT = CODE | {".py", ".sh", ".cmake", ".md", ".json", ".txt", ".in", ".map"}
 
 # Reserved names that belong to the compiler, the C library or an interface we call.
@@ -124,7 +124,7 @@ def check_code(path, text, lengths):
         yield 0, f"{lines} lines, {FILE_LINES} are allowed"
     if path.parent.name == "tests" and path.name.startswith("test_"):
         yield from check_tests(path, code)
-    if path.suffix == ".glsl":
+    if path.suffix in (".glsl", ".hlsl"):
         return
     functions = functions_of(code)
     if functions is None:

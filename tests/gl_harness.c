@@ -124,8 +124,9 @@ static void append_file(nb_gl *gl, source *s, const char *name)
 static void append_formulas(nb_gl *gl, source *s)
 {
     source order = {calloc(1, 1), 0};
-    append_file(gl, s, gl->language == NB_GL_330 ? "prelude_330.glsl" : "prelude_300es.glsl");
+    if (gl->language == NB_GL_300ES) append_file(gl, s, "prelude_300es.glsl");
     append_file(gl, s, "prelude_glsl.glsl");
+    append_file(gl, s, "prelude_shader.glsl");
     append_file(gl, &order, "ORDER");
     for (char *name = order.text ? strtok(order.text, "\n") : NULL; name; name = strtok(NULL, "\n"))
         if (*name != '#') append_file(gl, s, name);
@@ -199,27 +200,42 @@ static unsigned link_shaders(nb_gl *gl, const char *vertex_text)
     return program;
 }
 
+/* Takes what `s` holds as the functions; frees it. */
+static unsigned compile_source(nb_gl *gl, source functions, const char *body, unsigned inputs, unsigned outputs)
+{
+    source s = {calloc(1, 1), 0};
+    if (inputs > MOST_VECTORS || outputs > MOST_VECTORS) fault(gl, "more than %d inputs or outputs", (int)MOST_VECTORS);
+    const int fits = inputs <= MOST_VECTORS && outputs <= MOST_VECTORS;
+    gl->program_inputs = inputs;
+    gl->program_outputs = outputs;
+    append_text(&s, gl->language == NB_GL_330 ? "#version 330 core\n" : "#version 300 es\n");
+    append_text(&s, functions.text ? functions.text : "");
+    append_variables(&s, "in", inputs);
+    append_variables(&s, "out", outputs);
+    append_text(&s, "\nvoid main()\n{\ngl_Position = vec4(0.0);\n");
+    append_text(&s, body);
+    append_text(&s, "\n}\n");
+    const unsigned program = s.text && functions.text && fits ? link_shaders(gl, s.text) : 0;
+    free(s.text);
+    free(functions.text);
+    return program;
+}
+
 unsigned nb_gl_compile(nb_gl *gl, const char *functions, const char *body, unsigned inputs, unsigned outputs)
 {
     source s = {calloc(1, 1), 0};
     fault(gl, "out of memory");
-    if (inputs > MOST_VECTORS || outputs > MOST_VECTORS) {
-        fault(gl, "more than %d inputs or outputs", (int)MOST_VECTORS);
-        free(s.text);
-        return 0;
-    }
-    gl->program_inputs = inputs;
-    gl->program_outputs = outputs;
     append_formulas(gl, &s);
-    append_variables(&s, "in", inputs);
-    append_variables(&s, "out", outputs);
     append_text(&s, functions);
-    append_text(&s, "\nvoid main()\n{\ngl_Position = vec4(0.0);\n");
-    append_text(&s, body);
-    append_text(&s, "\n}\n");
-    const unsigned program = s.text ? link_shaders(gl, s.text) : 0;
-    free(s.text);
-    return program;
+    return compile_source(gl, s, body, inputs, outputs);
+}
+
+unsigned nb_gl_compile_texts(nb_gl *gl, const char *const *texts, const char *body, unsigned inputs, unsigned outputs)
+{
+    source s = {calloc(1, 1), 0};
+    fault(gl, "out of memory");
+    for (; *texts; ++texts) append_text(&s, *texts);
+    return compile_source(gl, s, body, inputs, outputs);
 }
 
 /* ---- evaluation -------------------------------------------------------------------------------------------------- */

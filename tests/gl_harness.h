@@ -32,6 +32,9 @@ void nb_gl_close(nb_gl *gl);
  * writes vec4 out0, out1, ... (at most 16). 0 on failure. */
 unsigned nb_gl_compile(nb_gl *gl, const char *functions, const char *body, unsigned inputs, unsigned outputs);
 
+/* The same behind the given texts, which end with NULL, instead of the formulas; they see no in0, out0 .... */
+unsigned nb_gl_compile_texts(nb_gl *gl, const char *const *texts, const char *body, unsigned inputs, unsigned outputs);
+
 /* Runs the program last compiled over `count` items of 4 * inputs floats into items of 4 * outputs floats. 0 on
  * failure. */
 int nb_gl_evaluate(nb_gl *gl, unsigned program, size_t count, const float *inputs, float *outputs);

@@ -169,32 +169,15 @@ enum { PERSPECTIVE = 0, ORTHOGRAPHIC = 5, OBLIQUE = 6 };
 /* ---- evaluation ----------------------------------------------------------------------------------------------------
  */
 
-static char *read_text(const char *name)
-{
-    char path[4096];
-    snprintf(path, sizeof path, "%s/%s", NEBEL_SOURCE, name);
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    char *const text = calloc(1, 1 << 16);
-    assert_non_null(text);
-    const size_t size = fread(text, 1, (1 << 16) - 1, file);
-    assert_true(size > 0 && size < (1 << 16) - 1);
-    fclose(file);
-    return text;
-}
-
 static unsigned compile(nb_gl *gl)
 {
-    char *const body = read_text("src/shader/view.glsl");
-    char *const functions = malloc(strlen(body) + 64);
-    assert_non_null(functions);
-    sprintf(functions, "#define NEBEL_VIEW\n%s", body);
-    const unsigned program = nb_gl_compile(gl, functions,
-                                           "nebel_sight s = nebel_see(in0.xy, in0.z);\n"
-                                           "out0 = vec4(s.origin, s.t_max); out1 = vec4(s.direction, 0.0);\n",
-                                           1, 2);
-    free(functions);
-    free(body);
+    const int es = gl->language == NB_GL_300ES;
+    const char *const texts[] = {
+        "#define NEBEL_VIEW\n", nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), NULL};
+    const unsigned program = nb_gl_compile_texts(gl, texts,
+                                                 "nebel_sight s = nebel_see(in0.xy, in0.z);\n"
+                                                 "out0 = vec4(s.origin, s.t_max); out1 = vec4(s.direction, 0.0);\n",
+                                                 1, 2);
     if (program == 0) fail_msg("%s", gl->fault);
     return program;
 }

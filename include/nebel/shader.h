@@ -39,8 +39,12 @@
  *
  * with NEBEL_TEXTURE defined before it `uniform highp sampler2D nebel_fog_texture;`, rows of NEBEL_TEXTURE_WIDTH texels RGBA32F;
  * a host that defines NEBEL_WORD itself gets neither. The Vulkan and HLSL texts declare nothing: define NEBEL_WORD before them.
- * NEBEL_INDEX(i), an int, is only needed by the _list functions; NEBEL_TILES makes GLSL declare
- * `uniform highp usampler2D nebel_tile_texture;`, rows of NEBEL_TEXTURE_WIDTH texels R32UI.
+ * NEBEL_INDEX(i), an int, is only needed by the _list functions, which are there when it is defined; NEBEL_TILES makes GLSL define
+ * it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be
+ * defined as what nebel_pack_features says. The GLSL ES text makes highp the default precision.
+ *
+ * A direction of no length, a t_max that is not above 0, or a NaN in either gives transmittance 1 and no light. In-scattering is
+ * at most NEBEL_MOST_LIGHT, 65504 (the largest half) unless it was defined before: so emission without end stays a number.
  */
 #ifndef NEBEL_SHADER_H
 #define NEBEL_SHADER_H
@@ -76,6 +80,11 @@ typedef struct nebel_word {
  * 2^24 words would be needed. */
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
                             size_t *count);
+
+/* What the fog has, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not name, and a
+ * driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong answers; masks of
+ * several snapshots may be joined with |. NULL gives everything. O(volumes and their parts). Any thread. */
+uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 
 /* ---- views ---------------------------------------------------------------------------------------------------------- */
 

@@ -1,5 +1,4 @@
-#version 300 es
-/* GLSL ES 3.00: followed by prelude_glsl.glsl. Nothing has a useful default precision there. */
+/* GLSL ES 3.00: behind #version 300 es, before prelude_glsl.glsl. Nothing has a useful default precision there. */
 precision highp float;
 precision highp int;
 precision highp sampler2D;

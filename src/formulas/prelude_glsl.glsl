@@ -1,65 +1,8 @@
-/* The vocabulary of the formula files in GLSL: one float, the same float as wide. See prelude.h.
- *
- * GLSL promises no infinity, no NaN and no exact -0; nb_min and nb_max are written out so that at least they choose
- * as in C where a machine does have them. */
-#define NB_FUNCTION
-#define NB_STRUCT(name) struct name {
-#define NB_STRUCT_END(name) };
-#define NB_F(x) (x)
-#define NB_W(x) (x)
-#define NB_EPSILON 5.9604644775390625e-8
-#define NB_WEPSILON NB_EPSILON
-
-#define nb_real float
-#define nb_wide float
-#define nb_mask bool
-#define nb_wmask bool
+/* Names of GLSL 3.30, GLSL ES 3.00 and GLSL 4.50. prelude_shader.glsl follows. */
+#define NB_GLOBAL
+#define nb_vec2 vec2
 #define nb_vec3 vec3
-#define nb_wvec3 vec3
-
-#define nb_mask_true true
-#define nb_mask_false false
-#define nb_wmask_true true
-#define nb_wmask_false false
-
-bool nb_and(bool m, bool n) { return m && n; }
-bool nb_or(bool m, bool n) { return m || n; }
-bool nb_xor(bool m, bool n) { return m != n; }
-bool nb_not(bool m) { return !m; }
-float nb_select(bool m, float a, float b) { return m ? a : b; }
-float nb_min(float a, float b) { return a < b ? a : b; }
-float nb_max(float a, float b) { return a > b ? a : b; }
-float nb_abs(float x) { return abs(x); }
-float nb_sqrt(float x) { return sqrt(x); }
-float nb_floor(float x) { return floor(x); }
-float nb_round(float x) { return roundEven(x); }
-
-#define nb_wand nb_and
-#define nb_wor nb_or
-#define nb_wxor nb_xor
-#define nb_wnot nb_not
-#define nb_wselect nb_select
-#define nb_wmin nb_min
-#define nb_wmax nb_max
-#define nb_wabs nb_abs
-#define nb_wsqrt nb_sqrt
-#define nb_wcopy_sign nb_copy_sign
-#define nb_widen(x) (x)
-#define nb_narrow(x) (x)
-#define nb_widen_mask(m) (m)
-#define nb_narrow_mask(m) (m)
-
-/* The functions of prelude_common.h; 0x3f3504f3 is sqrt(1/2), 0x3f800000 is 1. */
-float nb_copy_sign(float magnitude, float sign)
-{
-    return intBitsToFloat((floatBitsToInt(magnitude) & 0x7fffffff) | (floatBitsToInt(sign) & int(0x80000000u)));
-}
-
-float nb_truncate_half(float x) { return intBitsToFloat(floatBitsToInt(x) & ~0xfff); }
-float nb_scale_pow2(float x, float n) { return x * intBitsToFloat((int(n) + 127) << 23); }
-float nb_exponent(float x) { return float(((floatBitsToInt(x) + (0x3f800000 - 0x3f3504f3)) >> 23) - 127); }
-
-float nb_significand(float x)
-{
-    return intBitsToFloat(((floatBitsToInt(x) + (0x3f800000 - 0x3f3504f3)) & 0x7fffff) + 0x3f3504f3);
-}
+#define nb_vec4 vec4
+#define nb_to_bits floatBitsToInt
+#define nb_from_bits intBitsToFloat
+#define nb_round_even roundEven

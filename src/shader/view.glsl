@@ -1,11 +1,6 @@
 /* Rays of pixels and lengths of depths, from the words of nebel_view_rays; see src/shader/view.c for what they are.
  * Part of the shader text where NEBEL_VIEW is defined. */
 #ifdef NEBEL_VIEW
-#ifndef NEBEL_RAY
-uniform vec4 nebel_rays[10];
-#define NEBEL_RAY(i) nebel_rays[i]
-#endif
-
 struct nebel_sight {
     nb_vec3 origin;
     nb_vec3 direction;
@@ -13,13 +8,13 @@ struct nebel_sight {
 };
 
 /* A word is linear in the pixel: its xyz at (0, 0), and its growth in x and y in the two words behind it. */
-nb_vec3 nb_view_vector(int i, vec2 pixel)
+nb_vec3 nb_view_vector(int i, nb_vec2 pixel)
 {
     return NEBEL_RAY(i).xyz + pixel.x * NEBEL_RAY(i + 1).xyz + pixel.y * NEBEL_RAY(i + 2).xyz;
 }
 
 /* The same for one number: at (0, 0), growth in x, growth in y. */
-float nb_view_number(int i, vec2 pixel)
+float nb_view_number(int i, nb_vec2 pixel)
 {
     return NEBEL_RAY(i).x + pixel.x * NEBEL_RAY(i).y + pixel.y * NEBEL_RAY(i).z;
 }
@@ -40,7 +35,7 @@ bool nb_view_is_sky(float kind, float depth)
 }
 
 /* How far, in steps of the ray's own length, before division by that of a distance. */
-float nb_view_steps(float kind, float depth, vec2 pixel)
+float nb_view_steps(float kind, float depth, nb_vec2 pixel)
 {
     float above = nb_view_number(6, pixel);
     float below = nb_view_number(7, pixel);
@@ -50,7 +45,7 @@ float nb_view_steps(float kind, float depth, vec2 pixel)
     return nb_view_divide(above + value * NEBEL_RAY(6).w, below + value * NEBEL_RAY(7).w, 1e18);
 }
 
-nebel_sight nebel_see(vec2 pixel, float depth)
+nebel_sight nebel_see(nb_vec2 pixel, float depth)
 {
     nebel_sight sight;
     float kind = NEBEL_RAY(0).w;

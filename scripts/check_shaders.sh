@@ -1,0 +1,91 @@
+#!/bin/bash
+# Compiles the shader texts as a host would include them: OpenGL's dialects with every source of words, Vulkan's and HLSL's
+# with declarations of their own.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+passed=0
+failed=0
+
+# verdict NAME COMMAND...: a warning is a failure.
+verdict() {
+    local name=$1
+    shift
+    if "$@" >"$work/output" 2>&1 && ! grep -q '^WARNING' "$work/output"; then
+        passed=$((passed + 1))
+    else
+        failed=$((failed + 1))
+        echo "check_shaders: $name:"
+        head -40 "$work/output"
+    fi
+}
+
+text() {
+    cmake -DSOURCE="$PWD" -DDIALECT="$1" -DOUTPUT="$work/text" -P cmake/NebelShaderText.cmake
+    cat "$work/text"
+}
+
+calls='
+    nebel_sight sight = nebel_see(place.xy, place.z);
+    nebel_light light = nebel_trace(sight.origin, sight.direction, sight.t_max);
+    nebel_light listed = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
+    light.transmittance *= nebel_transmit(sight.origin, sight.direction, 2.0);
+    light.transmittance *= nebel_transmit_list(sight.origin, sight.direction, 3.0, 0, 1);
+    light.in_scattering += listed.transmittance * listed.in_scattering;'
+
+# try_opengl DIALECT VERSION DEFINES
+try_opengl() {
+    {
+        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n%b' "$2" "$3"
+        text "$1"
+        printf 'in highp vec3 place; out highp vec4 color;\nvoid main()\n{%s\n' "$calls"
+        printf '    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n'
+    } >"$work/fog.frag"
+    verdict "$1 $3" glslangValidator "$work/fog.frag"
+}
+
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+    try_opengl glsl_330 "330 core" "$defines"
+done
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n"; do
+    try_opengl glsl_300_es "300 es" "$defines"
+done
+
+{
+    cat <<'GLSL'
+#version 450
+layout(std140, binding = 0) uniform fog { vec4 words[1024]; };
+layout(std430, binding = 1) readonly buffer tiles { uint entries[]; };
+layout(std140, binding = 2) uniform view { vec4 rays[10]; };
+layout(location = 0) in vec3 place;
+layout(location = 0) out vec4 color;
+#define NEBEL_VIEW
+#define NEBEL_WORD(i) words[i]
+#define NEBEL_INDEX(i) int(entries[i])
+#define NEBEL_RAY(i) rays[i]
+GLSL
+    text glsl_450
+    printf 'void main()\n{%s\n    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n' "$calls"
+} >"$work/fog.frag"
+verdict glsl_450 glslangValidator -V "$work/fog.frag" -o "$work/fog.spv"
+
+{
+    cat <<'HLSL'
+cbuffer fog { float4 words[1024]; };
+cbuffer view { float4 rays[10]; };
+StructuredBuffer<uint> entries;
+#define NEBEL_VIEW
+#define NEBEL_WORD(i) words[i]
+#define NEBEL_INDEX(i) int(entries[i])
+#define NEBEL_RAY(i) rays[i]
+HLSL
+    text hlsl
+    printf 'float4 main(float3 place : TEXCOORD0) : SV_Target\n{%s\n' "$calls"
+    printf '    return float4(light.transmittance + light.in_scattering, 1.0);\n}\n'
+} >"$work/fog.hlsl"
+verdict hlsl glslangValidator -D -S frag -e main -V "$work/fog.hlsl" -o "$work/fog.spv"
+
+echo "check_shaders: $passed texts passed, $failed failed"
+[ "$failed" -eq 0 ]

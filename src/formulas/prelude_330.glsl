@@ -1,2 +1,0 @@
-#version 330 core
-/* GLSL 3.30: followed by prelude_glsl.glsl. */

@@ -1,0 +1,67 @@
+/* What the words of packed fog mean. pack.c writes them, fog.glsl reads them: this text is compiled as C, GLSL and HLSL.
+ * A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the bits of small numbers.
+ * Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
+ *
+ * Word 0: media, what one step of an integral without a closed form may be off by, 0, 0.
+ *
+ * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
+ *     0  extinction, density kind
+ *     1  light per metre at density 1 (radiance times extinction, plus emission), 1 where there is emission
+ *     2  radiance of opaque fog, leaves
+ *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye, 1 / (sqrt(2) sigma);
+ *        soft edge: 1 / distance
+ *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high, 0
+ *
+ * A leaf, NB_LEAF_WORDS words:
+ *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
+ *     1  the eye in the leaf's frame; box: low
+ *     2  box: high
+ *     3  the matrix, row by row; where the type says that it is turned
+ * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where both must
+ * hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule; number of faces and
+ * first face's word of planes. A face is one word: normal and distance, which are the world's. */
+#ifndef NB_SHADER_LAYOUT_H
+#define NB_SHADER_LAYOUT_H
+
+#define NB_HEADER_WORDS 1
+#define NB_MEDIUM_WORDS 10
+#define NB_MEDIUM_LEAF 4
+#define NB_LEAF_WORDS 6
+
+#define NB_KIND_CONSTANT 0
+#define NB_KIND_HEIGHT 1        /* grows below the base */
+#define NB_KIND_HEIGHT_CAPPED 2 /* 1 below the base */
+#define NB_KIND_LINEAR 3
+#define NB_KIND_GAUSSIAN 4
+#define NB_KIND_SOFT_EDGE 5
+#define NB_KIND_RADIAL 6 /* plus power - 1, 0 to 2 */
+#define NB_KIND_EXCLUDE 9
+
+#define NB_TYPE_WORLD 0
+#define NB_TYPE_PLANES 1
+#define NB_TYPE_BOX 2
+#define NB_TYPE_BALL 3
+#define NB_TYPE_TUBE 4
+#define NB_TYPE_CONE 5
+#define NB_TYPE_CAPSULE 6
+#define NB_TYPE_TURNED 8
+
+/* What fog may have: the bits of NEBEL_FEATURES. */
+#define NB_HAS_PLANES 1
+#define NB_HAS_BOX 2
+#define NB_HAS_BALL 4
+#define NB_HAS_TUBE 8
+#define NB_HAS_CONE 16
+#define NB_HAS_CAPSULE 32
+#define NB_HAS_TURNED 64
+#define NB_HAS_GROUP 128   /* a body of several leaves */
+#define NB_HAS_EXCLUDE 256
+#define NB_HAS_MIXED 512   /* two media of different light, or one of two that shines */
+#define NB_HAS_SLOPE 1024  /* height, linear */
+#define NB_HAS_GAUSSIAN 2048
+#define NB_HAS_SOFT_EDGE 4096
+#define NB_HAS_RADIAL 8192
+#define NB_HAS_ALL 16383
+#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT_EDGE | NB_HAS_RADIAL)
+
+#endif

@@ -1,0 +1,324 @@
+/* Fog as words: every place is brought to the eye in long double before it becomes float. */
+#include "layout.h"
+
+#include "march/snapshot.h"
+
+#include <nebel/shader.h>
+
+#include <math.h>
+#include <string.h>
+
+#define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
+
+/* Beyond this a float's square is none. */
+#define FARTHEST 1e18L
+
+/* What one step of an integral may be off by, relative to the brightest source: a hundred of them stay below a grey
+ * level. */
+#define STEP_TOLERANCE 3e-5
+
+typedef struct packer {
+    nebel_word *words;
+    size_t used; /* words behind those of the media that are taken */
+    long double eye[3];
+} packer;
+
+static float narrow(long double x)
+{
+    return (float)fminl(fmaxl(x, -FARTHEST), FARTHEST);
+}
+
+static void set_word(nebel_word *word, const long double v[3], double last)
+{
+    for (int i = 0; i < 3; i++) word->v[i] = narrow(v[i]);
+    word->v[3] = (float)last;
+}
+
+static void set_color(nebel_word *word, const double v[3], double last)
+{
+    for (int i = 0; i < 3; i++) word->v[i] = (float)v[i];
+    word->v[3] = (float)last;
+}
+
+/* ---- leaves
+ * ------------------------------------------------------------------------------------------------------------ */
+
+static int type_of(const nb_leaf *leaf)
+{
+    switch (leaf->type) {
+    case NB_LEAF_PLANES:
+        return NB_TYPE_PLANES;
+    case NB_LEAF_BOX:
+        return NB_TYPE_BOX;
+    case NB_LEAF_BALL:
+        return NB_TYPE_BALL;
+    case NB_LEAF_TUBE:
+        return NB_TYPE_TUBE;
+    case NB_LEAF_CONE:
+        return NB_TYPE_CONE;
+    case NB_LEAF_CAPSULE:
+        return NB_TYPE_CAPSULE;
+    default:
+        return NB_TYPE_WORLD;
+    }
+}
+
+static void apply(const long double matrix[9], const long double v[3], long double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = matrix[3 * i] * v[0] + matrix[3 * i + 1] * v[1] + matrix[3 * i + 2] * v[2];
+}
+
+static void way_to_eye(const packer *p, const nb_leaf *leaf, long double way[3])
+{
+    for (int i = 0; i < 3; i++) way[i] = (p->eye[i] - leaf->exact_origin[i]) - leaf->exact_rest[i];
+}
+
+/* In the world's axes around the eye; the power of two keeps the largest component near 1 and changes no digit. */
+static void pack_face(const nb_leaf *leaf, const nb_face *face, const long double way[3], nebel_word *word)
+{
+    long double normal[3], largest = 0, distance = (long double)face->distance;
+    for (int i = 0; i < 3; i++) {
+        normal[i] = 0;
+        for (int j = 0; j < 3; j++) normal[i] += leaf->exact_matrix[3 * j + i] * (long double)face->normal[j];
+        distance -= normal[i] * way[i];
+        largest = fmaxl(largest, fabsl(normal[i]));
+    }
+    int exponent;
+    frexpl(largest, &exponent);
+    for (int i = 0; i < 3; i++) word->v[i] = (float)ldexpl(normal[i], -exponent);
+    word->v[3] = narrow(ldexpl(distance, -exponent));
+}
+
+static void pack_faces(packer *p, const nb_volume *body, const nb_leaf *leaf, nebel_word *word)
+{
+    long double way[3];
+    way_to_eye(p, leaf, way);
+    word->v[1] = (float)leaf->face_count;
+    word->v[2] = (float)p->used;
+    for (size_t i = 0; i < leaf->face_count; i++)
+        pack_face(leaf, &body->faces[leaf->first_face + i], way, &p->words[p->used++]);
+}
+
+static void pack_frame(const packer *p, const nb_leaf *leaf, nebel_word *word)
+{
+    long double way[3], place[3], low[3], high[3];
+    way_to_eye(p, leaf, way);
+    apply(leaf->exact_matrix, way, place);
+    for (int i = 0; i < 3; i++) {
+        low[i] = (long double)leaf->low[i] - place[i];
+        high[i] = (long double)leaf->high[i] - place[i];
+    }
+    const int box = leaf->type == NB_LEAF_BOX;
+    set_word(&word[1], box ? low : place, 0);
+    if (box) set_word(&word[2], high, 0);
+    for (int i = 0; i < 3; i++) set_word(&word[3 + i], &leaf->exact_matrix[3 * i], 0);
+}
+
+static void pack_leaf(packer *p, const nb_volume *body, const nb_leaf *leaf, unsigned folds, nebel_word *word)
+{
+    memset(word, 0, NB_LEAF_WORDS * sizeof *word);
+    const int framed = leaf->type != NB_LEAF_WORLD && leaf->type != NB_LEAF_PLANES;
+    word->v[0] = (float)(type_of(leaf) + (framed && !leaf->aligned ? NB_TYPE_TURNED : 0));
+    word->v[1] = (float)(leaf->type == NB_LEAF_CAPSULE ? leaf->length : leaf->radius);
+    word->v[2] = (float)leaf->slope;
+    word->v[3] = (float)folds;
+    if (leaf->type == NB_LEAF_PLANES) pack_faces(p, body, leaf, word);
+    if (framed) pack_frame(p, leaf, word);
+}
+
+/* The steps of the program behind a leaf, up to the next one: see layout.h. */
+static unsigned folds_behind(const nb_volume *body, size_t *step)
+{
+    unsigned folds = 0, above = 1;
+    for (; *step < body->step_count && body->steps[*step] != NB_STEP_LEAF; ++*step, above <<= 1)
+        if (body->steps[*step] == NB_STEP_ALL) folds |= above;
+    return folds | above;
+}
+
+static void pack_group(packer *p, const nb_volume *body, nebel_word *word)
+{
+    long double low[3], high[3];
+    for (int i = 0; i < 3; i++) {
+        const long double margin =
+            1e-6L * (fabsl((long double)body->low[i] - p->eye[i]) + fabsl((long double)body->high[i] - p->eye[i]));
+        low[i] = (long double)body->low[i] - p->eye[i] - (isfinite(margin) ? margin : 0);
+        high[i] = (long double)body->high[i] - p->eye[i] + (isfinite(margin) ? margin : 0);
+    }
+    memset(word, 0, NB_LEAF_WORDS * sizeof *word);
+    nebel_word *leaves = &p->words[p->used];
+    set_word(&word[0], low, (double)p->used);
+    set_word(&word[1], high, 0);
+    p->used += body->leaf_count * NB_LEAF_WORDS;
+    size_t step = 1;
+    for (size_t i = 0; i < body->leaf_count; i++, step++)
+        pack_leaf(p, body, &body->leaves[i], folds_behind(body, &step), &leaves[i * NB_LEAF_WORDS]);
+}
+
+/* ---- profiles
+ * ---------------------------------------------------------------------------------------------------------- */
+
+static int kind_of(const nb_volume *body)
+{
+    if (body->operation == NEBEL_OPERATION_EXCLUDE) return NB_KIND_EXCLUDE;
+    switch (body->density.type) {
+    case NEBEL_DENSITY_HEIGHT:
+        return body->density.below == NEBEL_BELOW_GROW ? NB_KIND_HEIGHT : NB_KIND_HEIGHT_CAPPED;
+    case NEBEL_DENSITY_LINEAR:
+        return NB_KIND_LINEAR;
+    case NEBEL_DENSITY_GAUSSIAN:
+        return NB_KIND_GAUSSIAN;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return NB_KIND_SOFT_EDGE;
+    case NEBEL_DENSITY_RADIAL:
+        return NB_KIND_RADIAL + body->density.power - 1;
+    default:
+        return NB_KIND_CONSTANT;
+    }
+}
+
+/* gradient . x + value = 0 at `from`, 1 at `to` */
+static void pack_linear(const packer *p, const nebel_density *density, nebel_word *word)
+{
+    long double axis[3], square = 0, value = 0;
+    for (int i = 0; i < 3; i++) {
+        axis[i] = (long double)density->to[i] - (long double)density->from[i];
+        square += axis[i] * axis[i];
+        value += axis[i] * (p->eye[i] - (long double)density->from[i]);
+    }
+    for (int i = 0; i < 3; i++) word->v[i] = narrow(axis[i] / square);
+    word->v[3] = narrow(value / square);
+}
+
+static void pack_density(const packer *p, const nb_volume *body, nebel_word *word)
+{
+    const nebel_density *density = &body->density;
+    const long double height = density->type == NEBEL_DENSITY_HEIGHT ? (long double)density->scale_height : 1;
+    memset(word, 0, sizeof *word);
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+        word->v[1] = narrow(1 / height);
+        word->v[3] = narrow((p->eye[1] - (long double)density->base) / height);
+        break;
+    case NEBEL_DENSITY_LINEAR:
+        pack_linear(p, density, word);
+        break;
+    case NEBEL_DENSITY_GAUSSIAN:
+        for (int i = 0; i < 3; i++) word->v[i] = narrow(p->eye[i] - (long double)density->center[i]);
+        word->v[3] = narrow(0.70710678118654752440L / (long double)density->sigma);
+        break;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        word->v[3] = narrow(1 / (long double)density->distance);
+        break;
+    default:
+        break;
+    }
+}
+
+/* ---- fog
+ * --------------------------------------------------------------------------------------------------------------- */
+
+static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
+{
+    const nb_volume *body = &medium->body;
+    set_color(&word[0], body->extinction, kind_of(body));
+    set_color(&word[1], medium->light, medium->emits);
+    set_color(&word[2], medium->radiance, (double)body->leaf_count);
+    pack_density(p, body, &word[3]);
+    if (body->leaf_count > 1)
+        pack_group(p, body, &word[NB_MEDIUM_LEAF]);
+    else
+        pack_leaf(p, body, &body->leaves[0], 1, &word[NB_MEDIUM_LEAF]);
+}
+
+static size_t count_words(const nebel_snapshot *snapshot)
+{
+    size_t count = NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *body = &snapshot->media[i].body;
+        count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_WORDS : 0);
+    }
+    return count;
+}
+
+nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
+                            size_t *count)
+{
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (eye == NULL || count == NULL || (words == NULL && capacity > 0))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pack: eye, words and count must not be NULL");
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(eye[i]) <= 1e15))
+            return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
+                           "pack: the eye must be finite and at most 1e15 m away");
+    *count = count_words(snapshot);
+    if (*count > MOST_WORDS)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words; shaders can address %zu", *count,
+                       MOST_WORDS);
+    if (words == NULL) return NEBEL_OK;
+    if (capacity < *count)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words are needed, there is room for %zu", *count,
+                       capacity);
+    packer p = {words,
+                NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS,
+                {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};
+    words[0] = (nebel_word){
+        {(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)), 0, 0}};
+    for (size_t i = 0; i < snapshot->medium_count; i++)
+        pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
+    return NEBEL_OK;
+}
+
+/* ---- features
+ * ---------------------------------------------------------------------------------------------------------- */
+
+static uint32_t features_of_leaf(const nb_leaf *leaf)
+{
+    static const uint32_t bits[] = {[NB_TYPE_WORLD] = 0,
+                                    [NB_TYPE_PLANES] = NB_HAS_PLANES,
+                                    [NB_TYPE_BOX] = NB_HAS_BOX,
+                                    [NB_TYPE_BALL] = NB_HAS_BALL,
+                                    [NB_TYPE_TUBE] = NB_HAS_TUBE,
+                                    [NB_TYPE_CONE] = NB_HAS_CONE,
+                                    [NB_TYPE_CAPSULE] = NB_HAS_CAPSULE};
+    const int framed = leaf->type != NB_LEAF_WORLD && leaf->type != NB_LEAF_PLANES;
+    return bits[type_of(leaf)] | (framed && !leaf->aligned ? NB_HAS_TURNED : 0);
+}
+
+static uint32_t features_of_kind(int kind)
+{
+    if (kind == NB_KIND_CONSTANT) return 0;
+    if (kind <= NB_KIND_LINEAR) return NB_HAS_SLOPE;
+    if (kind == NB_KIND_GAUSSIAN) return NB_HAS_GAUSSIAN;
+    if (kind == NB_KIND_SOFT_EDGE) return NB_HAS_SOFT_EDGE;
+    return kind == NB_KIND_EXCLUDE ? NB_HAS_EXCLUDE : NB_HAS_RADIAL;
+}
+
+/* Whether two media may differ in their quotient of light and extinction, on which the walk for light depends. */
+static int is_mixed(const nebel_snapshot *snapshot)
+{
+    const nb_medium *first = NULL;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_medium *medium = &snapshot->media[i];
+        if (medium->body.operation == NEBEL_OPERATION_EXCLUDE) continue;
+        if (first == NULL) {
+            first = medium;
+            continue;
+        }
+        if (medium->emits || first->emits) return 1;
+        for (int c = 0; c < 3; c++)
+            if (medium->radiance[c] < first->radiance[c] || medium->radiance[c] > first->radiance[c]) return 1;
+    }
+    return 0;
+}
+
+uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
+{
+    if (snapshot == NULL) return NB_HAS_ALL;
+    uint32_t features = is_mixed(snapshot) ? NB_HAS_MIXED : 0;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *body = &snapshot->media[i].body;
+        features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0);
+        for (size_t k = 0; k < body->leaf_count; k++) features |= features_of_leaf(&body->leaves[k]);
+    }
+    return features;
+}
