@@ -8,7 +8,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["scene", "read_camera", "read_density", "read_light", "read_model", "read_shape", "read_volume"]
+READERS = ["scene", "read_camera", "read_density", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
 TABLE = re.compile(r"static const char \*const (?:\w+_)?(?:names|types|projections)\[\] = \{(.*?)\}", re.S)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
 REFUSED = {"grid", "noise"}  # known to the reader only to be refused
@@ -23,7 +23,9 @@ BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [],
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "contrast": 0.1}]}',
        '{"nebel": 1, "fog": [], "camera": {"vertical_fov": 180}}',
        '{"nebel": 1, "fog": [], "models": [{"file": "a", "scale": 0}]}',
-       '{"nebel": 1, "fog": [], "models": [{}]}']
+       '{"nebel": 1, "fog": [], "models": [{}]}',
+       '{"nebel": 1, "fog": [], "nebula": [{}]}',
+       '{"nebel": 1, "fog": [], "nebula": [{"shape": {"type": "world"}, "count": 0}]}']
 
 
 def reader_names():

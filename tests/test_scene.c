@@ -324,6 +324,34 @@ static void test_the_libraries_are_named(void **state)
             text, (const char *const[]){"Assimp 5", "libpng 1.", "OpenEXR 3.", "yajl 2.", "libjpeg-turbo 2."}[i]));
 }
 
+static void test_a_nebula_is_fog(void **state)
+{
+    (void)state;
+    nebel_scene *scene = NULL;
+    nebel_snapshot *fog = NULL;
+    nebel_particle *particles = NULL;
+    static const char text[] =
+        "{\"nebel\": 1, \"fog\": [{\"shape\": {\"type\": \"world\"}, \"extinction\": 1}], \"nebula\": [{\"name\": "
+        "\"a\", "
+        "\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}, \"count\": 70, \"emission\": 1, "
+        "\"colors\": [[1, 0, 0], [0, 0, 1]], \"profile\": \"ball\"}, "
+        "{\"shape\": {\"type\": \"box\", \"min\": [5, 5, 5], \"max\": [6, 6, 6]}, \"seed\": 3, \"count\": 30}]}";
+    assert_int_equal(nebel_parse_scene(text, sizeof text - 1, "nebula", &(nebel_scene_desc){0}, &scene), NEBEL_OK);
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(data->nebula_count, 2);
+    assert_int_equal(data->particle_count, 100);
+    assert_string_equal(data->nebula_names[0], "a");
+    assert_int_equal(nebel_make_scene_particles(scene, &particles), NEBEL_OK);
+    assert_int_equal(particles[69].profile, NEBEL_PARTICLE_BALL);
+    assert_int_equal(particles[70].profile, NEBEL_PARTICLE_SOFT);
+    assert_true(particles[70].center[0] > 5);
+    nebel_free_scene_particles(scene, particles);
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    assert_int_equal(nebel_snapshot_volume_count(fog), 101);
+    nebel_release_snapshot(fog);
+    nebel_destroy_scene(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -339,6 +367,7 @@ int main(void)
         cmocka_unit_test(test_the_order_of_sections_does_not_matter),
         cmocka_unit_test(test_numbers_are_read_exactly),
         cmocka_unit_test(test_the_libraries_are_named),
+        cmocka_unit_test(test_a_nebula_is_fog),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

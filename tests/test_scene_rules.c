@@ -8,6 +8,8 @@
 #define DENSITY(members) FOG(WORLD ", \"extinction\": 1, \"density\": {" members "}")
 #define CAMERA(members) SCENE("\"camera\": {" members "}")
 #define MODEL(members) SCENE("\"models\": [{" members "}]")
+#define NEBULA(members)                                                                                                \
+    SCENE("\"nebula\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 5}, " members "}]")
 #define LIGHT(members) SCENE("\"lights\": [`{" members "}]")
 #define BAD_LIGHT(members) SCENE("\"lights\": [{" members "}]")
 
@@ -25,11 +27,12 @@ static void test_what_no_scene_has(void **state)
         {FORMAT, "{\"nebel\": 1, \"fog\": [], `\"f\\u006fg\": []}",
          "fog: the key appears twice, first at line 1, column 14; remove"},
         {FORMAT, SCENE("`\"ambiant\": 0"),
-         "ambiant: unknown key; a scene has: nebel, camera, background, sun, ambient, lights, models, fog; did you "
+         "ambiant: unknown key; a scene has: nebel, camera, background, sun, ambient, lights, models, fog, nebula; did "
+         "you "
          "mean "
          "\"ambient\"?"},
         {FORMAT, SCENE("`\"planet\": {}"), "planet: unknown key"},
-        {FORMAT, SCENE("`\"nebula\": {}"), "nebula: unknown key"},
+        {FORMAT, SCENE("\"nebula\": `{}"), "nebula: is an object; must be an array"},
         {FORMAT, SCENE("\"background\": [0, `-1, 0]"), "background[1]: is -1; must be a number >= 0"},
         {FORMAT, SCENE("\"background\": `[0, 1]"), "background: has 2 elements; must be an array of 3 numbers"},
         {FORMAT, SCENE("\"background\": `\"red\""),
@@ -381,6 +384,35 @@ static void test_strange_keys_are_shown_safely(void **state)
     CHECK(rules);
 }
 
+static void test_what_no_nebula_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, SCENE("\"nebula\": [`{}]"), "nebula[0]: the key \"shape\" is missing; a nebula needs it"},
+        {FORMAT, SCENE("\"nebula\": [{\"shape\": `{\"type\": \"world\"}}]"), "nebula[0].shape: has no bounds"},
+        {FORMAT, NEBULA("\"count\": `0"), "nebula[0].count: is 0; must be a whole number from 1 to 1000000"},
+        {FORMAT, NEBULA("\"count\": `1e7"), "nebula[0].count: is 10000000; must be"},
+        {FORMAT, NEBULA("\"seed\": `-1"), "nebula[0].seed: is -1; must be"},
+        {FORMAT, NEBULA("\"profile\": `\"hard\""), "nebula[0].profile: unknown; must be one of: soft, gaussian, ball"},
+        {FORMAT, NEBULA("\"size\": `[2, 1]"), "nebula[0].size: is larger first"},
+        {FORMAT, NEBULA("\"size\": [`0, 1]"), "nebula[0].size[0]: is 0; must be a number > 0"},
+        {FORMAT, NEBULA("\"absorption\": `-1"), "nebula[0].absorption: is -1; must be"},
+        {FORMAT, NEBULA("\"colors\": `[]"), "nebula[0].colors: has 0 colors; 1 to 64 are possible"},
+        {FORMAT, NEBULA("\"colors\": [1, `-1]"), "nebula[0].colors[1]: is -1; must be"},
+        {FORMAT, NEBULA("\"turbulence\": `-1"), "nebula[0].turbulence: is -1; must be"},
+        {FORMAT, NEBULA("\"turbulence_size\": `0"), "nebula[0].turbulence_size: is 0; must be"},
+        {FORMAT, NEBULA("`\"points\": 3"), "nebula[0].points: unknown key; a nebula has: name, shape"},
+        {LIMIT,
+         SCENE("\"nebula\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 5}, \"count\": "
+               "1000000}, "
+               "`{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 5}, \"count\": 1}]"),
+         "nebula[1]: brings the particles of this scene above 1000000"},
+        {FORMAT, SCENE("\"nebula\": [`{\"shape\": {\"type\": \"convex\", \"planes\": [[1, 0, 0, 1]]}}]"),
+         "nebula[0]: its shape has no bounds"},
+    };
+    CHECK(rules);
+}
+
 static void test_arguments_are_checked(void **state)
 {
     (void)state;
@@ -406,6 +438,7 @@ int main(void)
         cmocka_unit_test(test_what_no_shape_has),
         cmocka_unit_test(test_what_no_density_has),
         cmocka_unit_test(test_what_no_volume_has),
+        cmocka_unit_test(test_what_no_nebula_has),
         cmocka_unit_test(test_what_only_the_core_knows_is_reported),
         cmocka_unit_test(test_sunlight_in_fog_is_refused_where_it_would_be_seen),
         cmocka_unit_test(test_nesting_has_a_limit),

@@ -14,6 +14,7 @@
 #define NEBEL_SCENE_H
 
 #include <nebel/nebel.h>
+#include <nebel/nebula.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -76,6 +77,11 @@ typedef struct nebel_scene_data {
     const nebel_volume_desc *volumes;
     const char *const *volume_names; /* UTF-8; "" where the file gives none */
 
+    size_t nebula_count; /* strewn by nebel_make_scene_particles; allocator and log are not set */
+    const nebel_nebula_desc *nebulae;
+    const char *const *nebula_names;
+    size_t particle_count; /* of all nebulae */
+
     size_t mesh_count; /* 0 until nebel_load_scene_models */
     const nebel_mesh *meshes;
     size_t texture_count;
@@ -109,7 +115,12 @@ const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene);
  * after the last). */
 nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
 
-/* A snapshot of the scene's fog; release it with nebel_release_snapshot before the scene's allocator goes away. */
+/* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the scene.
+ * Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
+nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);
+void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles); /* NULL is fine */
+
+/* A snapshot of the scene's fog, its nebulae's particles among it; release it with nebel_release_snapshot before the scene's allocator goes away. */
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
 
 /* NULL is fine. */

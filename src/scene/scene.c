@@ -9,11 +9,11 @@
 /* The longest scene file. */
 #define TEXT_LIMIT ((size_t)1 << 30)
 
-enum { NEBEL, CAMERA, BACKGROUND, SUN, AMBIENT, LIGHTS, MODELS, FOG, SECTION_COUNT = NB_SCENE_SECTIONS };
+enum { NEBEL, CAMERA, BACKGROUND, SUN, AMBIENT, LIGHTS, MODELS, FOG, NEBULA, SECTION_COUNT = NB_SCENE_SECTIONS };
 
-static const char *const section_names[] = {"nebel",   "camera", "background", "sun",
-                                            "ambient", "lights", "models",     "fog"};
-static const char *const streamed_names[] = {"lights", "models", "fog", NULL};
+static const char *const section_names[] = {"nebel",  "camera", "background", "sun",   "ambient",
+                                            "lights", "models", "fog",        "nebula"};
+static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
 
@@ -55,6 +55,7 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
 static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
 {
     if (nb_json_has_key(array, "fog")) return nb_read_volume(in, node);
+    if (nb_json_has_key(array, "nebula")) return nb_read_nebula(in, node);
     if (nb_json_has_key(array, "models")) return nb_read_model(in, node);
     return nb_read_light(in, node);
 }
@@ -82,7 +83,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     return nb_json_parent(json, parent) == NULL ? read_section(in, value) : read_element(in, parent, value);
 }
 
-static void keep_core_message(nebel_result result, const char *message, void *user)
+void nb_read_keep_message(nebel_result result, const char *message, void *user)
 {
     nb_scene_reader *in = user;
     (void)result;
@@ -93,7 +94,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
 {
     nb_json json;
     nb_scene_reader in = {.json = &json, .scene = scene};
-    const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {keep_core_message, &in}};
+    const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_read_keep_message, &in}};
     const nb_json_desc desc = {.text = text,
                                .size = size,
                                .name = name,
@@ -109,6 +110,8 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     nebel_destroy_fog(in.trial);
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
+    scene->data.nebulae = scene->nebulae;
+    scene->data.nebula_names = scene->nebula_names;
     return result;
 }
 
@@ -174,12 +177,59 @@ const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene)
     return &scene->data;
 }
 
-static nebel_result add_volumes(nebel_fog *fog, const nebel_scene_data *data)
+static nebel_result strew(const nebel_scene *scene, nebel_particle *particles)
 {
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < scene->data.nebula_count && result == NEBEL_OK; i++) {
+        nebel_nebula_desc desc = scene->nebulae[i];
+        desc.allocator = scene->allocator;
+        desc.log = scene->log;
+        result = nebel_scatter_nebula(&desc, particles);
+        particles += desc.count;
+    }
+    return result;
+}
+
+nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles)
+{
+    if (particles != NULL) *particles = NULL;
+    if (scene == NULL || particles == NULL) return NEBEL_ERROR_ARGUMENT;
+    const size_t count = scene->data.particle_count;
+    nebel_particle *made = nb_allocate(&scene->allocator, count, sizeof *made);
+    if (made == NULL) return nb_fail(&scene->log, NEBEL_ERROR_MEMORY, "out of memory for %zu particles", count);
+    const nebel_result result = strew(scene, made);
+    if (result == NEBEL_OK)
+        *particles = made;
+    else
+        nb_release(&scene->allocator, made);
+    return result;
+}
+
+void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles)
+{
+    nb_release(&scene->allocator, particles);
+}
+
+static nebel_result add_particles(nebel_fog *fog, const nebel_scene *scene)
+{
+    nebel_particle *particles = NULL;
+    if (scene->data.particle_count == 0) return NEBEL_OK;
+    nebel_result result = nebel_make_scene_particles(scene, &particles);
+    for (size_t i = 0; i < scene->data.particle_count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
+        result = nebel_add_volume(fog, &volume, NULL);
+    }
+    nebel_free_scene_particles(scene, particles);
+    return result;
+}
+
+static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene)
+{
+    const nebel_scene_data *data = &scene->data;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++)
         result = nebel_add_volume(fog, &data->volumes[i], NULL);
-    return result;
+    return result == NEBEL_OK ? add_particles(fog, scene) : result;
 }
 
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)
@@ -190,7 +240,7 @@ nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **s
     *snapshot = NULL;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
     nebel_result result = nebel_create_fog(&desc, &fog);
-    if (result == NEBEL_OK) result = add_volumes(fog, &scene->data);
+    if (result == NEBEL_OK) result = add_volumes(fog, scene);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);
     nebel_destroy_fog(fog);
     return result;
@@ -204,6 +254,8 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_arena_release(&scene->arena);
     nb_release(&allocator, scene->volumes);
     nb_release(&allocator, (void *)scene->volume_names);
+    nb_release(&allocator, scene->nebulae);
+    nb_release(&allocator, (void *)scene->nebula_names);
     nb_release(&allocator, scene->models);
     nb_release(&allocator, scene);
 }

@@ -37,6 +37,10 @@ struct nebel_scene {
     const char **volume_names;
     size_t volume_capacity, name_capacity;
 
+    nebel_nebula_desc *nebulae;
+    const char **nebula_names;
+    size_t nebula_capacity, nebula_name_capacity;
+
     nb_model_source *models;
     size_t model_count, model_capacity;
     nb_model_set loaded;
@@ -44,7 +48,7 @@ struct nebel_scene {
 };
 
 /* The keys that a scene may have. */
-enum { NB_SCENE_SECTIONS = 8 };
+enum { NB_SCENE_SECTIONS = 9 };
 
 /* What reading needs beside the scene itself. */
 typedef struct nb_scene_reader {
@@ -63,6 +67,7 @@ bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
 bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
@@ -70,6 +75,9 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
 /* Shows a volume to the core, which knows more than the file's rules: whether a convex body is empty, for one. Where
  * its message begins with `subject`, which the node's path says already, that is left out. */
 bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume);
+
+/* For logs of the core: keeps the message in the reader, which is `user`. */
+void nb_read_keep_message(nebel_result result, const char *message, void *user);
 
 nebel_camera nb_camera_default(void);
 

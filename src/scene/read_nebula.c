@@ -1,0 +1,146 @@
+/* One entry of the section "nebula". Particles are strewn later, by nebel_make_scene_particles. */
+#include "scene/scene_internal.h"
+
+#include <string.h>
+
+enum {
+    NAME,
+    SHAPE,
+    DENSITY,
+    COUNT,
+    SEED,
+    PROFILE,
+    SIZE,
+    ABSORPTION,
+    EMISSION,
+    COLORS,
+    TURBULENCE,
+    TURBULENCE_SIZE,
+    NEBULA_KEY_COUNT
+};
+
+static const char *const key_names[] = {"name", "shape",      "density",  "count",  "seed",       "profile",
+                                        "size", "absorption", "emission", "colors", "turbulence", "turbulence_size"};
+
+static const nb_keys nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, NB_BIT(SHAPE),
+                                    "a nebula"};
+
+#define MOST_PARTICLES 1000000
+#define MOST_COLORS 64
+
+static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
+{
+    int count = 10000, seed = 0;
+    if (!nb_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
+        !nb_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
+        return false;
+    nebula->count = (size_t)count;
+    nebula->seed = (uint64_t)seed;
+    return true;
+}
+
+/* In the order of nebel_particle_profile. */
+static bool read_profile(nb_json *json, const nb_json_node *node, nebel_particle_profile *profile)
+{
+    static const char *const names[] = {"soft", "gaussian", "ball"};
+    if (node == NULL) return true;
+    const int choice = nb_value_choice(json, node, names, NEBEL_PARTICLE_COUNT);
+    if (choice >= 0) *profile = (nebel_particle_profile)choice;
+    return choice >= 0;
+}
+
+static bool read_sizes(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
+{
+    if (!nb_value_numbers(json, found[SIZE], &nb_range_positive, 2, nebula->size) ||
+        !nb_value_number(json, found[TURBULENCE], &nb_range_not_negative, &nebula->turbulence) ||
+        !nb_value_number(json, found[TURBULENCE_SIZE], &nb_range_positive, &nebula->turbulence_size))
+        return false;
+    if (nebula->size[0] <= nebula->size[1]) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[SIZE], "is larger first; must be [smallest, largest] radius");
+}
+
+static bool read_colors(nb_scene_reader *in, const nb_json_node *node, nebel_nebula_desc *nebula)
+{
+    nb_json *json = in->json;
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colors")) return false;
+    if (node->count < 1 || node->count > MOST_COLORS)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %u colors; 1 to %d are possible",
+                            (unsigned)node->count, MOST_COLORS);
+    double(*colors)[3] = nb_arena_allocate(&in->scene->arena, node->count, sizeof *colors);
+    if (colors == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    nebula->colors = (const double(*)[3])colors;
+    for (const nb_json_node *color = nb_json_first(json, node); color != NULL; color = nb_json_next(json, color))
+        if (!nb_value_color(json, color, &nb_range_not_negative, colors[nebula->color_count++])) return false;
+    return true;
+}
+
+static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const nebel_nebula_desc *nebula,
+                        const char *name)
+{
+    nebel_scene *scene = in->scene;
+    const size_t count = scene->data.nebula_count;
+    void *nebulae = scene->nebulae;
+    void *names = (void *)scene->nebula_names;
+    const bool room = nb_grow(&scene->allocator, &nebulae, sizeof *nebula, count, &scene->nebula_capacity, count + 1);
+    scene->nebulae = nebulae;
+    const bool name_room =
+        nb_grow(&scene->allocator, &names, sizeof name, count, &scene->nebula_name_capacity, count + 1);
+    scene->nebula_names = names;
+    if (!room || !name_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    scene->nebulae[count] = *nebula;
+    scene->nebula_names[count] = name;
+    scene->data.nebula_count = count + 1;
+    scene->data.particle_count += nebula->count;
+    return true;
+}
+
+static bool check_bounds(nb_json *json, const nb_json_node *shape, nebel_shape_type type)
+{
+    if (type != NEBEL_SHAPE_WORLD && type != NEBEL_SHAPE_HALF_SPACE) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, shape,
+                        "has no bounds; particles need a shape that has, a sphere or a box");
+}
+
+/* The core's own checks: of nothing strewn, so quick. */
+static bool try_nebula(nb_scene_reader *in, const nb_json_node *node, const nebel_nebula_desc *nebula)
+{
+    static const char subject[] = "nebula: ";
+    nebel_nebula_desc empty = *nebula;
+    empty.count = 0;
+    empty.allocator = in->scene->allocator;
+    empty.log = (nebel_log){nb_read_keep_message, in};
+    in->core_message[0] = '\0';
+    const nebel_result result = nebel_scatter_nebula(&empty, NULL);
+    if (result == NEBEL_OK) return true;
+    const char *text = in->core_message;
+    if (strncmp(text, subject, strlen(subject)) == 0) text += strlen(subject);
+    return nb_json_fail(in->json, result == NEBEL_ERROR_VALUE ? NEBEL_ERROR_FORMAT : result, node, "%s",
+                        text[0] != '\0' ? text : nebel_result_text(result));
+}
+
+static bool check_total(nb_scene_reader *in, const nb_json_node *node, const nebel_nebula_desc *nebula)
+{
+    if (in->scene->data.particle_count + nebula->count <= MOST_PARTICLES) return true;
+    return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, node,
+                        "brings the particles of this scene above %d, the most it may have", MOST_PARTICLES);
+}
+
+bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
+{
+    const nb_json_node *found[NEBULA_KEY_COUNT];
+    nb_json *json = in->json;
+    nebel_nebula_desc nebula = {0};
+    const char *name = "";
+    return nb_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
+           nb_value_members(json, node, &nebula_keys, found) &&
+           nb_value_text(json, found[NAME], &in->scene->arena, &name) &&
+           nb_read_shape(in, found[SHAPE], &nebula.shape) && check_bounds(json, found[SHAPE], nebula.shape.type) &&
+           nb_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
+           read_counts(json, found, &nebula) && read_profile(json, found[PROFILE], &nebula.profile) &&
+           read_sizes(json, found, &nebula) &&
+           nb_value_color(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
+           nb_value_color(json, found[EMISSION], &nb_range_not_negative, nebula.emission) &&
+           read_colors(in, found[COLORS], &nebula) && try_nebula(in, node, &nebula) && check_total(in, node, &nebula) &&
+           keep_nebula(in, node, &nebula, name);
+}
