@@ -16,7 +16,7 @@
  *
  * with each of the four linear in the pixel. n is linear in the stored depth; it is taken as the difference from the
  * depth of the far end, which floats subtract without an error there, so that nothing cancels below the line. */
-#include <nebel/shader.h>
+#include "view.h"
 
 #include <math.h>
 #include <string.h>
@@ -308,6 +308,13 @@ static int is_view(const nebel_view *view)
 {
     return all_finite(view->eye_from_world, 16) && all_finite(view->clip_from_eye, 16) && view->width >= 1 &&
            view->width <= 65536 && view->height >= 1 && view->height <= 65536;
+}
+
+int nb_view_is_valid(const nebel_view *view)
+{
+    bundle rays;
+    double world[3][3];
+    return is_view(view) && set_bundle(view->clip_from_eye, &rays) && invert(view->eye_from_world, world);
 }
 
 nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays)
