@@ -140,7 +140,7 @@ static void test_a_particle_is_exact_fog(void **unused)
         const nebel_particle particle = {{1, 2, 3}, .5, {.7, .8, .9}, {2, 3, 4}, (nebel_particle_profile)p};
         const nebel_volume_desc volume = nebel_particle_volume(&particle);
         nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
-        const nebel_ray ray = {{1, 2, -3}, {0, 0, 1}, INFINITY};
+        const nebel_ray ray = {{1, 2, -3}, {0, 0, 1}, HUGE_VAL};
         nebel_light light;
         assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
@@ -173,13 +173,13 @@ static void test_refuses_what_is_not_a_nebula(void **unused)
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.size[0] = 2, desc.size[1] = 1;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.size[1] = NAN;
+    desc = a_nebula(), desc.size[1] = (double)NAN;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.turbulence = INFINITY;
+    desc = a_nebula(), desc.turbulence = (double)INFINITY;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.absorption[1] = -1;
     expect(NEBEL_ERROR_VALUE, desc);
-    desc = a_nebula(), desc.emission[2] = NAN;
+    desc = a_nebula(), desc.emission[2] = (double)NAN;
     expect(NEBEL_ERROR_VALUE, desc);
     desc = a_nebula(), desc.profile = NEBEL_PARTICLE_COUNT;
     expect(NEBEL_ERROR_VALUE, desc);

@@ -104,10 +104,11 @@ static double soft_edge_density(const nb_volume *volume, const double place[3])
     const nb_leaf *box = &volume->leaves[0];
     const nb_wide inverse = 1 / (nb_wide)volume->density.distance;
     const nb_wvec3 p = to_leaf(box, place);
-    const double *low = box->low, *high = box->high;
-    const nb_wvec3 middle = nb_wvec3((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
-    const nb_wvec3 half = nb_wvec3((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2);
-    return nb_soft_edge_density(nb_wscale3(nb_wsub3(p, middle), inverse), nb_wscale3(half, inverse));
+    const nb_wvec3 low = nb_wvec3((nb_wide)box->low[0], (nb_wide)box->low[1], (nb_wide)box->low[2]);
+    const nb_wvec3 high = nb_wvec3((nb_wide)box->high[0], (nb_wide)box->high[1], (nb_wide)box->high[2]);
+    const nb_wvec3 middle = nb_wscale3(nb_wadd3(low, high), NB_W(0.5));
+    const nb_wvec3 size = nb_wscale3(nb_wsub3(high, low), NB_W(0.5) * inverse);
+    return nb_soft_edge_density(nb_wscale3(nb_wsub3(p, middle), inverse), size);
 }
 
 double nb_density_at(const nb_volume *volume, const double place[3])
