@@ -211,10 +211,10 @@ static void test_faults_are_named(void **state)
     const nebel_light_planes to = {.transmittance = {out}};
     const nebel_ray_planes faults[] = {
         {.direction = {0, 0, 0}},
-        {.direction = {0, NAN, 0}},
+        {.direction = {0, (double)NAN, 0}},
         {.direction = {0, 0, HUGE_VAL}},
         {.direction = {0, 0, 1}, .origin = {0, 2e15, 0}},
-        {.direction = {0, 0, 1}, .origin = {NAN, 0, 0}},
+        {.direction = {0, 0, 1}, .origin = {(double)NAN, 0, 0}},
         {.direction = {0, 0, 1}, .offset = {zero, NULL, zero}},
         {.direction_float = {one, one, NULL}},
         {.direction_float = {one, one, one},
@@ -226,7 +226,7 @@ static void test_faults_are_named(void **state)
     assert_int_equal(nebel_trace_planes(NULL, NULL, 1, &right, &to), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_planes(fog, NULL, 1, NULL, &to), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_planes(fog, NULL, 1, &right, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_planes(fog, &(nebel_trace_desc){.tolerance = NAN}, 1, &right, &to),
+    assert_int_equal(nebel_trace_planes(fog, &(nebel_trace_desc){.tolerance = (double)NAN}, 1, &right, &to),
                      NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_planes(fog, NULL, 1, &right, &(nebel_light_planes){0}), NEBEL_OK);
     assert_int_equal(nebel_trace_planes(fog, NULL, 0, &right, &to), NEBEL_OK);
@@ -267,6 +267,28 @@ static void test_a_ray_that_is_none_is_found(void **state)
 }
 
 /* Whatever the march would do with it. */
+static void compare_masked(const random_fog *fog, const nebel_snapshot *snapshot, sharing shared, int wants_error)
+{
+    static ray_numbers numbers;
+    static light_numbers masked, plain;
+    nebel_ray rays[RAYS];
+    const size_t first = fog->seed % 5;
+    make_rays(fog, shared, 0, 1, &numbers, rays);
+    for (size_t i = first; i < RAYS; i += 5) numbers.t_max[i] = 0;
+    const nebel_ray_planes from = planes_of(&numbers, shared, 0, 1);
+    const nebel_light_planes to = lights_of(&plain, 1, wants_error, 1);
+    assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to), NEBEL_OK);
+    for (size_t i = first; i < RAYS; i += 5) {
+        numbers.offset[i] = NAN;
+        numbers.way[i] = i % 2 ? HUGE_VALF : 0;
+        for (size_t c = 1; c < 3; c++) numbers.way[c * STRIDE * RAYS + i] = 0;
+        assert_true(is(plain.transmittance[i], 1) && is(plain.in_scattering[i], 0));
+    }
+    const nebel_light_planes to_masked = lights_of(&masked, 1, wants_error, 1);
+    assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to_masked), NEBEL_OK);
+    assert_memory_equal(&masked, &plain, sizeof plain);
+}
+
 static void test_a_ray_of_no_length_may_be_anything(void **state)
 {
     (void)state;
@@ -274,23 +296,7 @@ static void test_a_ray_of_no_length_may_be_anything(void **state)
     for (uint64_t seed = 0; seed < 300; seed++) {
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
         nebel_snapshot *snapshot = commit(&fog);
-        static ray_numbers numbers;
-        static light_numbers masked, plain;
-        nebel_ray rays[RAYS];
-        make_rays(&fog, SHARE_NOTHING, 0, 1, &numbers, rays);
-        for (size_t i = seed % 5; i < RAYS; i += 5) numbers.t_max[i] = 0;
-        const nebel_ray_planes from = planes_of(&numbers, SHARE_NOTHING, 0, 1);
-        const nebel_light_planes to = lights_of(&plain, 1, seed % 2 != 0, 1);
-        assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to), NEBEL_OK);
-        for (size_t i = seed % 5; i < RAYS; i += 5) {
-            numbers.offset[i] = NAN;
-            numbers.way[i] = i % 2 ? HUGE_VALF : 0;
-            for (size_t c = 1; c < 3; c++) numbers.way[c * STRIDE * RAYS + i] = 0;
-            assert_true(is(plain.transmittance[i], 1) && is(plain.in_scattering[i], 0));
-        }
-        const nebel_light_planes to_masked = lights_of(&masked, 1, seed % 2 != 0, 1);
-        assert_int_equal(nebel_trace_planes(snapshot, NULL, RAYS, &from, &to_masked), NEBEL_OK);
-        assert_memory_equal(&masked, &plain, sizeof plain);
+        for (int shared = 0; shared < SHARE_END; shared++) compare_masked(&fog, snapshot, (sharing)shared, seed % 2 != 0);
         nebel_release_snapshot(snapshot);
     }
 }

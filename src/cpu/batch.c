@@ -28,13 +28,16 @@ static void set_clear(nb_light_samples *samples)
     for (int i = 0; i < NB_BATCH; i++) samples->error[i] = 0;
 }
 
-/* From the ray's start, before it was advanced, to the hit or to infinity; 0 outside the picture, where nothing is asked. */
+/* From the ray's start, before it was advanced, to the hit or to infinity; 0 outside the picture, where nothing is asked.
+ * In two loops: compilers do not speculate arithmetic. */
 NB_CLONES static void set_distances(double advance, const nb_rays *rays, const nb_hits *hits, const int *inside,
                                     float *restrict distance)
 {
     NB_SIMD
+    for (int i = 0; i < NB_BATCH; i++) distance[i] = (float)(advance * (double)rays->length[i] + (double)hits->t[i]);
+    NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
-        const float to_hit = (float)(advance * (double)rays->length[i] + (double)hits->t[i]);
+        const float to_hit = distance[i];
         const float way = hits->surface[i] == NB_NONE ? HUGE_VALF : to_hit;
         distance[i] = inside[i] ? way : 0;
     }
@@ -97,6 +100,12 @@ NB_CLONES static void set_clear_sunlight(const float *irradiance, nb_scratch *sc
     }
 }
 
+NB_CLONES static void mask_ends(const int *restrict lit, float *restrict distance)
+{
+    NB_SIMD
+    for (int i = 0; i < NB_BATCH; i++) distance[i] = lit[i] ? HUGE_VALF : 0;
+}
+
 /* What fog leaves of the sun's light where it is lit at all. */
 static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, float (*transmittance)[NB_BATCH])
 {
@@ -108,7 +117,7 @@ static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, fl
         rays.direction[c] = frame->lighting.sun_direction[c];
         lights.transmittance[c] = transmittance[c];
     }
-    for (int i = 0; i < NB_BATCH; i++) scratch->distance[i] = scratch->points.lit[i] ? HUGE_VALF : 0;
+    mask_ends(scratch->points.lit, scratch->distance);
     return nebel_trace_planes(frame->renderer->fog, &frame->trace, NB_BATCH, &rays, &lights);
 }
 

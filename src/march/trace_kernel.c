@@ -104,10 +104,15 @@ static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
 }
 
 /* Unit length; adding +0 makes every zero positive, on which the ownership of faces rests. */
+static nb_wvec3 divided(nb_wvec3 d, nb_wide length)
+{
+    const nb_wide inverse = NB_W(1.0) / length;
+    return nb_wvec3(d.x * inverse + NB_W(0.0), d.y * inverse + NB_W(0.0), d.z * inverse + NB_W(0.0));
+}
+
 static nb_wvec3 normalized(nb_wvec3 d)
 {
-    const nb_wide inverse = NB_W(1.0) / nb_wlength3(d);
-    return nb_wvec3(d.x * inverse + NB_W(0.0), d.y * inverse + NB_W(0.0), d.z * inverse + NB_W(0.0));
+    return divided(d, nb_wlength3(d));
 }
 
 /* Directions so long or short that their squares overflow or vanish, taken near 1 by a power of two: which is exact, so that

@@ -6,56 +6,72 @@
  * the march would give. */
 
 #define FORCE_INLINE static inline __attribute__((always_inline))
+#define NEVER_INLINE static __attribute__((noinline))
 
 /* ---- planes ------------------------------------------------------------------------------------------------------ */
 
-static nb_real load_floats(const float *plane, size_t stride, size_t first, size_t count)
+/* Of `count` numbers the lanes beyond repeat the first. */
+NEVER_INLINE nb_real gather_floats(const float *plane, size_t stride, size_t first, size_t count)
 {
-    if (stride == sizeof *plane && count == NB_WIDTH) return nb_load_lanes(plane + first);
     float lane[NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++)
         lane[i] = *(const float *)(const void *)((const char *)plane + (first + (i < count ? i : 0)) * stride);
     return nb_load_lanes(lane);
 }
 
-static nb_wide load_doubles(const double *plane, size_t stride, size_t first, size_t count)
+NEVER_INLINE nb_wide gather_doubles(const double *plane, size_t stride, size_t first, size_t count)
 {
-    if (stride == sizeof *plane && count == NB_WIDTH) return nb_wload_lanes(plane + first);
     double lane[NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++)
         lane[i] = *(const double *)(const void *)((const char *)plane + (first + (i < count ? i : 0)) * stride);
     return nb_wload_lanes(lane);
 }
 
-static nb_wvec3 load_float_vectors(const float *const plane[3], size_t stride, size_t first, size_t count)
+NEVER_INLINE void scatter_floats(float *plane, size_t stride, size_t first, size_t count, nb_real x)
+{
+    float lane[NB_WIDTH];
+    nb_store_lanes(lane, x);
+    for (size_t i = 0; i < count; i++) *(float *)(void *)((char *)plane + (first + i) * stride) = lane[i];
+}
+
+FORCE_INLINE nb_real load_floats(const float *plane, size_t stride, size_t first, size_t count)
+{
+    if (stride == sizeof *plane && count == NB_WIDTH) return nb_load_lanes(plane + first);
+    return gather_floats(plane, stride, first, count);
+}
+
+FORCE_INLINE nb_wide load_doubles(const double *plane, size_t stride, size_t first, size_t count)
+{
+    if (stride == sizeof *plane && count == NB_WIDTH) return nb_wload_lanes(plane + first);
+    return gather_doubles(plane, stride, first, count);
+}
+
+FORCE_INLINE nb_wvec3 load_float_vectors(const float *const plane[3], size_t stride, size_t first, size_t count)
 {
     return nb_wvec3(nb_widen(load_floats(plane[0], stride, first, count)),
                     nb_widen(load_floats(plane[1], stride, first, count)),
                     nb_widen(load_floats(plane[2], stride, first, count)));
 }
 
-static nb_wvec3 load_double_vectors(const double *const plane[3], size_t stride, size_t first, size_t count)
+FORCE_INLINE nb_wvec3 load_double_vectors(const double *const plane[3], size_t stride, size_t first, size_t count)
 {
     return nb_wvec3(load_doubles(plane[0], stride, first, count), load_doubles(plane[1], stride, first, count),
                     load_doubles(plane[2], stride, first, count));
 }
 
 /* A plane of NULL is not wanted. */
-static void store_floats(float *plane, size_t stride, size_t first, size_t count, nb_real x)
+FORCE_INLINE void store_floats(float *plane, size_t stride, size_t first, size_t count, nb_real x)
 {
     if (plane == NULL) return;
-    if (stride == sizeof *plane && count == NB_WIDTH) {
-        nb_store_lanes(plane + first, x);
-        return;
-    }
-    float lane[NB_WIDTH];
-    nb_store_lanes(lane, x);
-    for (size_t i = 0; i < count; i++) *(float *)(void *)((char *)plane + (first + i) * stride) = lane[i];
+    if (stride == sizeof *plane && count == NB_WIDTH) nb_store_lanes(plane + first, x);
+    else scatter_floats(plane, stride, first, count, x);
 }
 
-static void store_colors(float *const plane[3], size_t stride, size_t first, size_t count, const nb_real color[3])
+FORCE_INLINE void store_colors(float *const plane[3], size_t stride, size_t first, size_t count, const nb_real color[3])
 {
-    for (int c = 0; c < 3; c++) store_floats(plane[c], stride, first, count, color[c]);
+    store_floats(plane[0], stride, first, count, color[0]);
+    store_floats(plane[1], stride, first, count, color[1]);
+    store_floats(plane[2], stride, first, count, color[2]);
 }
 
 /* ---- rays -------------------------------------------------------------------------------------------------------- */
@@ -80,15 +96,8 @@ static void open_stream(stream *s, const nb_trace_job *job)
     s->direction = unit_vector(wide_vector(s->has_directions ? any : s->rays->direction));
 }
 
-static nb_wvec3 load_starts(const stream *s, size_t first, size_t count)
-{
-    const nebel_ray_planes *rays = s->rays;
-    if (!s->has_offsets) return s->origin;
-    return nb_wadd3(s->origin, load_float_vectors(rays->offset, rays->offset_stride, first, count));
-}
-
 /* Of any length. */
-static nb_wvec3 load_ways(const stream *s, size_t first, size_t count)
+FORCE_INLINE nb_wvec3 load_ways(const stream *s, size_t first, size_t count)
 {
     const nebel_ray_planes *rays = s->rays;
     if (rays->direction_float[0] == NULL)
@@ -97,7 +106,7 @@ static nb_wvec3 load_ways(const stream *s, size_t first, size_t count)
 }
 
 /* NB_WFAR at most; 0 in lanes beyond `count`. */
-static nb_wide load_ends(const stream *s, size_t first, size_t count)
+FORCE_INLINE nb_wide load_ends(const stream *s, size_t first, size_t count)
 {
     nb_wide t_max = NB_WFAR;
     if (s->rays->t_max != NULL)
@@ -109,12 +118,6 @@ static nb_wide load_ends(const stream *s, size_t first, size_t count)
     return nb_wload_lanes(lane);
 }
 
-static nb_wmask are_near(nb_wvec3 p)
-{
-    const nb_wide most = NB_W(NB_LARGEST_COORDINATE);
-    return nb_wand(nb_wand(nb_wabs(p.x) <= most, nb_wabs(p.y) <= most), nb_wabs(p.z) <= most);
-}
-
 /* A packet as it was loaded; its ways are not of unit length unless all rays share one. */
 typedef struct loaded {
     nb_wvec3 start, way;
@@ -122,21 +125,26 @@ typedef struct loaded {
     nb_wide square; /* of the way's length */
 } loaded;
 
-/* Lanes that are rays without a doubt. */
-static nb_wmask are_sound(const loaded *p)
+FORCE_INLINE nb_wmask are_near(nb_wvec3 p)
 {
-    const nb_wmask moderate = nb_wand(p->square > NB_W(1e-200), p->square < NB_W(1e200));
-    return nb_wand(nb_wand(moderate, p->t_max >= NB_W(0.0)), are_near(p->start));
+    const nb_wide most = NB_W(NB_LARGEST_COORDINATE);
+    return nb_wand(nb_wand(nb_wabs(p.x) <= most, nb_wabs(p.y) <= most), nb_wabs(p.z) <= most);
+}
+
+FORCE_INLINE nb_wmask are_moderate(nb_wide square)
+{
+    return nb_wand(square > NB_W(1e-200), square < NB_W(1e200));
 }
 
 /* A way whose square overflows or vanishes is right, too, but for 0; and a ray of no length may be anything. */
-static nebel_result mend_rays(nb_trace_job *job, const stream *s, loaded *p, size_t first, size_t count)
+NEVER_INLINE nebel_result mend_rays(nb_trace_job *job, const stream *s, loaded *p, size_t first, size_t count)
 {
     job->failed = nb_trace_first_fault(job->ray_planes, first, count);
     if (job->failed < first + count) return NEBEL_ERROR_ARGUMENT;
     const nb_wmask asked = p->t_max > NB_W(0.0);
     const double any[3] = {1, 0, 0};
     p->start = nb_wselect3(asked, p->start, s->origin);
+    if (!s->has_directions) return NEBEL_OK;
     p->way = tamed(nb_wselect3(asked, p->way, wide_vector(any)));
     p->square = nb_wdot3(p->way, p->way);
     return NEBEL_OK;
@@ -144,11 +152,25 @@ static nebel_result mend_rays(nb_trace_job *job, const stream *s, loaded *p, siz
 
 FORCE_INLINE nebel_result load_rays(nb_trace_job *job, const stream *s, size_t first, size_t count, loaded *p)
 {
-    p->start = load_starts(s, first, count);
+    p->start = s->origin;
+    p->way = s->direction;
+    p->square = NB_W(1.0);
     p->t_max = load_ends(s, first, count);
-    p->way = s->has_directions ? load_ways(s, first, count) : s->direction;
-    p->square = nb_wdot3(p->way, p->way);
-    return nb_wall(are_sound(p)) ? NEBEL_OK : mend_rays(job, s, p, first, count);
+    nb_wmask sound = p->t_max >= NB_W(0.0);
+    if (s->has_offsets) {
+        p->start = nb_wadd3(s->origin, load_float_vectors(s->rays->offset, s->rays->offset_stride, first, count));
+        sound = nb_wand(sound, are_near(p->start));
+    }
+    if (s->has_directions) {
+        p->way = load_ways(s, first, count);
+        p->square = nb_wdot3(p->way, p->way);
+        sound = nb_wand(sound, are_moderate(p->square));
+    }
+    if (nb_wall(sound)) return NEBEL_OK;
+    loaded mended = *p; /* whose address keeps it out of registers */
+    const nebel_result result = mend_rays(job, s, &mended, first, count);
+    *p = mended;
+    return result;
 }
 
 /* ---- the march --------------------------------------------------------------------------------------------------- */
@@ -262,7 +284,7 @@ FORCE_INLINE int all_miss(const straight *way, const loaded *p, nb_wide length)
 }
 
 /* leaf_interval for one caller, so that what computes slack falls away. */
-__attribute__((flatten)) static void cross_leaf(const packet *rays, const nb_volume *body, nb_wide *enter,
+__attribute__((flatten)) NEVER_INLINE void cross_leaf(const packet *rays, const nb_volume *body, nb_wide *enter,
                                                 nb_wide *leave)
 {
     const nb_interval raw = leaf_interval(rays, body, &body->leaves[0]);
@@ -289,22 +311,35 @@ FORCE_INLINE void cross_body(const straight *way, const stream *s, const loaded 
 }
 
 /* gather_closed, pass_piece and limit_radiance for a first and only piece, of length 0 in lanes outside. */
-FORCE_INLINE void light_piece(const straight *way, nb_real length, nb_real transmittance[3], nb_real radiance[3])
+FORCE_INLINE void light_channel(const straight *way, int c, nb_real length, nb_real *transmittance, nb_real *ratio)
 {
-    nb_real ratio = NB_F(0.0);
-    for (int c = 0; c < 3; c++) {
-        if (c > 0 && way->gray) {
-            transmittance[c] = transmittance[0];
-        } else {
-            const nb_real depth = way->extinction[c] * length;
-            transmittance[c] = nb_exp(-depth);
-            if (way->wants_light) ratio = nb_exp_ratio(depth);
-        }
-        radiance[c] = nb_min(ratio * (way->light[c] * length), way->radiance[c]);
-    }
+    const nb_real depth = way->extinction[c] * length;
+    *transmittance = nb_exp(-depth);
+    if (way->wants_light) *ratio = nb_exp_ratio(depth);
 }
 
-static void store_clear(const nebel_light_planes *to, size_t first, size_t count)
+FORCE_INLINE nb_real glow(const straight *way, int c, nb_real length, nb_real ratio)
+{
+    return nb_min(ratio * (way->light[c] * length), way->radiance[c]);
+}
+
+FORCE_INLINE void light_piece(const straight *way, nb_real length, nb_real transmittance[3], nb_real radiance[3])
+{
+    nb_real ratio[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    light_channel(way, 0, length, &transmittance[0], &ratio[0]);
+    if (way->gray) {
+        transmittance[1] = transmittance[2] = transmittance[0];
+        ratio[1] = ratio[2] = ratio[0];
+    } else {
+        light_channel(way, 1, length, &transmittance[1], &ratio[1]);
+        light_channel(way, 2, length, &transmittance[2], &ratio[2]);
+    }
+    radiance[0] = glow(way, 0, length, ratio[0]);
+    radiance[1] = glow(way, 1, length, ratio[1]);
+    radiance[2] = glow(way, 2, length, ratio[2]);
+}
+
+FORCE_INLINE void store_clear(const nebel_light_planes *to, size_t first, size_t count)
 {
     const nb_real none[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, all[3] = {NB_F(1.0), NB_F(1.0), NB_F(1.0)};
     store_colors(to->transmittance, to->transmittance_stride, first, count, all);
@@ -318,13 +353,13 @@ FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way,
     loaded p;
     const nebel_result valid = load_rays(job, s, first, count, &p);
     if (valid != NEBEL_OK) return valid;
-    const nb_wide speed = nb_wsqrt(p.square);
-    if (way->may_miss && all_miss(way, &p, speed)) {
+    const nb_wide length = nb_wsqrt(p.square);
+    if (way->may_miss && all_miss(way, &p, length)) {
         store_clear(to, first, count);
         return NEBEL_OK;
     }
     nb_wide enter, leave;
-    cross_body(way, s, &p, s->has_directions ? normalized(p.way) : p.way, &enter, &leave);
+    cross_body(way, s, &p, s->has_directions ? divided(p.way, length) : p.way, &enter, &leave);
     const nb_mask inside = nb_narrow_mask(enter < leave);
     if (!nb_any(inside)) {
         store_clear(to, first, count);
@@ -349,7 +384,8 @@ static nebel_result trace_planes(nb_trace_job *job, workspace *w, const allowanc
     return result;
 }
 
-static nebel_result trace_all_straight(nb_trace_job *job)
+/* Flattened, so that packets stay in registers. */
+__attribute__((flatten)) NEVER_INLINE nebel_result trace_all_straight(nb_trace_job *job)
 {
     stream s;
     straight way;
