@@ -91,7 +91,7 @@ endfunction()
 
 # <name>_internal: the library with every symbol visible, for tests and benchmarks that enter the rooms.
 function(nebel_add_internal_libraries)
-    foreach(name nebel nebel_scene nebel_cpu)
+    foreach(name nebel nebel_scene nebel_cpu nebel_gl)
         if(NOT TARGET ${name})
             continue()
         endif()
@@ -107,6 +107,9 @@ function(nebel_add_internal_libraries)
     endif()
     if(TARGET nebel_cpu)
         target_link_libraries(nebel_cpu_internal INTERFACE nebel_scene_internal ${nebel_cpu_dependencies})
+    endif()
+    if(TARGET nebel_gl)
+        target_link_libraries(nebel_gl_internal INTERFACE nebel_internal ${nebel_gl_dependencies})
     endif()
 endfunction()
 

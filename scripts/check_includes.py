@@ -23,7 +23,7 @@ ROOMS = {
     "planet": {"base", "march", "media"},
     "scene": {"base"},
     "cpu": {"base"},
-    "gl": {"base", "formulas"},
+    "gl": {"base"},
     "tools": {"bench"},
 }
 

@@ -45,14 +45,29 @@ int main(void)
     return 0;
 }
 C
+cat >"$work/consumer/passes.c" <<'C'
+#include <nebel/gl.h>
+#include <stdio.h>
+
+/* There is no context here, and nebel says so. */
+int main(void)
+{
+    nebel_gl *gl = NULL;
+    const nebel_result result = nebel_create_gl(&(nebel_gl_desc){0}, &gl);
+    printf("without a context: %s\n", nebel_result_text(result));
+    return result == NEBEL_ERROR_UNSUPPORTED && gl == NULL ? 0 : 1;
+}
+C
 cat >"$work/consumer/CMakeLists.txt" <<'C'
 cmake_minimum_required(VERSION 3.21)
 project(consumer LANGUAGES C)
-find_package(nebel 0.1 REQUIRED COMPONENTS scene cpu)
+find_package(nebel 0.1 REQUIRED COMPONENTS scene cpu gl)
 add_executable(core core.c)
 target_link_libraries(core PRIVATE nebel::nebel m)
 add_executable(layers layers.c)
 target_link_libraries(layers PRIVATE nebel::cpu)
+add_executable(passes passes.c)
+target_link_libraries(passes PRIVATE nebel::gl)
 C
 
 cd "$work/consumer"
@@ -60,14 +75,18 @@ compiler=${CC:-cc}
 read -ra core_flags < <(pkg-config --cflags --libs nebel)
 read -ra layer_flags < <(pkg-config --cflags --libs nebel_cpu)
 "$compiler" -std=c11 -o core core.c "${core_flags[@]}" -lm
+read -ra pass_flags < <(pkg-config --cflags --libs nebel_gl)
 "$compiler" -std=c11 -o layers layers.c "${layer_flags[@]}"
+"$compiler" -std=c11 -o passes passes.c "${pass_flags[@]}"
 ./core
 ./layers
+./passes
 
 cmake -S . -B build -DCMAKE_PREFIX_PATH="$prefix" >"$work/configure.log"
 cmake --build build >"$work/build.log" || { cat "$work/build.log"; exit 1; }
 build/core
 build/layers
+build/passes
 
 if [ -x "$NEBEL" ]; then "$prefix/bin/nebel" --help >/dev/null; fi
 echo "installed, built twice, run"

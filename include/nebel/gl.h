@@ -1,0 +1,126 @@
+/* Fog in OpenGL: what a host engine in OpenGL 3.3 core or OpenGL ES 3.0 (or later) puts over its own picture.
+ *
+ *     nebel_gl *gl = NULL;
+ *     nebel_create_gl(&(nebel_gl_desc){0}, &gl);          // in the host's context
+ *
+ *     nebel_gl_set_fog(gl, snapshot, &view);              // each frame: the fog as this eye sees it
+ *     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target);     // the host's own, with one colour texture
+ *     nebel_gl_draw_fog(gl, &(nebel_gl_pass){.depth_texture = depth, .color_texture = color});
+ *
+ *     nebel_destroy_gl(gl);
+ *
+ * For fog in the host's own shaders see nebel/shader.h; nebel_gl_get_fog hands out the buffer and textures that they
+ * read. Link with libnebel_gl and libnebel.
+ *
+ * Light is linear, coming in and going out: colour textures and targets are float, or sRGB with the conversion switched
+ * on. Pictures lie as OpenGL keeps them, the lowest row first.
+ *
+ * nebel creates no context and no window. Every function but nebel_destroy_gl wants the context current that
+ * nebel_create_gl was called in, no transform feedback under way, and no error pending in glGetError (only errors of
+ * memory are asked for there).
+ *
+ * Which state is touched: every function leaves all state of the context as it found it. While it runs it changes
+ *
+ *   - the program, the vertex array, the active texture unit;
+ *   - on texture units 0 to 3: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler;
+ *   - the bindings UNIFORM_BUFFER (general and index 0) and PIXEL_UNPACK_BUFFER, and the parameters UNPACK_*;
+ *   - the viewport (the first of an array); SCISSOR_TEST, STENCIL_TEST, DEPTH_TEST, CULL_FACE, RASTERIZER_DISCARD,
+ *     SAMPLE_COVERAGE, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_MASK, COLOR_LOGIC_OP, POLYGON_SMOOTH and
+ *     CLIP_DISTANCEi, all switched off where they exist; the polygon mode;
+ *   - of draw buffers 0 and 1: BLEND and the colour mask; of draw buffer 0 the blend function and equation;
+ *   - the draw framebuffer, to ask where the samples of a multisampled texture are.
+ *
+ * What stays as the host has set it, because it belongs to the target: FRAMEBUFFER_SRGB, DITHER, the draw buffers, the
+ * clip control, conditional rendering, and occlusion queries. Depth and stencil are never written.
+ *
+ * Threads: as OpenGL, one nebel_gl belongs to the thread in which its context is current.
+ */
+#ifndef NEBEL_GL_H
+#define NEBEL_GL_H
+
+#include <nebel/shader.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct nebel_gl nebel_gl;
+
+/* Where the packed fog lies. The host's own shaders are compiled for one of the two. */
+typedef enum nebel_gl_storage {
+    NEBEL_GL_STORAGE_BLOCK_OR_TEXTURE = 0, /* a uniform block of 16 KiB while the fog fits, else a float texture */
+    NEBEL_GL_STORAGE_TEXTURE               /* always a float texture */
+} nebel_gl_storage;
+
+typedef struct nebel_gl_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    nebel_gl_storage storage;
+} nebel_gl_desc;
+
+/* Makes what the passes need, in the current context; programs are compiled when a pass first needs them. Destroy it
+ * with nebel_destroy_gl. On an error *gl is NULL. Errors: ARGUMENT, MEMORY, UNSUPPORTED (no current context; older than
+ * OpenGL 3.3 or OpenGL ES 3.0). */
+nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl);
+
+/* Frees everything, in the context where it was made. Where that context is lost, or no longer current, the objects of
+ * OpenGL are left alone: they went or go with it. NULL is fine. */
+void nebel_destroy_gl(nebel_gl *gl);
+
+/* Hands over the fog as one eye sees it: packed relative to the eye of `view`, with lists of volumes per screen tile
+ * where there are more than a few. It holds until the next call; the snapshot is not needed any longer. Snapshot NULL:
+ * no fog. O(volumes + tiles), plus what the driver takes for the upload. Errors: ARGUMENT (also a view that
+ * nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more volumes than the largest
+ * texture holds), UNSUPPORTED (the context is another one, or lost). On an error there is no fog. */
+nebel_result nebel_gl_set_fog(nebel_gl *gl, const nebel_snapshot *snapshot, const nebel_view *view);
+
+typedef enum nebel_gl_output {
+    NEBEL_GL_OUTPUT_COMPOSE = 0, /* transmittance * color + in-scattering; alpha of the colour texture */
+    NEBEL_GL_OUTPUT_SPLIT,       /* in-scattering into draw buffer 0, transmittance into draw buffer 1; alpha 1 */
+    NEBEL_GL_OUTPUT_BLEND, /* over what the target holds, each colour by its own transmittance; alpha stays. OpenGL, and
+                              OpenGL ES with GL_EXT_blend_func_extended */
+    NEBEL_GL_OUTPUT_BLEND_GREY, /* the same with the mean of the three transmittances: right where fog takes all colours
+                                   alike. Everywhere */
+    NEBEL_GL_OUTPUT_COUNT
+} nebel_gl_output;
+
+/* A full-screen pass into the bound draw framebuffer. Texture names are of the host. */
+typedef struct nebel_gl_pass {
+    nebel_gl_output output;
+    unsigned depth_texture; /* two-dimensional; a depth format, or the first component of a float format */
+    unsigned color_texture; /* COMPOSE only; not the target */
+    uint32_t samples; /* of the depth texture, and of the colour texture in COMPOSE: 0 or 1: no multisampling; else
+                         both are multisampled with so many. COMPOSE gives the mean of what the samples see, SPLIT
+                         the means of both. OpenGL only */
+    nebel_depth_desc depth; /* {0}: OpenGL's own */
+    uint32_t x, y;          /* lower left pixel of the picture, in the textures and in the target alike */
+} nebel_gl_pass;
+
+/* Draws the fog of nebel_gl_set_fog over the pixels of its view.
+ * Errors: ARGUMENT (no fog was set; a name that is no texture; a texture that is too small or of other samples, where
+ * the context can tell; a colour texture that is also the target; a framebuffer that is incomplete or whose draw
+ * buffers do not fit the output; a depth convention that nebel_view_rays refuses), MEMORY, UNSUPPORTED (multisampled
+ * textures in OpenGL ES 3.0, BLEND where the context cannot, BLEND with samples; a shader that the driver does not
+ * take, with the driver's words; the context is another one, or lost). On an error nothing was drawn. */
+nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass);
+
+/* The fog of nebel_gl_set_fog, for the host's own shaders. */
+typedef struct nebel_gl_fog {
+    unsigned block;        /* uniform buffer of 16 KiB for nebel_fog_block; 0 where the fog is in the texture */
+    unsigned texture;      /* for nebel_fog_texture; 0 where the fog is in the block. Read with texelFetch alone */
+    unsigned tiles;        /* for nebel_tile_texture; 0: without tiles, use nebel_trace */
+    uint32_t tile_size;    /* pixels */
+    uint32_t tile_columns; /* tile of a pixel: x / tile_size + y / tile_size * tile_columns */
+    uint32_t features;     /* NEBEL_FEATURES: a shader compiled with these, or more, will do */
+    size_t word_count;
+    double eye[3]; /* what positions are relative to [m] */
+} nebel_gl_fog;
+
+/* The names stay what they are until the next nebel_gl_set_fog. Calls no OpenGL. Errors: ARGUMENT (also where no fog
+ * was set). */
+nebel_result nebel_gl_get_fog(const nebel_gl *gl, nebel_gl_fog *fog);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,31 @@
+/* What a nebel_gl holds. */
+#ifndef NB_GL_GL_H
+#define NB_GL_GL_H
+
+#include "program.h"
+
+struct nebel_gl {
+    nebel_allocator allocator;
+    nebel_log log;
+    nebel_gl_storage storage;
+    nb_context context;
+    nebel_snapshot *empty; /* what is seen where there is no fog */
+
+    /* Names in OpenGL; 0: not made yet. The sampler fetches single texels, whatever the host's textures ask for. */
+    unsigned vertex_array, sampler, block, texture, tiles, framebuffer;
+    uint32_t texture_rows, tile_rows; /* allocated */
+    nb_programs programs;
+
+    int has_fog; /* what follows is of the last nebel_gl_set_fog, and that went well */
+    nebel_view view;
+    nebel_gl_fog fog;
+    nebel_word *words;
+    size_t word_capacity;
+    uint32_t *entries;
+    size_t entry_capacity;
+};
+
+/* The number of a tile's pixels in a row is 2 to this. */
+enum { NB_GL_TILE_SHIFT = 5 };
+
+#endif

@@ -1,0 +1,259 @@
+/* Fog over the host's picture: checks, state, one triangle. */
+#include "gl.h"
+#include "state.h"
+
+typedef struct size {
+    GLint width, height, samples;
+} size;
+
+static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *what)
+{
+    return nb_fail(&gl->log, result, "nebel_gl_draw_fog: %s", what);
+}
+
+/* ---- what the host gave --------------------------------------------------------------------------------------------
+ */
+
+static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    if (pass->samples <= 1) return NEBEL_OK;
+    if (gl->context.es) {
+        return fail(gl, NEBEL_ERROR_UNSUPPORTED,
+                    "OpenGL ES 3.0 has no multisampled textures; resolve color and depth first (glBlitFramebuffer), "
+                    "and set samples to 0");
+    }
+    if (pass->samples > NB_SAMPLES_MOST) return fail(gl, NEBEL_ERROR_LIMIT, "more than 32 samples");
+    if (pass->output != NEBEL_GL_OUTPUT_COMPOSE && pass->output != NEBEL_GL_OUTPUT_SPLIT) {
+        return fail(gl, NEBEL_ERROR_UNSUPPORTED,
+                    "blending over samples would leave outlines; use NEBEL_GL_OUTPUT_COMPOSE with the multisampled "
+                    "color texture");
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_output(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    if ((unsigned)pass->output >= NEBEL_GL_OUTPUT_COUNT)
+        return fail(gl, NEBEL_ERROR_ARGUMENT, "there is no such output");
+    if (pass->output == NEBEL_GL_OUTPUT_BLEND && !gl->context.dual_source) {
+        return fail(gl, NEBEL_ERROR_UNSUPPORTED,
+                    "this context cannot blend each color by its own transmittance (GL_EXT_blend_func_extended is "
+                    "missing); use "
+                    "NEBEL_GL_OUTPUT_COMPOSE, or NEBEL_GL_OUTPUT_BLEND_GREY where fog takes all colors alike");
+    }
+    return check_samples(gl, pass);
+}
+
+/* With the texture bound to the active unit. OpenGL ES 3.0 does not tell sizes. */
+static nebel_result check_size(const nebel_gl *gl, const nebel_gl_pass *pass, GLenum target, const char *name)
+{
+    size s = {0, 0, 0};
+    if (gl->context.es) return NEBEL_OK;
+    glGetTexLevelParameteriv(target, 0, GL_TEXTURE_WIDTH, &s.width);
+    glGetTexLevelParameteriv(target, 0, GL_TEXTURE_HEIGHT, &s.height);
+    if (target == GL_TEXTURE_2D_MULTISAMPLE) glGetTexLevelParameteriv(target, 0, GL_TEXTURE_SAMPLES, &s.samples);
+    const uint64_t right = (uint64_t)pass->x + gl->view.width, top = (uint64_t)pass->y + gl->view.height;
+    if ((uint64_t)s.width < right || (uint64_t)s.height < top) {
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
+                       "nebel_gl_draw_fog: the picture reaches to %llu, %llu, the %s texture is only %d x %d",
+                       (unsigned long long)right, (unsigned long long)top, name, (int)s.width, (int)s.height);
+    }
+    if (target == GL_TEXTURE_2D_MULTISAMPLE && (uint32_t)s.samples != pass->samples) {
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_draw_fog: the %s texture has %d samples, not %u", name,
+                       (int)s.samples, (unsigned)pass->samples);
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_texture(const nebel_gl *gl, unsigned texture, const char *name)
+{
+    if (glIsTexture(texture)) return NEBEL_OK;
+    return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_draw_fog: %s_texture %u is no texture of this context",
+                   name, texture);
+}
+
+static GLint draw_buffer(int i)
+{
+    GLint buffer = GL_NONE;
+    glGetIntegerv((GLenum)(GL_DRAW_BUFFER0 + i), &buffer);
+    return buffer;
+}
+
+/* Draw buffers that no output of the shader goes to would be filled with anything. */
+static nebel_result check_draw_buffers(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    const int wanted = pass->output == NEBEL_GL_OUTPUT_SPLIT ? 2 : 1;
+    GLint most = 0;
+    glGetIntegerv(GL_MAX_DRAW_BUFFERS, &most);
+    for (int i = 0; i < most; i++) {
+        if ((draw_buffer(i) != GL_NONE) != (i < wanted)) {
+            return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
+                           "nebel_gl_draw_fog: draw buffer %d is%s GL_NONE, this output writes %d draw buffer%s; see "
+                           "glDrawBuffers",
+                           i, i < wanted ? "" : " not", wanted, wanted == 1 ? "" : "s");
+        }
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_feedback(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    GLint type = GL_NONE, name = 0;
+    const GLint buffer = draw_buffer(0);
+    if (pass->output != NEBEL_GL_OUTPUT_COMPOSE || buffer < GL_COLOR_ATTACHMENT0) return NEBEL_OK;
+    glGetFramebufferAttachmentParameteriv(GL_DRAW_FRAMEBUFFER, (GLenum)buffer, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE,
+                                          &type);
+    if (type != GL_TEXTURE) return NEBEL_OK;
+    glGetFramebufferAttachmentParameteriv(GL_DRAW_FRAMEBUFFER, (GLenum)buffer, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_NAME,
+                                          &name);
+    if ((unsigned)name != pass->color_texture) return NEBEL_OK;
+    return fail(gl, NEBEL_ERROR_ARGUMENT,
+                "the color texture is the target, too; draw into another texture, or use NEBEL_GL_OUTPUT_BLEND");
+}
+
+static nebel_result check_framebuffer(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    const GLenum status = glCheckFramebufferStatus(GL_DRAW_FRAMEBUFFER);
+    if (status != GL_FRAMEBUFFER_COMPLETE) {
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
+                       "nebel_gl_draw_fog: the draw framebuffer is not complete (status 0x%x); bind the target first",
+                       status);
+    }
+    const nebel_result result = check_draw_buffers(gl, pass);
+    return result == NEBEL_OK ? check_feedback(gl, pass) : result;
+}
+
+static nebel_result check_pass(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    nebel_result result = check_output(gl, pass);
+    if (result == NEBEL_OK) result = check_texture(gl, pass->depth_texture, "depth");
+    if (result == NEBEL_OK && pass->output == NEBEL_GL_OUTPUT_COMPOSE) {
+        result = check_texture(gl, pass->color_texture, "color");
+    }
+    return result == NEBEL_OK ? check_framebuffer(gl, pass) : result;
+}
+
+/* ---- drawing -------------------------------------------------------------------------------------------------------
+ */
+
+/* The host's state is saved around this. */
+typedef struct task {
+    nebel_gl *gl;
+    const nebel_gl_pass *pass;
+    nebel_rays rays;
+    const nb_program *program;
+} task;
+
+static void bind_texture(const nebel_gl *gl, GLuint unit, GLenum target, unsigned texture)
+{
+    glActiveTexture(GL_TEXTURE0 + unit);
+    glBindTexture(target, texture);
+    glBindSampler(unit, gl->sampler);
+}
+
+static nebel_result bind_textures(const task *t)
+{
+    const nebel_gl *const gl = t->gl;
+    const GLenum target = t->pass->samples > 1 ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D;
+    if (gl->fog.texture != 0) bind_texture(gl, NB_UNIT_FOG, GL_TEXTURE_2D, gl->fog.texture);
+    if (gl->fog.block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, gl->fog.block);
+    if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
+    bind_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
+    const nebel_result result = check_size(gl, t->pass, target, "depth");
+    if (result != NEBEL_OK || t->pass->output != NEBEL_GL_OUTPUT_COMPOSE) return result;
+    bind_texture(gl, NB_UNIT_COLOR, target, t->pass->color_texture);
+    return check_size(gl, t->pass, target, "color");
+}
+
+/* A framebuffer of nothing, which older OpenGL finds complete only where no buffer is drawn to or read. */
+static void make_framebuffer(nebel_gl *gl)
+{
+    GLint reading = 0;
+    glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &reading);
+    glGenFramebuffers(1, &gl->framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, gl->framebuffer);
+    glDrawBuffer(GL_NONE);
+    glReadBuffer(GL_NONE);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, (GLuint)reading);
+}
+
+/* Where in a pixel the samples of the depth texture are. Only the draw framebuffer can be asked. */
+static void read_places(nebel_gl *gl, const nebel_gl_pass *pass, GLfloat places[NB_SAMPLES_MOST][2])
+{
+    const GLenum attachments[] = {GL_DEPTH_ATTACHMENT, GL_COLOR_ATTACHMENT0};
+    int known = 0;
+    if (gl->framebuffer == 0) make_framebuffer(gl);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, gl->framebuffer);
+    for (int kind = 0; kind < 2 && !known; kind++) {
+        glFramebufferTexture(GL_DRAW_FRAMEBUFFER, attachments[kind], pass->depth_texture, 0);
+        known = glCheckFramebufferStatus(GL_DRAW_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+        for (GLuint i = 0; i < pass->samples && known; i++) glGetMultisamplefv(GL_SAMPLE_POSITION, i, places[i]);
+        glFramebufferTexture(GL_DRAW_FRAMEBUFFER, attachments[kind], 0, 0);
+    }
+    for (GLuint i = 0; i < pass->samples && !known; i++) places[i][0] = places[i][1] = .5f;
+}
+
+static void set_samples(const task *t, GLuint target_framebuffer)
+{
+    GLfloat places[NB_SAMPLES_MOST][2] = {{0}};
+    read_places(t->gl, t->pass, places);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_framebuffer);
+    glUniform1i(t->program->sample_count, (GLint)t->pass->samples);
+    glUniform2fv(t->program->sample_places, (GLsizei)t->pass->samples, places[0]);
+}
+
+static void set_uniforms(const task *t, GLuint target_framebuffer)
+{
+    const nb_program *const p = t->program;
+    glUniform4fv(p->rays, NEBEL_RAY_WORDS, t->rays.words[0].v);
+    glUniform2i(p->corner, (GLint)t->pass->x, (GLint)t->pass->y);
+    if (t->gl->fog.tiles != 0) glUniform2i(p->tiling, NB_GL_TILE_SHIFT, (GLint)t->gl->fog.tile_columns);
+    if (t->pass->samples > 1) set_samples(t, target_framebuffer);
+}
+
+static nebel_result draw(const task *t, GLuint target_framebuffer)
+{
+    const nb_context *const context = &t->gl->context;
+    const nebel_result result = bind_textures(t);
+    if (result != NEBEL_OK) return result;
+    nb_state_clear(context, t->pass->x, t->pass->y, t->gl->view.width, t->gl->view.height);
+    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND) nb_state_blend(context, GL_SRC1_COLOR);
+    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GREY) nb_state_blend(context, GL_SRC_ALPHA);
+    glUseProgram(t->program->name);
+    glBindVertexArray(t->gl->vertex_array);
+    set_uniforms(t, target_framebuffer);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    return NEBEL_OK;
+}
+
+static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
+{
+    nebel_gl *const gl = t->gl;
+    const nb_program_kind kind = {.in_texture = gl->fog.texture != 0,
+                                  .tiled = gl->fog.tiles != 0,
+                                  .multisampled = t->pass->samples > 1,
+                                  .output = t->pass->output,
+                                  .features = gl->fog.features};
+    const nebel_result result =
+        nb_programs_find(&gl->programs, &gl->context, &gl->allocator, &gl->log, &kind, &t->program);
+    return result == NEBEL_OK ? draw(t, target_framebuffer) : result;
+}
+
+nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (pass == NULL) return fail(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
+    if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
+    nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
+    if (result == NEBEL_OK) result = check_pass(gl, pass);
+    if (result != NEBEL_OK) return result;
+    task t = {.gl = gl, .pass = pass};
+    if (nebel_view_rays(&gl->view, &pass->depth, &t.rays) != NEBEL_OK) {
+        return fail(gl, NEBEL_ERROR_ARGUMENT, "the depth convention is none, or does not fit the view's projection");
+    }
+    nb_state state;
+    nb_state_save(&gl->context, &state);
+    result = draw_with_program(&t, (GLuint)state.framebuffer);
+    nb_state_restore(&gl->context, &state);
+    return result;
+}

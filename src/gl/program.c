@@ -1,0 +1,225 @@
+#include "program.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+#include <string.h>
+
+/* One triangle that covers the picture. */
+static const char vertex_text[] =
+    "void main()\n"
+    "{\n"
+    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
+    "}\n";
+
+/* Behind the shader text. Texels are fetched by number, so that no filter and no coordinate of the host matters. */
+static const char fragment_text[] =
+    "uniform ivec2 pass_corner;\n"
+    "#ifdef NEBEL_TILES\n"
+    "uniform ivec2 pass_tiling;\n" /* the logarithm of the size, and how many in a row */
+    "#endif\n"
+    "#ifdef PASS_MULTISAMPLED\n"
+    "uniform highp sampler2DMS pass_depth;\n"
+    "uniform int pass_sample_count;\n"
+    "uniform vec2 pass_sample_places[32];\n"
+    "#define PASS_COLOR highp sampler2DMS\n"
+    "#else\n"
+    "uniform highp sampler2D pass_depth;\n"
+    "#define PASS_COLOR highp sampler2D\n"
+    "#endif\n"
+    "#ifdef PASS_COMPOSE\n"
+    "uniform PASS_COLOR pass_color;\n"
+    "#endif\n"
+    "layout(location = 0 PASS_FIRST) out highp vec4 pass_first;\n"
+    "#ifdef PASS_SECOND\n"
+    "layout(location = PASS_SECOND) out highp vec4 pass_second;\n"
+    "#endif\n"
+    "\n"
+    "nebel_light pass_fog(vec2 pixel, float depth)\n"
+    "{\n"
+    "    nebel_sight sight = nebel_see(pixel, depth);\n"
+    "#ifdef NEBEL_TILES\n"
+    "    ivec2 tile = ivec2(pixel) >> pass_tiling.x;\n"
+    "    int entry = 2 * (tile.x + tile.y * pass_tiling.y);\n"
+    "    return nebel_trace_list(sight.origin, sight.direction, sight.t_max, NEBEL_INDEX(entry), NEBEL_INDEX(entry + "
+    "1));\n"
+    "#else\n"
+    "    return nebel_trace(sight.origin, sight.direction, sight.t_max);\n"
+    "#endif\n"
+    "}\n"
+    "\n"
+    "void pass_write(vec3 transmittance, vec3 in_scattering, vec4 composed)\n"
+    "{\n"
+    "#ifdef PASS_COMPOSE\n"
+    "    pass_first = composed;\n"
+    "#elif defined(PASS_SECOND)\n"
+    "    pass_first = vec4(in_scattering, 1.0);\n"
+    "    pass_second = vec4(transmittance, 1.0);\n"
+    "#else\n"
+    "    pass_first = vec4(in_scattering, dot(transmittance, vec3(1.0 / 3.0)));\n"
+    "#endif\n"
+    "}\n"
+    "\n"
+    "vec4 pass_over(nebel_light fog, ivec2 texel, int s)\n"
+    "{\n"
+    "#ifdef PASS_COMPOSE\n"
+    "    vec4 color = texelFetch(pass_color, texel, s);\n"
+    "    return vec4(fog.transmittance * color.rgb + fog.in_scattering, color.a);\n"
+    "#else\n"
+    "    return vec4(0.0);\n"
+    "#endif\n"
+    "}\n"
+    "\n"
+    "void main()\n"
+    "{\n"
+    "    ivec2 texel = ivec2(gl_FragCoord.xy);\n"
+    "    vec2 low = vec2(texel - pass_corner);\n"
+    "#ifdef PASS_MULTISAMPLED\n"
+    "    vec3 transmittance = vec3(0.0), in_scattering = vec3(0.0);\n"
+    "    vec4 composed = vec4(0.0);\n"
+    "    for (int s = 0; s < pass_sample_count; s++) {\n"
+    "        nebel_light fog = pass_fog(low + pass_sample_places[s], texelFetch(pass_depth, texel, s).x);\n"
+    "        transmittance += fog.transmittance;\n"
+    "        in_scattering += fog.in_scattering;\n"
+    "        composed += pass_over(fog, texel, s);\n"
+    "    }\n"
+    "    float share = 1.0 / float(pass_sample_count);\n"
+    "    pass_write(share * transmittance, share * in_scattering, share * composed);\n"
+    "#else\n"
+    "    nebel_light fog = pass_fog(low + 0.5, texelFetch(pass_depth, texel, 0).x);\n"
+    "    pass_write(fog.transmittance, fog.in_scattering, pass_over(fog, texel, 0));\n"
+    "#endif\n"
+    "}\n";
+
+/* What comes before the shader text. */
+static void write_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
+{
+    const char *const output[NEBEL_GL_OUTPUT_COUNT] = {
+        [NEBEL_GL_OUTPUT_COMPOSE] = "#define PASS_COMPOSE\n#define PASS_FIRST\n",
+        [NEBEL_GL_OUTPUT_SPLIT] = "#define PASS_FIRST\n#define PASS_SECOND 1\n",
+        [NEBEL_GL_OUTPUT_BLEND] = "#define PASS_FIRST , index = 0\n#define PASS_SECOND 0, index = 1\n",
+        [NEBEL_GL_OUTPUT_BLEND_GREY] = "#define PASS_FIRST\n",
+    };
+    const int extended = kind->output == NEBEL_GL_OUTPUT_BLEND && context->dual_source == 2;
+    (void)snprintf(text, size, "%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_FEATURES %u\n",
+                   context->es ? "#version 300 es\n" : "#version 330 core\n",
+                   extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
+                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+                   kind->multisampled ? "#define PASS_MULTISAMPLED\n" : "", output[kind->output],
+                   (unsigned)kind->features);
+}
+
+/* A message is one line. */
+static void flatten(char *text)
+{
+    for (; *text != '\0'; text++) {
+        if (*text == '\n' || *text == '\r') *text = text[1] != '\0' ? ';' : '\0';
+    }
+}
+
+static nebel_result refuse(const nebel_log *log, const char *what, char *words)
+{
+    flatten(words);
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                   "OpenGL: the driver (%s, %s) does not %s; a newer driver may. It says: %s",
+                   (const char *)glGetString(GL_RENDERER), (const char *)glGetString(GL_VERSION), what,
+                   words[0] != '\0' ? words : "nothing");
+}
+
+static nebel_result compile(const nebel_log *log, unsigned kind, int count, const char *const *texts, unsigned *shader)
+{
+    GLint good = 0;
+    *shader = glCreateShader(kind);
+    glShaderSource(*shader, count, texts, NULL);
+    glCompileShader(*shader);
+    glGetShaderiv(*shader, GL_COMPILE_STATUS, &good);
+    if (good) return NEBEL_OK;
+    char words[768] = "";
+    glGetShaderInfoLog(*shader, sizeof words, NULL, words);
+    glDeleteShader(*shader);
+    *shader = 0;
+    return refuse(log, kind == GL_VERTEX_SHADER ? "compile nebel's vertex shader" : "compile nebel's fragment shader",
+                  words);
+}
+
+static nebel_result link(const nebel_log *log, unsigned vertex, unsigned fragment, unsigned *name)
+{
+    GLint good = 0;
+    *name = glCreateProgram();
+    glAttachShader(*name, vertex);
+    glAttachShader(*name, fragment);
+    glLinkProgram(*name);
+    glGetProgramiv(*name, GL_LINK_STATUS, &good);
+    glDetachShader(*name, vertex);
+    glDetachShader(*name, fragment);
+    if (good) return NEBEL_OK;
+    char words[768] = "";
+    glGetProgramInfoLog(*name, sizeof words, NULL, words);
+    glDeleteProgram(*name);
+    *name = 0;
+    return refuse(log, "link nebel's shaders", words);
+}
+
+static void set_uniforms(nb_program *program)
+{
+    const unsigned name = program->name, block = glGetUniformBlockIndex(name, "nebel_fog_block");
+    if (block != GL_INVALID_INDEX) glUniformBlockBinding(name, block, 0);
+    program->rays = glGetUniformLocation(name, "nebel_rays");
+    program->corner = glGetUniformLocation(name, "pass_corner");
+    program->tiling = glGetUniformLocation(name, "pass_tiling");
+    program->sample_count = glGetUniformLocation(name, "pass_sample_count");
+    program->sample_places = glGetUniformLocation(name, "pass_sample_places");
+    glUseProgram(name);
+    glUniform1i(glGetUniformLocation(name, "nebel_fog_texture"), NB_UNIT_FOG);
+    glUniform1i(glGetUniformLocation(name, "nebel_tile_texture"), NB_UNIT_TILES);
+    glUniform1i(glGetUniformLocation(name, "pass_depth"), NB_UNIT_DEPTH);
+    glUniform1i(glGetUniformLocation(name, "pass_color"), NB_UNIT_COLOR);
+}
+
+static nebel_result make(const nb_context *context, const nebel_log *log, const nb_program_kind *kind,
+                         nb_program *program)
+{
+    char head[512];
+    unsigned vertex = 0, fragment = 0;
+    write_head(context, kind, head, sizeof head);
+    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const char *const vertex_texts[] = {context->es ? "#version 300 es\n" : "#version 330 core\n", vertex_text};
+    const char *const fragment_texts[] = {head, fog, fragment_text};
+    *program = (nb_program){.kind = *kind};
+    nebel_result result = compile(log, GL_VERTEX_SHADER, 2, vertex_texts, &vertex);
+    if (result == NEBEL_OK) result = compile(log, GL_FRAGMENT_SHADER, 3, fragment_texts, &fragment);
+    if (result == NEBEL_OK) result = link(log, vertex, fragment, &program->name);
+    glDeleteShader(vertex);
+    glDeleteShader(fragment);
+    if (result == NEBEL_OK) set_uniforms(program);
+    return result;
+}
+
+static int is_same(const nb_program_kind *a, const nb_program_kind *b)
+{
+    return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
+           a->output == b->output && a->features == b->features;
+}
+
+nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,
+                              const nebel_log *log, const nb_program_kind *kind, const nb_program **program)
+{
+    for (size_t i = 0; i < programs->count; i++) {
+        *program = &programs->list[i];
+        if (is_same(&programs->list[i].kind, kind)) return NEBEL_OK;
+    }
+    void *list = programs->list;
+    if (!nb_grow(allocator, &list, sizeof *programs->list, programs->count, &programs->capacity, programs->count + 1)) {
+        return nb_fail(log, NEBEL_ERROR_MEMORY, "nebel_gl_draw_fog: out of memory");
+    }
+    programs->list = list;
+    nb_program *const made = &programs->list[programs->count];
+    const nebel_result result = make(context, log, kind, made);
+    if (result == NEBEL_OK) programs->count++;
+    *program = made;
+    return result;
+}
+
+void nb_programs_delete(const nb_programs *programs)
+{
+    for (size_t i = 0; i < programs->count; i++) glDeleteProgram(programs->list[i].name);
+}

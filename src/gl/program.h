@@ -1,0 +1,39 @@
+/* The programs of the passes: one for each way in which fog is stored and light goes out, made when first needed. */
+#ifndef NB_GL_PROGRAM_H
+#define NB_GL_PROGRAM_H
+
+#include "context.h"
+
+#include <nebel/gl.h>
+
+/* Texture units of the samplers in a program. */
+enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_DEPTH, NB_UNIT_COLOR };
+
+enum { NB_SAMPLES_MOST = 32 };
+
+typedef struct nb_program_kind {
+    int in_texture, tiled, multisampled;
+    nebel_gl_output output;
+    uint32_t features; /* of the fog: what the text leaves out makes it faster */
+} nb_program_kind;
+
+typedef struct nb_program {
+    nb_program_kind kind;
+    unsigned name;
+    int rays, corner, tiling, sample_count, sample_places; /* where its uniforms are; -1: it has none such */
+} nb_program;
+
+typedef struct nb_programs {
+    nb_program *list;
+    size_t count, capacity;
+} nb_programs;
+
+/* Finds the program, or compiles and links it, which changes the current program. It stays where it is until the next
+ * call. UNSUPPORTED with the driver's words where it refuses; MEMORY. */
+nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,
+                              const nebel_log *log, const nb_program_kind *kind, const nb_program **program);
+
+/* Deletes them in OpenGL. */
+void nb_programs_delete(const nb_programs *programs);
+
+#endif

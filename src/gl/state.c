@@ -1,0 +1,271 @@
+#include "state.h"
+
+/* Which contexts know a switch. */
+typedef enum nb_known { EVERYWHERE, DESKTOP, SAMPLE_MASKS, DEPTH_BOUNDS } nb_known;
+
+static const struct {
+    GLenum name;
+    nb_known known;
+} switches[] = {
+    {GL_STENCIL_TEST, EVERYWHERE},
+    {GL_DEPTH_TEST, EVERYWHERE},
+    {GL_CULL_FACE, EVERYWHERE},
+    {GL_RASTERIZER_DISCARD, EVERYWHERE},
+    {GL_SAMPLE_COVERAGE, EVERYWHERE},
+    {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
+    {GL_SAMPLE_MASK, SAMPLE_MASKS},
+    {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP},
+    {GL_COLOR_LOGIC_OP, DESKTOP},
+    {GL_POLYGON_SMOOTH, DESKTOP},
+    {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
+};
+enum { SWITCHES = sizeof switches / sizeof *switches };
+
+static const GLenum blending_names[NB_STATE_BLENDING] = {GL_BLEND_SRC_RGB,      GL_BLEND_DST_RGB,
+                                                         GL_BLEND_SRC_ALPHA,    GL_BLEND_DST_ALPHA,
+                                                         GL_BLEND_EQUATION_RGB, GL_BLEND_EQUATION_ALPHA};
+
+/* The last two are of OpenGL alone. */
+static const GLenum unpack_names[NB_STATE_UNPACK] = {GL_UNPACK_ALIGNMENT,   GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS,
+                                                     GL_UNPACK_SKIP_PIXELS, GL_UNPACK_SWAP_BYTES, GL_UNPACK_LSB_FIRST};
+
+static int knows(const nb_context *c, nb_known known)
+{
+    switch (known) {
+    case DESKTOP:
+        return !c->es;
+    case SAMPLE_MASKS:
+        return c->sample_mask;
+    case DEPTH_BOUNDS:
+        return c->depth_bounds;
+    default:
+        return 1;
+    }
+}
+
+static void set_switch(GLenum name, int on)
+{
+    if (on) {
+        glEnable(name);
+    } else {
+        glDisable(name);
+    }
+}
+
+static void set_indexed_switch(int by_index, GLenum name, GLuint index, int on)
+{
+    if (!by_index) {
+        if (index == 0) set_switch(name, on);
+    } else if (on) {
+        glEnablei(name, index);
+    } else {
+        glDisablei(name, index);
+    }
+}
+
+static GLboolean indexed_switch(int by_index, GLenum name, GLuint index)
+{
+    return by_index ? glIsEnabledi(name, index) : glIsEnabled(name);
+}
+
+/* ---- reading -------------------------------------------------------------------------------------------------------
+ */
+
+static void save_units(const nb_context *c, nb_state *s)
+{
+    glGetIntegerv(GL_ACTIVE_TEXTURE, &s->active_unit);
+    for (int i = 0; i < NB_STATE_UNITS; i++) {
+        glActiveTexture((GLenum)(GL_TEXTURE0 + i));
+        glGetIntegerv(GL_TEXTURE_BINDING_2D, &s->units[i].texture);
+        if (!c->es) glGetIntegerv(GL_TEXTURE_BINDING_2D_MULTISAMPLE, &s->units[i].multisample);
+        glGetIntegerv(GL_SAMPLER_BINDING, &s->units[i].sampler);
+    }
+}
+
+static void save_block(nb_state *s)
+{
+    glGetIntegerv(GL_UNIFORM_BUFFER_BINDING, &s->uniform_buffer);
+    glGetIntegeri_v(GL_UNIFORM_BUFFER_BINDING, 0, &s->block);
+    glGetInteger64i_v(GL_UNIFORM_BUFFER_START, 0, &s->block_start);
+    glGetInteger64i_v(GL_UNIFORM_BUFFER_SIZE, 0, &s->block_size);
+}
+
+static void save_switches(const nb_context *c, nb_state *s)
+{
+    s->switches = s->clip_distances = 0;
+    for (unsigned i = 0; i < SWITCHES; i++) {
+        if (knows(c, switches[i].known) && glIsEnabled(switches[i].name)) s->switches |= 1u << i;
+    }
+    for (int i = 0; i < c->clip_distances; i++) {
+        if (glIsEnabled((GLenum)(GL_CLIP_DISTANCE0 + i))) s->clip_distances |= 1u << i;
+    }
+    s->scissor = indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, 0);
+}
+
+static void save_buffers(const nb_context *c, nb_state *s)
+{
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
+        s->blend[i] = indexed_switch(c->switches_by_buffer, GL_BLEND, i);
+        if (c->switches_by_buffer) {
+            glGetBooleani_v(GL_COLOR_WRITEMASK, i, s->mask[i]);
+        } else {
+            glGetBooleanv(GL_COLOR_WRITEMASK, s->mask[i]);
+        }
+    }
+    for (int i = 0; i < NB_STATE_BLENDING; i++) {
+        if (c->blending_by_buffer) {
+            glGetIntegeri_v(blending_names[i], 0, &s->blending[i]);
+        } else {
+            glGetIntegerv(blending_names[i], &s->blending[i]);
+        }
+    }
+}
+
+void nb_state_save(const nb_context *c, nb_state *s)
+{
+    glGetIntegerv(GL_CURRENT_PROGRAM, &s->program);
+    glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &s->vertex_array);
+    glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &s->framebuffer);
+    save_units(c, s);
+    save_block(s);
+    save_switches(c, s);
+    save_buffers(c, s);
+    if (c->viewport_arrays) {
+        glGetFloati_v(GL_VIEWPORT, 0, s->viewport);
+    } else {
+        glGetFloatv(GL_VIEWPORT, s->viewport);
+    }
+    if (!c->es) glGetIntegerv(GL_POLYGON_MODE, s->polygon_mode);
+}
+
+/* ---- writing -------------------------------------------------------------------------------------------------------
+ */
+
+static void restore_units(const nb_context *c, const nb_state *s)
+{
+    for (int i = 0; i < NB_STATE_UNITS; i++) {
+        glActiveTexture((GLenum)(GL_TEXTURE0 + i));
+        glBindTexture(GL_TEXTURE_2D, (GLuint)s->units[i].texture);
+        if (!c->es) glBindTexture(GL_TEXTURE_2D_MULTISAMPLE, (GLuint)s->units[i].multisample);
+        glBindSampler((GLuint)i, (GLuint)s->units[i].sampler);
+    }
+    glActiveTexture((GLenum)s->active_unit);
+}
+
+/* Size 0 says that the whole buffer is bound. */
+static void restore_block(const nb_state *s)
+{
+    if (s->block_size > 0) {
+        glBindBufferRange(GL_UNIFORM_BUFFER, 0, (GLuint)s->block, (GLintptr)s->block_start, (GLsizeiptr)s->block_size);
+    } else {
+        glBindBufferBase(GL_UNIFORM_BUFFER, 0, (GLuint)s->block);
+    }
+    glBindBuffer(GL_UNIFORM_BUFFER, (GLuint)s->uniform_buffer);
+}
+
+static void set_switches(const nb_context *c, uint32_t on, uint32_t clip_distances, int scissor)
+{
+    for (unsigned i = 0; i < SWITCHES; i++) {
+        if (knows(c, switches[i].known)) set_switch(switches[i].name, on >> i & 1);
+    }
+    for (int i = 0; i < c->clip_distances; i++) set_switch((GLenum)(GL_CLIP_DISTANCE0 + i), clip_distances >> i & 1);
+    set_indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, 0, scissor);
+}
+
+static void set_mask(const nb_context *c, GLuint buffer, const GLboolean mask[4])
+{
+    if (c->switches_by_buffer) {
+        glColorMaski(buffer, mask[0], mask[1], mask[2], mask[3]);
+    } else if (buffer == 0) {
+        glColorMask(mask[0], mask[1], mask[2], mask[3]);
+    }
+}
+
+static void set_blending(const nb_context *c, const GLint b[NB_STATE_BLENDING])
+{
+    if (c->blending_by_buffer) {
+        glBlendFuncSeparatei(0, (GLenum)b[0], (GLenum)b[1], (GLenum)b[2], (GLenum)b[3]);
+        glBlendEquationSeparatei(0, (GLenum)b[4], (GLenum)b[5]);
+    } else {
+        glBlendFuncSeparate((GLenum)b[0], (GLenum)b[1], (GLenum)b[2], (GLenum)b[3]);
+        glBlendEquationSeparate((GLenum)b[4], (GLenum)b[5]);
+    }
+}
+
+static void set_viewport(const nb_context *c, const GLfloat v[4])
+{
+    if (c->viewport_arrays) {
+        glViewportIndexedfv(0, v);
+    } else {
+        glViewport((GLint)v[0], (GLint)v[1], (GLsizei)v[2], (GLsizei)v[3]);
+    }
+}
+
+/* Core profiles have one mode for both faces. */
+void nb_state_restore(const nb_context *c, const nb_state *s)
+{
+    glUseProgram((GLuint)s->program);
+    glBindVertexArray((GLuint)s->vertex_array);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, (GLuint)s->framebuffer);
+    restore_units(c, s);
+    restore_block(s);
+    set_switches(c, s->switches, s->clip_distances, s->scissor);
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
+        set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, s->blend[i]);
+        set_mask(c, i, s->mask[i]);
+    }
+    set_blending(c, s->blending);
+    set_viewport(c, s->viewport);
+    if (!c->es) glPolygonMode(GL_FRONT_AND_BACK, (GLenum)s->polygon_mode[0]);
+}
+
+void nb_state_clear(const nb_context *c, uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+    const GLfloat viewport[4] = {(GLfloat)x, (GLfloat)y, (GLfloat)width, (GLfloat)height};
+    const GLboolean all[4] = {GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE};
+    set_switches(c, 0, 0, 0);
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
+        set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, 0);
+        set_mask(c, i, all);
+    }
+    set_viewport(c, viewport);
+    if (!c->es) glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+}
+
+void nb_state_blend(const nb_context *c, GLenum factor)
+{
+    const GLint blending[NB_STATE_BLENDING] = {GL_ONE, (GLint)factor, GL_ZERO, GL_ONE, GL_FUNC_ADD, GL_FUNC_ADD};
+    set_indexed_switch(c->switches_by_buffer, GL_BLEND, 0, 1);
+    set_blending(c, blending);
+}
+
+/* ---- uploads -------------------------------------------------------------------------------------------------------
+ */
+
+static int unpack_count(const nb_context *c)
+{
+    return c->es ? NB_STATE_UNPACK - 2 : NB_STATE_UNPACK;
+}
+
+void nb_state_save_unpacking(const nb_context *c, nb_unpacking *u)
+{
+    glGetIntegerv(GL_ACTIVE_TEXTURE, &u->active_unit);
+    glActiveTexture(GL_TEXTURE0);
+    glGetIntegerv(GL_TEXTURE_BINDING_2D, &u->texture);
+    glGetIntegerv(GL_PIXEL_UNPACK_BUFFER_BINDING, &u->buffer);
+    glGetIntegerv(GL_UNIFORM_BUFFER_BINDING, &u->uniform_buffer);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+    for (int i = 0; i < unpack_count(c); i++) {
+        glGetIntegerv(unpack_names[i], &u->parameters[i]);
+        glPixelStorei(unpack_names[i], i == 0 ? 4 : 0);
+    }
+}
+
+void nb_state_restore_unpacking(const nb_context *c, const nb_unpacking *u)
+{
+    for (int i = 0; i < unpack_count(c); i++) glPixelStorei(unpack_names[i], u->parameters[i]);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, (GLuint)u->buffer);
+    glBindBuffer(GL_UNIFORM_BUFFER, (GLuint)u->uniform_buffer);
+    glBindTexture(GL_TEXTURE_2D, (GLuint)u->texture);
+    glActiveTexture((GLenum)u->active_unit);
+}

@@ -1,0 +1,47 @@
+/* The state of the context that nebel changes, kept and put back. nebel/gl.h has the list in words. */
+#ifndef NB_GL_STATE_H
+#define NB_GL_STATE_H
+
+#include "context.h"
+
+#include <epoxy/gl.h>
+
+enum { NB_STATE_UNITS = 4, NB_STATE_BUFFERS = 2, NB_STATE_UNPACK = 6, NB_STATE_BLENDING = 6 };
+
+typedef struct nb_unit {
+    GLint texture, multisample, sampler;
+} nb_unit;
+
+/* For drawing. */
+typedef struct nb_state {
+    GLint program, vertex_array, active_unit, framebuffer;
+    nb_unit units[NB_STATE_UNITS];
+    GLint uniform_buffer, block;
+    GLint64 block_start, block_size;
+    GLfloat viewport[4];
+    uint32_t switches, clip_distances; /* bits: which were on */
+    GLboolean scissor, blend[NB_STATE_BUFFERS], mask[NB_STATE_BUFFERS][4];
+    GLint polygon_mode[2];
+    GLint blending[NB_STATE_BLENDING];
+} nb_state;
+
+/* For uploads. */
+typedef struct nb_unpacking {
+    GLint active_unit, texture, buffer, uniform_buffer;
+    GLint parameters[NB_STATE_UNPACK];
+} nb_unpacking;
+
+void nb_state_save(const nb_context *context, nb_state *state);
+void nb_state_restore(const nb_context *context, const nb_state *state);
+
+/* Everything that would keep fragments away or change them is switched off; fragments cover the rectangle alone. */
+void nb_state_clear(const nb_context *context, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
+
+/* Blending of draw buffer 0: source + target * factor, alpha of the target as it is. */
+void nb_state_blend(const nb_context *context, GLenum factor);
+
+/* Unit 0 is active afterwards, and memory is read as C arrays lie. */
+void nb_state_save_unpacking(const nb_context *context, nb_unpacking *unpacking);
+void nb_state_restore_unpacking(const nb_context *context, const nb_unpacking *unpacking);
+
+#endif

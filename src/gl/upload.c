@@ -1,0 +1,189 @@
+/* The fog of a frame, packed and handed to OpenGL. */
+#include "gl.h"
+#include "state.h"
+
+enum { TILE_SIZE = 1 << NB_GL_TILE_SHIFT, FEW_VOLUMES = 8 };
+
+/* ---- packing -------------------------------------------------------------------------------------------------------
+ */
+
+/* Whole rows of the texture, so that one call uploads all. What lies behind the last word is never read. */
+static size_t whole_rows(size_t count)
+{
+    return (count + NEBEL_TEXTURE_WIDTH - 1) / NEBEL_TEXTURE_WIDTH * NEBEL_TEXTURE_WIDTH;
+}
+
+/* Makes an array of at least `count` elements of what it was, without keeping its contents. 0 on failure. */
+static int make_room(nebel_gl *gl, void **array, size_t size, size_t count, size_t *capacity)
+{
+    if (count <= *capacity) return 1;
+    const size_t wanted = whole_rows(count + count / 2);
+    nb_release(&gl->allocator, *array);
+    *array = nb_allocate_zero(&gl->allocator, wanted, size);
+    *capacity = *array != NULL ? wanted : 0;
+    return *array != NULL;
+}
+
+static nebel_result out_of_memory(const nebel_gl *gl)
+{
+    return nb_fail(&gl->log, NEBEL_ERROR_MEMORY, "nebel_gl_set_fog: out of memory");
+}
+
+static nebel_result pack(nebel_gl *gl, const nebel_snapshot *snapshot)
+{
+    size_t count = 0;
+    nebel_result result = nebel_pack_fog(snapshot, gl->fog.eye, NULL, 0, &count);
+    if (result != NEBEL_OK) {
+        return nb_fail(&gl->log, result, "nebel_gl_set_fog: the fog cannot be packed: %s", nebel_result_text(result));
+    }
+    void *words = gl->words;
+    const int room = make_room(gl, &words, sizeof *gl->words, count, &gl->word_capacity);
+    gl->words = words;
+    if (!room) return out_of_memory(gl);
+    gl->fog.word_count = count;
+    return nebel_pack_fog(snapshot, gl->fog.eye, gl->words, gl->word_capacity, &count);
+}
+
+/* The lists of the last frame tell how much room this one's need; where it is more they are made once again. */
+static nebel_result list_tiles(nebel_gl *gl, const nebel_snapshot *snapshot, size_t *count)
+{
+    for (;;) {
+        const nebel_result result =
+            nebel_tile_volumes(snapshot, &gl->view, TILE_SIZE, gl->entries, gl->entry_capacity, count);
+        if (result == NEBEL_OK && *count <= gl->entry_capacity) return result;
+        if (*count <= gl->entry_capacity) {
+            return nb_fail(&gl->log, result, "nebel_gl_set_fog: the volumes of the tiles cannot be listed: %s",
+                           nebel_result_text(result));
+        }
+        void *entries = gl->entries;
+        const int room = make_room(gl, &entries, sizeof *gl->entries, *count, &gl->entry_capacity);
+        gl->entries = entries;
+        if (!room) return out_of_memory(gl);
+    }
+}
+
+/* ---- textures ------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct texel_kind {
+    GLenum internal, format, type;
+    const char *what;
+} texel_kind;
+
+static const texel_kind word_texels = {GL_RGBA32F, GL_RGBA, GL_FLOAT, "the texture of packed fog"};
+static const texel_kind entry_texels = {GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, "the texture of volumes per tile"};
+
+static void make_texture(unsigned *name)
+{
+    glGenTextures(1, name);
+    glBindTexture(GL_TEXTURE_2D, *name);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+}
+
+/* `rows` grows by half at least, so that fog that grows slowly seldom allocates. */
+static nebel_result grow_texture(const nebel_gl *gl, const texel_kind *kind, uint32_t needed, uint32_t *rows)
+{
+    const uint32_t half_more = needed + needed / 2;
+    const uint32_t wanted = half_more < gl->context.widest ? half_more : gl->context.widest;
+    glTexImage2D(GL_TEXTURE_2D, 0, (GLint)kind->internal, NEBEL_TEXTURE_WIDTH, (GLsizei)wanted, 0, kind->format,
+                 kind->type, NULL);
+    const nebel_result result = nb_context_check_memory(&gl->log, kind->what);
+    *rows = result == NEBEL_OK ? wanted : 0;
+    return result;
+}
+
+static nebel_result fill_texture(const nebel_gl *gl, const texel_kind *kind, const void *texels, size_t count,
+                                 unsigned *name, uint32_t *rows)
+{
+    const size_t needed = whole_rows(count) / NEBEL_TEXTURE_WIDTH;
+    if (needed > gl->context.widest) {
+        return nb_fail(
+            &gl->log, NEBEL_ERROR_LIMIT,
+            "nebel_gl_set_fog: %s needs %zu rows, this context has %u (GL_MAX_TEXTURE_SIZE); use fewer volumes",
+            kind->what, needed, (unsigned)gl->context.widest);
+    }
+    if (*name == 0) make_texture(name);
+    glBindTexture(GL_TEXTURE_2D, *name);
+    if (needed > *rows) {
+        const nebel_result result = grow_texture(gl, kind, (uint32_t)needed, rows);
+        if (result != NEBEL_OK) return result;
+    }
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, NEBEL_TEXTURE_WIDTH, (GLsizei)needed, kind->format, kind->type, texels);
+    return NEBEL_OK;
+}
+
+/* ---- the frame -----------------------------------------------------------------------------------------------------
+ */
+
+/* Fresh memory each time: the last frame may still be reading the old one. */
+static nebel_result fill_block(nebel_gl *gl)
+{
+    const GLsizeiptr size = NEBEL_BLOCK_WORDS * sizeof(nebel_word);
+    if (gl->block == 0) glGenBuffers(1, &gl->block);
+    glBindBuffer(GL_UNIFORM_BUFFER, gl->block);
+    glBufferData(GL_UNIFORM_BUFFER, size, NULL, GL_STREAM_DRAW);
+    glBufferSubData(GL_UNIFORM_BUFFER, 0, (GLsizeiptr)(gl->fog.word_count * sizeof(nebel_word)), gl->words);
+    return NEBEL_OK;
+}
+
+static nebel_result upload_words(nebel_gl *gl)
+{
+    if (gl->storage == NEBEL_GL_STORAGE_BLOCK_OR_TEXTURE && gl->fog.word_count <= NEBEL_BLOCK_WORDS) {
+        const nebel_result result = fill_block(gl);
+        gl->fog.block = gl->block;
+        return result;
+    }
+    const nebel_result result =
+        fill_texture(gl, &word_texels, gl->words, gl->fog.word_count, &gl->texture, &gl->texture_rows);
+    gl->fog.texture = gl->texture;
+    return result;
+}
+
+static nebel_result upload_tiles(nebel_gl *gl, size_t count)
+{
+    const nebel_result result = fill_texture(gl, &entry_texels, gl->entries, count, &gl->tiles, &gl->tile_rows);
+    gl->fog.tiles = gl->tiles;
+    gl->fog.tile_size = TILE_SIZE;
+    gl->fog.tile_columns = (gl->view.width + TILE_SIZE - 1) / TILE_SIZE;
+    return result;
+}
+
+static nebel_result upload(nebel_gl *gl, size_t entry_count)
+{
+    nb_unpacking unpacking;
+    nb_state_save_unpacking(&gl->context, &unpacking);
+    nebel_result result = upload_words(gl);
+    if (result == NEBEL_OK && entry_count > 0) result = upload_tiles(gl, entry_count);
+    nb_state_restore_unpacking(&gl->context, &unpacking);
+    return result;
+}
+
+nebel_result nebel_gl_set_fog(nebel_gl *gl, const nebel_snapshot *snapshot, const nebel_view *view)
+{
+    if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
+    gl->has_fog = 0;
+    if (view == NULL) return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: the view is missing");
+    nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
+    if (result != NEBEL_OK) return result;
+    nebel_rays rays;
+    if (nebel_view_rays(view, NULL, &rays) != NEBEL_OK) {
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
+                       "nebel_gl_set_fog: %u x %u pixels, and matrices that make no view: sizes are 1 to 65536, all "
+                       "numbers finite, "
+                       "eye_from_world is a rotation and a translation, clip_from_eye a projection",
+                       (unsigned)view->width, (unsigned)view->height);
+    }
+    if (snapshot == NULL) snapshot = gl->empty;
+    gl->view = *view;
+    gl->fog = (nebel_gl_fog){.eye = {rays.eye[0], rays.eye[1], rays.eye[2]}, .features = nebel_pack_features(snapshot)};
+    size_t entry_count = 0;
+    result = pack(gl, snapshot);
+    if (result == NEBEL_OK && nebel_snapshot_volume_count(snapshot) > FEW_VOLUMES) {
+        result = list_tiles(gl, snapshot, &entry_count);
+    }
+    if (result == NEBEL_OK) result = upload(gl, entry_count);
+    gl->has_fog = result == NEBEL_OK;
+    return result;
+}
