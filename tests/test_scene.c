@@ -98,6 +98,21 @@ static void test_a_camera_without_look_at_looks_along_minus_z(void **state)
     nebel_destroy_scene(scene);
 }
 
+/* The numbers: IEC 61966-2-1 in 40 decimal digits. */
+static void test_colors_with_a_hash_are_srgb(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good("{\"nebel\": 1, \"background\": \"#0A0b80\", \"ambient\": \"#fc8\", \"fog\": [{"
+                                    "\"shape\": {\"type\": \"world\"}, \"extinction\": 1, \"albedo\": \"#ffffff\","
+                                    "\"emission\": \"#00F\"}]}");
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_vector(data->background, 0.0030352698354883750, 0.0033465357638991605, 0.21586050011389923);
+    assert_vector(data->ambient, 1, 0.60382733885533748, 0.24620132670783545);
+    assert_vector(data->volumes[0].albedo, 1, 1, 1);
+    assert_vector(data->volumes[0].emission, 0, 0, 1);
+    nebel_destroy_scene(scene);
+}
+
 #define VOLUME(members) "{\"nebel\": 1, \"fog\": [{\"extinction\": 1, " members "}]}"
 
 /* One volume; the scene goes to *scene, to be destroyed. */
@@ -358,6 +373,7 @@ int main(void)
         cmocka_unit_test(test_the_example_of_the_contract),
         cmocka_unit_test(test_what_is_absent_has_its_default),
         cmocka_unit_test(test_a_camera_without_look_at_looks_along_minus_z),
+        cmocka_unit_test(test_colors_with_a_hash_are_srgb),
         cmocka_unit_test(test_all_simple_shapes),
         cmocka_unit_test(test_shapes_are_made_of_shapes),
         cmocka_unit_test(test_all_densities),

@@ -139,7 +139,7 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
            nb_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
            read_counts(json, found, &nebula) && read_profile(json, found[PROFILE], &nebula.profile) &&
            read_sizes(json, found, &nebula) &&
-           nb_value_color(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
+           nb_value_amount(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
            nb_value_color(json, found[EMISSION], &nb_range_not_negative, nebula.emission) &&
            read_colors(in, found[COLORS], &nebula) && try_nebula(in, node, &nebula) && check_total(in, node, &nebula) &&
            keep_nebula(in, node, &nebula, name);

@@ -55,7 +55,7 @@ static bool read_length(nb_json *json, const nb_json_node *node, double contrast
                         double (*convert)(double length, double contrast), double extinction[3])
 {
     double length[3];
-    if (!nb_value_color(json, node, &nb_range_positive, length)) return false;
+    if (!nb_value_amount(json, node, &nb_range_positive, length)) return false;
     for (int i = 0; i < 3; i++) {
         extinction[i] = convert(length[i], contrast);
         if (!isfinite(extinction[i]))
@@ -90,7 +90,7 @@ static bool read_amount(nb_json *json, const nb_json_node *volume, const nb_json
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[CONTRAST],
                                 "belongs to \"visibility\", which is absent");
     if (!nb_value_number(json, found[CONTRAST], &contrast_range, &contrast)) return false;
-    if (found[EXTINCTION] != NULL) return nb_value_color(json, found[EXTINCTION], &nb_range_not_negative, extinction);
+    if (found[EXTINCTION] != NULL) return nb_value_amount(json, found[EXTINCTION], &nb_range_not_negative, extinction);
     if (found[VISIBILITY] != NULL)
         return read_length(json, found[VISIBILITY], contrast, nebel_extinction_from_visibility, extinction);
     return read_length(json, found[MEAN_FREE_PATH], 0, extinction_from_path, extinction);

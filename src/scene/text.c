@@ -48,7 +48,7 @@ bool nb_text_is_clean(const char *text, size_t size, size_t *offset)
     return true;
 }
 
-static int hex_digit(char c)
+int nb_text_hex_digit(char c)
 {
     if (c >= '0' && c <= '9') return c - '0';
     if (c >= 'a' && c <= 'f') return c - 'a' + 10;
@@ -62,7 +62,7 @@ static int32_t escaped_unit(const char *raw, size_t size, size_t at)
     if (size - at < 6 || raw[at] != '\\' || raw[at + 1] != 'u') return -1;
     int32_t unit = 0;
     for (size_t i = 2; i < 6; i++) {
-        const int digit = hex_digit(raw[at + i]);
+        const int digit = nb_text_hex_digit(raw[at + i]);
         if (digit < 0) return -1;
         unit = unit * 16 + digit;
     }

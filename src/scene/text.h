@@ -23,6 +23,9 @@ size_t nb_text_sequence(const char *text, size_t size, size_t at);
  * True when there is none; otherwise *offset says where. */
 bool nb_text_is_clean(const char *text, size_t size, size_t *offset);
 
+/* The value of a hexadecimal digit, -1 of any other character. */
+int nb_text_hex_digit(char c);
+
 /* True when \uXXXX, with four hexadecimal digits, stands at `at`. */
 bool nb_text_is_unicode_escape(const char *raw, size_t size, size_t at);
 

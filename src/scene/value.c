@@ -232,10 +232,39 @@ bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3])
                         "a scale of 0 makes the transform singular; every scale must differ from 0");
 }
 
+bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *range, double rgb[3])
+{
+    if (node == NULL) return true;
+    return read_one_or_three(json, node, range, "a number or an array of 3 numbers [r, g, b]", rgb);
+}
+
+/* IEC 61966-2-1:1999, section 5.2. */
+static double linear_from_srgb(double value)
+{
+    return value <= 0.04045 ? value / 12.92 : pow((value + 0.055) / 1.055, 2.4);
+}
+
+/* "#rgb" is short for "#rrggbb". */
+static bool parse_color(const char *text, size_t size, double color[3])
+{
+    if ((size != 4 && size != 7) || text[0] != '#') return false;
+    const size_t digits = size / 3;
+    for (size_t i = 0; i < 3; i++) {
+        const int high = nb_text_hex_digit(text[1 + i * digits]), low = nb_text_hex_digit(text[(i + 1) * digits]);
+        if (high < 0 || low < 0) return false;
+        color[i] = linear_from_srgb((16 * high + low) / 255.0);
+    }
+    return true;
+}
+
 bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3])
 {
     if (node == NULL) return true;
-    return read_one_or_three(json, node, range, "a number or an array of 3 numbers [r, g, b]", color);
+    if (node->type != NB_JSON_STRING)
+        return read_one_or_three(json, node, range, "a number, an array of 3 numbers [r, g, b], or \"#rrggbb\"", color);
+    if (parse_color(node->string, node->string_size, color)) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                        "is no color; \"#\" and 6 hexadecimal digits, as in \"#ffcc88\", or 3 of them, are sRGB");
 }
 
 void nb_vector_normalize(double *vector, size_t count)

@@ -49,7 +49,10 @@ bool nb_value_vector(nb_json *json, const nb_json_node *node, double vector[3]);
 bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3]);  /* not zero; length kept */
 bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4]); /* not zero; normalised */
 bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3]);       /* one number or three, none 0 */
-bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3]); /* one or three */
+bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *range, double rgb[3]); /* one or three */
+
+/* The same, or "#rrggbb" or "#rgb": an sRGB color, made linear. 0 and 1 must be in the range. */
+bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3]);
 
 /* Copies a string without zero bytes into the arena. */
 bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text);
