@@ -43,8 +43,8 @@ FOREIGN = {
     "scene": POSIX | {"assimp/", "png.h", "jpeglib.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h"},
     "cpu": {"embree3/", "omp.h"},
     "gl": {"epoxy/"},
-    "tools": POSIX | {"omp.h"},
-    "bench": POSIX | {"omp.h", "embree3/"},
+    "tools": POSIX | {"omp.h", "epoxy/"},
+    "bench": POSIX | {"omp.h", "embree3/", "epoxy/"},
     "examples": POSIX,
 }
 

@@ -1,0 +1,116 @@
+#include "gl_context.h"
+
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { DEVICES_MOST = 16 };
+
+static int fail(nb_gl_context *gl, const char *what)
+{
+    (void)snprintf(gl->fault, sizeof gl->fault, "%s (EGL error 0x%x)", what, (unsigned)eglGetError());
+    return -1;
+}
+
+/* ---- displays ------------------------------------------------------------------------------------------------------
+ */
+
+static int client_has(const char *extension)
+{
+    return epoxy_has_egl_extension(EGL_NO_DISPLAY, extension);
+}
+
+static int is_software(EGLDeviceEXT device)
+{
+    const char *const extensions = eglQueryDeviceStringEXT(device, EGL_EXTENSIONS);
+    return extensions == NULL || epoxy_extension_in_string(extensions, "EGL_MESA_device_software");
+}
+
+/* A display of every graphics processor, then Mesa without a screen, then the default: the order in which they are
+ * tried. */
+static int list_displays(EGLDisplay displays[DEVICES_MOST + 2])
+{
+    EGLDeviceEXT devices[DEVICES_MOST];
+    EGLint device_count = 0;
+    int count = 0;
+    if (client_has("EGL_EXT_platform_device") && client_has("EGL_EXT_device_enumeration") &&
+        client_has("EGL_EXT_device_query") && !eglQueryDevicesEXT(DEVICES_MOST, devices, &device_count)) {
+        device_count = 0;
+    }
+    for (EGLint i = 0; i < device_count; i++) {
+        if (!is_software(devices[i]))
+            displays[count++] = eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, devices[i], NULL);
+    }
+    if (client_has("EGL_MESA_platform_surfaceless")) {
+        displays[count++] = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
+    }
+    displays[count++] = eglGetDisplay(EGL_DEFAULT_DISPLAY);
+    return count;
+}
+
+/* ---- contexts ------------------------------------------------------------------------------------------------------
+ */
+
+static EGLContext make_context(EGLDisplay display, EGLConfig config, nb_gl_api api)
+{
+    const EGLint desktop[] = {
+        EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    const EGLint embedded[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 0, EGL_NONE};
+    return eglCreateContext(display, config, EGL_NO_CONTEXT, api == NB_GL_API_ES ? embedded : desktop);
+}
+
+/* A surface of one pixel, because not every driver makes a context current without one. */
+static int open_on(nb_gl_context *gl, EGLDisplay display, nb_gl_api api)
+{
+    const EGLint kinds[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE,
+                            api == NB_GL_API_ES ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
+    const EGLint pixel[] = {EGL_WIDTH, 1, EGL_HEIGHT, 1, EGL_NONE};
+    EGLConfig config;
+    EGLint count = 0;
+    if (display == EGL_NO_DISPLAY || !eglInitialize(display, NULL, NULL)) return fail(gl, "no display of EGL starts");
+    if (!eglBindAPI(api == NB_GL_API_ES ? EGL_OPENGL_ES_API : EGL_OPENGL_API) ||
+        !eglChooseConfig(display, kinds, &config, 1, &count) || count < 1) {
+        return fail(gl, "EGL offers no such OpenGL");
+    }
+    gl->display = display;
+    gl->surface = eglCreatePbufferSurface(display, config, pixel);
+    if (gl->surface == EGL_NO_SURFACE) return fail(gl, "EGL makes no surface off the screen");
+    gl->context = make_context(display, config, api);
+    if (gl->context != EGL_NO_CONTEXT && eglMakeCurrent(display, gl->surface, gl->surface, gl->context)) return 0;
+    (void)fail(gl, api == NB_GL_API_ES ? "the driver has no OpenGL ES 3.0" : "the driver has no OpenGL 3.3 core");
+    if (gl->context != EGL_NO_CONTEXT) eglDestroyContext(display, gl->context);
+    eglDestroySurface(display, gl->surface);
+    return -1;
+}
+
+int nb_gl_context_open(nb_gl_context *gl, nb_gl_api api)
+{
+    EGLDisplay displays[DEVICES_MOST + 2];
+    *gl = (nb_gl_context){.fault = ""};
+    if (!epoxy_has_egl()) {
+        (void)snprintf(gl->fault, sizeof gl->fault,
+                       "there is no EGL; install a driver, or Mesa's software (Debian: libegl1 libgl1-mesa-dri)");
+        return -1;
+    }
+    const int count = list_displays(displays);
+    for (int i = 0; i < count; i++) {
+        if (open_on(gl, displays[i], api) != 0) continue;
+        (void)snprintf(gl->renderer, sizeof gl->renderer, "%s, %s", (const char *)glGetString(GL_RENDERER),
+                       (const char *)glGetString(GL_VERSION));
+        return 0;
+    }
+    const size_t used = strlen(gl->fault);
+    (void)snprintf(gl->fault + used, sizeof gl->fault - used,
+                   "; update the driver, or install Mesa's software (Debian: libegl1 libgl1-mesa-dri)");
+    return -1;
+}
+
+/* The display stays: to terminate it would unload the driver for everyone else in the process. */
+void nb_gl_context_close(nb_gl_context *gl)
+{
+    eglMakeCurrent(gl->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    eglDestroyContext(gl->display, gl->context);
+    eglDestroySurface(gl->display, gl->surface);
+}
