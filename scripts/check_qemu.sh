@@ -1,6 +1,6 @@
 #!/bin/bash
-# check_qemu.sh BUILD: the kernels on processors that this machine is not. test_kernels for aarch64 (NEON), and of BUILD on
-# x86 models without AVX2, without AVX, and with AVX2; there the dispatcher must pick a level that the model has.
+# check_qemu.sh BUILD: the kernels on processors that this machine is not. test_kernels and test_pixels for aarch64 (NEON), and of
+# BUILD on x86 models without AVX2, without AVX, and with AVX2; there the dispatcher must pick a level that the model has.
 set -euo pipefail
 
 build=$(cd "${1:?usage: check_qemu.sh BUILD}" && pwd)
@@ -20,7 +20,7 @@ run_aarch64() {
     aarch64-linux-gnu-gcc -std=c11 -O2 -ffp-contract=off -fno-math-errno -static -DNEBEL_SOURCE="\"$source\"" \
         -I"$source/tests/cross" -I"$source/include" -I"$source/src" \
         "$source/tests/$name.c" "$cross/libnebel.a" -lm -o "$cross/$name"
-    qemu-aarch64 "$cross/$name" $segments 10000
+    qemu-aarch64 "$cross/$name" $segments
 }
 
 if [ ! -e "$source/tests/test_kernels.c" ]; then
@@ -33,24 +33,30 @@ if ! build_aarch64; then
     exit 1
 fi
 models=(aarch64 Conroe Nehalem Haswell)
+tests=(test_kernels test_pixels)
 declare -A running
 for model in "${models[@]}"; do
-    case $model in
-    aarch64) run_aarch64 test_kernels >"$build/qemu-$model.log" 2>&1 & ;;
-    *) qemu-x86_64 -cpu "$model" "$build/tests/test_kernels" $segments >"$build/qemu-$model.log" 2>&1 & ;;
-    esac
-    running[$model]=$!
+    for name in "${tests[@]}"; do
+        case $model in
+        aarch64) run_aarch64 "$name" >"$build/qemu-$model-$name.log" 2>&1 & ;;
+        *) qemu-x86_64 -cpu "$model" "$build/tests/$name" $segments >"$build/qemu-$model-$name.log" 2>&1 & ;;
+        esac
+        running[$model-$name]=$!
+    done
 done
 
 failed=0
 for model in "${models[@]}"; do
-    if wait "${running[$model]}"; then
-        echo "check_qemu: test_kernels on $model passed, with $(sed -n 's/^\([a-z0-9]*\): runs$/\1/p' "$build/qemu-$model.log" | xargs)"
-    else
-        failed=$((failed + 1))
-        echo "check_qemu: test_kernels on $model:"
-        cat "$build/qemu-$model.log"
-    fi
+    for name in "${tests[@]}"; do
+        log=$build/qemu-$model-$name.log
+        if wait "${running[$model-$name]}"; then
+            echo "check_qemu: $name on $model passed" "$(sed -n 's/^\([a-z0-9]*\): runs$/\1/p' "$log" | xargs)"
+        else
+            failed=$((failed + 1))
+            echo "check_qemu: $name on $model:"
+            cat "$log"
+        fi
+    done
 done
-echo "check_qemu: $((${#models[@]} - failed)) passed, $failed failed"
+echo "check_qemu: $((${#running[@]} - failed)) passed, $failed failed"
 [ "$failed" -eq 0 ]

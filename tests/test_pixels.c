@@ -98,6 +98,34 @@ static void test_every_pixel_is_the_nearest_byte(void **state)
     }
 }
 
+/* Straight ahead, along faces and in them: components of ways are 0, and 0 times the distance of the sky is a NaN. */
+static void test_the_sky_is_right_where_ways_are_level(void **state)
+{
+    (void)state;
+    static const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {1000, 15, -20}, .max = {1010, 20, -5}}, .extinction = {.1, .1, .1}},
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {990, 10, -60}, .max = {1005, 30, -30}}, .extinction = {.1, .1, .1}}};
+    for (int boxes = 1; boxes <= 2; boxes++) {
+        nebel_pixels p = make_picture(boxes == 1 ? NEBEL_DEPTH_AXIS : NEBEL_DEPTH_RAY);
+        memcpy(p.corner, (const float[3]){-1, .5f, -1}, sizeof p.corner);
+        memcpy(p.step_x, (const float[3]){.03125f, 0, 0}, sizeof p.step_x);
+        memcpy(p.step_y, (const float[3]){0, -.03125f, 0}, sizeof p.step_y);
+        for (int i = 0; i < PIXELS; i++) depth[i] = HUGE_VALF;
+        nebel_fog *fog = NULL;
+        nebel_snapshot *snapshot = NULL;
+        assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+        for (int i = 0; i < boxes; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+        assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+        for (nebel_isa isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
+            if (!nebel_isa_available(isa)) continue;
+            assert_int_equal(nebel_fog_pixels(snapshot, isa, &p), NEBEL_OK);
+            assert_fogged(snapshot, &p);
+        }
+        nebel_release_snapshot(snapshot);
+        nebel_destroy_fog(fog);
+    }
+}
+
 static void test_instruction_sets_and_splits_give_the_same_bytes(void **state)
 {
     (void)state;
@@ -200,6 +228,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_pixel_is_the_nearest_byte),
+        cmocka_unit_test(test_the_sky_is_right_where_ways_are_level),
         cmocka_unit_test(test_instruction_sets_and_splits_give_the_same_bytes),
         cmocka_unit_test(test_a_picture_may_be_fogged_in_place_between_other_rows),
         cmocka_unit_test(test_depths_that_are_none_leave_the_picture_alone),

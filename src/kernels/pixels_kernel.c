@@ -1,7 +1,7 @@
 /* Fog over a finished picture, compiled once per instruction set.
  *
- * Per pixel 8 bytes come and 4 go; 15 operations, three divisions and a square root for the ray, 22 operations per box, and 45 for
- * exponential and blending, which are left out where no lane meets fog. */
+ * Per pixel 8 bytes come and 4 go; 10 operations for the ray and 9 per box to find that a packet misses it. Where it does not, three
+ * divisions, a square root, 5 operations for the ray, 20 per box, and 45 for exponential and blending. */
 #define NB_FAST
 
 #include "pixels.h"
@@ -11,6 +11,8 @@
 #include "formulas/elementary.inc"
 
 #include "packet.h"
+
+#include "fence.h"
 
 #include <string.h>
 
@@ -23,11 +25,15 @@ NB_INLINE nb_vec3 way_of(const float row[3], const float step[3], nb_real x)
                    nb_splat(row[2]) + x * nb_splat(step[2]));
 }
 
-NB_INLINE nb_real octaves_of(const nb_slabs *boxes, size_t count, const nb_packet *packet, nb_real limit)
+/* Through the boxes named in `list`. */
+NB_INLINE nb_real octaves_of(const nb_slabs *boxes, const unsigned char *list, size_t count, const nb_packet *packet,
+                             nb_real limit)
 {
     nb_real octaves = NB_F(0.0);
-    for (size_t i = 0; i < count; i++)
-        octaves = octaves + nb_part_inside(&boxes[i], packet, limit) * nb_splat(boxes[i].octaves);
+    for (size_t i = 0; i < count; i++) {
+        const nb_slabs *box = &boxes[list[i]];
+        octaves = octaves + nb_part_inside(box, packet, limit) * nb_splat(box->octaves);
+    }
     return octaves;
 }
 
@@ -66,6 +72,7 @@ NB_INLINE nb_bits blend(nb_bits pixel, const glow fog[3], nb_real light)
 /* What stays the same for a whole call, copied so that no store to the picture can change it. */
 typedef struct scene {
     nb_slabs boxes[NB_FOG_BOXES];
+    nb_fence fences[NB_FOG_BOXES];
     size_t box_count;
     glow fog[3];
     float step[3];
@@ -74,11 +81,23 @@ typedef struct scene {
 NB_INLINE nb_bits fog_packet(const scene *s, const float row[3], nb_real x, nb_real depth, nb_bits pixels, int along_ray)
 {
     const nb_vec3 none = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
-    const nb_packet packet = nb_make_packet(none, way_of(row, s->step, x));
-    const nb_real limit = along_ray ? depth / nb_sqrt(packet.square) : depth;
-    const nb_real octaves = octaves_of(s->boxes, s->box_count, &packet, limit);
+    const nb_vec3 way = way_of(row, s->step, x);
+    const nb_real limit = along_ray ? depth / nb_sqrt(nb_dot3(way, way)) : depth;
+    const nb_vec3 end = nb_scale3(way, limit);
+    unsigned char list[NB_FOG_BOXES];
+    const size_t count = nb_list_boxes(s->fences, s->box_count, end, end, 1, list);
+    if (count == 0) return pixels;
+    const nb_packet packet = nb_make_packet(none, way);
+    const nb_real octaves = octaves_of(s->boxes, list, count, &packet, limit);
     if (!nb_any(octaves < NB_F(0.0))) return pixels;
     return blend(pixels, s->fog, nb_light_after(octaves * nb_sqrt(packet.square)));
+}
+
+/* Processors fetch ahead by themselves, but begin anew in every page and only once its address is translated. */
+NB_INLINE void fetch_ahead(const unsigned char *p)
+{
+    enum { PAGE = 4096 };
+    __builtin_prefetch((const void *)((uintptr_t)p + PAGE));
 }
 
 /* `along_ray` is a constant. */
@@ -93,6 +112,9 @@ NB_INLINE void fog_row(const scene *s, const float row[3], uint32_t width, const
     nb_real x = nb_load_lanes(lanes);
     uint32_t left = width;
     for (; left >= NB_WIDTH; left -= NB_WIDTH, depth += packet, color += packet, out += packet) {
+        fetch_ahead(depth);
+        fetch_ahead(color);
+        fetch_ahead(out);
         memcpy(&depths, depth, sizeof depths);
         memcpy(&pixels, color, sizeof pixels);
         pixels = fog_packet(s, row, x, depths, pixels, along_ray);
@@ -112,7 +134,10 @@ static void set_scene(const nb_pixels_job *job, scene *s)
 {
     const float zero[3] = {0, 0, 0};
     s->box_count = job->box_count;
-    for (size_t i = 0; i < job->box_count; i++) s->boxes[i] = nb_make_slabs(&job->boxes[i], zero);
+    for (size_t i = 0; i < job->box_count; i++) {
+        s->boxes[i] = nb_make_slabs(&job->boxes[i], zero);
+        s->fences[i] = nb_make_fence(&s->boxes[i]);
+    }
     for (int c = 0; c < 3; c++) s->fog[c] = make_glow(job->radiance[c]);
     memcpy(s->step, job->step_x, sizeof s->step);
 }

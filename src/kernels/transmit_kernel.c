@@ -13,6 +13,8 @@
 
 #include "packet.h"
 
+#include "fence.h"
+
 #include <stdint.h>
 #include <string.h>
 
@@ -143,58 +145,6 @@ NB_INLINE void fetch_ahead(const nb_transmit_job *job, size_t i)
 
 /* ---- from one place ---------------------------------------------------------------------------------------------------- */
 
-NB_INLINE nb_vec3 least3(nb_vec3 a, nb_vec3 b)
-{
-    return nb_vec3(nb_min(a.x, b.x), nb_min(a.y, b.y), nb_min(a.z, b.z));
-}
-
-NB_INLINE nb_vec3 most3(nb_vec3 a, nb_vec3 b)
-{
-    return nb_vec3(nb_max(a.x, b.x), nb_max(a.y, b.y), nb_max(a.z, b.z));
-}
-
-/* A start outside two planes is left behind by them where the other end is so, too: where on some axis sign * way is less than
- * bound. The sign is 0 where the start is between the planes. */
-typedef struct fence {
-    float sign[3], bound[3];
-} fence;
-
-/* The margin covers the roundings of nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so that
- * leaving a box out changes no bit. */
-static fence make_fence(const nb_slabs *box)
-{
-    const float margin = 1 - 0x1p-20f;
-    fence made;
-    for (int c = 0; c < 3; c++) {
-        const int below = box->low[c] > 0, above = box->high[c] < 0;
-        made.sign[c] = (float)(below - above);
-        made.bound[c] = below ? box->low[c] * margin : above ? -box->high[c] * margin : -HUGE_VALF;
-    }
-    return made;
-}
-
-/* Whether all ways between low and high, lane by lane, miss the box; low and high are the same packet where `one` says so, a constant.
- * A lane that holds a NaN may count as one that misses: its light is 1 in any case. */
-NB_INLINE int is_missed(const fence *f, nb_vec3 low, nb_vec3 high, int one)
-{
-    const nb_vec3 sign = nb_vec3(nb_splat(f->sign[0]), nb_splat(f->sign[1]), nb_splat(f->sign[2]));
-    const nb_vec3 bound = nb_vec3(nb_splat(f->bound[0]), nb_splat(f->bound[1]), nb_splat(f->bound[2]));
-    const nb_vec3 reach = one ? nb_mul3(sign, low) : most3(nb_mul3(sign, low), nb_mul3(sign, high));
-    const nb_vec3 short_of = nb_sub3(bound, reach);
-    return nb_all(nb_max(nb_max(short_of.x, short_of.y), short_of.z) > NB_F(0.0));
-}
-
-/* The boxes that are not missed. Returns how many. */
-NB_INLINE size_t list_boxes(const fence *fences, size_t count, nb_vec3 low, nb_vec3 high, int one, unsigned char *list)
-{
-    size_t found = 0;
-    for (size_t i = 0; i < count; i++) {
-        list[found] = (unsigned char)i;
-        found += !is_missed(&fences[i], low, high, one);
-    }
-    return found;
-}
-
 /* Packets on their way through one box: each call of advance does a third of the work, on three packets. The chain of operations of
  * a packet takes 140 cycles and its work 25, and processors hold too few waiting operations to fill the difference. */
 typedef struct pipeline {
@@ -220,11 +170,11 @@ NB_INLINE void advance(pipeline *p, const nb_slabs *box, nb_vec3 way, float *out
 }
 
 /* Full packets only, as below. Returns how many segments are done. */
-static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slabs *boxes, const fence *fences)
+static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slabs *boxes, const nb_fence *fences)
 {
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
     const nb_slabs box = boxes[0];
-    const fence f = fences[0];
+    const nb_fence f = fences[0];
     const nb_transmit_job j = *job;
     float scratch[NB_WIDTH];
     pipeline p = make_pipeline(scratch);
@@ -232,7 +182,7 @@ static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slab
     for (; i + NB_WIDTH <= j.count; i += NB_WIDTH) {
         fetch_ahead(&j, i);
         const nb_vec3 way = nb_sub3(load_packed(j.to + 3 * i), from);
-        if (is_missed(&f, way, way, 1))
+        if (nb_is_missed(&f, way, way, 1))
             nb_store_lanes(j.out + i, nb_splat(1));
         else
             advance(&p, &box, way, j.out + i);
@@ -242,7 +192,7 @@ static size_t transmit_fan_through_one(const nb_transmit_job *job, const nb_slab
 }
 
 /* Full packets only, as below. Returns how many segments are done. */
-static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, const fence *fences)
+static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, const nb_fence *fences)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
@@ -252,7 +202,7 @@ static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, co
     for (; i + NB_WIDTH <= count; i += NB_WIDTH) {
         fetch_ahead(job, i);
         const nb_vec3 way = nb_sub3(load_packed(job->to + 3 * i), from);
-        const size_t found = list_boxes(fences, box_count, way, way, 1, list);
+        const size_t found = nb_list_boxes(fences, box_count, way, way, 1, list);
         nb_store_lanes(job->out + i, found == 0 ? nb_splat(1) : transmit_packet(boxes, list, found, zero, way));
     }
     return i;
@@ -267,18 +217,23 @@ typedef struct block {
     nb_vec3 low, high; /* over the packets, lane by lane */
 } block;
 
+NB_INLINE nb_vec3 least3(nb_vec3 a, nb_vec3 b)
+{
+    return nb_vec3(nb_min(a.x, b.x), nb_min(a.y, b.y), nb_min(a.z, b.z));
+}
+
 NB_INLINE void load_block(const float *to, nb_vec3 from, size_t packets, block *made)
 {
     made->low = made->high = made->way[0] = nb_sub3(load_packed(to), from);
     for (size_t k = 1; k < packets; k++) {
         const nb_vec3 way = nb_sub3(load_packed(to + 3 * NB_WIDTH * k), from);
         made->low = least3(way, made->low);
-        made->high = most3(way, made->high);
+        made->high = nb_most3(way, made->high);
         made->way[k] = way;
     }
 }
 
-static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes, const fence *fences)
+static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes, const nb_fence *fences)
 {
     const nb_vec3 zero = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 from = nb_vec3(nb_splat(job->from[0]), nb_splat(job->from[1]), nb_splat(job->from[2]));
@@ -289,7 +244,7 @@ static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes,
         const size_t packets = all - first < PACKETS ? all - first : PACKETS;
         for (size_t k = 0; k < NB_WIDTH * packets; k += LINE) fetch_ahead(job, NB_WIDTH * first + k);
         load_block(job->to + 3 * NB_WIDTH * first, from, packets, &b);
-        const size_t count = list_boxes(fences, job->box_count, b.low, b.high, 0, list);
+        const size_t count = nb_list_boxes(fences, job->box_count, b.low, b.high, 0, list);
         float *const out = job->out + NB_WIDTH * first;
         for (size_t k = 0; k < packets; k++) {
             const nb_real light = count == 0 ? nb_splat(1) : transmit_packet(boxes, list, count, zero, b.way[k]);
@@ -301,8 +256,8 @@ static size_t transmit_blocks(const nb_transmit_job *job, const nb_slabs *boxes,
 
 static size_t transmit_from_one_place(const nb_transmit_job *job, const nb_slabs *boxes)
 {
-    fence fences[NB_FOG_BOXES];
-    for (size_t i = 0; i < job->box_count; i++) fences[i] = make_fence(&boxes[i]);
+    nb_fence fences[NB_FOG_BOXES];
+    for (size_t i = 0; i < job->box_count; i++) fences[i] = nb_make_fence(&boxes[i]);
     if (job->box_count == 1) return transmit_fan_through_one(job, boxes, fences);
     return job->box_count < FEW_BOXES ? transmit_fan(job, boxes, fences) : transmit_blocks(job, boxes, fences);
 }
