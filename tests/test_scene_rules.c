@@ -27,11 +27,25 @@ static void test_what_no_scene_has(void **state)
         {FORMAT, "{\"nebel\": 1, \"fog\": [], `\"f\\u006fg\": []}",
          "fog: the key appears twice, first at line 1, column 14; remove"},
         {FORMAT, SCENE("`\"ambiant\": 0"),
-         "ambiant: unknown key; a scene has: nebel, camera, background, sun, ambient, lights, models, fog, nebula; did "
+         "ambiant: unknown key; a scene has: nebel, up, unit, camera, background, sun, ambient, lights, models, fog, "
+         "nebula; did "
          "you "
          "mean "
          "\"ambient\"?"},
         {FORMAT, SCENE("`\"planet\": {}"), "planet: unknown key"},
+        {FORMAT, SCENE("`\"up\": \"z\""),
+         "up: comes after \"fog\", whose numbers it explains; move it to the top of the file"},
+        {FORMAT, "{\"nebel\": 1, \"camera\": {}, `\"unit\": 1, \"fog\": []}", "unit: comes after \"camera\", whose"},
+        {FORMAT, "{\"up\": `\"x\"}", "up: unknown; must be one of: y, z"},
+        {FORMAT, "{\"up\": \"y\", `\"up\": \"y\"}", "up: the key appears twice"},
+        {FORMAT, "{\"unit\": `0}", "unit: is 0; must be a number of metres from 1e-9 to 1e18"},
+        {FORMAT, "{\"unit\": `2e18}", "unit: is 2e+18; must be"},
+        {FORMAT, "{\"unit\": 1e18, \"camera\": `{\"position\": [1e300, 0, 0]}}",
+         "camera: has numbers that \"unit\" makes too large"},
+        {FORMAT, "{\"unit\": 1e18, \"models\": [`{\"file\": \"a\", \"position\": [1e300, 0, 0]}]}",
+         "models[0]: has numbers that \"unit\" makes too large"},
+        {FORMAT, "{\"unit\": 1e-9, \"fog\": [`{\"shape\": {\"type\": \"world\"}, \"extinction\": 1e300}]}",
+         "fog[0]: extinction"},
         {FORMAT, SCENE("\"nebula\": `{}"), "nebula: is an object; must be an array"},
         {FORMAT, SCENE("\"background\": [0, `-1, 0]"), "background[1]: is -1; must be a number >= 0"},
         {FORMAT, SCENE("\"background\": `[0, 1]"), "background: has 2 elements; must be an array of 3 numbers"},
@@ -129,6 +143,8 @@ static void test_what_no_model_has(void **state)
     const rule rules[] = {
         {FORMAT, SCENE("\"models\": [`{}]"), "models[0]: is neither; a model has \"file\" or \"heightfield\""},
         {FORMAT, MODEL(HEIGHTS ", `\"file\": \"a\""), "models[0].file: does not go with \"heightfield\""},
+        {FORMAT, MODEL(HEIGHTS ", `\"up\": \"z\""), "models[0].up: does not go with \"heightfield\""},
+        {FORMAT, MODEL("\"file\": \"a\", \"unit\": `-1"), "models[0].unit: is -1; must be a number of metres"},
         {FORMAT, MODEL(HEIGHTS ", `\"scale\": 2"), "models[0].scale: does not go with \"heightfield\""},
         {FORMAT, MODEL("\"file\": `\"\""), "models[0].file: is empty; must be the path of a file"},
         {FORMAT, MODEL("\"file\": `\"a\\u0000b\""), "models[0].file: holds a zero character"},
@@ -148,7 +164,8 @@ static void test_what_no_model_has(void **state)
         {FORMAT, MODEL("\"heightfield\": `{\"file\": \"a.png\"}"),
          "models[0].heightfield: the key \"size\" is missing"},
         {FORMAT, SCENE("\"models\": [{\"file\": \"a\"}, {\"file\": \"b\", `\"colour\": 1}]"),
-         "models[1].colour: unknown key; a model has: file, position, rotation, scale, heightfield, color; did you "
+         "models[1].colour: unknown key; a model has: file, up, unit, position, rotation, scale, heightfield, color; "
+         "did you "
          "mean "
          "\"color\"?"},
     };

@@ -76,7 +76,7 @@ static nb_affine compose(const nb_affine *outer, const nb_affine *inner)
     return result;
 }
 
-/* Scale, then rotation; the position stays apart, as the meshes' origin. */
+/* First to metres, y up; then scale, then rotation; the position stays apart, as the meshes' origin. */
 static nb_affine place_of(const nb_model_source *source)
 {
     const double x = source->rotation[0], y = source->rotation[1], z = source->rotation[2], w = source->rotation[3];
@@ -84,8 +84,13 @@ static nb_affine place_of(const nb_model_source *source)
                                    {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
                                    {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
     nb_affine place = {0};
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) place.m[i][j] = rotation[i][j] * source->scale[j];
+    for (int j = 0; j < 3; j++) {
+        double axis[3] = {0};
+        axis[j] = 1;
+        nb_space_convert_place(&source->space, axis);
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++) place.m[i][j] += rotation[i][k] * (source->scale[k] * axis[k]);
+    }
     return place;
 }
 

@@ -14,11 +14,10 @@ static const nb_keys key_keys = {names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(FRA
 
 static const nb_range fov_range = {0, 180, true, "a number of degrees, > 0 and < 180"};
 
-/* Without a look_at of its own a camera looks along -z from wherever it is. */
-static void look_ahead(nebel_camera *camera)
+/* Without a look_at of its own a camera looks where the default one does, from wherever it is. */
+static void look_ahead(nebel_camera *camera, const double ahead[3])
 {
-    for (int i = 0; i < 3; i++) camera->look_at[i] = camera->position[i];
-    camera->look_at[2] -= 1;
+    for (int i = 0; i < 3; i++) camera->look_at[i] = camera->position[i] + ahead[i];
 }
 
 static bool check_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found,
@@ -34,12 +33,12 @@ static bool check_view(nb_json *json, const nb_json_node *node, const nb_json_no
     return true;
 }
 
-/* Reads what a camera and its keys have in common. `has_look_at` says whether one was given before. */
-static bool read_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found, bool has_look_at,
+/* Reads what a camera and its keys have in common. Without a look_at they look `ahead`; NULL: one was given before. */
+static bool read_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found, const double *ahead,
                       nebel_camera *camera)
 {
     if (!nb_value_vector(json, found[POSITION], camera->position)) return false;
-    if (found[LOOK_AT] == NULL && !has_look_at) look_ahead(camera);
+    if (found[LOOK_AT] == NULL && ahead != NULL) look_ahead(camera, ahead);
     return nb_value_vector(json, found[LOOK_AT], camera->look_at) && nb_value_direction(json, found[UP], camera->up) &&
            nb_value_number(json, found[VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
            nb_value_number(json, found[VIEW_HEIGHT], &nb_range_positive, &camera->view_height) &&
@@ -68,15 +67,23 @@ static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *fr
     return true;
 }
 
-static bool read_key(nb_json *json, const nb_json_node *node, bool has_look_at, nebel_camera_key *key)
+static bool read_key(nb_json *json, const nb_json_node *node, const double *ahead, nebel_camera_key *key)
 {
     const nb_json_node *found[CAMERA_KEY_COUNT];
     return nb_value_members(json, node, &key_keys, found) &&
            nb_value_number(json, found[FRAME], &nb_range_any, &key->frame) &&
-           read_view(json, node, found, has_look_at, &key->camera);
+           read_view(json, node, found, ahead, &key->camera);
 }
 
-static bool read_keys(nb_scene_reader *in, const nb_json_node *node, bool has_look_at)
+/* Checks of the file's numbers come before, so that they speak of these. */
+static bool convert_camera(nb_scene_reader *in, const nb_json_node *node, nebel_camera *camera)
+{
+    nb_space_convert_camera(&in->space, camera);
+    if (nb_camera_is_apart(camera) && nb_camera_is_upright(camera)) return true;
+    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has numbers that \"unit\" makes too large");
+}
+
+static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const double *ahead)
 {
     nebel_scene_data *data = &in->scene->data;
     if (node == NULL) return true;
@@ -87,12 +94,14 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *node, bool has_lo
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(in->json, node); at != NULL; at = nb_json_next(in->json, at), i++) {
         keys[i].camera = data->camera;
-        if (!read_key(in->json, at, has_look_at, &keys[i])) return false;
+        if (!read_key(in->json, at, ahead, &keys[i])) return false;
         if (i > 0 && keys[i].frame <= keys[i - 1].frame)
             return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, at,
                                 "its frame %.15g is not after the key before it, %.15g; frames must ascend",
                                 keys[i].frame, keys[i - 1].frame);
     }
+    for (i = 0; i < node->count; i++)
+        if (!convert_camera(in, node, &keys[i].camera)) return false;
     data->camera_keys = keys;
     data->camera_key_count = node->count;
     return true;
@@ -106,8 +115,11 @@ bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node)
     if (found[TURNTABLE] != NULL && found[KEYS] != NULL)
         return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, found[KEYS],
                                 "a camera has \"turntable\" or \"keys\", not both; remove one");
+    double ahead[3];
+    nb_space_restore_camera(&in->space, &data->camera);
+    for (int i = 0; i < 3; i++) ahead[i] = data->camera.look_at[i] - data->camera.position[i];
     return read_projection(in->json, found[PROJECTION], &data->camera.projection) &&
-           read_view(in->json, node, found, false, &data->camera) &&
+           read_view(in->json, node, found, ahead, &data->camera) &&
            read_turntable(in->json, found[TURNTABLE], &data->turntable_frames) &&
-           read_keys(in, found[KEYS], found[LOOK_AT] != NULL);
+           read_keys(in, found[KEYS], found[LOOK_AT] == NULL ? ahead : NULL) && convert_camera(in, node, &data->camera);
 }

@@ -12,6 +12,7 @@ bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node)
         !nb_value_direction(in->json, found[DIRECTION], data->sun_direction) ||
         !nb_value_color(in->json, found[IRRADIANCE], &nb_range_not_negative, data->sun_irradiance))
         return false;
+    nb_space_convert_direction(&in->space, data->sun_direction);
     nb_vector_normalize(data->sun_direction, 3);
     data->has_sun = 1;
     return true;

@@ -2,11 +2,13 @@
 #include "scene/path.h"
 #include "scene/scene_internal.h"
 
+#include <math.h>
 #include <stdio.h>
 
-enum { FILE_KEY, POSITION, ROTATION, SCALE, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
+enum { FILE_KEY, UP, UNIT, POSITION, ROTATION, SCALE, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
 
-static const char *const model_names[] = {"file", "position", "rotation", "scale", "heightfield", "color"};
+static const char *const model_names[] = {"file",     "up",    "unit",        "position",
+                                          "rotation", "scale", "heightfield", "color"};
 static const nb_keys model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
 
 static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
@@ -58,6 +60,37 @@ static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_no
     return true;
 }
 
+bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space)
+{
+    static const char *const names[] = {"y", "z"};
+    if (node == NULL) return true;
+    const int choice = nb_value_choice(json, node, names, 2);
+    space->z_up = choice == 1;
+    return choice >= 0;
+}
+
+bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_space *space)
+{
+    static const nb_range range = {1e-9, 1e18, false, "a number of metres from 1e-9 to 1e18"};
+    return nb_value_number(json, node, &range, &space->unit);
+}
+
+static bool is_finite(const double *numbers, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(numbers[i])) return false;
+    return true;
+}
+
+static bool convert_model(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
+{
+    nb_space_convert_placement(&in->space, model->position, model->rotation, model->scale);
+    for (int i = 0; i < 2; i++) model->size[i] *= in->space.unit;
+    model->height *= in->space.unit;
+    if (is_finite(model->position, 3) && is_finite(model->size, 2) && isfinite(model->height)) return true;
+    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has numbers that \"unit\" makes too large");
+}
+
 static bool keep_model(nb_scene_reader *in, const nb_json_node *node, const nb_model_source *model)
 {
     nebel_scene *scene = in->scene;
@@ -74,13 +107,15 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_json *json = in->json;
-    nb_model_source model = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
+    nb_model_source model = {.space = NB_SPACE_OURS, .rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
     if (!nb_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
     model.has_color = found[COLOR] != NULL;
     return (found[FILE_KEY] != NULL ? read_file(in, found[FILE_KEY], &model)
                                     : read_heightfield(in, found[HEIGHTFIELD], &model)) &&
+           nb_read_up(json, found[UP], &model.space) && nb_read_unit(json, found[UNIT], &model.space) &&
            nb_value_vector(json, found[POSITION], model.position) &&
            nb_value_rotation(json, found[ROTATION], model.rotation) &&
            nb_value_scale(json, found[SCALE], model.scale) &&
-           nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) && keep_model(in, node, &model);
+           nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) && convert_model(in, node, &model) &&
+           keep_model(in, node, &model);
 }

@@ -126,11 +126,18 @@ static bool check_total(nb_scene_reader *in, const nb_json_node *node, const neb
                         "brings the particles of this scene above %d, the most it may have", MOST_PARTICLES);
 }
 
+static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, nebel_nebula_desc *nebula, const char *name)
+{
+    nb_space_convert_nebula(&in->space, nebula);
+    return try_nebula(in, node, nebula) && check_total(in, node, nebula) && keep_nebula(in, node, nebula, name);
+}
+
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[NEBULA_KEY_COUNT];
     nb_json *json = in->json;
-    nebel_nebula_desc nebula = {0};
+    /* The defaults of the core, in the numbers of the file. */
+    nebel_nebula_desc nebula = {.size = {0.05 / in->space.unit, 0.2 / in->space.unit}};
     const char *name = "";
     return nb_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
            nb_value_members(json, node, &nebula_keys, found) &&
@@ -141,6 +148,5 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
            read_sizes(json, found, &nebula) &&
            nb_value_amount(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
            nb_value_color(json, found[EMISSION], &nb_range_not_negative, nebula.emission) &&
-           read_colors(in, found[COLORS], &nebula) && try_nebula(in, node, &nebula) && check_total(in, node, &nebula) &&
-           keep_nebula(in, node, &nebula, name);
+           read_colors(in, found[COLORS], &nebula) && finish_nebula(in, node, &nebula, name);
 }

@@ -172,5 +172,6 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
          !read_amount(json, node, found, volume.extinction) || !read_light(in, found, &volume)))
         return false;
+    nb_space_convert_volume(&in->space, &volume);
     return nb_read_try(in, node, "", &volume) && keep_volume(in, node, &volume, name);
 }

@@ -9,10 +9,26 @@
 /* The longest scene file. */
 #define TEXT_LIMIT ((size_t)1 << 30)
 
-enum { NEBEL, CAMERA, BACKGROUND, SUN, AMBIENT, LIGHTS, MODELS, FOG, NEBULA, SECTION_COUNT = NB_SCENE_SECTIONS };
+enum {
+    NEBEL,
+    UP,
+    UNIT,
+    CAMERA,
+    BACKGROUND,
+    SUN,
+    AMBIENT,
+    LIGHTS,
+    MODELS,
+    FOG,
+    NEBULA,
+    SECTION_COUNT = NB_SCENE_SECTIONS
+};
 
-static const char *const section_names[] = {"nebel",  "camera", "background", "sun",   "ambient",
-                                            "lights", "models", "fog",        "nebula"};
+/* Their numbers are in the units of the file. */
+#define PLACED_SECTIONS (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA))
+
+static const char *const section_names[] = {"nebel",   "up",     "unit",   "camera", "background", "sun",
+                                            "ambient", "lights", "models", "fog",    "nebula"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
@@ -28,6 +44,24 @@ static bool read_version(nb_json *json, const nb_json_node *node)
     return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node, "is %.15g; this program reads version 1", version);
 }
 
+static int find_section(uint32_t mask)
+{
+    int section = 0;
+    while ((mask & NB_BIT(section)) == 0) section++;
+    return section;
+}
+
+/* Elements are gone once they are read, so what explains their numbers stands before them. */
+static bool read_space(nb_scene_reader *in, const nb_json_node *node, int section)
+{
+    const uint32_t before = in->seen & PLACED_SECTIONS;
+    if (before != 0)
+        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node,
+                                "comes after \"%s\", whose numbers it explains; move it to the top of the file",
+                                section_names[find_section(before)]);
+    return section == UP ? nb_read_up(in->json, node, &in->space) : nb_read_unit(in->json, node, &in->space);
+}
+
 static bool read_section(nb_scene_reader *in, const nb_json_node *node)
 {
     nebel_scene_data *data = &in->scene->data;
@@ -39,6 +73,9 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     switch (section) {
     case NEBEL:
         return read_version(in->json, node);
+    case UP:
+    case UNIT:
+        return read_space(in, node, section);
     case CAMERA:
         return nb_read_camera(in, node);
     case BACKGROUND:
@@ -93,7 +130,7 @@ void nb_read_keep_message(nebel_result result, const char *message, void *user)
 static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name)
 {
     nb_json json;
-    nb_scene_reader in = {.json = &json, .scene = scene};
+    nb_scene_reader in = {.json = &json, .scene = scene, .space = NB_SPACE_OURS};
     const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_read_keep_message, &in}};
     const nb_json_desc desc = {.text = text,
                                .size = size,

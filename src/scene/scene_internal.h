@@ -4,6 +4,7 @@
 
 #include <nebel/scene.h>
 
+#include "scene/space.h"
 #include "scene/value.h"
 
 /* A model or height field as the file describes it. */
@@ -11,6 +12,7 @@ typedef struct nb_model_source {
     const char *file;  /* path, resolved against the scene's folder */
     const char *where; /* "FILE:LINE:COLUMN: models[0].file", for messages */
     bool is_heightfield;
+    nb_space space; /* of the file's own numbers */
     double position[3], rotation[4], scale[3];
     double size[2], height; /* height field */
     bool has_color;
@@ -48,12 +50,13 @@ struct nebel_scene {
 };
 
 /* The keys that a scene may have. */
-enum { NB_SCENE_SECTIONS = 9 };
+enum { NB_SCENE_SECTIONS = 11 };
 
 /* What reading needs beside the scene itself. */
 typedef struct nb_scene_reader {
     nb_json *json;
     nebel_scene *scene;
+    nb_space space;                            /* of the file's numbers */
     nebel_fog *trial;                          /* takes every volume once, for the core's own checks */
     char core_message[512];                    /* what the core said about the last one */
     uint32_t seen;                             /* sections */
@@ -84,6 +87,10 @@ nebel_camera nb_camera_default(void);
 /* True when position and look_at differ and up is not along the view. */
 bool nb_camera_is_apart(const nebel_camera *camera);
 bool nb_camera_is_upright(const nebel_camera *camera);
+
+/* The keys "up" and "unit" of a scene or a model. */
+bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space);
+bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_space *space);
 
 void nb_models_release(nebel_scene *scene);
 

@@ -1,0 +1,143 @@
+#include "scene/space.h"
+
+/* ---- numbers
+ * --------------------------------------------------------------------------------------------------------- */
+
+static void scale_all(double factor, double *numbers, size_t count)
+{
+    for (size_t i = 0; i < count; i++) numbers[i] *= factor;
+}
+
+static void convert_inverse_lengths(const nb_space *space, double rgb[3])
+{
+    for (int c = 0; c < 3; c++) rgb[c] /= space->unit;
+}
+
+static void swap_y_and_z(double vector[3])
+{
+    const double y = vector[1];
+    vector[1] = vector[2];
+    vector[2] = y;
+}
+
+void nb_space_convert_direction(const nb_space *space, double direction[3])
+{
+    if (!space->z_up) return;
+    swap_y_and_z(direction);
+    direction[2] = -direction[2];
+}
+
+void nb_space_convert_place(const nb_space *space, double place[3])
+{
+    nb_space_convert_direction(space, place);
+    scale_all(space->unit, place, 3);
+}
+
+/* Lengths along the axes, and scales: without signs. */
+static void convert_extents(const nb_space *space, double unit, double extents[3])
+{
+    if (space->z_up) swap_y_and_z(extents);
+    scale_all(unit, extents, 3);
+}
+
+/* A rotation turns about the same axis by the same angle in either convention. */
+void nb_space_convert_placement(const nb_space *space, double position[3], double rotation[4], double scale[3])
+{
+    nb_space_convert_place(space, position);
+    nb_space_convert_direction(space, rotation);
+    convert_extents(space, 1, scale);
+}
+
+/* ---- fog
+ * ------------------------------------------------------------------------------------------------------------- */
+
+/* What was the least y is the largest z. */
+static void convert_box(const nb_space *space, double min[3], double max[3])
+{
+    nb_space_convert_place(space, min);
+    nb_space_convert_place(space, max);
+    if (!space->z_up) return;
+    const double near = min[2];
+    min[2] = max[2];
+    max[2] = near;
+}
+
+static void convert_shape(const nb_space *space, nebel_shape *shape)
+{
+    nebel_transform *transform = &shape->transform;
+    nb_space_convert_placement(space, transform->position, transform->rotation, transform->scale);
+    convert_box(space, shape->min, shape->max);
+    nb_space_convert_place(space, shape->center);
+    nb_space_convert_place(space, shape->from);
+    nb_space_convert_place(space, shape->to);
+    nb_space_convert_place(space, shape->point);
+    nb_space_convert_direction(space, shape->normal);
+    convert_extents(space, space->unit, shape->radii);
+    shape->radius *= space->unit;
+    shape->radius_from *= space->unit;
+    shape->radius_to *= space->unit;
+    for (size_t i = 0; i < shape->plane_count; i++) {
+        nebel_plane *plane = (nebel_plane *)&shape->planes[i];
+        nb_space_convert_direction(space, plane->normal);
+        plane->distance *= space->unit;
+    }
+    for (size_t i = 0; i < shape->part_count; i++) convert_shape(space, (nebel_shape *)&shape->parts[i]);
+}
+
+static void convert_density(const nb_space *space, nebel_density *density)
+{
+    nb_space_convert_place(space, density->from);
+    nb_space_convert_place(space, density->to);
+    nb_space_convert_place(space, density->center);
+    density->base *= space->unit;
+    density->scale_height *= space->unit;
+    density->sigma *= space->unit;
+    density->distance *= space->unit;
+}
+
+void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume)
+{
+    convert_shape(space, &volume->shape);
+    convert_density(space, &volume->density);
+    convert_inverse_lengths(space, volume->extinction);
+    convert_inverse_lengths(space, volume->emission);
+}
+
+void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula)
+{
+    convert_shape(space, &nebula->shape);
+    convert_density(space, &nebula->density);
+    convert_inverse_lengths(space, nebula->absorption);
+    convert_inverse_lengths(space, nebula->emission);
+    scale_all(space->unit, nebula->size, 2);
+    nebula->turbulence *= space->unit;
+    nebula->turbulence_size *= space->unit;
+}
+
+/* ---- camera
+ * ---------------------------------------------------------------------------------------------------------- */
+
+void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
+{
+    nb_space_convert_place(space, camera->position);
+    nb_space_convert_place(space, camera->look_at);
+    nb_space_convert_direction(space, camera->up);
+    camera->view_height *= space->unit;
+}
+
+static void restore_direction(const nb_space *space, double direction[3])
+{
+    if (!space->z_up) return;
+    direction[2] = -direction[2];
+    swap_y_and_z(direction);
+}
+
+void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
+{
+    restore_direction(space, camera->position);
+    restore_direction(space, camera->look_at);
+    restore_direction(space, camera->up);
+    scale_all(1 / space->unit, camera->position, 3);
+    scale_all(1 / space->unit, camera->look_at, 3);
+    camera->view_height /= space->unit;
+}

@@ -1,0 +1,32 @@
+/* The conventions a file's numbers are in, and the way from them to ours: metres, y up. */
+#ifndef NB_SCENE_SPACE_H
+#define NB_SCENE_SPACE_H
+
+#include <nebel/scene.h>
+
+#include <stdbool.h>
+
+typedef struct nb_space {
+    bool z_up;
+    double unit; /* m, > 0: one unit of the file */
+} nb_space;
+
+#define NB_SPACE_OURS ((nb_space){false, 1})
+
+/* Right-handed all: (x, y, z) with z up is (x, z, -y) with y up. */
+void nb_space_convert_direction(const nb_space *space, double direction[3]);
+void nb_space_convert_place(const nb_space *space, double place[3]);
+
+/* What turns, stretches and moves: position, quaternion, scale. */
+void nb_space_convert_placement(const nb_space *space, double position[3], double rotation[4], double scale[3]);
+
+/* Parts and planes, too: they must be memory that may be written to. */
+void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume);
+void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula);
+
+void nb_space_convert_camera(const nb_space *space, nebel_camera *camera);
+
+/* The other way: from metres, y up, to the file's numbers. */
+void nb_space_restore_camera(const nb_space *space, nebel_camera *camera);
+
+#endif
