@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that the reader, the schema and the manual of the scene file speak of the same keys, and, where python3-jsonschema is
-installed, that good scenes conform to the schema and bad ones do not."""
+"""Checks that the reader, the schema, the manual and the fuzzer of the scene file speak of the same keys, and, where
+python3-jsonschema is installed, that good scenes conform to the schema and bad ones do not."""
 
 import json
 import pathlib
@@ -81,6 +81,8 @@ def main():
     faults = [f"not in docs/scene.schema.json: {name}" for name in sorted(names - schema_names(schema))]
     faults += [f"not read by src/scene: {name}" for name in sorted(schema_names(schema) - names)]
     faults += [f"not in docs/scene-file.md: {name}" for name in sorted(names - manual)]
+    words = set(re.findall(r'^"\\"([a-z_]+)\\""$', (ROOT / "fuzz/scene.dict").read_text(), re.M))
+    faults += [f"not in fuzz/scene.dict: {name}" for name in sorted(names - words)]
     if len(names) < 50:
         faults.append(f"only {len(names)} keys found in src/scene: this check needs mending")
     judge(schema, faults)
