@@ -464,20 +464,20 @@ static void test_background_behind_endless_fog(void **state)
 static void test_samples_are_stratified(void **state)
 {
     (void)state;
-    enum { PIXELS = NB_REGION * NB_REGION };
     static nb_region_points points;
-    static uint8_t columns[PIXELS][64], rows[PIXELS][64], cells[PIXELS][64];
+    static uint8_t columns[NB_PIXELS][64], rows[NB_PIXELS][64], cells[NB_PIXELS][64];
+    const nb_sample_range range = nb_sample_range_of(64);
     for (uint32_t s = 0; s < 64; s++) {
         nb_sample_region(s, 64, 128, 320, &points);
-        for (int i = 0; i < PIXELS; i++) {
-            const double x = (double)points.x[i] - i % NB_REGION, y = (double)points.y[i] - i / NB_REGION;
-            assert_true(x >= points.low && x < points.high && y >= points.low && y < points.high);
+        for (uint32_t i = 0; i < NB_PIXELS; i++) {
+            const float x = points.x[i] - (float)nb_lane_x(i), y = points.y[i] - (float)nb_lane_y(i);
+            assert_true(x >= range.low && x < range.high && y >= range.low && y < range.high);
             columns[i][(int)(x * 64)]++;
             rows[i][(int)(y * 64)]++;
             cells[i][(int)(x * 8) + 8 * (int)(y * 8)]++;
         }
     }
-    for (int i = 0; i < PIXELS * 64; i++) {
+    for (int i = 0; i < NB_PIXELS * 64; i++) {
         assert_int_equal(columns[i / 64][i % 64], 1);
         assert_int_equal(rows[i / 64][i % 64], 1);
         assert_int_equal(cells[i / 64][i % 64], 1);

@@ -5,10 +5,10 @@
 
 enum { SIDE = NB_REGION, PIXELS = SIDE * SIDE };
 
-/* Both answers for one region. */
+/* Both answers for a region. */
 typedef struct test_both {
-    nb_region_points points;
-    nb_seen seen;
+    nb_region_points points[NB_TOGETHER];
+    nb_seen seen[NB_TOGETHER];
     nb_rays rays;
     nb_packets packets;
     nb_hits raster, ray;
@@ -43,32 +43,43 @@ static void compare_batch(test_both *both)
     }
 }
 
-static void compare_region(nebel_renderer *renderer, const nebel_camera *camera, uint32_t samples, test_both *both)
+static void compare_sample(const nb_geometry *geometry, const nb_view *view, uint32_t left, uint32_t top,
+                           uint32_t sample, test_both *both)
 {
     static _Alignas(64) int active[NB_BATCH];
     for (int i = 0; i < NB_BATCH; i++) active[i] = -1;
+    const nb_region_points *points = &both->points[sample];
+    for (uint32_t first = 0; first < PIXELS; first += NB_BATCH) {
+        nb_view_rays(view, left, top, points->x + first, points->y + first, &both->rays);
+        nb_raster_hits(geometry, both->seen[sample].triangle + first, &both->rays, &both->raster);
+        nb_hits_trace(geometry->scene, &both->rays, active, &both->packets, &both->ray);
+        compare_batch(both);
+    }
+}
+
+/* All whole regions of a picture, at most NB_TOGETHER samples. */
+static void compare_picture(nebel_renderer *renderer, const nebel_camera *camera, uint32_t width, uint32_t height,
+                            uint32_t samples, test_both *both)
+{
     nb_view view;
     nb_raster raster;
     nb_geometry *geometry = &renderer->geometry;
-    assert_int_equal(nb_view_set(&view, camera, SIDE, SIDE, &renderer->log), NEBEL_OK);
+    assert_int_equal(nb_view_set(&view, camera, width, height, &renderer->log), NEBEL_OK);
     assert_int_equal(nb_geometry_place(geometry, view.position), NEBEL_OK);
     nb_view_place(&view, geometry->origin, geometry->bounds_min, geometry->bounds_max);
-    nb_raster_set(&raster, geometry, &view, SIDE, SIDE, 1);
-    nb_sample_region(0, samples, 0, 0, &both->points);
-    nb_raster_region(&raster, 0, 0, &both->points, &both->seen);
-    for (uint32_t y = 0; y < SIDE; y += NB_TILE) {
-        for (uint32_t x = 0; x < SIDE; x += NB_TILE) {
-            float px[NB_BATCH], py[NB_BATCH];
-            for (uint32_t i = 0; i < NB_BATCH; i++) {
-                px[i] = both->points.x[(y + nb_lane_y(i)) * SIDE + x + nb_lane_x(i)];
-                py[i] = both->points.y[(y + nb_lane_y(i)) * SIDE + x + nb_lane_x(i)];
-            }
-            nb_view_rays(&view, 0, 0, px, py, &both->rays);
-            nb_raster_hits(geometry, &both->seen, x, y, &both->rays, &both->raster);
-            nb_hits_trace(geometry->scene, &both->rays, active, &both->packets, &both->ray);
-            compare_batch(both);
+    nb_raster_set(&raster, geometry, &view, &(nb_picture){width, height, nb_sample_range_of(samples)}, 1);
+    for (uint32_t top = 0; top + SIDE <= height; top += SIDE) {
+        for (uint32_t left = 0; left + SIDE <= width; left += SIDE) {
+            for (uint32_t s = 0; s < samples; s++) nb_sample_region(s, samples, left, top, &both->points[s]);
+            nb_raster_region(&raster, left, top, samples, both->points, both->seen);
+            for (uint32_t s = 0; s < samples; s++) compare_sample(geometry, &view, left, top, s, both);
         }
     }
+}
+
+static void compare_region(nebel_renderer *renderer, const nebel_camera *camera, uint32_t samples, test_both *both)
+{
+    compare_picture(renderer, camera, SIDE, SIDE, samples, both);
 }
 
 static double random_within(uint32_t *seed, double low, double high)
@@ -177,23 +188,29 @@ static void set_grid_indices(uint32_t (*indices)[6])
     }
 }
 
+static float grid_positions[GRID * GRID][3];
+static uint32_t grid_indices[(GRID - 1) * (GRID - 1)][6];
+
+static nebel_mesh make_grid(void)
+{
+    set_grid_indices(grid_indices);
+    return (nebel_mesh){.positions = grid_positions[0],
+                        .indices = grid_indices[0],
+                        .vertex_count = GRID * GRID,
+                        .triangle_count = 2 * (GRID - 1) * (GRID - 1),
+                        .texture = -1};
+}
+
 /* Every sample lies on a corner where six triangles meet, but for rounding errors. */
 static void test_nothing_slips_through_corners_under_samples(void **state)
 {
     (void)state;
-    static float positions[GRID * GRID][3];
-    static uint32_t indices[(GRID - 1) * (GRID - 1)][6];
-    set_grid_indices(indices);
-    const nebel_mesh mesh = {.positions = positions[0],
-                             .indices = indices[0],
-                             .vertex_count = GRID * GRID,
-                             .triangle_count = 2 * (GRID - 1) * (GRID - 1),
-                             .texture = -1};
+    const nebel_mesh mesh = make_grid();
     const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
     test_both *both = make_both();
     for (int i = 0; i < 10; i++) {
         const double angle = .3 * i;
-        set_grid(positions, angle);
+        set_grid(grid_positions, angle);
         nebel_renderer *renderer = make_renderer(&scene);
         nebel_camera camera = test_camera(0, 5, 0, 0, 0, 0);
         camera.up[0] = sin(angle);
@@ -206,6 +223,34 @@ static void test_nothing_slips_through_corners_under_samples(void **state)
     }
     assert_int_equal(both->misses, 0);
     free(both);
+}
+
+/* 32,000 triangles: more than wait at a time, and a tree of four levels. The picture's right and lower edges are within
+ * regions that are not compared, two meshes share the others. */
+static void test_regions_and_samples_of_a_picture(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = make_grid();
+    nebel_mesh meshes[2] = {mesh, mesh};
+    meshes[1].triangle_count = 5001;
+    meshes[0].triangle_count -= 5001;
+    meshes[0].indices += 3 * 5001;
+    const nebel_scene_data scene = {.mesh_count = 2, .meshes = meshes};
+    set_grid(grid_positions, .2);
+    nebel_renderer *renderer = make_renderer(&scene);
+    test_both *both = make_both();
+    for (int i = 0; i < 4; i++) {
+        nebel_camera camera = test_camera(.5, 6 - i, 4, .2, 0, 0);
+        camera.vertical_fov = 60 + 10 * i;
+        camera.view_height = 10;
+        camera.projection = i % 2 ? NEBEL_PROJECTION_ORTHOGRAPHIC : NEBEL_PROJECTION_PERSPECTIVE;
+        compare_picture(renderer, &camera, 3 * SIDE + 9, 2 * SIDE + 5, i < 2 ? NB_TOGETHER : 1, both);
+    }
+    assert_true(both->hits > 10 * 6 * PIXELS / 2);
+    assert_true(both->misses > PIXELS);
+    assert_in_range(both->differences, 0, 60); /* points on an outline */
+    free(both);
+    nebel_destroy_renderer(renderer);
 }
 
 /* The nearer of two squares wins, in whatever order they come; of equal ones the first. */
@@ -239,6 +284,7 @@ int main(void)
         cmocka_unit_test(test_scale_does_not_matter),
         cmocka_unit_test(test_nothing_slips_through_a_closed_ball),
         cmocka_unit_test(test_nothing_slips_through_corners_under_samples),
+        cmocka_unit_test(test_regions_and_samples_of_a_picture),
         cmocka_unit_test(test_nearer_surfaces_hide_farther_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

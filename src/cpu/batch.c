@@ -1,15 +1,14 @@
-/* One sample of 16 x 16 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
+/* One sample of 64 x 4 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
 #include "renderer.h"
 
 #include <math.h>
-#include <string.h>
 
-NB_CLONES static void set_inside(const nb_frame *frame, uint32_t left, uint32_t top, int *inside)
+NB_CLONES static void set_inside(const nb_frame *frame, const nb_place *place, int *inside)
 {
-    const uint32_t columns = frame->width - left, rows = frame->height - top;
+    const uint32_t columns = frame->width - place->left, rows = frame->height - place->top, first = place->first;
     NB_SIMD
     for (uint32_t i = 0; i < NB_BATCH; i++) {
-        const int in_row = nb_lane_x(i) < columns, in_column = nb_lane_y(i) < rows;
+        const int in_row = nb_lane_x(first + i) < columns, in_column = nb_lane_y(first + i) < rows;
         inside[i] = -(in_row & in_column);
     }
 }
@@ -156,44 +155,45 @@ NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratc
     }
 }
 
-static void set_points(const nb_place *place, nb_scratch *scratch)
-{
-    const uint32_t x = place->left - place->region_left, y = place->top - place->region_top;
-    for (uint32_t i = 0; i < NB_BATCH; i += NB_BLOCK) {
-        const uint32_t from = (y + nb_lane_y(i)) * NB_REGION + x + nb_lane_x(i);
-        memcpy(scratch->x + i, scratch->region.x + from, NB_BLOCK * sizeof(float));
-        memcpy(scratch->y + i, scratch->region.y + from, NB_BLOCK * sizeof(float));
-    }
-}
-
-static void find_hits(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+static void find_hits(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
 {
     const nb_geometry *geometry = &frame->renderer->geometry;
-    set_points(place, scratch);
-    nb_view_rays(&frame->view, place->region_left, place->region_top, scratch->x, scratch->y, &scratch->rays);
+    const nb_region_points *points = &scratch->points_of_region[sample];
+    nb_view_rays(&frame->view, place->left, place->top, points->x + place->first, points->y + place->first,
+                 &scratch->rays);
     if (frame->rasters) {
-        nb_raster_hits(geometry, &scratch->seen, place->left - place->region_left, place->top - place->region_top,
-                       &scratch->rays, &scratch->hits);
+        nb_raster_hits(geometry, scratch->seen[sample].triangle + place->first, &scratch->rays, &scratch->hits);
     } else {
         nb_hits_trace(geometry->scene, &scratch->rays, scratch->inside, &scratch->packets, &scratch->hits);
     }
 }
 
-nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+static int meets_surface(const nb_hits *hits)
+{
+    uint32_t met = NB_NONE;
+    for (int i = 0; i < NB_BATCH; i++) met &= hits->surface[i];
+    return met != NB_NONE;
+}
+
+static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
     const nb_lighting *lighting = &frame->lighting;
-    set_inside(frame, place->left, place->top, scratch->inside);
-    find_hits(frame, place, scratch);
-    nebel_result result = trace_camera_fog(frame, scratch);
-    if (result != NEBEL_OK) return result;
     nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,
                       &scratch->points);
-    if (geometry->scene != NULL && lighting->has_sun) {
+    if (lighting->has_sun) {
         nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
     }
-    result = set_sunlight(frame, scratch);
-    if (result == NEBEL_OK) set_colors(lighting, scratch);
+    return set_sunlight(frame, scratch);
+}
+
+nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
+{
+    set_inside(frame, place, scratch->inside);
+    find_hits(frame, place, sample, scratch);
+    nebel_result result = trace_camera_fog(frame, scratch);
+    if (result == NEBEL_OK && meets_surface(&scratch->hits)) result = light_surfaces(frame, scratch);
+    if (result == NEBEL_OK) set_colors(&frame->lighting, scratch);
     return result;
 }

@@ -71,13 +71,14 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     result = nb_geometry_place(geometry, frame->view.position);
     if (result != NEBEL_OK) return nb_fail(&renderer->log, result, "frame: the surfaces could not be built");
     nb_view_place(&frame->view, geometry->origin, geometry->bounds_min, geometry->bounds_max);
-    frame->rasters = nb_raster_is_apt(geometry, frame->view.projection, desc->width, desc->height);
-    if (frame->rasters) {
-        nb_raster_set(&frame->raster, geometry, &frame->view, desc->width, desc->height, renderer->threads);
-    }
     frame->width = desc->width;
     frame->height = desc->height;
     frame->samples = desc->samples != 0 ? desc->samples : 4;
+    frame->rasters = nb_raster_is_apt(geometry, frame->view.projection, desc->width, desc->height);
+    if (frame->rasters) {
+        const nb_picture picture = {desc->width, desc->height, nb_sample_range_of(frame->samples)};
+        nb_raster_set(&frame->raster, geometry, &frame->view, &picture, renderer->threads);
+    }
     frame->trace =
         (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = renderer->fog_isa, .tolerance = desc->tolerance};
     return NEBEL_OK;
@@ -86,18 +87,31 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
 /* ---- regions -------------------------------------------------------------------------------------------------------
  */
 
-static nebel_result render_sample(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t index,
-                                  nb_scratch *scratch)
+static nebel_result render_batch(const nb_frame *frame, const nb_place *place, uint32_t first, uint32_t count,
+                                 nb_scratch *scratch)
 {
-    nb_sample_region(index, frame->samples, left, top, &scratch->region);
-    if (frame->rasters) nb_raster_region(&frame->raster, left, top, &scratch->region, &scratch->seen);
-    for (uint32_t y = 0; y < NB_REGION && top + y < frame->height; y += NB_TILE) {
-        for (uint32_t x = 0; x < NB_REGION && left + x < frame->width; x += NB_TILE) {
-            const nb_place place = {left + x, top + y, left, top};
-            const nebel_result result = nb_batch_render(frame, &place, scratch);
-            if (result != NEBEL_OK) return result;
-            nb_planes_add(frame, left + x, top + y, index == 0, scratch, scratch->hit_counts + y * NB_REGION + x);
-        }
+    for (uint32_t s = 0; s < count; s++) {
+        const nebel_result result = nb_batch_render(frame, place, s, scratch);
+        if (result != NEBEL_OK) return result;
+        nb_planes_add(frame, place, first + s == 0, scratch);
+    }
+    return NEBEL_OK;
+}
+
+/* Samples first to first + count - 1. */
+static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t first, uint32_t count,
+                                   nb_scratch *scratch)
+{
+    for (uint32_t s = 0; s < count; s++) {
+        nb_sample_region(first + s, frame->samples, left, top, &scratch->points_of_region[s]);
+    }
+    if (frame->rasters) {
+        nb_raster_region(&frame->raster, left, top, count, scratch->points_of_region, scratch->seen);
+    }
+    nb_place place = {left, top, 0};
+    for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
+        const nebel_result result = render_batch(frame, &place, first, count, scratch);
+        if (result != NEBEL_OK) return result;
     }
     return NEBEL_OK;
 }
@@ -106,11 +120,15 @@ static nebel_result render_region(const nb_frame *frame, size_t number, nb_scrat
 {
     const uint32_t columns = (frame->width + NB_REGION - 1) / NB_REGION;
     const uint32_t left = (uint32_t)(number % columns) * NB_REGION, top = (uint32_t)(number / columns) * NB_REGION;
-    for (uint32_t index = 0; index < frame->samples; index++) {
-        const nebel_result result = render_sample(frame, left, top, index, scratch);
+    for (uint32_t first = 0; first < frame->samples; first += NB_TOGETHER) {
+        const uint32_t count = frame->samples - first < NB_TOGETHER ? frame->samples - first : NB_TOGETHER;
+        const nebel_result result = render_samples(frame, left, top, first, count, scratch);
         if (result != NEBEL_OK) return result;
     }
-    nb_planes_finish(frame, left, top, scratch->hit_counts);
+    nb_place place = {left, top, 0};
+    for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
+        nb_planes_finish(frame, &place, scratch);
+    }
     return NEBEL_OK;
 }
 

@@ -159,50 +159,75 @@ static nebel_result make_device(nb_geometry *geometry, nebel_isa isa, int thread
     return NEBEL_OK;
 }
 
-static size_t clusters_of(const nb_surface *surface)
+/* ---- numbers of triangles ------------------------------------------------------------------------------------------
+ */
+
+static size_t fans(size_t count)
 {
-    return (surface->mesh->triangle_count + (size_t)NB_CLUSTER - 1) / NB_CLUSTER;
+    return (count + NB_FAN - 1) / NB_FAN;
 }
 
-static nebel_result make_clusters(nb_geometry *geometry)
+static nebel_result set_ids(nb_geometry *geometry)
 {
     size_t count = 0;
-    for (size_t s = 0; s < geometry->surface_count; s++) count += clusters_of(&geometry->surfaces[s]);
-    if (count >= UINT32_MAX / NB_CLUSTER) {
+    for (size_t s = 0; s < geometry->surface_count; s++) count += fans(geometry->surfaces[s].mesh->triangle_count);
+    if (count >= UINT32_MAX / NB_FAN) {
         return nb_fail(&geometry->log, NEBEL_ERROR_ARGUMENT, "scene: more than 4 billion triangles");
     }
-    geometry->clusters = nb_allocate(&geometry->allocator, count, sizeof *geometry->clusters);
-    geometry->groups = nb_allocate(&geometry->allocator, count / NB_GROUP + 1, sizeof *geometry->groups);
-    if (geometry->clusters == NULL || geometry->groups == NULL) return NEBEL_ERROR_MEMORY;
+    geometry->owners = nb_allocate(&geometry->allocator, count, sizeof *geometry->owners);
+    if (geometry->owners == NULL) return NEBEL_ERROR_MEMORY;
+    size_t leaf = 0;
     for (uint32_t s = 0; s < geometry->surface_count; s++) {
-        const uint32_t triangles = geometry->surfaces[s].mesh->triangle_count;
-        for (uint32_t c = 0; c < clusters_of(&geometry->surfaces[s]); c++) {
-            const uint32_t first = c * NB_CLUSTER, left = triangles - first;
-            geometry->clusters[geometry->cluster_count++] =
-                (nb_cluster){.surface = s, .first = first, .count = left < NB_CLUSTER ? left : NB_CLUSTER};
-        }
+        geometry->surfaces[s].first_id = (uint32_t)(leaf * NB_FAN);
+        const size_t end = leaf + fans(geometry->surfaces[s].mesh->triangle_count);
+        while (leaf < end) geometry->owners[leaf++] = s;
     }
+    geometry->node_counts[0] = count;
+    return NEBEL_OK;
+}
+
+static nebel_result make_tree(nb_geometry *geometry)
+{
+    size_t total = geometry->node_counts[0];
+    geometry->level_count = 1;
+    for (size_t count = total; count > 1; total += count) {
+        count = fans(count);
+        geometry->node_counts[geometry->level_count++] = count;
+    }
+    geometry->nodes = nb_allocate(&geometry->allocator, total + 1, sizeof(nb_node));
+    if (geometry->nodes == NULL) return NEBEL_ERROR_MEMORY;
+    nb_node *level = (nb_node *)(((uintptr_t)geometry->nodes + sizeof *level - 1) / sizeof *level * sizeof *level);
+    for (int i = 0; i < geometry->level_count; i++) {
+        geometry->levels[i] = level;
+        level += geometry->node_counts[i];
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result make_surface(nb_geometry *geometry, const nebel_mesh *mesh)
+{
+    nb_surface *surface = &geometry->surfaces[geometry->surface_count++];
+    surface->mesh = mesh;
+    surface->positions = nb_allocate(&geometry->allocator, mesh->vertex_count + (size_t)1, 3 * sizeof(float));
+    surface->ends = nb_allocate(&geometry->allocator, mesh->vertex_count, 4 * sizeof *surface->ends);
+    if (surface->positions == NULL || surface->ends == NULL) return NEBEL_ERROR_MEMORY;
+    memset(surface->positions + 3 * (size_t)mesh->vertex_count, 0, 3 * sizeof(float));
+    measure(geometry, surface);
     return NEBEL_OK;
 }
 
 nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *scene, nebel_isa isa, int threads)
 {
-    const nebel_result result = check_scene(scene, &geometry->log);
+    nebel_result result = check_scene(scene, &geometry->log);
     if (result != NEBEL_OK) return result;
     geometry->surfaces = nb_allocate_zero(&geometry->allocator, scene->mesh_count, sizeof *geometry->surfaces);
     if (geometry->surfaces == NULL) return NEBEL_ERROR_MEMORY;
-    for (size_t i = 0; i < scene->mesh_count; i++) {
-        if (scene->meshes[i].triangle_count == 0) continue;
-        nb_surface *surface = &geometry->surfaces[geometry->surface_count++];
-        surface->mesh = &scene->meshes[i];
-        surface->positions =
-            nb_allocate(&geometry->allocator, surface->mesh->vertex_count + (size_t)1, 3 * sizeof(float));
-        if (surface->positions == NULL) return NEBEL_ERROR_MEMORY;
-        memset(surface->positions + 3 * (size_t)surface->mesh->vertex_count, 0, 3 * sizeof(float));
-        measure(geometry, surface);
+    for (size_t i = 0; i < scene->mesh_count && result == NEBEL_OK; i++) {
+        if (scene->meshes[i].triangle_count > 0) result = make_surface(geometry, &scene->meshes[i]);
     }
-    const nebel_result clusters = make_clusters(geometry);
-    return clusters == NEBEL_OK ? make_device(geometry, isa, threads) : clusters;
+    if (result == NEBEL_OK) result = set_ids(geometry);
+    if (result == NEBEL_OK) result = make_tree(geometry);
+    return result == NEBEL_OK ? make_device(geometry, isa, threads) : result;
 }
 
 /* ---- building -------------------------------------------------------------------------------------------------------
@@ -236,22 +261,6 @@ static void move_positions(const double origin[3], nb_surface *surface)
     }
 }
 
-/* Corners that are not finite are left out. */
-static void bound_cluster(const nb_surface *surface, nb_cluster *cluster)
-{
-    const uint32_t *index = surface->mesh->indices + 3 * (size_t)cluster->first;
-    float low[3] = {1e18f, 1e18f, 1e18f}, high[3] = {-1e18f, -1e18f, -1e18f};
-    for (uint32_t k = 0; k < 3 * cluster->count; k++) {
-        const float *p = surface->positions + 3 * (size_t)index[k];
-        for (int i = 0; i < 3; i++) {
-            low[i] = p[i] < low[i] ? p[i] : low[i];
-            high[i] = p[i] > high[i] ? p[i] : high[i];
-        }
-    }
-    memcpy(cluster->low, low, sizeof low);
-    memcpy(cluster->high, high, sizeof high);
-}
-
 static nebel_result attach(nb_geometry *geometry, size_t number)
 {
     const nb_surface *surface = &geometry->surfaces[number];
@@ -278,9 +287,6 @@ static nebel_result build(nb_geometry *geometry)
     for (size_t i = 0; i < geometry->surface_count && result == NEBEL_OK; i++) {
         move_positions(geometry->origin, &geometry->surfaces[i]);
         result = attach(geometry, i);
-    }
-    for (size_t i = 0; i < geometry->cluster_count; i++) {
-        bound_cluster(&geometry->surfaces[geometry->clusters[i].surface], &geometry->clusters[i]);
     }
     if (result == NEBEL_OK) {
         rtcCommitScene(geometry->scene);
@@ -324,9 +330,11 @@ void nb_geometry_free(nb_geometry *geometry)
 {
     if (geometry->scene != NULL) rtcReleaseScene(geometry->scene);
     if (geometry->device != NULL) rtcReleaseDevice(geometry->device);
-    for (size_t i = 0; i < geometry->surface_count; i++)
+    for (size_t i = 0; i < geometry->surface_count; i++) {
         nb_release(&geometry->allocator, geometry->surfaces[i].positions);
-    nb_release(&geometry->allocator, geometry->groups);
-    nb_release(&geometry->allocator, geometry->clusters);
+        nb_release(&geometry->allocator, geometry->surfaces[i].ends);
+    }
+    nb_release(&geometry->allocator, geometry->nodes);
+    nb_release(&geometry->allocator, geometry->owners);
     nb_release(&geometry->allocator, geometry->surfaces);
 }

@@ -9,25 +9,26 @@
 
 #include <embree3/rtcore.h>
 
+enum {
+    NB_FAN = 16,  /* children of a node of the tree of rectangles */
+    NB_LEVELS = 8 /* of this tree at most: 16^8 triangles */
+};
+
+/* Pixels around each of the NB_FAN triangles or nodes below a node as -x0, -y0, x1, y1, ends included: around two of
+ * them these are the larger numbers. INT16_MIN four times around what shows nothing. */
+typedef struct nb_node {
+    int16_t ends[4 * NB_FAN];
+} nb_node;
+
 /* A mesh with its positions relative to the origin of the geometry. */
 typedef struct nb_surface {
     const nebel_mesh *mesh;
     float *positions;      /* 3 per vertex, and one float more: Embree loads four */
+    int16_t *ends;         /* 4 per vertex: like those of a node, in the picture that is being rasterized */
     float low[3], high[3]; /* corners of the mesh around its own origin */
     float longest_edge;
+    uint32_t first_id; /* of its triangles in the geometry, a multiple of NB_FAN */
 } nb_surface;
-
-/* Up to NB_CLUSTER triangles of a mesh that follow each other. */
-typedef struct nb_cluster {
-    uint32_t surface, first, count;
-    float low[3], high[3]; /* relative to the origin of the geometry */
-    float from[2], to[2];  /* in pixels of the picture that is being rasterized; empty where to[0] < 0 */
-} nb_cluster;
-
-/* NB_GROUP clusters that follow each other, the last group fewer. */
-typedef struct nb_group {
-    float from[2], to[2]; /* around those of the clusters */
-} nb_group;
 
 typedef struct nb_geometry {
     nebel_allocator allocator;
@@ -38,11 +39,19 @@ typedef struct nb_geometry {
     float bounds_min[3], bounds_max[3]; /* relative to origin; 0 where there are no triangles */
     double largest_radius;              /* of a mesh around its own origin */
     size_t surface_count;
-    size_t cluster_count;
-    nb_cluster *clusters;
-    nb_group *groups;
     nb_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
+    uint32_t *owners;     /* the surface of NB_FAN triangles whose IDs follow each other */
+    void *nodes;
+    int level_count;
+    nb_node *levels[NB_LEVELS]; /* of the tree: parts of `nodes`, leaves first; a node is on two lines of the cache */
+    size_t node_counts[NB_LEVELS];
 } nb_geometry;
+
+/* The surface of the triangle with the given ID. */
+static inline uint32_t nb_owner_of(const nb_geometry *geometry, uint32_t id)
+{
+    return geometry->owners[id / NB_FAN];
+}
 
 /* Checks the meshes and makes the device; builds nothing yet. On an error the geometry is to be freed all the same.
  * Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */

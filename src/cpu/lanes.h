@@ -1,18 +1,18 @@
-/* Batches of rays: 16 x 16 points of the picture, in blocks of 4 x 4, a block for a packet of Embree. */
+/* The picture is rendered in regions of 64 x 64 pixels, a region in batches of 64 x 4, a batch in blocks of 4 x 4, a
+ * block for a packet of Embree. Arrays over a region go block by block, row after row: each batch is a part of them. */
 #ifndef NB_CPU_LANES_H
 #define NB_CPU_LANES_H
 
 #include <stdint.h>
 
 enum {
-    NB_PACKET = 16,                    /* rays in a packet */
     NB_BLOCK = 4,                      /* width and height of a packet in pixels */
-    NB_TILE = 16,                      /* width and height of a batch in pixels */
-    NB_BATCH = NB_TILE * NB_TILE,      /* rays in a batch */
-    NB_PACKETS = NB_BATCH / NB_PACKET, /* packets in a batch */
+    NB_PACKET = NB_BLOCK * NB_BLOCK,   /* rays in a packet */
     NB_REGION = 64,                    /* width and height of what a thread renders at a time */
-    NB_CLUSTER = 16,                   /* neighbouring triangles that are rasterized together */
-    NB_GROUP = 16                      /* neighbouring clusters that are looked at together */
+    NB_PIXELS = NB_REGION * NB_REGION, /* pixels in a region */
+    NB_BATCH = NB_REGION * NB_BLOCK,   /* rays in a batch */
+    NB_PACKETS = NB_REGION / NB_BLOCK, /* packets in a batch */
+    NB_TOGETHER = 4,                   /* samples of a region that are rasterized together */
 };
 
 #define NB_NONE UINT32_MAX
@@ -42,15 +42,15 @@ static inline float nb_clamp_coordinate(float x)
 #define NB_SIMD _Pragma("omp simd")
 #endif
 
-/* Column and row of lane `i` in its batch. */
+/* Column and row of lane `i` in its region. */
 static inline uint32_t nb_lane_x(uint32_t i)
 {
-    return i / NB_PACKET % (NB_TILE / NB_BLOCK) * NB_BLOCK + i % NB_BLOCK;
+    return i / NB_PACKET % NB_PACKETS * NB_BLOCK + i % NB_BLOCK;
 }
 
 static inline uint32_t nb_lane_y(uint32_t i)
 {
-    return i / NB_PACKET / (NB_TILE / NB_BLOCK) * NB_BLOCK + i % NB_PACKET / NB_BLOCK;
+    return i / NB_BATCH * NB_BLOCK + i % NB_PACKET / NB_BLOCK;
 }
 
 #endif

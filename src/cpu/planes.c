@@ -12,15 +12,16 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-static nb_area area_of(const nb_frame *frame, uint32_t left, uint32_t top, uint32_t size)
+static nb_area area_of(const nb_frame *frame, const nb_place *place)
 {
-    return (nb_area){left, top, least(size, frame->width - left), least(size, frame->height - top)};
+    const uint32_t left = place->left, top = place->top + nb_lane_y(place->first);
+    return (nb_area){left, top, least(NB_REGION, frame->width - left), least(NB_BLOCK, frame->height - top)};
 }
 
 /* Lane of a pixel in its batch: the inverse of nb_lane_x and nb_lane_y. */
 static uint32_t lane_of(uint32_t x, uint32_t y)
 {
-    return (y / NB_BLOCK * (NB_TILE / NB_BLOCK) + x / NB_BLOCK) * NB_PACKET + y % NB_BLOCK * NB_BLOCK + x % NB_BLOCK;
+    return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
 }
 
 static void set_vectors(float *plane, uint32_t width, const nb_area *area, const float (*v)[NB_BATCH])
@@ -77,27 +78,25 @@ static void widen_errors(float *plane, uint32_t width, const nb_area *area, int 
 }
 
 static void add_depths(const nb_frame *frame, const nb_area *area, int is_first, const nb_scratch *scratch,
-                       uint32_t *hit_counts)
+                       uint32_t *counts)
 {
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = frame->planes->depth + (size_t)(area->top + y) * frame->width + area->left;
-        uint32_t *counts = hit_counts + (size_t)y * NB_REGION;
         for (uint32_t x = 0; x < area->columns; x++) {
             const uint32_t i = lane_of(x, y);
             const int hit = scratch->hits.surface[i] != NB_NONE;
             const float t = (float)(frame->view.advance * (double)scratch->rays.length[i]) + scratch->hits.t[i];
             row[x] = (is_first ? 0 : row[x]) + (hit ? t : 0);
-            counts[x] = (is_first ? 0 : counts[x]) + (hit ? 1 : 0);
+            counts[i] = (is_first ? 0 : counts[i]) + (hit ? 1 : 0);
         }
     }
 }
 
-void nb_planes_add(const nb_frame *frame, uint32_t left, uint32_t top, int is_first, const nb_scratch *scratch,
-                   uint32_t *hit_counts)
+void nb_planes_add(const nb_frame *frame, const nb_place *place, int is_first, nb_scratch *scratch)
 {
     const nebel_frame *planes = frame->planes;
     const nb_light_samples *samples = &scratch->samples;
-    const nb_area area = area_of(frame, left, top, NB_TILE);
+    const nb_area area = area_of(frame, place);
     const uint32_t width = frame->width;
     if (planes->color != NULL) add_vectors(planes->color, width, &area, is_first, samples->color);
     if (planes->transmittance != NULL)
@@ -106,7 +105,7 @@ void nb_planes_add(const nb_frame *frame, uint32_t left, uint32_t top, int is_fi
         add_vectors(planes->in_scattering, width, &area, is_first, samples->in_scattering);
     if (planes->normal != NULL) add_normals(planes->normal, width, &area, is_first, scratch);
     if (planes->error != NULL) widen_errors(planes->error, width, &area, is_first, samples->error);
-    if (planes->depth != NULL) add_depths(frame, &area, is_first, scratch, hit_counts);
+    if (planes->depth != NULL) add_depths(frame, &area, is_first, scratch, scratch->hit_counts + place->first);
 }
 
 static void scale(float *plane, uint32_t width, const nb_area *area, size_t channels, float factor)
@@ -118,20 +117,22 @@ static void scale(float *plane, uint32_t width, const nb_area *area, size_t chan
     }
 }
 
-static void divide_depths(const nb_frame *frame, const nb_area *area, const uint32_t *hit_counts)
+static void divide_depths(const nb_frame *frame, const nb_area *area, const uint32_t *counts)
 {
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = frame->planes->depth + (size_t)(area->top + y) * frame->width + area->left;
-        const uint32_t *counts = hit_counts + (size_t)y * NB_REGION;
-        for (uint32_t x = 0; x < area->columns; x++) row[x] = counts[x] > 0 ? row[x] / (float)counts[x] : INFINITY;
+        for (uint32_t x = 0; x < area->columns; x++) {
+            const uint32_t count = counts[lane_of(x, y)];
+            row[x] = count > 0 ? row[x] / (float)count : INFINITY;
+        }
     }
 }
 
-void nb_planes_finish(const nb_frame *frame, uint32_t left, uint32_t top, const uint32_t *hit_counts)
+void nb_planes_finish(const nb_frame *frame, const nb_place *place, const nb_scratch *scratch)
 {
     const nebel_frame *planes = frame->planes;
-    const nb_area area = area_of(frame, left, top, NB_REGION);
-    if (planes->depth != NULL) divide_depths(frame, &area, hit_counts);
+    const nb_area area = area_of(frame, place);
+    if (planes->depth != NULL) divide_depths(frame, &area, scratch->hit_counts + place->first);
     if (frame->samples == 1) return;
     const float factor = 1 / (float)frame->samples;
     scale(planes->color, frame->width, &area, 3, factor);

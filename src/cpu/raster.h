@@ -8,37 +8,32 @@
 #define NB_CPU_RASTER_H
 
 #include "hits.h"
-#include "sampling.h"
+#include "projection.h"
 
-/* A view made ready for a picture, and where the clusters of the geometry lie in it. */
+/* A view of a geometry made ready for a picture. */
 typedef struct nb_raster {
     const nb_geometry *geometry;
-    int orthographic;
-    double rows[3]
-               [3]; /* from a point relative to the geometry's origin to homogeneous coordinates, after adding shift */
-    double shift[3];
-    uint32_t width, height;
+    nb_projection projection;
 } nb_raster;
 
 /* What is seen at the points of a region. */
 typedef struct nb_seen {
-    float nearness[NB_REGION * NB_REGION];    /* grows towards the camera */
-    uint32_t triangle[NB_REGION * NB_REGION]; /* cluster * NB_CLUSTER + place in it; NB_NONE: background */
+    float nearness[NB_PIXELS];    /* grows towards the camera */
+    uint32_t triangle[NB_PIXELS]; /* its ID; NB_NONE: background */
 } nb_seen;
 
 /* 1 where rasterizing is possible and pays. */
 int nb_raster_is_apt(const nb_geometry *geometry, nebel_projection projection, uint32_t width, uint32_t height);
 
-/* Call before the threads of the frame start; writes the rectangles of the geometry's clusters. */
-void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view, uint32_t width, uint32_t height,
+/* Call before the threads of the frame start; writes the geometry's rectangles. */
+void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view, const nb_picture *picture,
                    int threads);
 
-/* What is seen at the points of the region whose first pixel is (left, top). */
-void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, const nb_region_points *points,
-                      nb_seen *seen);
+/* What is seen at `count` points of each pixel of the region whose first pixel is (left, top). */
+void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, uint32_t count,
+                      const nb_region_points *points, nb_seen *seen);
 
-/* The hits of a batch, whose first pixel is (x, y) of the region. */
-void nb_raster_hits(const nb_geometry *geometry, const nb_seen *seen, uint32_t x, uint32_t y, const nb_rays *rays,
-                    nb_hits *hits);
+/* The hits of a batch, where the triangles with these IDs are seen. */
+void nb_raster_hits(const nb_geometry *geometry, const uint32_t *ids, const nb_rays *rays, nb_hits *hits);
 
 #endif

@@ -22,8 +22,8 @@ typedef struct nb_light_samples {
 /* What a thread works in: allocated once, aligned to 64 bytes. */
 typedef struct nb_scratch {
     nb_packets packets;
-    nb_region_points region;
-    float x[NB_BATCH], y[NB_BATCH];    /* of these points those of the batch */
+    nb_region_points points_of_region[NB_TOGETHER];
+    nb_seen seen[NB_TOGETHER];
     _Alignas(64) int inside[NB_BATCH]; /* -1 within the picture, else 0 */
     nb_rays rays;
     nb_hits hits;
@@ -32,8 +32,7 @@ typedef struct nb_scratch {
     float distance[NB_BATCH];             /* m, over which fog is asked for */
     float offset[3][NB_BATCH];            /* of the rays' starts from the camera's position; orthographic only */
     float sun_transmittance[3][NB_BATCH]; /* of the way to the sun */
-    nb_seen seen;
-    uint32_t hit_counts[NB_REGION * NB_REGION]; /* samples of a pixel that met a surface */
+    uint32_t hit_counts[NB_PIXELS];       /* samples of a pixel that met a surface */
 } nb_scratch;
 
 struct nebel_renderer {
@@ -68,21 +67,20 @@ typedef struct nb_frame {
     uint32_t width, height, samples;
 } nb_frame;
 
-/* A batch of a region: both first pixels are in pixels of the picture. */
+/* A batch of a region. */
 typedef struct nb_place {
-    uint32_t left, top, region_left, region_top;
+    uint32_t left, top; /* first pixel of the region */
+    uint32_t first;     /* lane of the region in which the batch begins */
 } nb_place;
 
-/* Renders one sample of a batch into scratch->samples. scratch->region holds the points of its region and, where the
- * frame is rasterized, scratch->seen what is seen there. */
-nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
+/* Renders a sample of a batch into scratch->samples. The members `sample` of scratch->points_of_region and, where the
+ * frame is rasterized, of scratch->seen belong to its region. */
+nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch);
 
-/* Adds the samples of a batch to the planes: the first sample replaces what is there. `hit_counts` belongs to the
- * batch's first pixel; its rows are NB_REGION long. */
-void nb_planes_add(const nb_frame *frame, uint32_t left, uint32_t top, int is_first, const nb_scratch *scratch,
-                   uint32_t *hit_counts);
+/* Adds the sample of a batch to the planes: the first sample replaces what is there. */
+void nb_planes_add(const nb_frame *frame, const nb_place *place, int is_first, nb_scratch *scratch);
 
 /* Makes means of sums. */
-void nb_planes_finish(const nb_frame *frame, uint32_t left, uint32_t top, const uint32_t *hit_counts);
+void nb_planes_finish(const nb_frame *frame, const nb_place *place, const nb_scratch *scratch);
 
 #endif

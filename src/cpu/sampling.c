@@ -34,28 +34,26 @@ static inline float fraction(uint32_t digits)
     return (float)(digits >> 14) * 0x1p-18f;
 }
 
-/* Digits of the sample before the shift, then of pixels row after row. */
+/* Digits of the sample before the shift. */
 NB_CLONES static void shift_points(uint32_t digits_x, uint32_t digits_y, uint32_t left, uint32_t top, float *restrict x,
                                    float *restrict y)
 {
-    for (uint32_t row = 0; row < NB_REGION; row++) {
-        NB_SIMD
-        for (uint32_t column = 0; column < NB_REGION; column++) {
-            const uint32_t pixel = (left + column) | (top + row) << 16;
-            const uint32_t seed = mix(pixel ^ 0x85ebca6bu); /* mix(0) is 0: no shift at all */
-            x[row * NB_REGION + column] = (float)column + fraction(digits_x ^ seed);
-            y[row * NB_REGION + column] = (float)row + fraction(digits_y ^ mix(seed + 0x9e3779b9u));
-        }
+    NB_SIMD
+    for (uint32_t i = 0; i < NB_PIXELS; i++) {
+        const uint32_t column = nb_lane_x(i), row = nb_lane_y(i);
+        const uint32_t pixel = (left + column) | (top + row) << 16;
+        const uint32_t seed = mix(pixel ^ 0x85ebca6bu); /* mix(0) is 0: no shift at all */
+        x[i] = (float)column + fraction(digits_x ^ seed);
+        y[i] = (float)row + fraction(digits_y ^ mix(seed + 0x9e3779b9u));
     }
 }
 
-static void center_points(float *restrict x, float *restrict y)
+NB_CLONES static void center_points(float *restrict x, float *restrict y)
 {
-    for (int row = 0; row < NB_REGION; row++) {
-        for (int column = 0; column < NB_REGION; column++) {
-            x[row * NB_REGION + column] = (float)column + .5f;
-            y[row * NB_REGION + column] = (float)row + .5f;
-        }
+    NB_SIMD
+    for (uint32_t i = 0; i < NB_PIXELS; i++) {
+        x[i] = (float)nb_lane_x(i) + .5f;
+        y[i] = (float)nb_lane_y(i) + .5f;
     }
 }
 
@@ -63,10 +61,7 @@ void nb_sample_region(uint32_t index, uint32_t count, uint32_t left, uint32_t to
 {
     if (count == 1) {
         center_points(points->x, points->y);
-        points->low = points->high = .5;
     } else {
         shift_points(mirror(index), sobol(index), left, top, points->x, points->y);
-        points->low = 0;
-        points->high = 1;
     }
 }

@@ -5,11 +5,20 @@
 
 #include "lanes.h"
 
-/* One point in every pixel of a region, row after row, in pixels from the region's first. */
+/* One point in every pixel of a region, in pixels from the corner of the region's first. */
 typedef struct nb_region_points {
-    float x[NB_REGION * NB_REGION], y[NB_REGION * NB_REGION];
-    double low, high; /* how far from the corners of their pixels they lie */
+    float x[NB_PIXELS], y[NB_PIXELS];
 } nb_region_points;
+
+/* How far from the corner of a pixel its points lie where there are `count` of them. */
+typedef struct nb_sample_range {
+    float low, high;
+} nb_sample_range;
+
+static inline nb_sample_range nb_sample_range_of(uint32_t count)
+{
+    return count == 1 ? (nb_sample_range){.5f, .5f} : (nb_sample_range){0, 1};
+}
 
 /* Sample `index` of `count` for the region whose first pixel is (left, top) of the picture. Depends on pixel and sample
  * only. The only sample of a pixel is its centre. */

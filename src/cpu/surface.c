@@ -57,8 +57,8 @@ static void sample_texture(const nebel_texture *texture, const nb_srgb_table *ta
 /* ---- points --------------------------------------------------------------------------------------------------------
  */
 
-/* Unit normals of the triangles, turned to the camera. Scaled by the largest component first: squares of the areas of
- * small and large triangles leave the range of float. */
+/* Unit normals of the triangles, turned to the camera, also for shading until smooth ones are known. Scaled by the
+ * largest component first: squares of the areas of small and large triangles leave the range of float. */
 NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_points *points)
 {
     NB_SIMD
@@ -71,9 +71,9 @@ NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_poi
         const float along = sx * rays->unit[0][i] + sy * rays->unit[1][i] + sz * rays->unit[2][i];
         const float length = sqrtf(sx * sx + sy * sy + sz * sz);
         const float unit = (along > 0 ? -1 : 1) / length;
-        points->side[0][i] = sx * unit;
-        points->side[1][i] = sy * unit;
-        points->side[2][i] = sz * unit;
+        points->normal[0][i] = points->side[0][i] = sx * unit;
+        points->normal[1][i] = points->side[1][i] = sy * unit;
+        points->normal[2][i] = points->side[2][i] = sz * unit;
     }
 }
 
@@ -85,11 +85,6 @@ static void set_smooth_normal(const nebel_mesh *mesh, const nb_hits *hits, int i
     const float *c = mesh->normals + 3 * (size_t)index[2];
     const float u = hits->u[i], v = hits->v[i], w = 1 - u - v;
     for (int k = 0; k < 3; k++) points->normal[k][i] = w * a[k] + u * b[k] + v * c[k];
-}
-
-static void set_flat_normal(int i, nb_points *points)
-{
-    for (int k = 0; k < 3; k++) points->normal[k][i] = points->side[k][i];
 }
 
 static void multiply_texture(const nebel_texture *texture, const nb_srgb_table *table, const nebel_mesh *mesh,
@@ -110,20 +105,12 @@ static void fetch(const nb_geometry *geometry, const nebel_scene_data *scene, co
                   const nb_hits *hits, nb_points *points)
 {
     for (int i = 0; i < NB_BATCH; i++) {
-        if (hits->surface[i] == NB_NONE) {
-            points->edge[i] = 0;
-            set_flat_normal(i, points);
-            continue;
-        }
+        if (hits->surface[i] == NB_NONE) continue;
         const nb_surface *surface = &geometry->surfaces[hits->surface[i]];
         const nebel_mesh *mesh = surface->mesh;
         points->edge[i] = surface->longest_edge;
         for (int k = 0; k < 3; k++) points->reflectance[k][i] = mesh->base_color[k];
-        if (mesh->normals != NULL) {
-            set_smooth_normal(mesh, hits, i, points);
-        } else {
-            set_flat_normal(i, points);
-        }
+        if (mesh->normals != NULL) set_smooth_normal(mesh, hits, i, points);
         if (mesh->texture >= 0 && mesh->uvs != NULL) {
             multiply_texture(&scene->textures[mesh->texture], table, mesh, hits, i, points);
         }
