@@ -25,6 +25,7 @@ BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [],
        '{"nebel": 1, "fog": [], "models": [{"file": "a", "scale": 0}]}',
        '{"nebel": 1, "fog": [], "models": [{}]}',
        '{"nebel": 1, "fog": [], "nebula": [{}]}',
+       '{"nebel": 1, "fog": [], "nebula": [{"points": {"file": "a.ply"}, "count": 3}]}',
        '{"nebel": 1, "fog": [], "background": "red"}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": "#fff"}]}',
        '{"nebel": 1, "fog": [], "nebula": [{"shape": {"type": "world"}, "count": 0}]}']

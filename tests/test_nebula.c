@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 #include <cmocka.h>
 
 #include "fog_help.h"
@@ -52,6 +53,36 @@ static void test_fills_its_shape_evenly(void **unused)
     /* an eighth of the volume, a third of the octaves; five standard deviations */
     assert_true(fabs(within_half - COUNT / 8.0) < 5 * sqrt(COUNT * 7 / 64.0));
     for (int i = 0; i < 3; i++) assert_true(fabs(in_lower_octave[i] - COUNT / 3.0) < 5 * sqrt(COUNT * 2 / 9.0));
+}
+
+/* Points take the place of the shape, and are stirred and coloured like strewn places. */
+static void test_starts_at_points(void **unused)
+{
+    (void)unused;
+    nebel_nebula_desc desc = a_nebula();
+    desc.turbulence_size = 5;
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    static double points[COUNT][3];
+    for (int i = 0; i < COUNT; i++) memcpy(points[i], particles[i].center, sizeof points[i]);
+    desc.points = (const double(*)[3])points;
+    desc.shape.radius = -1;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    for (int i = 0; i < COUNT; i++) {
+        assert_memory_equal(again[i].center, particles[i].center, sizeof again->center);
+        assert_memory_equal(again[i].emission, particles[i].emission, sizeof again->emission);
+        assert_true(again[i].radius == particles[i].radius);
+    }
+    desc.turbulence = 1;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    int moved = 0;
+    for (int i = 0; i < COUNT; i++) moved += distance(&again[i], points[i]) > .01;
+    assert_true(moved > COUNT / 2);
+    desc.turbulence_size = 0;
+    for (int i = 0; i < COUNT; i++) memset(points[i], 0, sizeof points[i]);
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    assert_true(isfinite(again[COUNT - 1].center[0]));
+    points[7][1] = HUGE_VAL;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_ERROR_VALUE);
 }
 
 static void test_is_strewn_as_its_density_says(void **unused)
@@ -210,6 +241,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fills_its_shape_evenly),
+        cmocka_unit_test(test_starts_at_points),
         cmocka_unit_test(test_is_strewn_as_its_density_says),
         cmocka_unit_test(test_every_shape_holds_its_particles),
         cmocka_unit_test(test_the_same_seed_gives_the_same_particles),

@@ -10,6 +10,7 @@
 #define MODEL(members) SCENE("\"models\": [{" members "}]")
 #define NEBULA(members)                                                                                                \
     SCENE("\"nebula\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 5}, " members "}]")
+#define POINTS(rest) SCENE("\"nebula\": [{\"points\": {\"file\": " rest "}]")
 #define LIGHT(members) SCENE("\"lights\": [`{" members "}]")
 #define BAD_LIGHT(members) SCENE("\"lights\": [{" members "}]")
 
@@ -411,7 +412,7 @@ static void test_what_no_nebula_has(void **state)
 {
     (void)state;
     const rule rules[] = {
-        {FORMAT, SCENE("\"nebula\": [`{}]"), "nebula[0]: the key \"shape\" is missing; a nebula needs it"},
+        {FORMAT, SCENE("\"nebula\": [`{}]"), "nebula[0]: is nowhere; a nebula has \"shape\" or \"points\""},
         {FORMAT, SCENE("\"nebula\": [{\"shape\": `{\"type\": \"world\"}}]"), "nebula[0].shape: has no bounds"},
         {FORMAT, NEBULA("\"count\": `0"), "nebula[0].count: is 0; must be a whole number from 1 to 1000000"},
         {FORMAT, NEBULA("\"count\": `1e7"), "nebula[0].count: is 10000000; must be"},
@@ -427,7 +428,17 @@ static void test_what_no_nebula_has(void **state)
         {FORMAT, NEBULA("\"colors\": [1, `-1]"), "nebula[0].colors[1]: is -1; must be"},
         {FORMAT, NEBULA("\"turbulence\": `-1"), "nebula[0].turbulence: is -1; must be"},
         {FORMAT, NEBULA("\"turbulence_size\": `0"), "nebula[0].turbulence_size: is 0; must be"},
-        {FORMAT, NEBULA("`\"points\": 3"), "nebula[0].points: unknown key; a nebula has: name, shape"},
+        {FORMAT, NEBULA("`\"place\": 3"), "nebula[0].place: unknown key; a nebula has: name, shape, points"},
+        {FORMAT, SCENE("\"nebula\": [{`\"shape\": {}, \"points\": {}}]"),
+         "nebula[0].shape: does not go with \"points\""},
+        {FORMAT, POINTS("\"a.ply\"}, `\"count\": 3"), "nebula[0].count: does not go with \"points\""},
+        {FORMAT, POINTS("\"a.ply\"}, `\"density\": {\"type\": \"constant\"}"), "nebula[0].density: does not go with"},
+        {FORMAT, POINTS("\"a.ply\", `\"color\": 1}"),
+         "nebula[0].points.color: unknown key; a set of points has: file, up,"},
+        {FORMAT, POINTS("\"a.ply\", \"scale\": `0}"), "nebula[0].points.scale: a scale of 0"},
+        {FORMAT, SCENE("\"nebula\": [{\"points\": `{}}]"), "nebula[0].points: the key \"file\" is missing"},
+        {NEBEL_ERROR_FILE, POINTS("`\"there is none.ply\"}"),
+         "nebula[0].points.file: cannot read the model \"dir/there is none.ply\""},
         {LIMIT,
          SCENE("\"nebula\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 5}, \"count\": "
                "1000000}, "

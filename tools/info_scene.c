@@ -128,9 +128,14 @@ static void print_volumes(const nebel_scene_data *scene)
 
 static void print_nebulae(const nebel_scene_data *scene)
 {
-    for (size_t i = 0; i < scene->nebula_count; i++)
-        (void)printf("nebula: %zu particles in a shape of type %s\n", scene->nebulae[i].count,
-                     shape_names[scene->nebulae[i].shape.type]);
+    for (size_t i = 0; i < scene->nebula_count; i++) {
+        const nebel_nebula_desc *const nebula = &scene->nebulae[i];
+        (void)printf("nebula: %zu particles ", nebula->count);
+        if (nebula->points != NULL)
+            (void)printf("at the vertices of a model\n");
+        else
+            (void)printf("in a shape of type %s\n", shape_names[nebula->shape.type]);
+    }
 }
 
 /* Where 5 % of the light of the green channel is left, straight ahead: the meteorological range in uniform fog. NaN:

@@ -5,6 +5,7 @@
 #include "media/density.h"
 
 #include <math.h>
+#include <string.h>
 
 #define NB_DOUBLE
 #include "formulas/prelude.h"
@@ -23,7 +24,7 @@ enum { STREAM_PLACE, STREAM_SIZE, STREAM_COLOR, STREAM_COLOR_FIELD, STREAM_EDDIE
 typedef struct cloud {
     const nebel_nebula_desc *desc;
     nebel_allocator allocator;
-    nb_volume volume;
+    nb_volume volume; /* unless there are points */
     double size[2];
     double eddy; /* m */
 } cloud;
@@ -81,25 +82,51 @@ static nebel_result check_desc(const nebel_nebula_desc *desc)
     return check_amounts(desc);
 }
 
+static double find_extent(const double low[3], const double high[3])
+{
+    double extent = 0;
+    for (int i = 0; i < 3; i++) extent = fmax(extent, high[i] - low[i]);
+    return extent;
+}
+
+/* *extent [m] is the longest side of the shape's bounds. */
+static nebel_result open_shape(cloud *made, double *extent)
+{
+    const nebel_volume_desc body = {.shape = made->desc->shape, .density = made->desc->density};
+    const nebel_result result = nb_volume_resolve(&made->allocator, &made->desc->log, &body, &made->volume);
+    if (result != NEBEL_OK) return result;
+    *extent = find_extent(made->volume.low, made->volume.high);
+    if (isfinite(*extent)) return NEBEL_OK;
+    nb_volume_free(&made->allocator, &made->volume);
+    return nb_fail(&made->desc->log, NEBEL_ERROR_VALUE,
+                   "nebula: its shape has no bounds; particles need a place to be in");
+}
+
+static nebel_result measure_points(const nebel_nebula_desc *desc, double *extent)
+{
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (size_t i = 0; i < desc->count; i++)
+        for (int k = 0; k < 3; k++) {
+            if (!isfinite(desc->points[i][k]))
+                return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: point %zu is not finite", i);
+            low[k] = fmin(low[k], desc->points[i][k]);
+            high[k] = fmax(high[k], desc->points[i][k]);
+        }
+    *extent = find_extent(low, high);
+    return NEBEL_OK;
+}
+
 static nebel_result open_cloud(const nebel_nebula_desc *desc, cloud *made)
 {
-    const nebel_volume_desc body = {.shape = desc->shape, .density = desc->density};
+    double extent = 0;
     *made = (cloud){.desc = desc,
                     .allocator = nb_resolve_allocator(&desc->allocator),
                     .size = {desc->size[0], desc->size[1]},
                     .eddy = desc->turbulence_size};
-    const nebel_result result = nb_volume_resolve(&made->allocator, &desc->log, &body, &made->volume);
+    const nebel_result result = desc->points != NULL ? measure_points(desc, &extent) : open_shape(made, &extent);
     if (result != NEBEL_OK) return result;
-    const double *low = made->volume.low, *high = made->volume.high;
-    double extent = 0;
-    for (int i = 0; i < 3; i++) extent = fmax(extent, high[i] - low[i]);
-    if (!isfinite(extent)) {
-        nb_volume_free(&made->allocator, &made->volume);
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
-                       "nebula: its shape has no bounds; particles need a place to be in");
-    }
     if (made->size[1] == 0) made->size[0] = 0.05, made->size[1] = 0.2;
-    if (made->eddy == 0) made->eddy = extent / 4;
+    if (made->eddy == 0) made->eddy = extent > 0 ? extent / 4 : 1;
     return NEBEL_OK;
 }
 
@@ -112,10 +139,15 @@ static double chance(const cloud *from, int stream, size_t particle, uint64_t i)
     return nb_chance(seed, (uint64_t)particle * (MOST_TRIES * 4) + i);
 }
 
-/* Tries places in the bounding box, each taken with the chance that the density there says. */
+/* A point of the caller's; or tries places in the bounding box, each taken with the chance that the density there says.
+ */
 static int find_place(const cloud *from, size_t particle, double place[3])
 {
     const double *low = from->volume.low, *high = from->volume.high;
+    if (from->desc->points != NULL) {
+        memcpy(place, from->desc->points[particle], 3 * sizeof *place);
+        return 1;
+    }
     for (uint64_t n = 0; n < MOST_TRIES; n++) {
         for (uint64_t i = 0; i < 3; i++)
             place[i] = low[i] + (high[i] - low[i]) * chance(from, STREAM_PLACE, particle, 4 * n + i);
@@ -186,6 +218,6 @@ nebel_result nebel_scatter_nebula(const nebel_nebula_desc *desc, nebel_particle 
                 "nebula: no place for particle %zu in %d tries; its shape is empty or thin, or its density nearly 0", i,
                 MOST_TRIES);
     }
-    nb_volume_free(&from.allocator, &from.volume);
+    if (desc->points == NULL) nb_volume_free(&from.allocator, &from.volume);
     return result;
 }

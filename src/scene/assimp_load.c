@@ -29,11 +29,19 @@ static bool has_polygons(const struct aiScene *scene)
     return found;
 }
 
+/* Points need no faces, which validation asks for. */
+static nebel_result import_points(nb_assimp *in)
+{
+    in->scene = aiImportFile(in->load->source->file, 0);
+    return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in->load, aiGetErrorString());
+}
+
 /* Reads the file as it is, checks it, and only then has it worked on. Assimp's own validation belongs to the reading: a
  * scene that fails in the second step is freed twice. What Assimp could do beyond that takes it more memory and time
  * than reading, and is done on our copy. */
 static nebel_result import_locked(nb_assimp *in)
 {
+    if (in->load->points != NULL) return import_points(in);
     const struct aiScene *raw = aiImportFile(in->load->source->file, aiProcess_ValidateDataStructure);
     if (raw == NULL) return nb_assimp_refuse(in->load, aiGetErrorString());
     const nebel_result result = nb_assimp_check_meshes(in, raw);
@@ -119,6 +127,11 @@ static nebel_result push(const nb_assimp *in, stack *nodes, const struct aiNode 
     return NEBEL_OK;
 }
 
+static nebel_result take_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place)
+{
+    return in->load->points != NULL ? nb_assimp_add_points(in, mesh, place) : nb_assimp_add_mesh(in, mesh, place);
+}
+
 static nebel_result visit(nb_assimp *in, stack *nodes)
 {
     const waiting top = nodes->items[--nodes->count];
@@ -126,7 +139,7 @@ static nebel_result visit(nb_assimp *in, stack *nodes)
     nebel_result result = NEBEL_OK;
     for (unsigned i = 0; i < top.node->mNumMeshes && result == NEBEL_OK; i++)
         if (top.node->mMeshes[i] < in->scene->mNumMeshes)
-            result = nb_assimp_add_mesh(in, in->scene->mMeshes[top.node->mMeshes[i]], &place);
+            result = take_mesh(in, in->scene->mMeshes[top.node->mMeshes[i]], &place);
     for (unsigned i = top.node->mNumChildren; i > 0 && result == NEBEL_OK; i--)
         result = push(in, nodes, top.node->mChildren[i - 1], &place);
     return result;
@@ -145,7 +158,7 @@ static nebel_result walk(nb_assimp *in)
 /* ---- loading
  * --------------------------------------------------------------------------------------------------------- */
 
-static nebel_result convert(nb_assimp *in)
+static nebel_result convert_meshes(nb_assimp *in)
 {
     const nb_model_load *load = in->load;
     const uint64_t before = load->set->triangle_count;
@@ -165,7 +178,19 @@ static nebel_result convert(nb_assimp *in)
     return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", load->source->file);
 }
 
-nebel_result nb_assimp_load(const nb_model_load *load)
+static nebel_result convert_points(nb_assimp *in)
+{
+    const nb_model_load *load = in->load;
+    const nebel_result result = walk(in);
+    if (result != NEBEL_OK) return result;
+    if (in->left_out_points > 0)
+        nb_model_fail(load, NEBEL_OK, "%llu vertices of \"%s\" are left out; they are not numbers",
+                      (unsigned long long)in->left_out_points, load->source->file);
+    if (load->points->count > 0) return NEBEL_OK;
+    return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no vertex", load->source->file);
+}
+
+static nebel_result load_file(const nb_model_load *load, nebel_result (*take)(nb_assimp *in))
 {
     nb_assimp in = {.load = load, .scratch = {.allocator = load->allocator}};
     nebel_result result = nb_file_check(&load->log, load->source->where, "model", load->source->file);
@@ -173,11 +198,21 @@ nebel_result nb_assimp_load(const nb_model_load *load)
     if (result == NEBEL_OK) result = import(&in);
     if (result != NEBEL_OK) return result;
     if (in.scene->mRootNode == NULL)
-        result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", load->source->file);
+        result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds nothing", load->source->file);
     else
-        result = convert(&in);
+        result = take(&in);
     aiReleaseImport(in.scene);
     nb_release(&load->allocator, in.textures);
     nb_arena_release(&in.scratch);
     return result;
+}
+
+nebel_result nb_assimp_load(const nb_model_load *load)
+{
+    return load_file(load, convert_meshes);
+}
+
+nebel_result nb_assimp_load_points(const nb_model_load *load)
+{
+    return load_file(load, convert_points);
 }

@@ -33,6 +33,7 @@ typedef struct nb_assimp {
     nb_loaded_texture *textures; /* those already tried */
     size_t loaded_count, loaded_capacity;
     uint64_t left_out_faces, left_out_triangles; /* points and lines; triangles with bad corners */
+    uint64_t left_out_points;                    /* not finite */
 } nb_assimp;
 
 /* Refuse, or mend, what Assimp would not survive: before it reads the file, and before it works on what it read.
@@ -45,6 +46,9 @@ nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason);
 
 /* Adds one mesh of the model at a place. A mesh without triangles adds nothing. */
 nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
+
+/* Adds the vertices of one mesh to load->points. */
+nebel_result nb_assimp_add_points(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
 
 /* Finds the surface of a material; a texture that cannot be read leaves the plain colour and a note in the log. */
 nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface);

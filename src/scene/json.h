@@ -99,4 +99,7 @@ bool nb_json_fail_key(nb_json *json, nebel_result result, const nb_json_node *no
 bool nb_json_fail_at(nb_json *json, nebel_result result, size_t offset, const char *path, const char *format, ...)
     NB_PRINTF(5, 6);
 
+/* Ends the reading for a reason that has been logged. Returns false. */
+bool nb_json_stop(nb_json *json, nebel_result result);
+
 #endif

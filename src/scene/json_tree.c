@@ -110,3 +110,9 @@ bool nb_json_fail_at(nb_json *json, nebel_result result, size_t offset, const ch
     va_end(arguments);
     return false;
 }
+
+bool nb_json_stop(nb_json *json, nebel_result result)
+{
+    if (json->result == NEBEL_OK) json->result = result;
+    return false;
+}

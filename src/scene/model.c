@@ -110,7 +110,7 @@ static nebel_result load_all(const nebel_scene *scene, nb_model_set *set)
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < scene->model_count && result == NEBEL_OK; i++) {
         const nb_model_source *source = &scene->models[i];
-        const nb_model_load load = {scene->allocator, scene->log, source, set};
+        const nb_model_load load = {scene->allocator, scene->log, source, set, NULL};
         result = source->is_heightfield ? nb_heightfield_load(&load) : nb_assimp_load(&load);
     }
     return result;

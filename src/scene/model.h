@@ -8,16 +8,27 @@
 /* The most triangles of all models together. */
 #define NB_MAX_TRIANGLES ((uint64_t)1 << 28)
 
-/* What a loader works with; `set` receives the meshes. */
+typedef struct nb_point_set {
+    double (*places)[3]; /* m */
+    size_t count, capacity;
+    size_t limit; /* the most there may be */
+} nb_point_set;
+
+/* What a loader works with; `set` receives the meshes, or `points` the vertices. */
 typedef struct nb_model_load {
     nebel_allocator allocator;
     nebel_log log;
     const nb_model_source *source;
     nb_model_set *set;
+    nb_point_set *points;
 } nb_model_load;
 
 nebel_result nb_heightfield_load(const nb_model_load *load);
 nebel_result nb_assimp_load(const nb_model_load *load);
+
+/* The vertices of a model, those at one place once, in metres and where load->source places them. Goes to load->points.
+ */
+nebel_result nb_assimp_load_points(const nb_model_load *load);
 
 /* Memory for positions and normals, uvs where wanted. False when memory is out; release the mesh also then. */
 bool nb_mesh_allocate_vertices(const nebel_allocator *allocator, uint32_t count, bool has_uvs, nebel_mesh *mesh);

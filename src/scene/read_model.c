@@ -1,15 +1,19 @@
-/* One entry of the section "models". The files are read later, by nebel_load_scene_models. */
+/* One entry of the section "models", whose files are read later, by nebel_load_scene_models; and the points of a
+ * nebula, which are read at once, since a scene knows how many particles it has. */
+#include "scene/model.h"
 #include "scene/path.h"
-#include "scene/scene_internal.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 enum { FILE_KEY, UP, UNIT, POSITION, ROTATION, SCALE, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
 
 static const char *const model_names[] = {"file",     "up",    "unit",        "position",
                                           "rotation", "scale", "heightfield", "color"};
 static const nb_keys model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
+
+static const nb_model_source unplaced = {.space = {false, 1}, .rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
 
 static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
 {
@@ -91,6 +95,14 @@ static bool convert_model(nb_scene_reader *in, const nb_json_node *node, nb_mode
     return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has numbers that \"unit\" makes too large");
 }
 
+static bool read_placement(nb_json *json, const nb_json_node *const *found, nb_model_source *model)
+{
+    return nb_read_up(json, found[UP], &model->space) && nb_read_unit(json, found[UNIT], &model->space) &&
+           nb_value_vector(json, found[POSITION], model->position) &&
+           nb_value_rotation(json, found[ROTATION], model->rotation) &&
+           nb_value_scale(json, found[SCALE], model->scale);
+}
+
 static bool keep_model(nb_scene_reader *in, const nb_json_node *node, const nb_model_source *model)
 {
     nebel_scene *scene = in->scene;
@@ -107,15 +119,46 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_json *json = in->json;
-    nb_model_source model = {.space = NB_SPACE_OURS, .rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
+    nb_model_source model = unplaced;
     if (!nb_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
     model.has_color = found[COLOR] != NULL;
     return (found[FILE_KEY] != NULL ? read_file(in, found[FILE_KEY], &model)
                                     : read_heightfield(in, found[HEIGHTFIELD], &model)) &&
-           nb_read_up(json, found[UP], &model.space) && nb_read_unit(json, found[UNIT], &model.space) &&
-           nb_value_vector(json, found[POSITION], model.position) &&
-           nb_value_rotation(json, found[ROTATION], model.rotation) &&
-           nb_value_scale(json, found[SCALE], model.scale) &&
-           nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) && convert_model(in, node, &model) &&
-           keep_model(in, node, &model);
+           read_placement(json, found, &model) && nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) &&
+           convert_model(in, node, &model) && keep_model(in, node, &model);
+}
+
+/* ---- points
+ * ---------------------------------------------------------------------------------------------------------- */
+
+static const nb_keys points_keys = {model_names, MODEL_KEY_COUNT,
+                                    NB_BIT(MODEL_KEY_COUNT) - 1 - NB_BIT(HEIGHTFIELD) - NB_BIT(COLOR), NB_BIT(FILE_KEY),
+                                    "a set of points"};
+
+/* A copy of the points that lives as long as the scene. */
+static bool keep_points(nb_scene_reader *in, const nb_json_node *node, const nb_point_set *points,
+                        nebel_nebula_desc *nebula)
+{
+    double(*places)[3] = nb_arena_allocate(&in->scene->arena, points->count, sizeof *places);
+    if (places == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    memcpy(places, points->places, points->count * sizeof *places);
+    nebula->points = (const double(*)[3])places;
+    nebula->count = points->count;
+    return true;
+}
+
+bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula)
+{
+    const nb_json_node *found[MODEL_KEY_COUNT];
+    nb_model_source model = unplaced;
+    nb_point_set points = {.limit = limit};
+    const nb_model_load load = {in->scene->allocator, in->scene->log, &model, NULL, &points};
+    if (node == NULL) return true;
+    if (!nb_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
+        !read_placement(in->json, found, &model) || !convert_model(in, node, &model))
+        return false;
+    const nebel_result result = nb_assimp_load_points(&load);
+    const bool good = result == NEBEL_OK ? keep_points(in, node, &points, nebula) : nb_json_stop(in->json, result);
+    nb_release(&load.allocator, points.places);
+    return good;
 }

@@ -6,6 +6,7 @@
 enum {
     NAME,
     SHAPE,
+    POINTS,
     DENSITY,
     COUNT,
     SEED,
@@ -19,11 +20,11 @@ enum {
     NEBULA_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name", "shape",      "density",  "count",  "seed",       "profile",
-                                        "size", "absorption", "emission", "colors", "turbulence", "turbulence_size"};
+static const char *const key_names[] = {"name",   "shape",      "points",         "density",    "count",
+                                        "seed",   "profile",    "size",           "absorption", "emission",
+                                        "colors", "turbulence", "turbulence_size"};
 
-static const nb_keys nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, NB_BIT(SHAPE),
-                                    "a nebula"};
+static const nb_keys nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
 
 #define MOST_PARTICLES 1000000
 #define MOST_COLORS 64
@@ -95,8 +96,21 @@ static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const neb
     return true;
 }
 
+static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
+{
+    static const int strewn[] = {SHAPE, DENSITY, COUNT};
+    if (found[POINTS] == NULL && found[SHAPE] == NULL)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is nowhere; a nebula has \"shape\" or \"points\"");
+    for (size_t i = 0; i < sizeof strewn / sizeof *strewn && found[POINTS] != NULL; i++)
+        if (found[strewn[i]] != NULL)
+            return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[strewn[i]],
+                                    "does not go with \"points\", of which each is a particle");
+    return true;
+}
+
 static bool check_bounds(nb_json *json, const nb_json_node *shape, nebel_shape_type type)
 {
+    if (shape == NULL) return true;
     if (type != NEBEL_SHAPE_WORLD && type != NEBEL_SHAPE_HALF_SPACE) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, shape,
                         "has no bounds; particles need a shape that has, a sphere or a box");
@@ -141,11 +155,12 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
     const char *name = "";
     return nb_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
            nb_value_members(json, node, &nebula_keys, found) &&
-           nb_value_text(json, found[NAME], &in->scene->arena, &name) &&
-           nb_read_shape(in, found[SHAPE], &nebula.shape) && check_bounds(json, found[SHAPE], nebula.shape.type) &&
+           nb_value_text(json, found[NAME], &in->scene->arena, &name) && check_kind(json, node, found) &&
+           (found[SHAPE] == NULL || nb_read_shape(in, found[SHAPE], &nebula.shape)) &&
+           check_bounds(json, found[SHAPE], nebula.shape.type) &&
            nb_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
-           read_counts(json, found, &nebula) && read_profile(json, found[PROFILE], &nebula.profile) &&
-           read_sizes(json, found, &nebula) &&
+           read_counts(json, found, &nebula) && nb_read_points(in, found[POINTS], MOST_PARTICLES, &nebula) &&
+           read_profile(json, found[PROFILE], &nebula.profile) && read_sizes(json, found, &nebula) &&
            nb_value_amount(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
            nb_value_color(json, found[EMISSION], &nb_range_not_negative, nebula.emission) &&
            read_colors(in, found[COLORS], &nebula) && finish_nebula(in, node, &nebula, name);

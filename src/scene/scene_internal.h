@@ -71,6 +71,8 @@ bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
+/* Points and their number, from a model file. NULL: none. */
+bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula);
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
 bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
