@@ -199,42 +199,51 @@ static void place_volume(trace *tr, volume *v, const oracle_line *ray)
 
 /* ---- densities at the nodes of a stretch ---- */
 
+/* Where a density is what is left of two large numbers (the depth below a surface, an exponent), long double keeps what
+ * is left; only that is rounded. */
 static void soft_edge_at(const volume *v, long double a, double h, double density[NODES])
 {
     const nebel_shape *const shape = &v->desc->shape;
     for (int i = 0; i < NODES; i++) density[i] = 1;
     for (int k = 0; k < 3; k++) {
-        const double start = (double)(v->start[k] + v->slope[k] * a), slope = (double)v->slope[k];
-        const double half = (shape->max[k] - shape->min[k]) / 2;
-        for (int i = 0; i < NODES; i++)
-            density[i] *= fmin(1, fmax(0, half - fabs(start + slope * (h * node[i]))) / v->desc->density.distance);
+        const long double start = v->start[k] + v->slope[k] * a, slope = v->slope[k];
+        const long double half = (LONG(shape->max[k]) - LONG(shape->min[k])) / 2;
+        for (int i = 0; i < NODES; i++) {
+            const double depth = (double)(half - fabsl(start + slope * LONG(h * node[i])));
+            density[i] *= fmin(1, fmax(0, depth) / v->desc->density.distance);
+        }
     }
 }
 
-static double density_of_height(double u, nebel_below below)
+static double exp_of(long double x)
 {
-    return exp(-(below == NEBEL_BELOW_CONSTANT ? fmax(u, 0) : u));
+    const double nearest = (double)x;
+    return isfinite(nearest) ? exp(nearest) * (1 + (double)(x - LONG(nearest))) : exp(nearest);
+}
+
+static double density_of_height(long double u, nebel_below below)
+{
+    return exp_of(-(below == NEBEL_BELOW_CONSTANT ? fmaxl(u, 0) : u));
 }
 
 static void fill_density(const volume *v, long double a, double h, double density[NODES])
 {
     const nebel_density *const d = &v->desc->density;
-    const double start = (double)(v->start[0] + v->slope[0] * a), slope = (double)v->slope[0];
-    const double offset = (double)((a - v->nearest) * v->speed), speed = (double)v->speed, square = (double)v->square;
+    const long double start = v->start[0] + v->slope[0] * a, offset = (a - v->nearest) * v->speed;
     for (int i = 0; i < NODES; i++) {
-        const double u = start + slope * (h * node[i]), r = offset + speed * (h * node[i]);
+        const long double t = LONG(h * node[i]), u = start + v->slope[0] * t, r = offset + v->speed * t;
         switch (d->type) {
         case NEBEL_DENSITY_HEIGHT:
             density[i] = density_of_height(u, d->below);
             break;
         case NEBEL_DENSITY_LINEAR:
-            density[i] = fmin(1, fmax(0, u));
+            density[i] = fmin(1, fmax(0, (double)u));
             break;
         case NEBEL_DENSITY_GAUSSIAN:
-            density[i] = exp(-(square + r * r) / 2);
+            density[i] = exp_of(-(v->square + r * r) / 2);
             break;
         case NEBEL_DENSITY_RADIAL:
-            density[i] = pow(fmax(0, 1 - square - r * r), d->power);
+            density[i] = pow(fmax(0, (double)(1 - v->square - r * r)), d->power);
             break;
         default:
             density[i] = 1;
@@ -355,49 +364,44 @@ static void refine(trace *tr, long double a, double h, const stretch *whole, int
     }
 }
 
-static void integrate_between(trace *tr, long double a, long double b)
+/* A short piece of very dense fog needs its length to more digits than long double has of its ends. */
+static void integrate_between(trace *tr, real a, real b)
 {
     if (!(a < b)) return;
     const double h = (double)(b - a);
-    const stretch whole = integrate(tr, a, h);
-    refine(tr, a, h, &whole, 0);
+    const stretch whole = integrate(tr, LONG(a), h);
+    refine(tr, LONG(a), h, &whole, 0);
 }
 
 typedef struct marks {
     size_t count, capacity;
-    long double *at;
+    real *at;
 } marks;
 
-static void add_mark(marks *m, long double t, long double from, long double to)
+static void add_mark(marks *m, real t, real from, real to)
 {
     if (!(from < t && t < to)) return;
     m->at = oracle_grow(m->at, m->count, &m->capacity, sizeof *m->at);
     m->at[m->count++] = t;
 }
 
-static int marks_ascending(const void *a, const void *b)
-{
-    const long double x = *(const long double *)a, y = *(const long double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Sixteen nodes on a long piece can all miss where the fog is: so there are cuts at fixed numbers of scale heights from
  * the dense end, and of sigmas from the middle. */
-static void add_guides(marks *m, const volume *v, long double from, long double to)
+static void add_guides(marks *m, const volume *v, real from, real to)
 {
     static const long double heights[] = {2, 8, 30, 100, 400}, sigmas[] = {1, 3, 7, 15};
     if (v->desc->density.type == NEBEL_DENSITY_HEIGHT && v->slope[0] != 0)
-        for (int i = 0; i < 5; i++) add_mark(m, (v->slope[0] > 0 ? from : to) + heights[i] / v->slope[0], from, to);
+        for (int i = 0; i < 5; i++) add_mark(m, (v->slope[0] > 0 ? from : to) + REAL(heights[i] / v->slope[0]), from, to);
     if (v->desc->density.type == NEBEL_DENSITY_GAUSSIAN)
-        for (int i = 0; i < 8; i++) add_mark(m, v->nearest + (i % 2 ? 1 : -1) * sigmas[i / 2] / v->speed, from, to);
+        for (int i = 0; i < 8; i++) add_mark(m, REAL(v->nearest + (i % 2 ? 1 : -1) * sigmas[i / 2] / v->speed), from, to);
 }
 
-static void integrate_piece(trace *tr, long double from, long double to)
+static void integrate_piece(trace *tr, real from, real to)
 {
     marks m = {0};
     for (size_t i = 0; i < tr->active_count; i++) add_guides(&m, tr->active[i], from, to);
-    if (m.count > 0) qsort(m.at, m.count, sizeof *m.at, marks_ascending);
-    long double start = from;
+    if (m.count > 0) qsort(m.at, m.count, sizeof *m.at, oracle_ascending);
+    real start = from;
     for (size_t i = 0; i < m.count; i++) {
         integrate_between(tr, start, m.at[i]);
         start = m.at[i];
@@ -452,7 +456,7 @@ static long double horizon(const volume *v, long double from)
     const nebel_density *const d = &v->desc->density;
     const double final = final_density(v);
     const long double u = v->start[0] + v->slope[0] * from;
-    if (final > 1e300) return fmaxl(0, u + 700) / -v->slope[0];
+    if (final > 1e300) return (fmaxl(0, u + 700) + 1) / -v->slope[0];
     if (d->type == NEBEL_DENSITY_GAUSSIAN) return fmaxl(0, v->nearest - from) + 40 / v->speed;
     if (d->type == NEBEL_DENSITY_HEIGHT && !(final > 0) && v->slope[0] > 0) return (80 + fmaxl(0, -u)) / v->slope[0];
     long double furthest = 0;
@@ -496,12 +500,13 @@ static void pass_piece(trace *tr, real from, real to)
         pass_even(tr, endless ? LONG(HUGE_VAL) : LONG(to - from));
         return;
     }
-    long double length = LONG(to - from);
+    real last = to;
     if (endless) {
-        length = 0;
+        long double length = 0;
         for (size_t i = 0; i < tr->active_count; i++) length = fmaxl(length, horizon(tr->active[i], LONG(from)));
+        last = from + REAL(length);
     }
-    integrate_piece(tr, LONG(from), LONG(from) + length);
+    integrate_piece(tr, from, last);
 }
 
 /* ---- the whole ray ---- */
