@@ -6,6 +6,7 @@ set(nebel_kernel_files ${PROJECT_SOURCE_DIR}/src/march/trace_kernel.c ${PROJECT_
 set(nebel_flags_scalar "")
 set(nebel_flags_neon "")
 set(nebel_flags_double "")
+set(nebel_flags_quad "")
 set(nebel_flags_sse2 -msse2)
 set(nebel_flags_avx2 -mavx2 -mfma)
 set(nebel_flags_avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mavx2)
@@ -17,6 +18,14 @@ elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
 else()
     set(nebel_levels scalar)
 endif()
+
+# The condition of formulas/quad.h.
+include(CheckCSourceCompiles)
+check_c_source_compiles("#include <float.h>
+#if !defined(__SIZEOF_FLOAT128__) || LDBL_MANT_DIG >= 113
+#error long double is the widest type
+#endif
+int main(void) { return 0; }" NEBEL_HAVE_QUAD)
 
 function(nebel_add_kernel file level)
     get_filename_component(stem ${file} NAME_WE)
@@ -41,6 +50,9 @@ function(nebel_add_kernels objects definitions)
         set(levels ${nebel_levels})
         if(stem STREQUAL trace_kernel)
             list(APPEND levels double)
+            if(NEBEL_HAVE_QUAD)
+                list(APPEND levels quad)
+            endif()
         endif()
         foreach(level IN LISTS levels)
             nebel_add_kernel(${file} ${level})

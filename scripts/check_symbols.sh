@@ -28,14 +28,14 @@ check_object() {
 }
 
 # A function shared by two levels would be linked once, with the instructions of either: so every name ends in the level.
-# The double reference alone may have several entries.
+# The double references alone may have several entries.
 check_kernel() {
     local level names foreign
     level=$(sed -E 's/.*_kernel_([a-z0-9]+)\.dir.*/\1/' <<<"$1")
     names=$(nm -g --defined-only "$1" | awk 'NF == 3 { print $3 }')
     foreign=$(grep -v "_$level\$" <<<"$names" | xargs || true)
     [ -z "$foreign" ] || fault "$1: global names that do not end in _$level: $foreign"
-    [ "$level" = double ] || [ "$(wc -l <<<"$names")" -eq 1 ] || fault "$1: more than one global name: $(xargs <<<"$names")"
+    [[ $level = double || $level = quad ]] || [ "$(wc -l <<<"$names")" -eq 1 ] || fault "$1: more than one global name: $(xargs <<<"$names")"
 }
 
 shopt -s nullglob

@@ -8,6 +8,7 @@
  * Macros of the compiler call choose the target:
  *     (none)                       one float, one double as wide
  *     NB_DOUBLE                    one double, one long double as wide: the reference
+ *     NB_DOUBLE and NB_QUAD        one double, one of 113 bits as wide: for rays that the reference cannot decide
  *     NB_ISA_SSE2 | NB_ISA_NEON    2 floats, 2 doubles as wide
  *     NB_ISA_AVX2                  4 floats, 4 doubles as wide
  *     NB_ISA_AVX512                8 floats, 8 doubles as wide (needs -mavx512f -mavx512vl -mavx512dq)

@@ -9,6 +9,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#ifdef NB_QUAD
+#include "quad.h"
+#endif
+
 #define NB_FUNCTION static inline
 #define NB_WIDTH 1
 
@@ -30,6 +34,10 @@ typedef uint32_t nb_bits;
 typedef nb_scalar nb_wscalar;
 #define NB_W(x) NB_F(x)
 #define NB_WEPSILON NB_EPSILON
+#elif defined(NB_QUAD)
+typedef nb_quad nb_wscalar;
+#define NB_W(x) ((nb_quad)x##L)
+#define NB_WEPSILON (NB_QUAD_EPSILON / 2)
 #elif defined(NB_DOUBLE)
 typedef long double nb_wscalar;
 #define NB_W(x) x##L
@@ -98,6 +106,8 @@ static inline nb_real nb_sqrt(nb_real x) { return sqrtf(x); }
 
 #if defined(NB_FAST)
 static inline nb_wide nb_wsqrt(nb_wide x) { return nb_sqrt(x); }
+#elif defined(NB_QUAD)
+static inline nb_wide nb_wsqrt(nb_wide x) { return nb_quad_sqrt(x); }
 #elif defined(NB_DOUBLE)
 static inline nb_wide nb_wsqrt(nb_wide x) { return sqrtl(x); }
 #else
@@ -111,6 +121,8 @@ static inline nb_wide nb_wabs(nb_wide x)
     return fabsf(x);
 #elif defined(NB_FAST) || !defined(NB_DOUBLE)
     return fabs(x);
+#elif defined(NB_QUAD)
+    return nb_quad_abs(x);
 #else
     return fabsl(x);
 #endif
@@ -122,6 +134,8 @@ static inline nb_wide nb_wcopy_sign(nb_wide magnitude, nb_wide sign)
     return copysignf(magnitude, sign);
 #elif defined(NB_FAST) || !defined(NB_DOUBLE)
     return copysign(magnitude, sign);
+#elif defined(NB_QUAD)
+    return nb_quad_copy_sign(magnitude, sign);
 #else
     return copysignl(magnitude, sign);
 #endif

@@ -135,6 +135,10 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
     return nb_fail(&job->snapshot->log, result, "ray %zu: out of memory for the fog it meets", job->failed);
 }
 
+/* What the error may be beyond the tolerance. */
+#define FLOAT_ROUNDING 1e-4
+#define DOUBLE_ROUNDING 1e-8
+
 /* Asks `kernel`, NULL where there is none, about a job that says where rays and lights are. */
 static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, nb_trace_fn *kernel, nb_trace_job *job)
 {
@@ -145,6 +149,7 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(desc->isa));
     job->snapshot = snapshot;
     job->budget = tolerance * fmax(1, snapshot->largest_radiance);
+    job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
     job->count = n;
     return explain(job, kernel(job), desc->failed_ray);
 }

@@ -1,4 +1,4 @@
-/* Visibility: where along a ray the optical depth reaches a value. Included by the double kernel only.
+/* Visibility: where along a ray the optical depth reaches a value. Included by the double kernels only.
  *
  * Optical depth never falls along a ray, and is exact at every point, so the piece that holds the place is found by the march
  * and the place in it by Newton's method, kept inside a shrinking bracket. */
@@ -66,15 +66,24 @@ static double find_depth(march *m, int channel, nb_real wanted)
     }
 }
 
-nebel_result nb_find_double(nb_find_job *job)
+nebel_result SUFFIXED(nb_find_, NB_SUFFIX)(nb_find_job *job)
 {
     workspace w;
     open_workspace(&w);
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < job->count && result == NEBEL_OK; i++) {
-        w.m.rays = load_packet(ray_at(job->rays, job->ray_stride, i), job->ray_stride, 1);
-        if (meet_fog(&w, job->snapshot)) job->distances[i] = find_depth(&w.m, job->channel, job->depth);
-        else result = NEBEL_ERROR_MEMORY;
+        const nebel_ray *ray = ray_at(job->rays, job->ray_stride, i);
+        w.m.rays = load_packet(ray, job->ray_stride, 1);
+        if (!meet_fog(&w, job->snapshot)) {
+            result = NEBEL_ERROR_MEMORY;
+#if defined(ASKS_QUAD)
+        } else if (!ends_are_clear(&w.m)) {
+            nb_find_job one = {job->snapshot, job->depth, job->channel, 1, ray, job->ray_stride, &job->distances[i]};
+            result = nb_find_quad(&one);
+#endif
+        } else {
+            job->distances[i] = find_depth(&w.m, job->channel, job->depth);
+        }
     }
     close_workspace(&w, &job->snapshot->allocator);
     return result;

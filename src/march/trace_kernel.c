@@ -1,9 +1,13 @@
-/* The march, compiled once per instruction set and once as the double reference: packets of rays in, light out.
+/* The march, compiled once per instruction set, once as the double reference, and once for the rays that this cannot decide:
+ * packets of rays in, light out.
  *
  * NB_SUFFIX names the one symbol; everything else is static. Every lane's arithmetic is independent of the others, so a ray
  * gives the same bits alone, in any company and in any width. */
-#if defined(NB_ISA_DOUBLE)
+#if defined(NB_ISA_DOUBLE) || defined(NB_ISA_QUAD)
 #define NB_DOUBLE
+#endif
+#if defined(NB_ISA_QUAD)
+#define NB_QUAD
 #endif
 
 #include "trace_kernel.h"
@@ -15,8 +19,14 @@
 #include "formulas/profiles.inc"
 #include "formulas/medium.inc"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
+
+/* Where long double is not enough for the double reference. */
+#if defined(NB_DOUBLE) && !defined(NB_QUAD) && defined(NB_HAVE_QUAD)
+#define ASKS_QUAD
+#endif
 
 #include "trace_packet.h"
 #include "trace_walk.h"
@@ -101,6 +111,11 @@ static void close_workspace(workspace *w, const nebel_allocator *allocator)
 static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
 {
     return (const nebel_ray *)(const void *)((const char *)rays + i * stride);
+}
+
+static nebel_light *light_at(nebel_light *lights, size_t stride, size_t i)
+{
+    return (nebel_light *)(void *)((char *)lights + i * stride);
 }
 
 /* Unit length; adding +0 makes every zero positive, on which the ownership of faces rests. */
@@ -243,7 +258,7 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 static gathered nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
-    return (gathered){{zero, zero, zero}, {one, one, one}, {zero, zero, zero}, {zero, zero, zero}, zero};
+    return (gathered){{zero, zero, zero}, {one, one, one}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
 }
 
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
@@ -329,9 +344,14 @@ static void limit_radiance(const march *m, gathered *g)
     for (int c = 0; c < 3; c++) g->radiance[c] = nb_min(g->radiance[c], most_radiance(m, c));
 }
 
-/* The bound of the absolute error of all six numbers. exp(-depth) is steepest on the thin side, so the transmittance errs
- * most where the optical depth is less by its error. */
-static nb_real bound_error(const march *m, const gathered *g, int transmittance_only)
+/* Bounds of the absolute error: of transmittance, of radiance. */
+typedef struct bounds {
+    nb_real transmittance, radiance;
+} bounds;
+
+/* exp(-depth) is steepest on the thin side, so the transmittance errs most where the optical depth is less by its error. Ends that
+ * are watched have been counted on the way. */
+static bounds bound_errors(const march *m, const gathered *g)
 {
     const nb_mask watched = ends_matter(m);
     const nb_real pieces = m->event_count + NB_F(4.0);
@@ -340,36 +360,73 @@ static nb_real bound_error(const march *m, const gathered *g, int transmittance_
         const nb_real end_depth = nb_select(watched, m->grazing_ends.depth[c], m->all_ends.depth[c]);
         const nb_real end_light = nb_select(watched, m->grazing_ends.light[c], m->all_ends.light[c]);
         const nb_real error = (end_depth + g->depth_error[c]) * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON);
-        const nb_real rise = nb_exp(-nb_max(g->depth[c] - error, NB_F(0.0))) - g->transmittance[c];
+        const nb_real rise = nb_exp(-nb_max(g->depth[c] - error, g->least_depth[c])) - g->transmittance[c];
         const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
         const nb_real other = (NB_F(4.0) * NB_EPSILON + m->event_count * LEAST_DOUBT) * g->transmittance[c];
         transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + other);
         radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
-    if (transmittance_only) return transmittance;
     /* fog that the ray may only graze is not among what it met */
     const nb_mask grazes = largest(m->grazing_ends.light) > NB_F(0.0);
     const nb_real met = nb_max(nb_max(most_radiance(m, 0), most_radiance(m, 1)), most_radiance(m, 2));
     const nb_real most = nb_select(grazes, NB_HUGE, met);
-    return nb_max(transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON)));
+    return (bounds){transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON))};
 }
 
-/* With room for the rounding of the bound's own arithmetic. */
-static nb_real reported_error(const march *m, const gathered *g, int transmittance_only)
+/* Light per extinction of a medium: the radiance it has where it is opaque. */
+static nb_real opaque_radiance(const contact *k, int c)
 {
-    return bound_error(m, g, transmittance_only) * (NB_F(1.0) + NB_F(16.0) * NB_EPSILON);
+    const nb_real ratio = k->light[c] / nb_max(k->extinction[c], NB_TINY);
+    return nb_select(k->extinction[c] > NB_F(0.0), ratio, k->light[c] * NB_HUGE);
 }
 
-static void store_light(const nb_trace_job *job, const march *m, const gathered *g, size_t first, size_t count)
+/* Another bound, which holds whatever the ends and the integration do: all light comes from media that give between the least and
+ * the most light per extinction, so that the radiance is between these two times 1 - T. */
+static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmittance_error)
+{
+    const nb_mask grazes = largest(m->grazing_ends.light) + largest(m->grazing_ends.depth) > NB_F(0.0);
+    nb_real bound = transmittance_error;
+    for (int c = 0; c < 3; c++) {
+        nb_real least = NB_HUGE, most = NB_F(0.0);
+        for (size_t i = 0; i < m->contact_count; i++) {
+            const contact *k = &m->contacts[i];
+            if (k->medium->body.operation != NEBEL_OPERATION_ADD) continue;
+            const nb_mask counts = nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
+            const nb_real radiance = opaque_radiance(k, c);
+            least = nb_select(counts, nb_min(radiance, least), least);
+            most = nb_select(counts, nb_max(radiance, most), most);
+        }
+        const nb_real absorbed = NB_F(1.0) - g->transmittance[c];
+        const nb_real high = most * nb_min(absorbed + transmittance_error, NB_F(1.0));
+        const nb_real low = nb_min(least, most) * nb_max(absorbed - transmittance_error, NB_F(0.0));
+        const nb_real apart = nb_max(high - g->radiance[c], g->radiance[c] - low);
+        bound = nb_max(bound, apart + most * (NB_F(16.0) * NB_EPSILON));
+    }
+    return nb_select(grazes, NB_HUGE, bound);
+}
+
+/* The bound of the absolute error of all six numbers, with room for the rounding of its own arithmetic. */
+static nb_real reported_error(const nb_trace_job *job, const march *m, const gathered *g)
+{
+    const nb_real own_rounding = NB_F(1.0) + NB_F(16.0) * NB_EPSILON;
+    bounds b = bound_errors(m, g);
+    if (job->transmittance_only) return b.transmittance * own_rounding;
+    const nb_mask doubtful = nb_not(b.radiance <= REAL(job->promised));
+    if (nb_any(doubtful))
+        b.radiance = nb_select(doubtful, nb_min(b.radiance, bound_by_range(m, g, b.transmittance)), b.radiance);
+    return nb_max(b.transmittance, b.radiance) * own_rounding;
+}
+
+static void store_light(const nb_trace_job *job, const gathered *g, nb_real error, size_t first, size_t count)
 {
     nb_scalar lane[7][NB_WIDTH];
     for (int c = 0; c < 3; c++) {
         nb_store_lanes(lane[c], g->transmittance[c]);
         nb_store_lanes(lane[3 + c], g->radiance[c]);
     }
-    nb_store_lanes(lane[6], reported_error(m, g, job->transmittance_only));
+    nb_store_lanes(lane[6], error);
     for (size_t i = 0; i < count; i++) {
-        nebel_light *light = (nebel_light *)(void *)((char *)job->lights + (first + i) * job->light_stride);
+        nebel_light *light = light_at(job->lights, job->light_stride, first + i);
         for (int c = 0; c < 3; c++) {
             light->transmittance[c] = (double)lane[c][i];
             light->in_scattering[c] = (double)lane[3 + c][i];
@@ -412,14 +469,100 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     return NEBEL_OK;
 }
 
+/* ---- doubts ------------------------------------------------------------------------------------------------------ */
+
+/* Rays that touch a surface, or run level with it, to the last digits of a precision have no good answer in it. But they are exact
+ * numbers, so that more digits give one.
+ *
+ * Float keeps its light, whose bits depend on nothing else, and learns from double how good it is. Double takes the answer with
+ * more digits instead of its own, whatever is asked of the ray, so that its bits, too, depend on nothing else. */
+#if !defined(NB_DOUBLE)
+
+static nb_mask in_doubt(const nb_trace_job *job, nb_real error)
+{
+    return nb_not(error <= REAL(job->promised));
+}
+
+static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const nebel_light *light)
+{
+    nebel_light truth;
+    nb_trace_job one = {.snapshot = job->snapshot,
+                        .budget = job->budget,
+                        .promised = job->promised,
+                        .transmittance_only = job->transmittance_only,
+                        .wants_error = 1,
+                        .count = 1,
+                        .rays = ray,
+                        .ray_stride = sizeof *ray,
+                        .lights = &truth,
+                        .light_stride = sizeof truth};
+    if (nb_trace_double(&one) != NEBEL_OK) return light->error;
+    double apart = 0;
+    for (int c = 0; c < 3; c++) {
+        apart = fmax(apart, fabs(light->transmittance[c] - truth.transmittance[c]));
+        if (!job->transmittance_only) apart = fmax(apart, fabs(light->in_scattering[c] - truth.in_scattering[c]));
+    }
+    const double bound = (apart + truth.error) * (1 + 2 * (double)FLT_EPSILON); /* it will be rounded to float */
+    return bound < light->error ? bound : light->error;
+}
+
+/* The error where the lanes in doubt are settled; `rays` are the packet's. */
+static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real error, const nebel_ray *rays, size_t stride,
+                             size_t count)
+{
+    const nb_mask doubtful = in_doubt(job, error);
+    if (!nb_any(doubtful)) return error;
+    nb_scalar lane[NB_WIDTH];
+    nb_store_lanes(lane, error);
+    for (size_t i = 0; i < count; i++) {
+        if (!nb_lane(doubtful, i)) continue;
+        nebel_light light = {.error = (double)lane[i]};
+        for (int c = 0; c < 3; c++) {
+            light.transmittance[c] = (double)nb_lane(g->transmittance[c], i);
+            light.in_scattering[c] = (double)nb_lane(g->radiance[c], i);
+        }
+        lane[i] = (nb_scalar)settle_lane(job, ray_at(rays, stride, i), &light);
+    }
+    return nb_load_lanes(lane);
+}
+
+#elif defined(ASKS_QUAD)
+
+/* What the ends may do to the light is far less than double promises, so that it does not show who was asked. */
+static int ends_are_clear(const march *m)
+{
+    return largest(m->all_ends.depth) + largest(m->all_ends.light) <= 1e-10;
+}
+
+static nebel_result ask_again(nb_trace_job *job, size_t i)
+{
+    nb_trace_job one = *job;
+    one.count = 1;
+    one.rays = ray_at(job->rays, job->ray_stride, i);
+    one.lights = light_at(job->lights, job->light_stride, i);
+    job->failed = i;
+    return nb_trace_quad(&one);
+}
+
+#endif
+
 static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
 {
     const size_t count = packet_size(job, first);
+    const nebel_ray *rays = ray_at(job->rays, job->ray_stride, first);
     gathered g;
-    w->m.rays = load_packet(ray_at(job->rays, job->ray_stride, first), job->ray_stride, count);
+    w->m.rays = load_packet(rays, job->ray_stride, count);
     const nebel_result result = answer_packet(job, w, may, first, count, &g);
-    if (result == NEBEL_OK) store_light(job, &w->m, &g, first, count);
-    return result;
+#if defined(ASKS_QUAD)
+    if (result != NEBEL_ERROR_MEMORY && !ends_are_clear(&w->m)) return ask_again(job, first);
+#endif
+    if (result != NEBEL_OK) return result;
+    nb_real error = reported_error(job, &w->m, &g);
+#if !defined(NB_DOUBLE)
+    error = settle_doubts(job, &g, error, rays, job->ray_stride, count);
+#endif
+    store_light(job, &g, error, first, count);
+    return NEBEL_OK;
 }
 
 static nebel_result trace_structures(nb_trace_job *job, workspace *w, const allowance *may)

@@ -10,7 +10,8 @@
 /* Rays and lights are structures or, in float, planes. */
 typedef struct nb_trace_job {
     const nebel_snapshot *snapshot;
-    double budget; /* what adaptive integration may add to the error of in-scattering, absolute */
+    double budget;   /* what adaptive integration may add to the error of in-scattering, absolute */
+    double promised; /* where the error would be larger than this, more digits are asked */
     int transmittance_only;
     int wants_error;
     size_t count;
@@ -24,13 +25,14 @@ typedef struct nb_trace_job {
 
 typedef nebel_result nb_trace_fn(nb_trace_job *job);
 
-nb_trace_fn nb_trace_scalar, nb_trace_sse2, nb_trace_avx2, nb_trace_avx512, nb_trace_neon, nb_trace_double;
+nb_trace_fn nb_trace_scalar, nb_trace_sse2, nb_trace_avx2, nb_trace_avx512, nb_trace_neon, nb_trace_double,
+    nb_trace_quad;
 
 /* The first of `count` rays in planes that is none; first + count where all are right. A ray of no length is, whatever
  * else it says. */
 size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count);
 
-/* Distances to a transmittance; only the double kernel has it. */
+/* Distances to a transmittance; only the double kernels have it. */
 typedef struct nb_find_job {
     const nebel_snapshot *snapshot;
     double depth; /* optical depth sought, > 0 */
@@ -42,5 +44,6 @@ typedef struct nb_find_job {
 } nb_find_job;
 
 nebel_result nb_find_double(nb_find_job *job);
+nebel_result nb_find_quad(nb_find_job *job);
 
 #endif

@@ -38,7 +38,15 @@ static nb_real ellipse_factor(nb_real r)
     return NB_F(64.0) / (NB_F(15.0) * (NB_F(1.0) - NB_F(1.0) / square) * (sixth * sixth));
 }
 
-/* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. */
+/* For one axis of a soft edge, which has the density q in the middle and changes by `rise` within the ellipse. */
+static nb_wide soft_axis_ceiling(nb_wide q, nb_wide rise)
+{
+    const nb_wmask level = nb_wor(q <= NB_W(0.0), q >= NB_W(1.0));
+    return nb_wselect(level, q, q + rise);
+}
+
+/* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that stays level
+ * is the same number on all of it. */
 static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, nb_real across)
 {
     const nebel_density *density = &k->medium->body.density;
@@ -47,8 +55,11 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
     switch (density->type) {
     case NEBEL_DENSITY_HEIGHT:
         if (density->below == NEBEL_BELOW_GROW) return nb_height_density(u - slope * along);
-        return nb_exp(nb_min(slope * along - nb_max(u, NB_F(0.0)), NB_F(80.0)));
-    case NEBEL_DENSITY_LINEAR: return nb_linear_density(u) + slope * along;
+        return nb_select(u < NB_F(0.0), NB_F(1.0), nb_exp(nb_min(slope * along - u, NB_F(80.0))));
+    case NEBEL_DENSITY_LINEAR: {
+        const nb_mask level = nb_or(u <= NB_F(0.0), u >= NB_F(1.0));
+        return nb_linear_density(u) + nb_select(level, NB_F(0.0), slope * along);
+    }
     case NEBEL_DENSITY_GAUSSIAN: {
         const nb_real closest = nb_max(nb_abs(u) - slope * along, NB_F(0.0));
         const nb_real rise = slope * across;
@@ -64,9 +75,9 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
     case NEBEL_DENSITY_SOFT_EDGE: {
         const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, middle));
         const nb_wide wide = nb_widen(along);
-        return nb_narrow((nb_soft_axis(q.x, k->size.x) + nb_wabs(k->slope.x) * wide) *
-                         (nb_soft_axis(q.y, k->size.y) + nb_wabs(k->slope.y) * wide) *
-                         (nb_soft_axis(q.z, k->size.z) + nb_wabs(k->slope.z) * wide));
+        return nb_narrow(soft_axis_ceiling(nb_soft_axis(q.x, k->size.x), nb_wabs(k->slope.x) * wide) *
+                         soft_axis_ceiling(nb_soft_axis(q.y, k->size.y), nb_wabs(k->slope.y) * wide) *
+                         soft_axis_ceiling(nb_soft_axis(q.z, k->size.z), nb_wabs(k->slope.z) * wide));
     }
     default: return NB_F(1.0);
     }
@@ -243,7 +254,7 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
 }
 
 /* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. Steps that never fit (their
- * number is bounded) end in one crude step whose honest bound the error then shows. */
+ * number is bounded) end in one crude step, across whatever kinks are left, whose honest bound the error then shows. */
 static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const allowance *may, gathered *g)
 {
     nb_wide t = p->start;
@@ -261,6 +272,7 @@ static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const al
         lanes = nb_and(lanes, nb_narrow_mask(t < p->end));
     }
     if (!nb_any(lanes)) return;
-    const step s = consider(m, g, ellipse, t, nb_narrow(p->end - t));
+    step s = consider(m, g, ellipse, t, nb_narrow(p->end - t));
+    s.gauss_bound = NB_HUGE;
     take_step(m, &s, g, lanes);
 }

@@ -2,12 +2,20 @@
  * coordinates along the ray. Included by trace_kernel.c once the vocabulary of formulas/prelude.h is there. */
 
 /* The double reference keeps the digits that resolving had. */
-#if defined(NB_DOUBLE)
+#if defined(NB_QUAD)
+#define FRAME(leaf, member) ((leaf)->quad_##member)
+#define ORIGIN_ERROR(leaf) ((leaf)->resolved_error)
+#elif defined(NB_DOUBLE)
 #define FRAME(leaf, member) ((leaf)->exact_##member)
+#define ORIGIN_ERROR(leaf) ((leaf)->resolved_error)
+#else
+#define FRAME(leaf, member) ((leaf)->member)
+#define ORIGIN_ERROR(leaf) ((leaf)->origin_error)
+#endif
+#if defined(NB_DOUBLE)
 #define WIDE(x) ((nb_wide)(x))
 #define REAL(x) ((nb_real)(x))
 #else
-#define FRAME(leaf, member) ((leaf)->member)
 #define WIDE(x) nb_wsplat((double)(x))
 #define REAL(x) nb_splat((float)(x))
 #endif
@@ -65,7 +73,9 @@ typedef struct local_ray {
 
 static nb_wvec3 from_origin(const packet *rays, const nb_leaf *leaf)
 {
-#if defined(NB_DOUBLE)
+#if defined(NB_QUAD)
+    return nb_wsub3(rays->origin, nb_wvec3(leaf->quad_origin[0], leaf->quad_origin[1], leaf->quad_origin[2]));
+#elif defined(NB_DOUBLE)
     const nb_wvec3 origin = nb_wvec3(leaf->exact_origin[0], leaf->exact_origin[1], leaf->exact_origin[2]);
     const nb_wvec3 rest = nb_wvec3(leaf->exact_rest[0], leaf->exact_rest[1], leaf->exact_rest[2]);
     return nb_wsub3(nb_wsub3(rays->origin, origin), rest);
@@ -90,7 +100,7 @@ static local_ray localize(const packet *rays, const nb_leaf *leaf)
         distance = distance * WIDE(leaf->scale);
     }
     const nb_wide size = WIDE(1.0 + leaf->radius + leaf->length);
-    local.reach = (distance + size) * (NB_W(8.0) * NB_WEPSILON) + WIDE(leaf->origin_error * leaf->scale);
+    local.reach = (distance + size) * (NB_W(8.0) * NB_WEPSILON) + WIDE(ORIGIN_ERROR(leaf) * leaf->scale);
     return local;
 }
 
@@ -98,7 +108,7 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
 {
     double size = 0;
     for (int i = 0; i < 3; i++) size += fabs(leaf->low[i]) + fabs(leaf->high[i]);
-    const nb_wide reach = leaf->aligned ? WIDE(leaf->origin_error) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
+    const nb_wide reach = leaf->aligned ? WIDE(ORIGIN_ERROR(leaf)) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
     return nb_interval_box(local->p, local->d, wide_vector(leaf->low), wide_vector(leaf->high), reach);
 }
 
@@ -289,27 +299,28 @@ static int grows_without_bound(const nebel_density *density)
 
 /* ---- meeting the fog ---------------------------------------------------------------------------------------------------- */
 
-/* The steepest change of the density along the ray, per metre, of the profiles that stay below 1. */
-static nb_real steepness(const contact *k)
-{
-    const nebel_density *density = &k->medium->body.density;
-    const nb_real slope = nb_abs(nb_narrow(k->slope.x));
-    switch (density->type) {
-    case NEBEL_DENSITY_CONSTANT: return NB_F(0.0);
-    case NEBEL_DENSITY_RADIAL: return slope * REAL(2 * density->power);
-    case NEBEL_DENSITY_SOFT_EDGE:
-        return slope + nb_abs(nb_narrow(k->slope.y)) + nb_abs(nb_narrow(k->slope.z));
-    default: return slope;
-    }
-}
-
 /* How dense a medium may be within slack of t, for what an uncertain end there may do. */
 static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
 {
-    const nb_real density = contact_density(k, t);
-    if (grows_without_bound(&k->medium->body.density))
-        return nb_min(density * nb_exp(nb_min(steepness(k) * slack, NB_F(80.0))), NB_FAR);
-    return nb_min(density + steepness(k) * slack + k->noise, NB_F(1.0));
+    const nebel_density *density = &k->medium->body.density;
+    const nb_wide rounding = (nb_wabs(k->offset.x) + nb_wabs(k->slope.x * t)) * (NB_W(4.0) * NB_WEPSILON);
+    const nb_real u = coordinate(k, t);
+    const nb_real reach = nb_abs(nb_narrow(k->slope.x)) * slack + nb_narrow(rounding) + nb_abs(u) * (NB_F(4.0) * NB_EPSILON);
+    const nb_real nearest = nb_max(nb_abs(u) - reach, NB_F(0.0));
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+        return density->below == NEBEL_BELOW_GROW ? nb_height_density(u - reach) : nb_height_capped_density(u - reach);
+    case NEBEL_DENSITY_LINEAR: return nb_linear_density(u + reach);
+    case NEBEL_DENSITY_GAUSSIAN: return nb_gaussian_density(k->level * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON), nearest);
+    case NEBEL_DENSITY_RADIAL:
+        return nb_min(nb_radial_density(k->level, nearest, density->power) + k->noise, NB_F(1.0));
+    case NEBEL_DENSITY_SOFT_EDGE: {
+        const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, t));
+        const nb_real width = nb_narrow(nb_wabs(k->slope.x) + nb_wabs(k->slope.y) + nb_wabs(k->slope.z)) * slack;
+        return nb_min(nb_soft_edge_density(q, k->size) + width + k->noise, NB_F(1.0));
+    }
+    default: return NB_F(1.0);
+    }
 }
 
 static ends no_ends(void)

@@ -173,6 +173,18 @@ FORCE_INLINE nebel_result load_rays(nb_trace_job *job, const stream *s, size_t f
     return result;
 }
 
+/* The rays of a packet one by one, as they were given. */
+static void unload_rays(const stream *s, const loaded *p, nebel_ray rays[NB_WIDTH])
+{
+    const nb_wvec3 way = s->has_directions ? p->way : wide_vector(s->rays->direction);
+    const nb_wide numbers[7] = {p->start.x, p->start.y, p->start.z, way.x, way.y, way.z, p->t_max};
+    double lane[7][NB_WIDTH];
+    for (int k = 0; k < 7; k++) nb_wstore_lanes(lane[k], numbers[k]);
+    for (size_t i = 0; i < NB_WIDTH; i++)
+        rays[i] = (nebel_ray){
+            {lane[0][i], lane[1][i], lane[2][i]}, {lane[3][i], lane[4][i], lane[5][i]}, lane[6][i]};
+}
+
 /* ---- the march --------------------------------------------------------------------------------------------------- */
 
 static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowance *may, const stream *s, size_t first,
@@ -188,8 +200,11 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
     const nebel_light_planes *to = s->lights;
     store_colors(to->transmittance, to->transmittance_stride, first, count, g.transmittance);
     store_colors(to->in_scattering, to->in_scattering_stride, first, count, g.radiance);
-    if (job->wants_error)
-        store_floats(to->error, to->error_stride, first, count, reported_error(&w->m, &g, job->transmittance_only));
+    if (!job->wants_error) return NEBEL_OK;
+    const nb_real error = reported_error(job, &w->m, &g);
+    nebel_ray rays[NB_WIDTH];
+    if (nb_any(in_doubt(job, error))) unload_rays(s, &p, rays);
+    store_floats(to->error, to->error_stride, first, count, settle_doubts(job, &g, error, rays, sizeof *rays, count));
     return NEBEL_OK;
 }
 

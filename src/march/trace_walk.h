@@ -6,6 +6,7 @@ typedef struct gathered {
     nb_real transmittance[3]; /* exp(-depth) */
     nb_real radiance[3];
     nb_real depth_error[3];
+    nb_real least_depth[3];   /* what the optical depth is at least, in spite of ends farther on */
     nb_real radiance_error;   /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
 } gathered;
 
@@ -38,6 +39,14 @@ static nb_wide next_event(const march *m, nb_wide t)
     return next;
 }
 
+/* ANY or ALL of a body's program: the two topmost masks become one. Returns the new height. */
+static int fold_step(nb_step step, nb_mask *stack, int top)
+{
+    const nb_mask a = stack[top - 2], b = stack[top - 1];
+    stack[top - 2] = step == NB_STEP_ANY ? nb_or(a, b) : nb_and(a, b);
+    return top - 1;
+}
+
 /* Membership of a leaf needs no midpoint: between neighbouring events a span is either all there or not at all. */
 static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
 {
@@ -51,9 +60,7 @@ static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
             stack[top++] = nb_narrow_mask(nb_wand(span->enter <= start, span->leave > start));
             continue;
         }
-        top--;
-        stack[top - 1] = body->steps[i] == NB_STEP_ANY ? nb_or(stack[top - 1], stack[top])
-                                                       : nb_and(stack[top - 1], stack[top]);
+        top = fold_step(body->steps[i], stack, top);
     }
     return stack[0];
 }
@@ -168,25 +175,72 @@ static nb_mask ends_matter(const march *m)
     return largest(m->all_ends.depth) + largest(m->all_ends.light) > NB_F(16.0) * NB_EPSILON;
 }
 
+/* Whether an end of a leaf within slack of t may be an end of the body: not where other leaves hold the body together there, or
+ * leave it out, whatever their own ends do. */
+static nb_mask may_end_body(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
+{
+    const nb_volume *body = &k->medium->body;
+    nb_mask most[NB_STEP_STACK], least[NB_STEP_STACK];
+    int top = 0;
+    size_t leaf = 0;
+    for (size_t i = 0; i < body->step_count; i++) {
+        if (body->steps[i] != NB_STEP_LEAF) {
+            fold_step(body->steps[i], most, top);
+            top = fold_step(body->steps[i], least, top);
+            continue;
+        }
+        const leaf_span *span = &m->spans[k->first_span + leaf];
+        const nb_wide enter_slack = nb_widen(span->enter_slack), leave_slack = nb_widen(span->leave_slack);
+        const nb_wmask may = nb_wand(span->enter - enter_slack <= t + slack, span->leave + leave_slack >= t - slack);
+        const nb_wmask must = nb_wand(span->enter + enter_slack <= t - slack, span->leave - leave_slack >= t + slack);
+        most[top] = leaf == which ? nb_mask_true : nb_narrow_mask(may);
+        least[top] = leaf == which ? nb_mask_false : nb_narrow_mask(must);
+        top++;
+        leaf++;
+    }
+    return nb_and(most[0], nb_not(least[0]));
+}
+
+/* Ends at t, and what those that may already lie before t may take from the fog there: where fog begins it can only be more. */
+typedef struct passing {
+    nb_wide t;
+    nb_mask lanes;
+    ends here, less;
+} passing;
+
+static void pass_end(const march *m, passing *p, const contact *k, size_t leaf, nb_wide end, nb_real slack, int fog_ends)
+{
+    if (!nb_any(slack > NB_F(0.0))) return;
+    const nb_wide wide_slack = nb_widen(slack);
+    const nb_mask here = nb_and(p->lanes, nb_narrow_mask(end == p->t));
+    const nb_mask may_be_before = nb_and(p->lanes, nb_narrow_mask(nb_wand(end >= p->t, end - wide_slack <= p->t)));
+    if (nb_any(here)) {
+        const int whole = k->medium->body.leaf_count == 1;
+        const nb_mask ends_body = whole ? here : nb_and(here, may_end_body(m, k, leaf, end, wide_slack));
+        add_end(m, &p->here, k, end, nb_select(ends_body, slack, NB_F(0.0)));
+    }
+    if (fog_ends && nb_any(may_be_before)) add_end(m, &p->less, k, end, nb_select(may_be_before, slack, NB_F(0.0)));
+}
+
 static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
 {
-    ends here = no_ends();
+    passing p = {t, lanes, no_ends(), no_ends()};
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
+        const int adds = k->medium->body.operation == NEBEL_OPERATION_ADD;
         for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
             const leaf_span *span = &m->spans[k->first_span + j];
-            const nb_wmask event = nb_wand(nb_widen_mask(lanes), span->enter < span->leave);
-            const nb_mask enters = nb_narrow_mask(nb_wand(event, span->enter == t));
-            const nb_mask leaves = nb_narrow_mask(nb_wand(event, span->leave == t));
-            if (!nb_any(nb_or(enters, leaves))) continue;
-            add_end(m, &here, k, t, nb_select(enters, span->enter_slack, NB_F(0.0)) +
-                                        nb_select(leaves, span->leave_slack, NB_F(0.0)));
+            p.lanes = nb_and(lanes, nb_narrow_mask(span->enter < span->leave));
+            pass_end(m, &p, k, j, span->enter, span->enter_slack, !adds);
+            pass_end(m, &p, k, j, span->leave, span->leave_slack, adds);
         }
     }
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        g->depth_error[c] = g->depth_error[c] + here.depth[c];
-        most = nb_max(most, here.light[c] * g->transmittance[c]);
+        const nb_real least = g->depth[c] - (g->depth_error[c] + p.less.depth[c]);
+        g->least_depth[c] = nb_select(lanes, nb_max(g->least_depth[c], least), g->least_depth[c]);
+        g->depth_error[c] = g->depth_error[c] + p.here.depth[c];
+        most = nb_max(most, p.here.light[c] * g->transmittance[c]);
     }
     g->radiance_error = g->radiance_error + most;
 }

@@ -1,6 +1,8 @@
-/* Small algebra in long double for resolving transforms: what is rounded here is rounded for every ray. */
+/* Small algebra in quad for resolving transforms: what is rounded here is rounded for every ray. */
 #ifndef NB_MEDIA_AFFINE_H
 #define NB_MEDIA_AFFINE_H
+
+#include "formulas/quad.h"
 
 #include <nebel/nebel.h>
 
@@ -8,7 +10,7 @@
 
 /* world = matrix local + offset; the matrix row by row */
 typedef struct nb_affine {
-    long double matrix[9], offset[3];
+    nb_quad matrix[9], offset[3];
 } nb_affine;
 
 static inline nb_affine nb_affine_identity(void)
@@ -16,13 +18,21 @@ static inline nb_affine nb_affine_identity(void)
     return (nb_affine){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
 }
 
-static inline void nb_affine_direction(const nb_affine *a, const long double v[3], long double out[3])
+/* Neither turns nor scales. */
+static inline int nb_affine_is_shift(const nb_affine *a)
+{
+    for (int i = 0; i < 9; i++)
+        if (a->matrix[i] != (i % 4 == 0 ? 1 : 0)) return 0;
+    return 1;
+}
+
+static inline void nb_affine_direction(const nb_affine *a, const nb_quad v[3], nb_quad out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = a->matrix[3 * i] * v[0] + a->matrix[3 * i + 1] * v[1] + a->matrix[3 * i + 2] * v[2];
 }
 
-static inline void nb_affine_point(const nb_affine *a, const long double p[3], long double out[3])
+static inline void nb_affine_point(const nb_affine *a, const nb_quad p[3], nb_quad out[3])
 {
     nb_affine_direction(a, p, out);
     for (int i = 0; i < 3; i++) out[i] += a->offset[i];
@@ -32,29 +42,31 @@ static inline void nb_affine_point(const nb_affine *a, const long double p[3], l
 static inline nb_affine nb_affine_from_transform(const nebel_transform *t)
 {
     nb_affine a = nb_affine_identity();
-    const long double x = (long double)t->rotation[0], y = (long double)t->rotation[1];
-    const long double z = (long double)t->rotation[2], w = (long double)t->rotation[3];
-    const long double n = x * x + y * y + z * z + w * w;
+    const nb_quad x = (nb_quad)t->rotation[0], y = (nb_quad)t->rotation[1];
+    const nb_quad z = (nb_quad)t->rotation[2], w = (nb_quad)t->rotation[3];
+    const nb_quad n = x * x + y * y + z * z + w * w;
     if (n > 0) {
-        const long double s = 2 / n;
-        const long double m[9] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
+        const nb_quad s = 2 / n;
+        const nb_quad m[9] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
                                   s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
                                   s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
         for (int i = 0; i < 9; i++) a.matrix[i] = m[i];
     }
     const int scaled = t->scale[0] != 0 || t->scale[1] != 0 || t->scale[2] != 0;
-    for (int i = 0; i < 9 && scaled; i++) a.matrix[i] *= (long double)t->scale[i % 3];
-    for (int i = 0; i < 3; i++) a.offset[i] = (long double)t->position[i];
+    for (int i = 0; i < 9 && scaled; i++) a.matrix[i] *= (nb_quad)t->scale[i % 3];
+    for (int i = 0; i < 3; i++) a.offset[i] = (nb_quad)t->position[i];
     return a;
 }
 
 /* outer after inner */
 static inline nb_affine nb_affine_compose(const nb_affine *outer, const nb_affine *inner)
 {
-    nb_affine out;
+    nb_affine out = *inner;
+    for (int i = 0; i < 3; i++) out.offset[i] += outer->offset[i];
+    if (nb_affine_is_shift(outer)) return out;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
-            long double sum = 0;
+            nb_quad sum = 0;
             for (int k = 0; k < 3; k++) sum += outer->matrix[3 * i + k] * inner->matrix[3 * k + j];
             out.matrix[3 * i + j] = sum;
         }
@@ -63,16 +75,16 @@ static inline nb_affine nb_affine_compose(const nb_affine *outer, const nb_affin
 }
 
 /* The inverse of the matrix by its cofactors; 0 where it is singular. */
-static inline int nb_affine_invert_matrix(const nb_affine *a, long double out[9])
+static inline int nb_affine_invert_matrix(const nb_affine *a, nb_quad out[9])
 {
-    const long double *m = a->matrix;
+    const nb_quad *m = a->matrix;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             const int r0 = (j + 1) % 3, r1 = (j + 2) % 3, c0 = (i + 1) % 3, c1 = (i + 2) % 3;
             out[3 * i + j] = m[3 * r0 + c0] * m[3 * r1 + c1] - m[3 * r0 + c1] * m[3 * r1 + c0];
         }
-    const long double determinant = m[0] * out[0] + m[1] * out[3] + m[2] * out[6];
-    if (!(fabsl(determinant) > 0) || !isfinite((double)determinant)) return 0;
+    const nb_quad determinant = m[0] * out[0] + m[1] * out[3] + m[2] * out[6];
+    if (!(nb_quad_abs(determinant) > 0) || !isfinite((double)determinant)) return 0;
     for (int i = 0; i < 9; i++) out[i] /= determinant;
     return 1;
 }

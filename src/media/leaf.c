@@ -4,71 +4,104 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
-static void widen_point(const double v[3], long double out[3])
+static void widen_point(const double v[3], nb_quad out[3])
 {
-    for (int i = 0; i < 3; i++) out[i] = (long double)v[i];
+    for (int i = 0; i < 3; i++) out[i] = (nb_quad)v[i];
 }
 
-/* origin + rest = `local` after the world's matrix, plus its offset: the sum in two parts (Knuth's two-sum), because at 1e7 m even a
- * long double would round it by more than a silhouette forgives. Offsets that are doubles came from the caller unrounded. */
-static void set_origin(nb_leaf *leaf, const nb_affine *world, const long double local[3])
+/* `local` after the world's matrix, plus its offset. A turned point is rounded to a few units of its last digit, the sum by
+ * what it leaves (Knuth's two-sum), an offset only where it is no double as the caller gave it. */
+static void set_origin(nb_leaf *leaf, const nb_affine *world, const nb_quad local[3])
 {
-    long double turned[3];
-    nb_affine_direction(world, local, turned);
-    int unturned = 1;
-    for (int i = 0; i < 9; i++) unturned = unturned && world->matrix[i] == (i % 4 == 0 ? 1 : 0);
+    nb_quad turned[3] = {local[0], local[1], local[2]};
+    const int unturned = nb_affine_is_shift(world);
+    if (!unturned) nb_affine_direction(world, local, turned);
+    leaf->resolved_error = 0;
     leaf->origin_error = 0;
     for (int i = 0; i < 3; i++) {
-        const long double offset = world->offset[i], sum = turned[i] + offset, part = sum - turned[i];
-        leaf->exact_origin[i] = sum;
-        leaf->exact_rest[i] = (turned[i] - (sum - part)) + (offset - part);
-        leaf->origin[i] = (double)sum;
-        leaf->origin_rest[i] = (double)((sum - (long double)leaf->origin[i]) + leaf->exact_rest[i]);
-        const int exact = (long double)(double)offset == offset;
+        const nb_quad offset = world->offset[i], sum = turned[i] + offset, part = sum - turned[i];
+        const nb_quad lost = (turned[i] - (sum - part)) + (offset - part);
+        const int exact = (nb_quad)(double)offset == offset;
         const double rounded = (unturned ? 0 : fabs((double)turned[i])) + (exact ? 0 : fabs((double)offset));
-        leaf->origin_error += rounded * (double)LDBL_EPSILON;
+        leaf->resolved_error += 2 * rounded * (double)NB_QUAD_EPSILON + fabs((double)lost);
+        leaf->quad_origin[i] = sum;
+        leaf->exact_origin[i] = (long double)sum;
+        leaf->exact_rest[i] = (long double)(sum - (nb_quad)leaf->exact_origin[i]);
+        leaf->origin[i] = (double)sum;
+        const nb_quad rest = sum - (nb_quad)leaf->origin[i];
+        leaf->origin_rest[i] = (double)rest;
+        leaf->origin_error += fabs((double)(rest - (nb_quad)leaf->origin_rest[i]));
     }
+    leaf->origin_error += leaf->resolved_error;
+}
+
+/* shaping after the inverse of the world's matrix; 0 where there is none. */
+static int invert_frame(const nb_affine *world, const nb_quad shaping[9], nb_quad matrix[9])
+{
+    nb_affine back = nb_affine_identity();
+    const nb_affine shape = {{shaping[0], shaping[1], shaping[2], shaping[3], shaping[4], shaping[5], shaping[6],
+                              shaping[7], shaping[8]}, {0, 0, 0}};
+    memcpy(matrix, shaping, sizeof shape.matrix);
+    if (nb_affine_is_shift(world)) return 1;
+    if (!nb_affine_invert_matrix(world, back.matrix)) return 0;
+    const nb_affine frame = nb_affine_compose(&shape, &back);
+    memcpy(matrix, frame.matrix, sizeof frame.matrix);
+    return 1;
 }
 
 /* The frame whose origin is `center` and whose axes are normalised by `shaping` (rows, in the shape's coordinates). */
-static int set_frame(nb_leaf *leaf, const nb_affine *world, const long double center[3], const long double shaping[9])
+static int set_frame(nb_leaf *leaf, const nb_affine *world, const nb_quad center[3], const nb_quad shaping[9])
 {
-    long double inverse[9];
-    if (!nb_affine_invert_matrix(world, inverse)) return 0;
-    const nb_affine shape = {{shaping[0], shaping[1], shaping[2], shaping[3], shaping[4], shaping[5], shaping[6],
-                              shaping[7], shaping[8]}, {0, 0, 0}};
-    nb_affine back = nb_affine_identity();
-    for (int i = 0; i < 9; i++) back.matrix[i] = inverse[i];
-    const nb_affine frame = nb_affine_compose(&shape, &back);
+    if (!invert_frame(world, shaping, leaf->quad_matrix)) return 0;
     set_origin(leaf, world, center);
     leaf->aligned = 1;
+    for (int i = 0; i < 9; i++) {
+        leaf->exact_matrix[i] = (long double)leaf->quad_matrix[i];
+        leaf->matrix[i] = (double)leaf->exact_matrix[i];
+        leaf->aligned = leaf->aligned && leaf->quad_matrix[i] == (i % 4 == 0 ? 1 : 0);
+    }
     leaf->scale = 0;
     for (int i = 0; i < 3; i++) {
-        const long double *row = &frame.matrix[3 * i];
+        const long double *row = &leaf->exact_matrix[3 * i];
         leaf->scale = fmax(leaf->scale, (double)sqrtl(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
-    }
-    for (int i = 0; i < 9; i++) {
-        leaf->exact_matrix[i] = frame.matrix[i];
-        leaf->matrix[i] = (double)frame.matrix[i];
-        leaf->aligned = leaf->aligned && frame.matrix[i] == (i % 4 == 0 ? 1 : 0);
     }
     return isfinite(leaf->scale);
 }
 
-static const long double no_shaping[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+static const nb_quad no_shaping[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/* Bounds are wider than the body by far more than what long double rounds, and much cheaper in it. */
+typedef struct rough_affine {
+    long double matrix[9], offset[3];
+} rough_affine;
+
+static rough_affine round_affine(const nb_affine *world)
+{
+    rough_affine rough;
+    for (int i = 0; i < 9; i++) rough.matrix[i] = (long double)world->matrix[i];
+    for (int i = 0; i < 3; i++) rough.offset[i] = (long double)world->offset[i];
+    return rough;
+}
+
+static long double row_times(const rough_affine *world, int row, const long double v[3])
+{
+    const long double *m = &world->matrix[3 * row];
+    return m[0] * v[0] + m[1] * v[1] + m[2] * v[2];
+}
 
 /* Encloses center +- the image of the unit ball under the given columns. */
-static void enclose_ball(const nb_affine *world, const long double center[3], long double axes[3][3], int axis_count,
+static void enclose_ball(const rough_affine *world, const long double center[3], long double axes[3][3], int axis_count,
                          double low[3], double high[3])
 {
-    long double middle[3], image[3][3];
-    nb_affine_point(world, center, middle);
-    for (int k = 0; k < axis_count; k++) nb_affine_direction(world, axes[k], image[k]);
     for (int i = 0; i < 3; i++) {
         long double square = 0;
-        for (int k = 0; k < axis_count; k++) square += image[k][i] * image[k][i];
-        const double half = (double)sqrtl(square), m = (double)middle[i];
+        for (int k = 0; k < axis_count; k++) {
+            const long double image = row_times(world, i, axes[k]);
+            square += image * image;
+        }
+        const double half = (double)sqrtl(square), m = (double)(row_times(world, i, center) + world->offset[i]);
         const double margin = 1e-12 * (fabs(m) + half) + DBL_MIN;
         low[i] = fmin(low[i], m - half - margin);
         high[i] = fmax(high[i], m + half + margin);
@@ -77,26 +110,32 @@ static void enclose_ball(const nb_affine *world, const long double center[3], lo
 
 static int set_ball(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
 {
-    long double center[3], axes[3][3] = {{0}}, shaping[9] = {0};
     const int sphere = shape->type == NEBEL_SHAPE_SPHERE;
-    widen_point(shape->center, center);
+    const rough_affine rough = round_affine(world);
+    nb_quad center[3], shaping[9] = {0};
+    long double rough_center[3], axes[3][3] = {{0}};
     for (int i = 0; i < 3; i++) {
-        axes[i][i] = (long double)(sphere ? shape->radius : shape->radii[i]);
-        shaping[4 * i] = sphere ? 1 : 1 / axes[i][i];
+        const double radius = sphere ? shape->radius : shape->radii[i];
+        center[i] = (nb_quad)shape->center[i];
+        shaping[4 * i] = sphere ? 1 : 1 / (nb_quad)radius;
+        rough_center[i] = (long double)shape->center[i];
+        axes[i][i] = (long double)radius;
     }
     leaf->type = NB_LEAF_BALL;
-    leaf->exact_radius = sphere ? (long double)shape->radius : 1;
-    leaf->radius = (double)leaf->exact_radius;
-    enclose_ball(world, center, axes, 3, low, high);
+    leaf->radius = sphere ? shape->radius : 1;
+    leaf->exact_radius = (long double)leaf->radius;
+    leaf->quad_radius = (nb_quad)leaf->radius;
+    enclose_ball(&rough, rough_center, axes, 3, low, high);
     return set_frame(leaf, world, center, shaping);
 }
 
 static void enclose_box(const nb_affine *world, const nebel_shape *shape, double low[3], double high[3])
 {
+    const rough_affine rough = round_affine(world);
     for (int corner = 0; corner < 8; corner++) {
         long double p[3];
         for (int i = 0; i < 3; i++) p[i] = (long double)(corner >> i & 1 ? shape->max[i] : shape->min[i]);
-        enclose_ball(world, p, NULL, 0, low, high);
+        enclose_ball(&rough, p, NULL, 0, low, high);
     }
 }
 
@@ -108,17 +147,17 @@ static int set_box(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *wor
         leaf->high[i] = shape->max[i];
     }
     enclose_box(world, shape, low, high);
-    return set_frame(leaf, world, (const long double[3]){0, 0, 0}, no_shaping);
+    return set_frame(leaf, world, (const nb_quad[3]){0, 0, 0}, no_shaping);
 }
 
 /* Two unit vectors across `axis` (unit length), without a branch cut near the poles that would lose digits. */
-static void across(const long double axis[3], long double u[3], long double v[3])
+static void across(const nb_quad axis[3], nb_quad u[3], nb_quad v[3])
 {
     int smallest = 0;
     for (int i = 1; i < 3; i++)
-        if (fabsl(axis[i]) < fabsl(axis[smallest])) smallest = i;
+        if (nb_quad_abs(axis[i]) < nb_quad_abs(axis[smallest])) smallest = i;
     const int j = (smallest + 1) % 3, k = (smallest + 2) % 3;
-    const long double length = sqrtl(axis[j] * axis[j] + axis[k] * axis[k]);
+    const nb_quad length = nb_quad_sqrt(axis[j] * axis[j] + axis[k] * axis[k]);
     u[smallest] = 0;
     u[j] = -axis[k] / length;
     u[k] = axis[j] / length;
@@ -127,50 +166,55 @@ static void across(const long double axis[3], long double u[3], long double v[3]
 }
 
 /* Encloses the two end discs (or balls, for a capsule) of a body around an axis. */
-static void enclose_ends(const nebel_shape *shape, const nb_affine *world, long double basis[3][3],
-                         const long double radii[2], double low[3], double high[3])
+static void enclose_ends(const nebel_shape *shape, const nb_affine *world, nb_quad basis[3][3], const nb_quad radii[2],
+                         double low[3], double high[3])
 {
+    const rough_affine rough = round_affine(world);
     for (int end = 0; end < 2; end++) {
         long double center[3], axes[3][3];
-        widen_point(end ? shape->to : shape->from, center);
-        for (int k = 0; k < 3; k++)
-            for (int i = 0; i < 3; i++) axes[k][i] = basis[k][i] * radii[end];
-        enclose_ball(world, center, axes, shape->type == NEBEL_SHAPE_CAPSULE ? 3 : 2, low, high);
+        for (int i = 0; i < 3; i++) {
+            center[i] = (long double)(end ? shape->to[i] : shape->from[i]);
+            for (int k = 0; k < 3; k++) axes[k][i] = (long double)basis[k][i] * (long double)radii[end];
+        }
+        enclose_ball(&rough, center, axes, shape->type == NEBEL_SHAPE_CAPSULE ? 3 : 2, low, high);
     }
 }
 
-static void set_profile_of_axis(nb_leaf *leaf, const nebel_shape *shape, long double length, const long double radii[2],
-                                long double across_unit)
+static void set_profile_of_axis(nb_leaf *leaf, const nebel_shape *shape, nb_quad length, const nb_quad radii[2],
+                                nb_quad across_unit)
 {
     leaf->type = shape->type == NEBEL_SHAPE_CAPSULE ? NB_LEAF_CAPSULE
                  : radii[0] == radii[1]             ? NB_LEAF_TUBE
                                                     : NB_LEAF_CONE;
-    leaf->exact_length = length / across_unit;
-    leaf->exact_radius = radii[0] / across_unit;
-    leaf->exact_slope = (radii[1] - radii[0]) / across_unit;
-    leaf->length = (double)leaf->exact_length;
-    leaf->radius = (double)leaf->exact_radius;
-    leaf->slope = (double)leaf->exact_slope;
+    leaf->quad_length = length / across_unit;
+    leaf->quad_radius = radii[0] / across_unit;
+    leaf->quad_slope = (radii[1] - radii[0]) / across_unit;
+    leaf->exact_length = (long double)leaf->quad_length;
+    leaf->exact_radius = (long double)leaf->quad_radius;
+    leaf->exact_slope = (long double)leaf->quad_slope;
+    leaf->length = (double)leaf->quad_length;
+    leaf->radius = (double)leaf->quad_radius;
+    leaf->slope = (double)leaf->quad_slope;
 }
 
 static int set_axis_body(nb_leaf *leaf, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
 {
     const int cone = shape->type == NEBEL_SHAPE_CONE;
-    const long double radii[2] = {(long double)(cone ? shape->radius_from : shape->radius),
-                                  (long double)(cone ? shape->radius_to : shape->radius)};
-    long double basis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, from[3], square = 0, axis[3];
+    const nb_quad radii[2] = {(nb_quad)(cone ? shape->radius_from : shape->radius),
+                                  (nb_quad)(cone ? shape->radius_to : shape->radius)};
+    nb_quad basis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, from[3], square = 0, axis[3];
     widen_point(shape->from, from);
     for (int i = 0; i < 3; i++) {
-        axis[i] = (long double)shape->to[i] - from[i];
+        axis[i] = (nb_quad)shape->to[i] - from[i];
         square += axis[i] * axis[i];
     }
-    const long double length = sqrtl(square), widest = fmaxl(radii[0], radii[1]);
+    const nb_quad length = nb_quad_sqrt(square), widest = radii[0] > radii[1] ? radii[0] : radii[1];
     if (length > 0) {
         for (int i = 0; i < 3; i++) basis[2][i] = axis[i] / length;
         across(basis[2], basis[0], basis[1]);
     }
-    const long double along = shape->type == NEBEL_SHAPE_CAPSULE ? widest : length;
-    long double shaping[9];
+    const nb_quad along = shape->type == NEBEL_SHAPE_CAPSULE ? widest : length;
+    nb_quad shaping[9];
     for (int i = 0; i < 9; i++) shaping[i] = basis[i / 3][i % 3] / (i < 6 ? widest : along);
     set_profile_of_axis(leaf, shape, length, radii, widest);
     enclose_ends(shape, world, basis, radii, low, high);
@@ -225,7 +269,7 @@ static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_
                                nb_face *faces, double low[3], double high[3])
 {
     const int half_space = shape->type == NEBEL_SHAPE_HALF_SPACE;
-    long double center[3] = {0, 0, 0};
+    nb_quad center[3] = {0, 0, 0};
     leaf->type = NB_LEAF_PLANES;
     leaf->face_count = half_space ? 1 : shape->plane_count;
     if (half_space) {

@@ -76,10 +76,20 @@ static nebel_result add_group(builder *b, const nebel_shape *shape, const nb_aff
     return NEBEL_OK;
 }
 
+static int is_moved(const nebel_transform *t)
+{
+    for (int i = 0; i < 3; i++)
+        if (t->position[i] != 0 || t->rotation[i] != 0 || t->scale[i] != 0) return 1;
+    return t->rotation[3] != 0;
+}
+
 static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3], double high[3])
 {
-    const nb_affine own = nb_affine_from_transform(&shape->transform);
-    const nb_affine world = nb_affine_compose(above, &own);
+    nb_affine world = *above;
+    if (is_moved(&shape->transform)) {
+        const nb_affine own = nb_affine_from_transform(&shape->transform);
+        world = nb_affine_compose(above, &own);
+    }
     return is_group(shape) ? add_group(b, shape, &world, low, high) : add_leaf(b, shape, &world, low, high);
 }
 
@@ -183,7 +193,7 @@ static int compare_density(const nebel_density *a, const nebel_density *b)
     return compare_numbers(x, y, sizeof x / sizeof *x);
 }
 
-static int compare_exact(const long double *a, const long double *b, size_t n)
+static int compare_quads(const nb_quad *a, const nb_quad *b, size_t n)
 {
     for (size_t i = 0; i < n; i++)
         if (a[i] != b[i]) return a[i] < b[i] ? -1 : 1;
@@ -193,14 +203,13 @@ static int compare_exact(const long double *a, const long double *b, size_t n)
 static int compare_leaf(const nb_leaf *a, const nb_leaf *b)
 {
     int order = (a->type > b->type) - (a->type < b->type);
-    if (order == 0) order = compare_exact(a->exact_origin, b->exact_origin, 3);
-    if (order == 0) order = compare_exact(a->exact_rest, b->exact_rest, 3);
-    if (order == 0) order = compare_exact(a->exact_matrix, b->exact_matrix, 9);
+    if (order == 0) order = compare_quads(a->quad_origin, b->quad_origin, 3);
+    if (order == 0) order = compare_quads(a->quad_matrix, b->quad_matrix, 9);
     if (order == 0) order = compare_numbers(a->low, b->low, 3);
     if (order == 0) order = compare_numbers(a->high, b->high, 3);
-    if (order == 0) order = compare_exact(&a->exact_radius, &b->exact_radius, 1);
-    if (order == 0) order = compare_exact(&a->exact_slope, &b->exact_slope, 1);
-    if (order == 0) order = compare_exact(&a->exact_length, &b->exact_length, 1);
+    if (order == 0) order = compare_quads(&a->quad_radius, &b->quad_radius, 1);
+    if (order == 0) order = compare_quads(&a->quad_slope, &b->quad_slope, 1);
+    if (order == 0) order = compare_quads(&a->quad_length, &b->quad_length, 1);
     if (order == 0) order = compare_sizes(a->face_count, b->face_count);
     return order;
 }

@@ -6,6 +6,7 @@
 #define NB_MEDIA_VOLUME_H
 
 #include "base/base.h"
+#include "formulas/quad.h"
 
 #include <nebel/nebel.h>
 
@@ -30,14 +31,17 @@ typedef struct nb_leaf {
     int aligned;             /* the matrix is the identity */
     double origin[3];        /* local = matrix (world - origin) */
     double origin_rest[3];   /* what rounding to double took from the origin */
-    double origin_error;     /* what resolving may have lost of it */
+    double origin_error;     /* what resolving and rounding may have lost of it */
     double matrix[9];        /* row by row */
     long double exact_origin[3], exact_rest[3], exact_matrix[9]; /* the same for the double reference */
+    nb_quad quad_origin[3], quad_matrix[9];                      /* the same as resolved */
+    double resolved_error;   /* what resolving may have lost of the origin */
     double scale;            /* largest row length of the matrix */
     double low[3], high[3];  /* box */
     double radius, slope;    /* ball, cone */
     double length;           /* capsule */
     long double exact_radius, exact_slope, exact_length;
+    nb_quad quad_radius, quad_slope, quad_length;
     size_t first_face, face_count; /* planes: into the volume's faces */
 } nb_leaf;
 
