@@ -4,7 +4,7 @@ BUILD ?= build
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 V ?= 0
 SOURCES = $(shell git ls-files '*.c' '*.h' '*.cpp')
-LANDSCAPE = examples/scenes/models/landscape.png
+MODELS = examples/scenes/models/landscape.png examples/scenes/models/planet.obj
 
 MAKEFLAGS += --no-print-directory
 ifeq ($(V),0)
@@ -15,14 +15,14 @@ endif
 
 .PHONY: all demo test bench asan lint format clean
 
-all: $(LANDSCAPE)
+all: $(MODELS)
 	@scripts/install_packages.sh build
 	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=OFF
 	@cmake --build $(BUILD) -j $(JOBS)
 	@echo "nebel: the program is $(BUILD)/nebel"
 
-demo: $(LANDSCAPE)
+demo: $(MODELS)
 	@scripts/install_packages.sh build demo
 	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=OFF
@@ -61,7 +61,11 @@ format:
 clean:
 	@rm -rf $(BUILD) $(BUILD)-asan
 
-# The height map of an example, which is made and not kept.
-$(LANDSCAPE): examples/make_landscape.py
+# What example scenes need and what is made, not kept.
+examples/scenes/models/%.png: examples/make_%.py
+	@scripts/install_packages.sh example
+	@python3 $< $@
+
+examples/scenes/models/%.obj: examples/make_%.py
 	@scripts/install_packages.sh example
 	@python3 $< $@
