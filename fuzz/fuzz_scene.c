@@ -33,6 +33,17 @@ static void release(void *memory, void *user)
 /* More particles take longer than a fuzzer should spend on one scene. */
 enum { MOST_PARTICLES = 2000 };
 
+/* Only particles may find no place; fog that was read can be had at every frame. */
+static void commit(const nebel_scene *scene, double frame)
+{
+    nebel_snapshot *fog = NULL;
+    const nebel_result result = nebel_commit_scene_fog_at(scene, frame, &fog);
+    const size_t particles = nebel_scene_contents(scene)->particle_count;
+    if (result != NEBEL_OK && !(result == NEBEL_ERROR_VALUE && particles > 0)) abort();
+    if ((result == NEBEL_OK) != (fog != NULL)) abort();
+    nebel_release_snapshot(fog);
+}
+
 /* What a scene promises to its users. That a shape leaves no place for particles is found when they are strewn. */
 static void check_scene(const nebel_scene *scene)
 {
@@ -42,11 +53,8 @@ static void check_scene(const nebel_scene *scene)
     const nebel_camera camera = nebel_scene_camera(scene, 12.5);
     if (!(camera.vertical_fov > 0 && camera.vertical_fov < 180 && camera.view_height > 0)) abort();
     if (data->particle_count > MOST_PARTICLES) return;
-    nebel_snapshot *fog = NULL;
-    const nebel_result result = nebel_commit_scene_fog(scene, &fog);
-    if (result != NEBEL_OK && !(result == NEBEL_ERROR_VALUE && data->particle_count > 0)) abort();
-    if ((result == NEBEL_OK) != (fog != NULL)) abort();
-    nebel_release_snapshot(fog);
+    commit(scene, 0);
+    if (data->moving_volume_count > 0) commit(scene, 12.5);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

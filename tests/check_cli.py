@@ -187,6 +187,13 @@ class TraceTest(Case):
         self.assertTrue(done.out.startswith(HEADER))
         return [[float(field) for field in line.split(",")] for line in done.out.splitlines()[1:]]
 
+    def test_a_frame_of_fog_that_moves(self):
+        moving = dict(FOG, keys=[{"frame": 0}, {"frame": 20, "extinction": 0}])
+        scene = self.write_scene("moving.json", [moving])
+        for words, part in (([], 1), (["--frame", "0"], 1), (["--frame", "10"], 0.5), (["--frame", "20"], 0)):
+            self.assertAlmostEqual(self.numbers(RAY, *words, scene=scene)[0][0], math.exp(-part), delta=1e-15)
+        self.assert_misused(self.trace(RAY, "--frame", "-1"), "--frame")
+
     def test_a_box_of_constant_fog(self):
         row = self.numbers(RAY)[0]
         for i, source in enumerate((0.7, 0.7, 0.5)):
@@ -478,6 +485,18 @@ class RenderTest(PictureCase):
         self.assertNotIn("nothing moves", done.err)
         pictures = [(self.folder / f"t{n}.png").read_bytes() for n in range(5)]
         self.assertNotEqual(pictures[0], pictures[1])
+
+    def test_fog_moves(self):
+        moving = dict(FOG, keys=[{"frame": 0}, {"frame": 2, "extinction": 0}])
+        self.scene = self.write_scene("fog.json", [moving], background=1, camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        done = self.render("t%d.png", "--frames", "0-3")
+        self.assert_done(done)
+        self.assertNotIn("nothing moves", done.err)
+        pictures = [(self.folder / f"t{n}.png").read_bytes() for n in range(4)]
+        self.assertEqual(len(set(pictures)), 3)
+        self.assertEqual(pictures[2], pictures[3])
+        self.assert_done(self.render("u.png", "--frame", "1"))
+        self.assertEqual((self.folder / "u.png").read_bytes(), pictures[1])
 
     def test_no_bar_without_a_terminal(self):
         done = self.render("a.png", "--samples", "64")

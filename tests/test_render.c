@@ -346,6 +346,32 @@ static void test_earlier_frames_change_no_byte(void **state)
     test_picture_free(&later);
 }
 
+static void test_fog_of_a_frame_takes_the_place_of_that_before(void **state)
+{
+    (void)state;
+    static test_ball ball;
+    test_ball_make(&ball, (const double[3]){0, 0, 0});
+    nebel_snapshot *fogs[3] = {test_world_fog(.1, .5), NULL, test_world_fog(.3, .2)};
+    const nebel_camera camera = test_camera(2, 2, 5, 0, 0, 0);
+    const nebel_frame_desc frame = {.camera = camera, .width = 40, .height = 30, .samples = 1};
+    nebel_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_renderer(&ball.scene, fogs[2], &plain, &renderer), NEBEL_OK);
+    test_picture fresh = test_picture_make(40, 30), later = test_picture_make(40, 30);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(nebel_set_renderer_fog(renderer, fogs[i]), NEBEL_OK);
+        assert_int_equal(nebel_set_renderer_fog(renderer, fogs[i]), NEBEL_OK);
+        assert_int_equal(nebel_render_frame(renderer, &frame, &later.planes), NEBEL_OK);
+        test_render(&ball.scene, fogs[i], &plain, &camera, 1, &fresh);
+        assert_same_bytes(&fresh, &later);
+    }
+    assert_int_equal(nebel_set_renderer_fog(NULL, fogs[0]), NEBEL_ERROR_ARGUMENT);
+    nebel_release_snapshot(fogs[0]);
+    nebel_release_snapshot(fogs[2]);
+    nebel_destroy_renderer(renderer);
+    test_picture_free(&fresh);
+    test_picture_free(&later);
+}
+
 /* ---- places far away
  * ------------------------------------------------------------------------------------------------- */
 
@@ -542,6 +568,7 @@ int main(void)
         cmocka_unit_test(test_thread_count_changes_no_byte),
         cmocka_unit_test(test_fog_in_any_instruction_set_changes_no_byte),
         cmocka_unit_test(test_earlier_frames_change_no_byte),
+        cmocka_unit_test(test_fog_of_a_frame_takes_the_place_of_that_before),
         cmocka_unit_test(test_far_from_the_origin_is_as_good),
         cmocka_unit_test(test_telescope_sees_what_a_parallel_camera_sees),
         cmocka_unit_test(test_nothing_to_see),

@@ -302,7 +302,7 @@ static void test_what_no_volume_has(void **state)
          "fog[0].extinction: unknown key; a volume with \"operation\": \"exclude\" has: name, shape, operation"},
         {FORMAT, LIT("`\"albdo\": 1"),
          "fog[0].albdo: unknown key; a volume has: name, shape, operation, density, extinction, "
-         "mean_free_path, visibility, contrast, source, albedo, phase, emission; did you mean "
+         "mean_free_path, visibility, contrast, source, albedo, phase, emission, keys; did you mean "
          "\"albedo\"?"},
         {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"name\": 1"),
          "fog[0].name: the key appears twice, first at line 2, column 3; remove one"},

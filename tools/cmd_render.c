@@ -325,10 +325,18 @@ static int render_frame(studio *all)
                              all->listener.kept[0] != '\0' ? all->listener.kept : nebel_result_text(result));
 }
 
+static int move_fog(studio *all)
+{
+    nebel_result result = nb_load_move_fog(&all->loaded, all->frame);
+    if (result == NEBEL_OK) result = nebel_set_renderer_fog(all->renderer, all->loaded.fog);
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->scene, result);
+}
+
 static int make_picture(studio *all)
 {
     if (nb_interrupt_is_requested()) return NB_DONE;
-    int status = render_frame(all);
+    int status = move_fog(all);
+    if (status == NB_DONE) status = render_frame(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     char *const name = name_picture(all->wanted, all->frame);
     status = name != NULL ? write_picture(all, name) : NB_FAILED;
@@ -339,7 +347,7 @@ static int make_picture(studio *all)
 static void note_stillness(const nebel_scene *scene, const settings *wanted)
 {
     const nebel_scene_data *const data = nebel_scene_contents(scene);
-    if (data->turntable_frames > 0 || data->camera_key_count > 1) return;
+    if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->moving_volume_count > 0) return;
     nb_report_message("note: %s: nothing moves, all frames are the same picture; "
                       "the camera turns with \"turntable\", or moves with \"keys\"",
                       wanted->scene);
@@ -348,7 +356,7 @@ static void note_stillness(const nebel_scene *scene, const settings *wanted)
 static int set_up(studio *all)
 {
     const settings *const wanted = all->wanted;
-    int status = nb_load_scene(wanted->scene, 1, &all->listener, &all->loaded);
+    int status = nb_load_scene(wanted->scene, 1, wanted->first_frame, &all->listener, &all->loaded);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
     status = allocate_planes(all);

@@ -18,7 +18,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PRECISION, ISA, TOLERANCE, THREADS };
+enum { PRECISION, ISA, TOLERANCE, FRAME, THREADS };
 
 static const nb_option options[] = {
     [PRECISION] = {"precision", 'p', "NAME", "double: the reference (default).\nfloat: 32 bit, several rays at once."},
@@ -29,6 +29,7 @@ static const nb_option options[] = {
                    "How far off an integrated result may be: absolute\non transmittance, relative to max(1, largest\n"
                    "source radiance) on in-scattering. Closed forms\nare exact whatever it is. 0 < E <= 1.\n"
                    "Default: 0.002."},
+    [FRAME] = {"frame", 0, "N", "The frame of moving fog, 0 to 1000000. Default: 0."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame bytes."},
 };
 
@@ -61,8 +62,11 @@ static const char examples[] = "Examples:\n"
                                "Exit status: 0 done, 1 the scene or a ray is wrong or the output could not be\n"
                                "written, 2 the call was wrong.\n";
 
+enum { LAST_FRAME = 1000000 };
+
 typedef struct settings {
     nebel_trace_desc trace;
+    uint32_t frame;
     int threads;
 } settings;
 
@@ -259,6 +263,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     static const char *const precisions[] = {"double", "float", NULL};
     const uint32_t threads = nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
     wanted->threads = threads > 0 ? (int)threads : nb_workers_available();
+    wanted->frame = nb_options_whole(arguments, FRAME, 0, LAST_FRAME, 0);
     wanted->trace.tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
     if (wanted->trace.tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");
     wanted->trace.precision = (nebel_precision)nb_options_choice(arguments, PRECISION, precisions, 0);
@@ -281,7 +286,7 @@ static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
 {
     nb_report_listener listener = {0};
     nb_load_result loaded;
-    int status = nb_load_scene(path, 0, &listener, &loaded);
+    int status = nb_load_scene(path, 0, wanted->frame, &listener, &loaded);
     if (status != NB_DONE) return status;
     status = read_rays(rays);
     if (status == NB_DONE) {

@@ -208,7 +208,7 @@ int nb_info_print_scene(const char *path)
 {
     nb_report_listener listener = {0};
     nb_load_result loaded;
-    if (nb_load_scene(path, 1, &listener, &loaded) != NB_DONE) return NB_FAILED;
+    if (nb_load_scene(path, 1, 0, &listener, &loaded) != NB_DONE) return NB_FAILED;
     const nebel_scene_data *const scene = nebel_scene_contents(loaded.scene);
     const double visibility = visibility_of(scene, loaded.fog);
     (void)printf("scene: %s\n", path);

@@ -33,6 +33,10 @@ nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot
                                    nebel_renderer **renderer);
 void nebel_destroy_renderer(nebel_renderer *renderer);
 
+/* The fog of the frames from now on, for fog that moves. The snapshot is retained; NULL: none. Not while a frame is rendered.
+ * Errors: ARGUMENT. */
+nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fog);
+
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
 typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);
 

@@ -73,9 +73,11 @@ typedef struct nebel_scene_data {
     double sun_irradiance[3]; /* on a surface that faces it, before any fog */
     double ambient[3];        /* radiance */
 
-    size_t volume_count; /* the fog, in the order of the file */
+    size_t volume_count; /* the fog, in the order of the file; what moves stands as it is at frame 0 */
     const nebel_volume_desc *volumes;
     const char *const *volume_names; /* UTF-8; "" where the file gives none */
+
+    size_t moving_volume_count; /* how many volumes have keys: 0 means that the fog is the same at every frame */
 
     size_t nebula_count; /* strewn by nebel_make_scene_particles; allocator and log are not set */
     const nebel_nebula_desc *nebulae;
@@ -120,7 +122,15 @@ nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
 nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);
 void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles); /* NULL is fine */
 
-/* A snapshot of the scene's fog, its nebulae's particles among it; release it with nebel_release_snapshot before the scene's allocator goes away. */
+/* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no number leaves
+ * its range. Its arrays are the scene's. index < contents->volume_count. */
+nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame);
+
+/* A snapshot of the scene's fog at a frame, its nebulae's particles among it; release it with nebel_release_snapshot before the
+ * scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT, MEMORY, VALUE, LIMIT. */
+nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
+
+/* The same at frame 0. */
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
 
 /* NULL is fine. */

@@ -84,6 +84,15 @@ nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot
     return NEBEL_OK;
 }
 
+nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fog)
+{
+    if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (fog != NULL) nebel_retain_snapshot(fog);
+    nebel_release_snapshot(renderer->fog);
+    renderer->fog = fog;
+    return NEBEL_OK;
+}
+
 void nebel_destroy_renderer(nebel_renderer *renderer)
 {
     if (renderer == NULL) return;

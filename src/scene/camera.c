@@ -1,4 +1,5 @@
 /* The camera at a frame: standing, turning, or on its way between keys. */
+#include "scene/keyframes.h"
 #include "scene/scene_internal.h"
 
 #include <math.h>
@@ -76,58 +77,6 @@ static nebel_camera from_numbers(const double numbers[NUMBER_COUNT], nebel_proje
     return camera;
 }
 
-/* The slope at a key between two intervals of lengths h0, h1 and mean slopes d0, d1: that of the parabola through the
- * three keys (Catmull and Rom, for unequal distances). */
-static double smooth_slope(double h0, double d0, double h1, double d1)
-{
-    return (d0 * h1 + d1 * h0) / (h0 + h1);
-}
-
-/* The same without leaving the keys' range: the weighted harmonic mean of F. Fritsch and J. Butland (1984). */
-static double limited_slope(double h0, double d0, double h1, double d1)
-{
-    if (d0 * d1 <= 0) return 0;
-    const double w0 = 2 * h1 + h0, w1 = h1 + 2 * h0;
-    return (w0 + w1) / (w0 / d0 + w1 / d1);
-}
-
-/* At the first and last key the camera rests. */
-static void find_slopes(const nebel_camera_key *keys, size_t count, size_t at, double slopes[NUMBER_COUNT])
-{
-    memset(slopes, 0, NUMBER_COUNT * sizeof *slopes);
-    if (at == 0 || at + 1 == count) return;
-    const double h0 = keys[at].frame - keys[at - 1].frame, h1 = keys[at + 1].frame - keys[at].frame;
-    double before[NUMBER_COUNT], here[NUMBER_COUNT], after[NUMBER_COUNT];
-    to_numbers(&keys[at - 1].camera, before);
-    to_numbers(&keys[at].camera, here);
-    to_numbers(&keys[at + 1].camera, after);
-    for (int i = 0; i < NUMBER_COUNT; i++) {
-        const double d0 = (here[i] - before[i]) / h0, d1 = (after[i] - here[i]) / h1;
-        slopes[i] = i < FIRST_LIMITED ? smooth_slope(h0, d0, h1, d1) : limited_slope(h0, d0, h1, d1);
-    }
-}
-
-/* Cubic Hermite basis on 0..1; h is the interval's length. */
-static double interpolate(double s, double h, double p0, double m0, double p1, double m1)
-{
-    const double r = 1 - s;
-    return r * r * (1 + 2 * s) * p0 + s * s * (3 - 2 * s) * p1 + s * r * h * (r * m0 - s * m1);
-}
-
-/* The last key at or before the frame, which lies between the first and the last. */
-static size_t find_key(const nebel_camera_key *keys, size_t count, double frame)
-{
-    size_t low = 0, high = count - 1;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (keys[middle].frame <= frame)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 static bool is_usable(const double numbers[NUMBER_COUNT], const nebel_camera *camera)
 {
     for (int i = 0; i < NUMBER_COUNT; i++)
@@ -150,18 +99,16 @@ static nebel_camera mend(const nebel_camera *between, const nebel_camera *nearer
 
 static nebel_camera camera_between_keys(const nebel_camera_key *keys, size_t count, double frame)
 {
-    if (!(frame > keys[0].frame)) return keys[0].camera;
-    if (frame >= keys[count - 1].frame) return keys[count - 1].camera;
-    const size_t at = find_key(keys, count, frame);
-    const double h = keys[at + 1].frame - keys[at].frame, s = (frame - keys[at].frame) / h;
-    double p0[NUMBER_COUNT], p1[NUMBER_COUNT], m0[NUMBER_COUNT], m1[NUMBER_COUNT], numbers[NUMBER_COUNT];
-    to_numbers(&keys[at].camera, p0);
-    to_numbers(&keys[at + 1].camera, p1);
-    find_slopes(keys, count, at, m0);
-    find_slopes(keys, count, at + 1, m1);
-    for (int i = 0; i < NUMBER_COUNT; i++) numbers[i] = interpolate(s, h, p0[i], m0[i], p1[i], m1[i]);
-    const nebel_camera camera = from_numbers(numbers, keys[at].camera.projection);
-    return is_usable(numbers, &camera) ? camera : mend(&camera, &keys[s < .5 ? at : at + 1].camera);
+    nb_keyframes around;
+    if (!nb_keyframes_find(&keys->frame, sizeof *keys, count, frame, &around)) return keys[around.keys[1]].camera;
+    double at[4][NUMBER_COUNT], numbers[NUMBER_COUNT];
+    for (int k = 0; k < 4; k++) to_numbers(&keys[around.keys[k]].camera, at[k]);
+    for (int i = 0; i < NUMBER_COUNT; i++) {
+        const double values[4] = {at[0][i], at[1][i], at[2][i], at[3][i]};
+        numbers[i] = nb_keyframes_between(&around, i >= FIRST_LIMITED, values);
+    }
+    const nebel_camera camera = from_numbers(numbers, keys->camera.projection);
+    return is_usable(numbers, &camera) ? camera : mend(&camera, &keys[nb_keyframes_nearer(&around)].camera);
 }
 
 /* ---- turntable

@@ -55,11 +55,13 @@ static bool read_below(nb_json *json, const nb_json_node *node, nebel_below *bel
     return choice >= 0;
 }
 
-static bool check_ends(nb_json *json, const nb_json_node *to, const nebel_density *density)
+static bool check_ends(nb_json *json, const nb_json_node *const *found, const nebel_density *density)
 {
+    const nb_json_node *end = found[TO] != NULL ? found[TO] : found[FROM];
     const double *a = density->from, *b = density->to;
-    if (to == NULL || a[0] != b[0] || a[1] != b[1] || a[2] != b[2]) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, to, "is the same place as \"from\"; the two must lie apart");
+    if (end == NULL || a[0] != b[0] || a[1] != b[1] || a[2] != b[2]) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, end, "is the same place as \"%s\"; the two must lie apart",
+                        found[TO] != NULL ? "from" : "to");
 }
 
 static const nb_json_node *find_type(const nb_json *json, const nb_json_node *object)
@@ -67,6 +69,31 @@ static const nb_json_node *find_type(const nb_json *json, const nb_json_node *ob
     const nb_json_node *node = nb_json_first(json, object);
     while (!nb_json_has_key(node, "type")) node = nb_json_next(json, node);
     return node;
+}
+
+static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_density *density)
+{
+    return nb_value_number(json, found[BASE], &nb_range_any, &density->base) &&
+           nb_value_number(json, found[SCALE_HEIGHT], &nb_range_positive, &density->scale_height) &&
+           read_below(json, found[BELOW], &density->below) && nb_value_vector(json, found[FROM], density->from) &&
+           nb_value_vector(json, found[TO], density->to) && check_ends(json, found, density) &&
+           nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
+           nb_value_vector(json, found[CENTER], density->center) &&
+           nb_value_number(json, found[SIGMA], &nb_range_positive, &density->sigma) &&
+           nb_value_number(json, found[DISTANCE], &nb_range_positive, &density->distance);
+}
+
+bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
+{
+    const nb_json_node *found[DENSITY_KEY_COUNT];
+    nb_keys keys = density_keys[density->type];
+    keys.allowed &= ~(NB_BIT(TYPE) | NB_BIT(BELOW) | NB_BIT(POWER));
+    keys.required = 0;
+    if (node == NULL) return true;
+    if (keys.allowed == 0)
+        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node, "does not move; %s has no numbers for that",
+                                keys.owner);
+    return nb_value_members(in->json, node, &keys, found) && read_members(in->json, found, density);
 }
 
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density)
@@ -79,14 +106,7 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
         !nb_value_members(json, node, &density_keys[type], found))
         return false;
     *density = (nebel_density){.type = (nebel_density_type)type, .power = type == NEBEL_DENSITY_RADIAL ? 1 : 0};
-    return nb_value_number(json, found[BASE], &nb_range_any, &density->base) &&
-           nb_value_number(json, found[SCALE_HEIGHT], &nb_range_positive, &density->scale_height) &&
-           read_below(json, found[BELOW], &density->below) && nb_value_vector(json, found[FROM], density->from) &&
-           nb_value_vector(json, found[TO], density->to) && check_ends(json, found[TO], density) &&
-           nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
-           nb_value_vector(json, found[CENTER], density->center) &&
-           nb_value_number(json, found[SIGMA], &nb_range_positive, &density->sigma) &&
-           nb_value_number(json, found[DISTANCE], &nb_range_positive, &density->distance);
+    return read_members(json, found, density);
 }
 
 /* ---- phase

@@ -61,29 +61,32 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
            nb_value_scale(json, found[SCALE], transform->scale);
 }
 
-static bool check_box(nb_json *json, const nb_json_node *max, const nebel_shape *shape)
+/* `min` or `max`, of which a key may have one alone. */
+static bool check_box(nb_json *json, const nb_json_node *min, const nb_json_node *max, const nebel_shape *shape)
 {
-    const nb_json_node *element = nb_json_first(json, max);
+    const bool at_max = max != NULL;
+    const nb_json_node *element = nb_json_first(json, at_max ? max : min);
     for (int i = 0; i < 3; i++, element = nb_json_next(json, element))
         if (shape->min[i] >= shape->max[i])
-            return nb_json_fail(json, NEBEL_ERROR_FORMAT, element,
-                                "is %.15g; must be greater than min[%d], which is %.15g", shape->max[i], i,
-                                shape->min[i]);
+            return nb_json_fail(json, NEBEL_ERROR_FORMAT, element, "is %.15g; must be %s[%d], which is %.15g",
+                                at_max ? shape->max[i] : shape->min[i], at_max ? "greater than min" : "less than max",
+                                i, at_max ? shape->min[i] : shape->max[i]);
     return true;
 }
 
-static bool check_axis(nb_json *json, const nb_json_node *to, const nebel_shape *shape)
+static bool check_axis(nb_json *json, const nb_json_node *end, const nebel_shape *shape)
 {
     const bool apart =
         shape->from[0] != shape->to[0] || shape->from[1] != shape->to[1] || shape->from[2] != shape->to[2];
     if (apart || shape->type == NEBEL_SHAPE_CAPSULE) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, to, "is the same place as \"from\"; the ends must lie apart");
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, end, "is the same place as \"%s\"; the ends must lie apart",
+                        nb_json_has_key(end, "to") ? "from" : "to");
 }
 
-static bool check_cone(nb_json *json, const nb_json_node *radius_to, const nebel_shape *shape)
+static bool check_cone(nb_json *json, const nb_json_node *radius, const nebel_shape *shape)
 {
     if (shape->radius_from > 0 || shape->radius_to > 0) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, radius_to, "both radii are 0; one must be > 0");
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, radius, "both radii are 0; one must be > 0");
 }
 
 static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
@@ -149,6 +152,16 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
            nb_value_vector(json, found[POINT], shape->point) && nb_value_direction(json, found[NORMAL], shape->normal);
 }
 
+/* What one number has to do with another. */
+static bool check_members(nb_json *json, const nb_json_node *const *found, const nebel_shape *shape)
+{
+    const nb_json_node *box = found[MAX] != NULL ? found[MAX] : found[MIN];
+    const nb_json_node *axis = found[TO] != NULL ? found[TO] : found[FROM];
+    const nb_json_node *cone = found[RADIUS_TO] != NULL ? found[RADIUS_TO] : found[RADIUS_FROM];
+    return (box == NULL || check_box(json, found[MIN], found[MAX], shape)) &&
+           (axis == NULL || check_axis(json, axis, shape)) && (cone == NULL || check_cone(json, cone, shape));
+}
+
 static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count)
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
@@ -158,9 +171,7 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
     *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = no_transform};
     if (!read_members(json, found, shape)) return false;
     if (found[SHAPES] != NULL) return read_parts(in, found[SHAPES], shape, leaf_count);
-    return count_leaf(json, node, leaf_count) && (found[MAX] == NULL || check_box(json, found[MAX], shape)) &&
-           (found[TO] == NULL || check_axis(json, found[TO], shape)) &&
-           (found[RADIUS_TO] == NULL || check_cone(json, found[RADIUS_TO], shape)) &&
+    return count_leaf(json, node, leaf_count) && check_members(json, found, shape) &&
            (found[PLANES] == NULL || read_planes(in, found[PLANES], shape));
 }
 
@@ -168,4 +179,14 @@ bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *s
 {
     size_t leaf_count = 0;
     return read_shape(in, node, shape, &leaf_count);
+}
+
+bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+{
+    const nb_json_node *found[SHAPE_KEY_COUNT];
+    nb_keys keys = shape_keys[shape->type];
+    keys.allowed &= ~(NB_BIT(TYPE) | NB_BIT(PLANES) | NB_BIT(SHAPES));
+    keys.required = 0;
+    return node == NULL || (nb_value_members(in->json, node, &keys, found) && read_members(in->json, found, shape) &&
+                            check_members(in->json, found, shape));
 }

@@ -17,18 +17,26 @@ enum {
     ALBEDO,
     PHASE,
     EMISSION,
+    KEYS,
+    FRAME,
     VOLUME_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",       "shape",          "operation",  "density",
-                                        "extinction", "mean_free_path", "visibility", "contrast",
-                                        "source",     "albedo",         "phase",      "emission"};
+static const char *const key_names[] = {"name",           "shape",      "operation", "density", "extinction",
+                                        "mean_free_path", "visibility", "contrast",  "source",  "albedo",
+                                        "phase",          "emission",   "keys",      "frame"};
 
-#define EXCLUDE_KEYS (NB_BIT(NAME) | NB_BIT(SHAPE) | NB_BIT(OPERATION))
+#define EXCLUDE_KEYS (NB_BIT(NAME) | NB_BIT(SHAPE) | NB_BIT(OPERATION) | NB_BIT(KEYS))
+#define FOG_KEYS (NB_BIT(VOLUME_KEY_COUNT) - 1 - NB_BIT(FRAME))
+#define MOVING_KEYS (FOG_KEYS - NB_BIT(NAME) - NB_BIT(OPERATION) - NB_BIT(PHASE) - NB_BIT(KEYS) + NB_BIT(FRAME))
 
+/* In the order of nebel_operation. */
 static const nb_keys volume_keys[] = {
-    {key_names, VOLUME_KEY_COUNT, NB_BIT(VOLUME_KEY_COUNT) - 1, NB_BIT(SHAPE), "a volume"},
+    {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"},
     {key_names, VOLUME_KEY_COUNT, EXCLUDE_KEYS, NB_BIT(SHAPE), "a volume with \"operation\": \"exclude\""}};
+static const nb_keys moving_keys[] = {
+    {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"},
+    {key_names, VOLUME_KEY_COUNT, NB_BIT(FRAME) | NB_BIT(SHAPE), NB_BIT(FRAME), "a key of excluded fog"}};
 
 static bool read_operation(nb_json *json, const nb_json_node *volume, nebel_operation *operation)
 {
@@ -55,6 +63,7 @@ static bool read_length(nb_json *json, const nb_json_node *node, double contrast
                         double (*convert)(double length, double contrast), double extinction[3])
 {
     double length[3];
+    if (node == NULL) return true;
     if (!nb_value_amount(json, node, &nb_range_positive, length)) return false;
     for (int i = 0; i < 3; i++) {
         extinction[i] = convert(length[i], contrast);
@@ -65,7 +74,7 @@ static bool read_length(nb_json *json, const nb_json_node *node, double contrast
     return true;
 }
 
-static bool check_amount_count(nb_json *json, const nb_json_node *volume, const nb_json_node *const *found)
+static bool check_amount_count(nb_json *json, const nb_json_node *const *found)
 {
     const nb_json_node *first = NULL;
     for (int i = EXTINCTION; i <= VISIBILITY; i++) {
@@ -75,17 +84,22 @@ static bool check_amount_count(nb_json *json, const nb_json_node *volume, const 
                                     "the amount is given twice; keep one of extinction, mean_free_path, visibility");
         first = found[i];
     }
-    if (first != NULL) return true;
+    return true;
+}
+
+static bool check_amount_given(nb_json *json, const nb_json_node *volume, const nb_json_node *const *found)
+{
+    if (found[EXTINCTION] != NULL || found[MEAN_FREE_PATH] != NULL || found[VISIBILITY] != NULL) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, volume,
                         "the amount is missing; give one of extinction, mean_free_path, visibility");
 }
 
-static bool read_amount(nb_json *json, const nb_json_node *volume, const nb_json_node *const *found,
-                        double extinction[3])
+/* An amount that is not given leaves `extinction` as it is. */
+static bool read_amount(nb_json *json, const nb_json_node *const *found, double extinction[3])
 {
     static const nb_range contrast_range = {0, 1, true, "a number > 0 and < 1"};
     double contrast = 0.05;
-    if (!check_amount_count(json, volume, found)) return false;
+    if (!check_amount_count(json, found)) return false;
     if (found[CONTRAST] != NULL && found[VISIBILITY] == NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[CONTRAST],
                                 "belongs to \"visibility\", which is absent");
@@ -122,8 +136,8 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
     return true;
 }
 
-/* ---- volume
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- keeping
+ * --------------------------------------------------------------------------------------------------------- */
 
 bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume)
 {
@@ -157,6 +171,123 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
     return true;
 }
 
+/* ---- keys
+ * ------------------------------------------------------------------------------------------------------------ */
+
+/* A volume is lit in one way at all frames, so that it is in between, too. */
+static bool check_light_key(nb_json *json, const nb_json_node *const *entry, const nb_json_node *const *found)
+{
+    if (found[SOURCE] != NULL && entry[ALBEDO] != NULL)
+        return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[SOURCE],
+                                "does not go with the volume's \"albedo\"; a volume has one of them at all frames");
+    if (found[ALBEDO] == NULL || entry[ALBEDO] != NULL) return true;
+    return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[ALBEDO],
+                            "moves only where the volume itself has an \"albedo\"; give it one, 0 perhaps");
+}
+
+/* A scale that changes its sign would pass through 0. */
+static bool check_scale_signs(nb_json *json, const nb_json_node *node, const nebel_volume_desc *volume,
+                              const nebel_volume_desc *before)
+{
+    for (int i = 0; i < 3; i++)
+        if ((volume->shape.transform.scale[i] < 0) != (before->shape.transform.scale[i] < 0))
+            return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                                "its scale has another sign than that of the key before; between them it would be 0");
+    return true;
+}
+
+static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *entry,
+                     nb_volume_key *key)
+{
+    const nb_json_node *found[VOLUME_KEY_COUNT];
+    nb_json *json = in->json;
+    nebel_volume_desc *volume = &key->volume;
+    return nb_value_members(json, node, &moving_keys[volume->operation], found) &&
+           nb_value_number(json, found[FRAME], &nb_range_any, &key->frame) &&
+           nb_read_shape_key(in, found[SHAPE], &volume->shape) &&
+           nb_read_density_key(in, found[DENSITY], &volume->density) && read_amount(json, found, volume->extinction) &&
+           check_light_key(json, entry, found) && read_light(in, found, volume);
+}
+
+/* The parts are those of the volume, which are converted with it, once. */
+static void convert_key(const nb_space *space, nebel_volume_desc *volume)
+{
+    const size_t planes = volume->shape.plane_count, parts = volume->shape.part_count;
+    volume->shape.plane_count = volume->shape.part_count = 0;
+    nb_space_convert_volume(space, volume);
+    volume->shape.plane_count = planes;
+    volume->shape.part_count = parts;
+}
+
+static bool read_key_list(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *entry,
+                          const nebel_volume_desc *volume, nb_volume_key *keys)
+{
+    nb_json *json = in->json;
+    size_t i = 0;
+    for (const nb_json_node *at = nb_json_first(json, list); at != NULL; at = nb_json_next(json, at), i++) {
+        keys[i].volume = *volume;
+        if (!read_key(in, at, entry, &keys[i])) return false;
+        if (i > 0 && keys[i].frame <= keys[i - 1].frame)
+            return nb_json_fail(json, NEBEL_ERROR_FORMAT, at,
+                                "its frame %.15g is not after the key before it, %.15g; frames must ascend",
+                                keys[i].frame, keys[i - 1].frame);
+        if (i > 0 && !check_scale_signs(json, at, &keys[i].volume, &keys[i - 1].volume)) return false;
+    }
+    return true;
+}
+
+/* `volume` is still in the file's numbers. */
+static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *entry,
+                      const nebel_volume_desc *volume, nb_volume_track *track)
+{
+    if (list == NULL) return true;
+    if (!nb_value_is(in->json, list, NB_JSON_ARRAY, "an array of keys {\"frame\": ...}")) return false;
+    if (list->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, list, "holds no key; give one or more");
+    nb_volume_key *keys = nb_arena_allocate(&in->scene->arena, list->count, sizeof *keys);
+    if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, list, "out of memory");
+    if (!read_key_list(in, list, entry, volume, keys)) return false;
+    for (size_t i = 0; i < list->count; i++) convert_key(&in->space, &keys[i].volume);
+    track->keys = keys;
+    track->key_count = list->count;
+    return true;
+}
+
+static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nb_volume_track *track)
+{
+    const nb_json_node *node = list != NULL ? nb_json_first(in->json, list) : NULL;
+    for (size_t i = 0; i < track->key_count; i++, node = nb_json_next(in->json, node))
+        if (!nb_read_try(in, node, "", &track->keys[i].volume)) return false;
+    return true;
+}
+
+static bool keep_track(nb_scene_reader *in, const nb_json_node *node, const nb_volume_track *track)
+{
+    nebel_scene *scene = in->scene;
+    void *tracks = scene->tracks;
+    if (track->key_count == 0) return true;
+    if (!nb_grow(&scene->allocator, &tracks, sizeof *track, scene->track_count, &scene->track_capacity,
+                 scene->track_count + 1))
+        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    scene->tracks = tracks;
+    scene->tracks[scene->track_count++] = *track;
+    scene->data.moving_volume_count++;
+    return true;
+}
+
+/* ---- volume
+ * ---------------------------------------------------------------------------------------------------------- */
+
+static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
+                          nebel_volume_desc *volume, const char *name)
+{
+    nb_volume_track track = {.volume = in->scene->data.volume_count};
+    if (!read_keys(in, found[KEYS], found, volume, &track)) return false;
+    nb_space_convert_volume(&in->space, volume);
+    if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], &track)) return false;
+    if (track.key_count > 0) *volume = nb_volume_at(&track, 0);
+    return keep_volume(in, node, volume, name) && keep_track(in, node, &track);
+}
+
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
 {
     const nb_json_node *found[VOLUME_KEY_COUNT];
@@ -170,8 +301,8 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
         return false;
     if (volume.operation == NEBEL_OPERATION_ADD &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
-         !read_amount(json, node, found, volume.extinction) || !read_light(in, found, &volume)))
+         !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction) ||
+         !read_light(in, found, &volume)))
         return false;
-    nb_space_convert_volume(&in->space, &volume);
-    return nb_read_try(in, node, "", &volume) && keep_volume(in, node, &volume, name);
+    return finish_volume(in, node, found, &volume, name);
 }

@@ -260,16 +260,18 @@ static nebel_result add_particles(nebel_fog *fog, const nebel_scene *scene)
     return result;
 }
 
-static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene)
+static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double frame)
 {
     const nebel_scene_data *data = &scene->data;
     nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++)
-        result = nebel_add_volume(fog, &data->volumes[i], NULL);
+    for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
+        result = nebel_add_volume(fog, &volume, NULL);
+    }
     return result == NEBEL_OK ? add_particles(fog, scene) : result;
 }
 
-nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)
+nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot)
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_fog *fog = NULL;
@@ -277,10 +279,15 @@ nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **s
     *snapshot = NULL;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
     nebel_result result = nebel_create_fog(&desc, &fog);
-    if (result == NEBEL_OK) result = add_volumes(fog, scene);
+    if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);
     nebel_destroy_fog(fog);
     return result;
+}
+
+nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)
+{
+    return nebel_commit_scene_fog_at(scene, 0, snapshot);
 }
 
 void nebel_destroy_scene(nebel_scene *scene)
@@ -291,6 +298,7 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_arena_release(&scene->arena);
     nb_release(&allocator, scene->volumes);
     nb_release(&allocator, (void *)scene->volume_names);
+    nb_release(&allocator, scene->tracks);
     nb_release(&allocator, scene->nebulae);
     nb_release(&allocator, (void *)scene->nebula_names);
     nb_release(&allocator, scene->models);

@@ -19,6 +19,18 @@ typedef struct nb_model_source {
     double color[3];
 } nb_model_source;
 
+typedef struct nb_volume_key {
+    double frame;
+    nebel_volume_desc volume;
+} nb_volume_key;
+
+/* A volume that moves: one or more keys, frames ascending. Parts and planes are the same in all. */
+typedef struct nb_volume_track {
+    size_t volume; /* which one of the scene's */
+    const nb_volume_key *keys;
+    size_t key_count;
+} nb_volume_track;
+
 /* Meshes and textures of loaded models. */
 typedef struct nb_model_set {
     nebel_mesh *meshes;
@@ -38,6 +50,9 @@ struct nebel_scene {
     nebel_volume_desc *volumes;
     const char **volume_names;
     size_t volume_capacity, name_capacity;
+
+    nb_volume_track *tracks; /* in the order of their volumes */
+    size_t track_count, track_capacity;
 
     nebel_nebula_desc *nebulae;
     const char **nebula_names;
@@ -75,6 +90,10 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula);
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
+
+/* The numbers that a key of fog gives anew. Numbers it leaves out stay, as do type, planes and parts. */
+bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
 bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
 
 /* Shows a volume to the core, which knows more than the file's rules: whether a convex body is empty, for one. Where
@@ -83,6 +102,9 @@ bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subj
 
 /* For logs of the core: keeps the message in the reader, which is `user`. */
 void nb_read_keep_message(nebel_result result, const char *message, void *user);
+
+/* The volume at a frame: that of the first or last key, or between two. */
+nebel_volume_desc nb_volume_at(const nb_volume_track *track, double frame);
 
 nebel_camera nb_camera_default(void);
 
