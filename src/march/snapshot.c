@@ -11,6 +11,15 @@ static int compare_media(const void *a, const void *b)
     return nb_volume_compare(&((const nb_medium *)a)->body, &((const nb_medium *)b)->body);
 }
 
+static double proportion_of(const nb_volume *v)
+{
+    const double extent = (v->high[0] - v->low[0]) + (v->high[1] - v->low[1]) + (v->high[2] - v->low[2]);
+    double most = 1;
+    for (size_t i = 0; i < v->leaf_count; i++)
+        if (!v->leaves[i].aligned) most = fmax(most, v->leaves[i].scale * extent);
+    return most;
+}
+
 static void light_medium(nb_medium *medium, const double ambient[3])
 {
     const nb_volume *v = &medium->body;
@@ -21,6 +30,7 @@ static void light_medium(nb_medium *medium, const double ambient[3])
         medium->brightest = fmax(medium->brightest, medium->light[c]);
         medium->emits = medium->emits || v->emission[c] > 0;
     }
+    medium->proportion = proportion_of(v);
 }
 
 static void free_snapshot(nebel_snapshot *s)

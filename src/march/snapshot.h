@@ -14,6 +14,7 @@ typedef struct nb_medium {
     double light[3];    /* radiance * extinction + emission: radiance per metre at density 1 */
     double densest;     /* largest channel of the extinction */
     double brightest;   /* largest channel of light */
+    double proportion;  /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1; for margins */
     int emits;
 } nb_medium;
 

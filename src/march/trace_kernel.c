@@ -29,6 +29,7 @@
 #endif
 
 #include "trace_packet.h"
+#include "trace_bounds.h"
 #include "trace_walk.h"
 #include "trace_mixed.h"
 
@@ -221,8 +222,10 @@ static int find_media(workspace *w, const nebel_snapshot *snapshot)
 
 static int meet_one(workspace *w, const nebel_snapshot *snapshot, size_t index)
 {
-    if (!reserve(w, &snapshot->allocator, snapshot->media[index].body.leaf_count)) return 0;
-    meet_medium(&w->m, &snapshot->media[index]);
+    const nb_medium *medium = &snapshot->media[index];
+    if (!w->m.wants_error && all_miss(&w->m.rays, medium)) return 1;
+    if (!reserve(w, &snapshot->allocator, medium->body.leaf_count)) return 0;
+    meet_medium(&w->m, medium);
     return 1;
 }
 
@@ -453,6 +456,7 @@ static allowance share_budget(const nb_trace_job *job)
 static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first, size_t count, gathered *g)
 {
     job->failed = first;
+    w->m.wants_error = job->wants_error;
     if (!meet_fog(w, job->snapshot)) return NEBEL_ERROR_MEMORY;
     allowance share = *may;
     const nb_real pieces = w->m.event_count + NB_F(1.0);

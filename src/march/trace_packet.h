@@ -51,6 +51,7 @@ typedef struct ends {
 
 typedef struct march {
     packet rays;
+    int wants_error; /* 0: media that no ray comes near may be left out */
     size_t contact_count, span_count;
     contact *contacts;
     leaf_span *spans;

@@ -210,9 +210,6 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
 
 /* ---- the straight way -------------------------------------------------------------------------------------------- */
 
-/* Within how many times the size of the scene two ways of computing a crossing agree: far more than they are apart. */
-#define SCENE_MARGIN 1e-5
-
 typedef struct straight {
     const nb_medium *medium;
     const nb_leaf *leaf;
@@ -240,27 +237,6 @@ static nb_wvec3 reciprocals(nb_wvec3 d)
     return nb_wvec3(nb_wrcp_bounded(d.x), nb_wrcp_bounded(d.y), nb_wrcp_bounded(d.z));
 }
 
-/* Bounds within which a ray must come near to be asked further. The margin covers the rounding of every crossing:
- * distances times roundings, more by its shape's proportions in a frame that scales, and by the square root where a ray
- * grazes. */
-static void set_bounds(straight *way, const stream *s)
-{
-    const nb_volume *body = &way->medium->body;
-    const double *origin = s->rays->origin;
-    double distance = 0, extent = 0;
-    for (int c = 0; c < 3; c++) {
-        distance += fabs(body->low[c] - origin[c]) + fabs(body->high[c] - origin[c]);
-        extent += body->high[c] - body->low[c];
-    }
-    const double proportion = way->leaf->aligned ? 1 : fmax(1, way->leaf->scale * extent);
-    const double margin = SCENE_MARGIN * proportion * distance;
-    way->may_miss = s->has_directions && !s->has_offsets && isfinite(margin);
-    way->nearest = nb_wvec3(WIDE(body->low[0] - origin[0] - margin), WIDE(body->low[1] - origin[1] - margin),
-                            WIDE(body->low[2] - origin[2] - margin));
-    way->farthest = nb_wvec3(WIDE(body->high[0] - origin[0] + margin), WIDE(body->high[1] - origin[1] + margin),
-                             WIDE(body->high[2] - origin[2] + margin));
-}
-
 static void open_straight(straight *way, const nb_trace_job *job, const stream *s)
 {
     const nb_medium *medium = &job->snapshot->media[0];
@@ -280,22 +256,8 @@ static void open_straight(straight *way, const nb_trace_job *job, const stream *
         way->light[c] = REAL(medium->light[c]);
         way->radiance[c] = REAL(medium->radiance[c]);
     }
-    set_bounds(way, s);
-}
-
-/* Whether a slab lies before the start or beyond the end of ways that go `reach` across it, both times the way's
- * length. */
-FORCE_INLINE nb_wmask passes_slab(nb_wide reach, nb_wide nearest, nb_wide farthest, nb_wide length)
-{
-    return nb_wor(nb_wmax(reach, NB_W(0.0)) < nearest * length, nb_wmin(reach, NB_W(0.0)) > farthest * length);
-}
-
-FORCE_INLINE int all_miss(const straight *way, const loaded *p, nb_wide length)
-{
-    const nb_wmask x = passes_slab(p->way.x * p->t_max, way->nearest.x, way->farthest.x, length);
-    const nb_wmask y = passes_slab(p->way.y * p->t_max, way->nearest.y, way->farthest.y, length);
-    const nb_wmask z = passes_slab(p->way.z * p->t_max, way->nearest.z, way->farthest.z, length);
-    return nb_wall(nb_wor(nb_wor(x, y), nb_wor(z, p->t_max == NB_W(0.0))));
+    way->may_miss = s->has_directions && !s->has_offsets;
+    set_bounds(medium, s->origin, &way->nearest, &way->farthest);
 }
 
 /* leaf_interval for one caller, so that what computes slack falls away. */
@@ -369,7 +331,7 @@ FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way,
     const nebel_result valid = load_rays(job, s, first, count, &p);
     if (valid != NEBEL_OK) return valid;
     const nb_wide length = nb_wsqrt(p.square);
-    if (way->may_miss && all_miss(way, &p, length)) {
+    if (way->may_miss && all_pass(p.way, length, p.t_max, way->nearest, way->farthest)) {
         store_clear(to, first, count);
         return NEBEL_OK;
     }
