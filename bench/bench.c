@@ -11,6 +11,12 @@ static group_fn *const functions[] = {nb_bench_process, nb_bench_segments, nb_be
 
 int nb_bench_run(const nb_bench_desc *desc, nb_figures *figures, const char **fault)
 {
+#if defined(NEBEL_HAVE_GL)
+    if (desc->opengl) {
+        *fault = nb_bench_opengl(desc, figures);
+        return *fault == NULL ? 0 : -1;
+    }
+#endif
     for (size_t i = 0; nb_bench_groups[i] != NULL; i++) {
         if (desc->group != NULL && strcmp(desc->group, nb_bench_groups[i]) != 0) continue;
         *fault = functions[i](desc, figures);

@@ -5,6 +5,7 @@
 #include "bench.h"
 
 const char *nb_bench_frame(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_opengl(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_pass(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_process(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures);

@@ -49,8 +49,21 @@ class BenchTest(unittest.TestCase):
         units = {figure["unit"] for figure in json.loads(self.file.read_text())["figures"]}
         self.assertEqual(units, {"M segments/s", "GB/s"})
 
+    def test_opengl_gives_figures(self):
+        done = bench("--quick", "--device", "gl", "--json", self.file)
+        if "built without OpenGL" in done.stderr:
+            self.skipTest("built without OpenGL")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        figures = json.loads(self.file.read_text())["figures"]
+        self.assertGreaterEqual(len(figures), 10)
+        for figure in figures:
+            self.assertIn(figure["name"], done.stdout)
+            self.assertTrue(math.isfinite(figure["value"]))
+
     def test_wrong_calls(self):
-        for words in (["--group", "nothing"], ["scene.json"], ["--fast"]):
+        for words in (["--group", "nothing"], ["scene.json"], ["--fast"], ["--device", "none"],
+                      ["--device", "gl", "--group", "pass"]):
             done = bench(*words)
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertEqual(done.stdout, "")

@@ -2,6 +2,9 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "commands.h"
+#if defined(NEBEL_HAVE_GL)
+#include "gl_context.h"
+#endif
 #include "machine.h"
 #include "report.h"
 
@@ -12,7 +15,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { OPTION_GROUP, OPTION_JSON, OPTION_QUICK };
+enum { OPTION_DEVICE, OPTION_GROUP, OPTION_JSON, OPTION_QUICK };
 
 static const char about[] = "Measures, and prints each figure beside a floor measured in the same run: what\n"
                             "memory, Embree or older code need for the same work. The ratios compare from one\n"
@@ -20,6 +23,8 @@ static const char about[] = "Measures, and prints each figure beside a floor mea
                             "bench/NOTES.md says what to expect.\n";
 
 static const nb_option options[] = {
+    {"device", 'd', "NAME",
+     "cpu (default), or gl: fog over pictures in OpenGL,\non a graphics processor or in Mesa's software"},
     {"group", 'g', "NAME", "only one group: process, segments, frame or\npass"},
     {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
     {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
@@ -28,6 +33,7 @@ static const nb_option options[] = {
 static const char examples[] = "Examples:\n"
                                "  nebel bench\n"
                                "  nebel bench --group segments --json figures.json\n"
+                               "  nebel bench --device gl\n"
                                "\n"
                                "A target that is missed is no failure: the exit status says whether it ran.\n"
                                "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
@@ -55,10 +61,14 @@ static int write_json(const nb_figures *figures, FILE *file, const char *path)
     return NB_DONE;
 }
 
-static int bench(const nb_bench_desc *desc, const char *json)
+static int bench(const nb_bench_desc *desc, const char *json, const char *renderer)
 {
-    char processor[256];
-    nb_machine_read_processor(processor, sizeof processor);
+    char processor[640];
+    nb_machine_read_processor(processor, 256);
+    if (renderer != NULL) {
+        const size_t used = strlen(processor);
+        (void)snprintf(processor + used, sizeof processor - used, "; %s", renderer);
+    }
     nb_figures figures = {
         .table = stdout, .processor = processor, .compiler = nb_machine_compiler(), .quick = desc->quick};
     const char *fault = NULL;
@@ -74,6 +84,24 @@ static int bench(const nb_bench_desc *desc, const char *json)
     return status;
 }
 
+#if defined(NEBEL_HAVE_GL)
+static int bench_opengl(const nb_bench_desc *desc, const char *json)
+{
+    nb_gl_context gl;
+    if (nb_gl_context_open(&gl, NB_GL_API_DESKTOP) != 0) return nb_report_failure("bench: --device gl: %s", gl.fault);
+    const int status = bench(desc, json, gl.renderer);
+    nb_gl_context_close(&gl);
+    return status;
+}
+#else
+static int bench_opengl(const nb_bench_desc *desc, const char *json)
+{
+    (void)desc, (void)json;
+    return nb_report_failure(
+        "bench: --device gl: this program was built without OpenGL; build it with -DNEBEL_BUILD_GL=ON");
+}
+#endif
+
 static int run(int count, char **words)
 {
     nb_arguments arguments;
@@ -86,7 +114,13 @@ static int run(int count, char **words)
         if (arguments.misused) return nb_report_misuse("bench", "bench: nothing was done");
         desc.group = nb_bench_groups[group];
     }
-    return bench(&desc, arguments.values[OPTION_JSON]);
+    static const char *const devices[] = {"cpu", "gl", NULL};
+    desc.opengl = nb_options_choice(&arguments, OPTION_DEVICE, devices, 0) == 1;
+    if (desc.opengl && desc.group != NULL)
+        nb_options_reject(&arguments, OPTION_GROUP, "is measured on the cpu, not on gl");
+    if (arguments.misused) return nb_report_misuse("bench", "bench: nothing was done");
+    if (desc.opengl) return bench_opengl(&desc, arguments.values[OPTION_JSON]);
+    return bench(&desc, arguments.values[OPTION_JSON], NULL);
 }
 
 const nb_command nb_commands_bench = {

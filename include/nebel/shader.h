@@ -30,7 +30,8 @@
  *     struct nebel_sight { vec3 origin; vec3 direction; float t_max; };
  *     nebel_sight nebel_see(vec2 pixel, float depth);
  *         The ray of a pixel (gl_FragCoord.xy) up to the surface at `depth`, ready for nebel_trace; 1e18 where there is none.
- *         See nebel_view_rays. It reads NEBEL_RAY(i), a vec4 of nebel_rays; GLSL 3.30 and ES 3.00 declare
+ *         See nebel_view_rays. Where NEBEL_DEPTH_KIND is defined as the number of a nebel_depth_kind, the text knows no other; where
+ *         NEBEL_FROM_EYE is, all rays start at the eye, as nebel_rays says. It reads NEBEL_RAY(i), a vec4 of nebel_rays; GLSL 3.30 and ES 3.00 declare
  *         `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];` unless the host defines NEBEL_RAY itself.
  *
  * Where the words come from: NEBEL_WORD(i), a vec4. By default (GLSL 3.30 and ES 3.00) the text declares
@@ -137,6 +138,7 @@ typedef struct nebel_depth_desc {
 /* The rays of a view as the text's nebel_see takes them, and the eye that they count from. */
 typedef struct nebel_rays {
     double eye[3]; /* [m]: pack the fog for it */
+    int from_eye;  /* nonzero: all rays start there */
     nebel_word words[NEBEL_RAY_WORDS];
 } nebel_rays;
 

@@ -26,6 +26,6 @@ struct nebel_gl {
 };
 
 /* The number of a tile's pixels in a row is 2 to this. */
-enum { NB_GL_TILE_SHIFT = 5 };
+enum { NB_GL_TILE_SHIFT = 4 };
 
 #endif

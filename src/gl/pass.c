@@ -233,6 +233,8 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .tiled = gl->fog.tiles != 0,
                                   .multisampled = t->pass->samples > 1,
                                   .output = t->pass->output,
+                                  .depth = t->pass->depth.kind,
+                                  .from_eye = t->rays.from_eye,
                                   .features = gl->fog.features};
     const nebel_result result =
         nb_programs_find(&gl->programs, &gl->context, &gl->allocator, &gl->log, &kind, &t->program);

@@ -14,6 +14,8 @@ enum { NB_SAMPLES_MOST = 32 };
 typedef struct nb_program_kind {
     int in_texture, tiled, multisampled;
     nebel_gl_output output;
+    nebel_depth_kind depth;
+    int from_eye;      /* all rays start where the fog was packed for */
     uint32_t features; /* of the fog: what the text leaves out makes it faster */
 } nb_program_kind;
 

@@ -2,7 +2,7 @@
 #include "gl.h"
 #include "state.h"
 
-enum { TILE_SIZE = 1 << NB_GL_TILE_SHIFT, FEW_VOLUMES = 8 };
+enum { TILE_SIZE = 1 << NB_GL_TILE_SHIFT, FEW_VOLUMES = 3 };
 
 /* ---- packing -------------------------------------------------------------------------------------------------------
  */

@@ -339,6 +339,7 @@ nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *dep
         rays->eye[i] = (b.parallel ? 0 : b.o.middle[i]) - view->eye_from_world[12 + i];
         if (!b.parallel) b.o.middle[i] = 0;
     }
+    rays->from_eye = !b.parallel && depth->start == NEBEL_START_EYE;
     turn(world, rays->eye);
     turn_vector(world, &b.o);
     turn_vector(world, &b.d);

@@ -25,13 +25,11 @@ float nb_view_divide(float above, float below, float never)
     return below > 0.0 ? above / below : never;
 }
 
-bool nb_view_is_sky(float kind, float depth)
+bool nb_view_is_sky(float depth)
 {
-    float sky = NEBEL_RAY(8).w;
     float test = NEBEL_RAY(9).w;
-    if (test == 1.0) return depth == sky;
-    if (test == 2.0) return false;
-    return !(depth > 0.0 && depth < 1e18);
+    bool found = depth > 0.0 && depth < 1e18;
+    return test == 1.0 ? depth == NEBEL_RAY(8).w : test == 0.0 && !found;
 }
 
 /* How far, in steps of the ray's own length, before division by that of a distance. */
@@ -45,18 +43,28 @@ float nb_view_steps(float kind, float depth, nb_vec2 pixel)
     return nb_view_divide(above + value * NEBEL_RAY(6).w, below + value * NEBEL_RAY(7).w, 1e18);
 }
 
+/* NEBEL_DEPTH_KIND and NEBEL_FROM_EYE leave out what a host knows that it does not need. */
 nebel_sight nebel_see(nb_vec2 pixel, float depth)
 {
     nebel_sight sight;
+#ifdef NEBEL_DEPTH_KIND
+    float kind = float(NEBEL_DEPTH_KIND);
+#else
     float kind = NEBEL_RAY(0).w;
+#endif
     nb_vec3 way = nb_view_vector(3, pixel);
     float size = sqrt(dot(way, way));
-    float start = size * nb_view_divide(nb_view_number(8, pixel), nb_view_number(9, pixel), 0.0);
     float end = kind == 3.0 ? depth : size * nb_view_steps(kind, depth, pixel);
-    if (nb_view_is_sky(kind, depth)) end = 1e18;
-    sight.direction = way / size;
+    if (nb_view_is_sky(depth)) end = 1e18;
+    sight.direction = way * (1.0 / size);
+#ifdef NEBEL_FROM_EYE
+    sight.origin = nb_vec3(0.0, 0.0, 0.0);
+    sight.t_max = end < 1e18 ? max(end, 0.0) : 1e18;
+#else
+    float start = size * nb_view_divide(nb_view_number(8, pixel), nb_view_number(9, pixel), 0.0);
     sight.origin = nb_view_vector(0, pixel) + start * sight.direction;
     sight.t_max = end < 1e18 ? max(end - start, 0.0) : 1e18;
+#endif
     return sight;
 }
 #endif
