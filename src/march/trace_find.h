@@ -8,8 +8,8 @@ static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real 
 {
     nb_real depth = NB_F(0.0);
     *extinction = NB_F(0.0);
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
         if (!nb_any(k->inside)) continue;
         depth = depth + k->extinction[channel] * contact_integral(k, start, h).value;
         *extinction = *extinction + k->extinction[channel] * contact_density(k, start + nb_widen(h));
@@ -51,10 +51,9 @@ static double find_depth(march *m, int channel, nb_real wanted)
 {
     nb_real depth = NB_F(0.0);
     nb_wide t = NB_W(0.0);
-    for (;;) {
-        const nb_wide next = next_event(m, t);
-        if (next > NB_WFAR) return HUGE_VAL;
-        const piece p = {t, next, nb_narrow(next - t), nb_mask_true};
+    piece p;
+    open_window(m, nb_any(ends_matter(m)));
+    while (next_piece(m, t, m->rays.t_max > t, &p)) {
         if (mark_inside(m, &p)) {
             nb_real extinction;
             const nb_real within = depth_within(m, channel, t, p.length, &extinction);
@@ -62,8 +61,9 @@ static double find_depth(march *m, int channel, nb_real wanted)
                 return (double)(t + nb_widen(find_in_piece(m, channel, t, p.length, wanted - depth)));
             depth = depth + within;
         }
-        t = next;
+        t = p.end;
     }
+    return HUGE_VAL;
 }
 
 nebel_result SUFFIXED(nb_find_, NB_SUFFIX)(nb_find_job *job)

@@ -30,6 +30,7 @@
 
 #include "trace_packet.h"
 #include "trace_bounds.h"
+#include "trace_window.h"
 #include "trace_walk.h"
 #include "trace_mixed.h"
 
@@ -45,8 +46,11 @@
 typedef struct workspace {
     contact contacts[STACK_CONTACTS];
     leaf_span spans[2 * STACK_CONTACTS];
+    uint32_t window[STACK_CONTACTS];
+    stretch stretches[STACK_CONTACTS];
+    double lasts[STACK_CONTACTS];
     size_t contact_capacity, span_capacity;
-    void *contact_memory, *span_memory; /* as allocated; NULL while the stack suffices */
+    void *contact_memory, *window_memory, *span_memory; /* as allocated; NULL while the stack suffices */
     uint32_t *found;                    /* media that the packet may meet, by index */
     size_t found_count, found_capacity;
     march m;
@@ -68,6 +72,19 @@ static void *grow_aligned(const nebel_allocator *allocator, const void *old, siz
     return aligned;
 }
 
+/* Room for a window of `capacity` contacts, which are not known yet. 0 when memory is out. */
+static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t capacity)
+{
+    march *m = &w->m;
+    nb_release(allocator, w->window_memory);
+    w->window_memory = nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + sizeof *m->window);
+    if (w->window_memory == NULL) return 0;
+    m->stretches = w->window_memory;
+    m->lasts = (double *)(void *)(m->stretches + capacity);
+    m->window = (uint32_t *)(void *)(m->lasts + capacity);
+    return 1;
+}
+
 /* Room for one more contact and its leaves. 0 when memory is out. */
 static int reserve(workspace *w, const nebel_allocator *allocator, size_t leaves)
 {
@@ -77,6 +94,7 @@ static int reserve(workspace *w, const nebel_allocator *allocator, size_t leaves
                                       m->contact_count + 1, &w->contact_memory);
         if (moved == NULL) return 0;
         m->contacts = moved;
+        if (!reserve_window(w, allocator, w->contact_capacity)) return 0;
     }
     if (m->span_count + leaves > w->span_capacity) {
         leaf_span *moved = grow_aligned(allocator, m->spans, m->span_count, sizeof *moved, &w->span_capacity,
@@ -92,17 +110,22 @@ static void open_workspace(workspace *w)
     w->contact_capacity = STACK_CONTACTS;
     w->span_capacity = 2 * STACK_CONTACTS;
     w->contact_memory = NULL;
+    w->window_memory = NULL;
     w->span_memory = NULL;
     w->found = NULL;
     w->found_count = 0;
     w->found_capacity = 0;
     w->m.contacts = w->contacts;
+    w->m.window = w->window;
+    w->m.stretches = w->stretches;
+    w->m.lasts = w->lasts;
     w->m.spans = w->spans;
 }
 
 static void close_workspace(workspace *w, const nebel_allocator *allocator)
 {
     nb_release(allocator, w->contact_memory);
+    nb_release(allocator, w->window_memory);
     nb_release(allocator, w->span_memory);
     nb_release(allocator, w->found);
 }
@@ -291,6 +314,7 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
     const nb_mask lanes = nb_narrow_mask(span->enter < span->leave);
     const piece p = {span->enter, span->leave, nb_narrow(span->leave - span->enter), lanes};
     m->contacts[0].inside = lanes;
+    look_at_all(m);
     gather_piece(m, &p, may, g, unbounded);
 }
 
@@ -313,20 +337,19 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
         gather_single(m, may, &g, unbounded);
         return g;
     }
-    for (;;) {
-        const nb_wide next = next_event(m, t);
-        lanes = nb_wand(lanes, next <= NB_WFAR);
-        if (!nb_wany(lanes)) return g;
-        const piece p = {t, next, nb_narrow(next - t), nb_narrow_mask(lanes)};
+    open_window(m, nb_any(watched));
+    piece p;
+    while (next_piece(m, t, lanes, &p)) {
         const int foggy = mark_inside(m, &p);
         if (foggy) gather_piece(m, &p, may, &g, unbounded);
-        if (nb_any(watched)) pass_ends(m, &g, next, nb_and(watched, p.lanes));
+        if (nb_any(watched)) pass_ends(m, &g, p.end, nb_and(watched, p.lanes));
         if (foggy) {
             const nb_real thinnest = nb_min(nb_min(g.depth[0], g.depth[1]), g.depth[2]);
             lanes = nb_wand(lanes, nb_widen_mask(thinnest < OPAQUE_DEPTH));
         }
-        t = nb_wselect(lanes, next, t);
+        t = nb_wselect(nb_wand(lanes, nb_widen_mask(p.lanes)), p.end, t);
     }
+    return g;
 }
 
 /* The radiance of the brightest fog on the ray: what any answer is below, unless something shines by itself. */

@@ -20,6 +20,21 @@
     {NB_F(0.085662246189585173), NB_F(0.180380786524069304), NB_F(0.233956967286345524),                               \
      NB_F(0.233956967286345524), NB_F(0.180380786524069304), NB_F(0.085662246189585173)}
 
+/* [n][i]: the integral up to node n of the polynomial that is 1 at node i and 0 at the other nodes. Derived with 40 digits. */
+static const double up_to_node[NODE_COUNT][NODE_COUNT] = {
+    {0.042831123094792586, -0.014763725997197412, 0.0093250507064777512, -0.0056688580494835119,
+     0.0028544333150993351, -0.00081278017126476211},
+    {0.092673491430378863, 0.090190393262034652, -0.020300102293239586, 0.010363156240246424,
+     -0.0048871929280376715, 0.0013555610554850618},
+    {0.082247922612843874, 0.19603216233324501, 0.11697848364317276, -0.020482527745656098,
+     0.0079899918996623357, -0.0020756257848663342},
+    {0.087737871974451507, 0.17239079462440697, 0.25443949503200162, 0.11697848364317276,
+     -0.015651375809175702, 0.0034143235767412987},
+    {0.084306685134100111, 0.18526797945210698, 0.22359381104609910, 0.25425706957958511,
+     0.090190393262034652, -0.0070112452407936907},
+    {0.086475026360849935, 0.17752635320896997, 0.23962582533582904, 0.22463181657986777,
+     0.19514451252126672, 0.042831123094792586}};
+
 /* The parameter to begin with: so wide that a step over which the integrand hardly grows in the ellipse fits a budget
  * relative to the radiance. A step that does not fit gets a wider ellipse as it gets shorter, so that any budget is met. */
 #define WIDEST_ELLIPSE 64.0
@@ -88,6 +103,7 @@ typedef struct step {
     nb_wide start;
     nb_real length;
     piece_sum sum;
+    nb_real least[3], most[3]; /* light per extinction of the media there */
     nb_real behind[3];    /* transmittance at its end */
     nb_real drop;         /* largest loss of transmittance over it */
     nb_real gauss_bound;
@@ -102,8 +118,8 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     const nb_real along = NB_F(0.5) * (ellipse + NB_F(1.0) / ellipse) * radius;
     const nb_real across = NB_F(0.5) * (ellipse - NB_F(1.0) / ellipse) * radius;
     nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, light[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
         if (!nb_any(k->inside)) continue;
         const nb_real ceiling = nb_select(k->inside, density_ceiling(k, middle, along, across), NB_F(0.0));
         for (int c = 0; c < 3; c++) {
@@ -120,31 +136,52 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     return nb_min(ellipse_factor(ellipse) * radius * bound, NB_HUGE);
 }
 
+/* The range of light per extinction. Returns where some medium shines without that quotient meaning anything. */
+static nb_mask find_range(const march *m, step *s)
+{
+    nb_mask emits = nb_mask_false;
+    for (int c = 0; c < 3; c++) {
+        s->least[c] = NB_HUGE;
+        s->most[c] = NB_F(0.0);
+    }
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
+        if (!nb_any(k->inside)) continue;
+        if (k->medium->emits) emits = nb_or(emits, k->inside);
+        for (int c = 0; c < 3; c++) {
+            s->least[c] = nb_select(k->inside, nb_min(k->radiance[c], s->least[c]), s->least[c]);
+            s->most[c] = nb_select(k->inside, nb_max(k->radiance[c], s->most[c]), s->most[c]);
+        }
+    }
+    return emits;
+}
+
 /* [0]: all light attenuated by something between the transmittances at both ends. [1]: light per extinction between the least and
  * the most radiant medium, which holds where nothing shines without absorbing. */
 static void bound_crude(const march *m, step *s, const gathered *g)
 {
     nb_real spread = NB_F(0.0);
-    nb_mask emits = nb_mask_false;
+    const nb_mask emits = find_range(m, s);
     for (int c = 0; c < 3; c++) {
-        nb_real least = NB_HUGE, most = NB_F(0.0);
-        for (size_t i = 0; i < m->contact_count; i++) {
-            const contact *k = &m->contacts[i];
-            least = nb_select(k->inside, nb_min(k->radiance[c], least), least);
-            most = nb_select(k->inside, nb_max(k->radiance[c], most), most);
-            if (k->medium->emits) emits = nb_or(emits, k->inside);
-        }
-        spread = nb_max(spread, NB_F(0.5) * (most - least) * (g->transmittance[c] - s->behind[c]));
-        s->crude_bound[0] = nb_max(s->crude_bound[0], NB_F(0.5) * s->sum.light[c] * (g->transmittance[c] - s->behind[c]));
+        const nb_real drop = g->transmittance[c] - s->behind[c];
+        spread = nb_max(spread, NB_F(0.5) * (s->most[c] - s->least[c]) * drop);
+        s->crude_bound[0] = nb_max(s->crude_bound[0], NB_F(0.5) * s->sum.light[c] * drop);
     }
     s->crude_bound[1] = nb_select(emits, NB_HUGE, spread);
 }
 
+static piece_sum sum_step(const march *m, nb_wide start, nb_real length)
+{
+    piece_sum sum = no_sum();
+    for (size_t i = 0; i < m->window_count; i++)
+        if (nb_any(in_window(m, i)->inside)) add_contact(&sum, in_window(m, i), start, length);
+    return sum;
+}
+
 static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length)
 {
-    step s = {start, length, no_sum(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, NB_F(0.0), NB_F(0.0), {NB_F(0.0), NB_F(0.0)}};
-    for (size_t i = 0; i < m->contact_count; i++)
-        if (nb_any(m->contacts[i].inside)) add_contact(&s.sum, &m->contacts[i], start, length);
+    step s = {.start = start, .length = length, .sum = sum_step(m, start, length), .drop = NB_F(0.0)};
+    s.crude_bound[0] = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         s.behind[c] = nb_exp(-(g->depth[c] + s.sum.depth[c]));
         s.drop = nb_max(s.drop, g->transmittance[c] - s.behind[c]);
@@ -154,42 +191,74 @@ static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide
     return s;
 }
 
+/* Light and optical depth so far at each node of a step. */
+typedef struct node_sums {
+    nb_real light[3][NODE_COUNT], depth[3][NODE_COUNT];
+    nb_real extinction[3][NODE_COUNT]; /* of the media whose depth is still to be had from it */
+} node_sums;
+
+/* Profiles that are polynomials between kinks, of a degree below the number of nodes: the polynomial through their values there is they. */
+static int is_polynomial(const nebel_density *density)
+{
+    switch (density->type) {
+    case NEBEL_DENSITY_CONSTANT:
+    case NEBEL_DENSITY_LINEAR:
+    case NEBEL_DENSITY_SOFT_EDGE: return 1;
+    case NEBEL_DENSITY_RADIAL: return density->power <= 2;
+    default: return 0;
+    }
+}
+
+static void add_nodes(node_sums *sums, const contact *k, const step *s)
+{
+    const nb_real nodes[NODE_COUNT] = NODES;
+    const int polynomial = is_polynomial(&k->medium->body.density);
+    for (int n = 0; n < NODE_COUNT; n++) {
+        const nb_real h = s->length * nodes[n];
+        const nb_real density = nb_select(k->inside, contact_density(k, s->start + nb_widen(h)), NB_F(0.0));
+        const nb_real before = polynomial ? NB_F(0.0) : nb_select(k->inside, contact_integral(k, s->start, h).value, NB_F(0.0));
+        for (int c = 0; c < 3; c++) {
+            sums->light[c][n] = sums->light[c][n] + k->light[c] * density;
+            if (polynomial) sums->extinction[c][n] = sums->extinction[c][n] + k->extinction[c] * density;
+            else sums->depth[c][n] = sums->depth[c][n] + k->extinction[c] * before;
+        }
+    }
+}
+
+/* The optical depth of polynomials, exact at every node. */
+static nb_real depth_of_polynomials(const nb_real extinction[NODE_COUNT], int n, nb_real length)
+{
+    nb_real mean = NB_F(0.0);
+    for (int i = 0; i < NODE_COUNT; i++) mean = mean + extinction[i] * REAL(up_to_node[n][i]);
+    return nb_max(mean * length, NB_F(0.0));
+}
+
 /* Six nodes with exact optical depth at each. */
 static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real radiance[3])
 {
-    const nb_real nodes[NODE_COUNT] = NODES, weights[NODE_COUNT] = WEIGHTS;
-    for (int c = 0; c < 3; c++) radiance[c] = NB_F(0.0);
-    for (int n = 0; n < NODE_COUNT; n++) {
-        const nb_real h = s->length * nodes[n];
-        const nb_wide t = s->start + nb_widen(h);
-        piece_sum before = no_sum();
-        nb_real light[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-        for (size_t i = 0; i < m->contact_count; i++) {
-            const contact *k = &m->contacts[i];
-            if (!nb_any(k->inside)) continue;
-            add_contact(&before, k, s->start, h);
-            const nb_real density = nb_select(k->inside, contact_density(k, t), NB_F(0.0));
-            for (int c = 0; c < 3; c++) light[c] = light[c] + k->light[c] * density;
+    const nb_real weights[NODE_COUNT] = WEIGHTS;
+    node_sums sums;
+    for (int c = 0; c < 3; c++)
+        for (int n = 0; n < NODE_COUNT; n++) sums.light[c][n] = sums.depth[c][n] = sums.extinction[c][n] = NB_F(0.0);
+    for (size_t i = 0; i < m->window_count; i++)
+        if (nb_any(in_window(m, i)->inside)) add_nodes(&sums, in_window(m, i), s);
+    for (int c = 0; c < 3; c++) {
+        radiance[c] = NB_F(0.0);
+        for (int n = 0; n < NODE_COUNT; n++) {
+            const nb_real before = sums.depth[c][n] + depth_of_polynomials(sums.extinction[c], n, s->length);
+            radiance[c] = radiance[c] + weights[n] * sums.light[c][n] * nb_exp(-(g->depth[c] + before));
         }
-        for (int c = 0; c < 3; c++)
-            radiance[c] = radiance[c] + weights[n] * light[c] * nb_exp(-(g->depth[c] + before.depth[c]));
+        radiance[c] = radiance[c] * s->length;
     }
-    for (int c = 0; c < 3; c++) radiance[c] = radiance[c] * s->length;
 }
 
 /* The middles of the two crude rules. */
-static void sum_crude(const march *m, const step *s, const gathered *g, nb_mask between_media, nb_real radiance[3])
+static void sum_crude(const step *s, const gathered *g, nb_mask between_media, nb_real radiance[3])
 {
     for (int c = 0; c < 3; c++) {
-        nb_real least = NB_HUGE, most = NB_F(0.0);
-        for (size_t i = 0; i < m->contact_count; i++) {
-            const contact *k = &m->contacts[i];
-            least = nb_select(k->inside, nb_min(k->radiance[c], least), least);
-            most = nb_select(k->inside, nb_max(k->radiance[c], most), most);
-        }
         const nb_real drop = g->transmittance[c] - s->behind[c];
         const nb_real attenuated = NB_F(0.5) * s->sum.light[c] * (g->transmittance[c] + s->behind[c]);
-        radiance[c] = nb_select(between_media, NB_F(0.5) * (least + most) * drop, attenuated);
+        radiance[c] = nb_select(between_media, NB_F(0.5) * (s->least[c] + s->most[c]) * drop, attenuated);
     }
 }
 
@@ -201,7 +270,7 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
     const nb_mask fine = s->gauss_bound < crude;
     nb_real by_nodes[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, by_ends[3];
     if (nb_any(nb_and(lanes, fine))) sum_nodes(m, s, g, by_nodes);
-    sum_crude(m, s, g, between_media, by_ends);
+    sum_crude(s, g, between_media, by_ends);
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real light = nb_select(lanes, nb_select(fine, by_nodes[c], by_ends[c]), NB_F(0.0));
@@ -227,8 +296,8 @@ typedef struct allowance {
 static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
 {
     nb_wide nearest = end;
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
         if (!nb_any(k->inside)) continue;
         const nb_wide kink = contact_kink(k, t);
         nearest = nb_wselect(nb_wand(nb_widen_mask(k->inside), kink < nearest), kink, nearest);

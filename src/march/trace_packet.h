@@ -58,6 +58,13 @@ typedef struct march {
     nb_real event_count;          /* two for every leaf that the lane's ray meets, whatever its company meets */
     ends all_ends;                /* what the ends may do if nothing attenuates it, */
     ends grazing_ends;            /* and those of them that are no events */
+
+    uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_window.h */
+    size_t window_count;
+    double window_end; /* up to here they are all there are */
+    struct stretch *stretches; /* of all contacts, by their first places */
+    double *lasts;         /* of all contacts */
+    size_t entered;        /* how many of the stretches the window has had */
 } march;
 
 static nb_wvec3 wide_vector(const double v[3])

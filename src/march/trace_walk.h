@@ -30,11 +30,14 @@ typedef struct piece_sum {
 static nb_wide next_event(const march *m, nb_wide t)
 {
     nb_wide next = NB_W(2.0) * NB_WFAR;
-    for (size_t i = 0; i < m->span_count; i++) {
-        const leaf_span *span = &m->spans[i];
-        const nb_wmask some = span->enter < span->leave;
-        next = nb_wselect(nb_wand(some, nb_wand(span->enter > t, span->enter < next)), span->enter, next);
-        next = nb_wselect(nb_wand(some, nb_wand(span->leave > t, span->leave < next)), span->leave, next);
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
+        for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
+            const leaf_span *span = &m->spans[k->first_span + j];
+            const nb_wmask some = span->enter < span->leave;
+            next = nb_wselect(nb_wand(some, nb_wand(span->enter > t, span->enter < next)), span->enter, next);
+            next = nb_wselect(nb_wand(some, nb_wand(span->leave > t, span->leave < next)), span->leave, next);
+        }
     }
     return next;
 }
@@ -45,6 +48,22 @@ static int fold_step(nb_step step, nb_mask *stack, int top)
     const nb_mask a = stack[top - 2], b = stack[top - 1];
     stack[top - 2] = step == NB_STEP_ANY ? nb_or(a, b) : nb_and(a, b);
     return top - 1;
+}
+
+/* The next piece of each lane that is in `lanes`; those whose next event lies beyond the window wait for it to move. Returns 0 when no lane
+ * has a piece left. */
+static int next_piece(march *m, nb_wide t, nb_wmask lanes, piece *p)
+{
+    for (;;) {
+        const nb_wide next = next_event(m, t);
+        const nb_wmask within = nb_wand(lanes, nb_wand(next <= NB_WFAR, next <= WIDE(m->window_end)));
+        if (nb_wany(within)) {
+            *p = (piece){t, next, nb_narrow(next - t), nb_narrow_mask(within)};
+            return 1;
+        }
+        if (m->entered == m->contact_count || !nb_wany(lanes)) return 0;
+        move_window(m, earliest(t, lanes));
+    }
 }
 
 /* Membership of a leaf needs no midpoint: between neighbouring events a span is either all there or not at all. */
@@ -70,8 +89,8 @@ static int mark_inside(march *m, const piece *p)
 {
     nb_mask free_of_fog = nb_not(p->lanes);
     int any = 0;
-    for (size_t i = m->contact_count; i-- > 0;) { /* exclusions come last in the canonical order */
-        contact *k = &m->contacts[i];
+    for (size_t i = m->window_count; i-- > 0;) { /* exclusions come last in the canonical order */
+        contact *k = in_window(m, i);
         k->inside = is_inside(m, k, p->start);
         if (k->medium->body.operation == NEBEL_OPERATION_EXCLUDE) {
             free_of_fog = nb_or(free_of_fog, k->inside);
@@ -117,8 +136,8 @@ static piece_sum sum_piece(const march *m, const piece *p)
     piece_sum sum = no_sum();
     nb_mask seen = nb_mask_false, uneven = nb_mask_false, emits = nb_mask_false, varies = nb_mask_false;
     nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
         if (!nb_any(k->inside)) continue;
         add_contact(&sum, k, p->start, p->length);
         const nb_mask again = nb_and(k->inside, seen);
@@ -225,8 +244,8 @@ static void pass_end(const march *m, passing *p, const contact *k, size_t leaf, 
 static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
 {
     passing p = {t, lanes, no_ends(), no_ends()};
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *k = &m->contacts[i];
+    for (size_t i = 0; i < m->window_count; i++) {
+        const contact *k = in_window(m, i);
         const int adds = k->medium->body.operation == NEBEL_OPERATION_ADD;
         for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
             const leaf_span *span = &m->spans[k->first_span + j];
@@ -250,8 +269,8 @@ static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum
 {
     nb_mask endless = nb_mask_false;
     const nb_mask open = nb_and(p->lanes, p->length >= NB_F(0.5) * NB_FAR);
-    for (size_t i = 0; i < m->contact_count && nb_any(open); i++) {
-        const contact *k = &m->contacts[i];
+    for (size_t i = 0; i < m->window_count && nb_any(open); i++) {
+        const contact *k = in_window(m, i);
         if (!k->medium->emits) continue;
         const nb_mask here = nb_and(open, nb_and(k->inside, contact_integral(k, p->start, p->length).value >= NB_F(0.5) * NB_FAR));
         for (int c = 0; c < 3; c++)
