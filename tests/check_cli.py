@@ -403,9 +403,6 @@ class RenderTest(PictureCase):
         self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact")
         self.assertEqual(self.files(), self.given)
 
-    def test_the_graphics_card_is_not_in_this_version(self):
-        self.assert_failed(self.render("a.png", "--device", "gl"), "gl", "version")
-
     def test_places_that_cannot_be_written_are_found_before_the_work(self):
         began = time.monotonic()
         more = ("--size", "4000x4000", "--samples", "4096")

@@ -10,10 +10,14 @@
 #include <nebel/render.h>
 #include <nebel/scene.h>
 
+#if defined(NEBEL_HAVE_GL)
+#include "gl_context.h"
+#endif
+
 #include <stdio.h>
 
-static const char about[] = "Without SCENE: version, compiler, libraries, processor, instruction sets and\n"
-                            "threads, as bug reports need them.\n"
+static const char about[] = "Without SCENE: version, compiler, libraries, processor, instruction sets, OpenGL\n"
+                            "and threads, as bug reports need them.\n"
                             "\n"
                             "With SCENE: checks the file and its models and says what is in them (camera,\n"
                             "light, fog by shape and density, triangles, bounds), how far one sees from the\n"
@@ -65,6 +69,22 @@ static void print_instruction_sets(void)
     (void)printf("\nchosen: %s\n", nebel_isa_name(nb_isa_best()));
 }
 
+/* What `nebel render --device gl` would draw with. */
+static void print_opengl(void)
+{
+#if defined(NEBEL_HAVE_GL)
+    nb_gl_context gl;
+    if (nb_gl_context_open(&gl, NB_GL_API_DESKTOP) == 0 || nb_gl_context_open(&gl, NB_GL_API_ES) == 0) {
+        (void)printf("OpenGL: %s\n", gl.renderer);
+        nb_gl_context_close(&gl);
+    } else {
+        (void)printf("OpenGL: none: %s\n", gl.fault);
+    }
+#else
+    (void)printf("OpenGL: not in this build\n");
+#endif
+}
+
 static int print_program(void)
 {
     char processor[256];
@@ -76,6 +96,7 @@ static int print_program(void)
     (void)printf("renderer libraries: %s\n", nebel_renderer_libraries());
     (void)printf("processor: %s\n", processor);
     print_instruction_sets();
+    print_opengl();
     (void)printf("threads: %d\n", nb_workers_available());
     return NB_DONE;
 }

@@ -14,6 +14,10 @@
 
 #include <nebel/render.h>
 
+#if defined(NEBEL_HAVE_GL)
+#include "gl_painter.h"
+#endif
+
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,12 +36,14 @@ static const nb_option options[] = {
                 "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %)."},
     [AOV] = {"aov", 0, NULL,
              "EXR only: adds transmittance.{R,G,B},\nin_scattering.{R,G,B}, depth.Z (m, inf: nothing\n"
-             "there), normal.{X,Y,Z} and error (its bound)."},
+             "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound)."},
     [TOLERANCE] = {"tolerance", 0, "E",
                    "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
     [METHOD] = {"method", 0, "NAME", "exact, the only one in this version."},
-    [DEVICE] = {"device", 0, "NAME", "cpu (default); gl is not in this version."},
+    [DEVICE] = {"device", 0, "NAME",
+                "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
+                "--threads with gl."},
     [ISA] = {"isa", 0, "NAME",
              "Instruction set: scalar, sse2, avx2, avx512 or neon.\nDefault: the best of this processor."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},
@@ -72,7 +78,7 @@ typedef struct settings {
     uint32_t width, height, samples;
     double exposure, tolerance;
     uint32_t first_frame, last_frame;
-    int many_frames, aov, quiet;
+    int many_frames, aov, quiet, gl;
     nebel_renderer_desc renderer;
 } settings;
 
@@ -136,15 +142,18 @@ static void read_output(nb_arguments *arguments, settings *wanted)
     }
 }
 
-/* NB_DONE, or NB_FAILED where something known is not in this version. */
-static int read_device(nb_arguments *arguments)
+static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
     static const char *const methods[] = {"exact", NULL};
+    static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
     (void)nb_options_choice(arguments, METHOD, methods, 0);
-    const int device = nb_options_choice(arguments, DEVICE, devices, 0);
-    if (device == 0 || arguments->misused) return NB_DONE;
-    return nb_report_failure("render: --device: %s is not in this version; leave it out or say cpu", devices[device]);
+    wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
+    for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
+        if (arguments->values[of_cpu[i]] != NULL) {
+            nb_options_reject(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
+        }
+    }
 }
 
 /* -1 to go on, or the exit status. */
@@ -162,9 +171,8 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     read_size(arguments, wanted);
     read_frames(arguments, wanted);
     read_output(arguments, wanted);
-    const int status = read_device(arguments);
+    read_device(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
-    if (status != NB_DONE) return status;
     return nb_isa_check("render", wanted->renderer.isa) == NB_DONE ? -1 : NB_FAILED;
 }
 
@@ -216,7 +224,10 @@ typedef struct studio {
     const settings *wanted;
     nb_report_listener listener;
     nb_load_result loaded;
-    nebel_renderer *renderer;
+    nebel_renderer *renderer; /* of the CPU */
+#if defined(NEBEL_HAVE_GL)
+    nb_gl_painter painter; /* of OpenGL */
+#endif
     float *samples[PLANES]; /* NULL: not wanted */
     float *interleaved;     /* all planes pixel by pixel; NULL where there is only one */
     nb_meter meter;
@@ -230,9 +241,16 @@ static float *allocate_pixels(const settings *wanted, uint32_t channels)
     return malloc((size_t)wanted->width * wanted->height * channels * sizeof(float));
 }
 
+/* OpenGL knows no bound of its error. */
+static int count_planes(const settings *wanted)
+{
+    if (!wanted->aov) return 1;
+    return wanted->gl ? ERROR : PLANES;
+}
+
 static int allocate_planes(studio *all)
 {
-    const int count = all->wanted->aov ? PLANES : 1;
+    const int count = count_planes(all->wanted);
     int good = 1;
     for (int i = 0; i < count && good; i++) {
         all->samples[i] = allocate_pixels(all->wanted, planes[i].channels);
@@ -252,17 +270,19 @@ static void free_studio(studio *all)
     for (int i = 0; i < PLANES; i++) free(all->samples[i]);
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
+#if defined(NEBEL_HAVE_GL)
+    nb_gl_painter_close(&all->painter);
+#endif
     nb_load_free(&all->loaded);
 }
 
-/* Puts the plane's channels into every pixel, from channel `first` on. */
-static void interleave(const studio *all, int which, uint32_t first)
+/* Puts the plane's channels into every pixel of so many channels, from channel `first` on. */
+static void interleave(const studio *all, int which, uint32_t first, uint32_t of)
 {
     const size_t pixels = (size_t)all->wanted->width * all->wanted->height;
     const uint32_t channels = planes[which].channels;
     for (size_t i = 0; i < pixels; i++) {
-        memcpy(all->interleaved + i * CHANNELS_AOV + first, all->samples[which] + i * channels,
-               channels * sizeof(float));
+        memcpy(all->interleaved + i * of + first, all->samples[which] + i * channels, channels * sizeof(float));
     }
 }
 
@@ -272,8 +292,9 @@ static int write_picture(studio *all, const char *name)
     const size_t pixels = (size_t)wanted->width * wanted->height;
     const char *names[CHANNELS_AOV];
     nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
+    const uint32_t of = wanted->gl ? CHANNELS_AOV - 1 : CHANNELS_AOV;
     for (int i = 0; i < PLANES && all->samples[i] != NULL; i++) {
-        if (all->interleaved != NULL) interleave(all, i, image.channel_count);
+        if (all->interleaved != NULL) interleave(all, i, image.channel_count, of);
         for (uint32_t c = 0; c < planes[i].channels; c++) names[image.channel_count++] = planes[i].names[c];
     }
     image.samples = all->interleaved != NULL ? all->interleaved : all->samples[COLOR];
@@ -296,7 +317,7 @@ static int show_progress(size_t done, size_t total, void *user)
     return nb_interrupt_is_requested();
 }
 
-static int render_frame(studio *all)
+static nebel_result trace_frame(studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_frame_desc desc = {
@@ -316,9 +337,62 @@ static int render_frame(studio *all)
         .normal = all->samples[NORMAL],
         .error = all->samples[ERROR],
     };
+    const nebel_result result = nebel_set_renderer_fog(all->renderer, all->loaded.fog);
+    return result == NEBEL_OK ? nebel_render_frame(all->renderer, &desc, &frame) : result;
+}
+
+#if defined(NEBEL_HAVE_GL)
+static nebel_result draw_frame(studio *all)
+{
+    const nebel_gl_frame_desc desc = {
+        .camera = nebel_scene_camera(all->loaded.scene, all->frame),
+        .width = all->wanted->width,
+        .height = all->wanted->height,
+        .samples = all->wanted->samples,
+        .progress = show_progress,
+        .progress_user = all,
+    };
+    const nebel_gl_planes wanted = {
+        .color = all->samples[COLOR],
+        .transmittance = all->samples[TRANSMITTANCE],
+        .in_scattering = all->samples[IN_SCATTERING],
+        .depth = all->samples[DEPTH],
+        .normal = all->samples[NORMAL],
+    };
+    return nb_gl_painter_draw(&all->painter, all->loaded.fog, &desc, &wanted);
+}
+
+static int open_gl(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, &all->listener);
+    if (status != NB_DONE || wanted->quiet) return status;
+    nb_report_message("note: --device gl: %s", all->painter.context.renderer);
+    if (wanted->aov) nb_report_message("note: --device gl: there is no channel error; OpenGL knows no bound of it");
+    return NB_DONE;
+}
+#else
+static nebel_result draw_frame(studio *all)
+{
+    (void)all;
+    return NEBEL_ERROR_UNSUPPORTED;
+}
+
+static int open_gl(studio *all)
+{
+    (void)all;
+    return nb_report_failure(
+        "render: --device gl: this program was built without OpenGL; build it with NEBEL_BUILD_GL=ON, "
+        "or say --device cpu");
+}
+#endif
+
+static int render_frame(studio *all)
+{
+    const settings *const wanted = all->wanted;
     (void)show_progress(0, 1, all);
     all->listener.mode = NB_REPORT_KEEP; /* that the frame was stopped is no news */
-    const nebel_result result = nebel_render_frame(all->renderer, &desc, &frame);
+    const nebel_result result = wanted->gl ? draw_frame(all) : trace_frame(all);
     all->listener.mode = NB_REPORT_PRINT;
     if (result == NEBEL_OK || nb_interrupt_is_requested()) return NB_DONE;
     return nb_report_failure("render: %s: %s", wanted->scene,
@@ -327,8 +401,7 @@ static int render_frame(studio *all)
 
 static int move_fog(studio *all)
 {
-    nebel_result result = nb_load_move_fog(&all->loaded, all->frame);
-    if (result == NEBEL_OK) result = nebel_set_renderer_fog(all->renderer, all->loaded.fog);
+    const nebel_result result = nb_load_move_fog(&all->loaded, all->frame);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
@@ -361,6 +434,7 @@ static int set_up(studio *all)
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
     status = allocate_planes(all);
     if (status != NB_DONE) return status;
+    if (wanted->gl) return open_gl(all);
     nebel_renderer_desc desc = wanted->renderer;
     desc.log = nb_report_log(&all->listener);
     const nebel_result result =

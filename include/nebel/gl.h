@@ -27,7 +27,7 @@
  *   - the viewport (the first of an array); SCISSOR_TEST, STENCIL_TEST, DEPTH_TEST, CULL_FACE, RASTERIZER_DISCARD,
  *     SAMPLE_COVERAGE, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_MASK, COLOR_LOGIC_OP, POLYGON_SMOOTH and
  *     CLIP_DISTANCEi, all switched off where they exist; the polygon mode;
- *   - of draw buffers 0 and 1: BLEND and the colour mask; of draw buffer 0 the blend function and equation;
+ *   - of draw buffers 0 to 3: BLEND, the colour mask, the blend function and equation;
  *   - the draw framebuffer, to ask where the samples of a multisampled texture are.
  *
  * What stays as the host has set it, because it belongs to the target: FRAMEBUFFER_SRGB, DITHER, the draw buffers, the

@@ -94,6 +94,11 @@ static const char fragment_text[] =
     "#endif\n"
     "}\n";
 
+const char *nb_program_version(const nb_context *context)
+{
+    return context->es ? "#version 300 es\n" : "#version 330 core\n";
+}
+
 /* What comes before the shader text. */
 static void write_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
 {
@@ -107,8 +112,7 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
     (void)snprintf(text, size,
                    "%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
                    "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n",
-                   context->es ? "#version 300 es\n" : "#version 330 core\n",
-                   extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
+                   nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    kind->multisampled ? "#define PASS_MULTISAMPLED\n" : "", output[kind->output],
                    kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features);
@@ -131,11 +135,11 @@ static nebel_result refuse(const nebel_log *log, const char *what, char *words)
                    words[0] != '\0' ? words : "nothing");
 }
 
-static nebel_result compile(const nebel_log *log, unsigned kind, int count, const char *const *texts, unsigned *shader)
+static nebel_result compile(const nebel_log *log, unsigned kind, const nb_texts *texts, unsigned *shader)
 {
     GLint good = 0;
     *shader = glCreateShader(kind);
-    glShaderSource(*shader, count, texts, NULL);
+    glShaderSource(*shader, texts->count, texts->list, NULL);
     glCompileShader(*shader);
     glGetShaderiv(*shader, GL_COMPILE_STATUS, &good);
     if (good) return NEBEL_OK;
@@ -165,6 +169,18 @@ static nebel_result link(const nebel_log *log, unsigned vertex, unsigned fragmen
     return refuse(log, "link nebel's shaders", words);
 }
 
+nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, const nb_texts *fragment, unsigned *name)
+{
+    unsigned shaders[2] = {0, 0};
+    *name = 0;
+    nebel_result result = compile(log, GL_VERTEX_SHADER, vertex, &shaders[0]);
+    if (result == NEBEL_OK) result = compile(log, GL_FRAGMENT_SHADER, fragment, &shaders[1]);
+    if (result == NEBEL_OK) result = link(log, shaders[0], shaders[1], name);
+    glDeleteShader(shaders[0]);
+    glDeleteShader(shaders[1]);
+    return result;
+}
+
 static void set_uniforms(nb_program *program)
 {
     const unsigned name = program->name, block = glGetUniformBlockIndex(name, "nebel_fog_block");
@@ -185,17 +201,12 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
                          nb_program *program)
 {
     char head[512];
-    unsigned vertex = 0, fragment = 0;
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const char *const vertex_texts[] = {context->es ? "#version 300 es\n" : "#version 330 core\n", vertex_text};
-    const char *const fragment_texts[] = {head, fog, fragment_text};
+    const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
+    const nb_texts fragment = {{head, fog, fragment_text}, 3};
     *program = (nb_program){.kind = *kind};
-    nebel_result result = compile(log, GL_VERTEX_SHADER, 2, vertex_texts, &vertex);
-    if (result == NEBEL_OK) result = compile(log, GL_FRAGMENT_SHADER, 3, fragment_texts, &fragment);
-    if (result == NEBEL_OK) result = link(log, vertex, fragment, &program->name);
-    glDeleteShader(vertex);
-    glDeleteShader(fragment);
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
     return result;
 }

@@ -11,6 +11,18 @@ enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_DEPTH, NB_UNIT_COLOR };
 
 enum { NB_SAMPLES_MOST = 32 };
 
+/* The texts of a shader, one after the other. */
+typedef struct nb_texts {
+    const char *list[5];
+    int count;
+} nb_texts;
+
+/* The first line of a shader. */
+const char *nb_program_version(const nb_context *context);
+
+/* Compiles and links. UNSUPPORTED, with the driver's words, where it refuses; *name is 0 then. */
+nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, const nb_texts *fragment, unsigned *name);
+
 typedef struct nb_program_kind {
     int in_texture, tiled, multisampled;
     nebel_gl_output output;

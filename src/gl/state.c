@@ -102,6 +102,12 @@ static void save_switches(const nb_context *c, nb_state *s)
     s->scissor = indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, 0);
 }
 
+/* How many draw buffers blend each in its own way. */
+static GLuint blending_count(const nb_context *c)
+{
+    return c->blending_by_buffer ? NB_STATE_BUFFERS : 1;
+}
+
 static void save_buffers(const nb_context *c, nb_state *s)
 {
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
@@ -112,11 +118,13 @@ static void save_buffers(const nb_context *c, nb_state *s)
             glGetBooleanv(GL_COLOR_WRITEMASK, s->mask[i]);
         }
     }
-    for (int i = 0; i < NB_STATE_BLENDING; i++) {
-        if (c->blending_by_buffer) {
-            glGetIntegeri_v(blending_names[i], 0, &s->blending[i]);
-        } else {
-            glGetIntegerv(blending_names[i], &s->blending[i]);
+    for (GLuint i = 0; i < blending_count(c); i++) {
+        for (int k = 0; k < NB_STATE_BLENDING; k++) {
+            if (c->blending_by_buffer) {
+                glGetIntegeri_v(blending_names[k], i, &s->blending[i][k]);
+            } else {
+                glGetIntegerv(blending_names[k], &s->blending[i][k]);
+            }
         }
     }
 }
@@ -181,11 +189,11 @@ static void set_mask(const nb_context *c, GLuint buffer, const GLboolean mask[4]
     }
 }
 
-static void set_blending(const nb_context *c, const GLint b[NB_STATE_BLENDING])
+static void set_blending(const nb_context *c, GLuint buffer, const GLint b[NB_STATE_BLENDING])
 {
     if (c->blending_by_buffer) {
-        glBlendFuncSeparatei(0, (GLenum)b[0], (GLenum)b[1], (GLenum)b[2], (GLenum)b[3]);
-        glBlendEquationSeparatei(0, (GLenum)b[4], (GLenum)b[5]);
+        glBlendFuncSeparatei(buffer, (GLenum)b[0], (GLenum)b[1], (GLenum)b[2], (GLenum)b[3]);
+        glBlendEquationSeparatei(buffer, (GLenum)b[4], (GLenum)b[5]);
     } else {
         glBlendFuncSeparate((GLenum)b[0], (GLenum)b[1], (GLenum)b[2], (GLenum)b[3]);
         glBlendEquationSeparate((GLenum)b[4], (GLenum)b[5]);
@@ -214,7 +222,7 @@ void nb_state_restore(const nb_context *c, const nb_state *s)
         set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, s->blend[i]);
         set_mask(c, i, s->mask[i]);
     }
-    set_blending(c, s->blending);
+    for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, s->blending[i]);
     set_viewport(c, s->viewport);
     if (!c->es) glPolygonMode(GL_FRONT_AND_BACK, (GLenum)s->polygon_mode[0]);
 }
@@ -236,7 +244,14 @@ void nb_state_blend(const nb_context *c, GLenum factor)
 {
     const GLint blending[NB_STATE_BLENDING] = {GL_ONE, (GLint)factor, GL_ZERO, GL_ONE, GL_FUNC_ADD, GL_FUNC_ADD};
     set_indexed_switch(c->switches_by_buffer, GL_BLEND, 0, 1);
-    set_blending(c, blending);
+    set_blending(c, 0, blending);
+}
+
+void nb_state_add(const nb_context *c)
+{
+    const GLint blending[NB_STATE_BLENDING] = {GL_ONE, GL_ONE, GL_ONE, GL_ONE, GL_FUNC_ADD, GL_FUNC_ADD};
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, 1);
+    for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, blending);
 }
 
 /* ---- uploads -------------------------------------------------------------------------------------------------------

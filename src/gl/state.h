@@ -6,7 +6,7 @@
 
 #include <epoxy/gl.h>
 
-enum { NB_STATE_UNITS = 4, NB_STATE_BUFFERS = 2, NB_STATE_UNPACK = 6, NB_STATE_BLENDING = 6 };
+enum { NB_STATE_UNITS = 4, NB_STATE_BUFFERS = 4, NB_STATE_UNPACK = 6, NB_STATE_BLENDING = 6 };
 
 typedef struct nb_unit {
     GLint texture, multisample, sampler;
@@ -22,7 +22,7 @@ typedef struct nb_state {
     uint32_t switches, clip_distances; /* bits: which were on */
     GLboolean scissor, blend[NB_STATE_BUFFERS], mask[NB_STATE_BUFFERS][4];
     GLint polygon_mode[2];
-    GLint blending[NB_STATE_BLENDING];
+    GLint blending[NB_STATE_BUFFERS][NB_STATE_BLENDING]; /* the first alone where buffers cannot differ */
 } nb_state;
 
 /* For uploads. */
@@ -39,6 +39,9 @@ void nb_state_clear(const nb_context *context, uint32_t x, uint32_t y, uint32_t 
 
 /* Blending of draw buffer 0: source + target * factor, alpha of the target as it is. */
 void nb_state_blend(const nb_context *context, GLenum factor);
+
+/* Blending of all four draw buffers: source + target, alpha too. */
+void nb_state_add(const nb_context *context);
 
 /* Unit 0 is active afterwards, and memory is read as C arrays lie. */
 void nb_state_save_unpacking(const nb_context *context, nb_unpacking *unpacking);

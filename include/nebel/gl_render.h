@@ -1,0 +1,104 @@
+/* A scene in OpenGL: the picture of the CPU renderer (nebel/render.h), drawn by OpenGL 3.3 core or OpenGL ES 3.0.
+ *
+ *     nebel_gl_renderer *renderer = NULL;
+ *     nebel_create_gl_renderer(scene_data, fog, &(nebel_gl_renderer_desc){0}, &renderer);    // in a current context
+ *
+ *     nebel_gl_render_frame(renderer, &(nebel_gl_frame_desc){.camera = camera, .width = 1280, .height = 720});
+ *     nebel_gl_get_textures(renderer, &textures);      // to show it, or
+ *     nebel_gl_read_planes(renderer, &planes);         // to have it in memory
+ *
+ *     nebel_destroy_gl_renderer(renderer);
+ *
+ * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun, which is attenuated by all fog
+ * on its way, and by the ambient radiance; colour = transmittance * surface + in-scattering. With one sample per pixel
+ * both renderers look through the centres of the pixels; with more, both use the same (0,2)-sequence, which the CPU
+ * renderer shifts for each pixel and this one does not. Shadows come from maps fitted to what is seen, so their edges
+ * are a texel of the map wide. No panoramas. Link with libnebel_gl and libnebel.
+ *
+ * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
+ * what nebel/gl.h lists it changes, while it runs, texture units 4 to 7 and there TEXTURE_2D_ARRAY; both framebuffers;
+ * the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; the depth function, mask and range;
+ * POLYGON_OFFSET_FILL, PRIMITIVE_RESTART, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and the clip
+ * control, where they exist.
+ */
+#ifndef NEBEL_GL_RENDER_H
+#define NEBEL_GL_RENDER_H
+
+#include <nebel/gl.h>
+#include <nebel/scene.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct nebel_gl_renderer nebel_gl_renderer;
+
+typedef struct nebel_gl_renderer_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    uint32_t shadow_size; /* texels of a side of each of the four shadow maps, 64 to 16384; 0: 2048 */
+} nebel_gl_renderer_desc;
+
+/* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, background and
+ * ambient are read anew for each frame, so `scene` must outlive the renderer. The snapshot is retained; fog NULL: none.
+ * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_renderer,
+ * MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE), UNSUPPORTED (no current context, or one that is too old or
+ * cannot draw into textures of floats). */
+nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+                                      const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer);
+
+/* NULL is fine. As nebel_destroy_gl where the context is lost. */
+void nebel_destroy_gl_renderer(nebel_gl_renderer *renderer);
+
+/* The fog of the frames from now on. The snapshot is retained; NULL: none. Errors: ARGUMENT. */
+nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapshot *fog);
+
+typedef struct nebel_gl_frame_desc {
+    nebel_camera camera;                                    /* not PANORAMA */
+    uint32_t width, height;                                 /* pixels, 1 to GL_MAX_TEXTURE_SIZE */
+    uint32_t samples;                                       /* per pixel, 1 to 4096; 0: 4 */
+    int (*progress)(size_t done, size_t total, void *user); /* after each sample; nonzero stops the frame. NULL: none */
+    void *progress_user;
+} nebel_gl_frame_desc;
+
+/* Draws a frame into textures of the renderer. Errors: ARGUMENT, VALUE (a camera or light as for nebel_render_frame),
+ * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (a panorama; more than one
+ * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
+ * lost). */
+nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
+
+/* What the last frame is made of: RGBA32F, linear light, the lowest row first, without filters or mipmaps. */
+typedef struct nebel_gl_textures {
+    unsigned color;         /* rgb: transmittance * surface + in-scattering; a: share of samples that hit a surface */
+    unsigned transmittance; /* rgb */
+    unsigned in_scattering; /* rgb */
+    unsigned surface; /* rgb: shading normal; a: distance [m]; both times the share of samples that hit a surface */
+    uint32_t width, height;
+} nebel_gl_textures;
+
+/* The names hold until the next frame. Calls no OpenGL. Errors: ARGUMENT (also where no frame was drawn). */
+nebel_result nebel_gl_get_textures(const nebel_gl_renderer *renderer, nebel_gl_textures *textures);
+
+/* The planes of the last frame, as those of nebel_frame in nebel/render.h: caller memory, width * height pixels, top
+ * row first, or NULL when not wanted. */
+typedef struct nebel_gl_planes {
+    float *color;         /* 3 */
+    float *transmittance; /* 3 */
+    float *in_scattering; /* 3 */
+    float *depth;         /* 1: distance from the camera [m], mean over the samples that hit; INFINITY where none did */
+    float *normal;        /* 3: mean of the world-space shading normals; 0 where nothing is hit */
+} nebel_gl_planes;
+
+/* Errors: ARGUMENT (also where no frame was drawn), MEMORY, UNSUPPORTED (the context is another one, or lost). */
+nebel_result nebel_gl_read_planes(nebel_gl_renderer *renderer, const nebel_gl_planes *planes);
+
+/* The view of a camera without near and far planes, for nebel_gl_set_fog and nebel_view_rays with
+ * NEBEL_DEPTH_KIND_DISTANCE: the projection is infinite and begins 1e-6 m before the eye. Errors: ARGUMENT, VALUE as
+ * for nebel_render_frame, UNSUPPORTED (a panorama, which no matrix makes). Any thread. */
+nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                                  nebel_view *view);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

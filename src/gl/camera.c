@@ -1,0 +1,183 @@
+#include "camera.h"
+
+#include <math.h>
+
+static const double pi = 3.14159265358979323846;
+
+/* Where the frustum of a perspective view begins [m], and where the box of an orthographic one ends. Surfaces bring
+ * their own depth, so that neither costs any digits. */
+static const double near_distance = 1e-6, far_distance = 1e9;
+
+/* ---- vectors -------------------------------------------------------------------------------------------------------
+ */
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void nb_camera_cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* By the largest component first, so that no square overflows. */
+int nb_camera_normalize(double v[3])
+{
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(largest > 0) || isinf(largest)) return 0;
+    for (int i = 0; i < 3; i++) v[i] /= largest;
+    const double length = sqrt(dot(v, v));
+    for (int i = 0; i < 3; i++) v[i] /= length;
+    return 1;
+}
+
+void nb_camera_subtract(const double a[3], const double b[3], float difference[3])
+{
+    for (int i = 0; i < 3; i++) difference[i] = (float)(a[i] - b[i]);
+}
+
+static int is_finite(const double v[3])
+{
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+/* ---- cameras -------------------------------------------------------------------------------------------------------
+ */
+
+/* Across the view where `up` is along it: the axis that is farthest from it tells. */
+static void choose_right(const double forward[3], double right[3])
+{
+    int least = 0;
+    for (int i = 1; i < 3; i++) {
+        if (fabs(forward[i]) < fabs(forward[least])) least = i;
+    }
+    double axis[3] = {0, 0, 0};
+    axis[least] = 1;
+    nb_camera_cross(forward, axis, right);
+    (void)nb_camera_normalize(right);
+}
+
+static nebel_result set_axes(const nebel_camera *camera, const nebel_log *log, double eye_from_world[16])
+{
+    double forward[3], up[3], right[3];
+    if (!is_finite(camera->position) || !is_finite(camera->look_at) || !is_finite(camera->up)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "camera: position, look_at and up must be finite numbers");
+    }
+    for (int i = 0; i < 3; i++) {
+        forward[i] = camera->look_at[i] - camera->position[i];
+        up[i] = camera->up[i];
+    }
+    if (!nb_camera_normalize(forward)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "camera: look_at is where the camera stands; move one of the two");
+    }
+    if (!nb_camera_normalize(up)) return nb_fail(log, NEBEL_ERROR_VALUE, "camera: up has no direction");
+    nb_camera_cross(forward, up, right);
+    if (!(dot(right, right) > 1e-20) || !nb_camera_normalize(right)) choose_right(forward, right);
+    nb_camera_cross(right, forward, up);
+    for (int i = 0; i < 3; i++) {
+        eye_from_world[4 * i] = right[i];
+        eye_from_world[4 * i + 1] = up[i];
+        eye_from_world[4 * i + 2] = -forward[i];
+        eye_from_world[4 * i + 3] = 0;
+    }
+    eye_from_world[12] = -dot(right, camera->position);
+    eye_from_world[13] = -dot(up, camera->position);
+    eye_from_world[14] = dot(forward, camera->position);
+    eye_from_world[15] = 1;
+    return NEBEL_OK;
+}
+
+static nebel_result set_perspective(const nebel_camera *camera, const nebel_log *log, nebel_view *view)
+{
+    if (!(camera->vertical_fov > 0 && camera->vertical_fov < 180)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "camera: vertical_fov is %g, it must be above 0 and below 180 degrees",
+                       camera->vertical_fov);
+    }
+    const double scale = 1 / tan(camera->vertical_fov * (pi / 360));
+    view->clip_from_eye[0] = scale * view->height / view->width;
+    view->clip_from_eye[5] = scale;
+    view->clip_from_eye[10] = view->clip_from_eye[11] = -1;
+    view->clip_from_eye[14] = -2 * near_distance;
+    return NEBEL_OK;
+}
+
+static nebel_result set_orthographic(const nebel_camera *camera, const nebel_log *log, nebel_view *view)
+{
+    if (!(camera->view_height > 0) || isinf(camera->view_height)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "camera: view_height is %g, it must be above 0 metres",
+                       camera->view_height);
+    }
+    view->clip_from_eye[0] = 2 / camera->view_height * view->height / view->width;
+    view->clip_from_eye[5] = 2 / camera->view_height;
+    view->clip_from_eye[10] = -2 / far_distance;
+    view->clip_from_eye[14] = -1;
+    view->clip_from_eye[15] = 1;
+    return NEBEL_OK;
+}
+
+nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                                  nebel_view *view)
+{
+    const nebel_log silent = {0};
+    if (log == NULL) log = &silent;
+    if (camera == NULL || view == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "camera: it or the view is NULL");
+    if (width < 1 || height < 1) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "camera: a picture of no size");
+    *view = (nebel_view){.width = width, .height = height};
+    const nebel_result result = set_axes(camera, log, view->eye_from_world);
+    if (result != NEBEL_OK) return result;
+    switch (camera->projection) {
+    case NEBEL_PROJECTION_PERSPECTIVE:
+        return set_perspective(camera, log, view);
+    case NEBEL_PROJECTION_ORTHOGRAPHIC:
+        return set_orthographic(camera, log, view);
+    case NEBEL_PROJECTION_PANORAMA:
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "camera: OpenGL draws no panorama; render it with the CPU, or six perspective views");
+    }
+    return nb_fail(log, NEBEL_ERROR_VALUE, "camera: there is no projection %d", (int)camera->projection);
+}
+
+/* ---- samples -------------------------------------------------------------------------------------------------------
+ */
+
+/* The van der Corput sequence in base 2. */
+static double mirror(uint32_t i)
+{
+    double x = 0;
+    for (double half = .5; i != 0; i >>= 1, half *= .5) x += i & 1 ? half : 0;
+    return x;
+}
+
+/* The second dimension of the Sobol sequence: column k of its matrix is row k of Pascal's triangle modulo 2. */
+static double sobol(uint32_t i)
+{
+    uint32_t digits = 0;
+    for (uint32_t column = 1u << 31; i != 0; i >>= 1, column ^= column >> 1) {
+        if (i & 1) digits ^= column;
+    }
+    return digits * 0x1p-32;
+}
+
+nb_place nb_camera_place(uint32_t index, uint32_t count)
+{
+    double x = 0, y = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        x += mirror(i);
+        y += sobol(i);
+    }
+    return (nb_place){mirror(index) + .5 - x / count, sobol(index) + .5 - y / count};
+}
+
+nebel_view nb_camera_move(const nebel_view *view, nb_place place)
+{
+    nebel_view moved = *view;
+    for (int column = 0; column < 4; column++) {
+        const double w = view->clip_from_eye[4 * column + 3];
+        moved.clip_from_eye[4 * column] += (1 - 2 * place.x) / view->width * w;
+        moved.clip_from_eye[4 * column + 1] += (1 - 2 * place.y) / view->height * w;
+    }
+    return moved;
+}

@@ -1,0 +1,396 @@
+/* A frame of the scene renderer. Sample after sample, each through other places of the pixels: surfaces with their
+ * properties; once, shadow maps around what the first sample sees; the fog up to the surfaces; the light of all that.
+ */
+#include "renderer.h"
+
+#include <math.h>
+
+enum { MOST_SIDE = 32768, MOST_SAMPLES = 4096 };
+
+/* The light of a frame. */
+typedef struct lighting {
+    float background[3], ambient[3];
+    float sun[3], sunlight[3]; /* 0 where there is no sun */
+    double sun_direction[3];
+    int has_sun;
+} lighting;
+
+typedef struct frame {
+    nebel_gl_renderer *renderer;
+    const nebel_gl_frame_desc *desc;
+    uint32_t samples;
+    lighting light;
+    double eye[3];
+    nebel_view view;        /* through the pixels' centres */
+    nebel_view sample_view; /* through the places of the present sample */
+    nebel_rays rays;        /* of sample_view */
+    nebel_view sun_view;    /* of all that is seen, against the sun's light */
+    int casts;              /* the sun shines, and there is something to cast shadows */
+} frame;
+
+/* ---- checks
+ * ----------------------------------------------------------------------------------------------------------
+ */
+
+static nebel_result check_size(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    GLint viewport[2] = {0, 0};
+    glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
+    uint32_t most = r->context.widest < MOST_SIDE ? r->context.widest : MOST_SIDE;
+    for (int i = 0; i < 2; i++) most = (uint32_t)viewport[i] < most ? (uint32_t)viewport[i] : most;
+    if (desc->width < 1 || desc->height < 1) {
+        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u x %u pixels; 1 to %u are possible", (unsigned)desc->width,
+                       (unsigned)desc->height, (unsigned)most);
+    }
+    if (desc->width > most || desc->height > most) {
+        return nb_fail(
+            &r->log, NEBEL_ERROR_LIMIT,
+            "frame: %u x %u pixels; this OpenGL draws at most %u either way. The CPU renders larger pictures",
+            (unsigned)desc->width, (unsigned)desc->height, (unsigned)most);
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
+{
+    if (samples > MOST_SAMPLES) {
+        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)samples);
+    }
+    if (samples > 1 && r->context.es && !epoxy_has_gl_extension("GL_EXT_float_blend")) {
+        return nb_fail(
+            &r->log, NEBEL_ERROR_UNSUPPORTED,
+            "frame: OpenGL ES without GL_EXT_float_blend cannot add samples; ask for one sample, or use OpenGL");
+    }
+    return NEBEL_OK;
+}
+
+static int is_light(const double rgb[3])
+{
+    return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
+}
+
+static nebel_result set_lighting(const nebel_scene_data *scene, lighting *light, const nebel_log *log)
+{
+    double direction[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
+    if (!is_light(scene->background) || !is_light(scene->ambient) ||
+        (scene->has_sun && !is_light(scene->sun_irradiance))) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
+    }
+    light->has_sun = scene->has_sun != 0;
+    if (light->has_sun && !nb_camera_normalize(direction)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
+    }
+    for (int c = 0; c < 3; c++) {
+        light->background[c] = (float)scene->background[c];
+        light->ambient[c] = (float)scene->ambient[c];
+        light->sunlight[c] = light->has_sun ? (float)(scene->sun_irradiance[c] * 0.31830988618379067) : 0;
+        light->sun_direction[c] = light->has_sun ? direction[c] : 0;
+        light->sun[c] = (float)light->sun_direction[c];
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result set_frame(frame *f)
+{
+    const nebel_gl_renderer *const r = f->renderer;
+    const nebel_gl_frame_desc *const desc = f->desc;
+    f->samples = desc->samples != 0 ? desc->samples : 4;
+    nebel_result result = check_size(r, desc);
+    if (result == NEBEL_OK) result = check_samples(r, f->samples);
+    if (result == NEBEL_OK) result = set_lighting(r->scene, &f->light, &r->log);
+    if (result == NEBEL_OK) result = nebel_gl_camera_view(&desc->camera, desc->width, desc->height, &r->log, &f->view);
+    for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
+    f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
+    return result;
+}
+
+/* ---- surfaces
+ * --------------------------------------------------------------------------------------------------------
+ */
+
+static void set_vector(unsigned program, const char *name, const float v[3])
+{
+    glUniform3fv(glGetUniformLocation(program, name), 1, v);
+}
+
+static void set_rays(const frame *f, unsigned program)
+{
+    float rays[6][3];
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k < 3; k++) rays[i][k] = f->rays.words[i].v[k];
+    }
+    glUniform3fv(glGetUniformLocation(program, "scene_rays"), 6, rays[0]);
+}
+
+/* From positions relative to the eye. */
+static void set_clip(const frame *f, unsigned program)
+{
+    const double *const clip = f->sample_view.clip_from_eye, *const eye = f->sample_view.eye_from_world;
+    float matrix[16];
+    for (int column = 0; column < 4; column++) {
+        for (int row = 0; row < 4; row++) {
+            double sum = column == 3 ? clip[12 + row] : 0;
+            for (int k = 0; k < 3 && column < 3; k++) sum += clip[4 * k + row] * eye[4 * column + k];
+            matrix[4 * column + row] = (float)sum;
+        }
+    }
+    glUniformMatrix4fv(glGetUniformLocation(program, "scene_clip"), 1, GL_FALSE, matrix);
+}
+
+static void bind_texture(GLuint unit, GLenum target, unsigned texture)
+{
+    glActiveTexture(GL_TEXTURE0 + unit);
+    glBindTexture(target, texture);
+    glBindSampler(unit, 0);
+}
+
+static void draw_meshes(const frame *f, unsigned program)
+{
+    const nb_meshes *const meshes = &f->renderer->meshes;
+    const GLint offset = glGetUniformLocation(program, "scene_offset"),
+                color = glGetUniformLocation(program, "scene_color"),
+                has_texture = glGetUniformLocation(program, "scene_has_texture");
+    for (size_t i = 0; i < meshes->count; i++) {
+        const nb_mesh *const mesh = &meshes->list[i];
+        float from_eye[3];
+        nb_camera_subtract(mesh->origin, f->eye, from_eye);
+        glUniform3fv(offset, 1, from_eye);
+        glUniform3fv(color, 1, mesh->base_color);
+        glUniform1i(has_texture, mesh->texture != 0);
+        bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
+        glBindVertexArray(mesh->vertex_array);
+        glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
+    }
+}
+
+static void draw_surfaces(const frame *f)
+{
+    static const GLfloat zeros[4] = {0, 0, 0, 0};
+    const nebel_gl_renderer *const r = f->renderer;
+    const unsigned program = r->shading.surface;
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.surface_buffer);
+    nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
+    for (int i = 0; i < 3; i++) glClearBufferfv(GL_COLOR, i, zeros);
+    glClearBufferfv(GL_DEPTH, 0, zeros);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER);
+    glUseProgram(program);
+    set_rays(f, program);
+    set_clip(f, program);
+    draw_meshes(f, program);
+}
+
+/* ---- fog
+ * -------------------------------------------------------------------------------------------------------------
+ */
+
+/* Transmittance 1 and no light. */
+static void clear_fog(void)
+{
+    static const GLfloat dark[4] = {0, 0, 0, 1}, clear[4] = {1, 1, 1, 1};
+    glClearBufferfv(GL_COLOR, 0, dark);
+    glClearBufferfv(GL_COLOR, 1, clear);
+}
+
+static nebel_result draw_fog(const frame *f)
+{
+    const nebel_gl_renderer *const r = f->renderer;
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
+    nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
+    if (r->fog == NULL) {
+        clear_fog();
+        return NEBEL_OK;
+    }
+    const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
+                                .depth_texture = r->targets.place,
+                                .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
+    const nebel_result result = nebel_gl_set_fog(r->eye_fog, r->fog, &f->sample_view);
+    return result == NEBEL_OK ? nebel_gl_draw_fog(r->eye_fog, &pass) : result;
+}
+
+/* ---- the sun
+ * ---------------------------------------------------------------------------------------------------------
+ */
+
+/* A square picture of all that is seen, against the sun's light, from the same eye: light coordinates are its metres.
+ */
+static void set_sun_view(frame *f)
+{
+    enum { SUN_VIEW_SIZE = 2048 };
+    const nb_shadows *const s = &f->renderer->shadows;
+    f->sun_view = (nebel_view){.width = SUN_VIEW_SIZE, .height = SUN_VIEW_SIZE};
+    double *const eye = f->sun_view.eye_from_world, *const clip = f->sun_view.clip_from_eye;
+    for (int i = 0; i < 3; i++) {
+        const double axes[3] = {s->across[0][i], s->across[1][i], -f->light.sun_direction[i]};
+        for (int k = 0; k < 3; k++) {
+            eye[4 * i + k] = axes[k];
+            eye[12 + k] -= axes[k] * f->eye[i];
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        const double extent = s->seen_high[i] - s->seen_low[i];
+        clip[5 * i] = 2 / extent;
+        clip[12 + i] = -(s->seen_high[i] + s->seen_low[i]) / extent;
+    }
+    const double reach = 1e9;
+    clip[10] = -2 / reach;
+    clip[14] = -1;
+    eye[15] = clip[15] = 1;
+}
+
+/* Lists of volumes along the sun's light are made where the eye has some, too. */
+static nebel_result set_sun_fog(frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    if (r->fog == NULL || !(r->shadows.seen_low[0] < r->shadows.seen_high[0])) return NEBEL_OK;
+    set_sun_view(f);
+    return nebel_gl_set_fog(r->sun_fog, r->fog, &f->sun_view);
+}
+
+static nebel_result prepare_sun(frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nb_shadows_turn(&r->shadows, f->light.sun_direction);
+    nebel_result result = nb_shadows_fit(&r->shadows, &r->allocator, &r->log, &r->targets, &f->rays, &r->meshes);
+    if (result != NEBEL_OK) return result;
+    f->casts = r->shadows.seen_low[0] < r->shadows.seen_high[0];
+    if (!f->casts) return NEBEL_OK;
+    result = nb_shadows_draw(&r->shadows, &r->context, &r->log, r->shading.shadow, &r->meshes, f->eye);
+    return result == NEBEL_OK ? set_sun_fog(f) : result;
+}
+
+static void set_shadows(const frame *f, unsigned program)
+{
+    const nb_shadows *const s = &f->renderer->shadows;
+    bind_texture(NB_UNIT_SHADOWS, GL_TEXTURE_2D_ARRAY, s->texture);
+    glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, s->light);
+    glUniform1f(glGetUniformLocation(program, "map_size"), (float)s->size);
+    glUniform4fv(glGetUniformLocation(program, "map_places"), NB_CASCADES, s->places[0]);
+    glUniform4fv(glGetUniformLocation(program, "map_ends"), 1, s->ends);
+    glUniform3f(glGetUniformLocation(program, "map_heights"), s->low, s->high, s->rounding);
+}
+
+static void set_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
+{
+    const nb_shadows *const s = &f->renderer->shadows;
+    float place[4];
+    for (int i = 0; i < 2; i++) {
+        place[i] = (float)s->seen_low[i];
+        place[2 + i] = (float)(f->sun_view.width / (s->seen_high[i] - s->seen_low[i]));
+    }
+    bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
+    glUniform4fv(glGetUniformLocation(program, "tile_place"), 1, place);
+    glUniform4i(glGetUniformLocation(program, "tile_grid"), (GLint)f->sun_view.width, (GLint)f->sun_view.height,
+                (GLint)fog->tile_size, (GLint)fog->tile_columns);
+}
+
+/* ---- light
+ * -----------------------------------------------------------------------------------------------------------
+ */
+
+static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
+{
+    const nb_targets *const t = &f->renderer->targets;
+    glUseProgram(program);
+    set_rays(f, program);
+    set_vector(program, "scene_background", f->light.background);
+    set_vector(program, "scene_ambient", f->light.ambient);
+    set_vector(program, "scene_sun", f->light.sun);
+    set_vector(program, "scene_sunlight", f->light.sunlight);
+    glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
+    if (f->casts) set_shadows(f, program);
+    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
+    bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
+    bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
+    bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
+    bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
+    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
+    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    if (fog->tiles != 0) set_tiles(f, fog, program);
+}
+
+/* The first sample replaces what was there. */
+static void start_picture(const frame *f, uint32_t sample)
+{
+    static const GLfloat zeros[4] = {0, 0, 0, 0};
+    const nebel_gl_renderer *const r = f->renderer;
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.picture_buffer);
+    nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
+    for (int i = 0; i < 4 && sample == 0; i++) glClearBufferfv(GL_COLOR, i, zeros);
+    if (f->samples > 1) nb_state_add(&r->context);
+}
+
+static nebel_result draw_light(const frame *f, uint32_t sample)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nebel_gl_fog fog = {0};
+    unsigned program = 0;
+    const int has_fog = f->casts && r->fog != NULL;
+    nebel_result result = has_fog ? nebel_gl_get_fog(r->sun_fog, &fog) : NEBEL_OK;
+    if (result != NEBEL_OK) return result;
+    const nb_light_kind kind = {
+        .has_fog = has_fog, .in_texture = fog.texture != 0, .tiled = fog.tiles != 0, .features = fog.features};
+    result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
+    if (result != NEBEL_OK) return result;
+    start_picture(f, sample);
+    set_light(f, &fog, program);
+    glBindVertexArray(r->vertex_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    return NEBEL_OK;
+}
+
+/* ---- the frame
+ * -------------------------------------------------------------------------------------------------------
+ */
+
+static nebel_result draw_sample(frame *f, uint32_t sample)
+{
+    const nb_place place = nb_camera_place(sample, f->samples);
+    f->sample_view = nb_camera_move(&f->view, place);
+    nebel_result result = nebel_view_rays(&f->sample_view, NULL, &f->rays);
+    if (result != NEBEL_OK) {
+        return nb_fail(&f->renderer->log, NEBEL_ERROR_VALUE,
+                       "camera: it is too far out, or its view too narrow, for numbers");
+    }
+    draw_surfaces(f);
+    if (sample == 0 && f->casts) result = prepare_sun(f);
+    if (result == NEBEL_OK) result = draw_fog(f);
+    return result == NEBEL_OK ? draw_light(f, sample) : result;
+}
+
+/* Waits for the sample first, so that progress is that of the work. */
+static nebel_result report(const frame *f, uint32_t done)
+{
+    if (f->desc->progress == NULL) return NEBEL_OK;
+    glFinish();
+    if (f->desc->progress(done, f->samples, f->desc->progress_user) == 0) return NEBEL_OK;
+    return nb_fail(&f->renderer->log, NEBEL_ERROR_LIMIT, "frame: stopped");
+}
+
+static nebel_result draw_samples(frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    glActiveTexture(GL_TEXTURE0);
+    nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
+    for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {
+        result = draw_sample(f, i);
+        if (result == NEBEL_OK) result = report(f, i + 1);
+    }
+    return result;
+}
+
+nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc)
+{
+    if (renderer == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    frame f = {.renderer = renderer, .desc = desc};
+    renderer->has_frame = 0;
+    nebel_result result = nb_context_check(&renderer->log, renderer->vertex_array);
+    if (result == NEBEL_OK) result = set_frame(&f);
+    if (result != NEBEL_OK) return result;
+    nb_scene_state state;
+    nb_scene_state_enter(&renderer->context, &state);
+    result = draw_samples(&f);
+    nb_scene_state_leave(&renderer->context, &state);
+    renderer->has_frame = result == NEBEL_OK;
+    return result;
+}

@@ -1,0 +1,37 @@
+/* Meshes and textures in OpenGL. */
+#ifndef NB_GL_MESHES_H
+#define NB_GL_MESHES_H
+
+#include "context.h"
+
+#include <nebel/scene.h>
+
+/* Vertex attributes. */
+enum { NB_ATTRIBUTE_POSITION, NB_ATTRIBUTE_NORMAL, NB_ATTRIBUTE_UV, NB_ATTRIBUTE_FACE };
+
+typedef struct nb_mesh {
+    double origin[3];
+    float low[3], high[3]; /* of the positions that are used */
+    float base_color[3];
+    unsigned vertex_array, vertices, indices, texture; /* texture 0: none */
+    int index_count;
+} nb_mesh;
+
+typedef struct nb_meshes {
+    nebel_allocator allocator;
+    nebel_log log;
+    nb_mesh *list;
+    size_t count;
+    unsigned *textures;
+    size_t texture_count;
+    double low[3], high[3]; /* of all meshes, in the world; low above high where there is nothing */
+} nb_meshes;
+
+/* Checks and copies. What was made before an error is freed by nb_meshes_delete. Changes the bindings of TEXTURE_2D on
+ * the active unit, ARRAY_BUFFER and the vertex array. Errors: as nebel_create_gl_renderer. */
+nebel_result nb_meshes_make(nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene);
+
+/* In OpenGL, where the context is still there; then in memory. */
+void nb_meshes_delete(nb_meshes *meshes, int in_context);
+
+#endif

@@ -1,0 +1,200 @@
+/* The scene renderer is made, destroyed and read. */
+#include "renderer.h"
+
+#include <math.h>
+
+enum { USUAL_SHADOW_SIZE = 2048, LEAST_SHADOW_SIZE = 64, MOST_SHADOW_SIZE = 16384 };
+
+static nebel_result check(const nebel_scene_data *scene, const nebel_gl_renderer_desc *desc)
+{
+    const nebel_log *const log = &desc->log;
+    if (scene == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: scene is NULL");
+    if (!nb_allocator_is_valid(&desc->allocator)) {
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: the allocator needs both functions or neither");
+    }
+    if (desc->shadow_size != 0 && (desc->shadow_size < LEAST_SHADOW_SIZE || desc->shadow_size > MOST_SHADOW_SIZE)) {
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "OpenGL renderer: shadow_size is %u; %d to %d, or 0, are possible",
+                       (unsigned)desc->shadow_size, LEAST_SHADOW_SIZE, MOST_SHADOW_SIZE);
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_context(const nb_context *context, const nebel_log *log)
+{
+    if (!context->es || context->version >= 32 || epoxy_has_gl_extension("GL_EXT_color_buffer_float")) return NEBEL_OK;
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                   "OpenGL ES: the driver (%s) does not draw into textures of floats (GL_EXT_color_buffer_float); use "
+                   "OpenGL, or a newer driver",
+                   (const char *)glGetString(GL_RENDERER));
+}
+
+/* A vertex array exists once it was bound. */
+static nebel_result make_objects(nebel_gl_renderer *r)
+{
+    glGenVertexArrays(1, &r->vertex_array);
+    glBindVertexArray(r->vertex_array);
+    nebel_result result = nb_shading_make(&r->shading, &r->context, &r->log);
+    if (result == NEBEL_OK) result = nb_meshes_make(&r->meshes, &r->context, r->scene);
+    return result;
+}
+
+static nebel_result make(nebel_gl_renderer *r)
+{
+    const nebel_gl_desc desc = {.allocator = r->allocator, .log = r->log};
+    nb_scene_state state;
+    nebel_result result = nebel_create_gl(&desc, &r->eye_fog);
+    if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_fog);
+    if (result != NEBEL_OK) return result;
+    nb_scene_state_enter(&r->context, &state);
+    result = make_objects(r);
+    nb_scene_state_leave(&r->context, &state);
+    return result;
+}
+
+nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snapshot *fog,
+                                      const nebel_gl_renderer_desc *desc, nebel_gl_renderer **renderer)
+{
+    nb_context context;
+    if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
+    *renderer = NULL;
+    if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check(scene, desc);
+    if (result == NEBEL_OK) result = nb_context_read(&desc->log, &context);
+    if (result == NEBEL_OK) result = check_context(&context, &desc->log);
+    if (result != NEBEL_OK) return result;
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    nebel_gl_renderer *const made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory");
+    made->allocator = made->meshes.allocator = allocator;
+    made->log = made->meshes.log = desc->log;
+    made->scene = scene;
+    made->context = context;
+    const uint32_t size = desc->shadow_size != 0 ? desc->shadow_size : USUAL_SHADOW_SIZE;
+    made->shadows.size = size < context.widest ? size : context.widest;
+    made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
+    result = make(made);
+    if (result != NEBEL_OK) {
+        nebel_destroy_gl_renderer(made);
+        return result;
+    }
+    *renderer = made;
+    return NEBEL_OK;
+}
+
+void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
+{
+    if (r == NULL) return;
+    const nebel_log silent = {0};
+    const int in_context = r->vertex_array != 0 && nb_context_check(&silent, r->vertex_array) == NEBEL_OK;
+    nb_meshes_delete(&r->meshes, in_context);
+    if (in_context) {
+        nb_shading_delete(&r->shading);
+        nb_shadows_delete(&r->shadows);
+        nb_targets_delete(&r->targets);
+        glDeleteVertexArrays(1, &r->vertex_array);
+    }
+    nebel_destroy_gl(r->eye_fog);
+    nebel_destroy_gl(r->sun_fog);
+    nebel_release_snapshot(r->fog);
+    nb_release(&r->allocator, r->shading.lights);
+    nb_release(&r->allocator, r->shadows.pixels);
+    const nebel_allocator allocator = r->allocator;
+    nb_release(&allocator, r);
+}
+
+nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *r, nebel_snapshot *fog)
+{
+    if (r == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (fog != NULL) nebel_retain_snapshot(fog);
+    nebel_release_snapshot(r->fog);
+    r->fog = fog;
+    return NEBEL_OK;
+}
+
+/* ---- results -------------------------------------------------------------------------------------------------------
+ */
+
+static nebel_result check_frame(const nebel_gl_renderer *r, const char *name)
+{
+    if (r->has_frame) return NEBEL_OK;
+    return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "%s: no frame was drawn", name);
+}
+
+nebel_result nebel_gl_get_textures(const nebel_gl_renderer *r, nebel_gl_textures *textures)
+{
+    if (r == NULL || textures == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nb_targets *const t = &r->targets;
+    *textures = (nebel_gl_textures){.color = t->picture[0],
+                                    .transmittance = t->picture[1],
+                                    .in_scattering = t->picture[2],
+                                    .surface = t->picture[3],
+                                    .width = t->width,
+                                    .height = t->height};
+    return check_frame(r, "nebel_gl_get_textures");
+}
+
+static void take_rgb(const nb_targets *t, const float *texels, float *plane)
+{
+    for (uint32_t y = 0; y < t->height; y++) {
+        const float *const row = texels + 4 * (size_t)(t->height - 1 - y) * t->width;
+        float *const out = plane + 3 * (size_t)y * t->width;
+        for (size_t x = 0; x < t->width; x++) {
+            for (size_t c = 0; c < 3; c++) out[3 * x + c] = row[4 * x + c];
+        }
+    }
+}
+
+/* The distance is a sum over the samples that hit, times their share. */
+static void divide_depth(const nb_targets *t, const float *colors, const float *surfaces, float *depth)
+{
+    for (uint32_t y = 0; y < t->height; y++) {
+        const size_t row = (size_t)(t->height - 1 - y) * t->width;
+        for (size_t x = 0; x < t->width; x++) {
+            const float share = colors[4 * (row + x) + 3], distance = surfaces[4 * (row + x) + 3];
+            depth[(size_t)y * t->width + x] = share > 0 ? distance / share : HUGE_VALF;
+        }
+    }
+}
+
+static void read_picture(const nb_targets *t, int number, float *texels)
+{
+    glReadBuffer((GLenum)(GL_COLOR_ATTACHMENT0 + number));
+    glReadPixels(0, 0, (GLsizei)t->width, (GLsizei)t->height, GL_RGBA, GL_FLOAT, texels);
+}
+
+static void read_planes(const nb_targets *t, const nebel_gl_planes *planes, float *texels, float *colors)
+{
+    float *const rgb[4] = {planes->color, planes->transmittance, planes->in_scattering, planes->normal};
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, t->picture_buffer);
+    for (int i = 0; i < 4; i++) {
+        const int last = i == 3 && planes->depth != NULL;
+        if (rgb[i] == NULL && !last) continue;
+        read_picture(t, i, texels);
+        if (rgb[i] != NULL) take_rgb(t, texels, rgb[i]);
+    }
+    if (planes->depth == NULL) return;
+    read_picture(t, 0, colors);
+    divide_depth(t, colors, texels, planes->depth);
+}
+
+nebel_result nebel_gl_read_planes(nebel_gl_renderer *r, const nebel_gl_planes *planes)
+{
+    nb_scene_state state;
+    if (r == NULL || planes == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check_frame(r, "nebel_gl_read_planes");
+    if (result == NEBEL_OK) result = nb_context_check(&r->log, r->vertex_array);
+    if (result != NEBEL_OK) return result;
+    const size_t size = 4 * (size_t)r->targets.width * r->targets.height;
+    float *const texels = nb_allocate(&r->allocator, size, sizeof(float));
+    float *const colors = planes->depth != NULL ? nb_allocate(&r->allocator, size, sizeof(float)) : NULL;
+    if (texels == NULL || (planes->depth != NULL && colors == NULL)) {
+        result = nb_fail(&r->log, NEBEL_ERROR_MEMORY, "nebel_gl_read_planes: out of memory");
+    } else {
+        nb_scene_state_enter(&r->context, &state);
+        read_planes(&r->targets, planes, texels, colors);
+        nb_scene_state_leave(&r->context, &state);
+    }
+    nb_release(&r->allocator, texels);
+    nb_release(&r->allocator, colors);
+    return result;
+}

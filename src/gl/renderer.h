@@ -1,0 +1,28 @@
+/* The scene renderer: what is in it. */
+#ifndef NB_GL_RENDERER_H
+#define NB_GL_RENDERER_H
+
+#include "camera.h"
+#include "meshes.h"
+#include "scene_state.h"
+#include "shading.h"
+#include "shadows.h"
+#include "targets.h"
+
+struct nebel_gl_renderer {
+    nebel_allocator allocator;
+    nebel_log log;
+    const nebel_scene_data *scene;
+    nebel_snapshot *fog; /* NULL: none */
+    nb_context context;
+    unsigned vertex_array; /* without attributes */
+    nebel_gl *eye_fog;     /* as the eye sees it */
+    nebel_gl *sun_fog;     /* with tiles as the sun sees them */
+    nb_meshes meshes;
+    nb_shading shading;
+    nb_shadows shadows;
+    nb_targets targets;
+    int has_frame;
+};
+
+#endif

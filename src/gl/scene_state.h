@@ -1,0 +1,28 @@
+/* The state of the context that the renderer changes beside that of the passes, kept and put back. nebel/gl_render.h
+ * has the list in words. */
+#ifndef NB_GL_SCENE_STATE_H
+#define NB_GL_SCENE_STATE_H
+
+#include "state.h"
+
+enum { NB_SCENE_UNITS = 4, NB_SCENE_PACK = 6 };
+
+typedef struct nb_scene_state {
+    nb_state base;
+    nb_unpacking unpacking;
+    GLint textures[NB_SCENE_UNITS], samplers[NB_SCENE_UNITS],
+        array_texture; /* of units 4 to 7; the array of the last */
+    GLint read_framebuffer, array_buffer, pack_buffer, pack[NB_SCENE_PACK];
+    GLint depth_function;
+    GLboolean depth_mask;
+    GLfloat depth_range[2];
+    uint32_t switches; /* bits: which were on */
+    GLint provoking_vertex, clip_control[2];
+} nb_scene_state;
+
+/* Saves, and sets what no part of the renderer wants otherwise: memory is read and written as C arrays lie, depth is
+ * tested only where it is switched on, with the least winning, and goes from 0 to 1. */
+void nb_scene_state_enter(const nb_context *context, nb_scene_state *state);
+void nb_scene_state_leave(const nb_context *context, const nb_scene_state *state);
+
+#endif

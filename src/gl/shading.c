@@ -1,0 +1,305 @@
+#include "shading.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+
+/* ---- surfaces ------------------------------------------------------------------------------------------------------
+ * Positions are relative to the eye. The distance of a surface is where the ray of the pixel's centre meets the plane
+ * of the triangle, which the last vertex of each triangle brings: interpolation between far corners would be off by
+ * more. */
+
+static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_position;\n"
+                                          "layout(location = 1) in vec3 mesh_normal;\n"
+                                          "layout(location = 2) in vec2 mesh_uv;\n"
+                                          "layout(location = 3) in vec3 mesh_face;\n"
+                                          "uniform mat4 scene_clip;\n"
+                                          "uniform vec3 scene_offset;\n"
+                                          "out vec3 surface_place;\n"
+                                          "out vec3 surface_normal;\n"
+                                          "out vec2 surface_uv;\n"
+                                          "flat out vec3 surface_corner;\n"
+                                          "flat out vec3 surface_face;\n"
+                                          "void main()\n"
+                                          "{\n"
+                                          "    surface_place = surface_corner = mesh_position + scene_offset;\n"
+                                          "    surface_normal = mesh_normal;\n"
+                                          "    surface_uv = mesh_uv;\n"
+                                          "    surface_face = mesh_face;\n"
+                                          "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
+                                          "}\n";
+
+/* The ray of a pixel: scene_rays are the words of nebel_view_rays. */
+static const char ray_text[] =
+    "uniform vec3 scene_rays[6];\n"
+    "vec3 ray_origin(vec2 pixel)\n"
+    "{\n"
+    "    return scene_rays[0] + pixel.x * scene_rays[1] + pixel.y * scene_rays[2];\n"
+    "}\n"
+    "vec3 ray_direction(vec2 pixel)\n"
+    "{\n"
+    "    return normalize(scene_rays[3] + pixel.x * scene_rays[4] + pixel.y * scene_rays[5]);\n"
+    "}\n";
+
+/* Where a ray grazes its triangle the plane alone would be met anywhere: the interpolated distance, which is off by
+ * rounding of far corners only, bounds it. Depth is 1 at the eye and falls to 0: floats are as fine in all distances.
+ */
+static const char surface_fragment_text[] =
+    "in vec3 surface_place;\n"
+    "in vec3 surface_normal;\n"
+    "in vec2 surface_uv;\n"
+    "flat in vec3 surface_corner;\n"
+    "flat in vec3 surface_face;\n"
+    "uniform vec3 scene_color;\n"
+    "uniform bool scene_has_texture;\n"
+    "uniform highp sampler2D scene_texture;\n"
+    "layout(location = 0) out vec4 out_place;\n"
+    "layout(location = 1) out vec4 out_normal;\n"
+    "layout(location = 2) out vec4 out_reflectance;\n"
+    "float surface_distance(vec3 origin, vec3 direction)\n"
+    "{\n"
+    "    float met = dot(surface_face, surface_corner - origin) / dot(surface_face, direction);\n"
+    "    float near = dot(surface_place - origin, direction);\n"
+    "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5);\n"
+    "    return met > near - slack && met < near + slack ? met : near;\n"
+    "}\n"
+    "void main()\n"
+    "{\n"
+    "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
+    "    float t = surface_distance(origin, direction);\n"
+    "    if (!(t > 0.0)) discard;\n"
+    "    vec3 side = dot(surface_face, direction) > 0.0 ? -surface_face : surface_face;\n"
+    "    float size = dot(surface_normal, surface_normal);\n"
+    "    vec3 normal = size > 1e-12 && size < 1e12 ? surface_normal * inversesqrt(size) : side;\n"
+    "    vec3 reflectance = scene_color;\n"
+    "    if (scene_has_texture) reflectance *= textureLod(scene_texture, surface_uv, 0.0).rgb;\n"
+    "    out_place = vec4(t, side);\n"
+    "    out_normal = vec4(dot(normal, side) < 0.0 ? -normal : normal, 0.0);\n"
+    "    out_reflectance = vec4(reflectance, 0.0);\n"
+    "    gl_FragDepth = 1.0 / (1.0 + t);\n"
+    "}\n";
+
+/* ---- shadow maps ---------------------------------------------------------------------------------------------------
+ * Light coordinates are relative to the eye, too: across the sun's light, and against it. */
+
+static const char shadow_vertex_text[] =
+    "layout(location = 0) in vec3 mesh_position;\n"
+    "uniform vec3 scene_offset;\n"
+    "uniform mat3 scene_light;\n" /* to light coordinates */
+    "uniform vec3 map_low;\n"
+    "uniform vec3 map_scale;\n" /* to 0 ... 2 */
+    "void main()\n"
+    "{\n"
+    "    vec3 at = (scene_light * (mesh_position + scene_offset) - map_low) * map_scale - 1.0;\n"
+    "    gl_Position = vec4(at.xy, -at.z, 1.0);\n"
+    "}\n";
+
+static const char shadow_fragment_text[] = "void main() {}\n";
+
+/* ---- light ---------------------------------------------------------------------------------------------------------
+ */
+
+/* Each texel of the map is compared with the plane of the surface continued to the texel's centre, so that a surface
+ * does not shade itself however it leans; the rest is for neighbours that rise above that plane, and for rounding. A
+ * square of two texels smooths the edge. */
+static const char shadow_text[] =
+    "uniform mat3 scene_light;\n"
+    "uniform highp sampler2DArray scene_shadows;\n"
+    "uniform float map_size;\n"
+    "uniform vec4 map_places[NB_CASCADES];\n" /* low corner in light coordinates, texels per metre */
+    "uniform vec4 map_ends;\n"                /* distance up to which a map is the finest */
+    "uniform vec3 map_heights;\n"             /* of depth 1 and of depth 0; what rounding may amount to */
+    "float shadow_tap(int map, ivec2 texel, float height)\n"
+    "{\n"
+    "    float depth = texelFetch(scene_shadows, ivec3(texel, map), 0).x;\n"
+    "    return mix(map_heights.y, map_heights.x, depth) <= height ? 1.0 : 0.0;\n"
+    "}\n"
+    "float shadow_filter(int map, vec2 place, float height, vec2 slope)\n"
+    "{\n"
+    "    vec2 cell = 1.0 / map_places[map].zw, corner = floor(place), part = place - corner;\n"
+    "    float rise = map_heights.z + max(cell.x, cell.y) * (0.5 + 0.5 * length(slope));\n"
+    "    float sum = 0.0;\n"
+    "    for (int y = -1; y <= 1; y++) {\n"
+    "        for (int x = -1; x <= 1; x++) {\n"
+    "            vec2 way = (vec2(float(x), float(y)) + 0.5 - part) * cell;\n"
+    "            vec2 weight = vec2(x < 0 ? 1.0 - part.x : x > 0 ? part.x : 1.0,\n"
+    "                               y < 0 ? 1.0 - part.y : y > 0 ? part.y : 1.0);\n"
+    "            sum += weight.x * weight.y *\n"
+    "                   shadow_tap(map, ivec2(corner) + ivec2(x, y), height + dot(slope, way) + rise);\n"
+    "        }\n"
+    "    }\n"
+    "    return 0.25 * sum;\n"
+    "}\n"
+    "float shadow(vec3 at, vec3 side, float t)\n"
+    "{\n"
+    "    vec3 leaning = scene_light * side;\n"
+    "    vec2 slope = -leaning.xy / max(leaning.z, 0.05);\n"
+    "    for (int map = 0; map < NB_CASCADES; map++) {\n"
+    "        vec2 place = (at.xy - map_places[map].xy) * map_places[map].zw;\n"
+    "        bool inside = all(greaterThan(place, vec2(1.0))) && all(lessThan(place, vec2(map_size - 1.0)));\n"
+    "        if (t <= map_ends[map] && inside) return shadow_filter(map, place, at.z, slope);\n"
+    "    }\n"
+    "    return 1.0;\n"
+    "}\n";
+
+/* One triangle that covers the picture. */
+static const char light_vertex_text[] =
+    "void main()\n"
+    "{\n"
+    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
+    "}\n";
+
+static const char light_text[] =
+    "uniform highp sampler2D scene_place;\n"
+    "uniform highp sampler2D scene_normal;\n"
+    "uniform highp sampler2D scene_reflectance;\n"
+    "uniform highp sampler2D scene_in_scattering;\n"
+    "uniform highp sampler2D scene_transmittance;\n"
+    "uniform vec3 scene_background;\n"
+    "uniform vec3 scene_ambient;\n"
+    "uniform vec3 scene_sun;\n"
+    "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun */
+    "uniform float scene_share;\n"   /* of this sample */
+    "#ifdef NEBEL_TILES\n"
+    "uniform vec4 tile_place;\n" /* low corner in light coordinates, pixels per metre */
+    "uniform ivec4 tile_grid;\n" /* pixels in all, in a tile, and tiles in a row */
+    "#endif\n"
+    "layout(location = 0) out highp vec4 out_color;\n"
+    "layout(location = 1) out highp vec4 out_transmittance;\n"
+    "layout(location = 2) out highp vec4 out_in_scattering;\n"
+    "layout(location = 3) out highp vec4 out_surface;\n"
+    "vec3 sun_transmittance(vec3 place, vec2 at)\n"
+    "{\n"
+    "#if !defined(SCENE_FOG)\n"
+    "    return vec3(1.0);\n"
+    "#elif defined(NEBEL_TILES)\n"
+    "    ivec2 pixel = clamp(ivec2((at - tile_place.xy) * tile_place.zw), ivec2(0), tile_grid.xy - 1);\n"
+    "    ivec2 tile = pixel / tile_grid.z;\n"
+    "    int entry = 2 * (tile.x + tile.y * tile_grid.w);\n"
+    "    return nebel_transmit_list(place, scene_sun, 1e18, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
+    "#else\n"
+    "    return nebel_transmit(place, scene_sun, 1e18);\n"
+    "#endif\n"
+    "}\n"
+    "vec3 sunlight(vec3 place, vec3 normal, vec3 side, float t)\n"
+    "{\n"
+    "    float cosine = dot(normal, scene_sun);\n"
+    "    if (!(cosine > 0.0 && dot(side, scene_sun) > 0.0)) return vec3(0.0);\n"
+    "    vec3 at = scene_light * place;\n"
+    "    float visible = shadow(at, side, t);\n"
+    "    if (!(visible > 0.0)) return vec3(0.0);\n"
+    "    return visible * cosine * scene_sunlight * sun_transmittance(place, at.xy);\n"
+    "}\n"
+    "void main()\n"
+    "{\n"
+    "    ivec2 texel = ivec2(gl_FragCoord.xy);\n"
+    "    vec4 place = texelFetch(scene_place, texel, 0);\n"
+    "    vec3 transmittance = texelFetch(scene_transmittance, texel, 0).rgb;\n"
+    "    vec3 in_scattering = texelFetch(scene_in_scattering, texel, 0).rgb;\n"
+    "    vec3 normal = texelFetch(scene_normal, texel, 0).xyz;\n"
+    "    vec3 surface = scene_background;\n"
+    "    if (place.x > 0.0) {\n"
+    "        vec3 at = ray_origin(gl_FragCoord.xy) + place.x * ray_direction(gl_FragCoord.xy);\n"
+    "        vec3 light = scene_ambient + sunlight(at, normal, place.yzw, place.x);\n"
+    "        surface = texelFetch(scene_reflectance, texel, 0).rgb * light;\n"
+    "    }\n"
+    "    float hit = place.x > 0.0 ? scene_share : 0.0;\n"
+    "    out_color = vec4(scene_share * (transmittance * surface + in_scattering), hit);\n"
+    "    out_transmittance = vec4(scene_share * transmittance, scene_share);\n"
+    "    out_in_scattering = vec4(scene_share * in_scattering, scene_share);\n"
+    "    out_surface = hit * vec4(normal, place.x);\n"
+    "}\n";
+
+/* ---- programs ------------------------------------------------------------------------------------------------------
+ */
+
+static const char *precision_of(const nb_context *context)
+{
+    return context->es ? "precision highp float;\nprecision highp int;\n" : "";
+}
+
+static void set_unit(unsigned program, const char *sampler, int unit)
+{
+    glUniform1i(glGetUniformLocation(program, sampler), unit);
+}
+
+nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, const nebel_log *log)
+{
+    const char *const version = nb_program_version(context), *const precision = precision_of(context);
+    const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
+    const nb_texts surface_fragment = {{version, precision, ray_text, surface_fragment_text}, 4};
+    const nb_texts shadow_vertex = {{version, shadow_vertex_text}, 2};
+    const nb_texts shadow_fragment = {{version, shadow_fragment_text}, 2};
+    nebel_result result = nb_program_build(log, &surface_vertex, &surface_fragment, &shading->surface);
+    if (result == NEBEL_OK) result = nb_program_build(log, &shadow_vertex, &shadow_fragment, &shading->shadow);
+    if (result != NEBEL_OK) return result;
+    glUseProgram(shading->surface);
+    set_unit(shading->surface, "scene_texture", NB_UNIT_REFLECTANCE);
+    return NEBEL_OK;
+}
+
+static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
+{
+    (void)snprintf(text, size, "%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
+                   nb_program_version(context), kind->has_fog ? "#define SCENE_FOG\n" : "",
+                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+                   NB_CASCADES, (unsigned)kind->features, precision_of(context));
+}
+
+static void set_units(unsigned program)
+{
+    const unsigned block = glGetUniformBlockIndex(program, "nebel_fog_block");
+    if (block != GL_INVALID_INDEX) glUniformBlockBinding(program, block, 0);
+    glUseProgram(program);
+    set_unit(program, "nebel_fog_texture", NB_UNIT_FOG);
+    set_unit(program, "nebel_tile_texture", NB_UNIT_TILES);
+    set_unit(program, "scene_place", NB_UNIT_PLACE);
+    set_unit(program, "scene_normal", NB_UNIT_NORMAL);
+    set_unit(program, "scene_reflectance", NB_UNIT_REFLECTANCE);
+    set_unit(program, "scene_in_scattering", NB_UNIT_IN_SCATTERING);
+    set_unit(program, "scene_transmittance", NB_UNIT_TRANSMITTANCE);
+    set_unit(program, "scene_shadows", NB_UNIT_SHADOWS);
+}
+
+static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
+                               unsigned *name)
+{
+    char head[512];
+    write_head(context, kind, head, sizeof head);
+    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const nb_texts vertex = {{nb_program_version(context), light_vertex_text}, 2};
+    const nb_texts fragment = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, light_text}, 5};
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
+    if (result == NEBEL_OK) set_units(*name);
+    return result;
+}
+
+static int is_same(const nb_light_kind *a, const nb_light_kind *b)
+{
+    return a->has_fog == b->has_fog && a->in_texture == b->in_texture && a->tiled == b->tiled &&
+           a->features == b->features;
+}
+
+nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
+                                   const nebel_log *log, const nb_light_kind *kind, unsigned *program)
+{
+    for (size_t i = 0; i < shading->light_count; i++) {
+        *program = shading->lights[i].name;
+        if (is_same(&shading->lights[i].kind, kind)) return NEBEL_OK;
+    }
+    void *list = shading->lights;
+    if (!nb_grow(allocator, &list, sizeof *shading->lights, shading->light_count, &shading->light_capacity,
+                 shading->light_count + 1)) {
+        return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory");
+    }
+    shading->lights = list;
+    const nebel_result result = make_light(context, log, kind, program);
+    if (result == NEBEL_OK) shading->lights[shading->light_count++] = (nb_light_program){*kind, *program};
+    return result;
+}
+
+void nb_shading_delete(const nb_shading *shading)
+{
+    glDeleteProgram(shading->surface);
+    glDeleteProgram(shading->shadow);
+    for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
+}

@@ -1,0 +1,47 @@
+/* The programs of the scene renderer: surfaces into their properties, surfaces into shadow maps, and properties into
+ * light. */
+#ifndef NB_GL_SHADING_H
+#define NB_GL_SHADING_H
+
+#include "program.h"
+
+/* Texture units of the samplers; the fog's are those of the passes. */
+enum {
+    NB_UNIT_PLACE = 2,
+    NB_UNIT_NORMAL,
+    NB_UNIT_REFLECTANCE,
+    NB_UNIT_IN_SCATTERING,
+    NB_UNIT_TRANSMITTANCE,
+    NB_UNIT_SHADOWS
+};
+
+enum { NB_CASCADES = 4 };
+
+/* What a program that lights is made for. */
+typedef struct nb_light_kind {
+    int has_fog; /* between surfaces and the sun */
+    int in_texture, tiled;
+    uint32_t features;
+} nb_light_kind;
+
+typedef struct nb_light_program {
+    nb_light_kind kind;
+    unsigned name;
+} nb_light_program;
+
+typedef struct nb_shading {
+    unsigned surface, shadow;
+    nb_light_program *lights;
+    size_t light_count, light_capacity;
+} nb_shading;
+
+/* Compile and link what is not there yet, which changes the current program. UNSUPPORTED with the driver's words;
+ * MEMORY. */
+nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, const nebel_log *log);
+nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
+                                   const nebel_log *log, const nb_light_kind *kind, unsigned *program);
+
+/* In OpenGL. */
+void nb_shading_delete(const nb_shading *shading);
+
+#endif

@@ -1,0 +1,37 @@
+/* Shadow maps, fitted to what is seen: each covers the surfaces of one range of distances and no more. */
+#ifndef NB_GL_SHADOWS_H
+#define NB_GL_SHADOWS_H
+
+#include "meshes.h"
+#include "shading.h"
+#include "targets.h"
+
+/* Light coordinates are metres relative to the eye: two across the sun's light, and one against it. */
+typedef struct nb_shadows {
+    unsigned texture, buffer; /* 0: not made yet */
+    uint32_t size;
+    float light[9];                   /* to light coordinates, by columns */
+    double across[2][3];              /* the first two axes */
+    float places[NB_CASCADES][4];     /* low corner, texels per metre */
+    float ends[NB_CASCADES];          /* distance up to which a map is the finest; 0: the map is empty */
+    float low, high;                  /* of everything that may cast shadows, against the light */
+    float rounding;                   /* what heights may be off by [m] */
+    double seen_low[2], seen_high[2]; /* of all surfaces that are seen; low above high: there are none */
+    float *pixels;                    /* places read back */
+    size_t capacity;
+} nb_shadows;
+
+/* The axes of a sun in this direction. */
+void nb_shadows_turn(nb_shadows *shadows, const double sun[3]);
+
+/* Looks through the surfaces of targets, whose pixels have these rays, and lays the maps. MEMORY. */
+nebel_result nb_shadows_fit(nb_shadows *shadows, const nebel_allocator *allocator, const nebel_log *log,
+                            const nb_targets *targets, const nebel_rays *rays, const nb_meshes *meshes);
+
+/* Draws the maps. Depth is tested afterwards. MEMORY, UNSUPPORTED. */
+nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, const nebel_log *log, unsigned program,
+                             const nb_meshes *meshes, const double eye[3]);
+
+void nb_shadows_delete(const nb_shadows *shadows);
+
+#endif

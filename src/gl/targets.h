@@ -1,0 +1,24 @@
+/* What the renderer draws into. */
+#ifndef NB_GL_TARGETS_H
+#define NB_GL_TARGETS_H
+
+#include "context.h"
+
+/* Pictures of one size, the lowest row first. */
+typedef struct nb_targets {
+    uint32_t width, height; /* 0: there are none */
+    unsigned depth;
+    unsigned place;                        /* distance [m], 0 for none; unit normal of the triangle */
+    unsigned normal, reflectance;          /* rgb */
+    unsigned in_scattering, transmittance; /* of one sample */
+    unsigned picture[4];                   /* color, transmittance, in-scattering, surface: see nebel_gl_textures */
+    unsigned surface_buffer, fog_buffer, picture_buffer;
+} nb_targets;
+
+/* Makes them for a size; those of another size go. Changes the bindings of TEXTURE_2D on the active unit and of the
+ * draw framebuffer. MEMORY, UNSUPPORTED. */
+nebel_result nb_targets_fit(nb_targets *targets, const nebel_log *log, uint32_t width, uint32_t height);
+
+void nb_targets_delete(nb_targets *targets);
+
+#endif

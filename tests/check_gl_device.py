@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""Checks `nebel render --device gl`: the call, its messages, and its pictures beside those of the CPU."""
+
+import unittest
+
+from check_cli import FOG, PictureCase, nebel
+
+
+class GlDeviceTest(PictureCase):
+    def setUp(self):
+        super().setUp()
+        if "OpenGL: not in this build" in nebel("info").out:
+            self.skipTest("built without OpenGL")
+
+    def draw(self, output, *words, **more):
+        return self.render(output, "--device", "gl", *words, **more)
+
+    def test_the_driver_is_named(self):
+        done = self.draw("a.png")
+        self.assert_done(done)
+        self.assertRegex(done.err, r"^nebel: note: --device gl: .+\nnebel: a\.png: 64 x 36, 4 samples, .*s\n$")
+        driver = done.err.splitlines()[0].partition("--device gl: ")[2]
+        self.assertIn(f"OpenGL: {driver}\n", nebel("info").out)
+        self.assertEqual(self.draw("b.png", "--quiet").err, "")
+        self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes())
+
+    def test_every_layer_is_that_of_the_cpu(self):
+        self.assert_done(self.render("cpu.exr", "--aov", "--samples", 1))
+        done = self.draw("gl.exr", "--aov", "--samples", 1)
+        self.assert_done(done)
+        self.assertIn("no channel error", done.err)
+        layers = [f"{layer}.{c}" for layer in ("transmittance", "in_scattering") for c in "RGB"]
+        for channel in ("R", "G", "B", *layers, "normal.Z"):
+            same = nebel("compare", "cpu.exr", "gl.exr", "--channel", channel, "--fail-above", 1e-4, cwd=self.folder)
+            self.assert_done(same)
+        error = nebel("compare", "cpu.exr", "gl.exr", "--channel", "error", cwd=self.folder)
+        self.assertNotEqual(error.returncode, 0)
+
+    def test_frames(self):
+        self.scene = self.write_scene("turn.json", [FOG], models=[{"file": "triangle.obj"}], background=1, camera={
+            "position": [0, 0, 6], "look_at": [0, 0, 0], "turntable": {"frames": 8}})
+        self.assert_done(self.draw("t%d.png", "--frames", "0-1"))
+        self.assertNotEqual((self.folder / "t0.png").read_bytes(), (self.folder / "t1.png").read_bytes())
+
+    def test_what_is_of_the_cpu_alone(self):
+        for words in (("--threads", 2), ("--isa", "scalar"), ("--tolerance", 0.1)):
+            self.assert_misused(self.draw("a.png", *words), words[0], "--device cpu")
+        self.scene = self.write_scene("round.json", [FOG], camera={"projection": "panorama"})
+        self.assert_failed(self.draw("a.png", "--quiet"), "panorama", "CPU")
+        self.assertNotIn("a.png", self.files())
+
+    def test_without_a_driver(self):
+        nothing = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}
+        self.assert_failed(self.draw("a.png", env=nothing), "--device gl", "install", "--device cpu")
+        self.assertIn("OpenGL: none: ", nebel("info", env=nothing).out)
+        self.assertNotIn("a.png", self.files())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,27 @@
+/* Frames drawn by OpenGL, without a window. */
+#ifndef NB_GL_PAINTER_H
+#define NB_GL_PAINTER_H
+
+#include "gl_context.h"
+#include "load.h"
+
+#include <nebel/gl_render.h>
+
+typedef struct nb_gl_painter {
+    nb_gl_context context;
+    nebel_gl_renderer *renderer; /* NULL: there is no context */
+} nb_gl_painter;
+
+/* Opens a context, of OpenGL ES where there is no OpenGL, and hands it the scene. NB_DONE; or NB_FAILED, said on
+ * standard error, with nothing to close. */
+int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
+                       nb_report_listener *listener);
+
+/* Draws a frame and reads its planes. Returns a result; the log has said why. */
+nebel_result nb_gl_painter_draw(nb_gl_painter *painter, nebel_snapshot *fog, const nebel_gl_frame_desc *desc,
+                                const nebel_gl_planes *planes);
+
+/* Fine with what a failed nb_gl_painter_open left, and with zeros. */
+void nb_gl_painter_close(nb_gl_painter *painter);
+
+#endif
