@@ -144,11 +144,11 @@ nebel_view pass_view(int kind, range clip, double yaw, double pitch)
     return view;
 }
 
-/* The nearest of a plain and some balls; INFINITY where none is. */
+/* The nearest of a plain and some balls; HUGE_VAL where none is. */
 static double hit(const line *ray)
 {
     static const double balls[][4] = {{3, 0, -14, 2}, {-9, 2, -25, 6}, {2, 5, -60, 9}, {0, -1, 20, 5}, {16, 1, 3, 4}};
-    double o[3], d[3], nearest = INFINITY;
+    double o[3], d[3], nearest = HUGE_VAL;
     for (int i = 0; i < 3; i++)
         o[i] = (double)(ray->origin[i] - (long double)pass_eye[i]), d[i] = (double)ray->direction[i];
     if (d[1] < 0 && (-3 - o[1]) / d[1] > 0) nearest = (-3 - o[1]) / d[1];
@@ -158,7 +158,7 @@ static double hit(const line *ray)
         const double root = b * b - c, t = -b - sqrt(fmax(root, 0));
         if (root > 0 && t > 0 && t < nearest) nearest = t;
     }
-    return nearest < 400 ? nearest : (double)INFINITY;
+    return nearest < 400 ? nearest : HUGE_VAL;
 }
 
 static float store(const pass_picture *p, const line *ray, double t)
@@ -198,15 +198,15 @@ static double distance(const pass_picture *p, const line *ray, double x, double 
     switch (p->depth.kind) {
     case NEBEL_DEPTH_KIND_AXIS:
     case NEBEL_DEPTH_KIND_LOGARITHM:
-        if (p->depth.kind == NEBEL_DEPTH_KIND_AXIS ? depth <= 0 : depth == 1) return INFINITY;
+        if (p->depth.kind == NEBEL_DEPTH_KIND_AXIS ? depth <= 0 : depth == 1) return HUGE_VAL;
         if (p->depth.kind == NEBEL_DEPTH_KIND_LOGARITHM)
             depth = expm1(depth * log1p(p->depth.log_scale * p->depth.log_far)) / p->depth.log_scale;
         for (int i = 0; i < 3; i++) cosine -= (long double)p->view.eye_from_world[4 * i + 2] * ray->direction[i];
         return (double)((long double)depth / cosine);
     case NEBEL_DEPTH_KIND_DISTANCE:
-        return depth <= 0 ? (double)INFINITY : depth;
+        return depth <= 0 ? HUGE_VAL : depth;
     default:
-        if (depth == (double)(float)far) return INFINITY;
+        if (depth == (double)(float)far) return HUGE_VAL;
         unproject(&p->view, x, y, normalized(p->clip, first, last, depth), point);
         for (int i = 0; i < 3; i++) along += (point[i] - ray->origin[i]) * ray->direction[i];
         return fmax(0, (double)along);

@@ -71,7 +71,7 @@ static matrix perspective(range r)
 
 static matrix infinite(range r)
 {
-    return frustum(r, -.8, .8, -.5, .5, .1, INFINITY);
+    return frustum(r, -.8, .8, -.5, .5, .1, HUGE_VAL);
 }
 
 static matrix off_axis_tile(range r)

@@ -369,6 +369,17 @@ typedef struct outcome {
     float first[4 * PASS_PIXELS], second[4 * PASS_PIXELS];
 } outcome;
 
+/* So that tests of depth and stencil have something to test. */
+static GLuint attach_depth_and_stencil(void)
+{
+    GLuint name;
+    glGenRenderbuffers(1, &name);
+    glBindRenderbuffer(GL_RENDERBUFFER, name);
+    glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH24_STENCIL8, PASS_WIDTH, PASS_HEIGHT);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER, name);
+    return name;
+}
+
 /* All functions, in the state as it is, between two snapshots of it. */
 static void use_all(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture *picture, unsigned depth,
                     unsigned color, const unsigned targets[2], nebel_gl_output output, int desktop)
@@ -378,6 +389,7 @@ static void use_all(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture 
     const nebel_gl_pass pass = {.output = output, .depth_texture = depth, .color_texture = color};
     const nebel_gl_pass wrong = {.output = output, .depth_texture = 9999, .color_texture = color};
     const unsigned framebuffer = pass_framebuffer(targets[0], output == NEBEL_GL_OUTPUT_SPLIT ? targets[1] : 0);
+    const GLuint tested = attach_depth_and_stencil();
     take(&before, desktop);
     assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &made), NEBEL_OK);
     assert_int_equal(nebel_gl_set_fog(gl, fog, &picture->view), NEBEL_OK);
@@ -387,6 +399,7 @@ static void use_all(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture 
     take(&after, desktop);
     expect_same(&before, &after);
     pass_delete_framebuffer(framebuffer);
+    glDeleteRenderbuffers(1, &tested);
 }
 
 /* What a pass draws in a state. */

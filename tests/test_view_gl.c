@@ -293,8 +293,8 @@ static void test_what_is_no_view_is_refused(void **state)
     view.width = 65537;
     expect_refusal(&view, NULL);
     for (int i = 0; i < 16; i++) {
-        refuse_view_with(1, i, NAN);
-        refuse_view_with(0, i, INFINITY);
+        refuse_view_with(1, i, (double)NAN);
+        refuse_view_with(0, i, HUGE_VAL);
     }
     refuse_view_with(1, 0, 0);  /* no width */
     refuse_view_with(1, 11, 0); /* w is 0 everywhere */
@@ -314,9 +314,9 @@ static void test_what_is_no_convention_is_refused(void **state)
         {.sky = (nebel_sky)7},
         {.start = (nebel_start)-1},
         {.range = {1, 1}},
-        {.range = {0, NAN}},
+        {.range = {0, (double)NAN}},
         {.kind = NEBEL_DEPTH_KIND_LOGARITHM},
-        {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = INFINITY},
+        {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = HUGE_VAL},
         {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = 10, .log_scale = -1},
     };
     const nebel_depth_desc logarithm = {.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_far = 10};

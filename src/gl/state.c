@@ -209,10 +209,11 @@ static void set_viewport(const nb_context *c, const GLfloat v[4])
     }
 }
 
-/* Core profiles have one mode for both faces. */
+/* A program that was deleted while it was current is gone for good once another takes its place. Core profiles have one
+ * polygon mode for both faces. */
 void nb_state_restore(const nb_context *c, const nb_state *s)
 {
-    glUseProgram((GLuint)s->program);
+    glUseProgram(glIsProgram((GLuint)s->program) ? (GLuint)s->program : 0);
     glBindVertexArray((GLuint)s->vertex_array);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, (GLuint)s->framebuffer);
     restore_units(c, s);

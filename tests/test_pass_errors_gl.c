@@ -1,0 +1,423 @@
+/* What is missing, wrong or lost is said, with what to do, and nothing is left behind. Where this machine's driver is
+ * too good to fail, one of its functions is replaced. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "fog_help.h"
+#include "pass_help.h"
+
+#include <epoxy/gl.h>
+
+static fog_messages messages;
+
+static void expect_message(nebel_result result, nebel_result wanted, const char *part)
+{
+    assert_int_equal(result, wanted);
+    if (messages.count == 0 || messages.result != wanted || strstr(messages.text, part) == NULL)
+        fail_msg("'%s' says nothing of '%s'", messages.text, part);
+    messages.count = 0;
+}
+
+/* ---- a stage -------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct stage {
+    nb_gl context;
+    nebel_gl *gl;
+    nebel_snapshot *fog;
+    pass_picture picture;
+    unsigned depth, color, target, second, framebuffer;
+    int objects;
+} stage;
+
+static const range usual = {-1, 0};
+
+static nebel_gl_desc desc_of(fog_memory *memory)
+{
+    nebel_gl_desc desc = {.log = fog_messages_log(&messages)};
+    if (memory != NULL) desc.allocator = fog_memory_allocator(memory);
+    return desc;
+}
+
+static void open_stage(stage *s, nb_gl_language language)
+{
+    const nebel_gl_desc desc = desc_of(NULL);
+    messages.count = 0;
+    pass_open(&s->context, language);
+    s->picture = (pass_picture){.view = pass_view(PERSPECTIVE, usual, .3, -.1), .clip = usual};
+    pass_fill(&s->picture);
+    s->fog = pass_fog(0);
+    s->depth = pass_depth_texture(PASS_WIDTH, PASS_HEIGHT, s->picture.stored);
+    s->color = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    s->target = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    s->second = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    s->framebuffer = pass_framebuffer(s->target, 0);
+    s->objects = pass_count_objects();
+    assert_int_equal(nebel_create_gl(&desc, &s->gl), NEBEL_OK);
+    assert_int_equal(nebel_gl_set_fog(s->gl, s->fog, &s->picture.view), NEBEL_OK);
+}
+
+static void close_stage(stage *s)
+{
+    nebel_destroy_gl(s->gl);
+    assert_int_equal(pass_count_objects(), s->objects);
+    nebel_release_snapshot(s->fog);
+    pass_close(&s->context);
+}
+
+static nebel_gl_pass pass_of(const stage *s)
+{
+    return (nebel_gl_pass){.depth_texture = s->depth, .color_texture = s->color};
+}
+
+static nebel_result draw(const stage *s)
+{
+    const nebel_gl_pass pass = pass_of(s);
+    return nebel_gl_draw_fog(s->gl, &pass);
+}
+
+/* ---- contexts ------------------------------------------------------------------------------------------------------
+ */
+
+static void test_no_context_is_said(void **state)
+{
+    (void)state;
+    const nebel_gl_desc desc = desc_of(NULL);
+    nebel_gl *gl = (nebel_gl *)&messages;
+    expect_message(nebel_create_gl(&desc, &gl), NEBEL_ERROR_UNSUPPORTED, "no context is current");
+    assert_null(gl);
+    assert_int_equal(nebel_create_gl(NULL, &gl), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_gl(&desc, NULL), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_gl(NULL);
+}
+
+static const char *version_text;
+static PFNGLGETSTRINGPROC true_get_string;
+
+static const GLubyte *EPOXY_CALLSPEC fake_get_string(GLenum name)
+{
+    return name == GL_VERSION ? (const GLubyte *)version_text : true_get_string(name);
+}
+
+static void expect_too_old(const char *version, const char *part)
+{
+    const nebel_gl_desc desc = desc_of(NULL);
+    nebel_gl *gl = NULL;
+    version_text = version;
+    true_get_string = epoxy_glGetString;
+    epoxy_glGetString = fake_get_string;
+    const nebel_result result = nebel_create_gl(&desc, &gl);
+    epoxy_glGetString = true_get_string;
+    expect_message(result, NEBEL_ERROR_UNSUPPORTED, part);
+    assert_null(gl);
+}
+
+static void test_old_contexts_are_named(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    expect_too_old("3.2.1 Old Driver", "OpenGL 3.2");
+    close_stage(&s);
+    open_stage(&s, NB_GL_300ES);
+    expect_too_old("OpenGL ES 2.0 Old Driver", "OpenGL ES 2.0");
+    close_stage(&s);
+}
+
+static void test_another_context_is_refused(void **state)
+{
+    (void)state;
+    static stage s;
+    static nb_gl other;
+    open_stage(&s, NB_GL_330);
+    pass_open(&other, NB_GL_330);
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, &s.picture.view), NEBEL_ERROR_UNSUPPORTED, "not current, or was lost");
+    nebel_destroy_gl(s.gl);
+    pass_close(&other);
+    nb_gl_close(&s.context);
+    nebel_release_snapshot(s.fog);
+}
+
+static GLboolean EPOXY_CALLSPEC is_nothing(GLuint name)
+{
+    (void)name;
+    return GL_FALSE;
+}
+
+/* In a lost context no name is known any longer. */
+static void test_a_lost_context_is_survived(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    const PFNGLISVERTEXARRAYPROC true_is = epoxy_glIsVertexArray;
+    epoxy_glIsVertexArray = is_nothing;
+    expect_message(draw(&s), NEBEL_ERROR_UNSUPPORTED, "lost");
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, &s.picture.view), NEBEL_ERROR_UNSUPPORTED, "create another");
+    nebel_destroy_gl(s.gl);
+    epoxy_glIsVertexArray = true_is;
+    nebel_release_snapshot(s.fog);
+    pass_close(&s.context);
+}
+
+/* ---- drivers that fail ---------------------------------------------------------------------------------------------
+ */
+
+static PFNGLSHADERSOURCEPROC true_shader_source;
+
+static void EPOXY_CALLSPEC spoil_source(GLuint shader, GLsizei count, const GLchar *const *texts, const GLint *lengths)
+{
+    const GLchar *const text = "#version 330 core\nvoid main() { no_such_function(); }\n";
+    (void)count, (void)texts, (void)lengths;
+    true_shader_source(shader, 1, &text, NULL);
+}
+
+static void EPOXY_CALLSPEC do_not_link(GLuint program)
+{
+    (void)program;
+}
+
+static void test_shaders_that_the_driver_refuses(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    nebel_gl_pass pass = pass_of(&s);
+    pass.output = NEBEL_GL_OUTPUT_BLEND_GREY; /* another program, so that all functions are loaded that are replaced */
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &pass), NEBEL_OK);
+    const int objects = pass_count_objects();
+    true_shader_source = epoxy_glShaderSource;
+    epoxy_glShaderSource = spoil_source;
+    const nebel_result compiled = draw(&s);
+    epoxy_glShaderSource = true_shader_source;
+    expect_message(compiled, NEBEL_ERROR_UNSUPPORTED, "no_such_function");
+    assert_int_equal(pass_take_errors(), 1); /* the compiler's own report */
+    const PFNGLLINKPROGRAMPROC true_link = epoxy_glLinkProgram;
+    epoxy_glLinkProgram = do_not_link;
+    const nebel_result linked = draw(&s);
+    epoxy_glLinkProgram = true_link;
+    expect_message(linked, NEBEL_ERROR_UNSUPPORTED, "link");
+    assert_int_equal(pass_count_objects(), objects);
+    assert_int_equal(draw(&s), NEBEL_OK);
+    close_stage(&s);
+}
+
+static PFNGLGETINTEGERVPROC true_get_integer;
+
+static void EPOXY_CALLSPEC narrow_textures(GLenum name, GLint *value)
+{
+    true_get_integer(name, value);
+    if (name == GL_MAX_TEXTURE_SIZE) *value = 3;
+}
+
+static void test_more_volumes_than_a_texture_holds(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    const nebel_gl_desc desc = desc_of(NULL);
+    nebel_gl *narrow = NULL;
+    nebel_snapshot *const many = pass_fog(1000);
+    true_get_integer = epoxy_glGetIntegerv;
+    epoxy_glGetIntegerv = narrow_textures;
+    assert_int_equal(nebel_create_gl(&desc, &narrow), NEBEL_OK);
+    epoxy_glGetIntegerv = true_get_integer;
+    expect_message(nebel_gl_set_fog(narrow, many, &s.picture.view), NEBEL_ERROR_LIMIT, "has 3 (GL_MAX_TEXTURE_SIZE)");
+    assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
+    nebel_destroy_gl(narrow);
+    nebel_release_snapshot(many);
+    close_stage(&s);
+}
+
+static GLenum EPOXY_CALLSPEC out_of_memory(void)
+{
+    return GL_OUT_OF_MEMORY;
+}
+
+static void test_a_driver_without_memory(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    nebel_snapshot *const many = pass_fog(1000);
+    (void)glGetError();
+    const PFNGLGETERRORPROC true_error = epoxy_glGetError;
+    epoxy_glGetError = out_of_memory;
+    const nebel_result result = nebel_gl_set_fog(s.gl, many, &s.picture.view);
+    epoxy_glGetError = true_error;
+    expect_message(result, NEBEL_ERROR_MEMORY, "no memory for the texture");
+    expect_message(draw(&s), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
+    assert_int_equal(nebel_gl_set_fog(s.gl, many, &s.picture.view), NEBEL_OK);
+    assert_int_equal(draw(&s), NEBEL_OK);
+    nebel_release_snapshot(many);
+    close_stage(&s);
+}
+
+/* ---- memory --------------------------------------------------------------------------------------------------------
+ */
+
+/* Everything once, with every allocation failing in turn. */
+static void test_memory_that_runs_out(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    nebel_snapshot *const many = pass_fog(60);
+    const nebel_gl_pass pass = pass_of(&s);
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    size_t fails = 0;
+    for (size_t k = 1; result != NEBEL_OK; k++) {
+        fog_memory memory = {.fail_first = k, .fail_count = 1};
+        const nebel_gl_desc desc = desc_of(&memory);
+        const int objects = pass_count_objects();
+        nebel_gl *gl = NULL;
+        result = nebel_create_gl(&desc, &gl);
+        if (result == NEBEL_OK) result = nebel_gl_set_fog(gl, many, &s.picture.view);
+        if (result == NEBEL_OK) result = nebel_gl_draw_fog(gl, &pass);
+        if (result != NEBEL_OK) expect_message(result, NEBEL_ERROR_MEMORY, "memory");
+        fails += result != NEBEL_OK;
+        nebel_destroy_gl(gl);
+        assert_int_equal(memory.live, 0);
+        assert_int_equal(pass_count_objects(), objects);
+    }
+    assert_true(fails >= 4);
+    nebel_release_snapshot(many);
+    close_stage(&s);
+}
+
+/* ---- arguments -----------------------------------------------------------------------------------------------------
+ */
+
+static void test_views_that_are_none(void **state)
+{
+    (void)state;
+    static stage s;
+    nebel_gl_fog fog;
+    open_stage(&s, NB_GL_300ES);
+    nebel_view view = s.picture.view;
+    view.height = 0;
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "96 x 0 pixels");
+    view = s.picture.view;
+    view.clip_from_eye[3] = (double)NAN;
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "finite");
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, NULL), NEBEL_ERROR_ARGUMENT, "view is missing");
+    expect_message(nebel_gl_get_fog(s.gl, &fog), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
+    assert_int_equal(nebel_gl_set_fog(NULL, s.fog, &view), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_draw_fog(NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    close_stage(&s);
+}
+
+static void refuse(const stage *s, nebel_gl_pass pass, nebel_result wanted, const char *part)
+{
+    expect_message(nebel_gl_draw_fog(s->gl, &pass), wanted, part);
+    pass_expect_no_errors();
+}
+
+static void test_passes_that_cannot_be_drawn(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_330);
+    nebel_gl_pass pass = pass_of(&s);
+    expect_message(nebel_gl_draw_fog(s.gl, NULL), NEBEL_ERROR_ARGUMENT, "pass is missing");
+    pass.output = NEBEL_GL_OUTPUT_COUNT;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "no such output");
+    pass = pass_of(&s);
+    pass.depth_texture = 0;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "depth_texture 0");
+    pass = pass_of(&s);
+    pass.color_texture = 4711;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "color_texture 4711");
+    pass.color_texture = s.target;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "is the target, too");
+    pass = pass_of(&s);
+    pass.x = 1;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "reaches to 97, 64");
+    pass = pass_of(&s);
+    pass.depth.kind = NEBEL_DEPTH_KIND_LOGARITHM;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "depth convention");
+    pass = pass_of(&s);
+    pass.samples = 4;
+    pass.output = NEBEL_GL_OUTPUT_BLEND;
+    refuse(&s, pass, NEBEL_ERROR_UNSUPPORTED, "NEBEL_GL_OUTPUT_COMPOSE");
+    pass.output = NEBEL_GL_OUTPUT_COMPOSE;
+    pass.samples = 33;
+    refuse(&s, pass, NEBEL_ERROR_LIMIT, "32 samples");
+    close_stage(&s);
+}
+
+static void test_targets_that_do_not_fit(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_300ES);
+    nebel_gl_pass pass = pass_of(&s);
+    pass.output = NEBEL_GL_OUTPUT_SPLIT;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "draw buffer 1 is GL_NONE");
+    const unsigned both = pass_framebuffer(s.target, s.second);
+    refuse(&s, pass_of(&s), NEBEL_ERROR_ARGUMENT, "draw buffer 1 is not GL_NONE");
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &pass), NEBEL_OK);
+    pass_delete_framebuffer(both);
+    unsigned empty;
+    glGenFramebuffers(1, &empty);
+    glBindFramebuffer(GL_FRAMEBUFFER, empty);
+    refuse(&s, pass_of(&s), NEBEL_ERROR_ARGUMENT, "not complete");
+    pass_delete_framebuffer(empty);
+    close_stage(&s);
+}
+
+static PFNGLGETSTRINGIPROC true_get_stringi;
+
+static const GLubyte *EPOXY_CALLSPEC without_dual_source(GLenum name, GLuint index)
+{
+    const GLubyte *const text = true_get_stringi(name, index);
+    return strcmp((const char *)text, "GL_EXT_blend_func_extended") == 0 ? (const GLubyte *)"GL_hidden" : text;
+}
+
+static void test_what_embedded_contexts_lack(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_300ES);
+    const nebel_gl_desc desc = desc_of(NULL);
+    nebel_gl_pass pass = pass_of(&s);
+    pass.samples = 4;
+    refuse(&s, pass, NEBEL_ERROR_UNSUPPORTED, "glBlitFramebuffer");
+    nebel_destroy_gl(s.gl);
+    true_get_stringi = epoxy_glGetStringi;
+    epoxy_glGetStringi = without_dual_source;
+    assert_int_equal(nebel_create_gl(&desc, &s.gl), NEBEL_OK);
+    epoxy_glGetStringi = true_get_stringi;
+    assert_int_equal(nebel_gl_set_fog(s.gl, s.fog, &s.picture.view), NEBEL_OK);
+    pass = pass_of(&s);
+    pass.output = NEBEL_GL_OUTPUT_BLEND;
+    refuse(&s, pass, NEBEL_ERROR_UNSUPPORTED, "NEBEL_GL_OUTPUT_BLEND_GREY");
+    pass.output = NEBEL_GL_OUTPUT_BLEND_GREY;
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &pass), NEBEL_OK);
+    close_stage(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_no_context_is_said),
+        cmocka_unit_test(test_old_contexts_are_named),
+        cmocka_unit_test(test_another_context_is_refused),
+        cmocka_unit_test(test_a_lost_context_is_survived),
+        cmocka_unit_test(test_shaders_that_the_driver_refuses),
+        cmocka_unit_test(test_more_volumes_than_a_texture_holds),
+        cmocka_unit_test(test_a_driver_without_memory),
+        cmocka_unit_test(test_memory_that_runs_out),
+        cmocka_unit_test(test_views_that_are_none),
+        cmocka_unit_test(test_passes_that_cannot_be_drawn),
+        cmocka_unit_test(test_targets_that_do_not_fit),
+        cmocka_unit_test(test_what_embedded_contexts_lack),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
