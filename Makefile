@@ -4,7 +4,7 @@ BUILD ?= build
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 V ?= 0
 SOURCES = $(shell git ls-files '*.c' '*.h' '*.cpp')
-MODELS = examples/scenes/models/landscape.png examples/scenes/models/planet.obj
+MODELS = examples/scenes/models/landscape.png examples/scenes/models/planet.obj examples/scenes/models/gates.gltf
 
 MAKEFLAGS += --no-print-directory
 ifeq ($(V),0)
@@ -63,6 +63,10 @@ clean:
 
 # What example scenes need and what is made, not kept.
 examples/scenes/models/%.png: examples/make_%.py
+	@scripts/install_packages.sh example
+	@python3 $< $@
+
+examples/scenes/models/%.gltf: examples/make_%.py
 	@scripts/install_packages.sh example
 	@python3 $< $@
 

@@ -72,36 +72,6 @@ static nb_affine from_assimp(const struct aiMatrix4x4 *matrix)
                         {(double)matrix->c1, (double)matrix->c2, (double)matrix->c3, (double)matrix->c4}}};
 }
 
-static nb_affine compose(const nb_affine *outer, const nb_affine *inner)
-{
-    nb_affine result;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++) {
-            const double *row = outer->m[i];
-            result.m[i][j] = row[0] * inner->m[0][j] + row[1] * inner->m[1][j] + row[2] * inner->m[2][j];
-            if (j == 3) result.m[i][j] += row[3];
-        }
-    return result;
-}
-
-/* First to metres, y up; then scale, then rotation; the position stays apart, as the meshes' origin. */
-static nb_affine place_of(const nb_model_source *source)
-{
-    const double x = source->rotation[0], y = source->rotation[1], z = source->rotation[2], w = source->rotation[3];
-    const double rotation[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
-                                   {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
-                                   {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
-    nb_affine place = {0};
-    for (int j = 0; j < 3; j++) {
-        double axis[3] = {0};
-        axis[j] = 1;
-        nb_space_convert_place(&source->space, axis);
-        for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 3; k++) place.m[i][j] += rotation[i][k] * (source->scale[k] * axis[k]);
-    }
-    return place;
-}
-
 /* ---- the scene graph
  * ------------------------------------------------------------------------------------------------- */
 
@@ -135,7 +105,7 @@ static nebel_result take_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb
 static nebel_result visit(nb_assimp *in, stack *nodes)
 {
     const waiting top = nodes->items[--nodes->count];
-    const nb_affine own = from_assimp(&top.node->mTransformation), place = compose(&top.place, &own);
+    const nb_affine own = from_assimp(&top.node->mTransformation), place = nb_affine_compose(&top.place, &own);
     nebel_result result = NEBEL_OK;
     for (unsigned i = 0; i < top.node->mNumMeshes && result == NEBEL_OK; i++)
         if (top.node->mMeshes[i] < in->scene->mNumMeshes)
@@ -148,7 +118,8 @@ static nebel_result visit(nb_assimp *in, stack *nodes)
 static nebel_result walk(nb_assimp *in)
 {
     stack nodes = {0};
-    const nb_affine place = place_of(in->load->source);
+    nb_affine place = nb_model_place(in->load->source);
+    for (int i = 0; i < 3; i++) place.m[i][3] = 0; /* the position stays apart, as the meshes' origin */
     nebel_result result = push(in, &nodes, in->scene->mRootNode, &place);
     while (nodes.count > 0 && result == NEBEL_OK) result = visit(in, &nodes);
     nb_release(&in->load->allocator, nodes.items);
@@ -174,7 +145,7 @@ static nebel_result convert_meshes(nb_assimp *in)
         nb_model_fail(load, NEBEL_OK,
                       "%llu triangles of \"%s\" are left out; their corners are not numbers or do not exist",
                       (unsigned long long)in->left_out_triangles, load->source->file);
-    if (load->set->triangle_count > before) return NEBEL_OK;
+    if (load->set->triangle_count > before || load->source->has_fog) return NEBEL_OK;
     return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", load->source->file);
 }
 

@@ -6,11 +6,6 @@
 
 #include <assimp/scene.h>
 
-/* A place in the model's own space times three rows of four: R x = m[.][0..2] x + m[.][3]. */
-typedef struct nb_affine {
-    double m[3][4];
-} nb_affine;
-
 /* What a material says, once it has been looked at. */
 typedef struct nb_surface {
     bool known;

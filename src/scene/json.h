@@ -47,6 +47,7 @@ typedef bool (*nb_json_take)(nb_json *json, const nb_json_node *value, void *use
 typedef struct nb_json_desc {
     const char *text;
     size_t size;
+    size_t lead;      /* bytes before what the user wrote, without a line's end: places count from behind them */
     const char *name; /* of the file, in messages */
     nebel_allocator allocator;
     nebel_log log;

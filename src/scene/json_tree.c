@@ -28,7 +28,9 @@ bool nb_json_has_key(const nb_json_node *node, const char *key)
 nb_text_place nb_json_place(nb_json *json, size_t offset)
 {
     nb_text_move(json->desc.text, &json->place, offset);
-    return json->place;
+    nb_text_place place = json->place;
+    if (place.line == 1 && place.column > json->desc.lead) place.column -= json->desc.lead;
+    return place;
 }
 
 /* Keys longer than this are cut in messages. */

@@ -1,6 +1,7 @@
 #include "scene/model.h"
 
 #include <stdio.h>
+#include <string.h>
 
 nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const char *format, ...)
 {
@@ -22,6 +23,23 @@ static void keep_note(nebel_result result, const char *message, void *user)
 nebel_log nb_note_log(nb_note *note)
 {
     return (nebel_log){keep_note, note};
+}
+
+nb_affine nb_model_place(const nb_model_source *model)
+{
+    nb_affine own = {0};
+    nebel_transform transform;
+    for (int j = 0; j < 3; j++) {
+        double axis[3] = {0};
+        axis[j] = 1;
+        nb_space_convert_place(&model->space, axis);
+        for (int i = 0; i < 3; i++) own.m[i][j] = axis[i];
+    }
+    memcpy(transform.position, model->position, sizeof transform.position);
+    memcpy(transform.rotation, model->rotation, sizeof transform.rotation);
+    memcpy(transform.scale, model->scale, sizeof transform.scale);
+    const nb_affine placed = nb_affine_from_transform(&transform);
+    return nb_affine_compose(&placed, &own);
 }
 
 /* ---- meshes

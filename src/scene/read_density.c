@@ -96,11 +96,23 @@ bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_de
     return nb_value_members(in->json, node, &keys, found) && read_members(in->json, found, density);
 }
 
+/* In a node of a model a text may name a density that needs no numbers. */
+static bool read_named(nb_json *json, const nb_json_node *node, nebel_shape_type shape, nebel_density *density)
+{
+    static const char *const names[] = {"constant", "radial"};
+    static const nebel_density_type types[] = {NEBEL_DENSITY_CONSTANT, NEBEL_DENSITY_RADIAL};
+    const int choice = nb_value_choice(json, node, names, 2);
+    if (choice < 0 || !check_type(json, node, (int)types[choice], shape)) return false;
+    *density = (nebel_density){.type = types[choice], .power = types[choice] == NEBEL_DENSITY_RADIAL ? 1 : 0};
+    return true;
+}
+
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density)
 {
     const nb_json_node *found[DENSITY_KEY_COUNT];
     nb_json *json = in->json;
     if (node == NULL) return true;
+    if (in->node != NULL && node->type == NB_JSON_STRING) return read_named(json, node, shape, density);
     const int type = nb_value_type(json, node, type_names, TYPE_COUNT);
     if (type < 0 || !check_type(json, find_type(json, node), type, shape) ||
         !nb_value_members(json, node, &density_keys[type], found))

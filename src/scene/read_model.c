@@ -125,7 +125,8 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
     return (found[FILE_KEY] != NULL ? read_file(in, found[FILE_KEY], &model)
                                     : read_heightfield(in, found[HEIGHTFIELD], &model)) &&
            read_placement(json, found, &model) && nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) &&
-           convert_model(in, node, &model) && keep_model(in, node, &model);
+           convert_model(in, node, &model) && (found[FILE_KEY] == NULL || nb_read_nodes(in, found[FILE_KEY], &model)) &&
+           keep_model(in, node, &model);
 }
 
 /* ---- points

@@ -38,11 +38,11 @@ static const nb_keys moving_keys[] = {
     {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"},
     {key_names, VOLUME_KEY_COUNT, NB_BIT(FRAME) | NB_BIT(SHAPE), NB_BIT(FRAME), "a key of excluded fog"}};
 
-static bool read_operation(nb_json *json, const nb_json_node *volume, nebel_operation *operation)
+static bool read_operation(nb_json *json, const nb_json_node *volume, const char *prefix, nebel_operation *operation)
 {
     static const char *const names[] = {"add", "exclude"};
     for (const nb_json_node *node = nb_json_first(json, volume); node != NULL; node = nb_json_next(json, node)) {
-        if (!nb_json_has_key(node, "operation")) continue;
+        if (!nb_value_is_key(node, prefix, "operation")) continue;
         const int choice = nb_value_choice(json, node, names, 2);
         if (choice < 0) return false;
         *operation = (nebel_operation)choice;
@@ -283,9 +283,35 @@ static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const n
     nb_volume_track track = {.volume = in->scene->data.volume_count};
     if (!read_keys(in, found[KEYS], found, volume, &track)) return false;
     nb_space_convert_volume(&in->space, volume);
+    if (in->node != NULL && !nb_read_place_volume(in, node, volume)) return false;
     if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], &track)) return false;
     if (track.key_count > 0) *volume = nb_volume_at(&track, 0);
     return keep_volume(in, node, volume, name) && keep_track(in, node, &track);
+}
+
+/* A node of a model has its shape from the modelling program, where it names none, and does not move. */
+static bool read_members(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume,
+                         const nb_json_node **found)
+{
+    const char *prefix = in->node != NULL ? in->node->prefix : "";
+    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "a volume {\"shape\": ...}") ||
+        !read_operation(in->json, node, prefix, &volume->operation))
+        return false;
+    nb_keys keys = volume_keys[volume->operation];
+    if (in->node == NULL)
+        return nb_value_members(in->json, node, &keys, found) && nb_read_shape(in, found[SHAPE], &volume->shape);
+    keys.allowed &= ~NB_BIT(KEYS);
+    keys.required = 0;
+    keys.owner = "a fog node";
+    return nb_value_members_after(in->json, node, prefix, &keys, found) &&
+           nb_read_node_shape(in, found[SHAPE], &volume->shape);
+}
+
+static bool read_name(nb_scene_reader *in, const nb_json_node *node, const char **name)
+{
+    if (node != NULL || in->node == NULL) return nb_value_text(in->json, node, &in->scene->arena, name);
+    *name = nb_arena_copy_text(&in->scene->arena, in->node->name, strlen(in->node->name));
+    return *name != NULL;
 }
 
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
@@ -294,11 +320,8 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     nb_json *json = in->json;
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};
     const char *name = "";
-    if (!nb_value_is(json, node, NB_JSON_OBJECT, "a volume {\"shape\": ...}") ||
-        !read_operation(json, node, &volume.operation) ||
-        !nb_value_members(json, node, &volume_keys[volume.operation], found) ||
-        !nb_value_text(json, found[NAME], &in->scene->arena, &name) || !nb_read_shape(in, found[SHAPE], &volume.shape))
-        return false;
+    if (!read_members(in, node, &volume, found)) return false;
+    if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     if (volume.operation == NEBEL_OPERATION_ADD &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
          !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction) ||

@@ -4,12 +4,14 @@
 
 #include <nebel/scene.h>
 
+#include "scene/affine.h"
 #include "scene/space.h"
 #include "scene/value.h"
 
 /* A model or height field as the file describes it. */
 typedef struct nb_model_source {
     const char *file;  /* path, resolved against the scene's folder */
+    bool has_fog;      /* in its nodes */
     const char *where; /* "FILE:LINE:COLUMN: models[0].file", for messages */
     bool is_heightfield;
     nb_space space; /* of the file's own numbers */
@@ -64,6 +66,15 @@ struct nebel_scene {
     bool models_loaded;
 };
 
+/* What a node of a model says about fog. */
+#define NB_NODE_PREFIX "nebel_"
+
+typedef struct nb_fog_node {
+    nb_affine place;    /* in the world */
+    const char *name;   /* of the volume, where it has no other */
+    const char *prefix; /* of its keys; "": none */
+} nb_fog_node;
+
 /* The keys that a scene may have. */
 enum { NB_SCENE_SECTIONS = 11 };
 
@@ -72,6 +83,7 @@ typedef struct nb_scene_reader {
     nb_json *json;
     nebel_scene *scene;
     nb_space space;                            /* of the file's numbers */
+    const nb_fog_node *node;                   /* of a model, whose fog is being read; NULL: the scene's own */
     nebel_fog *trial;                          /* takes every volume once, for the core's own checks */
     char core_message[512];                    /* what the core said about the last one */
     uint32_t seen;                             /* sections */
@@ -88,7 +100,16 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 /* Points and their number, from a model file. NULL: none. */
 bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula);
+
+/* The fog in the nodes of a glTF model. Sets model->has_fog. */
+bool nb_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model);
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+
+/* The shape of a node: an object like any other, a name, or NULL, a box. 1 is the size of an empty. */
+bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
+
+/* Takes a volume from its node's coordinates to the world's. */
+bool nb_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume);
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
 
 /* The numbers that a key of fog gives anew. Numbers it leaves out stay, as do type, planes and parts. */
@@ -115,6 +136,9 @@ bool nb_camera_is_upright(const nebel_camera *camera);
 /* The keys "up" and "unit" of a scene or a model. */
 bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space);
 bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_space *space);
+
+/* Where a model's numbers are in the world. */
+nb_affine nb_model_place(const nb_model_source *model);
 
 void nb_models_release(nebel_scene *scene);
 

@@ -20,10 +20,10 @@ typedef struct list {
     size_t size;
 } list;
 
-static void append(list *names, const char *separator, const char *name)
+static void append(list *names, const char *prefix, const char *name)
 {
     const size_t room = sizeof names->text - names->size;
-    const int length = snprintf(names->text + names->size, room, "%s%s", names->size > 0 ? separator : "", name);
+    const int length = snprintf(names->text + names->size, room, "%s%s%s", names->size > 0 ? ", " : "", prefix, name);
     if (length > 0) names->size += (size_t)length < room ? (size_t)length : room - 1;
 }
 
@@ -34,8 +34,8 @@ static bool is_near(const char *word, size_t size, const char *name)
 }
 
 /* "; did you mean "radius"?" for the nearest of the allowed names, "" where none is near. */
-static void suggest(const char *word, size_t size, const char *const *names, uint32_t count, uint32_t allowed,
-                    char text[64])
+static void suggest(const char *word, size_t size, const char *prefix, const char *const *names, uint32_t count,
+                    uint32_t allowed, char text[64])
 {
     size_t best = SIZE_MAX;
     text[0] = '\0';
@@ -44,27 +44,46 @@ static void suggest(const char *word, size_t size, const char *const *names, uin
         const size_t distance = nb_text_distance(word, size, names[i], strlen(names[i]));
         if (distance >= best) continue;
         best = distance;
-        snprintf(text, 64, "; did you mean \"%s\"?", names[i]);
+        snprintf(text, 64, "; did you mean \"%s%s\"?", prefix, names[i]);
     }
 }
 
-static void fail_unknown_key(nb_json *json, const nb_json_node *node, const nb_keys *keys)
+static void fail_unknown_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_keys *keys)
 {
     list allowed = {.size = 0};
     char suggestion[64];
     for (uint32_t i = 0; i < keys->count; i++)
-        if ((keys->allowed & NB_BIT(i)) != 0) append(&allowed, ", ", keys->names[i]);
-    suggest(node->key, node->key_size, keys->names, keys->count, keys->allowed, suggestion);
+        if ((keys->allowed & NB_BIT(i)) != 0) append(&allowed, prefix, keys->names[i]);
+    const size_t skipped = strlen(prefix);
+    suggest(node->key + skipped, node->key_size - skipped, prefix, keys->names, keys->count, keys->allowed, suggestion);
     nb_json_fail_key(json, NEBEL_ERROR_FORMAT, node, "unknown key; %s has: %s%s", keys->owner, allowed.text,
                      suggestion);
 }
 
-int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys)
+static bool has_prefix(const nb_json_node *node, const char *prefix)
+{
+    const size_t size = strlen(prefix);
+    return node->key_size >= size && (size == 0 || memcmp(node->key, prefix, size) == 0);
+}
+
+bool nb_value_is_key(const nb_json_node *node, const char *prefix, const char *name)
+{
+    const size_t skipped = strlen(prefix), size = strlen(name);
+    return node->key != NULL && has_prefix(node, prefix) && node->key_size == skipped + size &&
+           memcmp(node->key + skipped, name, size) == 0;
+}
+
+static int find_key(nb_json *json, const nb_json_node *node, const char *prefix, const nb_keys *keys)
 {
     for (uint32_t i = 0; i < keys->count; i++)
-        if ((keys->allowed & NB_BIT(i)) != 0 && nb_json_has_key(node, keys->names[i])) return (int)i;
-    fail_unknown_key(json, node, keys);
+        if ((keys->allowed & NB_BIT(i)) != 0 && nb_value_is_key(node, prefix, keys->names[i])) return (int)i;
+    fail_unknown_key(json, node, prefix, keys);
     return -1;
+}
+
+int nb_value_find_key(nb_json *json, const nb_json_node *node, const nb_keys *keys)
+{
+    return find_key(json, node, "", keys);
 }
 
 static bool fail_missing(nb_json *json, const nb_json_node *object, const nb_keys *keys, uint32_t missing)
@@ -83,13 +102,15 @@ bool nb_value_fail_repeated(nb_json *json, const nb_json_node *node, size_t firs
                             place.column);
 }
 
-bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found)
+bool nb_value_members_after(nb_json *json, const nb_json_node *object, const char *prefix, const nb_keys *keys,
+                            const nb_json_node **found)
 {
     uint32_t seen = 0;
     if (!nb_value_is(json, object, NB_JSON_OBJECT, "an object {...}")) return false;
     for (uint32_t i = 0; i < keys->count; i++) found[i] = NULL;
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node)) {
-        const int key = nb_value_find_key(json, node, keys);
+        if (!has_prefix(node, prefix)) continue;
+        const int key = find_key(json, node, prefix, keys);
         if (key < 0) return false;
         if (found[key] != NULL) return nb_value_fail_repeated(json, node, found[key]->key_offset);
         seen |= NB_BIT(key);
@@ -97,6 +118,11 @@ bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *
     }
     const uint32_t missing = keys->required & ~seen;
     return missing == 0 || fail_missing(json, object, keys, missing);
+}
+
+bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found)
+{
+    return nb_value_members_after(json, object, "", keys, found);
 }
 
 int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count)
@@ -107,13 +133,13 @@ int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *
         const size_t size = strlen(names[i]);
         const bool equal = node->string_size == size && memcmp(node->string, names[i], size) == 0;
         if (node->type == NB_JSON_STRING && equal) return i;
-        append(&allowed, ", ", names[i]);
+        append(&allowed, "", names[i]);
     }
     if (node->type != NB_JSON_STRING) {
         nb_value_is(json, node, NB_JSON_STRING, "a string");
         return -1;
     }
-    suggest(node->string, node->string_size, names, (uint32_t)count, UINT32_MAX, suggestion);
+    suggest(node->string, node->string_size, "", names, (uint32_t)count, UINT32_MAX, suggestion);
     nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "unknown; must be one of: %s%s", allowed.text, suggestion);
     return -1;
 }
@@ -124,7 +150,7 @@ int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *
     if (!nb_value_is(json, object, NB_JSON_OBJECT, "an object {\"type\": ...}")) return -1;
     for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node))
         if (nb_json_has_key(node, "type")) return nb_value_choice(json, node, names, count);
-    for (int i = 0; i < count; i++) append(&allowed, ", ", names[i]);
+    for (int i = 0; i < count; i++) append(&allowed, "", names[i]);
     nb_json_fail(json, NEBEL_ERROR_FORMAT, object, "the key \"type\" is missing; must be one of: %s", allowed.text);
     return -1;
 }

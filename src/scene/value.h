@@ -19,6 +19,13 @@ typedef struct nb_keys {
  * errors. */
 bool nb_value_members(nb_json *json, const nb_json_node *object, const nb_keys *keys, const nb_json_node **found);
 
+/* The same where keys have a prefix in the file ("": none): members without it are none of ours. */
+bool nb_value_members_after(nb_json *json, const nb_json_node *object, const char *prefix, const nb_keys *keys,
+                            const nb_json_node **found);
+
+/* Whether the member's key is the name, with the prefix ("": none) before it. */
+bool nb_value_is_key(const nb_json_node *node, const char *prefix, const char *name);
+
 /* Fails because of the node's key, which was there before, at `first`. Returns false. */
 bool nb_value_fail_repeated(nb_json *json, const nb_json_node *node, size_t first);
 
