@@ -184,6 +184,100 @@ static void test_a_particle_is_exact_fog(void **unused)
     }
 }
 
+enum { CROWD = 6000, CROWD_RAYS = 37 };
+
+static nebel_snapshot *crowd(nebel_particle_profile profile)
+{
+    nebel_nebula_desc desc = a_nebula();
+    desc.count = CROWD;
+    desc.profile = profile;
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    for (int i = 0; i < CROWD; i++) {
+        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
+        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    }
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static void aim(nebel_ray rays[CROWD_RAYS])
+{
+    uint64_t state = 2;
+    for (int i = 0; i < CROWD_RAYS; i++) {
+        rays[i] = (nebel_ray){
+            .origin = {1e3, 5, -30}, .direction = {dice(&state, -.3, .3), dice(&state, -.3, .3), 1}, .t_max = HUGE_VAL};
+        if (i % 5 == 0) rays[i].t_max = dice(&state, 15, 35);
+    }
+}
+
+static void trace(const nebel_snapshot *fog, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
+                  nebel_light *lights)
+{
+    assert_int_equal(nebel_trace(fog, desc, n, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
+/* A hundred particles on a ray: the march then looks at those near by alone, and no ray may see whose company it is in.
+ */
+static void test_a_crowd_is_integrated_as_one_particle_is(void **unused)
+{
+    (void)unused;
+    static nebel_ray rays[CROWD_RAYS];
+    static nebel_light truth[CROWD_RAYS], light[CROWD_RAYS], alone;
+    aim(rays);
+    for (int p = 0; p < NEBEL_PARTICLE_COUNT; p++) {
+        nebel_snapshot *fog = crowd((nebel_particle_profile)p);
+        trace(fog, &(nebel_trace_desc){.tolerance = 1e-9}, CROWD_RAYS, rays, truth);
+        trace(fog, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT}, CROWD_RAYS, rays, light);
+        for (int i = 0; i < CROWD_RAYS; i++) {
+            for (int c = 0; c < 3; c++) {
+                assert_true(fabs(light[i].transmittance[c] - truth[i].transmittance[c]) <=
+                            light[i].error + truth[i].error);
+                assert_true(fabs(light[i].in_scattering[c] - truth[i].in_scattering[c]) <=
+                            light[i].error + truth[i].error);
+            }
+            assert_true(light[i].error < .0021 * 10); /* the most radiant particle has 1 / 0.1 */
+            trace(fog, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT}, 1, &rays[i], &alone);
+            assert_memory_equal(&alone, &light[i], sizeof alone);
+        }
+        nebel_release_snapshot(fog);
+    }
+}
+
+/* The same light from everywhere: what the parts of a ray give must be what the whole ray gives. */
+static void test_a_crowd_may_be_cut_anywhere(void **unused)
+{
+    (void)unused;
+    static nebel_ray rays[CROWD_RAYS], parts[2 * CROWD_RAYS];
+    static nebel_light whole[CROWD_RAYS], part[2 * CROWD_RAYS];
+    nebel_snapshot *fog = crowd(NEBEL_PARTICLE_SOFT);
+    aim(rays);
+    for (int i = 0; i < CROWD_RAYS; i++) {
+        const double length =
+            sqrt(rays[i].direction[0] * rays[i].direction[0] + rays[i].direction[1] * rays[i].direction[1] + 1);
+        parts[2 * i] = parts[2 * i + 1] = rays[i];
+        rays[i].t_max = 60;
+        parts[2 * i].t_max = 29;
+        parts[2 * i + 1].t_max = 31;
+        for (int c = 0; c < 3; c++) parts[2 * i + 1].origin[c] += 29 * rays[i].direction[c] / length;
+    }
+    const nebel_trace_desc desc = {.tolerance = 1e-9};
+    trace(fog, &desc, CROWD_RAYS, rays, whole);
+    trace(fog, &desc, 2 * CROWD_RAYS, parts, part);
+    for (int i = 0; i < CROWD_RAYS; i++) {
+        for (int c = 0; c < 3; c++) {
+            const nebel_light *near = &part[2 * i], *far = &part[2 * i + 1];
+            assert_true(fabs(near->transmittance[c] * far->transmittance[c] - whole[i].transmittance[c]) < 1e-11);
+            const double sum = near->in_scattering[c] + near->transmittance[c] * far->in_scattering[c];
+            assert_true(fabs(sum - whole[i].in_scattering[c]) < 4e-8);
+        }
+    }
+    nebel_release_snapshot(fog);
+}
+
 static void expect(nebel_result result, nebel_nebula_desc desc)
 {
     fog_messages messages = {0};
@@ -247,6 +341,8 @@ int main(void)
         cmocka_unit_test(test_the_same_seed_gives_the_same_particles),
         cmocka_unit_test(test_eddies_carry_no_farther_than_told),
         cmocka_unit_test(test_a_particle_is_exact_fog),
+        cmocka_unit_test(test_a_crowd_is_integrated_as_one_particle_is),
+        cmocka_unit_test(test_a_crowd_may_be_cut_anywhere),
         cmocka_unit_test(test_refuses_what_is_not_a_nebula),
         cmocka_unit_test(test_memory_may_fail),
     };
