@@ -6,6 +6,7 @@
 
 const char *nb_bench_frame(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_opengl(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_particles(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_pass(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_process(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures);
