@@ -37,6 +37,10 @@ function(nebel_add_kernel file level)
     target_compile_definitions(${target} PRIVATE NB_ISA_${upper}=1 NB_SUFFIX=${level})
     # gcc's note that vectors wider than the base level change the calling convention: the kernels pass none between objects.
     target_compile_options(${target} PRIVATE -Wno-psabi ${nebel_flags_${level}})
+    # The march is full of loops over three colours, which -O2 leaves in memory.
+    if(stem STREQUAL trace_kernel AND CMAKE_C_COMPILER_ID STREQUAL GNU)
+        target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
+    endif()
 endfunction()
 
 # Returns the objects of all kernels and the NB_HAVE_ definitions that tell the dispatcher which there are.

@@ -8,9 +8,8 @@ static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real 
 {
     nb_real depth = NB_F(0.0);
     *extinction = NB_F(0.0);
-    for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
-        if (!nb_any(k->inside)) continue;
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
         depth = depth + k->extinction[channel] * contact_integral(k, start, h).value;
         *extinction = *extinction + k->extinction[channel] * contact_density(k, start + nb_widen(h));
     }

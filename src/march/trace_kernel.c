@@ -46,7 +46,7 @@
 typedef struct workspace {
     contact contacts[STACK_CONTACTS];
     leaf_span spans[2 * STACK_CONTACTS];
-    uint32_t window[STACK_CONTACTS];
+    uint32_t window[STACK_CONTACTS], present[STACK_CONTACTS];
     stretch stretches[STACK_CONTACTS];
     double lasts[STACK_CONTACTS];
     size_t contact_capacity, span_capacity;
@@ -77,11 +77,12 @@ static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t
 {
     march *m = &w->m;
     nb_release(allocator, w->window_memory);
-    w->window_memory = nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + sizeof *m->window);
+    w->window_memory = nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + 2 * sizeof *m->window);
     if (w->window_memory == NULL) return 0;
     m->stretches = w->window_memory;
     m->lasts = (double *)(void *)(m->stretches + capacity);
     m->window = (uint32_t *)(void *)(m->lasts + capacity);
+    m->present = m->window + capacity;
     return 1;
 }
 
@@ -117,6 +118,7 @@ static void open_workspace(workspace *w)
     w->found_capacity = 0;
     w->m.contacts = w->contacts;
     w->m.window = w->window;
+    w->m.present = w->present;
     w->m.stretches = w->stretches;
     w->m.lasts = w->lasts;
     w->m.spans = w->spans;
@@ -300,7 +302,7 @@ static void gather_piece(const march *m, const piece *p, const allowance *may, g
     if (nb_any(closed)) gather_closed(g, &sum, closed);
     if (nb_any(mixed)) {
         gathered within = *g;
-        gather_mixed(m, p, mixed, may, &within);
+        gather_mixed(m, p, &sum, mixed, may, &within);
         for (int c = 0; c < 3; c++) g->radiance[c] = within.radiance[c];
         g->radiance_error = within.radiance_error;
     }
@@ -314,7 +316,9 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
     const nb_mask lanes = nb_narrow_mask(span->enter < span->leave);
     const piece p = {span->enter, span->leave, nb_narrow(span->leave - span->enter), lanes};
     m->contacts[0].inside = lanes;
-    look_at_all(m);
+    m->window_count = 1;
+    m->present[0] = 0;
+    m->present_first = 0;
     gather_piece(m, &p, may, g, unbounded);
 }
 

@@ -118,9 +118,8 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     const nb_real along = NB_F(0.5) * (ellipse + NB_F(1.0) / ellipse) * radius;
     const nb_real across = NB_F(0.5) * (ellipse - NB_F(1.0) / ellipse) * radius;
     nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, light[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
-        if (!nb_any(k->inside)) continue;
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
         const nb_real ceiling = nb_select(k->inside, density_ceiling(k, middle, along, across), NB_F(0.0));
         for (int c = 0; c < 3; c++) {
             depth[c] = depth[c] + k->extinction[c] * ceiling;
@@ -144,9 +143,8 @@ static nb_mask find_range(const march *m, step *s)
         s->least[c] = NB_HUGE;
         s->most[c] = NB_F(0.0);
     }
-    for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
-        if (!nb_any(k->inside)) continue;
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
         if (k->medium->emits) emits = nb_or(emits, k->inside);
         for (int c = 0; c < 3; c++) {
             s->least[c] = nb_select(k->inside, nb_min(k->radiance[c], s->least[c]), s->least[c]);
@@ -173,14 +171,13 @@ static void bound_crude(const march *m, step *s, const gathered *g)
 static piece_sum sum_step(const march *m, nb_wide start, nb_real length)
 {
     piece_sum sum = no_sum();
-    for (size_t i = 0; i < m->window_count; i++)
-        if (nb_any(in_window(m, i)->inside)) add_contact(&sum, in_window(m, i), start, length);
+    for (size_t i = m->present_first; i < m->window_count; i++) add_contact(&sum, present(m, i), start, length);
     return sum;
 }
 
-static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length)
+static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length, const piece_sum *sum)
 {
-    step s = {.start = start, .length = length, .sum = sum_step(m, start, length), .drop = NB_F(0.0)};
+    step s = {.start = start, .length = length, .sum = *sum, .drop = NB_F(0.0)};
     s.crude_bound[0] = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         s.behind[c] = nb_exp(-(g->depth[c] + s.sum.depth[c]));
@@ -190,12 +187,6 @@ static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide
     bound_crude(m, &s, g);
     return s;
 }
-
-/* Light and optical depth so far at each node of a step. */
-typedef struct node_sums {
-    nb_real light[3][NODE_COUNT], depth[3][NODE_COUNT];
-    nb_real extinction[3][NODE_COUNT]; /* of the media whose depth is still to be had from it */
-} node_sums;
 
 /* Profiles that are polynomials between kinks, of a degree below the number of nodes: the polynomial through their values there is they. */
 static int is_polynomial(const nebel_density *density)
@@ -209,44 +200,49 @@ static int is_polynomial(const nebel_density *density)
     }
 }
 
-static void add_nodes(node_sums *sums, const contact *k, const step *s)
+/* A node of a step: its place, light per metre, the optical depth up to it where it is known, and the extinction of the media whose
+ * optical depth is still to be had from their extinction at all nodes. */
+typedef struct node {
+    nb_real h, share; /* m from the start of the step, and as a part of it */
+    nb_real light[3], depth[3], extinction[3];
+} node;
+
+static void add_to_node(node *n, const contact *k, const step *s)
 {
-    const nb_real nodes[NODE_COUNT] = NODES;
-    const int polynomial = is_polynomial(&k->medium->body.density);
-    for (int n = 0; n < NODE_COUNT; n++) {
-        const nb_real h = s->length * nodes[n];
-        const nb_real density = nb_select(k->inside, contact_density(k, s->start + nb_widen(h)), NB_F(0.0));
-        const nb_real before = polynomial ? NB_F(0.0) : nb_select(k->inside, contact_integral(k, s->start, h).value, NB_F(0.0));
-        for (int c = 0; c < 3; c++) {
-            sums->light[c][n] = sums->light[c][n] + k->light[c] * density;
-            if (polynomial) sums->extinction[c][n] = sums->extinction[c][n] + k->extinction[c] * density;
-            else sums->depth[c][n] = sums->depth[c][n] + k->extinction[c] * before;
-        }
+    const nb_real density = nb_select(k->inside, contact_density_within(k, s->start, s->length, n->share), NB_F(0.0));
+    for (int c = 0; c < 3; c++) n->light[c] = n->light[c] + k->light[c] * density;
+    if (is_polynomial(&k->medium->body.density)) {
+        for (int c = 0; c < 3; c++) n->extinction[c] = n->extinction[c] + k->extinction[c] * density;
+        return;
     }
+    const nb_real before = nb_select(k->inside, contact_integral(k, s->start, n->h).value, NB_F(0.0));
+    for (int c = 0; c < 3; c++) n->depth[c] = n->depth[c] + k->extinction[c] * before;
 }
 
 /* The optical depth of polynomials, exact at every node. */
-static nb_real depth_of_polynomials(const nb_real extinction[NODE_COUNT], int n, nb_real length)
+static nb_real depth_of_polynomials(const node nodes[NODE_COUNT], int n, int c, nb_real length)
 {
     nb_real mean = NB_F(0.0);
-    for (int i = 0; i < NODE_COUNT; i++) mean = mean + extinction[i] * REAL(up_to_node[n][i]);
+    for (int i = 0; i < NODE_COUNT; i++) mean = mean + nodes[i].extinction[c] * REAL(up_to_node[n][i]);
     return nb_max(mean * length, NB_F(0.0));
 }
 
 /* Six nodes with exact optical depth at each. */
 static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real radiance[3])
 {
-    const nb_real weights[NODE_COUNT] = WEIGHTS;
-    node_sums sums;
-    for (int c = 0; c < 3; c++)
-        for (int n = 0; n < NODE_COUNT; n++) sums.light[c][n] = sums.depth[c][n] = sums.extinction[c][n] = NB_F(0.0);
-    for (size_t i = 0; i < m->window_count; i++)
-        if (nb_any(in_window(m, i)->inside)) add_nodes(&sums, in_window(m, i), s);
+    const nb_real shares[NODE_COUNT] = NODES, weights[NODE_COUNT] = WEIGHTS;
+    node nodes[NODE_COUNT];
+    for (int n = 0; n < NODE_COUNT; n++) {
+        node sum = {.h = s->length * shares[n], .share = shares[n]};
+        for (int c = 0; c < 3; c++) sum.light[c] = sum.depth[c] = sum.extinction[c] = NB_F(0.0);
+        for (size_t i = m->present_first; i < m->window_count; i++) add_to_node(&sum, present(m, i), s);
+        nodes[n] = sum;
+    }
     for (int c = 0; c < 3; c++) {
         radiance[c] = NB_F(0.0);
         for (int n = 0; n < NODE_COUNT; n++) {
-            const nb_real before = sums.depth[c][n] + depth_of_polynomials(sums.extinction[c], n, s->length);
-            radiance[c] = radiance[c] + weights[n] * sums.light[c][n] * nb_exp(-(g->depth[c] + before));
+            const nb_real before = nodes[n].depth[c] + depth_of_polynomials(nodes, n, c, s->length);
+            radiance[c] = radiance[c] + weights[n] * nodes[n].light[c] * nb_exp(-(g->depth[c] + before));
         }
         radiance[c] = radiance[c] * s->length;
     }
@@ -296,21 +292,22 @@ typedef struct allowance {
 static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
 {
     nb_wide nearest = end;
-    for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
-        if (!nb_any(k->inside)) continue;
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
         const nb_wide kink = contact_kink(k, t);
         nearest = nb_wselect(nb_wand(nb_widen_mask(k->inside), kink < nearest), kink, nearest);
     }
     return nearest;
 }
 
-/* Halves the step in every lane until its bound fits. */
+/* Halves the step in every lane until its bound fits. `whole` is the sum of the piece. */
 static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, nb_wide start, nb_real length,
-                     nb_mask pending, nb_real *ellipse)
+                     nb_mask pending, nb_real *ellipse, const piece_sum *whole)
 {
     for (;;) {
-        const step s = consider(m, g, *ellipse, start, length);
+        const int is_whole = nb_wall(start == p->start) && nb_all(length == p->length);
+        const piece_sum sum = is_whole ? *whole : sum_step(m, start, length);
+        const step s = consider(m, g, *ellipse, start, length, &sum);
         const nb_mask last = length >= nb_narrow(p->end - start);
         const nb_real allowed = may->drop_share * s.drop + may->length_share * (length / p->length) +
                                 nb_select(last, may->last_share, NB_F(0.0));
@@ -324,7 +321,7 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
 
 /* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. Steps that never fit (their
  * number is bounded) end in one crude step, across whatever kinks are left, whose honest bound the error then shows. */
-static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const allowance *may, gathered *g)
+static void gather_mixed(const march *m, const piece *p, const piece_sum *whole, nb_mask lanes, const allowance *may, gathered *g)
 {
     nb_wide t = p->start;
     nb_real guess = p->length, ellipse = may->ellipse;
@@ -332,7 +329,7 @@ static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const al
         const nb_wide stop = nearest_kink(m, t, p->end);
         const nb_real rest = nb_narrow(stop - t);
         const nb_real wish = nb_min(guess, rest);
-        const step s = fit_step(m, g, may, p, t, wish, lanes, &ellipse);
+        const step s = fit_step(m, g, may, p, t, wish, lanes, &ellipse, whole);
         take_step(m, &s, g, lanes);
         t = nb_wselect(nb_widen_mask(s.length >= rest), stop, t + nb_widen(s.length));
         guess = s.length + s.length;
@@ -341,7 +338,9 @@ static void gather_mixed(const march *m, const piece *p, nb_mask lanes, const al
         lanes = nb_and(lanes, nb_narrow_mask(t < p->end));
     }
     if (!nb_any(lanes)) return;
-    step s = consider(m, g, ellipse, t, nb_narrow(p->end - t));
+    const nb_real rest = nb_narrow(p->end - t);
+    const piece_sum sum = sum_step(m, t, rest);
+    step s = consider(m, g, ellipse, t, rest, &sum);
     s.gauss_bound = NB_HUGE;
     take_step(m, &s, g, lanes);
 }

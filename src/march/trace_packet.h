@@ -61,6 +61,8 @@ typedef struct march {
 
     uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_window.h */
     size_t window_count;
+    uint32_t *present; /* of the window those within the current piece in any lane: from present_first to window_count */
+    size_t present_first;
     double window_end; /* up to here they are all there are */
     struct stretch *stretches; /* of all contacts, by their first places */
     double *lasts;         /* of all contacts */
@@ -251,6 +253,16 @@ static nb_real contact_density(const contact *k, nb_wide t)
         return nb_soft_edge_density(nb_wadd3(k->offset, nb_wscale3(k->slope, t)), k->size);
     default: return NB_F(1.0);
     }
+}
+
+/* The density a part `share` of the way through a step: in float, which the coordinates of a step are small enough for. */
+static nb_real contact_density_within(const contact *k, nb_wide start, nb_real length, nb_real share)
+{
+    const nebel_density *density = &k->medium->body.density;
+    if (density->type == NEBEL_DENSITY_CONSTANT) return NB_F(1.0);
+    if (density->type != NEBEL_DENSITY_RADIAL) return contact_density(k, start + nb_widen(length * share));
+    const nb_real u = coordinate(k, start) + nb_narrow(k->slope.x) * length * share;
+    return nb_radial_density(k->level, u, density->power);
 }
 
 static nb_estimate blur(nb_estimate estimate, nb_real noise, nb_real h)

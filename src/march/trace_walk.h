@@ -88,19 +88,19 @@ static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
 static int mark_inside(march *m, const piece *p)
 {
     nb_mask free_of_fog = nb_not(p->lanes);
-    int any = 0;
+    size_t first = m->window_count;
     for (size_t i = m->window_count; i-- > 0;) { /* exclusions come last in the canonical order */
         contact *k = in_window(m, i);
         k->inside = is_inside(m, k, p->start);
         if (k->medium->body.operation == NEBEL_OPERATION_EXCLUDE) {
             free_of_fog = nb_or(free_of_fog, k->inside);
-            k->inside = nb_mask_false;
             continue;
         }
         k->inside = nb_and(k->inside, nb_not(free_of_fog));
-        any = any || nb_any(k->inside);
+        if (nb_any(k->inside)) m->present[--first] = m->window[i];
     }
-    return any;
+    m->present_first = first;
+    return first < m->window_count;
 }
 
 static nb_real largest(const nb_real v[3])
@@ -136,9 +136,8 @@ static piece_sum sum_piece(const march *m, const piece *p)
     piece_sum sum = no_sum();
     nb_mask seen = nb_mask_false, uneven = nb_mask_false, emits = nb_mask_false, varies = nb_mask_false;
     nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = 0; i < m->window_count; i++) {
-        const contact *k = in_window(m, i);
-        if (!nb_any(k->inside)) continue;
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
         add_contact(&sum, k, p->start, p->length);
         const nb_mask again = nb_and(k->inside, seen);
         nb_mask differs = k->medium->emits ? nb_mask_true : emits;
@@ -269,8 +268,8 @@ static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum
 {
     nb_mask endless = nb_mask_false;
     const nb_mask open = nb_and(p->lanes, p->length >= NB_F(0.5) * NB_FAR);
-    for (size_t i = 0; i < m->window_count && nb_any(open); i++) {
-        const contact *k = in_window(m, i);
+    for (size_t i = m->present_first; i < m->window_count && nb_any(open); i++) {
+        const contact *k = present(m, i);
         if (!k->medium->emits) continue;
         const nb_mask here = nb_and(open, nb_and(k->inside, contact_integral(k, p->start, p->length).value >= NB_F(0.5) * NB_FAR));
         for (int c = 0; c < 3; c++)

@@ -21,6 +21,11 @@ static contact *in_window(const march *m, size_t i)
     return &m->contacts[m->window[i]];
 }
 
+static contact *present(const march *m, size_t i)
+{
+    return &m->contacts[m->present[i]];
+}
+
 static stretch stretch_of(const march *m, uint32_t index)
 {
     const contact *k = &m->contacts[index];
