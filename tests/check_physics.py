@@ -97,7 +97,8 @@ def height(check):
 
 
 def two_layers(check):
-    """Unreal's T = 2^-(sum L) is that of two layers whose extinction is (ln 2)^2 D 2^(-f (z - h)), here in metres."""
+    """Unreal's T = 2^-(sum L) is that of two layers whose extinction is (ln 2)^2 D 2^(-f (z - h)): here in metres, and as an
+    artist would copy the settings from the editor."""
     fog = []
     for name in ("layer1", "layer2"):
         layer = check["inputs"][name]
@@ -109,6 +110,13 @@ def two_layers(check):
     ray = ray_of(origin, direction, math.sqrt(x * x + y * y + z * z))
     yield fog, Case("T", ray, "T", check["expected"]["T_unreal"], double=1e-6)
     yield fog, Case("tau", ray, "tau", check["expected"]["tau_natural"], double=1e-6)
+    first, second = check["inputs"]["layer1"], check["inputs"]["layer2"]
+    copied = {"import": {"type": "unreal_height_fog", "FogDensity": first["FogDensity"], "FogHeightFalloff": first["HeightFalloff"],
+                         "RelativeLocation": [0, 0, first["height_cm"]],
+                         "SecondFogData": {"FogDensity": second["FogDensity"], "FogHeightFalloff": second["HeightFalloff"],
+                                           "FogHeightOffset": second["height_cm"] - first["height_cm"]}}}
+    yield [copied], Case("imported, T", ray, "T", check["expected"]["T_unreal"])
+    yield [copied], Case("imported, tau", ray, "tau", check["expected"]["tau_natural"])
 
 
 def ramp(check):

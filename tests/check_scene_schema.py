@@ -8,8 +8,8 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["scene", "read_camera", "read_density", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
-TABLE = re.compile(r"static const char \*const (?:\w+_)?(?:names|types|projections)\[\] = \{(.*?)\}", re.S)
+READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_density", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
+TABLE = re.compile(r"static const char \*const (?:\w+_)?(?:names|types|projections)\[\w*\] = \{(.*?)\}", re.S)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
 REFUSED = {"grid", "noise"}  # known to the reader only to be refused
 
@@ -30,6 +30,10 @@ BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [],
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": [{"frame": 1, "name": "a"}]}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "frame": 1}]}',
        '{"nebel": 1, "fog": [], "nebula": [{"points": {"file": "a.ply"}, "count": 3}]}',
+       '{"nebel": 1, "fog": [{"import": {"type": "unity_fog"}}]}',
+       '{"nebel": 1, "fog": [{"import": {"type": "unreal_height_fog", "FogMaxOpacity": 0.5}}]}',
+       '{"nebel": 1, "fog": [{"import": {"type": "hdrp_fog"}, "extinction": 1}]}',
+       '{"nebel": 1, "fog": [{"import": {"type": "bevy_distance_fog"}}]}',
        '{"nebel": 1, "fog": [], "background": "red"}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": "#fff"}]}',
        '{"nebel": 1, "fog": [], "nebula": [{"shape": {"type": "world"}, "count": 0}]}']
@@ -40,7 +44,7 @@ def reader_names():
     found = set()
     for name in READERS:
         for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
-            found |= set(re.findall(r'"([a-z_]+)"', table))
+            found |= set(re.findall(r'"([A-Za-z_3]+)"', table))
     return found - REFUSED
 
 
@@ -71,7 +75,7 @@ def judge(schema, faults):
         return
     validator = jsonschema.Draft202012Validator(schema)
     validator.check_schema(schema)
-    for path in sorted([*ROOT.glob("fuzz/corpus/scene/*.json"), *ROOT.glob("examples/scenes/*.json")]):
+    for path in sorted([*ROOT.glob("fuzz/corpus/scene/*.json"), *ROOT.glob("examples/scenes/*.json"), *ROOT.glob("examples/engines/*.json")]):
         for error in validator.iter_errors(json.loads(without_comments(path.read_text()))):
             faults.append(f"{path.relative_to(ROOT)}: {error.json_path}: {error.message[:200]}")
     for text in BAD:
@@ -81,12 +85,13 @@ def judge(schema, faults):
 
 def main():
     schema = json.loads((ROOT / "docs/scene.schema.json").read_text())
-    manual = set(re.findall(r"`([a-z_]+)`", (ROOT / "docs/scene-file.md").read_text()))
+    pages = "".join((ROOT / "docs" / page).read_text() for page in ("scene-file.md", "engines.md"))
+    manual = set(re.findall(r"`([A-Za-z_3]+)`", pages))
     names = reader_names()
     faults = [f"not in docs/scene.schema.json: {name}" for name in sorted(names - schema_names(schema))]
     faults += [f"not read by src/scene: {name}" for name in sorted(schema_names(schema) - names)]
-    faults += [f"not in docs/scene-file.md: {name}" for name in sorted(names - manual)]
-    words = set(re.findall(r'^"\\"([a-z_]+)\\""$', (ROOT / "fuzz/scene.dict").read_text(), re.M))
+    faults += [f"in no manual: {name}" for name in sorted(names - manual)]
+    words = set(re.findall(r'^"\\"([A-Za-z_3]+)\\""$', (ROOT / "fuzz/scene.dict").read_text(), re.M))
     faults += [f"not in fuzz/scene.dict: {name}" for name in sorted(names - words)]
     if len(names) < 50:
         faults.append(f"only {len(names)} keys found in src/scene: this check needs mending")

@@ -1,5 +1,5 @@
 /* One entry of the section "fog". */
-#include "scene/scene_internal.h"
+#include "scene/import.h"
 
 #include <math.h>
 #include <string.h>
@@ -314,8 +314,45 @@ static bool read_name(nb_scene_reader *in, const nb_json_node *node, const char 
     return *name != NULL;
 }
 
+/* ---- fog of other programs
+ * ------------------------------------------------------------------------------------------- */
+
+/* A source of the entry's own stands for the lights of the engine. */
+static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3], nebel_volume_desc *volume,
+                          const char *name)
+{
+    static const double black[3] = {0};
+    if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
+    if (!nb_value_color(in->json, found[2], &nb_range_not_negative, volume->source)) return false;
+    remember_lit(in, found[1], volume->albedo);
+    return nb_read_try(in, found[1], "", volume) && keep_volume(in, found[1], volume, name);
+}
+
+static bool read_imported(nb_scene_reader *in, const nb_json_node *node)
+{
+    static const char *const names[] = {"name", "import", "source"};
+    static const nb_keys keys = {names, 3, 7, 2, "imported fog"};
+    const nb_json_node *found[3];
+    const char *name = "";
+    nb_import fog = {.count = 0};
+    if (!nb_value_members(in->json, node, &keys, found) ||
+        !nb_value_text(in->json, found[0], &in->scene->arena, &name) || !nb_read_import(in, found[1], &fog))
+        return false;
+    for (size_t i = 0; i < fog.count; i++)
+        if (!keep_imported(in, found, &fog.volumes[i], name)) return false;
+    return true;
+}
+
+static bool is_imported(const nb_json *json, const nb_json_node *volume)
+{
+    const nb_json_node *node = volume->type == NB_JSON_OBJECT ? nb_json_first(json, volume) : NULL;
+    while (node != NULL && !nb_json_has_key(node, "import")) node = nb_json_next(json, node);
+    return node != NULL;
+}
+
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
 {
+    if (in->node == NULL && is_imported(in->json, node)) return read_imported(in, node);
     const nb_json_node *found[VOLUME_KEY_COUNT];
     nb_json *json = in->json;
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};

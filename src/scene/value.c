@@ -265,7 +265,7 @@ bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *ra
 }
 
 /* IEC 61966-2-1:1999, section 5.2. */
-static double linear_from_srgb(double value)
+double nb_value_linear_from_srgb(double value)
 {
     return value <= 0.04045 ? value / 12.92 : pow((value + 0.055) / 1.055, 2.4);
 }
@@ -278,7 +278,7 @@ static bool parse_color(const char *text, size_t size, double color[3])
     for (size_t i = 0; i < 3; i++) {
         const int high = nb_text_hex_digit(text[1 + i * digits]), low = nb_text_hex_digit(text[(i + 1) * digits]);
         if (high < 0 || low < 0) return false;
-        color[i] = linear_from_srgb((16 * high + low) / 255.0);
+        color[i] = nb_value_linear_from_srgb((16 * high + low) / 255.0);
     }
     return true;
 }

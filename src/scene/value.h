@@ -61,6 +61,9 @@ bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *ra
 /* The same, or "#rrggbb" or "#rgb": an sRGB color, made linear. 0 and 1 must be in the range. */
 bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3]);
 
+/* Of one channel, >= 0. */
+double nb_value_linear_from_srgb(double value);
+
 /* Copies a string without zero bytes into the arena. */
 bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text);
 

@@ -1,0 +1,141 @@
+/* Godot 4: the fog of an Environment, its volumetric fog, FogVolume with FogMaterial. Our axes and metres. */
+#include "scene/import.h"
+
+#include <math.h>
+
+static const double ln2 = 0.69314718055994530942;
+
+/* Color(r, g, b, a) holds sRGB values, also beyond 1. */
+static bool read_color(nb_json *json, const nb_json_node *node, double color[3])
+{
+    double rgba[4];
+    if (node == NULL || node->type != NB_JSON_ARRAY) return nb_value_color(json, node, &nb_range_not_negative, color);
+    if (!nb_value_numbers(json, node, &nb_range_not_negative, node->count == 4 ? 4 : 3, rgba)) return false;
+    for (int c = 0; c < 3; c++) color[c] = nb_value_linear_from_srgb(rgba[c]);
+    return true;
+}
+
+static bool read_albedo(nb_json *json, const nb_json_node *node, double albedo[3])
+{
+    if (!read_color(json, node, albedo)) return false;
+    if (albedo[0] <= 1 && albedo[1] <= 1 && albedo[2] <= 1) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is brighter than white; an albedo is at most 1");
+}
+
+/* ---- fog of the environment
+ * ------------------------------------------------------------------------------------------ */
+
+bool nb_import_godot_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
+{
+    enum { TYPE, MODE, DENSITY, COLOR, ENERGY, HEIGHT_DENSITY, COUNT };
+    static const char *const names[] = {
+        "type", "fog_mode", "fog_density", "fog_light_color", "fog_light_energy", "fog_height_density"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    double density = 0.01, energy = 1;
+    double color[3] = {nb_value_linear_from_srgb(0.518), nb_value_linear_from_srgb(0.553),
+                       nb_value_linear_from_srgb(0.608)};
+    if (!nb_value_members(json, node, &keys, found) ||
+        !nb_import_refuse_other(json, found[MODE], 0, "depth fog is not the integral of a density") ||
+        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
+        !read_color(json, found[COLOR], color) ||
+        !nb_value_number(json, found[ENERGY], &nb_range_not_negative, &energy) ||
+        !nb_import_refuse_other(json, found[HEIGHT_DENSITY], 0,
+                                "Godot's height fog depends on the height of the surface alone"))
+        return false;
+    fog->volumes[0] = nb_import_world(density);
+    for (int c = 0; c < 3; c++) fog->volumes[0].source[c] = color[c] * energy;
+    fog->count = 1;
+    return true;
+}
+
+bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
+{
+    enum { TYPE, DENSITY, ALBEDO, EMISSION, ENERGY, COUNT };
+    static const char *const names[] = {"type", "volumetric_fog_density", "volumetric_fog_albedo",
+                                        "volumetric_fog_emission", "volumetric_fog_emission_energy"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_volumetric_fog"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    double density = 0.05, albedo[3] = {1, 1, 1}, emission[3] = {0}, energy = 1;
+    if (!nb_value_members(json, node, &keys, found) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
+        !read_albedo(json, found[ALBEDO], albedo) || !read_color(json, found[EMISSION], emission) ||
+        !nb_value_number(json, found[ENERGY], &nb_range_not_negative, &energy))
+        return false;
+    fog->volumes[0] = nb_import_world(density);
+    for (int c = 0; c < 3; c++) {
+        fog->volumes[0].albedo[c] = albedo[c];
+        fog->volumes[0].emission[c] = emission[c] * energy * density;
+    }
+    fog->count = 1;
+    return true;
+}
+
+/* ---- fog volumes
+ * ----------------------------------------------------------------------------------------------------- */
+
+enum { ELLIPSOID, CONE, CYLINDER, BOX, WORLD, SHAPE_COUNT };
+
+/* The largest upright shape that fits into `size`; cylinders and cones are round. */
+static void set_shape(nebel_shape *shape, int kind, const double size[3])
+{
+    static const nebel_shape_type types[SHAPE_COUNT] = {NEBEL_SHAPE_ELLIPSOID, NEBEL_SHAPE_CONE, NEBEL_SHAPE_CYLINDER,
+                                                        NEBEL_SHAPE_BOX, NEBEL_SHAPE_WORLD};
+    shape->type = types[kind];
+    for (int i = 0; i < 3; i++) {
+        shape->radii[i] = shape->max[i] = size[i] / 2;
+        shape->min[i] = -size[i] / 2;
+    }
+    shape->from[1] = -size[1] / 2;
+    shape->to[1] = size[1] / 2;
+    shape->radius = shape->radius_from = fmin(size[0], size[2]) / 2;
+}
+
+/* Three rows of the basis, then the origin, as in a scene file. */
+static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
+{
+    double numbers[12];
+    nb_affine map;
+    if (node == NULL) return true;
+    if (!nb_value_numbers(json, node, &nb_range_any, 12, numbers)) return false;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) map.m[i][j] = numbers[3 * i + j];
+        map.m[i][3] = numbers[9 + i];
+    }
+    return nb_affine_to_transform(&map, transform) ||
+           nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is flat or sheared; a volume needs a basis of right angles");
+}
+
+bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
+{
+    enum { TYPE, SHAPE, SIZE, TRANSFORM, DENSITY, ALBEDO, EMISSION, FALLOFF, FADE, COUNT };
+    static const char *const names[] = {"type",   "shape",    "size",           "transform", "density",
+                                        "albedo", "emission", "height_falloff", "edge_fade"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog_volume"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    int shape = BOX;
+    double size[3] = {2, 2, 2}, density = 1, falloff = 0, emission[3] = {0}, fade;
+    nebel_volume_desc *volume = &fog->volumes[0];
+    *volume = nb_import_world(0);
+    for (int c = 0; c < 3; c++) volume->albedo[c] = 1;
+    if (!nb_value_members(json, node, &keys, found) || !nb_value_integer(json, found[SHAPE], 0, WORLD, &shape) ||
+        !nb_value_numbers(json, found[SIZE], &nb_range_positive, 3, size) ||
+        !read_transform(json, found[TRANSFORM], &volume->shape.transform) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
+        !read_albedo(json, found[ALBEDO], volume->albedo) || !read_color(json, found[EMISSION], emission) ||
+        !nb_value_number(json, found[FALLOFF], &nb_range_not_negative, &falloff) ||
+        !nb_value_number(json, found[FADE], &nb_range_not_negative, &fade))
+        return false;
+    set_shape(&volume->shape, shape, size);
+    for (int c = 0; c < 3; c++) {
+        volume->extinction[c] = density;
+        volume->emission[c] = emission[c] * density;
+    }
+    if (falloff > 0)
+        nb_import_set_height(volume, volume->shape.transform.position[1], 1 / (falloff * ln2), NEBEL_BELOW_CONSTANT);
+    fog->count = 1;
+    return true;
+}

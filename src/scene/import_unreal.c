@@ -1,0 +1,105 @@
+/* Unreal Engine 4 and 5: exponential height fog, local fog volumes. Centimetres, z up, left-handed. */
+#include "scene/import.h"
+
+#include <math.h>
+
+static const double ln2 = 0.69314718055994530942;
+
+/* As the engine's own glTF exporter does it, so that models exported from there fit. */
+static void convert_location(double location[3])
+{
+    const double y = location[1];
+    location[1] = location[2];
+    location[2] = y;
+    for (int i = 0; i < 3; i++) location[i] *= 0.01;
+}
+
+/* ---- height fog
+ * ------------------------------------------------------------------------------------------------------ */
+
+/* The shader's line integral over 2^(-f (z - h)) leaves out 1 / ln 2, and transmittance is 2 to the power of its
+ * negative: the extinction is (ln 2)^2 times the density. Both settings are scaled by 1/1000 per cm, which is 1/10 per
+ * m. */
+static void add_layer(nb_import *fog, double density, double falloff, double height, const double color[3])
+{
+    if (density == 0) return;
+    nebel_volume_desc *layer = &fog->volumes[fog->count++];
+    *layer = nb_import_world(ln2 * ln2 * density / 10);
+    if (falloff > 0) nb_import_set_height(layer, height, 10 / (falloff * ln2), NEBEL_BELOW_GROW);
+    for (int c = 0; c < 3; c++) layer->source[c] = color[c];
+}
+
+typedef struct layer {
+    double density, falloff, offset; /* as the editor has them; cm */
+} layer;
+
+static bool read_second(nb_json *json, const nb_json_node *node, layer *second)
+{
+    enum { DENSITY, FALLOFF, OFFSET, COUNT };
+    static const char *const names[] = {"FogDensity", "FogHeightFalloff", "FogHeightOffset"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "SecondFogData"};
+    const nb_json_node *found[COUNT];
+    return node == NULL || (nb_value_members(json, node, &keys, found) &&
+                            nb_value_number(json, found[DENSITY], &nb_range_not_negative, &second->density) &&
+                            nb_value_number(json, found[FALLOFF], &nb_range_not_negative, &second->falloff) &&
+                            nb_value_number(json, found[OFFSET], &nb_range_any, &second->offset));
+}
+
+bool nb_import_unreal_height_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
+{
+    enum { TYPE, DENSITY, FALLOFF, SECOND, COLOR, START, CUTOFF, OPACITY, LOCATION, COUNT };
+    static const char *const names[] = {
+        "type",          "FogDensity",        "FogHeightFalloff", "SecondFogData",   "FogInscatteringLuminance",
+        "StartDistance", "FogCutoffDistance", "FogMaxOpacity",    "RelativeLocation"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_height_fog"};
+    static const char *const from_eye = "it depends on where the camera is, and fog here does not";
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    layer first = {0.02, 0.2, 0}, second = {0, 0.2, 0};
+    double color[3] = {0}, location[3] = {0};
+    if (!nb_value_members(json, node, &keys, found) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &first.density) ||
+        !nb_value_number(json, found[FALLOFF], &nb_range_not_negative, &first.falloff) ||
+        !read_second(json, found[SECOND], &second) ||
+        !nb_value_color(json, found[COLOR], &nb_range_not_negative, color) ||
+        !nb_import_refuse_other(json, found[START], 0, from_eye) ||
+        !nb_import_refuse_other(json, found[CUTOFF], 0, from_eye) ||
+        !nb_import_refuse_other(json, found[OPACITY], 1, "fog here has no largest opacity") ||
+        !nb_value_vector(json, found[LOCATION], location))
+        return false;
+    convert_location(location);
+    add_layer(fog, first.density, first.falloff, location[1], color);
+    add_layer(fog, second.density, second.falloff, location[1] + 0.01 * second.offset, color);
+    return true;
+}
+
+/* ---- local fog volumes
+ * ----------------------------------------------------------------------------------------------- */
+
+/* The radius of a volume of scale 1. */
+static const double base_radius = 5;
+
+bool nb_import_unreal_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
+{
+    enum { TYPE, EXTINCTION, ALBEDO, LOCATION, SCALE, COUNT };
+    static const char *const names[] = {"type", "RadialFogExtinction", "FogAlbedo", "RelativeLocation",
+                                        "RelativeScale3D"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_local_fog_volume"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    double extinction = 1, scale[3] = {1, 1, 1};
+    nebel_volume_desc volume = nb_import_world(0);
+    volume.shape.type = NEBEL_SHAPE_SPHERE;
+    volume.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1};
+    for (int c = 0; c < 3; c++) volume.albedo[c] = 1;
+    if (!nb_value_members(json, node, &keys, found) ||
+        !nb_value_number(json, found[EXTINCTION], &nb_range_not_negative, &extinction) ||
+        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume.albedo) ||
+        !nb_value_vector(json, found[LOCATION], volume.shape.center) || !nb_value_scale(json, found[SCALE], scale))
+        return false;
+    convert_location(volume.shape.center);
+    volume.shape.radius = base_radius * fmax(fabs(scale[0]), fmax(fabs(scale[1]), fabs(scale[2])));
+    for (int c = 0; c < 3; c++) volume.extinction[c] = extinction / volume.shape.radius;
+    fog->volumes[fog->count++] = volume;
+    return true;
+}

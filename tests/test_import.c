@@ -1,0 +1,311 @@
+/* Fog in the words of game engines becomes the volumes that docs/engines.md promises. */
+#include "scene_help.h"
+
+#include <math.h>
+
+#define FOG(entry) "{\"nebel\": 1, \"up\": \"z\", \"unit\": 0.01, \"fog\": [{" entry "}]}"
+#define IMPORT(members) FOG("\"import\": {" members "}")
+
+static void assert_number(double got, double wanted)
+{
+    if (!(fabs(got - wanted) <= 1e-14 * fmax(1, fabs(wanted)))) fail_msg("%.17g should be %.17g", got, wanted);
+}
+
+static void assert_vector(const double *got, double x, double y, double z)
+{
+    const double wanted[3] = {x, y, z};
+    for (int i = 0; i < 3; i++) assert_number(got[i], wanted[i]);
+}
+
+static void assert_grey(const double *got, double wanted)
+{
+    assert_vector(got, wanted, wanted, wanted);
+}
+
+static const nebel_volume_desc *import(const char *text, size_t count, nebel_scene **scene)
+{
+    *scene = parse_good(text);
+    assert_int_equal(nebel_scene_contents(*scene)->volume_count, count);
+    return nebel_scene_contents(*scene)->volumes;
+}
+
+/* ---- Unreal
+ * ---------------------------------------------------------------------------------------------------------- */
+
+static void test_unreal_height_fog(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog = import(
+        FOG("\"name\": \"haze\", \"import\": {\"type\": \"unreal_height_fog\", \"FogDensity\": 0.05, "
+            "\"FogHeightFalloff\": 0.4, "
+            "\"FogInscatteringLuminance\": [0.1, 0.2, 0.3], \"RelativeLocation\": [7, 8, 250], \"StartDistance\": 0, "
+            "\"FogMaxOpacity\": 1, \"SecondFogData\": {\"FogDensity\": 0.01, \"FogHeightFalloff\": 0, "
+            "\"FogHeightOffset\": -300}}"),
+        2, &scene);
+    const double ln2 = log(2);
+    assert_int_equal(fog[0].shape.type, NEBEL_SHAPE_WORLD);
+    assert_grey(fog[0].extinction, ln2 * ln2 * 0.005);
+    assert_int_equal(fog[0].density.type, NEBEL_DENSITY_HEIGHT);
+    assert_int_equal(fog[0].density.below, NEBEL_BELOW_GROW);
+    assert_number(fog[0].density.base, 2.5);
+    assert_number(fog[0].density.scale_height, 1 / (0.04 * ln2));
+    assert_vector(fog[0].source, .1, .2, .3);
+    assert_grey(fog[1].extinction, ln2 * ln2 * 0.001);
+    assert_int_equal(fog[1].density.type, NEBEL_DENSITY_CONSTANT);
+    assert_vector(fog[1].source, .1, .2, .3);
+    assert_string_equal(nebel_scene_contents(scene)->volume_names[0], "haze");
+    assert_string_equal(nebel_scene_contents(scene)->volume_names[1], "haze");
+    nebel_destroy_scene(scene);
+    fog = import(IMPORT("\"type\": \"unreal_height_fog\""), 1, &scene);
+    assert_grey(fog->extinction, ln2 * ln2 * 0.002);
+    assert_number(fog->density.scale_height, 1 / (0.02 * ln2));
+    nebel_destroy_scene(scene);
+    (void)import(IMPORT("\"type\": \"unreal_height_fog\", \"FogDensity\": 0"), 0, &scene);
+    nebel_destroy_scene(scene);
+}
+
+static void test_unreal_local_fog_volume(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog =
+        import(IMPORT("\"type\": \"unreal_local_fog_volume\", \"RadialFogExtinction\": 3, \"FogAlbedo\": [1, 0.5, 0], "
+                      "\"RelativeLocation\": [100, 200, 300], \"RelativeScale3D\": [1, -2, 1.5]"),
+               1, &scene);
+    assert_int_equal(fog->shape.type, NEBEL_SHAPE_SPHERE);
+    assert_vector(fog->shape.center, 1, 3, 2);
+    assert_number(fog->shape.radius, 10);
+    assert_grey(fog->extinction, .3);
+    assert_int_equal(fog->density.type, NEBEL_DENSITY_RADIAL);
+    assert_vector(fog->albedo, 1, .5, 0);
+    nebel_destroy_scene(scene);
+}
+
+/* ---- Godot
+ * ----------------------------------------------------------------------------------------------------------- */
+
+static void test_godot_fog(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog = import(IMPORT("\"type\": \"godot_fog\", \"fog_density\": 0.03, \"fog_light_color\": "
+                                                 "[0.5, 1, 0, 1], \"fog_light_energy\": 2"),
+                                          1, &scene);
+    assert_int_equal(fog->shape.type, NEBEL_SHAPE_WORLD);
+    assert_grey(fog->extinction, .03);
+    assert_vector(fog->source, 2 * pow((0.5 + 0.055) / 1.055, 2.4), 2, 0);
+    nebel_destroy_scene(scene);
+    fog = import(IMPORT("\"type\": \"godot_volumetric_fog\", \"volumetric_fog_density\": 0.02, "
+                        "\"volumetric_fog_albedo\": \"#fff\", "
+                        "\"volumetric_fog_emission\": [1, 0, 0], \"volumetric_fog_emission_energy\": 3"),
+                 1, &scene);
+    assert_grey(fog->extinction, .02);
+    assert_grey(fog->albedo, 1);
+    assert_vector(fog->emission, .06, 0, 0);
+    nebel_destroy_scene(scene);
+}
+
+static void test_godot_fog_volume(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog =
+        import(IMPORT("\"type\": \"godot_fog_volume\", \"shape\": 1, \"size\": [4, 6, 2], \"density\": 0.5, "
+                      "\"albedo\": [1, 0, 1], "
+                      "\"emission\": [0, 1, 0], \"height_falloff\": 0.25, \"edge_fade\": 0.1, "
+                      "\"transform\": [0, 0, 2, 0, 1, 0, -1, 0, 0, 10, 20, 30]"),
+               1, &scene);
+    assert_int_equal(fog->shape.type, NEBEL_SHAPE_CONE);
+    assert_vector(fog->shape.from, 0, -3, 0);
+    assert_vector(fog->shape.to, 0, 3, 0);
+    assert_number(fog->shape.radius_from, 1);
+    assert_number(fog->shape.radius_to, 0);
+    assert_vector(fog->shape.transform.position, 10, 20, 30);
+    assert_vector(fog->shape.transform.scale, 1, 1, 2);
+    assert_number(fabs(fog->shape.transform.rotation[1]), sqrt(.5));
+    assert_grey(fog->extinction, .5);
+    assert_vector(fog->albedo, 1, 0, 1);
+    assert_vector(fog->emission, 0, .5, 0);
+    assert_int_equal(fog->density.below, NEBEL_BELOW_CONSTANT);
+    assert_number(fog->density.base, 20);
+    assert_number(fog->density.scale_height, 4 / log(2));
+    nebel_destroy_scene(scene);
+    static const nebel_shape_type types[5] = {NEBEL_SHAPE_ELLIPSOID, NEBEL_SHAPE_CONE, NEBEL_SHAPE_CYLINDER,
+                                              NEBEL_SHAPE_BOX, NEBEL_SHAPE_WORLD};
+    for (int i = 0; i < 5; i++) {
+        char text[200];
+        snprintf(text, sizeof text, IMPORT("\"type\": \"godot_fog_volume\", \"size\": [2, 4, 6], \"shape\": %d"), i);
+        fog = import(text, 1, &scene);
+        assert_int_equal(fog->shape.type, types[i]);
+        if (i == 0) assert_vector(fog->shape.radii, 1, 2, 3);
+        if (i == 2) assert_number(fog->shape.radius, 1);
+        if (i == 3) assert_vector(fog->shape.min, -1, -2, -3);
+        nebel_destroy_scene(scene);
+    }
+}
+
+/* ---- Unity
+ * ----------------------------------------------------------------------------------------------------------- */
+
+static void test_hdrp_fog(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog = import(IMPORT("\"type\": \"hdrp_fog\", \"meanFreePath\": 50, \"baseHeight\": 10, "
+                                                 "\"maximumHeight\": 60, \"albedo\": [0.5, 0.6, 0.7]"),
+                                          1, &scene);
+    assert_grey(fog->extinction, .02);
+    assert_number(fog->density.base, 10);
+    assert_number(fog->density.scale_height, 50 * 0.144765);
+    assert_true(fabs(exp(-50 / fog->density.scale_height) / 0.001 - 1) < 1e-4);
+    assert_int_equal(fog->density.below, NEBEL_BELOW_CONSTANT);
+    assert_vector(fog->albedo, .5, .6, .7);
+    nebel_destroy_scene(scene);
+}
+
+#define LOCAL "\"type\": \"hdrp_local_volumetric_fog\", \"meanFreePath\": 4, "
+
+static void test_hdrp_local_volumetric_fog(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog =
+        import(IMPORT(LOCAL "\"size\": [10, 20, 5], \"positiveFade\": [0.1, 0.05, 0.2], \"negativeFade\": [0.1, 0.05, "
+                            "0.2], \"localPosition\": "
+                            "[1, 2, 3], \"localRotation\": [0.1, 0.3, 0.5, 0.8062257748298549]"),
+               1, &scene);
+    assert_vector(fog->shape.min, -5, -10, -2.5);
+    assert_vector(fog->shape.transform.position, -1, 2, 3);
+    assert_vector(fog->shape.transform.rotation, .1, -.3, -.5);
+    assert_grey(fog->extinction, .25);
+    assert_grey(fog->albedo, 1);
+    assert_int_equal(fog->density.type, NEBEL_DENSITY_SOFT_EDGE);
+    assert_number(fog->density.distance, 1);
+    nebel_destroy_scene(scene);
+    fog = import(IMPORT(LOCAL "\"size\": [10, 20, 5], \"positiveFade\": [0, 0, 0], \"negativeFade\": [0, 0, 0]"), 1,
+                 &scene);
+    assert_int_equal(fog->density.type, NEBEL_DENSITY_CONSTANT);
+    nebel_destroy_scene(scene);
+}
+
+/* ---- Bevy
+ * ------------------------------------------------------------------------------------------------------------ */
+
+static void test_bevy(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog =
+        import(IMPORT("\"type\": \"bevy_fog_volume\", \"density_factor\": 0.5, \"absorption\": 0.1, \"scattering\": "
+                      "0.3, \"fog_color\": [1, 0.5, 0], "
+                      "\"translation\": [1, 2, 3], \"scale\": [10, 4, 10]"),
+               1, &scene);
+    assert_vector(fog->shape.min, -.5, -.5, -.5);
+    assert_vector(fog->shape.transform.position, 1, 2, 3);
+    assert_vector(fog->shape.transform.scale, 10, 4, 10);
+    assert_grey(fog->extinction, .2);
+    assert_vector(fog->albedo, .75, .375, 0);
+    nebel_destroy_scene(scene);
+    fog = import(IMPORT("\"type\": \"bevy_distance_fog\", \"color\": \"#fff\", \"density\": 0.02"), 1, &scene);
+    assert_grey(fog->extinction, .02);
+    assert_grey(fog->source, 1);
+    nebel_destroy_scene(scene);
+    fog = import(IMPORT("\"type\": \"bevy_distance_fog\", \"color\": [1, 2, 3], \"extinction\": [0.1, 0.2, 0.3], "
+                        "\"inscattering\": [0.1, 0.2, 0.3]"),
+                 1, &scene);
+    assert_vector(fog->extinction, .1, .2, .3);
+    assert_vector(fog->source, 1, 2, 3);
+    nebel_destroy_scene(scene);
+}
+
+/* ---- all
+ * ------------------------------------------------------------------------------------------------------------- */
+
+static void test_a_source_stands_for_the_lights_of_the_engine(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog = import(
+        "{\"nebel\": 1, \"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 1}, \"fog\": [{\"source\": [1, 2, 3], "
+        "\"import\": {\"type\": \"hdrp_fog\"}}]}",
+        1, &scene);
+    assert_vector(fog->source, 1, 2, 3);
+    assert_grey(fog->albedo, 0);
+    nebel_destroy_scene(scene);
+}
+
+#define LIT(import)                                                                                                    \
+    "{\"nebel\": 1, \"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 1}, \"fog\": [{\"import\": " import "}]}"
+
+static void test_what_no_import_has(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, FOG("\"import\": `{}"),
+         "fog[0].import: the key \"type\" is missing; must be one of: unreal_height_fog,"},
+        {FORMAT, FOG("\"import\": `3"), "fog[0].import: is a number; must be an object"},
+        {FORMAT, IMPORT("\"type\": `\"unreal_hight_fog\""),
+         "fog[0].import.type: unknown; must be one of: unreal_height_fog, unreal_local"},
+        {FORMAT, FOG("\"import\": {\"type\": \"godot_fog\"}, `\"shape\": {}"),
+         "fog[0].shape: unknown key; imported fog has: name, import, source"},
+        {FORMAT, IMPORT("\"type\": \"unreal_height_fog\", `\"FogDensty\": 1"),
+         "fog[0].import.FogDensty: unknown key; an unreal_height_fog has: type, FogDensity,"},
+        {UNSUPPORTED, IMPORT("\"type\": \"unreal_height_fog\", \"StartDistance\": `100"),
+         "fog[0].import.StartDistance: is 100; it depends on where the camera is, and fog here does not, so it must be "
+         "0"},
+        {UNSUPPORTED, IMPORT("\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": `0.7"),
+         "fog[0].import.FogMaxOpacity: is 0.7; fog here has no"},
+        {FORMAT, IMPORT("\"type\": \"unreal_height_fog\", \"SecondFogData\": {`\"density\": 1}"),
+         "fog[0].import.SecondFogData.density: unknown key; SecondFogData has: FogDensity,"},
+        {FORMAT, IMPORT("\"type\": \"unreal_local_fog_volume\", `\"HeightFogExtinction\": 1"),
+         "fog[0].import.HeightFogExtinction: unknown key; an unreal_local_fog_volume has"},
+        {UNSUPPORTED, IMPORT("\"type\": \"godot_fog\", \"fog_height_density\": `0.1"),
+         "fog[0].import.fog_height_density: is 0.1; Godot's height fog"},
+        {UNSUPPORTED, IMPORT("\"type\": \"godot_fog\", \"fog_mode\": `1"),
+         "fog[0].import.fog_mode: is 1; depth fog is not"},
+        {FORMAT, IMPORT("\"type\": \"godot_fog_volume\", \"shape\": `5"),
+         "fog[0].import.shape: is 5; must be a whole number from 0 to 4"},
+        {FORMAT, IMPORT("\"type\": \"godot_fog_volume\", \"density\": `-1"),
+         "fog[0].import.density: is -1; must be a number >= 0"},
+        {FORMAT, IMPORT("\"type\": \"godot_fog_volume\", \"albedo\": `[1.5, 1, 1]"),
+         "fog[0].import.albedo: is brighter than white"},
+        {FORMAT, IMPORT("\"type\": \"godot_fog_volume\", \"transform\": `[1, 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]"),
+         "fog[0].import.transform: is flat or sheared"},
+        {FORMAT, IMPORT("\"type\": \"hdrp_fog\", \"meanFreePath\": `0"),
+         "fog[0].import.meanFreePath: is 0; must be a number > 0"},
+        {UNSUPPORTED,
+         IMPORT(LOCAL "\"size\": [2, 2, 4], \"positiveFade\": `[0.1, 0.1, 0.1], \"negativeFade\": [0.1, 0.1, 0.1]"),
+         "fog[0].import.positiveFade: fades over 0.2 m at one face and 0.4 m at another"},
+        {UNSUPPORTED,
+         IMPORT(LOCAL "\"size\": [2, 2, 2], \"positiveFade\": [0.1, 0.1, 0.1], \"negativeFade\": [0.1, 0.1, 0.1], "
+                      "\"falloffMode\": `1"),
+         "fog[0].import.falloffMode: is 1; only the linear"},
+        {UNSUPPORTED,
+         IMPORT(LOCAL "\"size\": [2, 2, 2], \"positiveFade\": [0.1, 0.1, 0.1], \"negativeFade\": [0.1, 0.1, 0.1], "
+                      "\"blendingMode\": `0"),
+         "fog[0].import.blendingMode: is 0; volumes here add"},
+        {FORMAT, FOG("\"import\": `{\"type\": \"bevy_distance_fog\", \"color\": 1}"), "fog[0].import: has \"density\""},
+        {UNSUPPORTED, IMPORT("\"type\": \"bevy_distance_fog\", \"extinction\": 1, \"inscattering\": `2"),
+         "fog[0].import.inscattering: differs from"},
+        {UNSUPPORTED, LIT("`{\"type\": \"bevy_fog_volume\"}"),
+         "fog[0].import: this version cannot light fog with the sun"},
+    };
+    CHECK(rules);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_unreal_height_fog),
+        cmocka_unit_test(test_unreal_local_fog_volume),
+        cmocka_unit_test(test_godot_fog),
+        cmocka_unit_test(test_godot_fog_volume),
+        cmocka_unit_test(test_hdrp_fog),
+        cmocka_unit_test(test_hdrp_local_volumetric_fog),
+        cmocka_unit_test(test_bevy),
+        cmocka_unit_test(test_a_source_stands_for_the_lights_of_the_engine),
+        cmocka_unit_test(test_what_no_import_has),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
