@@ -74,7 +74,6 @@ typedef struct volume {
 typedef struct trace {
     volume *volumes;
     size_t count;
-    oracle_spans excluded;
     real *cuts;
     size_t cut_count, cut_capacity;
     const volume **active;
@@ -442,7 +441,7 @@ static double final_density(const volume *v)
     case NEBEL_DENSITY_CONSTANT:
         return 1;
     case NEBEL_DENSITY_HEIGHT:
-        return density_of_height(slope > 0 ? HUGE_VAL : slope < 0 ? -HUGE_VAL : start, d->below);
+        return density_of_height(LONG(slope > 0 ? HUGE_VAL : slope < 0 ? -HUGE_VAL : start), d->below);
     case NEBEL_DENSITY_LINEAR:
         return slope > 0 ? 1 : slope < 0 ? 0 : fmin(1, fmax(0, start));
     default:
@@ -483,13 +482,27 @@ static int is_endless_light(const trace *tr)
     return 0;
 }
 
+/* The rule as it is written: nothing of a higher priority replaces it there, and nothing of its own or a higher one excludes it. */
+static int is_fog_at(const trace *tr, size_t which, real t)
+{
+    const nebel_volume_desc *const own = tr->volumes[which].desc;
+    if (own->operation == NEBEL_OPERATION_EXCLUDE || !oracle_contains(&tr->volumes[which].spans, t)) return 0;
+    for (size_t i = 0; i < tr->count; i++) {
+        const nebel_volume_desc *const other = tr->volumes[i].desc;
+        const int replaces = other->operation == NEBEL_OPERATION_REPLACE && other->priority > own->priority;
+        const int excludes = other->operation == NEBEL_OPERATION_EXCLUDE && other->priority >= own->priority;
+        if ((replaces || excludes) && oracle_contains(&tr->volumes[i].spans, t)) return 0;
+    }
+    return 1;
+}
+
 static void pass_piece(trace *tr, real from, real to)
 {
     tr->active_count = 0;
+    if (!(from < to)) return;
     const real middle = oracle_between(from, to);
-    if (!(from < to) || oracle_contains(&tr->excluded, middle)) return;
     for (size_t i = 0; i < tr->count; i++)
-        if (oracle_contains(&tr->volumes[i].spans, middle)) tr->active[tr->active_count++] = &tr->volumes[i];
+        if (is_fog_at(tr, i, middle)) tr->active[tr->active_count++] = &tr->volumes[i];
     if (tr->active_count == 0) return;
     const int endless = !(to < REAL(HUGE_VAL));
     if (endless && is_endless_light(tr)) {
@@ -523,14 +536,6 @@ static oracle_line line_of(const nebel_ray *ray)
     return l;
 }
 
-static void append_spans(oracle_spans *all, const oracle_spans *more)
-{
-    for (size_t i = 0; i < more->count; i++) {
-        all->at = oracle_grow(all->at, all->count, &all->capacity, sizeof *all->at);
-        all->at[all->count++] = more->at[i];
-    }
-}
-
 static void add_volume(trace *tr, const nebel_volume_desc *desc, const double ambient[3], const oracle_line *line,
                        real end)
 {
@@ -542,18 +547,14 @@ static void add_volume(trace *tr, const nebel_volume_desc *desc, const double am
         add_cut(tr, v->spans.at[i].from);
         add_cut(tr, v->spans.at[i].to);
     }
-    if (desc->operation == NEBEL_OPERATION_EXCLUDE) {
-        append_spans(&tr->excluded, &v->spans);
-        free(v->spans.at);
-        return;
-    }
+    tr->count++;
+    if (desc->operation == NEBEL_OPERATION_EXCLUDE) return;
     for (int c = 0; c < 3; c++) {
         const double radiance = desc->source[c] + desc->albedo[c] * ambient[c];
         v->light[c] = radiance * desc->extinction[c] + desc->emission[c];
         tr->scale = fmax(tr->scale, radiance);
     }
     if (v->spans.count > 0) place_volume(tr, v, line);
-    tr->count++;
 }
 
 static void pass_all(trace *tr, real end)
@@ -587,7 +588,6 @@ static void run(const nebel_volume_desc *volumes, size_t n, const double ambient
     for (size_t i = 0; i < tr.count; i++) free(tr.volumes[i].spans.at);
     free(tr.volumes);
     free(tr.active);
-    free(tr.excluded.at);
     free(tr.cuts);
 }
 

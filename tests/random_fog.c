@@ -183,6 +183,12 @@ static void make_level_density(uint64_t *state, nebel_density *d)
 
 /* ---- scenes ---- */
 
+static void make_priority(uint64_t *state, nebel_volume_desc *v)
+{
+    v->priority = below(state, 3) - 1;
+    if (v->operation == NEBEL_OPERATION_ADD && chance(state, .4)) v->operation = NEBEL_OPERATION_REPLACE;
+}
+
 static void make_volume(random_fog *fog, uint64_t *state, random_fog_kind kind, size_t i)
 {
     nebel_volume_desc *const v = &fog->volumes[i];
@@ -199,6 +205,7 @@ static void make_volume(random_fog *fog, uint64_t *state, random_fog_kind kind, 
     if (!even) make_density(state, &v->shape, &v->density);
     if (kind == RANDOM_FOG_LEVEL) make_level_density(state, &v->density);
     if (kind == RANDOM_FOG_EXCLUDE && (i == 2 || i == 4)) v->operation = NEBEL_OPERATION_EXCLUDE;
+    if (kind == RANDOM_FOG_EXCLUDE && fog->seed % 2 == 1) make_priority(state, v);
     if (v->operation == NEBEL_OPERATION_EXCLUDE)
         v->density = (nebel_density){.type = NEBEL_DENSITY_CONSTANT};
     else
@@ -586,10 +593,12 @@ static void print_volume(FILE *to, const nebel_volume_desc *v)
 {
     fprintf(to, "{\"name\": \"\", \"shape\": ");
     print_shape(to, &v->shape);
+    fprintf(to, ", \"priority\": %d", v->priority);
     if (v->operation == NEBEL_OPERATION_EXCLUDE) {
         fprintf(to, ", \"operation\": \"exclude\"}");
         return;
     }
+    if (v->operation == NEBEL_OPERATION_REPLACE) fprintf(to, ", \"operation\": \"replace\"");
     print_density(to, &v->density);
     print_vector(to, "extinction", v->extinction, 3);
     if (v->albedo[0] + v->albedo[1] + v->albedo[2] > 0)

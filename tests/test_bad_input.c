@@ -140,7 +140,7 @@ static const bad_volume bad_volumes[] = {
     {{.shape = {.type = NEBEL_SHAPE_COUNT}}, ARGUMENT, "shape", "unknown"},
     {{.shape = {.type = (nebel_shape_type)-1}}, ARGUMENT, "shape", "-1 is unknown"},
     {{.density = {.type = NEBEL_DENSITY_COUNT}}, ARGUMENT, "density", "unknown"},
-    {{.operation = (nebel_operation)2}, ARGUMENT, "operation", "2 is unknown"},
+    {{.operation = NEBEL_OPERATION_COUNT}, ARGUMENT, "operation", "3 is unknown"},
 };
 
 static void assert_refused(nebel_fog *fog, nebel_volume_id id, fog_messages *messages, const bad_volume *bad, size_t i)

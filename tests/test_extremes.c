@@ -3,6 +3,7 @@
  * test_extremes [SCENES [REACH]]: with REACH, lengths are within 10^-REACH and 10^REACH only, and the answers in double
  * and in float must agree within the errors that they state. */
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -163,7 +164,9 @@ static void make_density(scene *s, const nebel_shape *shape, nebel_density *d)
 static void make_volume(scene *s, size_t i)
 {
     nebel_volume_desc *const v = &s->volumes[i];
-    *v = (nebel_volume_desc){.operation = one_in(s, 10) ? NEBEL_OPERATION_EXCLUDE : NEBEL_OPERATION_ADD};
+    *v = (nebel_volume_desc){.operation = one_in(s, 5) ? (nebel_operation)dice_below(&s->state, NEBEL_OPERATION_COUNT)
+                                                       : NEBEL_OPERATION_ADD,
+                             .priority = one_in(s, 5) ? (one_in(s, 2) ? INT_MAX : INT_MIN) : 0};
     make_shape(s, i, &v->shape);
     make_density(s, &v->shape, &v->density);
     amounts(s, v->extinction, 1e9);
@@ -241,7 +244,7 @@ static int may_be_unbounded(const scene *s, const nebel_ray *ray)
     if (ray->t_max < 1e17) return 0;
     for (size_t i = 0; i < s->count; i++)
         for (int c = 0; c < 3; c++)
-            if (s->volumes[i].emission[c] > 0 && s->volumes[i].operation == NEBEL_OPERATION_ADD) return 1;
+            if (s->volumes[i].emission[c] > 0 && s->volumes[i].operation != NEBEL_OPERATION_EXCLUDE) return 1;
     return 0;
 }
 

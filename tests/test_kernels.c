@@ -101,7 +101,8 @@ static nebel_volume_desc random_volume(int kind)
         v.shape.part_count = 3;
     }
     v.density = random_density(&v.shape);
-    if (pick(10) == 0) v.operation = NEBEL_OPERATION_EXCLUDE;
+    if (pick(10) == 0) v.operation = (nebel_operation)pick(NEBEL_OPERATION_COUNT);
+    if (pick(4) == 0) v.priority = pick(3) - 1;
     for (int i = 0; i < 3; i++) {
         v.extinction[i] = pick(40) == 0 ? dice(0, 1000) : dice(0, .2);
         v.source[i] = dice(0, 2);

@@ -297,11 +297,15 @@ static void test_what_no_volume_has(void **state)
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"droplets\", \"diameter\": `0}"),
          "fog[0].phase.diameter: is 0"},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"rayleigh\", `\"g\": 0}"), "fog[0].phase.g: unknown key"},
-        {FORMAT, LIT("\"operation\": `\"subtract\""), "fog[0].operation: unknown; must be one of: add, exclude"},
+        {FORMAT, LIT("\"operation\": `\"subtract\""),
+         "fog[0].operation: unknown; must be one of: add, exclude, replace"},
+        {FORMAT, LIT("\"priority\": `0.5"),
+         "fog[0].priority: is 0.5; must be a whole number from -2147483648 to 2147483647"},
         {FORMAT, FOG(WORLD ", \"operation\": \"exclude\", `\"extinction\": 1"),
-         "fog[0].extinction: unknown key; a volume with \"operation\": \"exclude\" has: name, shape, operation"},
+         "fog[0].extinction: unknown key; a volume with \"operation\": \"exclude\" has: name, shape, operation, "
+         "priority, keys"},
         {FORMAT, LIT("`\"albdo\": 1"),
-         "fog[0].albdo: unknown key; a volume has: name, shape, operation, density, extinction, "
+         "fog[0].albdo: unknown key; a volume has: name, shape, operation, priority, density, extinction, "
          "mean_free_path, visibility, contrast, source, albedo, phase, emission, keys; did you mean "
          "\"albedo\"?"},
         {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"name\": 1"),

@@ -207,11 +207,9 @@ static double largest_source(const random_fog *fog)
 
 static random_fog fog;
 
-static void try_random_fog(tracer *t, random_fog_kind kind, uint64_t seed)
+/* `fog`, from an eye that hangs on the seed. */
+static void try_fog(tracer *t, const char *kind, uint64_t seed)
 {
-    static const char *const kinds[] = {"single", "overlap", "profiles", "exclude", "many",
-                                        "parts",  "far",     "opaque",   "level"};
-    random_fog_make(&fog, kind, seed);
     nebel_fog_desc desc = {0};
     memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
     nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
@@ -222,9 +220,42 @@ static void try_random_fog(tracer *t, random_fog_kind kind, uint64_t seed)
     pack_and_upload(t, snapshot, eye);
     if (!nb_gl_evaluate(&t->gl, t->program, RAYS, (const float *)items, (float *)answers)) fail_msg("%s", t->gl.fault);
     char name[64];
-    snprintf(name, sizeof name, "%s %d", kinds[kind], (int)seed);
+    snprintf(name, sizeof name, "%s %d", kind, (int)seed);
     compare(snapshot, largest_source(&fog), name);
     nebel_release_snapshot(snapshot);
+}
+
+static void try_random_fog(tracer *t, random_fog_kind kind, uint64_t seed)
+{
+    static const char *const kinds[] = {"single", "overlap", "profiles", "exclude", "many",
+                                        "parts",  "far",     "opaque",   "level"};
+    random_fog_make(&fog, kind, seed);
+    try_fog(t, kinds[kind], seed);
+}
+
+/* Priorities and fog that replaces, among so many that some places hold more than the walk's slots. */
+static void rank_volumes(uint64_t seed)
+{
+    uint64_t state = seed;
+    for (size_t i = 0; i < fog.count; i++) {
+        fog.volumes[i].priority = dice_below(&state, 4);
+        fog.volumes[i].operation = dice_below(&state, 5) == 0 ? NEBEL_OPERATION_REPLACE : NEBEL_OPERATION_ADD;
+        if (dice_below(&state, 20) == 0) fog.volumes[i].operation = NEBEL_OPERATION_EXCLUDE;
+    }
+}
+
+static void test_priorities_among_many(void **unused)
+{
+    (void)unused;
+    tracer t;
+    open_tracer(&t, NB_GL_330, TEXTURE, "", trace_body);
+    for (uint64_t seed = 0; seed < 8; seed++) {
+        random_fog_make(&fog, seed % 2 == 0 ? RANDOM_FOG_MANY : RANDOM_FOG_PARTS, seed);
+        for (size_t i = 0; i < fog.count && seed % 4 == 0; i++) fog.volumes[i].shape.transform.position[0] *= .2;
+        rank_volumes(seed);
+        try_fog(&t, "ranked", seed);
+    }
+    nb_gl_close(&t.gl);
 }
 
 static void try_language(nb_gl_language language, word_store store, int seeds)
@@ -263,10 +294,9 @@ static void test_300_es_block(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_330_texture),
-        cmocka_unit_test(test_330_block),
-        cmocka_unit_test(test_300_es_texture),
-        cmocka_unit_test(test_300_es_block),
+        cmocka_unit_test(test_330_texture),           cmocka_unit_test(test_330_block),
+        cmocka_unit_test(test_300_es_texture),        cmocka_unit_test(test_300_es_block),
+        cmocka_unit_test(test_priorities_among_many),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -197,7 +197,7 @@ static void warn_of_volumes(const nebel_scene_data *scene)
 static void warn_of_scene(const nebel_scene_data *scene, double visibility)
 {
     size_t volumes = 0;
-    for (size_t i = 0; i < scene->volume_count; i++) volumes += scene->volumes[i].operation == NEBEL_OPERATION_ADD;
+    for (size_t i = 0; i < scene->volume_count; i++) volumes += scene->volumes[i].operation != NEBEL_OPERATION_EXCLUDE;
     if (volumes == 0 && scene->nebula_count == 0) (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
     const int lit = (scene->has_sun && !is_black(scene->sun_irradiance)) || !is_black(scene->ambient);

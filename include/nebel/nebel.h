@@ -193,12 +193,19 @@ typedef struct nebel_density {
 
 typedef enum nebel_operation {
     NEBEL_OPERATION_ADD = 0,
-    NEBEL_OPERATION_EXCLUDE /* inside the shape there is no fog, whatever else is there; only `shape` is read */
+    NEBEL_OPERATION_EXCLUDE, /* inside the shape there is no fog of this or a lower priority; no density, colours or amounts
+                                are read */
+    NEBEL_OPERATION_REPLACE, /* inside the shape this fog is there, and none of a lower priority */
+    NEBEL_OPERATION_COUNT
 } nebel_operation;
 
-/* One volume of fog. Colours are linear RGB. */
+/* One volume of fog. Colours are linear RGB.
+ *
+ * At each place a volume's fog is there unless one that replaces has a higher priority there, or one that excludes the same or a
+ * higher one. What is there adds. */
 typedef struct nebel_volume_desc {
     nebel_operation operation;
+    int priority; /* any */
     nebel_shape shape;
     nebel_density density;
     double extinction[3]; /* 1/m, >= 0, where the density is 1 */

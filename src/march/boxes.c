@@ -2,8 +2,8 @@
 
 static int is_plain_box(const nb_volume *body)
 {
-    return body->operation == NEBEL_OPERATION_ADD && body->density.type == NEBEL_DENSITY_CONSTANT &&
-           body->step_count == 1 && body->leaves[0].type == NB_LEAF_BOX && body->leaves[0].aligned;
+    return !nb_volume_covers(body) && body->density.type == NEBEL_DENSITY_CONSTANT && body->step_count == 1 &&
+           body->leaves[0].type == NB_LEAF_BOX && body->leaves[0].aligned;
 }
 
 int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes)

@@ -23,7 +23,7 @@ struct nebel_snapshot {
     nebel_log log;
     atomic_size_t owners;
     size_t medium_count;
-    nb_medium *media;        /* fog first, then exclusions; each in the order of nb_volume_compare */
+    nb_medium *media;        /* in the order of nb_volume_compare: ranks ascend */
     double largest_radiance; /* of all volumes and channels */
     size_t endless_count;    /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;

@@ -325,7 +325,7 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
 static int is_single(const march *m)
 {
     return m->contact_count == 1 && m->span_count == 1 &&
-           m->contacts[0].medium->body.operation == NEBEL_OPERATION_ADD && !nb_any(ends_matter(m));
+           nb_volume_has_fog(&m->contacts[0].medium->body) && !nb_any(ends_matter(m));
 }
 
 /* From event to event along all rays at once. */
@@ -420,7 +420,7 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
         nb_real least = NB_HUGE, most = NB_F(0.0);
         for (size_t i = 0; i < m->contact_count; i++) {
             const contact *k = &m->contacts[i];
-            if (k->medium->body.operation != NEBEL_OPERATION_ADD) continue;
+            if (!nb_volume_has_fog(&k->medium->body)) continue;
             const nb_mask counts = nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
             const nb_real radiance = opaque_radiance(k, c);
             least = nb_select(counts, nb_min(radiance, least), least);

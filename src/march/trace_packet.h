@@ -359,17 +359,16 @@ static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
     }
 }
 
-/* An end of a leaf may be off by slack. An exclusion's end moves the fog of every medium that is there; those were met
- * before, as exclusions come last. */
+/* An end of a leaf may be off by slack. The end of a medium that covers moves the fog of every medium of a lower rank that is
+ * there, too; those were met before, as ranks ascend. */
 static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_real slack)
 {
-    if (k->medium->body.operation == NEBEL_OPERATION_ADD) {
-        add_end_of(sum, k, t, slack);
-        return;
-    }
+    if (nb_volume_has_fog(&k->medium->body)) add_end_of(sum, k, t, slack);
+    if (!nb_volume_covers(&k->medium->body)) return;
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *other = &m->contacts[i];
-        if (other->medium->body.operation != NEBEL_OPERATION_ADD) continue;
+        if (other->medium->body.rank >= k->medium->body.rank) break;
+        if (!nb_volume_has_fog(&other->medium->body)) continue;
         const nb_wmask there = nb_wand(t >= other->hull_enter, t <= other->hull_leave);
         add_end_of(sum, other, t, nb_select(nb_narrow_mask(there), slack, NB_F(0.0)));
     }
@@ -403,7 +402,7 @@ static nb_real slack_within(nb_wide end, nb_wide slack, const nb_interval *bound
 static nb_wide slack_that_matters(const contact *k, nb_wide slack)
 {
     if (grows_without_bound(&k->medium->body.density)) return slack;
-    const nb_wide least = nb_widen(LEAST_DOUBT) * WIDE(k->medium->body.operation == NEBEL_OPERATION_ADD ? k->least_slack : 0);
+    const nb_wide least = nb_widen(LEAST_DOUBT) * WIDE(nb_volume_covers(&k->medium->body) ? 0 : k->least_slack);
     return nb_wselect(slack < least, NB_W(0.0), slack);
 }
 
@@ -466,7 +465,7 @@ static void meet_medium(march *m, const nb_medium *medium)
         k->radiance[c] = REAL(medium->radiance[c]);
     }
     k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
-    if (medium->body.operation == NEBEL_OPERATION_ADD) profile_contact(k, &m->rays);
+    if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;
     m->contact_count++;
     m->span_count += medium->body.leaf_count;

@@ -228,7 +228,7 @@ static int is_straight(const nb_trace_job *job)
     const nebel_snapshot *snapshot = job->snapshot;
     if (snapshot->medium_count != 1 || job->wants_error) return 0;
     const nb_medium *medium = &snapshot->media[0];
-    return medium->body.operation == NEBEL_OPERATION_ADD && medium->body.leaf_count == 1 && !medium->emits &&
+    return nb_volume_has_fog(&medium->body) && medium->body.leaf_count == 1 && !medium->emits &&
            medium->body.density.type == NEBEL_DENSITY_CONSTANT;
 }
 

@@ -84,19 +84,21 @@ static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
     return stack[0];
 }
 
-/* Marks which media are there. Returns whether any is. */
+/* Marks which media's fog is there. Returns whether any is. From the highest rank down: what covers takes away what ranks below it. */
 static int mark_inside(march *m, const piece *p)
 {
-    nb_mask free_of_fog = nb_not(p->lanes);
+    nb_mask covered = nb_not(p->lanes), covered_below = covered;
+    int64_t rank = INT64_MAX;
     size_t first = m->window_count;
-    for (size_t i = m->window_count; i-- > 0;) { /* exclusions come last in the canonical order */
+    for (size_t i = m->window_count; i-- > 0;) {
         contact *k = in_window(m, i);
+        const nb_volume *body = &k->medium->body;
+        if (body->rank < rank) covered = covered_below;
+        rank = body->rank;
         k->inside = is_inside(m, k, p->start);
-        if (k->medium->body.operation == NEBEL_OPERATION_EXCLUDE) {
-            free_of_fog = nb_or(free_of_fog, k->inside);
-            continue;
-        }
-        k->inside = nb_and(k->inside, nb_not(free_of_fog));
+        if (nb_volume_covers(body)) covered_below = nb_or(covered_below, k->inside);
+        if (!nb_volume_has_fog(body)) continue;
+        k->inside = nb_and(k->inside, nb_not(covered));
         if (nb_any(k->inside)) m->present[--first] = m->window[i];
     }
     m->present_first = first;
@@ -193,11 +195,18 @@ static nb_mask ends_matter(const march *m)
     return largest(m->all_ends.depth) + largest(m->all_ends.light) > NB_F(16.0) * NB_EPSILON;
 }
 
-/* Whether an end of a leaf within slack of t may be an end of the body: not where other leaves hold the body together there, or
- * leave it out, whatever their own ends do. */
-static nb_mask may_end_body(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
+/* Within slack of t, whatever ends with slack of their own do: where the body may be somewhere, and where it is everywhere. */
+typedef struct presence {
+    nb_mask may, must;
+} presence;
+
+/* The leaf `which` may be or not; NO_LEAF: none. */
+#define NO_LEAF SIZE_MAX
+
+static presence body_near(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
 {
     const nb_volume *body = &k->medium->body;
+    const nb_wide from = nb_wmax(t - slack, NB_W(0.0)), to = nb_wmin(t + slack, m->rays.t_max);
     nb_mask most[NB_STEP_STACK], least[NB_STEP_STACK];
     int top = 0;
     size_t leaf = 0;
@@ -209,14 +218,34 @@ static nb_mask may_end_body(const march *m, const contact *k, size_t which, nb_w
         }
         const leaf_span *span = &m->spans[k->first_span + leaf];
         const nb_wide enter_slack = nb_widen(span->enter_slack), leave_slack = nb_widen(span->leave_slack);
-        const nb_wmask may = nb_wand(span->enter - enter_slack <= t + slack, span->leave + leave_slack >= t - slack);
-        const nb_wmask must = nb_wand(span->enter + enter_slack <= t - slack, span->leave - leave_slack >= t + slack);
+        const nb_wmask may = nb_wand(span->enter - enter_slack <= to, span->leave + leave_slack >= from);
+        const nb_wmask must = nb_wand(span->enter + enter_slack <= from, span->leave - leave_slack >= to);
         most[top] = leaf == which ? nb_mask_true : nb_narrow_mask(may);
         least[top] = leaf == which ? nb_mask_false : nb_narrow_mask(must);
         top++;
         leaf++;
     }
-    return nb_and(most[0], nb_not(least[0]));
+    return (presence){most[0], least[0]};
+}
+
+/* Whether an end of a leaf within slack of t may be an end of the body: not where other leaves hold the body together there, or
+ * leave it out. */
+static nb_mask may_end_body(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
+{
+    const presence near = body_near(m, k, which, t, slack);
+    return nb_and(near.may, nb_not(near.must));
+}
+
+/* Whether something that ranks higher takes a medium's fog away all about t, so that its ends there do nothing. */
+static nb_mask is_covered_near(const march *m, const contact *k, nb_wide t, nb_wide slack)
+{
+    nb_mask covered = nb_mask_false;
+    for (size_t i = m->window_count; i-- > 0;) {
+        const contact *other = in_window(m, i);
+        if (other->medium->body.rank <= k->medium->body.rank) break;
+        if (nb_volume_covers(&other->medium->body)) covered = nb_or(covered, body_near(m, other, NO_LEAF, t, slack).must);
+    }
+    return covered;
 }
 
 /* Ends at t, and what those that may already lie before t may take from the fog there: where fog begins it can only be more. */
@@ -230,8 +259,9 @@ static void pass_end(const march *m, passing *p, const contact *k, size_t leaf, 
 {
     if (!nb_any(slack > NB_F(0.0))) return;
     const nb_wide wide_slack = nb_widen(slack);
-    const nb_mask here = nb_and(p->lanes, nb_narrow_mask(end == p->t));
-    const nb_mask may_be_before = nb_and(p->lanes, nb_narrow_mask(nb_wand(end >= p->t, end - wide_slack <= p->t)));
+    const nb_mask counts = nb_and(p->lanes, nb_not(is_covered_near(m, k, end, wide_slack)));
+    const nb_mask here = nb_and(counts, nb_narrow_mask(end == p->t));
+    const nb_mask may_be_before = nb_and(counts, nb_narrow_mask(nb_wand(end >= p->t, end - wide_slack <= p->t)));
     if (nb_any(here)) {
         const int whole = k->medium->body.leaf_count == 1;
         const nb_mask ends_body = whole ? here : nb_and(here, may_end_body(m, k, leaf, end, wide_slack));
@@ -245,12 +275,12 @@ static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
     passing p = {t, lanes, no_ends(), no_ends()};
     for (size_t i = 0; i < m->window_count; i++) {
         const contact *k = in_window(m, i);
-        const int adds = k->medium->body.operation == NEBEL_OPERATION_ADD;
+        const int covers = nb_volume_covers(&k->medium->body), has_fog = nb_volume_has_fog(&k->medium->body);
         for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
             const leaf_span *span = &m->spans[k->first_span + j];
             p.lanes = nb_and(lanes, nb_narrow_mask(span->enter < span->leave));
-            pass_end(m, &p, k, j, span->enter, span->enter_slack, !adds);
-            pass_end(m, &p, k, j, span->leave, span->leave_slack, adds);
+            pass_end(m, &p, k, j, span->enter, span->enter_slack, covers);
+            pass_end(m, &p, k, j, span->leave, span->leave_slack, has_fog);
         }
     }
     nb_real most = NB_F(0.0);

@@ -200,7 +200,7 @@ nebel_result nb_check_volume(const nebel_log *log, const nebel_volume_desc *desc
     const nebel_result result = check_shape(log, &desc->shape, 0, &leaves);
     if (result != NEBEL_OK) return result;
     if (desc->operation == NEBEL_OPERATION_EXCLUDE) return NEBEL_OK;
-    if (desc->operation != NEBEL_OPERATION_ADD)
+    if (desc->operation != NEBEL_OPERATION_ADD && desc->operation != NEBEL_OPERATION_REPLACE)
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "operation: %d is unknown", (int)desc->operation);
     const nebel_result density = check_density(log, &desc->density, &desc->shape);
     return density != NEBEL_OK ? density : check_light(log, desc);

@@ -129,6 +129,12 @@ static void resolve_light(const nebel_volume_desc *desc, nb_volume *volume)
     }
 }
 
+/* An exclusion stands above the fog of its priority, and below that of the next. */
+static int64_t rank_of(const nebel_volume_desc *desc)
+{
+    return 2 * (int64_t)desc->priority + (desc->operation == NEBEL_OPERATION_EXCLUDE);
+}
+
 nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log *log, const nebel_volume_desc *desc,
                                nb_volume *volume)
 {
@@ -137,11 +143,12 @@ nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log
     nb_counts counts = {0, 0, 0};
     count_shape(&desc->shape, &counts);
     *volume = (nb_volume){.operation = desc->operation,
+                          .rank = rank_of(desc),
                           .leaf_count = counts.leaves,
                           .face_count = counts.faces,
                           .step_count = counts.steps};
     if (!allocate_arrays(allocator, volume)) return nb_fail(log, NEBEL_ERROR_MEMORY, "volume: out of memory");
-    if (desc->operation == NEBEL_OPERATION_ADD) {
+    if (nb_volume_has_fog(volume)) {
         volume->density = resolve_density(&desc->density);
         resolve_light(desc, volume);
     }
@@ -229,7 +236,8 @@ static int compare_body(const nb_volume *a, const nb_volume *b)
 
 int nb_volume_compare(const nb_volume *a, const nb_volume *b)
 {
-    int order = (a->operation > b->operation) - (a->operation < b->operation);
+    int order = (a->rank > b->rank) - (a->rank < b->rank);
+    if (order == 0) order = nb_volume_covers(b) - nb_volume_covers(a);
     if (order == 0) order = compare_numbers(a->extinction, b->extinction, 3);
     if (order == 0) order = compare_numbers(a->source, b->source, 3);
     if (order == 0) order = compare_numbers(a->albedo, b->albedo, 3);

@@ -53,6 +53,7 @@ typedef enum nb_step { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_step;
 
 typedef struct nb_volume {
     nebel_operation operation;
+    int64_t rank; /* one that covers takes away the fog of every lower rank: see nb_volume_covers */
     nebel_density density;
     double extinction[3], source[3], albedo[3], emission[3];
     int lit; /* albedo rather than source */
@@ -68,12 +69,23 @@ typedef struct nb_volume {
 nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log *log, const nebel_volume_desc *desc,
                                nb_volume *volume);
 
+static inline int nb_volume_has_fog(const nb_volume *volume)
+{
+    return volume->operation != NEBEL_OPERATION_EXCLUDE;
+}
+
+static inline int nb_volume_covers(const nb_volume *volume)
+{
+    return volume->operation != NEBEL_OPERATION_ADD;
+}
+
 /* A copy with arrays of its own. 0 when memory is out. */
 int nb_volume_copy(const nebel_allocator *allocator, const nb_volume *from, nb_volume *to);
 
 void nb_volume_free(const nebel_allocator *allocator, nb_volume *volume);
 
-/* A total order on what volumes are, whatever the order they were added in: the canonical order of summation. */
+/* A total order on what volumes are, whatever the order they were added in: the canonical order of summation. By rank first,
+ * and what covers before what does not. */
 int nb_volume_compare(const nb_volume *a, const nb_volume *b);
 
 #endif

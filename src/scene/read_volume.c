@@ -1,6 +1,7 @@
 /* One entry of the section "fog". */
 #include "scene/import.h"
 
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -8,6 +9,7 @@ enum {
     NAME,
     SHAPE,
     OPERATION,
+    PRIORITY,
     DENSITY,
     EXTINCTION,
     MEAN_FREE_PATH,
@@ -22,28 +24,31 @@ enum {
     VOLUME_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",           "shape",      "operation", "density", "extinction",
-                                        "mean_free_path", "visibility", "contrast",  "source",  "albedo",
-                                        "phase",          "emission",   "keys",      "frame"};
+static const char *const key_names[] = {"name",       "shape",          "operation",  "priority", "density",
+                                        "extinction", "mean_free_path", "visibility", "contrast", "source",
+                                        "albedo",     "phase",          "emission",   "keys",     "frame"};
 
-#define EXCLUDE_KEYS (NB_BIT(NAME) | NB_BIT(SHAPE) | NB_BIT(OPERATION) | NB_BIT(KEYS))
+#define EXCLUDE_KEYS (NB_BIT(NAME) | NB_BIT(SHAPE) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(KEYS))
 #define FOG_KEYS (NB_BIT(VOLUME_KEY_COUNT) - 1 - NB_BIT(FRAME))
-#define MOVING_KEYS (FOG_KEYS - NB_BIT(NAME) - NB_BIT(OPERATION) - NB_BIT(PHASE) - NB_BIT(KEYS) + NB_BIT(FRAME))
+#define STILL_KEYS (NB_BIT(NAME) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(PHASE) | NB_BIT(KEYS))
+#define MOVING_KEYS (FOG_KEYS - STILL_KEYS + NB_BIT(FRAME))
 
 /* In the order of nebel_operation. */
 static const nb_keys volume_keys[] = {
     {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"},
-    {key_names, VOLUME_KEY_COUNT, EXCLUDE_KEYS, NB_BIT(SHAPE), "a volume with \"operation\": \"exclude\""}};
+    {key_names, VOLUME_KEY_COUNT, EXCLUDE_KEYS, NB_BIT(SHAPE), "a volume with \"operation\": \"exclude\""},
+    {key_names, VOLUME_KEY_COUNT, FOG_KEYS, NB_BIT(SHAPE), "a volume"}};
 static const nb_keys moving_keys[] = {
     {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"},
-    {key_names, VOLUME_KEY_COUNT, NB_BIT(FRAME) | NB_BIT(SHAPE), NB_BIT(FRAME), "a key of excluded fog"}};
+    {key_names, VOLUME_KEY_COUNT, NB_BIT(FRAME) | NB_BIT(SHAPE), NB_BIT(FRAME), "a key of excluded fog"},
+    {key_names, VOLUME_KEY_COUNT, MOVING_KEYS, NB_BIT(FRAME), "a key of fog"}};
 
 static bool read_operation(nb_json *json, const nb_json_node *volume, const char *prefix, nebel_operation *operation)
 {
-    static const char *const names[] = {"add", "exclude"};
+    static const char *const names[] = {"add", "exclude", "replace"};
     for (const nb_json_node *node = nb_json_first(json, volume); node != NULL; node = nb_json_next(json, node)) {
         if (!nb_value_is_key(node, prefix, "operation")) continue;
-        const int choice = nb_value_choice(json, node, names, 2);
+        const int choice = nb_value_choice(json, node, names, 3);
         if (choice < 0) return false;
         *operation = (nebel_operation)choice;
     }
@@ -357,9 +362,11 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     nb_json *json = in->json;
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};
     const char *name = "";
-    if (!read_members(in, node, &volume, found)) return false;
+    if (!read_members(in, node, &volume, found) ||
+        !nb_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume.priority))
+        return false;
     if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    if (volume.operation == NEBEL_OPERATION_ADD &&
+    if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
          !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction) ||
          !read_light(in, found, &volume)))

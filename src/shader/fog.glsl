@@ -1,7 +1,7 @@
 /* The march in shading languages: what src/march does, for one ray, from the words of layout.h.
  *
  * Transmittance is a plain sum over media, and so is light where one medium or one radiance is met: most rays end there
- * (nb_sum_media). Where light of different colour mixes, or an exclusion cuts, nb_walk goes from event to event with a few slots
+ * (nb_sum_media). Where light of different colour mixes, or one medium takes away another's fog, nb_walk goes from event to event with a few slots
  * as memory; rays that meet more volumes than there are slots walk in windows, and through places where more overlap than that
  * they read everything again for each step: slower, never wrong.
  *
@@ -285,14 +285,14 @@ int nb_medium_at(int i, bool listed)
 #endif
 }
 
-/* What the media on a ray add up to if nothing excludes them. */
+/* What the media on a ray add up to if none covers another. */
 struct nb_media_sum {
     nb_vec3 depth;
     nb_vec3 light;
     nb_vec3 radiance; /* of the first */
     bool met, emits;
     bool mixed; /* more than one quotient of light and extinction */
-    bool holes; /* an exclusion is met */
+    bool covers; /* one that covers is met, and another */
 };
 
 nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
@@ -304,7 +304,9 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     sum.met = false;
     sum.emits = false;
     sum.mixed = false;
-    sum.holes = false;
+    sum.covers = false;
+    bool any = false;
+    bool covering = false;
     for (int i = 0; i < count; i++) {
         int at = nb_medium_at(first + i, listed);
         nb_vec4 extinction = NEBEL_WORD(at);
@@ -320,11 +322,15 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
             from = s.leave;
         }
         if (!(length > 0.0)) continue;
-        if (NB_HAS(NB_HAS_EXCLUDE) && kind == NB_KIND_EXCLUDE) {
-            sum.holes = true;
-        } else {
-            nb_vec4 light = NEBEL_WORD(at + 1);
-            bool emits = light.w != 0.0;
+        nb_vec4 light = NEBEL_WORD(at + 1);
+        int flags = int(light.w);
+        if (NB_HAS(NB_HAS_COVER)) {
+            sum.covers = sum.covers || (any && (covering || (flags & NB_LIGHT_COVERS) != 0));
+            covering = covering || (flags & NB_LIGHT_COVERS) != 0;
+            any = true;
+        }
+        if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
+            bool emits = (flags & NB_LIGHT_EMITS) != 0;
             bool other = radiance.x != sum.radiance.x || radiance.y != sum.radiance.y || radiance.z != sum.radiance.z;
             sum.mixed = sum.mixed || (sum.met && (other || emits || sum.emits));
             sum.emits = sum.emits || emits;
@@ -450,7 +456,8 @@ float nb_profile_kink(nb_profile profile)
 struct nb_piece {
     float start, end;
     int present; /* media */
-    bool varies, emits, excluded;
+    bool varies, emits;
+    int floor;                 /* the highest rank that covers: what ranks lower is not there */
     nb_vec3 extinction, light; /* per metre, of even media */
     nb_vec3 least, most;       /* radiance */
     float rate;                /* of the fastest profile */
@@ -464,7 +471,7 @@ nb_piece nb_open_piece(float start, float end)
     piece.present = 0;
     piece.varies = false;
     piece.emits = false;
-    piece.excluded = false;
+    piece.floor = 0;
     piece.extinction = nb_splat3(0.0);
     piece.light = nb_splat3(0.0);
     piece.least = nb_splat3(NB_HUGE);
@@ -483,23 +490,48 @@ nb_piece nb_note_profile(nb_piece piece, nb_profile profile)
     return piece;
 }
 
+bool nb_is_in_slot(int k, float t)
+{
+    return nb_slot_enter[k] <= t && nb_slot_leave[k] > t;
+}
+
+bool nb_is_covered(int medium, int floor)
+{
+    return NB_HAS(NB_HAS_COVER) && int(NEBEL_WORD(medium + 1).w) / NB_LIGHT_RANK < floor;
+}
+
+/* Finds what covers among the slots. Media come by rank, those that cover first, so that what earlier slots added up to ranks below a
+ * new floor. */
+nb_piece nb_cover_piece(nb_piece piece, int used)
+{
+    int floor = piece.floor;
+    for (int k = 0; k < used; k++) {
+        int flags = int(NEBEL_WORD(nb_slot_medium[k] + 1).w);
+        if ((flags & NB_LIGHT_COVERS) != 0 && nb_is_in_slot(k, piece.start)) floor = max(floor, flags / NB_LIGHT_RANK);
+    }
+    if (floor > piece.floor) {
+        float end = piece.end;
+        piece = nb_open_piece(piece.start, end);
+        piece.floor = floor;
+    }
+    return piece;
+}
+
 nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray)
 {
     float enter = nb_slot_enter[k];
     float leave = nb_slot_leave[k];
     if (enter > piece.start) piece.end = min(piece.end, enter);
     if (leave > piece.start) piece.end = min(piece.end, leave);
-    if (enter <= piece.start && leave > piece.start) {
-        int at = nb_slot_medium[k];
+    int at = nb_slot_medium[k];
+    if (nb_is_in_slot(k, piece.start) && !nb_is_covered(at, piece.floor)) {
         nb_vec4 extinction = NEBEL_WORD(at);
         nb_vec4 light = NEBEL_WORD(at + 1);
         nb_vec3 radiance = NEBEL_WORD(at + 2).xyz;
         int kind = int(extinction.w);
-        if (NB_HAS(NB_HAS_EXCLUDE) && kind == NB_KIND_EXCLUDE) {
-            piece.excluded = true;
-        } else {
+        if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
             piece.present++;
-            piece.emits = piece.emits || light.w != 0.0;
+            piece.emits = piece.emits || (int(light.w) & NB_LIGHT_EMITS) != 0;
             piece.least = min(piece.least, radiance);
             piece.most = max(piece.most, radiance);
             if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT) {
@@ -612,10 +644,11 @@ nebel_light nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
             }
             next = window.rest;
             piece.end = min(piece.end, window.end);
+            if (NB_HAS(NB_HAS_COVER) && !stepping) piece = nb_cover_piece(piece, window.used);
             for (int k = 0; k < window.used; k++) {
                 if (!stepping)
                     piece = nb_note_slot(piece, k, ray);
-                else if (nb_slot_enter[k] <= piece.start && nb_slot_leave[k] > piece.start)
+                else if (nb_is_in_slot(k, piece.start) && !nb_is_covered(nb_slot_medium[k], piece.floor))
                     nb_add_slot(leg, piece, k, ray);
             }
         }
@@ -644,7 +677,7 @@ nebel_light nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
             }
             steps++;
             leg.h = steps >= NB_MOST_STEPS ? rest : min(h, rest);
-        } else if (piece.present > 0 && !piece.excluded) {
+        } else if (piece.present > 0) {
             if (NB_HAS(NB_HAS_PROFILE) && piece.varies) {
                 over = false;
                 stepping = true;
@@ -686,11 +719,11 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
         nb_media_sum sum = nb_sum_media(ray, first, count, listed);
         light.transmittance = nb_exp3(-sum.depth);
         light.in_scattering = sum.light * nb_exp_ratio3(sum.depth);
-        bool holes = NB_HAS(NB_HAS_EXCLUDE) && sum.met && sum.holes;
-        if (holes || (NB_HAS(NB_HAS_MIXED) && lit && sum.mixed)) {
+        bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
+        if (covers || (NB_HAS(NB_HAS_MIXED) && lit && sum.mixed)) {
             nebel_light walked = nb_walk(ray, first, count, listed, lit);
             light.in_scattering = walked.in_scattering;
-            if (holes) light.transmittance = walked.transmittance;
+            if (covers) light.transmittance = walked.transmittance;
         }
         light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
     }

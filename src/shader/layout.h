@@ -6,7 +6,8 @@
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
- *     1  light per metre at density 1 (radiance times extinction, plus emission), 1 where there is emission
+ *     1  light per metre at density 1 (radiance times extinction, plus emission), 1 where there is emission, plus 2 where it covers,
+ *        plus 4 times its rank, counted from 0: what covers takes away the fog of every lower rank
  *     2  radiance of opaque fog, leaves
  *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye, 1 / (sqrt(2) sigma);
  *        soft edge: 1 / distance
@@ -37,6 +38,10 @@
 #define NB_KIND_RADIAL 6 /* plus power - 1, 0 to 2 */
 #define NB_KIND_EXCLUDE 9
 
+#define NB_LIGHT_EMITS 1
+#define NB_LIGHT_COVERS 2
+#define NB_LIGHT_RANK 4
+
 #define NB_TYPE_WORLD 0
 #define NB_TYPE_PLANES 1
 #define NB_TYPE_BOX 2
@@ -55,7 +60,7 @@
 #define NB_HAS_CAPSULE 32
 #define NB_HAS_TURNED 64
 #define NB_HAS_GROUP 128   /* a body of several leaves */
-#define NB_HAS_EXCLUDE 256
+#define NB_HAS_COVER 256   /* exclude or replace */
 #define NB_HAS_MIXED 512   /* two media of different light, or one of two that shines */
 #define NB_HAS_SLOPE 1024  /* height, linear */
 #define NB_HAS_GAUSSIAN 2048

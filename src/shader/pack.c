@@ -20,6 +20,7 @@
 typedef struct packer {
     nebel_word *words;
     size_t used; /* words behind those of the media that are taken */
+    size_t rank; /* of the medium, counted from 0 */
     long double eye[3];
 } packer;
 
@@ -159,7 +160,7 @@ static void pack_group(packer *p, const nb_volume *body, nebel_word *word)
 
 static int kind_of(const nb_volume *body)
 {
-    if (body->operation == NEBEL_OPERATION_EXCLUDE) return NB_KIND_EXCLUDE;
+    if (!nb_volume_has_fog(body)) return NB_KIND_EXCLUDE;
     switch (body->density.type) {
     case NEBEL_DENSITY_HEIGHT:
         return body->density.below == NEBEL_BELOW_GROW ? NB_KIND_HEIGHT : NB_KIND_HEIGHT_CAPPED;
@@ -217,11 +218,17 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
 /* ---- fog
  * --------------------------------------------------------------------------------------------------------------- */
 
+static double light_flags(const nb_medium *medium, size_t rank)
+{
+    return (medium->emits ? NB_LIGHT_EMITS : 0) + (nb_volume_covers(&medium->body) ? NB_LIGHT_COVERS : 0) +
+           NB_LIGHT_RANK * (double)rank;
+}
+
 static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
 {
     const nb_volume *body = &medium->body;
     set_color(&word[0], body->extinction, kind_of(body));
-    set_color(&word[1], medium->light, medium->emits);
+    set_color(&word[1], medium->light, light_flags(medium, p->rank));
     set_color(&word[2], medium->radiance, (double)body->leaf_count);
     pack_density(p, body, &word[3]);
     if (body->leaf_count > 1)
@@ -260,11 +267,14 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
                        capacity);
     packer p = {words,
                 NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS,
+                0,
                 {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};
     words[0] = (nebel_word){
         {(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)), 0, 0}};
-    for (size_t i = 0; i < snapshot->medium_count; i++)
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
         pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
+    }
     return NEBEL_OK;
 }
 
@@ -290,7 +300,7 @@ static uint32_t features_of_kind(int kind)
     if (kind <= NB_KIND_LINEAR) return NB_HAS_SLOPE;
     if (kind == NB_KIND_GAUSSIAN) return NB_HAS_GAUSSIAN;
     if (kind == NB_KIND_SOFT_EDGE) return NB_HAS_SOFT_EDGE;
-    return kind == NB_KIND_EXCLUDE ? NB_HAS_EXCLUDE : NB_HAS_RADIAL;
+    return kind == NB_KIND_EXCLUDE ? 0 : NB_HAS_RADIAL;
 }
 
 /* Whether two media may differ in their quotient of light and extinction, on which the walk for light depends. */
@@ -299,7 +309,7 @@ static int is_mixed(const nebel_snapshot *snapshot)
     const nb_medium *first = NULL;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
-        if (medium->body.operation == NEBEL_OPERATION_EXCLUDE) continue;
+        if (!nb_volume_has_fog(&medium->body)) continue;
         if (first == NULL) {
             first = medium;
             continue;
@@ -317,7 +327,8 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
     uint32_t features = is_mixed(snapshot) ? NB_HAS_MIXED : 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
-        features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0);
+        features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |
+                    (nb_volume_covers(body) ? NB_HAS_COVER : 0);
         for (size_t k = 0; k < body->leaf_count; k++) features |= features_of_leaf(&body->leaves[k]);
     }
     return features;
