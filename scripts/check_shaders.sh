@@ -33,12 +33,20 @@ calls='
     nebel_light listed = nebel_trace_list(sight.origin, sight.direction, sight.t_max, 3, 4);
     light.transmittance *= nebel_transmit(sight.origin, sight.direction, 2.0);
     light.transmittance *= nebel_transmit_list(sight.origin, sight.direction, 3.0, 0, 1);
-    light.in_scattering += listed.transmittance * listed.in_scattering;'
+    light.in_scattering += listed.transmittance * listed.in_scattering;
+    nebel_blend blend = nebel_blend_over(place, 0.5, light);
+    blend.source += nebel_blend_premultiplied(place, 0.5, light).source + nebel_blend_additive(place, light).source;
+    blend.factor *= nebel_blend_multiply(place, light).factor * nebel_blend_screen(place, light).factor;
+    float way = nebel_ball_length(sight.origin, sight.direction, sight.t_max, place, 2.0, 3);
+    way += nebel_gaussian_length(sight.origin, sight.direction, sight.t_max, place, 3.0, 1.0);
+    blend.factor *= nebel_blend_medium(nebel_medium_light(way, place, place), light).factor;
+    light.in_scattering += nebel_blend_grey(blend).xyz * nebel_five_taps(place.xy, place.z, nebel_default_taps());'
 
 # try_opengl DIALECT VERSION DEFINES
 try_opengl() {
     {
-        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n%b' "$2" "$3"
+        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n#define NEBEL_TRANSPARENT\n%b' "$2" "$3"
+        printf 'uniform highp sampler2D opaque;\n#define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x\n'
         text "$1"
         printf 'in highp vec3 place; out highp vec4 color;\nvoid main()\n{%s\n' "$calls"
         printf '    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n'
@@ -59,12 +67,15 @@ done
 layout(std140, binding = 0) uniform fog { vec4 words[1024]; };
 layout(std430, binding = 1) readonly buffer tiles { uint entries[]; };
 layout(std140, binding = 2) uniform view { vec4 rays[10]; };
+layout(binding = 3) uniform sampler2D opaque;
 layout(location = 0) in vec3 place;
 layout(location = 0) out vec4 color;
 #define NEBEL_VIEW
+#define NEBEL_TRANSPARENT
 #define NEBEL_WORD(i) words[i]
 #define NEBEL_INDEX(i) int(entries[i])
 #define NEBEL_RAY(i) rays[i]
+#define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x
 GLSL
     text glsl_450
     printf 'void main()\n{%s\n    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n' "$calls"
@@ -76,10 +87,14 @@ verdict glsl_450 glslangValidator -V "$work/fog.frag" -o "$work/fog.spv"
 cbuffer fog { float4 words[1024]; };
 cbuffer view { float4 rays[10]; };
 StructuredBuffer<uint> entries;
+Texture2D opaque;
+SamplerState opaque_sampler;
 #define NEBEL_VIEW
+#define NEBEL_TRANSPARENT
 #define NEBEL_WORD(i) words[i]
 #define NEBEL_INDEX(i) int(entries[i])
 #define NEBEL_RAY(i) rays[i]
+#define NEBEL_OPAQUE_DEPTH(at) opaque.SampleLevel(opaque_sampler, at, 0.0).x
 HLSL
     text hlsl
     printf 'float4 main(float3 place : TEXCOORD0) : SV_Target\n{%s\n' "$calls"

@@ -34,6 +34,44 @@
  *         NEBEL_FROM_EYE is, all rays start at the eye, as nebel_rays says. It reads NEBEL_RAY(i), a vec4 of nebel_rays; GLSL 3.30 and ES 3.00 declare
  *         `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];` unless the host defines NEBEL_RAY itself.
  *
+ * With NEBEL_TRANSPARENT defined before it, the text also declares, in every dialect, what transparent surfaces and particles need:
+ *
+ *     struct nebel_blend { vec3 source; vec3 factor; };
+ *     nebel_blend nebel_blend_over(vec3 color, float alpha, nebel_light fog);
+ *     nebel_blend nebel_blend_premultiplied(vec3 color, float alpha, nebel_light fog);
+ *     nebel_blend nebel_blend_additive(vec3 color, nebel_light fog);
+ *     nebel_blend nebel_blend_multiply(vec3 color, nebel_light fog);
+ *     nebel_blend nebel_blend_screen(vec3 color, nebel_light fog);
+ *     nebel_blend nebel_blend_medium(nebel_light medium, nebel_light fog);
+ *         nebel_blend_surface for each mode, over a picture that has its fog already: `fog` is nebel_trace up to the surface, and the pixel
+ *         becomes source + factor * pixel. MEDIUM is a particle: pixel behind times its transmittance, plus its own in-scattering.
+ *         Two outputs, location 0 index 0 and 1: glBlendFuncSeparate(GL_ONE, GL_SRC1_COLOR, GL_ZERO, GL_ONE), all modes, draw from the
+ *         back to the front; needs OpenGL 3.3 or GL_EXT_blend_func_extended.
+ *     vec4 nebel_blend_grey(nebel_blend blend);
+ *         Source, and the mean factor as alpha: glBlendFuncSeparate(GL_ONE, GL_SRC_ALPHA, GL_ZERO, GL_ONE), one output, everywhere.
+ *         Exact where the factors of the colours are equal: over, premultiplied, additive; multiply, screen and medium if they are grey.
+ *         Coloured ones without two outputs are drawn twice, exact too: first the factor with glBlendFunc(GL_ZERO, GL_SRC_COLOR), then
+ *         the source with glBlendFunc(GL_ONE, GL_ONE).
+ *     float nebel_ball_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, int power);
+ *     float nebel_gaussian_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, float sigma);
+ *         The density of a particle integrated along the ray from t = 0 to t_max [m], closed form: (1 - r^2)^power, r the distance from
+ *         the centre in radii, power 0 (even) to 3; exp(-distance^2 / (2 sigma^2)) within the radius (1e18: without bound). With the
+ *         t_max of nebel_see, that is with the opaque surface's depth, edges are soft because they are right. Radius and sigma > 0.
+ *         Positions are floats: a particle 10,000 radii away still has its digits.
+ *     nebel_light nebel_medium_light(float length, vec3 extinction, vec3 light);
+ *         What so much of a medium does to light: extinction and radiance per metre where the density is 1 [1/m].
+ *     struct nebel_tap_constants { float offset; float nothing; float edge; float margin; float brightness; };
+ *     nebel_tap_constants nebel_default_taps();
+ *         0.0005 of the screen, 100000, 0.5, 0.125, 1: constants of the classic comparison of a particle with the opaque depth around.
+ *     vec2 nebel_screen_place(vec4 clip);
+ *         Where clip space is on the screen, 0 to 1.
+ *     float nebel_compare_taps(float depth, float center, vec4 corners, nebel_tap_constants taps);
+ *         What to multiply a particle's colour by: `brightness`, or 0 where it is hidden. Depths are in metres along the camera's axis:
+ *         the particle's, and those of the opaque picture at the pixel and `offset` away along both diagonals; below 0 nothing is
+ *         there and `nothing` counts. Drawn where they differ by more than `edge`, and where none is nearer than depth - margin.
+ *     float nebel_five_taps(vec2 place, float depth, nebel_tap_constants taps);
+ *         The same with depths from NEBEL_OPAQUE_DEPTH(place), which the host defines before the text; else the function is not there.
+ *
  * Where the words come from: NEBEL_WORD(i), a vec4. By default (GLSL 3.30 and ES 3.00) the text declares
  *
  *     layout(std140) uniform nebel_fog_block { vec4 nebel_words[1024]; };
