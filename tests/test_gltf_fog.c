@@ -218,9 +218,10 @@ static void test_binary_files(void **state)
     nebel_scene *scene = parse_good(model);
     assert_int_equal(nebel_scene_contents(scene)->volume_count, 1);
     nebel_destroy_scene(scene);
+    const nebel_scene_desc silent = {.log = {NULL, NULL}};
     for (size_t cut = 0; cut < 20; cut++) { /* said when the model is loaded */
         write_file(GLB, file, cut);
-        scene = parse_good(model);
+        assert_int_equal(nebel_parse_scene(model, strlen(model), "test.json", &silent, &scene), NEBEL_OK);
         assert_int_equal(nebel_scene_contents(scene)->volume_count, 0);
         assert_int_equal(nebel_load_scene_models(scene), NEBEL_ERROR_FORMAT);
         nebel_destroy_scene(scene);
@@ -345,6 +346,32 @@ static void test_every_failing_allocation_is_survived(void **state)
     }
 }
 
+/* Any byte may be another: a scene or an error with a message, and all memory back. */
+static void test_every_garbled_byte_is_survived(void **state)
+{
+    (void)state;
+    static const char whole[] =
+        HEAD "\"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"children\": [1], \"scale\": [1, 2, 3]}, "
+             "{\"extras\": {\"nebel\": \"{\\\"extinction\\\": 1}\"}, \"rotation\": [0, 0, 0, 1]}]}";
+    static const char others[] = "\0{}[]\"\\,:9-ne";
+    for (size_t i = 0; i < sizeof whole - 1; i++)
+        for (size_t k = 0; k < sizeof others - 1; k++) {
+            meter m;
+            journal kept;
+            char text[sizeof whole];
+            nebel_scene *scene = NULL;
+            const nebel_scene_desc desc = metered_desc(&m, &kept);
+            memcpy(text, whole, sizeof whole);
+            text[i] = others[k];
+            write_file(GLTF, text, k == 0 ? i : sizeof whole - 1);
+            const nebel_result result = nebel_parse_scene(MODEL(""), strlen(MODEL("")), "a.json", &desc, &scene);
+            assert_int_equal(result == NEBEL_OK, scene != NULL);
+            assert_int_equal(result == NEBEL_OK, kept.count == 0);
+            nebel_destroy_scene(scene);
+            assert_int_equal(m.live, 0);
+        }
+}
+
 static int clean_up(void **state)
 {
     (void)state;
@@ -368,6 +395,7 @@ int main(void)
         cmocka_unit_test(test_rings_of_nodes),
         cmocka_unit_test(test_albedo_and_sun_are_refused_at_the_model),
         cmocka_unit_test(test_every_failing_allocation_is_survived),
+        cmocka_unit_test(test_every_garbled_byte_is_survived),
     };
     return cmocka_run_group_tests(tests, NULL, clean_up);
 }

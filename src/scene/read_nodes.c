@@ -151,6 +151,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
 static bool speaks_of_fog(const nb_bytes *text)
 {
     static const char word[] = "\"nebel";
+    if (text->size == 0) return false;
     const char *at = (const char *)text->data, *end = at + text->size;
     while ((size_t)(end - at) >= sizeof word - 1) {
         if (memcmp(at, word, sizeof word - 1) == 0) return true;
