@@ -1,9 +1,5 @@
 /* Is the error that nebel_trace reports never smaller than the true one, and never larger than promised?
  *
- * The promise is for questions that doubles can ask. Where the last bits of the ray change the answer by more than what
- * is promised (it touches very dense fog to 1e-16, or is endless and parallel to a face but for the last bit), the
- * error still has to be honest, but may be large.
- *
  *     test_error_bound [cases [first]]        20000 from 0 unless said otherwise; a million take some minutes */
 #include "oracle.h"
 #include "random_fog.h"
@@ -28,18 +24,19 @@ typedef struct mode {
     nebel_precision precision;
     double tolerance, extra; /* error <= tolerance * radiance + extra */
     double may_exceed;       /* by this share of the cases */
-    size_t cases, dishonest, excessive, ill_posed;
+    size_t cases, dishonest, excessive;
     double worst_ratio, worst_excess; /* true error / reported; error / promised */
     size_t worst_ratio_case, worst_excess_case;
 } mode;
 
-/* These fogs and rays are made to be hard: most rays graze something, a sixth of them without end, some in fog of 1e4 per metre.
- * Of a thousand, one in float may say that more hangs in doubt than was promised; of ten thousand, one in double. */
+/* These fogs and rays are made to be hard: most rays graze something, a sixth of them without end, some in fog of 1e4 per
+ * metre. Where the last bits of the ray change the answer, double keeps its promise all the same; float may fail on one
+ * of a thousand. */
 static mode modes[] = {
-    {"double 2e-3", NEBEL_PRECISION_DOUBLE, 2e-3, 1e-8, 1e-4, 0, 0, 0, 0, 0, 0, 0, 0},
-    {"double 1e-7", NEBEL_PRECISION_DOUBLE, 1e-7, 1e-8, 1e-4, 0, 0, 0, 0, 0, 0, 0, 0},
-    {"float  2e-3", NEBEL_PRECISION_FLOAT, 2e-3, 1e-4, 1e-3, 0, 0, 0, 0, 0, 0, 0, 0},
-    {"float  1e-7", NEBEL_PRECISION_FLOAT, 1e-7, 1e-4, 1e-3, 0, 0, 0, 0, 0, 0, 0, 0},
+    {"double 2e-3", NEBEL_PRECISION_DOUBLE, 2e-3, 1e-8, 0, 0, 0, 0, 0, 0, 0, 0},
+    {"double 1e-7", NEBEL_PRECISION_DOUBLE, 1e-7, 1e-8, 0, 0, 0, 0, 0, 0, 0, 0},
+    {"float  2e-3", NEBEL_PRECISION_FLOAT, 2e-3, 1e-4, 1e-3, 0, 0, 0, 0, 0, 0, 0},
+    {"float  1e-7", NEBEL_PRECISION_FLOAT, 1e-7, 1e-4, 1e-3, 0, 0, 0, 0, 0, 0, 0},
 };
 enum { MODES = sizeof modes / sizeof modes[0] };
 
@@ -97,30 +94,11 @@ static double apart(const double T[3], const double S[3], const double T2[3], co
     return isfinite(most) ? most : HUGE_VAL;
 }
 
-/* How much of the answer hangs on the last bits of the ray: the truth of eight rays beside it. */
-static double sensitivity(const random_fog *fog, const nebel_ray *ray, const double T[3], const double S[3])
-{
-    double most = 0;
-    for (int sign = 0; sign < 8; sign++) {
-        nebel_ray beside = *ray;
-        double T2[3], S2[3], uncertainty;
-        for (int k = 0; k < 3; k++) {
-            const double up = sign >> k & 1 ? 1 + 0x1p-52 : 1 - 0x1p-52;
-            beside.origin[k] *= up;
-            beside.direction[k] *= 2 - up;
-        }
-        oracle_trace(fog->volumes, fog->count, fog->ambient, &beside, T2, S2, &uncertainty);
-        most = fmax(most, isfinite(uncertainty) ? apart(T, S, T2, S2) : HUGE_VAL);
-    }
-    return most;
-}
-
 typedef struct truth {
     double T[3], S[3], uncertainty;
 } truth;
 
-static void judge(mode *m, size_t i, const random_fog *fog, const nebel_ray *ray, const nebel_light *light,
-                  const truth *is)
+static void judge(mode *m, size_t i, const random_fog *fog, const nebel_light *light, const truth *is)
 {
     const double wrong = apart(light->transmittance, light->in_scattering, is->T, is->S);
     const double surely = wrong - is->uncertainty, promised = m->tolerance * largest_radiance(fog) + m->extra;
@@ -128,10 +106,6 @@ static void judge(mode *m, size_t i, const random_fog *fog, const nebel_ray *ray
     m->dishonest += !(light->error >= surely);
     keep_worst(surely / fmax(light->error, 1e-300), i, &m->worst_ratio, &m->worst_ratio_case);
     if (light->error <= promised) return;
-    if (sensitivity(fog, ray, is->T, is->S) > promised) {
-        m->ill_posed++;
-        return;
-    }
     m->excessive++;
     keep_worst(isnan(light->error) ? HUGE_VAL : light->error / promised, i, &m->worst_excess, &m->worst_excess_case);
 }
@@ -159,7 +133,7 @@ static void try_fog(size_t from, size_t to)
             continue;
         }
         worst_uncertainty = fmax(worst_uncertainty, is.uncertainty);
-        for (int m = 0; m < MODES; m++) judge(&modes[m], i, &fog, &rays[i - from], &lights[m][i - from], &is);
+        for (int m = 0; m < MODES; m++) judge(&modes[m], i, &fog, &lights[m][i - from], &is);
     }
     nebel_release_snapshot(snapshot);
 }
@@ -191,8 +165,8 @@ static void print_mode(const mode *m)
     printf("%s: %zu cases\n", m->name, m->cases);
     printf("    error too small in %zu (worst: true error %.3g times the reported, case %zu)\n", m->dishonest,
            m->worst_ratio, m->worst_ratio_case);
-    printf("    error too large in %zu (worst: %.3g times the promised, case %zu), and in %zu ill-posed ones\n",
-           m->excessive, m->worst_excess, m->worst_excess_case, m->ill_posed);
+    printf("    error too large in %zu (worst: %.3g times the promised, case %zu)\n", m->excessive, m->worst_excess,
+           m->worst_excess_case);
 }
 
 static void test_reported_errors_bound_the_true_ones_and_keep_their_promise(void **unused)
@@ -206,8 +180,7 @@ static void test_reported_errors_bound_the_true_ones_and_keep_their_promise(void
         const int excessive = (double)modes[m].excessive > modes[m].may_exceed * (double)modes[m].cases;
         if (modes[m].dishonest > 0) print_case("true error larger than reported", &modes[m], modes[m].worst_ratio_case);
         if (excessive) print_case("error larger than promised", &modes[m], modes[m].worst_excess_case);
-        const int mostly_ill_posed = (double)modes[m].ill_posed > 2e-3 * (double)modes[m].cases;
-        failed = failed || excessive || mostly_ill_posed || modes[m].dishonest > 0;
+        failed = failed || excessive || modes[m].dishonest > 0;
     }
     assert_false(failed);
     assert_true(undecided < case_count / 20);

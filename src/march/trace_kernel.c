@@ -121,6 +121,7 @@ static void open_workspace(workspace *w)
     w->m.present = w->present;
     w->m.stretches = w->stretches;
     w->m.lasts = w->lasts;
+    w->m.total = NULL;
     w->m.spans = w->spans;
 }
 
@@ -286,7 +287,8 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 static gathered nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
-    return (gathered){{zero, zero, zero}, {one, one, one}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+    return (gathered){{zero, zero, zero}, {one, one, one},    {zero, zero, zero}, {zero, zero, zero},
+                      {zero, zero, zero}, {zero, zero, zero}, zero};
 }
 
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
@@ -507,12 +509,16 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
  *
  * Float keeps its light, whose bits depend on nothing else, and learns from double how good it is. Double takes the answer with
  * more digits instead of its own, whatever is asked of the ray, so that its bits, too, depend on nothing else. */
-#if !defined(NB_DOUBLE)
+#if !defined(ASKS_QUAD)
 
 static nb_mask in_doubt(const nb_trace_job *job, nb_real error)
 {
     return nb_not(error <= REAL(job->promised));
 }
+
+#endif
+
+#if !defined(NB_DOUBLE)
 
 static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const nebel_light *light)
 {
@@ -575,6 +581,29 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
     return nb_trace_quad(&one);
 }
 
+#else
+
+enum { MOST_MARCHES = 8 };
+
+/* Ends 1e15 m away are in doubt by millimetres even here. The same light, marched again with its radiance known, has a smaller error, from
+ * which the next march learns. */
+static nb_real weigh_ends(nb_trace_job *job, workspace *w, const allowance *may, const gathered *g, nb_real error)
+{
+    if (job->transmittance_only) return error;
+    known total = {{g->radiance[0], g->radiance[1], g->radiance[2]}, error};
+    w->m.total = &total;
+    for (int i = 0; i < MOST_MARCHES && in_doubt(job, total.error); i++) {
+        gathered again;
+        if (answer_packet(job, w, may, job->failed, 1, &again) != NEBEL_OK) break;
+        for (int c = 0; c < 3; c++) again.depth_error[c] = again.depth_error[c] + again.ends_depth[c];
+        const nb_real less = reported_error(job, &w->m, &again);
+        if (!(less < total.error)) break;
+        total.error = less;
+    }
+    w->m.total = NULL;
+    return total.error;
+}
+
 #endif
 
 static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
@@ -591,6 +620,8 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
     nb_real error = reported_error(job, &w->m, &g);
 #if !defined(NB_DOUBLE)
     error = settle_doubts(job, &g, error, rays, job->ray_stride, count);
+#elif !defined(ASKS_QUAD)
+    error = weigh_ends(job, w, may, &g, error);
 #endif
     store_light(job, &g, error, first, count);
     return NEBEL_OK;

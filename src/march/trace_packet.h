@@ -49,9 +49,15 @@ typedef struct ends {
     nb_real depth[3], light[3];
 } ends;
 
+/* The light of the whole ray, as a march has found it before. */
+typedef struct known {
+    nb_real radiance[3], error;
+} known;
+
 typedef struct march {
     packet rays;
     int wants_error; /* 0: media that no ray comes near may be left out */
+    const known *total; /* NULL the first time */
     size_t contact_count, span_count;
     contact *contacts;
     leaf_span *spans;

@@ -6,6 +6,7 @@ typedef struct gathered {
     nb_real transmittance[3]; /* exp(-depth) */
     nb_real radiance[3];
     nb_real depth_error[3];
+    nb_real ends_depth[3];    /* that of ends which were weighed against what lies behind them */
     nb_real least_depth[3];   /* what the optical depth is at least, in spite of ends farther on */
     nb_real radiance_error;   /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
 } gathered;
@@ -253,9 +254,46 @@ typedef struct passing {
     nb_wide t;
     nb_mask lanes;
     ends here, less;
+    nb_real weighed[3];
 } passing;
 
-static void pass_end(const march *m, passing *p, const contact *k, size_t leaf, nb_wide end, nb_real slack, int fog_ends)
+/* Moving an end brings light and takes as much from the light behind, which is all the same where fog begins that is opaque further
+ * on. Where the radiance is known but for its error, so is what lies behind: ends are moved one by one, the farthest first, and each
+ * changes the radiance by no more than |light T - depth (S - S before)|, depth times the error, and what others do to that within the
+ * slack. */
+static void weigh_end(const march *m, const gathered *g, passing *p, const contact *k, nb_wide end, nb_real slack)
+{
+    const nb_wide wide_slack = nb_widen(slack);
+    const int adds = !nb_volume_covers(&k->medium->body);
+    ends others = no_ends();
+    nb_real moved[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *fog = &m->contacts[i];
+        if (!nb_volume_has_fog(&fog->medium->body)) continue;
+        const nb_wmask near = nb_wand(end + wide_slack >= fog->hull_enter, end - wide_slack <= fog->hull_leave);
+        const nb_real weight = nb_select(nb_narrow_mask(near), slack * end_density(fog, end, slack), NB_F(0.0));
+        const int moves = adds ? fog == k : 1;
+        for (int c = 0; c < 3; c++) {
+            const nb_real light = weight * fog->light[c], dark = weight * fog->extinction[c];
+            others.light[c] = others.light[c] + (adds && moves ? NB_F(0.0) : light + light);
+            others.depth[c] = others.depth[c] + (adds && moves ? NB_F(0.0) : dark + dark);
+            if (!moves) continue;
+            const nb_real seen = light * g->transmittance[c], behind = dark * (m->total->radiance[c] - g->radiance[c]);
+            moved[c] = moved[c] + nb_abs(seen - behind) + seen * g->depth_error[c];
+            depth[c] = depth[c] + dark;
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        const nb_real behind = nb_abs(m->total->radiance[c] - g->radiance[c]) + m->total->error;
+        const nb_real beside = others.light[c] * g->transmittance[c] + others.depth[c] * behind;
+        const nb_real change = moved[c] + depth[c] * (m->total->error + NB_F(2.0) * beside);
+        const nb_mask small = depth[c] + others.depth[c] < NB_F(0.125);
+        p->weighed[c] = p->weighed[c] + nb_select(small, change, NB_HUGE);
+    }
+}
+
+static void pass_end(const march *m, const gathered *g, passing *p, const contact *k, size_t leaf, nb_wide end, nb_real slack,
+                     int fog_ends)
 {
     if (!nb_any(slack > NB_F(0.0))) return;
     const nb_wide wide_slack = nb_widen(slack);
@@ -265,30 +303,39 @@ static void pass_end(const march *m, passing *p, const contact *k, size_t leaf, 
     if (nb_any(here)) {
         const int whole = k->medium->body.leaf_count == 1;
         const nb_mask ends_body = whole ? here : nb_and(here, may_end_body(m, k, leaf, end, wide_slack));
-        add_end(m, &p->here, k, end, nb_select(ends_body, slack, NB_F(0.0)));
+        const nb_real doubt = nb_select(ends_body, slack, NB_F(0.0));
+        add_end(m, &p->here, k, end, doubt);
+        if (m->total != NULL && nb_any(doubt > NB_F(0.0))) weigh_end(m, g, p, k, end, doubt);
     }
     if (fog_ends && nb_any(may_be_before)) add_end(m, &p->less, k, end, nb_select(may_be_before, slack, NB_F(0.0)));
 }
 
+static void pass_ends_of(const march *m, const gathered *g, passing *p, const contact *k, nb_mask lanes)
+{
+    const int covers = nb_volume_covers(&k->medium->body), has_fog = nb_volume_has_fog(&k->medium->body);
+    for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
+        const leaf_span *span = &m->spans[k->first_span + j];
+        p->lanes = nb_and(lanes, nb_narrow_mask(span->enter < span->leave));
+        pass_end(m, g, p, k, j, span->enter, span->enter_slack, covers);
+        pass_end(m, g, p, k, j, span->leave, span->leave_slack, has_fog);
+    }
+}
+
+/* The window holds all media where ends are watched. */
 static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
 {
-    passing p = {t, lanes, no_ends(), no_ends()};
+    passing p = {t, lanes, no_ends(), no_ends(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
     for (size_t i = 0; i < m->window_count; i++) {
         const contact *k = in_window(m, i);
-        const int covers = nb_volume_covers(&k->medium->body), has_fog = nb_volume_has_fog(&k->medium->body);
-        for (size_t j = 0; j < k->medium->body.leaf_count; j++) {
-            const leaf_span *span = &m->spans[k->first_span + j];
-            p.lanes = nb_and(lanes, nb_narrow_mask(span->enter < span->leave));
-            pass_end(m, &p, k, j, span->enter, span->enter_slack, covers);
-            pass_end(m, &p, k, j, span->leave, span->leave_slack, has_fog);
-        }
+        pass_ends_of(m, g, &p, k, lanes);
     }
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        const nb_real least = g->depth[c] - (g->depth_error[c] + p.less.depth[c]);
+        const nb_real least = g->depth[c] - (g->depth_error[c] + g->ends_depth[c] + p.less.depth[c]);
+        nb_real *depth = m->total == NULL ? &g->depth_error[c] : &g->ends_depth[c];
         g->least_depth[c] = nb_select(lanes, nb_max(g->least_depth[c], least), g->least_depth[c]);
-        g->depth_error[c] = g->depth_error[c] + p.here.depth[c];
-        most = nb_max(most, p.here.light[c] * g->transmittance[c]);
+        *depth = *depth + p.here.depth[c];
+        most = nb_max(most, m->total == NULL ? p.here.light[c] * g->transmittance[c] : p.weighed[c]);
     }
     g->radiance_error = g->radiance_error + most;
 }
