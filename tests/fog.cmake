@@ -1,5 +1,6 @@
 # The tests of the core's queries with random fog, and with threads of their own.
 find_package(Threads REQUIRED)
+target_sources(test_distances PRIVATE random_fog.c)
 target_sources(test_find PRIVATE random_fog.c)
 target_sources(test_planes PRIVATE random_fog.c)
 target_sources(test_priority PRIVATE random_fog.c)

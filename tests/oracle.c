@@ -536,6 +536,20 @@ static oracle_line line_of(const nebel_ray *ray)
     return l;
 }
 
+/* The spans between the distances at which a volume begins and ceases to act. */
+static void clip_spans(oracle_spans *spans, const nebel_volume_desc *desc)
+{
+    const real start = REAL(desc->start), cutoff = REAL(desc->cutoff > 0 ? desc->cutoff : HUGE_VAL);
+    size_t kept = 0;
+    for (size_t i = 0; i < spans->count; i++) {
+        oracle_span s = spans->at[i];
+        if (s.from < start) s.from = start;
+        if (s.to > cutoff) s.to = cutoff;
+        if (s.from < s.to) spans->at[kept++] = s;
+    }
+    spans->count = kept;
+}
+
 static void add_volume(trace *tr, const nebel_volume_desc *desc, const double ambient[3], const oracle_line *line,
                        real end)
 {
@@ -543,6 +557,7 @@ static void add_volume(trace *tr, const nebel_volume_desc *desc, const double am
     int undecided = 0;
     *v = (volume){.desc = desc, .spans = oracle_inside(&desc->shape, line, end, &undecided)};
     if (undecided) tr->uncertainty = LONG(HUGE_VAL);
+    clip_spans(&v->spans, desc);
     for (size_t i = 0; i < v->spans.count; i++) {
         add_cut(tr, v->spans.at[i].from);
         add_cut(tr, v->spans.at[i].to);

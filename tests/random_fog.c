@@ -187,6 +187,8 @@ static void make_priority(uint64_t *state, nebel_volume_desc *v)
 {
     v->priority = below(state, 3) - 1;
     if (v->operation == NEBEL_OPERATION_ADD && chance(state, .4)) v->operation = NEBEL_OPERATION_REPLACE;
+    if (chance(state, .2)) v->start = place(state, 0, 30);
+    if (chance(state, .2)) v->cutoff = v->start + uniform(state, 1, 30);
 }
 
 static void make_volume(random_fog *fog, uint64_t *state, random_fog_kind kind, size_t i)
@@ -594,6 +596,8 @@ static void print_volume(FILE *to, const nebel_volume_desc *v)
     fprintf(to, "{\"name\": \"\", \"shape\": ");
     print_shape(to, &v->shape);
     fprintf(to, ", \"priority\": %d", v->priority);
+    print_number(to, "start", v->start);
+    if (v->cutoff > 0) print_number(to, "cutoff", v->cutoff);
     if (v->operation == NEBEL_OPERATION_EXCLUDE) {
         fprintf(to, ", \"operation\": \"exclude\"}");
         return;

@@ -10,7 +10,7 @@ typedef enum random_fog_kind {
     RANDOM_FOG_SINGLE,   /* one even volume of any shape */
     RANDOM_FOG_OVERLAP,  /* six even volumes, one of them the world */
     RANDOM_FOG_PROFILES, /* five volumes of any profile */
-    RANDOM_FOG_EXCLUDE,  /* profiles with exclusions, half of them with priorities and with fog that replaces */
+    RANDOM_FOG_EXCLUDE,  /* profiles with exclusions, half of them with priorities, fog that replaces, and distances */
     RANDOM_FOG_MANY,     /* forty volumes of any shape and profile */
     RANDOM_FOG_PARTS,    /* unions and intersections of shapes and of each other */
     RANDOM_FOG_FAR,      /* any of the above, 1e7 m away */

@@ -167,6 +167,9 @@ static void make_volume(scene *s, size_t i)
     *v = (nebel_volume_desc){.operation = one_in(s, 5) ? (nebel_operation)dice_below(&s->state, NEBEL_OPERATION_COUNT)
                                                        : NEBEL_OPERATION_ADD,
                              .priority = one_in(s, 5) ? (one_in(s, 2) ? INT_MAX : INT_MIN) : 0};
+    if (one_in(s, 10)) v->start = extent(s);
+    if (one_in(s, 10)) v->cutoff = v->start + extent(s);
+    if (!(v->cutoff > v->start && v->cutoff <= 1e15)) v->cutoff = 0;
     make_shape(s, i, &v->shape);
     make_density(s, &v->shape, &v->density);
     amounts(s, v->extinction, 1e9);
@@ -353,7 +356,7 @@ static void test_segments_give_transmittances(void **unused)
                 from[r][k] = (float)coordinate(&s);
                 to[r][k] = (float)coordinate(&s);
             }
-        const nebel_segments segments = {{0}, &from[0][0], sizeof from[0], &to[0][0], sizeof to[0]};
+        const nebel_segments segments = {{0}, &from[0][0], sizeof from[0], &to[0][0], sizeof to[0], 0};
         const nebel_result result = nebel_transmit_segments(snapshot, NEBEL_ISA_DEFAULT, 1, RAYS, &segments, out, 0);
         assert_true(result == NEBEL_OK);
         for (int r = 0; r < RAYS; r++) assert_true(out[r] >= 0 && out[r] <= 1);

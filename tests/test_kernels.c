@@ -103,6 +103,8 @@ static nebel_volume_desc random_volume(int kind)
     v.density = random_density(&v.shape);
     if (pick(10) == 0) v.operation = (nebel_operation)pick(NEBEL_OPERATION_COUNT);
     if (pick(4) == 0) v.priority = pick(3) - 1;
+    if (pick(10) == 0) v.start = dice(0, 10);
+    if (pick(10) == 0) v.cutoff = v.start + dice(1, 20);
     for (int i = 0; i < 3; i++) {
         v.extinction[i] = pick(40) == 0 ? dice(0, 1000) : dice(0, .2);
         v.source[i] = dice(0, 2);

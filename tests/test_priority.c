@@ -11,79 +11,11 @@
 
 #include "fog_help.h"
 
-/* A slab across x, as wide as the world for rays along x. */
-static nebel_volume_desc slab(nebel_operation operation, int priority, double from, double to, double extinction)
-{
-    return (nebel_volume_desc){.operation = operation,
-                               .priority = priority,
-                               .shape = {.type = NEBEL_SHAPE_BOX, .min = {from, -10, -10}, .max = {to, 10, 10}},
-                               .extinction = {extinction, extinction, extinction}};
-}
+#include "depth_help.h"
 
 #define ADD(...) slab(NEBEL_OPERATION_ADD, __VA_ARGS__)
 #define REPLACE(...) slab(NEBEL_OPERATION_REPLACE, __VA_ARGS__)
 #define EXCLUDE(priority, from, to) slab(NEBEL_OPERATION_EXCLUDE, priority, from, to, 0)
-
-enum { LENGTH = 10 };
-
-static const nebel_ray along = {{0, .5, .25}, {1, 0, 0}, LENGTH};
-
-static double depth_in(const nebel_snapshot *fog, nebel_precision precision)
-{
-    nebel_light light;
-    const nebel_trace_desc desc = {.precision = precision};
-    assert_int_equal(nebel_trace(fog, &desc, 1, &along, sizeof along, &light, sizeof light), NEBEL_OK);
-    return -log(light.transmittance[1]);
-}
-
-static double depth_in_planes(const nebel_snapshot *fog)
-{
-    const nebel_ray_planes rays = {.origin = {0, .5, .25}, .direction = {1, 0, 0}, .t_max = &(float){LENGTH}};
-    float transmittance;
-    const nebel_light_planes light = {.transmittance = {NULL, &transmittance, NULL}};
-    assert_int_equal(nebel_trace_planes(fog, NULL, 1, &rays, &light), NEBEL_OK);
-    return -log((double)transmittance);
-}
-
-static double depth_of_segment(const nebel_snapshot *fog)
-{
-    const float from[3] = {0, .5f, .25f}, to[3] = {LENGTH, .5f, .25f};
-    float transmittance;
-    const nebel_segments segments = {.from = from, .to = to};
-    assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_DEFAULT, 1, 1, &segments, &transmittance, 0), NEBEL_OK);
-    return -log((double)transmittance);
-}
-
-static double depth_of_pixel(const nebel_snapshot *fog)
-{
-    const float depth = LENGTH;
-    const uint8_t white[4] = {255, 255, 255, 255};
-    uint8_t out[4];
-    const nebel_pixels pixels = {
-        .eye = {0, .5, .25}, .corner = {1, 0, 0}, .width = 1, .height = 1, .depth = &depth, .color = white, .out = out};
-    assert_int_equal(nebel_fog_pixels(fog, NEBEL_ISA_DEFAULT, &pixels), NEBEL_OK);
-    return -log(out[1] / 255.0);
-}
-
-/* Every query sees the same optical depth along x. */
-static void assert_depth(const nebel_volume_desc *volumes, size_t n, double depth)
-{
-    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, n);
-    assert_true(fabs(depth_in(fog, NEBEL_PRECISION_DOUBLE) - depth) < 1e-12);
-    assert_true(fabs(depth_in(fog, NEBEL_PRECISION_FLOAT) - depth) < 1e-5);
-    assert_true(fabs(depth_in_planes(fog) - depth) < 1e-5);
-    assert_true(fabs(depth_of_segment(fog) - depth) < 1e-5);
-    assert_true(fabs(exp(-depth_of_pixel(fog)) - exp(-depth)) < .51 / 255);
-    double distance;
-    const double all = exp(-depth), nearly = exp(-depth * (1 - 1e-9));
-    nebel_ray far = along;
-    far.t_max = 1e3;
-    assert_int_equal(nebel_find_transmittance(fog, all * (1 - 1e-9), 1, 1, &far, sizeof far, &distance), NEBEL_OK);
-    assert_true(distance == HUGE_VAL);
-    assert_int_equal(nebel_find_transmittance(fog, nearly, 1, 1, &far, sizeof far, &distance), NEBEL_OK);
-    assert_true(distance <= LENGTH);
-    nebel_release_snapshot(fog);
-}
 
 static void test_fog_that_replaces_stands_alone_above_lower_priorities(void **unused)
 {
@@ -170,8 +102,11 @@ static void test_to_replace_is_to_exclude_and_add_above(void **unused)
         fog.volumes[last].priority = 2;
         memcpy(both, fog.volumes, fog.count * sizeof *both);
         both[last].operation = NEBEL_OPERATION_ADD;
-        both[last + 1] =
-            (nebel_volume_desc){.operation = NEBEL_OPERATION_EXCLUDE, .priority = 1, .shape = fog.volumes[last].shape};
+        both[last + 1] = (nebel_volume_desc){.operation = NEBEL_OPERATION_EXCLUDE,
+                                             .priority = 1,
+                                             .shape = fog.volumes[last].shape,
+                                             .start = fog.volumes[last].start,
+                                             .cutoff = fog.volumes[last].cutoff};
         assert_same_light(fog.volumes, fog.count, both, fog.count + 1);
     }
 }

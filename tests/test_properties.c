@@ -276,9 +276,12 @@ static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(voi
             far[i].t_max = rays[i].t_max - at;
             for (int k = 0; k < 3; k++) far[i].origin[k] += at * d[k] / length;
         }
-        trace_volumes(&fog, fog.volumes, fog.count, NEBEL_PRECISION_DOUBLE, rays, whole);
-        trace_volumes(&fog, fog.volumes, fog.count, NEBEL_PRECISION_DOUBLE, near, first);
-        trace_volumes(&fog, fog.volumes, fog.count, NEBEL_PRECISION_DOUBLE, far, second);
+        nebel_snapshot *const snapshot = commit(fog.ambient, fog.volumes, fog.count);
+        const nebel_trace_desc desc = {.tolerance = 1e-5, .ignore_distances = 1};
+        trace(snapshot, &desc, RAYS, rays, whole);
+        trace(snapshot, &desc, RAYS, near, first);
+        trace(snapshot, &desc, RAYS, far, second);
+        nebel_release_snapshot(snapshot);
         for (int i = 0; i < RAYS; i++) {
             nebel_light joined = {.error = first[i].error + 3 * second[i].error};
             for (int c = 0; c < 3; c++) {

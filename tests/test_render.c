@@ -76,6 +76,29 @@ static void test_sun_through_fog_onto_ground(void **state)
     nebel_release_snapshot(fog);
 }
 
+static void test_fog_that_begins_beyond_the_ground_still_dims_the_sun(void **state)
+{
+    (void)state;
+    nebel_mesh ground = test_square();
+    const nebel_scene_data scene = {
+        .mesh_count = 1, .meshes = &ground, .has_sun = 1, .sun_direction = {.6, .8, 0}, .sun_irradiance = {3, 2, 1}};
+    const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-100, -1, -100}, .max = {100, 5, 100}},
+                                     .extinction = {.1, .2, .3},
+                                     .source = {.6, .5, .4},
+                                     .start = 20};
+    nebel_snapshot *fog = test_fog(1, &layer);
+    const nebel_camera camera = test_camera(0, 10, .1, 0, 0, 0);
+    test_picture picture = test_picture_make(5, 5);
+    test_render(&scene, fog, &plain, &camera, 1, &picture);
+    const double base[3] = {.5, .25, .75}, all[3] = {1, 1, 1};
+    double surface[3];
+    for (int c = 0; c < 3; c++)
+        surface[c] = base[c] / test_pi * scene.sun_irradiance[c] * exp(-layer.extinction[c] * 5 / .8) * .8;
+    assert_pixel(test_color(&picture, 2, 2), surface, all, layer.source, 3e-6);
+    test_picture_free(&picture);
+    nebel_release_snapshot(fog);
+}
+
 static void test_shadow_leaves_the_ambient_light(void **state)
 {
     (void)state;
@@ -558,6 +581,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_wall_in_constant_fog),
         cmocka_unit_test(test_sun_through_fog_onto_ground),
+        cmocka_unit_test(test_fog_that_begins_beyond_the_ground_still_dims_the_sun),
         cmocka_unit_test(test_shadow_leaves_the_ambient_light),
         cmocka_unit_test(test_surfaces_have_two_sides),
         cmocka_unit_test(test_smooth_normals_are_interpolated),

@@ -259,20 +259,23 @@ static void test_albedo_takes_every_phase_function(void **state)
     }
 }
 
-static void test_operations_and_priorities_are_read(void **state)
+static void test_operations_priorities_and_distances_are_read(void **state)
 {
     (void)state;
-    nebel_scene *scene =
-        parse_good("{\"nebel\": 1, \"fog\": [{\"shape\": {\"type\": \"world\"}, \"extinction\": 0.1}, "
-                   "{\"operation\": \"replace\", \"priority\": 3, \"extinction\": 0.2, \"shape\": "
-                   "{\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}}, "
-                   "{\"operation\": \"exclude\", \"priority\": -4, \"shape\": {\"type\": \"world\"}}]}");
+    nebel_scene *scene = parse_good(
+        "{\"nebel\": 1, \"unit\": 0.5, \"fog\": [{\"shape\": {\"type\": \"world\"}, \"extinction\": 0.1}, "
+        "{\"operation\": \"replace\", \"start\": 4, \"cutoff\": 18, \"priority\": 3, \"extinction\": 0.2, \"shape\": "
+        "{\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}}, "
+        "{\"operation\": \"exclude\", \"priority\": -4, \"shape\": {\"type\": \"world\"}}]}");
     const nebel_volume_desc *const volumes = nebel_scene_contents(scene)->volumes;
     assert_int_equal(volumes[0].operation, NEBEL_OPERATION_ADD);
     assert_int_equal(volumes[0].priority, 0);
     assert_int_equal(volumes[1].operation, NEBEL_OPERATION_REPLACE);
     assert_int_equal(volumes[1].priority, 3);
-    assert_vector(volumes[1].extinction, .2, .2, .2);
+    assert_number(volumes[1].start, 2);
+    assert_number(volumes[1].cutoff, 9);
+    assert_number(volumes[0].start + volumes[0].cutoff, 0);
+    assert_vector(volumes[1].extinction, .4, .4, .4);
     assert_int_equal(volumes[2].operation, NEBEL_OPERATION_EXCLUDE);
     assert_int_equal(volumes[2].priority, -4);
     nebel_destroy_scene(scene);
@@ -398,7 +401,7 @@ int main(void)
         cmocka_unit_test(test_all_densities),
         cmocka_unit_test(test_all_amounts),
         cmocka_unit_test(test_albedo_takes_every_phase_function),
-        cmocka_unit_test(test_operations_and_priorities_are_read),
+        cmocka_unit_test(test_operations_priorities_and_distances_are_read),
         cmocka_unit_test(test_the_fog_of_the_scene_answers_rays),
         cmocka_unit_test(test_the_order_of_sections_does_not_matter),
         cmocka_unit_test(test_numbers_are_read_exactly),

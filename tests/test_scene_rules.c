@@ -299,14 +299,17 @@ static void test_what_no_volume_has(void **state)
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"rayleigh\", `\"g\": 0}"), "fog[0].phase.g: unknown key"},
         {FORMAT, LIT("\"operation\": `\"subtract\""),
          "fog[0].operation: unknown; must be one of: add, exclude, replace"},
+        {FORMAT, LIT("\"start\": `-1"), "fog[0].start: is -1; must be a number >= 0"},
+        {FORMAT, LIT("\"cutoff\": `0"), "fog[0].cutoff: is 0; must be a number > 0"},
+        {FORMAT, LIT("\"start\": 5, \"cutoff\": `5"), "fog[0].cutoff: is 5; must be more than \"start\", 5"},
         {FORMAT, LIT("\"priority\": `0.5"),
          "fog[0].priority: is 0.5; must be a whole number from -2147483648 to 2147483647"},
         {FORMAT, FOG(WORLD ", \"operation\": \"exclude\", `\"extinction\": 1"),
          "fog[0].extinction: unknown key; a volume with \"operation\": \"exclude\" has: name, shape, operation, "
-         "priority, keys"},
+         "priority, start, cutoff, keys"},
         {FORMAT, LIT("`\"albdo\": 1"),
          "fog[0].albdo: unknown key; a volume has: name, shape, operation, priority, density, extinction, "
-         "mean_free_path, visibility, contrast, source, albedo, phase, emission, keys; did you mean "
+         "mean_free_path, visibility, contrast, source, albedo, phase, emission, start, cutoff, keys; did you mean "
          "\"albedo\"?"},
         {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"name\": 1"),
          "fog[0].name: the key appears twice, first at line 2, column 3; remove one"},

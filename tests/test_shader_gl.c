@@ -143,7 +143,8 @@ static int ascending(const void *a, const void *b)
 }
 
 /* What a ray's own rounding may change: the largest difference among rays turned by a few roundings. */
-static double conditioning(const nebel_snapshot *snapshot, const nebel_ray *ray, double scale)
+static double conditioning(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray *ray,
+                           double scale)
 {
     nebel_ray near[6];
     nebel_light light[7];
@@ -151,9 +152,8 @@ static double conditioning(const nebel_snapshot *snapshot, const nebel_ray *ray,
         near[i] = *ray;
         near[i].direction[i / 2] += (i % 2 == 0 ? 1 : -1) * 3e-7;
     }
-    const nebel_trace_desc desc = {.tolerance = 1e-5};
-    assert_int_equal(nebel_trace(snapshot, &desc, 1, ray, sizeof *ray, &light[6], sizeof *light), NEBEL_OK);
-    assert_int_equal(nebel_trace(snapshot, &desc, 6, near, sizeof *near, light, sizeof *light), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, 1, ray, sizeof *ray, &light[6], sizeof *light), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, 6, near, sizeof *near, light, sizeof *light), NEBEL_OK);
     double most = 0;
     for (int i = 0; i < 6; i++)
         for (int c = 0; c < 3; c++) {
@@ -166,16 +166,15 @@ static double conditioning(const nebel_snapshot *snapshot, const nebel_ray *ray,
 static double differences[RAYS];
 
 /* 99.9 % of the foggy rays within 1/255, and 3/255 everywhere but where the ray's own rounding matters as much. */
-static void compare(const nebel_snapshot *snapshot, double scale, const char *name)
+static void compare(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, double scale, const char *name)
 {
-    const nebel_trace_desc desc = {.tolerance = 1e-5};
-    assert_int_equal(nebel_trace(snapshot, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
     size_t foggy = 0;
     double worst = 0, worst_silhouette = 0;
     for (int i = 0; i < RAYS; i++) {
         const double off = worst_of(&answers[i], &lights[i], scale);
         if (is_foggy(&lights[i])) differences[foggy++] = off;
-        if (off > .25 / 255 && off < 2 * conditioning(snapshot, &rays[i], scale)) {
+        if (off > .25 / 255 && off < 2 * conditioning(snapshot, desc, &rays[i], scale)) {
             worst_silhouette = fmax(worst_silhouette, off);
             continue;
         }
@@ -208,7 +207,7 @@ static double largest_source(const random_fog *fog)
 static random_fog fog;
 
 /* `fog`, from an eye that hangs on the seed. */
-static void try_fog(tracer *t, const char *kind, uint64_t seed)
+static void trace_fog(tracer *t, uint64_t seed, const nebel_trace_desc *truth, const char *kind)
 {
     nebel_fog_desc desc = {0};
     memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
@@ -221,8 +220,13 @@ static void try_fog(tracer *t, const char *kind, uint64_t seed)
     if (!nb_gl_evaluate(&t->gl, t->program, RAYS, (const float *)items, (float *)answers)) fail_msg("%s", t->gl.fault);
     char name[64];
     snprintf(name, sizeof name, "%s %d", kind, (int)seed);
-    compare(snapshot, largest_source(&fog), name);
+    compare(snapshot, truth, largest_source(&fog), name);
     nebel_release_snapshot(snapshot);
+}
+
+static void try_fog(tracer *t, const char *kind, uint64_t seed)
+{
+    trace_fog(t, seed, &(nebel_trace_desc){.tolerance = 1e-5}, kind);
 }
 
 static void try_random_fog(tracer *t, random_fog_kind kind, uint64_t seed)
@@ -242,6 +246,21 @@ static void rank_volumes(uint64_t seed)
         fog.volumes[i].operation = dice_below(&state, 5) == 0 ? NEBEL_OPERATION_REPLACE : NEBEL_OPERATION_ADD;
         if (dice_below(&state, 20) == 0) fog.volumes[i].operation = NEBEL_OPERATION_EXCLUDE;
     }
+}
+
+/* The transmittance of rays that do not begin at the eye, by the functions that say so. */
+static void test_rays_to_a_light_know_no_distances(void **unused)
+{
+    (void)unused;
+    tracer t;
+    open_tracer(&t, NB_GL_300ES, TEXTURE, "",
+                "out0 = vec4(nebel_transmit_light(in0.xyz, in1.xyz, in0.w), 0.0); out1 = vec4(0.0);\n");
+    const nebel_trace_desc desc = {.tolerance = 1e-5, .ignore_distances = 1, .transmittance_only = 1};
+    for (uint64_t seed = 1; seed < 12; seed += 2) {
+        random_fog_make(&fog, RANDOM_FOG_EXCLUDE, seed);
+        trace_fog(&t, seed, &desc, "to a light");
+    }
+    nb_gl_close(&t.gl);
 }
 
 static void test_priorities_among_many(void **unused)
@@ -296,7 +315,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_330_texture),           cmocka_unit_test(test_330_block),
         cmocka_unit_test(test_300_es_texture),        cmocka_unit_test(test_300_es_block),
-        cmocka_unit_test(test_priorities_among_many),
+        cmocka_unit_test(test_priorities_among_many), cmocka_unit_test(test_rays_to_a_light_know_no_distances),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -212,6 +212,8 @@ typedef struct nebel_volume_desc {
     double source[3];     /* radiance of opaque fog, >= 0: alone it gives source * (1 - transmittance) */
     double albedo[3];     /* 0..1: lit by the fog's ambient light, scattered evenly; not together with source */
     double emission[3];   /* radiance per metre, >= 0, where the density is 1 */
+    double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its operation;
+                             cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
 } nebel_volume_desc;
 
 /* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) / visibility.
@@ -293,6 +295,8 @@ typedef struct nebel_trace_desc {
     size_t *failed_ray;   /* NULL, or where the index of a ray that is an error is written */
     int transmittance_only; /* nonzero: in-scattering is not asked for and comes back 0; `error` is that of transmittance. Much
                              cheaper where fog of different light varies along the ray; same bits of transmittance. */
+    int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as those to a
+                             light, since `start` and `cutoff` of a volume count from where a ray starts. */
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
@@ -308,7 +312,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
 
 /* Visibility: how far one sees along each ray until the transmittance of `channel` (0 red, 1 green, 2 blue) falls to
  * `transmittance` (0 < transmittance < 1): distances[i] in metres, INFINITY where it does not within t_max. In double
- * precision, to 1e-12 relative where the fog is not vanishing. Errors as nebel_trace. Any thread. */
+ * precision, to 1e-12 relative where the fog is not vanishing. `start` and `cutoff` of volumes count. Errors as nebel_trace. Any thread. */
 nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                       const nebel_ray *rays, size_t ray_stride, double *distances);
 
@@ -343,8 +347,8 @@ typedef struct nebel_light_planes {
 } nebel_light_planes;
 
 /* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of transmittance and
- * in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero) `isa`, `tolerance` and
- * `failed_ray` are read. rays and lights must not overlap. Same bits for every isa and for every way of splitting the rays into
+ * in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero) `isa`, `tolerance`,
+ * `failed_ray` and `ignore_distances` are read. rays and lights must not overlap. Same bits for every isa and for every way of splitting the rays into
  * calls; a few hundred rays are enough for a call to be worth it. Any thread. Errors as nebel_trace. */
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
                                 const nebel_ray_planes *rays, const nebel_light_planes *lights);
@@ -359,6 +363,7 @@ typedef struct nebel_segments {
     size_t from_stride;
     const float *to;
     size_t to_stride; /* 0: 12 */
+    int ignore_distances; /* see nebel_trace_desc; 0: `start` and `cutoff` of volumes count from where a segment starts */
 } nebel_segments;
 
 /* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in bytes

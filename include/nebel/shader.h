@@ -24,6 +24,9 @@
  *     vec3 nebel_transmit(vec3 origin, vec3 direction, float t_max);
  *     vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first, int count);
  *         Transmittance alone.
+ *     vec3 nebel_transmit_light(vec3 origin, vec3 direction, float t_max);
+ *     vec3 nebel_transmit_light_list(vec3 origin, vec3 direction, float t_max, int first, int count);
+ *         The same for a ray that does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not count.
  *
  * With NEBEL_VIEW defined before it, the text also declares, in every dialect:
  *

@@ -117,7 +117,9 @@ static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, fl
         lights.transmittance[c] = transmittance[c];
     }
     mask_ends(scratch->points.lit, scratch->distance);
-    return nebel_trace_planes(frame->renderer->fog, &frame->trace, NB_BATCH, &rays, &lights);
+    nebel_trace_desc trace = frame->trace;
+    trace.ignore_distances = 1;
+    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
 }
 
 NB_CLONES static void dim(const float (*restrict transmittance)[NB_BATCH], float (*restrict color)[NB_BATCH])

@@ -6,12 +6,13 @@ static int is_plain_box(const nb_volume *body)
            body->leaves[0].type == NB_LEAF_BOX && body->leaves[0].aligned;
 }
 
-int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes)
+int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int channel, int ignore_distances,
+                  nb_fog_box *boxes)
 {
     if (snapshot->medium_count > NB_FOG_BOXES) return 0; /* more are better asked through the tree */
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
-        if (!is_plain_box(body)) return 0;
+        if (!is_plain_box(body) || (nb_volume_has_distances(body) && !ignore_distances)) return 0;
         const nb_leaf *leaf = &body->leaves[0];
         for (int c = 0; c < 3; c++) {
             boxes[i].low[c] = (float)(leaf->low[c] + (leaf->origin[c] - origin[c]));

@@ -6,8 +6,10 @@
 
 #include "kernels/fog_box.h"
 
-/* The fog as at most NB_FOG_BOXES aligned boxes of constant density relative to `origin`; 0 when it is something else. */
-int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int channel, nb_fog_box *boxes);
+/* The fog as at most NB_FOG_BOXES aligned boxes of constant density relative to `origin`; 0 when it is something else, as where
+ * distances along the ray count. */
+int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int channel, int ignore_distances,
+                  nb_fog_box *boxes);
 
 /* 1 when the fog weakens all colours alike and every volume has the same radiance, so that what it adds is that radiance times
  * what it takes away. */

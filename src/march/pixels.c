@@ -159,7 +159,7 @@ nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, con
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(isa));
     nb_pixels_job job = make_job(pixels);
     nb_fog_box boxes[NB_FOG_BOXES];
-    if (!nb_boxes_have_one_color(snapshot) || !nb_boxes_list(snapshot, pixels->eye, 0, boxes))
+    if (!nb_boxes_have_one_color(snapshot) || !nb_boxes_list(snapshot, pixels->eye, 0, 0, boxes))
         return trace_pixels(snapshot, isa, pixels, &job);
     set_radiance(snapshot, &job);
     job.boxes = boxes;

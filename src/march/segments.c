@@ -30,7 +30,8 @@ static nb_transmit_fn *kernel_for(nebel_isa isa)
 {
     nb_transmit_fn *found = NULL;
     for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa)) found = kernels[i].transmit;
+        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa))
+            found = kernels[i].transmit;
     return found;
 }
 
@@ -67,7 +68,10 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
                                    const nebel_segments *segments, float *out, size_t out_stride)
 {
     enum { BATCH = 64 };
-    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa, .transmittance_only = 1};
+    const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT,
+                                   .isa = isa,
+                                   .transmittance_only = 1,
+                                   .ignore_distances = segments->ignore_distances};
     for (size_t first = 0; first < n; first += BATCH) {
         nebel_ray rays[BATCH];
         nebel_light lights[BATCH];
@@ -93,20 +97,22 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (segments == NULL || (n > 0 && (segments->from == NULL || segments->to == NULL || out == NULL)))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: from, to and out must not be NULL");
-    if (channel < 0 || channel > 2)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
+    if (channel < 0 || channel > 2) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     for (int c = 0; c < 3; c++)
         if (!(fabs(segments->origin[c]) <= 1e15))
-            return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments origin: must be finite and at most 1e15 m away");
+            return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
+                           "segments origin: must be finite and at most 1e15 m away");
     nb_transmit_fn *kernel = kernel_for(isa);
     if (kernel == NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(isa));
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
+                       nebel_isa_name(isa));
     if (n == 0) return NEBEL_OK;
     nebel_segments s = *segments;
     if (s.to_stride == 0) s.to_stride = 3 * sizeof(float);
     const size_t stride = out_stride == 0 ? sizeof(float) : out_stride;
     nb_fog_box boxes[NB_FOG_BOXES];
-    if (!nb_boxes_list(snapshot, s.origin, channel, boxes)) return trace_segments(snapshot, isa, channel, n, &s, out, stride);
+    if (!nb_boxes_list(snapshot, s.origin, channel, s.ignore_distances, boxes))
+        return trace_segments(snapshot, isa, channel, n, &s, out, stride);
     kernel(&(nb_transmit_job){boxes, snapshot->medium_count, n, s.from, s.to, s.from_stride, s.to_stride, stride, out});
     return NEBEL_OK;
 }

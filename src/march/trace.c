@@ -164,6 +164,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
     if (valid != NEBEL_OK) return valid;
     const int is_float = desc->precision == NEBEL_PRECISION_FLOAT;
     nb_trace_job job = {.transmittance_only = desc->transmittance_only,
+                        .ignore_distances = desc->ignore_distances,
                         .wants_error = 1,
                         .rays = rays,
                         .ray_stride = ray_stride,
@@ -218,8 +219,11 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
     const int wants_light = to.in_scattering[0] != NULL || to.in_scattering[1] != NULL || to.in_scattering[2] != NULL;
     const nebel_trace_desc plain = {0};
     const nebel_trace_desc *asked = desc != NULL ? desc : &plain;
-    nb_trace_job job = {
-        .transmittance_only = !wants_light, .wants_error = to.error != NULL, .ray_planes = &from, .light_planes = &to};
+    nb_trace_job job = {.transmittance_only = !wants_light,
+                        .ignore_distances = asked->ignore_distances,
+                        .wants_error = to.error != NULL,
+                        .ray_planes = &from,
+                        .light_planes = &to};
     return run(snapshot, asked, n, kernel_for(asked->isa), &job);
 }
 

@@ -70,6 +70,7 @@ nebel_result SUFFIXED(nb_find_, NB_SUFFIX)(nb_find_job *job)
     workspace w;
     open_workspace(&w);
     w.m.wants_error = 1;
+    w.m.ignores_distances = 0;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < job->count && result == NEBEL_OK; i++) {
         const nebel_ray *ray = ray_at(job->rays, job->ray_stride, i);

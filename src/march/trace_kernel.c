@@ -486,6 +486,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
 {
     job->failed = first;
     w->m.wants_error = job->wants_error;
+    w->m.ignores_distances = job->ignore_distances;
     if (!meet_fog(w, job->snapshot)) return NEBEL_ERROR_MEMORY;
     allowance share = *may;
     const nb_real pieces = w->m.event_count + NB_F(1.0);
@@ -527,6 +528,7 @@ static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const n
                         .budget = job->budget,
                         .promised = job->promised,
                         .transmittance_only = job->transmittance_only,
+                        .ignore_distances = job->ignore_distances,
                         .wants_error = 1,
                         .count = 1,
                         .rays = ray,

@@ -14,6 +14,7 @@ typedef struct nb_trace_job {
     double promised; /* where the error would be larger than this, more digits are asked */
     int transmittance_only;
     int wants_error;
+    int ignore_distances;
     size_t count;
     const nebel_ray *rays; /* checked; strides in bytes */
     size_t ray_stride, light_stride;

@@ -26,7 +26,7 @@ typedef struct packet {
 } packet;
 
 typedef struct leaf_span {
-    nb_wide enter, leave; /* clipped to [0, t_max]; enter >= leave where there is nothing */
+    nb_wide enter, leave; /* clipped to where the medium acts; enter >= leave where there is nothing */
     nb_real enter_slack, leave_slack; /* by how much they may be off */
 } leaf_span;
 
@@ -58,6 +58,7 @@ typedef struct march {
     packet rays;
     int wants_error; /* 0: media that no ray comes near may be left out */
     const known *total; /* NULL the first time */
+    int ignores_distances;
     size_t contact_count, span_count;
     contact *contacts;
     leaf_span *spans;
@@ -380,20 +381,29 @@ static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_r
     }
 }
 
+/* The part of the rays on which a medium acts. */
+typedef struct part {
+    nb_wide enter, leave;
+} part;
+
+static part part_of_rays(const march *m, const nb_volume *body)
+{
+    if (m->ignores_distances) return (part){NB_W(0.0), m->rays.t_max};
+    return (part){WIDE(body->start), nb_wmin(m->rays.t_max, WIDE(body->cutoff))};
+}
+
 /* Where lanes can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside them
  * must not split the ray, or its bits would depend on whether its company brought the body here. */
-static nb_interval span_of_bounds(const packet *rays, const nb_volume *body)
+static part part_in_bounds(const packet *rays, const nb_volume *body, const part *acts)
 {
-    nb_interval span = nb_interval_all();
-    if (body->leaf_count > 1)
-        span = nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
-    span.enter = nb_wmax(span.enter, NB_W(0.0));
-    span.leave = nb_wmin(span.leave, rays->t_max);
-    return span;
+    if (body->leaf_count == 1) return *acts;
+    const nb_interval span =
+        nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
+    return (part){nb_wmax(span.enter, acts->enter), nb_wmin(span.leave, acts->leave)};
 }
 
 /* How far an end with slack may be from where it is, both within the bounds. */
-static nb_real slack_within(nb_wide end, nb_wide slack, const nb_interval *bounds, nb_wmask counts)
+static nb_real slack_within(nb_wide end, nb_wide slack, const part *bounds, nb_wmask counts)
 {
     const nb_wide here = nb_wclamp(end, bounds->enter, bounds->leave);
     const nb_wide before = here - nb_wclamp(end - slack, bounds->enter, bounds->leave);
@@ -412,13 +422,13 @@ static nb_wide slack_that_matters(const contact *k, nb_wide slack)
     return nb_wselect(slack < least, NB_W(0.0), slack);
 }
 
-/* Clips a leaf's interval to the ray. Ends have slack as far as they may move where the ray and the body are. */
-static leaf_span clip_interval(const march *m, const contact *k, const nb_interval *raw, const nb_interval *bounds)
+/* Clips a leaf's interval to where the medium acts. Ends have slack as far as they may move where the ray and the body are. */
+static leaf_span clip_interval(const contact *k, const nb_interval *raw, const part *acts, const part *bounds)
 {
     const nb_wide first = slack_that_matters(k, raw->enter_slack), last = slack_that_matters(k, raw->leave_slack);
     const nb_wmask some = raw->enter - first <= raw->leave + last;
     const nb_wmask counts = nb_wand(some, bounds->enter < bounds->leave);
-    leaf_span span = {nb_wmax(raw->enter, NB_W(0.0)), nb_wselect(counts, nb_wmin(raw->leave, m->rays.t_max), NB_W(0.0)),
+    leaf_span span = {nb_wmax(raw->enter, acts->enter), nb_wselect(counts, nb_wmin(raw->leave, acts->leave), NB_W(0.0)),
                       NB_F(0.0), NB_F(0.0)};
     if (!nb_wany(first + last > NB_W(0.0))) return span;
     span.enter_slack = slack_within(raw->enter, first, bounds, counts);
@@ -440,13 +450,13 @@ static void count_ends(march *m, const contact *k, const leaf_span *span)
 static int meet_leaves(march *m, contact *k)
 {
     const nb_volume *body = &k->medium->body;
-    const nb_interval bounds = span_of_bounds(&m->rays, body);
+    const part acts = part_of_rays(m, body), bounds = part_in_bounds(&m->rays, body, &acts);
     int hit = 0;
     k->hull_enter = NB_WFAR;
     k->hull_leave = NB_W(0.0);
     for (size_t i = 0; i < body->leaf_count; i++) {
         const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
-        const leaf_span span = clip_interval(m, k, &raw, &bounds);
+        const leaf_span span = clip_interval(k, &raw, &acts, &bounds);
         const nb_wmask met = span.enter < span.leave;
         count_ends(m, k, &span);
         m->spans[k->first_span + i] = span;

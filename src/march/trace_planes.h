@@ -229,7 +229,8 @@ static int is_straight(const nb_trace_job *job)
     if (snapshot->medium_count != 1 || job->wants_error) return 0;
     const nb_medium *medium = &snapshot->media[0];
     return nb_volume_has_fog(&medium->body) && medium->body.leaf_count == 1 && !medium->emits &&
-           medium->body.density.type == NEBEL_DENSITY_CONSTANT;
+           medium->body.density.type == NEBEL_DENSITY_CONSTANT &&
+           (job->ignore_distances || !nb_volume_has_distances(&medium->body));
 }
 
 static nb_wvec3 reciprocals(nb_wvec3 d)

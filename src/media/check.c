@@ -1,5 +1,7 @@
 #include "check.h"
 
+#include "volume.h"
+
 #include <math.h>
 
 static int is_zero(const double *v, int n)
@@ -194,10 +196,19 @@ static nebel_result check_light(const nebel_log *log, const nebel_volume_desc *d
     return result;
 }
 
+static nebel_result check_distances(const nebel_log *log, const nebel_volume_desc *desc)
+{
+    if (!(desc->start >= 0 && desc->start <= NB_LARGEST_LENGTH)) return bad(log, "start", "must be a distance from 0 to 1e15 m");
+    if (!(desc->cutoff == 0 || (desc->cutoff > desc->start && desc->cutoff <= NB_LARGEST_LENGTH)))
+        return bad(log, "cutoff", "must be 0, for none, or more than start and at most 1e15 m");
+    return NEBEL_OK;
+}
+
 nebel_result nb_check_volume(const nebel_log *log, const nebel_volume_desc *desc)
 {
     size_t leaves = 0;
-    const nebel_result result = check_shape(log, &desc->shape, 0, &leaves);
+    nebel_result result = check_shape(log, &desc->shape, 0, &leaves);
+    if (result == NEBEL_OK) result = check_distances(log, desc);
     if (result != NEBEL_OK) return result;
     if (desc->operation == NEBEL_OPERATION_EXCLUDE) return NEBEL_OK;
     if (desc->operation != NEBEL_OPERATION_ADD && desc->operation != NEBEL_OPERATION_REPLACE)

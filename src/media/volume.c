@@ -146,7 +146,9 @@ nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log
                           .rank = rank_of(desc),
                           .leaf_count = counts.leaves,
                           .face_count = counts.faces,
-                          .step_count = counts.steps};
+                          .step_count = counts.steps,
+                          .start = desc->start,
+                          .cutoff = desc->cutoff > 0 ? desc->cutoff : HUGE_VAL};
     if (!allocate_arrays(allocator, volume)) return nb_fail(log, NEBEL_ERROR_MEMORY, "volume: out of memory");
     if (nb_volume_has_fog(volume)) {
         volume->density = resolve_density(&desc->density);
@@ -243,5 +245,7 @@ int nb_volume_compare(const nb_volume *a, const nb_volume *b)
     if (order == 0) order = compare_numbers(a->albedo, b->albedo, 3);
     if (order == 0) order = compare_numbers(a->emission, b->emission, 3);
     if (order == 0) order = compare_density(&a->density, &b->density);
+    if (order == 0) order = compare_numbers(&a->start, &b->start, 1);
+    if (order == 0) order = compare_numbers(&a->cutoff, &b->cutoff, 1);
     return order == 0 ? compare_body(a, b) : order;
 }

@@ -10,6 +10,10 @@
 
 #include <nebel/nebel.h>
 
+/* Beyond these the single-precision arithmetic would overflow; no fog comes near. */
+#define NB_LARGEST_AMOUNT 1e9
+#define NB_LARGEST_LENGTH 1e15
+
 typedef enum nb_leaf_type {
     NB_LEAF_WORLD,
     NB_LEAF_PLANES,  /* n.x <= d for each plane */
@@ -62,6 +66,7 @@ typedef struct nb_volume {
     nb_face *faces;
     nb_step *steps;
     double low[3], high[3]; /* world bounds, infinite where unbounded */
+    double start, cutoff;   /* m along a ray; cutoff is infinite where there is none */
 } nb_volume;
 
 /* Checks `desc` and resolves it into *volume, whose arrays are one allocation owned by the caller (nb_volume_free).
@@ -77,6 +82,11 @@ static inline int nb_volume_has_fog(const nb_volume *volume)
 static inline int nb_volume_covers(const nb_volume *volume)
 {
     return volume->operation != NEBEL_OPERATION_ADD;
+}
+
+static inline int nb_volume_has_distances(const nb_volume *volume)
+{
+    return volume->start > 0 || volume->cutoff <= NB_LARGEST_LENGTH;
 }
 
 /* A copy with arrays of its own. 0 when memory is out. */

@@ -19,18 +19,21 @@ enum {
     ALBEDO,
     PHASE,
     EMISSION,
+    START,
+    CUTOFF,
     KEYS,
     FRAME,
     VOLUME_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",       "shape",          "operation",  "priority", "density",
-                                        "extinction", "mean_free_path", "visibility", "contrast", "source",
-                                        "albedo",     "phase",          "emission",   "keys",     "frame"};
+static const char *const key_names[] = {
+    "name",   "shape",  "operation", "priority", "density", "extinction", "mean_free_path", "visibility", "contrast",
+    "source", "albedo", "phase",     "emission", "start",   "cutoff",     "keys",           "frame"};
 
-#define EXCLUDE_KEYS (NB_BIT(NAME) | NB_BIT(SHAPE) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(KEYS))
+#define PLACE_KEYS (NB_BIT(NAME) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(START) | NB_BIT(CUTOFF))
+#define EXCLUDE_KEYS (PLACE_KEYS | NB_BIT(SHAPE) | NB_BIT(KEYS))
 #define FOG_KEYS (NB_BIT(VOLUME_KEY_COUNT) - 1 - NB_BIT(FRAME))
-#define STILL_KEYS (NB_BIT(NAME) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(PHASE) | NB_BIT(KEYS))
+#define STILL_KEYS (PLACE_KEYS | NB_BIT(PHASE) | NB_BIT(KEYS))
 #define MOVING_KEYS (FOG_KEYS - STILL_KEYS + NB_BIT(FRAME))
 
 /* In the order of nebel_operation. */
@@ -355,6 +358,18 @@ static bool is_imported(const nb_json *json, const nb_json_node *volume)
     return node != NULL;
 }
 
+/* What all volumes have, also those without fog. */
+static bool read_place(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
+{
+    if (!nb_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume->priority) ||
+        !nb_value_number(json, found[START], &nb_range_not_negative, &volume->start) ||
+        !nb_value_number(json, found[CUTOFF], &nb_range_positive, &volume->cutoff))
+        return false;
+    if (found[CUTOFF] == NULL || volume->cutoff > volume->start) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[CUTOFF], "is %.15g; must be more than \"start\", %.15g",
+                        volume->cutoff, volume->start);
+}
+
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
 {
     if (in->node == NULL && is_imported(in->json, node)) return read_imported(in, node);
@@ -362,9 +377,7 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     nb_json *json = in->json;
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};
     const char *name = "";
-    if (!read_members(in, node, &volume, found) ||
-        !nb_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume.priority))
-        return false;
+    if (!read_members(in, node, &volume, found) || !read_place(json, found, &volume)) return false;
     if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||

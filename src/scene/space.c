@@ -101,6 +101,8 @@ void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume)
     convert_density(space, &volume->density);
     convert_inverse_lengths(space, volume->extinction);
     convert_inverse_lengths(space, volume->emission);
+    volume->start *= space->unit;
+    volume->cutoff *= space->unit;
 }
 
 void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula)

@@ -24,6 +24,7 @@ struct nb_ray {
     nb_vec3 origin;
     nb_vec3 direction;
     float t_max;
+    bool from_eye; /* distances along it count */
 };
 
 nb_vec3 nb_splat3(float x) { return nb_vec3(x, x, x); }
@@ -144,6 +145,10 @@ nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
 {
     int at = medium + NB_MEDIUM_LEAF;
     nb_stretch s;
+    if (NB_HAS(NB_HAS_DISTANCES) && ray.from_eye) {
+        from = max(from, NEBEL_WORD(medium + NB_MEDIUM_START).w);
+        ray.t_max = min(ray.t_max, NEBEL_WORD(medium + NB_MEDIUM_CUTOFF).w);
+    }
     if (NB_HAS(NB_HAS_GROUP) && leaves > 1) {
         nb_vec4 low = NEBEL_WORD(at);
         nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(at + 1).xyz, 0.0);
@@ -706,12 +711,15 @@ nebel_light nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
 
 /* ---- the face ---------------------------------------------------------------------------------------------------------- */
 
-nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit)
+/* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
+nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
+                           bool from_eye)
 {
     nb_ray ray;
     ray.origin = origin;
     ray.direction = direction;
     ray.t_max = min(t_max, NB_FAR);
+    ray.from_eye = from_eye;
     nebel_light light;
     light.transmittance = nb_splat3(1.0);
     light.in_scattering = nb_splat3(0.0);
@@ -732,22 +740,32 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
 
 nebel_light nebel_trace(nb_vec3 origin, nb_vec3 direction, float t_max)
 {
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, true);
+    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, true, true);
 }
 
 nb_vec3 nebel_transmit(nb_vec3 origin, nb_vec3 direction, float t_max)
 {
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false).transmittance;
+    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, true).transmittance;
+}
+
+nb_vec3 nebel_transmit_light(nb_vec3 origin, nb_vec3 direction, float t_max)
+{
+    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, false).transmittance;
 }
 
 #ifdef NEBEL_INDEX
 nebel_light nebel_trace_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
 {
-    return nb_trace_media(origin, direction, t_max, first, count, true, true);
+    return nb_trace_media(origin, direction, t_max, first, count, true, true, true);
 }
 
 nb_vec3 nebel_transmit_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
 {
-    return nb_trace_media(origin, direction, t_max, first, count, true, false).transmittance;
+    return nb_trace_media(origin, direction, t_max, first, count, true, false, true).transmittance;
+}
+
+nb_vec3 nebel_transmit_light_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
+{
+    return nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance;
 }
 #endif

@@ -11,7 +11,8 @@
  *     2  radiance of opaque fog, leaves
  *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye, 1 / (sqrt(2) sigma);
  *        soft edge: 1 / distance
- *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high, 0
+ *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
+ *     The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does not [m].
  *
  * A leaf, NB_LEAF_WORDS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
@@ -27,6 +28,8 @@
 #define NB_HEADER_WORDS 1
 #define NB_MEDIUM_WORDS 10
 #define NB_MEDIUM_LEAF 4
+#define NB_MEDIUM_START 5
+#define NB_MEDIUM_CUTOFF 6
 #define NB_LEAF_WORDS 6
 
 #define NB_KIND_CONSTANT 0
@@ -66,7 +69,8 @@
 #define NB_HAS_GAUSSIAN 2048
 #define NB_HAS_SOFT_EDGE 4096
 #define NB_HAS_RADIAL 8192
-#define NB_HAS_ALL 16383
+#define NB_HAS_DISTANCES 16384
+#define NB_HAS_ALL 32767
 #define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT_EDGE | NB_HAS_RADIAL)
 
 #endif

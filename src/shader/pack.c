@@ -235,6 +235,8 @@ static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
         pack_group(p, body, &word[NB_MEDIUM_LEAF]);
     else
         pack_leaf(p, body, &body->leaves[0], 1, &word[NB_MEDIUM_LEAF]);
+    word[NB_MEDIUM_START].v[3] = (float)body->start;
+    word[NB_MEDIUM_CUTOFF].v[3] = narrow((long double)body->cutoff);
 }
 
 static size_t count_words(const nebel_snapshot *snapshot)
@@ -328,7 +330,8 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |
-                    (nb_volume_covers(body) ? NB_HAS_COVER : 0);
+                    (nb_volume_covers(body) ? NB_HAS_COVER : 0) |
+                    (nb_volume_has_distances(body) ? NB_HAS_DISTANCES : 0);
         for (size_t k = 0; k < body->leaf_count; k++) features |= features_of_leaf(&body->leaves[k]);
     }
     return features;
