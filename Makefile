@@ -13,7 +13,7 @@ else
 CONFIGURE = cmake -S . -DNEBEL_WERROR=ON -DCMAKE_RULE_MESSAGES=ON -DCMAKE_TARGET_MESSAGES=ON
 endif
 
-.PHONY: all demo test bench asan lint format clean
+.PHONY: all demo test report bench asan lint format clean
 
 all: $(MODELS)
 	@scripts/install_packages.sh build
@@ -35,6 +35,15 @@ test:
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=ON
 	@cmake --build $(BUILD) -j $(JOBS)
 	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error -j 2
+
+report: $(MODELS)
+	@scripts/install_packages.sh build demo test
+	@echo "nebel: building"
+	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=ON
+	@cmake --build $(BUILD) -j $(JOBS) --target test_picture_gl
+	@mkdir -p $(BUILD)/report
+	@NEBEL_REPORT=$(BUILD)/report $(BUILD)/tests/test_picture_gl
+	@echo "nebel: the report is $(BUILD)/report/index.html"
 
 bench: all
 	@$(BUILD)/nebel bench

@@ -47,6 +47,9 @@ class GlDeviceTest(PictureCase):
             self.assert_misused(self.draw("a.png", *words), words[0], "--device cpu")
         self.scene = self.write_scene("round.json", [FOG], camera={"projection": "panorama"})
         self.assert_failed(self.draw("a.png", "--quiet"), "panorama", "CPU")
+        cloud = {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "count": 10, "absorption": 1, "emission": 1}
+        self.scene = self.write_scene("cloud.json", [FOG], nebula=[cloud])
+        self.assert_failed(self.draw("a.png"), "cloud.json", "nebula", "--device cpu")
         self.assertNotIn("a.png", self.files())
 
     def test_without_a_driver(self):

@@ -5,6 +5,12 @@ int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_r
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
     *painter = (nb_gl_painter){.renderer = NULL};
+    if (nebel_scene_contents(loaded->scene)->particle_count > 0) {
+        return nb_report_failure(
+            "render: --device gl: %s has a nebula, which OpenGL does not draw in this version; say "
+            "--device cpu",
+            name);
+    }
     if (nb_gl_context_open(&painter->context, NB_GL_API_DESKTOP) != 0 &&
         nb_gl_context_open(&painter->context, NB_GL_API_ES) != 0) {
         return nb_report_failure("render: --device gl: %s; or say --device cpu", painter->context.fault);

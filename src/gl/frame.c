@@ -122,7 +122,8 @@ static void set_rays(const frame *f, unsigned program)
     glUniform3fv(glGetUniformLocation(program, "scene_rays"), 6, rays[0]);
 }
 
-/* From positions relative to the eye. */
+/* From positions relative to the eye. Parallel rays have no room for the digits of where they begin: nothing is clipped
+ * there, and fragments behind the eye are given up. */
 static void set_clip(const frame *f, unsigned program)
 {
     const double *const clip = f->sample_view.clip_from_eye, *const eye = f->sample_view.eye_from_world;
@@ -134,6 +135,7 @@ static void set_clip(const frame *f, unsigned program)
             matrix[4 * column + row] = (float)sum;
         }
     }
+    for (int column = 0; column < 4 && clip[15] != 0; column++) matrix[4 * column + 2] = 0;
     glUniformMatrix4fv(glGetUniformLocation(program, "scene_clip"), 1, GL_FALSE, matrix);
 }
 

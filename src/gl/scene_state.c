@@ -96,6 +96,30 @@ static void save_depth(const nb_context *c, nb_scene_state *s)
     }
 }
 
+static GLuint viewport_count(const nb_context *c)
+{
+    GLint count = 1;
+    if (c->viewport_arrays) glGetIntegerv(GL_MAX_VIEWPORTS, &count);
+    return count < NB_SCENE_VIEWPORTS ? (GLuint)count : NB_SCENE_VIEWPORTS;
+}
+
+/* That of viewport 0 is of the passes, too. Mesa 22 cuts off what is drawn through viewport 0 while those of others are
+ * on. */
+static void save_scissors(const nb_context *c, nb_scene_state *s)
+{
+    s->scissors = 0;
+    for (GLuint i = 1; i < viewport_count(c); i++) {
+        if (glIsEnabledi(GL_SCISSOR_TEST, i)) s->scissors |= 1u << i;
+    }
+}
+
+static void restore_scissors(const nb_scene_state *s)
+{
+    for (GLuint i = 1; i < NB_SCENE_VIEWPORTS; i++) {
+        if (s->scissors >> i & 1) glEnablei(GL_SCISSOR_TEST, i);
+    }
+}
+
 /* ---- setting -------------------------------------------------------------------------------------------------------
  */
 
@@ -122,10 +146,12 @@ void nb_scene_state_enter(const nb_context *c, nb_scene_state *s)
     save_units(s);
     save_buffers(c, s);
     save_depth(c, s);
+    save_scissors(c, s);
     nb_state_save_unpacking(c, &s->unpacking);
     for (GLuint i = 0; i < NB_SCENE_UNITS; i++) glBindSampler((GLuint)FIRST_UNIT + i, 0);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     for (int i = 0; i < pack_count(c); i++) glPixelStorei(pack_names[i], i == 0 ? 4 : 0);
+    glDisable(GL_SCISSOR_TEST);
     set_switches(c, 0);
     glDepthFunc(GL_LESS);
     glDepthMask(GL_TRUE);
@@ -163,5 +189,6 @@ void nb_scene_state_leave(const nb_context *c, const nb_scene_state *s)
     nb_state_restore_unpacking(c, &s->unpacking);
     restore_units(s);
     nb_state_restore(c, &s->base);
+    restore_scissors(s);
     restore_buffers(c, s);
 }

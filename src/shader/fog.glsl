@@ -441,18 +441,18 @@ float nb_profile_rate(nb_profile profile)
     return rate;
 }
 
-/* The next place behind the profile's start where it is not smooth. */
-float nb_profile_kink(nb_profile profile)
+/* The next place more than `near` metres behind the profile's start where it is not smooth. */
+float nb_profile_kink(nb_profile profile, float near)
 {
     float kink = NB_FAR;
     if (NB_HAS(NB_HAS_SOFT_EDGE) && profile.kind == NB_KIND_SOFT_EDGE)
-        kink = nb_soft_edge_kink(profile.offset, profile.slope, profile.size, 0.0);
+        kink = nb_soft_edge_kink(profile.offset, profile.slope, profile.size, near);
     if (NB_HAS(NB_HAS_SLOPE) && (profile.kind == NB_KIND_LINEAR || profile.kind == NB_KIND_HEIGHT_CAPPED)) {
         float inverse = nb_rcp_bounded(profile.slope.x);
         float zero = -profile.offset.x * inverse;
         float one = (1.0 - profile.offset.x) * inverse;
-        if (zero > 0.0) kink = zero;
-        if (profile.kind == NB_KIND_LINEAR && one > 0.0) kink = min(kink, one);
+        if (zero > near) kink = zero;
+        if (profile.kind == NB_KIND_LINEAR && one > near) kink = min(kink, one);
     }
     return kink;
 }
@@ -488,8 +488,7 @@ nb_piece nb_open_piece(float start, float end)
 /* Kinks nearer than the digits of a place on the ray are behind already. */
 nb_piece nb_note_profile(nb_piece piece, nb_profile profile)
 {
-    float kink = nb_profile_kink(profile);
-    if (kink > piece.start * (4.0 * NB_EPSILON)) piece.end = min(piece.end, piece.start + kink);
+    piece.end = min(piece.end, piece.start + nb_profile_kink(profile, piece.start * (4.0 * NB_EPSILON)));
     piece.rate = max(piece.rate, nb_profile_rate(profile));
     piece.varies = true;
     return piece;
@@ -609,7 +608,7 @@ float nb_even_error(nb_vec3 light, nb_vec3 depth, nb_vec3 before, nb_vec3 spread
 }
 
 /* What one step of the rule bears: so much of optical depth and of change of the densities' logarithm together. */
-#define NB_STEP_BEARS 3.0
+#define NB_STEP_BEARS 2.0
 #define NB_MOST_STEPS 32
 #define NB_OPAQUE 17.0
 

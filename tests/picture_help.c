@@ -1,0 +1,263 @@
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "picture_help.h"
+
+/* ---- pictures ------------------------------------------------------------------------------------------------------
+ */
+
+static float *make_plane(const picture_pair *pair, size_t channels)
+{
+    float *const plane = calloc((size_t)pair->width * pair->height * channels, sizeof *plane);
+    assert_non_null(plane);
+    return plane;
+}
+
+static nebel_frame make_frame(const picture_pair *pair)
+{
+    return (nebel_frame){.color = make_plane(pair, 3),
+                         .transmittance = make_plane(pair, 3),
+                         .in_scattering = make_plane(pair, 3),
+                         .depth = make_plane(pair, 1),
+                         .normal = make_plane(pair, 3)};
+}
+
+picture_pair picture_make(uint32_t width, uint32_t height)
+{
+    picture_pair pair = {.width = width, .height = height};
+    pair.cpu = make_frame(&pair);
+    pair.gl = make_frame(&pair);
+    return pair;
+}
+
+static void free_frame(nebel_frame *frame)
+{
+    free(frame->color);
+    free(frame->transmittance);
+    free(frame->in_scattering);
+    free(frame->depth);
+    free(frame->normal);
+}
+
+void picture_free(picture_pair *pair)
+{
+    free_frame(&pair->cpu);
+    free_frame(&pair->gl);
+}
+
+static void write_message(nebel_result result, const char *message, void *user)
+{
+    (void)user;
+    print_message("%d: %s\n", (int)result, message);
+}
+
+static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+                       picture_pair *pair)
+{
+    nebel_renderer *renderer = NULL;
+    const nebel_renderer_desc desc = {.log = {write_message, NULL}};
+    const nebel_frame_desc frame = {
+        .camera = *camera, .width = pair->width, .height = pair->height, .samples = samples, .tolerance = 1e-4};
+    assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &pair->cpu), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+}
+
+static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+                      picture_pair *pair)
+{
+    nebel_gl_renderer *renderer = NULL;
+    const nebel_gl_renderer_desc desc = {.log = {write_message, NULL}};
+    const nebel_gl_frame_desc frame = {
+        .camera = *camera, .width = pair->width, .height = pair->height, .samples = samples};
+    const nebel_gl_planes planes = {pair->gl.color, pair->gl.transmittance, pair->gl.in_scattering, pair->gl.depth,
+                                    pair->gl.normal};
+    assert_int_equal(nebel_create_gl_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    assert_int_equal(nebel_gl_read_planes(renderer, &planes), NEBEL_OK);
+    nebel_destroy_gl_renderer(renderer);
+}
+
+void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+                    picture_pair *pair)
+{
+    render_cpu(scene, fog, camera, samples, pair);
+    render_gl(scene, fog, camera, samples, pair);
+}
+
+/* ---- differences ---------------------------------------------------------------------------------------------------
+ */
+
+/* No number is farther off than any. */
+static double worse(double a, double b)
+{
+    return isnan(a) || isnan(b) ? HUGE_VAL : fmax(a, b);
+}
+
+static double vector_difference(const float *a, const float *b, size_t pixel)
+{
+    double most = 0;
+    for (size_t c = 0; c < 3; c++) most = worse(most, fabs((double)a[3 * pixel + c] - (double)b[3 * pixel + c]));
+    return most;
+}
+
+static double depth_difference(float a, float b)
+{
+    if (isinf(a) || isinf(b)) return isinf(a) && isinf(b) ? 0 : 1;
+    return fabs((double)a - (double)b) / fmax((double)a, (double)b);
+}
+
+static double pixel_difference(const picture_pair *pair, size_t pixel, double source)
+{
+    const double t = vector_difference(pair->cpu.transmittance, pair->gl.transmittance, pixel);
+    const double s = vector_difference(pair->cpu.in_scattering, pair->gl.in_scattering, pixel) / source;
+    const double d = depth_difference(pair->cpu.depth[pixel], pair->gl.depth[pixel]);
+    return worse(worse(t, s), d);
+}
+
+/* Whether depth jumps or bends between two opposite neighbours: on a plane its reciprocal is linear in the picture. */
+static int bends(const nebel_frame *frame, size_t before, size_t here, size_t behind)
+{
+    const double a = 1 / (double)frame->depth[before], b = 1 / (double)frame->depth[here],
+                 c = 1 / (double)frame->depth[behind]; /* 0 where nothing is hit */
+    return fabs(a - 2 * b + c) > 1. / 255 * fmax(b, fmax(a, c));
+}
+
+static int is_silhouette(const picture_pair *pair, uint32_t x, uint32_t y)
+{
+    const size_t width = pair->width, i = y * width + x;
+    const size_t left = x > 0 ? i - 1 : i, right = x + 1 < pair->width ? i + 1 : i;
+    const size_t above = y > 0 ? i - width : i, below = y + 1 < pair->height ? i + width : i;
+    return bends(&pair->cpu, left, i, right) || bends(&pair->cpu, above, i, below);
+}
+
+static int is_fogged(const nebel_frame *frame, size_t pixel)
+{
+    for (size_t c = 0; c < 3; c++) {
+        if (frame->transmittance[3 * pixel + c] < 1 || frame->in_scattering[3 * pixel + c] > 0) return 1;
+    }
+    return 0;
+}
+
+picture_difference picture_compare(const picture_pair *pair, double source)
+{
+    picture_difference all = {.fogged = 0};
+    double squares = 0;
+    for (uint32_t y = 0; y < pair->height; y++) {
+        for (uint32_t x = 0; x < pair->width; x++) {
+            const size_t i = (size_t)y * pair->width + x;
+            const double d = pixel_difference(pair, i, source);
+            const double color = vector_difference(pair->cpu.color, pair->gl.color, i) / source;
+            const int fogged = is_fogged(&pair->cpu, i);
+            all.fogged += (size_t)fogged;
+            all.beyond_step += fogged && d > 1. / 255 ? 1 : 0;
+            squares += color * color;
+            if (d <= all.largest || is_silhouette(pair, x, y)) continue;
+            all.largest = d;
+            all.x = x;
+            all.y = y;
+        }
+    }
+    all.color = sqrt(squares / ((double)pair->width * pair->height));
+    return all;
+}
+
+/* ---- report --------------------------------------------------------------------------------------------------------
+ */
+
+picture_report picture_report_open(const char *title)
+{
+    picture_report report = {.folder = getenv("NEBEL_REPORT")};
+    char path[1024];
+    if (report.folder == NULL) return report;
+    snprintf(path, sizeof path, "%s/index.html", report.folder);
+    report.page = fopen(path, "w");
+    assert_non_null(report.page);
+    fprintf(report.page,
+            "<!DOCTYPE html>\n<meta charset=\"utf-8\">\n<title>%s</title>\n"
+            "<style>body{font:15px sans-serif;margin:2em;background:#222;color:#ddd}td,th{padding:4px;text-align:left;"
+            "vertical-align:top}img{display:block;image-rendering:pixelated}</style>\n<h1>%s</h1>\n"
+            "<p>Each row: the CPU, OpenGL, and 32 times their difference. Colours are tone mapped; depth d is drawn as "
+            "d / (d + 20 m).</p>\n",
+            title, title);
+    return report;
+}
+
+typedef enum report_plane { COLOR, TRANSMITTANCE, IN_SCATTERING, DEPTH, REPORT_PLANES } report_plane;
+
+static const char *const plane_names[REPORT_PLANES] = {"color", "transmittance", "in-scattering", "depth"};
+
+static float report_value(const nebel_frame *frame, report_plane plane, size_t i)
+{
+    switch (plane) {
+    case COLOR:
+        return frame->color[i];
+    case TRANSMITTANCE:
+        return frame->transmittance[i];
+    case IN_SCATTERING:
+        return frame->in_scattering[i];
+    default:
+        return isinf(frame->depth[i / 3]) ? 1 : frame->depth[i / 3] / (frame->depth[i / 3] + 20);
+    }
+}
+
+static void write_picture(const picture_report *report, const picture_pair *pair, const char *file, float *samples)
+{
+    static const char *const channels[] = {"R", "G", "B"};
+    char path[1024];
+    const nebel_image image = {pair->width, pair->height, 3, channels, samples};
+    const size_t count = 3 * (size_t)pair->width * pair->height;
+    for (size_t i = 0; i < count; i++) samples[i] = fminf(fmaxf(samples[i], 0), 1);
+    snprintf(path, sizeof path, "%s/%s", report->folder, file);
+    assert_int_equal(nebel_write_image(path, &(nebel_scene_desc){0}, &image), NEBEL_OK);
+    fprintf(report->page, "<td><img src=\"%s\" alt=\"%s\">\n", file, file);
+}
+
+static void add_plane(const picture_report *report, const char *name, const picture_pair *pair, report_plane plane)
+{
+    const size_t pixels = (size_t)pair->width * pair->height;
+    const int toned = plane == COLOR || plane == IN_SCATTERING;
+    float *const samples = malloc(3 * 3 * pixels * sizeof *samples);
+    float *const cpu = samples, *const gl = samples + 3 * pixels, *const difference = samples + 6 * pixels;
+    char file[256];
+    assert_non_null(samples);
+    for (size_t i = 0; i < 3 * pixels; i++) {
+        cpu[i] = report_value(&pair->cpu, plane, i);
+        gl[i] = report_value(&pair->gl, plane, i);
+    }
+    if (toned) {
+        nebel_tone_map(pixels, cpu, 0, cpu);
+        nebel_tone_map(pixels, gl, 0, gl);
+    }
+    for (size_t i = 0; i < 3 * pixels; i++) difference[i] = 32 * fabsf(cpu[i] - gl[i]);
+    fprintf(report->page, "<tr><th>%s\n", plane_names[plane]);
+    for (int k = 0; k < 3; k++) {
+        snprintf(file, sizeof file, "%s-%s-%d.png", name, plane_names[plane], k);
+        write_picture(report, pair, file, samples + 3 * pixels * (size_t)k);
+    }
+    free(samples);
+}
+
+void picture_report_add(const picture_report *report, const char *name, const picture_pair *pair,
+                        const picture_difference *difference)
+{
+    if (report->folder == NULL) return;
+    fprintf(report->page,
+            "<h2>%s</h2>\n<p>%zu of %zu pixels with fog are more than 1/255 apart; away from silhouettes %.2g/255 at "
+            "most, at %u, %u.</p>\n<table>\n",
+            name, difference->beyond_step, difference->fogged, 255 * difference->largest, (unsigned)difference->x,
+            (unsigned)difference->y);
+    for (int plane = 0; plane < REPORT_PLANES; plane++) add_plane(report, name, pair, (report_plane)plane);
+    fprintf(report->page, "</table>\n");
+}
+
+void picture_report_close(picture_report *report)
+{
+    if (report->page != NULL) assert_int_equal(fclose(report->page), 0);
+    report->page = NULL;
+}

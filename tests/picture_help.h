@@ -1,0 +1,46 @@
+/* Pictures of one scene by both renderers, their differences, and a report of them. Include after <cmocka.h>. */
+#ifndef PICTURE_HELP_H
+#define PICTURE_HELP_H
+
+#include <nebel/gl_render.h>
+#include <nebel/render.h>
+
+#include <stdio.h>
+
+/* All planes, at the same pixels. */
+typedef struct picture_pair {
+    uint32_t width, height;
+    nebel_frame cpu, gl;
+} picture_pair;
+
+picture_pair picture_make(uint32_t width, uint32_t height);
+void picture_free(picture_pair *pair);
+
+/* Renders a scene by both. */
+void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
+                    picture_pair *pair);
+
+/* How far OpenGL is from the CPU. A pixel's difference is the largest of its transmittances, of its in-scattering as a
+ * share of `source`, and of its depth as a share of the depth. */
+typedef struct picture_difference {
+    size_t fogged, beyond_step; /* pixels that contain fog, and those of them more than 1/255 apart */
+    double largest;             /* of the pixels where no silhouette is near */
+    uint32_t x, y;              /* where */
+    double color;               /* root of the mean square of the colours' differences, as a share of `source` */
+} picture_difference;
+
+picture_difference picture_compare(const picture_pair *pair, double source);
+
+/* ---- the report: an HTML page and its pictures in the folder NEBEL_REPORT; nothing without it ---- */
+
+typedef struct picture_report {
+    const char *folder; /* NULL: none is wanted */
+    FILE *page;
+} picture_report;
+
+picture_report picture_report_open(const char *title);
+void picture_report_add(const picture_report *report, const char *name, const picture_pair *pair,
+                        const picture_difference *difference);
+void picture_report_close(picture_report *report);
+
+#endif

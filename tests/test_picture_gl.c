@@ -1,0 +1,207 @@
+/* The picture of OpenGL is that of the CPU: the demo scenes, and random fog around boxes. */
+#define _POSIX_C_SOURCE 200809L
+
+#include <glob.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "pass_help.h"
+#include "picture_help.h"
+#include "random_fog.h"
+
+enum { DEMO_WIDTH = 320, DEMO_HEIGHT = 180, RANDOM_WIDTH = 96, RANDOM_HEIGHT = 64, RANDOM_SCENES = 40 };
+
+static picture_report report;
+
+/* The largest radiance, which in-scattering is measured by: at least 1. */
+static double largest_light(const picture_pair *pair)
+{
+    const size_t count = 3 * (size_t)pair->width * pair->height;
+    double most = 1;
+    for (size_t i = 0; i < count; i++) most = fmax(most, (double)pair->cpu.in_scattering[i]);
+    return most;
+}
+
+static picture_difference check(const char *name, const picture_pair *pair)
+{
+    const picture_difference d = picture_compare(pair, largest_light(pair));
+    print_message("%s: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255 at %u, %u, color %.2g\n", name, d.fogged,
+                  d.beyond_step, 255 * d.largest, (unsigned)d.x, (unsigned)d.y, d.color);
+    picture_report_add(&report, name, pair, &d);
+    return d;
+}
+
+static void expect_sameness(const picture_difference *d)
+{
+    assert_true((double)d->beyond_step <= 1e-3 * (double)d->fogged);
+    assert_true(d->largest <= 3. / 255);
+}
+
+/* ---- demo scenes ---------------------------------------------------------------------------------------------------
+ */
+
+static void render_demo(const nebel_scene *scene, picture_pair *pair)
+{
+    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    nebel_snapshot *fog = NULL;
+    nb_gl context;
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    pass_open(&context, NB_GL_330);
+    const int objects = pass_count_objects();
+    picture_render(data, fog, &data->camera, 1, pair);
+    assert_int_equal(pass_count_objects(), objects);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+}
+
+static void check_demo(const nebel_scene *scene, const char *name)
+{
+    picture_pair pair = picture_make(DEMO_WIDTH, DEMO_HEIGHT);
+    render_demo(scene, &pair);
+    const picture_difference d = check(name, &pair);
+    expect_sameness(&d);
+    assert_true(d.fogged > DEMO_WIDTH * DEMO_HEIGHT / 8);
+    assert_true(d.color < .02);
+    picture_free(&pair);
+}
+
+/* Models that are made or installed, not kept, may be missing. The particles of nebulae are not for this renderer. */
+static int try_demo(const char *path)
+{
+    nebel_scene *scene = NULL;
+    const char *const name = strrchr(path, '/') + 1;
+    assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){0}, &scene), NEBEL_OK);
+    const nebel_result models = nebel_load_scene_models(scene);
+    const int fit = models == NEBEL_OK && nebel_scene_contents(scene)->particle_count == 0;
+    if (fit) {
+        check_demo(scene, name);
+    } else {
+        print_message("%s: left out: %s\n", name, models == NEBEL_OK ? "particles" : nebel_result_text(models));
+    }
+    nebel_destroy_scene(scene);
+    return fit;
+}
+
+static void test_demo_scenes(void **state)
+{
+    (void)state;
+    glob_t paths;
+    int count = 0;
+    assert_int_equal(glob(NEBEL_SOURCE "/examples/scenes/*.json", 0, NULL, &paths), 0);
+    for (size_t i = 0; i < paths.gl_pathc; i++) count += try_demo(paths.gl_pathv[i]);
+    globfree(&paths);
+    assert_true(count >= 3);
+}
+
+/* ---- random fog ----------------------------------------------------------------------------------------------------
+ */
+
+static const float box_positions[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
+                                          {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
+static const uint32_t box_indices[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+
+/* A floor and some boxes around the fog's middle. No sun: only fog is compared. */
+static nebel_scene_data scene_around(const double middle[3], nebel_mesh meshes[4], float positions[4][8][3])
+{
+    static const float sizes[4][3] = {{60, .5f, 60}, {2, 3, 1}, {1, 1, 4}, {3, .7f, 1}};
+    static const double places[4][3] = {{0, -6, 0}, {3, -1, -4}, {-5, 0, 2}, {1, 4, 6}};
+    for (int m = 0; m < 4; m++) {
+        for (int v = 0; v < 8; v++) {
+            for (int k = 0; k < 3; k++) positions[m][v][k] = sizes[m][k] * box_positions[v][k];
+        }
+        meshes[m] = (nebel_mesh){.positions = positions[m][0],
+                                 .indices = box_indices,
+                                 .vertex_count = 8,
+                                 .triangle_count = 12,
+                                 .base_color = {.5f, .6f, .7f},
+                                 .texture = -1};
+        for (int k = 0; k < 3; k++) meshes[m].origin[k] = middle[k] + places[m][k];
+    }
+    return (nebel_scene_data){.background = {.3, .4, .5}, .ambient = {1, 1, 1}, .mesh_count = 4, .meshes = meshes};
+}
+
+static nebel_snapshot *commit(const random_fog *random)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    nebel_fog_desc desc = {.log = {NULL, NULL}};
+    memcpy(desc.ambient, random->ambient, sizeof desc.ambient);
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < random->count; i++)
+        assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Every third camera is orthographic. */
+static nebel_camera camera_for(const random_fog *fog, int number)
+{
+    nebel_camera camera = {.up = {0, 1, 0}, .vertical_fov = 60, .view_height = 24};
+    const double turn = .9 * number, far = number % 2 == 0 ? 22 : 4;
+    const double from[3] = {far * cos(turn), -3 + .2 * number, far * sin(turn)};
+    for (int k = 0; k < 3; k++) {
+        camera.position[k] = fog->shift[k] + from[k];
+        camera.look_at[k] = fog->shift[k] + (far < 5 ? 2 * from[k] * (k != 1) : 0);
+    }
+    if (number % 3 == 2) camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    return camera;
+}
+
+static picture_difference check_random(int number)
+{
+    static random_fog random;
+    static float positions[4][8][3];
+    nebel_mesh meshes[4];
+    char name[64];
+    nb_gl context;
+    random_fog_make(&random, (random_fog_kind)(number % RANDOM_FOG_KIND_COUNT), (uint64_t)number);
+    nebel_snapshot *const fog = commit(&random);
+    const nebel_scene_data scene = scene_around(random.shift, meshes, positions);
+    const nebel_camera camera = camera_for(&random, number);
+    picture_pair pair = picture_make(RANDOM_WIDTH, RANDOM_HEIGHT);
+    pass_open(&context, number % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
+    picture_render(&scene, fog, &camera, 1, &pair);
+    pass_close(&context);
+    snprintf(name, sizeof name, "random-%d", number);
+    const picture_difference d = check(name, &pair);
+    picture_free(&pair);
+    nebel_release_snapshot(fog);
+    return d;
+}
+
+/* The scenes are small, so that their pixels are counted together. */
+static void test_random_fog_around_boxes(void **state)
+{
+    (void)state;
+    picture_difference all = {.fogged = 0};
+    for (int i = 0; i < RANDOM_SCENES; i++) {
+        const picture_difference d = check_random(i);
+        all.fogged += d.fogged;
+        all.beyond_step += d.beyond_step;
+        all.largest = fmax(all.largest, d.largest);
+    }
+    print_message("all: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255\n", all.fogged, all.beyond_step,
+                  255 * all.largest);
+    assert_true(all.fogged > RANDOM_SCENES * RANDOM_WIDTH * RANDOM_HEIGHT / 4);
+    expect_sameness(&all);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_demo_scenes),
+        cmocka_unit_test(test_random_fog_around_boxes),
+    };
+    report = picture_report_open("nebel: OpenGL beside the CPU");
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    picture_report_close(&report);
+    return failed;
+}

@@ -1,0 +1,236 @@
+/* The scene renderer's rules: what it refuses, which state it leaves, what samples, textures and shadows look like. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "odd_state.h"
+#include "pass_help.h"
+#include "picture_help.h"
+#include "test_render_scene.h"
+
+#include <epoxy/gl.h>
+
+enum { WIDTH = 96, HEIGHT = 64, TEXELS = 16 };
+
+static const nb_gl_language languages[] = {NB_GL_330, NB_GL_300ES};
+
+/* ---- the scene: a ball over a textured floor ------------------------------------------------------------------------
+ */
+
+typedef struct stage {
+    test_ball ball;
+    uint8_t texels[4 * TEXELS * TEXELS];
+    nebel_texture texture;
+    nebel_snapshot *fog;
+    nebel_camera camera;
+} stage;
+
+static void set_stage(stage *s, const double center[3])
+{
+    test_ball_make(&s->ball, center);
+    for (size_t i = 0; i < sizeof s->texels; i++) s->texels[i] = (uint8_t)(37 * i + i / 64 * 11);
+    s->texture = (nebel_texture){TEXELS, TEXELS, s->texels};
+    s->ball.meshes[1].uvs = test_square_uvs;
+    s->ball.meshes[1].texture = 0;
+    s->ball.scene.texture_count = 1;
+    s->ball.scene.textures = &s->texture;
+    const nebel_volume_desc volumes[] = {
+        {.extinction = {.02, .03, .04}, .source = {.5, .6, .7}},
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {center[0] + 2, center[1], center[2]}, .radius = 1.5},
+         .extinction = {.5, .5, .3}}};
+    s->fog = test_fog(2, volumes);
+    s->camera = test_camera(center[0] + 3, center[1] + 2, center[2] + 5, center[0], center[1], center[2]);
+}
+
+static nebel_gl_renderer *make_renderer(const stage *s)
+{
+    nebel_gl_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_gl_renderer(&s->ball.scene, s->fog, &(nebel_gl_renderer_desc){0}, &renderer),
+                     NEBEL_OK);
+    return renderer;
+}
+
+static nebel_gl_frame_desc frame_of(const stage *s, uint32_t samples)
+{
+    return (nebel_gl_frame_desc){.camera = s->camera, .width = WIDTH, .height = HEIGHT, .samples = samples};
+}
+
+static void draw(nebel_gl_renderer *renderer, const stage *s, uint32_t samples, float *color)
+{
+    const nebel_gl_frame_desc desc = frame_of(s, samples);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+    assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){.color = color}), NEBEL_OK);
+}
+
+/* ---- tests ---------------------------------------------------------------------------------------------------------
+ */
+
+/* Smooth normals, textures, shadows and fog in the sun's light, near the origin and far out. */
+static void test_light_is_that_of_the_cpu(void **state)
+{
+    (void)state;
+    static stage s;
+    static const double centers[2][3] = {{0, 0, 0}, {1e7, -3e6, 5e6}};
+    for (int i = 0; i < 2; i++) {
+        nb_gl context;
+        picture_pair pair = picture_make(WIDTH, HEIGHT);
+        set_stage(&s, centers[i]);
+        pass_open(&context, languages[i]);
+        picture_render(&s.ball.scene, s.fog, &s.camera, 1, &pair);
+        pass_close(&context);
+        const picture_difference d = picture_compare(&pair, 1);
+        print_message("%zu pixels with fog, %zu beyond 1/255, worst %.2g/255, color %.2g\n", d.fogged, d.beyond_step,
+                      255 * d.largest, d.color);
+        assert_int_equal(d.fogged, WIDTH * HEIGHT);
+        assert_true(d.largest < .1 / 255);
+        assert_true(d.color < .02);
+        picture_free(&pair);
+        nebel_release_snapshot(s.fog);
+    }
+}
+
+/* Many samples of both come close to the same mean; one sample does not. */
+static void test_samples_smooth_edges(void **state)
+{
+    (void)state;
+    static stage s;
+    double color[2];
+    nb_gl context;
+    set_stage(&s, (double[3]){0, 0, 0});
+    for (int i = 0; i < 2; i++) {
+        static float few[3 * WIDTH * HEIGHT];
+        picture_pair pair = picture_make(WIDTH, HEIGHT);
+        pass_open(&context, languages[i]);
+        picture_render(&s.ball.scene, s.fog, &s.camera, 64, &pair);
+        nebel_gl_renderer *const renderer = make_renderer(&s);
+        color[0] = picture_compare(&pair, 1).color;
+        draw(renderer, &s, 1, few);
+        memcpy(pair.gl.color, few, sizeof few);
+        color[1] = picture_compare(&pair, 1).color;
+        nebel_destroy_gl_renderer(renderer);
+        pass_close(&context);
+        print_message("64 samples %.2g, one %.2g\n", color[0], color[1]);
+        assert_true(color[0] < .01 && color[0] < .25 * color[1]);
+        picture_free(&pair);
+    }
+    nebel_release_snapshot(s.fog);
+}
+
+static void draw_in_odd_state(nb_gl_language language, int odd_state, float *color)
+{
+    static stage s;
+    static odd_snapshot before, after;
+    const int desktop = language == NB_GL_330;
+    nb_gl context;
+    odd o;
+    set_stage(&s, (double[3]){0, 0, 0});
+    pass_open(&context, language);
+    if (odd_state >= 0) odd_set(&o, desktop, odd_state);
+    if (odd_state >= 0 && desktop) glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
+    odd_take(&before, desktop);
+    nebel_gl_renderer *const renderer = make_renderer(&s);
+    draw(renderer, &s, 2, color);
+    nebel_destroy_gl_renderer(renderer);
+    odd_take(&after, desktop);
+    odd_expect_same(&before, &after);
+    if (odd_state >= 0) odd_delete(&o);
+    pass_close(&context);
+    nebel_release_snapshot(s.fog);
+}
+
+static void test_state_neither_changes_nor_matters(void **state)
+{
+    (void)state;
+    static float plain[3 * WIDTH * HEIGHT], strange[3 * WIDTH * HEIGHT];
+    for (int language = 0; language < 2; language++) {
+        draw_in_odd_state(languages[language], -1, plain);
+        for (int on = 0; on < 2; on++) {
+            draw_in_odd_state(languages[language], on, strange);
+            assert_memory_equal(plain, strange, sizeof plain);
+        }
+    }
+}
+
+static int stop(size_t done, size_t total, void *user)
+{
+    size_t *const calls = user;
+    assert_int_equal(total, 4);
+    assert_int_equal(done, ++*calls);
+    return *calls == 2;
+}
+
+static void check_frames(nebel_gl_renderer *renderer, const stage *s)
+{
+    nebel_gl_textures textures;
+    size_t calls = 0;
+    nebel_gl_frame_desc desc = frame_of(s, 4);
+    assert_int_equal(nebel_gl_get_textures(renderer, &textures), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){0}), NEBEL_ERROR_ARGUMENT);
+    desc.progress = stop;
+    desc.progress_user = &calls;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_LIMIT);
+    assert_int_equal(calls, 2);
+    assert_int_equal(nebel_gl_get_textures(renderer, &textures), NEBEL_ERROR_ARGUMENT);
+    desc = frame_of(s, 1);
+    desc.width = 1u << 30;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_LIMIT);
+    desc.width = 0;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_VALUE);
+    desc = frame_of(s, 5000);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_VALUE);
+    desc = frame_of(s, 1);
+    desc.camera.projection = NEBEL_PROJECTION_PANORAMA;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_UNSUPPORTED);
+    desc.camera.projection = NEBEL_PROJECTION_PERSPECTIVE;
+    desc.camera.vertical_fov = 180;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_VALUE);
+    desc = frame_of(s, 1);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+    assert_int_equal(nebel_gl_get_textures(renderer, &textures), NEBEL_OK);
+    assert_true(glIsTexture(textures.color) && textures.width == WIDTH && textures.height == HEIGHT);
+}
+
+static void test_what_is_refused(void **state)
+{
+    (void)state;
+    static stage s;
+    nb_gl context;
+    nebel_gl_renderer *renderer = NULL;
+    const nebel_gl_renderer_desc usual = {0}, tiny = {.shadow_size = 1};
+    set_stage(&s, (double[3]){0, 0, 0});
+    assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, s.fog, &usual, &renderer), NEBEL_ERROR_UNSUPPORTED);
+    pass_open(&context, NB_GL_330);
+    const int objects = pass_count_objects();
+    assert_int_equal(nebel_create_gl_renderer(NULL, s.fog, &usual, &renderer), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, s.fog, &tiny, &renderer), NEBEL_ERROR_ARGUMENT);
+    s.ball.meshes[1].texture = 3;
+    assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, s.fog, &usual, &renderer), NEBEL_ERROR_ARGUMENT);
+    s.ball.meshes[1].texture = 0;
+    s.ball.indices[7][1] = 1u << 30;
+    assert_int_equal(nebel_create_gl_renderer(&s.ball.scene, s.fog, &usual, &renderer), NEBEL_ERROR_ARGUMENT);
+    assert_null(renderer);
+    s.ball.indices[7][1] = 0;
+    renderer = make_renderer(&s);
+    check_frames(renderer, &s);
+    nebel_destroy_gl_renderer(renderer);
+    nebel_destroy_gl_renderer(NULL);
+    assert_int_equal(pass_count_objects(), objects);
+    pass_close(&context);
+    nebel_release_snapshot(s.fog);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_light_is_that_of_the_cpu),
+        cmocka_unit_test(test_samples_smooth_edges),
+        cmocka_unit_test(test_state_neither_changes_nor_matters),
+        cmocka_unit_test(test_what_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
