@@ -42,7 +42,7 @@ static void test_what_a_key_leaves_out_it_takes_from_the_volume(void **state)
     const nebel_volume_desc before = nebel_scene_volume(scene, 0, -1e9), after = nebel_scene_volume(scene, 0, HUGE_VAL);
     assert_number(before.shape.radius, 4);
     assert_number(after.shape.radius, 2);
-    assert_number(nebel_scene_volume(scene, 0, NAN).shape.radius, 4);
+    assert_number(nebel_scene_volume(scene, 0, (double)NAN).shape.radius, 4);
     assert_number(nebel_scene_contents(scene)->volumes[0].shape.radius, 4);
     const nebel_volume_desc middle = nebel_scene_volume(scene, 0, 15);
     assert_number(middle.shape.radius, 3);

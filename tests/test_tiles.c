@@ -353,7 +353,7 @@ static void test_bad_input(void **state)
         assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, entries, 200, &count), NEBEL_ERROR_MEMORY);
         assert_int_equal(memory.live, live);
     }
-    view.clip_from_eye[0] = NAN;
+    view.clip_from_eye[0] = (double)NAN;
     assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     memset(view.clip_from_eye, 0, sizeof view.clip_from_eye);
     assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
