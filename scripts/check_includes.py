@@ -43,7 +43,7 @@ FOREIGN = {
     "scene": POSIX | {"assimp/", "png.h", "jpeglib.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h"},
     "cpu": {"embree3/", "omp.h"},
     "gl": {"epoxy/"},
-    "tools": POSIX | {"omp.h", "epoxy/"},
+    "tools": POSIX | {"omp.h", "epoxy/", "GLFW/", "imgui.h", "backends/"},
     "bench": POSIX | {"omp.h", "embree3/", "epoxy/"},
     "examples": POSIX,
 }

@@ -20,7 +20,7 @@ import unittest
 
 NEBEL = os.environ["NEBEL"]
 HEADER = "T_r,T_g,T_b,S_r,S_g,S_b,error\n"
-COMMANDS = ("render", "trace", "info", "compare")
+COMMANDS = ("render", "trace", "view", "info", "compare")
 BOX = {"type": "box", "min": [-5, -5, -5], "max": [5, 5, 5]}
 FOG = {"shape": BOX, "extinction": 0.1, "source": [0.7, 0.7, 0.5]}
 RAY = "-9 0 0 1 0 0 100\n"
@@ -128,9 +128,6 @@ class CallingTest(Case):
         self.assert_misused(nebel("trace", self.scene, "-x"), "-x")
         self.assert_misused(nebel("info", "--zzzz"), "--zzzz")
         self.assert_misused(nebel("info", "--hlep"), "did you mean '--help'?")
-
-    def test_the_viewer_is_not_in_this_version(self):
-        self.assert_failed(nebel("view", self.scene), "version")
 
     def test_values_stand_apart_or_behind_an_equals_sign(self):
         for words in (["--precision", "float"], ["--precision=float"], ["-p", "float"], ["-pfloat"]):

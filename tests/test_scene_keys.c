@@ -29,6 +29,7 @@ static void test_what_a_key_leaves_out_it_takes_from_the_volume(void **state)
              "\"visibility\": 15, "
              "\"density\": {\"base\": 7}, \"shape\": {\"transform\": {\"scale\": 3}}}]"));
     assert_int_equal(nebel_scene_contents(scene)->moving_volume_count, 1);
+    assert_int_equal(nebel_scene_volume_origin(scene, 0), NEBEL_VOLUME_MOVING);
     const nebel_volume_desc first = nebel_scene_volume(scene, 0, 10), last = nebel_scene_volume(scene, 0, 20);
     assert_number(first.shape.radius, 4);
     assert_vector(first.source, 1, 2, 3);

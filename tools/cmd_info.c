@@ -60,6 +60,12 @@ static const char examples[] = "Examples:\n"
 #define SANITIZER ""
 #endif
 
+#if defined(NEBEL_HAVE_VIEWER)
+#define VIEWER "GLFW, Dear ImGui"
+#else
+#define VIEWER "not in this build"
+#endif
+
 static void print_instruction_sets(void)
 {
     (void)printf("instruction sets:");
@@ -97,6 +103,7 @@ static int print_program(void)
     (void)printf("processor: %s\n", processor);
     print_instruction_sets();
     print_opengl();
+    (void)printf("viewer: " VIEWER "\n");
     (void)printf("threads: %d\n", nb_workers_available());
     return NB_DONE;
 }

@@ -6,6 +6,7 @@
 
 extern const nb_command nb_commands_render;
 extern const nb_command nb_commands_trace;
+extern const nb_command nb_commands_view;
 extern const nb_command nb_commands_info;
 extern const nb_command nb_commands_compare;
 #if defined(NEBEL_HAVE_BENCH)

@@ -9,16 +9,13 @@
 #include <string.h>
 
 static const nb_command *const commands[] = {
-    &nb_commands_render, &nb_commands_trace, &nb_commands_info, &nb_commands_compare,
+    &nb_commands_render, &nb_commands_trace, &nb_commands_view, &nb_commands_info, &nb_commands_compare,
 #if defined(NEBEL_HAVE_BENCH)
     &nb_commands_bench,
 #endif
 };
 
 enum { COMMANDS = sizeof commands / sizeof *commands };
-
-/* Named in the plan, not in this version. */
-static const char view_name[] = "view";
 
 static const char help_option[] = "--help", version_option[] = "--version";
 
@@ -42,10 +39,10 @@ static int print_help(void)
 
 static int reject_command(const char *word)
 {
-    const char *names[COMMANDS + 3] = {view_name, help_option, version_option};
-    for (int i = 0; i < COMMANDS; i++) names[i + 3] = commands[i]->name;
+    const char *names[COMMANDS + 2] = {help_option, version_option};
+    for (int i = 0; i < COMMANDS; i++) names[i + 2] = commands[i]->name;
     const char *const kind = word[0] == '-' ? "option" : "command";
-    const char *const nearest = nb_options_nearest(word, names, COMMANDS + 3);
+    const char *const nearest = nb_options_nearest(word, names, COMMANDS + 2);
     if (nearest == NULL) return nb_report_misuse(NULL, "there is no %s '%s'", kind, word);
     return nb_report_misuse(NULL, "there is no %s '%s'; did you mean '%s'?", kind, word, nearest);
 }
@@ -81,9 +78,6 @@ static int run(int count, char **words)
     const int wants_help = strcmp(word, help_option) == 0 || strcmp(word, "-h") == 0 || strcmp(word, "help") == 0;
     if (wants_help) return help_with(count - 1, words + 1);
     if (strcmp(word, version_option) == 0) return print_version();
-    if (strcmp(word, view_name) == 0) {
-        return nb_report_failure("view: there is no viewer in this version; 'nebel render' makes pictures");
-    }
     const nb_command *const command = find_command(word);
     return command != NULL ? command->run(count - 1, words + 1) : reject_command(word);
 }

@@ -126,6 +126,17 @@ void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *partic
  * its range. Its arrays are the scene's. index < contents->volume_count. */
 nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame);
 
+/* What a volume comes from. */
+typedef enum nebel_volume_origin {
+    NEBEL_VOLUME_WRITTEN = 0, /* its numbers stand in the section "fog", and hold at every frame */
+    NEBEL_VOLUME_MOVING,      /* it has keys */
+    NEBEL_VOLUME_IMPORTED,    /* the settings of another program */
+    NEBEL_VOLUME_OF_NODE      /* a node of a model */
+} nebel_volume_origin;
+
+/* index < contents->volume_count. */
+nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index);
+
 /* A snapshot of the scene's fog at a frame, its nebulae's particles among it; release it with nebel_release_snapshot before the
  * scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT, MEMORY, VALUE, LIMIT. */
 nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);

@@ -162,7 +162,7 @@ bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subj
 }
 
 static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const nebel_volume_desc *volume,
-                        const char *name)
+                        const char *name, nebel_volume_origin origin)
 {
     nebel_scene *scene = in->scene;
     const size_t count = scene->data.volume_count;
@@ -172,9 +172,14 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
     scene->volumes = volumes;
     const bool name_room = nb_grow(&scene->allocator, &names, sizeof name, count, &scene->name_capacity, count + 1);
     scene->volume_names = names;
-    if (!room || !name_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    void *origins = scene->volume_origins;
+    const bool origin_room =
+        nb_grow(&scene->allocator, &origins, sizeof origin, count, &scene->origin_capacity, count + 1);
+    scene->volume_origins = origins;
+    if (!room || !name_room || !origin_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     scene->volumes[count] = *volume;
     scene->volume_names[count] = name;
+    scene->volume_origins[count] = origin;
     scene->data.volume_count = count + 1;
     return true;
 }
@@ -294,7 +299,9 @@ static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const n
     if (in->node != NULL && !nb_read_place_volume(in, node, volume)) return false;
     if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], &track)) return false;
     if (track.key_count > 0) *volume = nb_volume_at(&track, 0);
-    return keep_volume(in, node, volume, name) && keep_track(in, node, &track);
+    nebel_volume_origin origin = in->node != NULL ? NEBEL_VOLUME_OF_NODE : NEBEL_VOLUME_WRITTEN;
+    if (track.key_count > 0) origin = NEBEL_VOLUME_MOVING;
+    return keep_volume(in, node, volume, name, origin) && keep_track(in, node, &track);
 }
 
 /* A node of a model has its shape from the modelling program, where it names none, and does not move. */
@@ -333,7 +340,7 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
     if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
     if (!nb_value_color(in->json, found[2], &nb_range_not_negative, volume->source)) return false;
     remember_lit(in, found[1], volume->albedo);
-    return nb_read_try(in, found[1], "", volume) && keep_volume(in, found[1], volume, name);
+    return nb_read_try(in, found[1], "", volume) && keep_volume(in, found[1], volume, name, NEBEL_VOLUME_IMPORTED);
 }
 
 static bool read_imported(nb_scene_reader *in, const nb_json_node *node)

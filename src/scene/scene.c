@@ -214,6 +214,11 @@ const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene)
     return &scene->data;
 }
 
+nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index)
+{
+    return scene->volume_origins[index];
+}
+
 static nebel_result strew(const nebel_scene *scene, nebel_particle *particles)
 {
     nebel_result result = NEBEL_OK;
@@ -298,6 +303,7 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_arena_release(&scene->arena);
     nb_release(&allocator, scene->volumes);
     nb_release(&allocator, (void *)scene->volume_names);
+    nb_release(&allocator, scene->volume_origins);
     nb_release(&allocator, scene->tracks);
     nb_release(&allocator, scene->nebulae);
     nb_release(&allocator, (void *)scene->nebula_names);

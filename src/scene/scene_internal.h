@@ -51,7 +51,8 @@ struct nebel_scene {
 
     nebel_volume_desc *volumes;
     const char **volume_names;
-    size_t volume_capacity, name_capacity;
+    nebel_volume_origin *volume_origins;
+    size_t volume_capacity, name_capacity, origin_capacity;
 
     nb_volume_track *tracks; /* in the order of their volumes */
     size_t track_count, track_capacity;

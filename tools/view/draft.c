@@ -1,0 +1,126 @@
+#include "draft.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void *copy_array(const void *from, size_t count, size_t size)
+{
+    void *const copy = malloc(count > 0 ? count * size : 1);
+    if (copy != NULL && count > 0) memcpy(copy, from, count * size);
+    return copy;
+}
+
+static nebel_result allocate(nb_draft *draft)
+{
+    const size_t count = draft->data.volume_count;
+    draft->volumes = copy_array(draft->data.volumes, count, sizeof *draft->volumes);
+    draft->good = copy_array(draft->data.volumes, count, sizeof *draft->good);
+    draft->ids = calloc(count + 1, sizeof *draft->ids);
+    draft->data.volumes = draft->volumes;
+    return draft->volumes != NULL && draft->good != NULL && draft->ids != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+}
+
+static nebel_result add_particles(nb_draft *draft)
+{
+    nebel_particle *particles = NULL;
+    if (draft->data.particle_count == 0) return NEBEL_OK;
+    nebel_result result = nebel_make_scene_particles(draft->scene, &particles);
+    for (size_t i = 0; i < draft->data.particle_count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
+        result = nebel_add_volume(draft->fog, &volume, NULL);
+    }
+    nebel_free_scene_particles(draft->scene, particles);
+    return result;
+}
+
+static nebel_result fill_fog(nb_draft *draft)
+{
+    nebel_fog_desc desc = {.log = draft->log};
+    memcpy(desc.ambient, draft->data.ambient, sizeof desc.ambient);
+    nebel_result result = nebel_create_fog(&desc, &draft->fog);
+    for (size_t i = 0; i < draft->data.volume_count && result == NEBEL_OK; i++) {
+        result = nebel_add_volume(draft->fog, &draft->volumes[i], &draft->ids[i]);
+    }
+    if (result == NEBEL_OK) result = add_particles(draft);
+    return result == NEBEL_OK ? nebel_commit_fog(draft->fog, &draft->snapshot) : result;
+}
+
+static void place_frame(nb_draft *draft, double frame)
+{
+    draft->frame = frame;
+    for (size_t i = 0; i < draft->data.volume_count; i++) {
+        if (nb_draft_is_moving(draft, i)) draft->volumes[i] = nebel_scene_volume(draft->scene, i, frame);
+    }
+    if (draft->data.camera_key_count > 0 || draft->data.turntable_frames > 0) {
+        draft->data.camera = nebel_scene_camera(draft->scene, frame);
+    }
+}
+
+nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
+{
+    const nebel_scene_desc desc = {.log = *log};
+    *draft = (nb_draft){.log = *log};
+    nebel_result result = nebel_load_scene(path, &desc, &draft->scene);
+    if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
+    if (result == NEBEL_OK) {
+        draft->data = *nebel_scene_contents(draft->scene);
+        result = allocate(draft);
+    }
+    if (result == NEBEL_OK) {
+        place_frame(draft, frame);
+        result = fill_fog(draft);
+    }
+    if (result != NEBEL_OK) nb_draft_close(draft);
+    return result;
+}
+
+void nb_draft_close(nb_draft *draft)
+{
+    nebel_release_snapshot(draft->snapshot);
+    nebel_destroy_fog(draft->fog);
+    free(draft->volumes);
+    free(draft->good);
+    free(draft->ids);
+    nebel_destroy_scene(draft->scene);
+    *draft = (nb_draft){.scene = NULL};
+}
+
+/* A change that the fog does not take is undone. */
+static nebel_result change_volumes(nb_draft *draft)
+{
+    nebel_result first = NEBEL_OK;
+    for (size_t i = 0; i < draft->data.volume_count; i++) {
+        if (memcmp(&draft->volumes[i], &draft->good[i], sizeof *draft->good) == 0) continue;
+        const nebel_result result = nebel_change_volume(draft->fog, draft->ids[i], &draft->volumes[i]);
+        if (result == NEBEL_OK) {
+            draft->good[i] = draft->volumes[i];
+        } else {
+            draft->volumes[i] = draft->good[i];
+            if (first == NEBEL_OK) first = result;
+        }
+    }
+    return first;
+}
+
+nebel_result nb_draft_commit(nb_draft *draft)
+{
+    nebel_snapshot *fresh = NULL;
+    const nebel_result changed = change_volumes(draft);
+    nebel_result result = nebel_set_ambient(draft->fog, draft->data.ambient);
+    if (result == NEBEL_OK) result = nebel_commit_fog(draft->fog, &fresh);
+    if (result != NEBEL_OK) return result;
+    nebel_release_snapshot(draft->snapshot);
+    draft->snapshot = fresh;
+    return changed;
+}
+
+nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
+{
+    place_frame(draft, frame);
+    return nb_draft_commit(draft);
+}
+
+int nb_draft_is_moving(const nb_draft *draft, size_t volume)
+{
+    return nebel_scene_volume_origin(draft->scene, volume) == NEBEL_VOLUME_MOVING;
+}

@@ -1,0 +1,36 @@
+/* Mouse and keys, as far as they are not the panel's: to the camera, to what is shown, and to wishes. */
+#ifndef NB_HANDS_H
+#define NB_HANDS_H
+
+#include "look.h"
+#include "window.h"
+
+#include <nebel/scene.h>
+
+typedef enum nb_hands_grip {
+    NB_HANDS_FREE = 0,
+    NB_HANDS_ORBIT,
+    NB_HANDS_PAN,
+    NB_HANDS_LOOK,
+    NB_HANDS_SPLIT,
+    NB_HANDS_ELSEWHERE /* a button went down where it is not ours */
+} nb_hands_grip;
+
+typedef struct nb_hands {
+    double x, y; /* of the cursor, in heights of the window from its upper left corner */
+    nb_hands_grip grip;
+    int button;         /* that took hold */
+    unsigned keys_down; /* of those that fly, a bit each */
+
+    /* Answers of the last nb_hands_move. */
+    int moved_camera, changed_look;
+    int wants_home, wants_help, wants_panel, wants_picture, wants_window_picture, wants_save, wants_reload, wants_end;
+} nb_hands;
+
+/* Takes what has happened since the last turn, and what is held down. */
+void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_look *look);
+
+/* Whether something moves as long as nothing happens. */
+int nb_hands_are_busy(const nb_hands *hands);
+
+#endif

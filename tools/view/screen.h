@@ -1,0 +1,28 @@
+/* Pictures to the window: tone curve, split, difference. */
+#ifndef NB_SCREEN_H
+#define NB_SCREEN_H
+
+#include "look.h"
+
+#include <nebel/nebel.h>
+
+typedef struct nb_screen {
+    unsigned program, array;
+    unsigned cpu_texture;
+} nb_screen;
+
+nebel_result nb_screen_open(const nebel_log *log, nb_screen *screen);
+
+/* Fine with zeros. */
+void nb_screen_close(nb_screen *screen);
+
+/* The picture of the CPU: rgb, the top row first. */
+void nb_screen_set_cpu(nb_screen *screen, uint32_t width, uint32_t height, const float *rgb);
+
+/* Fills the window's framebuffer. `gl_texture` has the plane of the look, lowest row first; without a picture of the
+ * CPU
+ * (`has_cpu` 0) that of OpenGL is everywhere. */
+void nb_screen_draw(const nb_screen *screen, unsigned gl_texture, int has_cpu, const nb_look *look, uint32_t width,
+                    uint32_t height);
+
+#endif

@@ -1,0 +1,243 @@
+#define _POSIX_C_SOURCE 200809L
+
+#include "view.h"
+
+#include "../interrupt.h"
+#include "../report.h"
+#include "draft.h"
+#include "hands.h"
+#include "navigate.h"
+#include "panel.h"
+#include "picture.h"
+#include "screen.h"
+#include "stage.h"
+#include "window.h"
+
+#include <stdio.h>
+
+/* How long after the last movement the picture waits before it becomes whole [s]. */
+static const double rest = 0.15;
+
+typedef struct viewer {
+    const nb_view_settings *settings;
+    nb_window window;
+    nb_draft draft;
+    nb_stage stage;
+    nb_screen screen;
+    nb_hands hands;
+    nb_panel panel;
+    nb_look look;
+    nebel_camera home;
+    nebel_log log;
+    char message[512]; /* the last one, for the window */
+    double moved;      /* when something changed last [s] */
+    int wants_picture, wants_window_picture;
+} viewer;
+
+/* ---- messages
+ * --------------------------------------------------------------------------------------------------------
+ */
+
+/* Where the fine picture was given up the library says "stopped", which is no news. */
+static void listen(nebel_result result, const char *message, void *user)
+{
+    viewer *const all = user;
+    if (result == NEBEL_ERROR_LIMIT && all->stage.was_stopped) return;
+    (void)snprintf(all->message, sizeof all->message, "%s", message);
+    nb_report_message("%s", message);
+}
+
+static int fail(viewer *all, nebel_result result)
+{
+    if (all->message[0] == '\0') return nb_report_failure("view: %s", nebel_result_text(result));
+    return NB_FAILED;
+}
+
+/* ---- open and close
+ * --------------------------------------------------------------------------------------------------
+ */
+
+static int is_needed(void *user)
+{
+    viewer *const all = user;
+    nb_window_poll(&all->window);
+    return nb_window_has_news(&all->window);
+}
+
+static void set_home(viewer *all)
+{
+    nebel_camera *const camera = &all->draft.data.camera;
+    if (camera->projection == NEBEL_PROJECTION_PANORAMA) {
+        camera->projection = NEBEL_PROJECTION_PERSPECTIVE;
+        camera->vertical_fov = 75;
+        (void)snprintf(all->message, sizeof all->message, "The scene's camera is a panorama; this is a part of it.");
+    }
+    all->home = *camera;
+}
+
+static nebel_result open_stage(viewer *all)
+{
+    all->stage = (nb_stage){.is_needed = is_needed, .user = all};
+    return nb_stage_open(&all->draft.data, all->draft.snapshot, &all->log, &all->stage);
+}
+
+static int open_viewer(viewer *all)
+{
+    const nb_view_settings *const settings = all->settings;
+    nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
+    if (result != NEBEL_OK) return fail(all, result);
+    set_home(all);
+    if (nb_window_open(&all->window, settings->scene, settings->width, settings->height) != NB_DONE) return NB_FAILED;
+    result = nb_screen_open(&all->log, &all->screen);
+    if (result == NEBEL_OK) result = open_stage(all);
+    if (result != NEBEL_OK) return fail(all, result);
+    if (nb_panel_open(all->window.handle) != 0) return nb_report_failure("view: memory is out");
+    all->window.has_panel = 1;
+    return NB_DONE;
+}
+
+static void close_viewer(viewer *all)
+{
+    if (all->window.has_panel) nb_panel_close();
+    nb_stage_close(&all->stage);
+    nb_screen_close(&all->screen);
+    nb_window_close(&all->window);
+    nb_draft_close(&all->draft);
+}
+
+/* ---- one turn
+ * --------------------------------------------------------------------------------------------------------
+ */
+
+static void note_change(viewer *all)
+{
+    all->moved = all->window.time;
+    if (all->stage.state > NB_STAGE_COARSE) all->stage.state = NB_STAGE_COARSE;
+}
+
+static int is_moving(const viewer *all)
+{
+    return all->settings->screenshot == NULL && all->window.time - all->moved < rest;
+}
+
+static nebel_result commit(viewer *all)
+{
+    const nebel_result result = nb_draft_commit(&all->draft);
+    if (result != NEBEL_OK && result != NEBEL_ERROR_VALUE) return result;
+    note_change(all);
+    return nebel_set_gl_renderer_fog(all->stage.renderer, all->draft.snapshot);
+}
+
+static void obey_keys(viewer *all)
+{
+    const nb_hands *const hands = &all->hands;
+    if (hands->moved_camera) note_change(all);
+    if (hands->wants_home) {
+        all->draft.data.camera = all->home;
+        note_change(all);
+    }
+    if (hands->wants_help) all->panel.help_shown = !all->panel.help_shown;
+    if (hands->wants_panel) all->panel.shown = !all->panel.shown;
+    if (hands->changed_look) note_change(all);
+    all->wants_picture |= hands->wants_picture;
+    all->wants_window_picture |= hands->wants_window_picture;
+    if (hands->wants_end) nb_window_end(&all->window);
+}
+
+static nebel_result obey_panel(viewer *all)
+{
+    const nb_panel *const panel = &all->panel;
+    if (panel->wants_home) all->draft.data.camera = all->home;
+    if (panel->camera_changed || panel->light_changed || panel->wants_home) note_change(all);
+    if (panel->look_changed) note_change(all);
+    return panel->fog_changed || panel->light_changed ? commit(all) : NEBEL_OK;
+}
+
+static void fill_panel(viewer *all)
+{
+    static const char *const states[] = {"", "moving: fewer pixels", "refining", "complete"};
+    nb_panel *const panel = &all->panel;
+    panel->scene = all->settings->scene;
+    panel->driver = all->window.driver;
+    panel->data = &all->draft.data;
+    panel->volumes = all->draft.volumes;
+    panel->look = &all->look;
+    panel->message = all->message;
+    panel->picture = states[all->stage.state];
+    panel->seconds = all->stage.seconds;
+}
+
+/* ---- pictures
+ * --------------------------------------------------------------------------------------------------------
+ */
+
+static void keep_picture(viewer *all)
+{
+    char name[32];
+    if (nb_picture_name(name, sizeof name) != 0 ||
+        nb_picture_write(name, all->window.width, all->window.height, &all->log) != NB_DONE)
+        return;
+    (void)snprintf(all->message, sizeof all->message, "Saved %s", name);
+    nb_report_message("view: saved %s", name);
+}
+
+/* Pictures that were asked for are taken once they are complete: first without the controls, then with them. */
+static int take_pictures(viewer *all, int with_controls)
+{
+    const char *const screenshot = all->settings->screenshot;
+    int *const wanted = with_controls ? &all->wants_window_picture : &all->wants_picture;
+    if (all->stage.state != NB_STAGE_FINE) return NB_DONE;
+    if (screenshot != NULL && with_controls) {
+        nb_window_end(&all->window);
+        return nb_picture_write(screenshot, all->window.width, all->window.height, &all->log);
+    }
+    if (*wanted) keep_picture(all);
+    *wanted = 0;
+    return NB_DONE;
+}
+
+static int show(viewer *all)
+{
+    const nb_window *const window = &all->window;
+    nb_screen_draw(&all->screen, all->stage.texture, 0, &all->look, window->width, window->height);
+    int status = take_pictures(all, 0);
+    fill_panel(all);
+    nb_panel_draw(&all->panel, all->settings->controls);
+    if (status == NB_DONE) status = take_pictures(all, 1);
+    nb_window_show(&all->window);
+    return status;
+}
+
+static int turn(viewer *all)
+{
+    nb_window *const window = &all->window;
+    nb_window_wait(window, is_moving(all) || all->stage.state != NB_STAGE_FINE || nb_hands_are_busy(&all->hands));
+    if (nb_window_is_lost(window)) {
+        return nb_report_failure("view: the graphics driver was reset and its context is lost; start the viewer again");
+    }
+    if (window->width == 0 || window->height == 0) return NB_DONE;
+    if (window->was_resized) note_change(all);
+    nb_hands_move(&all->hands, window, &all->draft.data.camera, &all->look);
+    obey_keys(all);
+    const nebel_result result =
+        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &all->look, is_moving(all));
+    if (result != NEBEL_OK) return fail(all, result);
+    const int status = show(all);
+    const nebel_result obeyed = obey_panel(all);
+    return obeyed == NEBEL_OK ? status : fail(all, obeyed);
+}
+
+int nb_view_run(const nb_view_settings *settings)
+{
+    viewer all = {.settings = settings,
+                  .look = {.exposure = settings->exposure, .split = .5, .gain = 16, .range = 50, .samples = 4},
+                  .panel = {.shown = 1}};
+    all.log = (nebel_log){.write = listen, .user = &all};
+    nb_interrupt_listen();
+    int status = open_viewer(&all);
+    all.look.range = status == NB_DONE ? nb_navigate_distance(&all.draft.data.camera) : 1;
+    while (status == NB_DONE && !nb_window_is_ended(&all.window) && !nb_interrupt_is_requested()) status = turn(&all);
+    close_viewer(&all);
+    nb_interrupt_obey();
+    return status;
+}

@@ -1,0 +1,19 @@
+/* nebel view: a window on a scene. */
+#ifndef NB_VIEW_H
+#define NB_VIEW_H
+
+#include <stdint.h>
+
+typedef struct nb_view_settings {
+    const char *scene;
+    uint32_t width, height;
+    double exposure; /* stops */
+    double frame;
+    const char *screenshot; /* NULL: none; else the finished picture goes there, and the window closes */
+    const char *controls;   /* NULL: none; else a file that says where the controls are */
+} nb_view_settings;
+
+/* Opens the window and stays until it is closed. Returns an exit status; what went wrong was said. */
+int nb_view_run(const nb_view_settings *settings);
+
+#endif

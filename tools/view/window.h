@@ -1,0 +1,60 @@
+/* The window and its OpenGL, by GLFW. */
+#ifndef NB_WINDOW_H
+#define NB_WINDOW_H
+
+#include <stdint.h>
+
+typedef enum nb_window_event_kind {
+    NB_WINDOW_KEY_DOWN, /* also where it repeats */
+    NB_WINDOW_KEY_UP,
+    NB_WINDOW_BUTTON_DOWN,
+    NB_WINDOW_BUTTON_UP,
+    NB_WINDOW_MOTION,
+    NB_WINDOW_WHEEL
+} nb_window_event_kind;
+
+typedef struct nb_window_event {
+    nb_window_event_kind kind;
+    int code, modifiers; /* key or button, by GLFW's numbers */
+    double x, y;         /* of the cursor, in the window's coordinates; of the wheel, notches */
+} nb_window_event;
+
+enum { NB_WINDOW_EVENTS = 64 };
+
+typedef struct nb_window {
+    void *handle; /* GLFWwindow */
+    int has_panel;
+    uint32_t width, height;        /* of the framebuffer, pixels; 0 while minimised */
+    int inner_width, inner_height; /* in the window's coordinates */
+    double time;                   /* s */
+    double elapsed;                /* s since the turn before */
+    int was_resized;
+    nb_window_event events[NB_WINDOW_EVENTS]; /* that wait; who takes them sets event_count to 0 */
+    int event_count;
+    int news;         /* events since the turn began */
+    int awake;        /* turns that do not wait */
+    char driver[256]; /* GL_RENDERER and GL_VERSION */
+    int can_be_lost;  /* the driver would say so */
+} nb_window;
+
+/* A window with a context of OpenGL 3.3 core, which is current. Returns an exit status; what went wrong was said. */
+int nb_window_open(nb_window *window, const char *title, uint32_t width, uint32_t height);
+
+/* Fine with zeros. */
+void nb_window_close(nb_window *window);
+
+/* Begins a turn: waits for something to happen, a quarter of a second at most, or not at all where `busy`. */
+void nb_window_wait(nb_window *window, int busy);
+
+/* In the middle of a turn: whether something has happened that somebody waits for. */
+void nb_window_poll(nb_window *window);
+int nb_window_has_news(const nb_window *window);
+
+void nb_window_show(nb_window *window);
+int nb_window_is_ended(const nb_window *window);
+void nb_window_end(nb_window *window);
+
+/* Whether the driver has lost the context. */
+int nb_window_is_lost(const nb_window *window);
+
+#endif
