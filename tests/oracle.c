@@ -617,3 +617,14 @@ void oracle_trace_numerically(const nebel_volume_desc *volumes, size_t n, const 
 {
     run(volumes, n, ambient, ray, 1, T, S, uncertainty);
 }
+
+void oracle_limit(double max_opacity, double T[3], double S[3], double *uncertainty)
+{
+    if (!(max_opacity > 0)) return;
+    for (int c = 0; c < 3; c++) {
+        if (!(1 - T[c] > max_opacity)) continue;
+        S[c] *= max_opacity / (1 - T[c]);
+        T[c] = 1 - max_opacity;
+    }
+    *uncertainty *= 1 + 1 / max_opacity;
+}

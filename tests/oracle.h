@@ -16,6 +16,9 @@
 void oracle_trace(const nebel_volume_desc *volumes, size_t n, const double ambient[3], const nebel_ray *ray,
                   double T[3], double S[3], double *uncertainty);
 
+/* The opacity limited as nebel_set_max_opacity says, 0: not. */
+void oracle_limit(double max_opacity, double T[3], double S[3], double *uncertainty);
+
 /* The same without closed forms for pieces of even fog: the oracle's own check. */
 void oracle_trace_numerically(const nebel_volume_desc *volumes, size_t n, const double ambient[3], const nebel_ray *ray,
                               double T[3], double S[3], double *uncertainty);

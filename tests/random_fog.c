@@ -266,6 +266,7 @@ void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed)
     const random_fog_kind near = kind == RANDOM_FOG_FAR ? (random_fog_kind)below(&state, RANDOM_FOG_FAR) : kind;
     for (size_t i = 0; i < fog->count; i++) make_volume(fog, &state, near, i);
     if (kind == RANDOM_FOG_FAR) shift_fog(fog, &state);
+    if (seed % 4 == 3) fog->max_opacity = uniform(&state, .05, 1);
 }
 
 /* ---- rays ---- */
@@ -617,6 +618,7 @@ void random_fog_print(FILE *to, const random_fog *fog, const nebel_ray *ray)
 {
     fprintf(to, "{\"nebel\": 1");
     print_vector(to, "ambient", fog->ambient, 3);
+    print_number(to, "max_opacity", fog->max_opacity);
     fprintf(to, ", \"fog\": [\n");
     for (size_t i = 0; i < fog->count; i++) {
         fprintf(to, "  ");

@@ -26,6 +26,7 @@ typedef struct random_fog {
     random_fog_kind kind;
     uint64_t seed;
     double ambient[3];
+    double max_opacity; /* of one of four; 0: no limit. For those who ask for it */
     double shift[3]; /* of everything */
     size_t count;
     nebel_volume_desc volumes[RANDOM_FOG_VOLUMES];

@@ -58,7 +58,8 @@ static nebel_snapshot *commit(const random_fog *fog)
 {
     nebel_fog *now = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]}};
+    nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},
+                           .max_opacity = fog->max_opacity};
     assert_int_equal(nebel_create_fog(&desc, &now), NEBEL_OK);
     for (size_t i = 0; i < fog->count; i++) assert_int_equal(nebel_add_volume(now, &fog->volumes[i], NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(now, &snapshot), NEBEL_OK);
@@ -128,6 +129,7 @@ static void try_fog(size_t from, size_t to)
     for (size_t i = from; i < to; i++) {
         truth is;
         oracle_trace(fog.volumes, fog.count, fog.ambient, &rays[i - from], is.T, is.S, &is.uncertainty);
+        oracle_limit(fog.max_opacity, is.T, is.S, &is.uncertainty);
         if (!isfinite(is.uncertainty)) {
             undecided++;
             continue;
@@ -150,6 +152,7 @@ static void print_case(const char *why, const mode *m, size_t i)
     const nebel_trace_desc desc = {.precision = m->precision, .tolerance = m->tolerance};
     nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &light, sizeof light);
     oracle_trace(fog.volumes, fog.count, fog.ambient, &ray, T, S, &uncertainty);
+    oracle_limit(fog.max_opacity, T, S, &uncertainty);
     nebel_release_snapshot(snapshot);
     printf("\n%s, %s: case %zu (kind %d, seed %zu, ray %zu)\n", m->name, why, i, (int)kind_of(i), (size_t)seed_of(i),
            i % RAYS_PER_FOG);

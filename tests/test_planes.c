@@ -35,7 +35,8 @@ static nebel_snapshot *commit(const random_fog *fog)
 {
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]}};
+    const nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},
+                                 .max_opacity = fog->max_opacity};
     assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
     for (size_t i = 0; i < fog->count; i++) assert_int_equal(nebel_add_volume(made, &fog->volumes[i], NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);

@@ -300,6 +300,23 @@ static void test_the_fog_of_the_scene_answers_rays(void **state)
     nebel_release_snapshot(fog);
 }
 
+static void test_the_fog_of_the_scene_hides_no_more_than_it_may(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good("{\"nebel\": 1, \"max_opacity\": 0.4, \"fog\": [{\"shape\": {\"type\": \"world\"}, "
+                                    "\"extinction\": 0.1, \"source\": 0.5}]}");
+    nebel_snapshot *fog = NULL;
+    assert_number(nebel_scene_contents(scene)->max_opacity, .4);
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    nebel_destroy_scene(scene);
+    const nebel_ray ray = {.direction = {0, 0, -1}, .t_max = 10};
+    nebel_light light;
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    assert_true(fabs(light.transmittance[0] - .6) < 1e-12);
+    assert_true(fabs(light.in_scattering[0] - .5 * .4) < 1e-12);
+    nebel_release_snapshot(fog);
+}
+
 static void test_the_order_of_sections_does_not_matter(void **state)
 {
     (void)state;
@@ -403,6 +420,7 @@ int main(void)
         cmocka_unit_test(test_albedo_takes_every_phase_function),
         cmocka_unit_test(test_operations_priorities_and_distances_are_read),
         cmocka_unit_test(test_the_fog_of_the_scene_answers_rays),
+        cmocka_unit_test(test_the_fog_of_the_scene_hides_no_more_than_it_may),
         cmocka_unit_test(test_the_order_of_sections_does_not_matter),
         cmocka_unit_test(test_numbers_are_read_exactly),
         cmocka_unit_test(test_the_libraries_are_named),

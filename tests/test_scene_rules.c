@@ -28,7 +28,8 @@ static void test_what_no_scene_has(void **state)
         {FORMAT, "{\"nebel\": 1, \"fog\": [], `\"f\\u006fg\": []}",
          "fog: the key appears twice, first at line 1, column 14; remove"},
         {FORMAT, SCENE("`\"ambiant\": 0"),
-         "ambiant: unknown key; a scene has: nebel, up, unit, camera, background, sun, ambient, lights, models, fog, "
+         "ambiant: unknown key; a scene has: nebel, up, unit, camera, background, sun, ambient, max_opacity, lights, "
+         "models, fog, "
          "nebula; did "
          "you "
          "mean "

@@ -211,6 +211,7 @@ static void trace_fog(tracer *t, uint64_t seed, const nebel_trace_desc *truth, c
 {
     nebel_fog_desc desc = {0};
     memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
+    desc.max_opacity = fog.max_opacity;
     nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
     uint64_t state = seed;
     double eye[3];

@@ -231,6 +231,7 @@ typedef struct nebel_fog_desc {
     nebel_allocator allocator;
     nebel_log log;
     double ambient[3]; /* radiance, the same from everywhere, >= 0; lights volumes with an albedo */
+    double max_opacity; /* 0 to 1; 0: 1. See nebel_set_max_opacity */
 } nebel_fog_desc;
 
 /* Makes an empty fog in *fog; destroy it with nebel_destroy_fog. On an error *fog is NULL.
@@ -252,6 +253,11 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
 /* Sets the ambient radiance, >= 0. Cost O(1). Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
+
+/* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
+ * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T). Every query
+ * answers so. A look, not physics: the fog of a ray is no longer that of its parts. Cost O(1). Errors: ARGUMENT, VALUE. */
+nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
 
 /* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the same
  * bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT, MEMORY. */

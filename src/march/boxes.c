@@ -10,6 +10,7 @@ int nb_boxes_list(const nebel_snapshot *snapshot, const double origin[3], int ch
                   nb_fog_box *boxes)
 {
     if (snapshot->medium_count > NB_FOG_BOXES) return 0; /* more are better asked through the tree */
+    if (snapshot->max_opacity < 1) return 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         if (!is_plain_box(body) || (nb_volume_has_distances(body) && !ignore_distances)) return 0;

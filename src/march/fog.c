@@ -19,6 +19,12 @@ static nb_slot *slot_of(nebel_fog *fog, nebel_volume_id id)
     return &fog->slots[slot];
 }
 
+static nebel_result check_opacity(const nebel_log *log, double max_opacity)
+{
+    if (max_opacity >= 0 && max_opacity <= 1) return NEBEL_OK;
+    return nb_fail(log, NEBEL_ERROR_VALUE, "max_opacity: is %g; must be within 0 and 1", max_opacity);
+}
+
 nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -26,7 +32,8 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
-    const nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NB_LARGEST_AMOUNT);
+    nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NB_LARGEST_AMOUNT);
+    if (result == NEBEL_OK) result = check_opacity(&desc->log, desc->max_opacity);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_fog *made = nb_allocate_zero(&allocator, 1, sizeof *made);
@@ -34,6 +41,7 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     made->allocator = allocator;
     made->log = desc->log;
     memcpy(made->ambient, desc->ambient, sizeof made->ambient);
+    made->max_opacity = desc->max_opacity;
     *fog = made;
     return NEBEL_OK;
 }
@@ -129,5 +137,13 @@ nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3])
     if (ambient == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "ambient: must not be NULL");
     const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NB_LARGEST_AMOUNT);
     if (result == NEBEL_OK) memcpy(fog->ambient, ambient, sizeof fog->ambient);
+    return result;
+}
+
+nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity)
+{
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result result = check_opacity(&fog->log, max_opacity);
+    if (result == NEBEL_OK) fog->max_opacity = max_opacity;
     return result;
 }

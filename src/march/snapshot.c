@@ -107,6 +107,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     if (s == NULL) return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "snapshot: out of memory");
     s->allocator = fog->allocator;
     s->log = fog->log;
+    s->max_opacity = fog->max_opacity > 0 ? fog->max_opacity : 1;
     atomic_init(&s->owners, 1);
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (copy_media(fog, s)) {

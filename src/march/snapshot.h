@@ -25,6 +25,7 @@ struct nebel_snapshot {
     size_t medium_count;
     nb_medium *media;        /* in the order of nb_volume_compare: ranks ascend */
     double largest_radiance; /* of all volumes and channels */
+    double max_opacity;      /* 1 where there is no limit */
     size_t endless_count;    /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
     nb_bvh bvh;              /* over the others */

@@ -241,6 +241,10 @@ nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double tra
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transmittance: must be within 0 and 1");
     if (channel < 0 || channel > 2)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
+    if (transmittance < 1 - snapshot->max_opacity) {
+        for (size_t i = 0; i < n; i++) distances[i] = HUGE_VAL;
+        return NEBEL_OK;
+    }
     nb_find_job job = {snapshot, -log(transmittance), channel, n, rays, ray_stride, distances};
     const nebel_result result = nb_find_double(&job);
     return result == NEBEL_OK ? result : nb_fail(&snapshot->log, result, "rays: out of memory for the fog they meet");

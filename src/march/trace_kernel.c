@@ -376,6 +376,19 @@ static void limit_radiance(const march *m, gathered *g)
     for (int c = 0; c < 3; c++) g->radiance[c] = nb_min(g->radiance[c], most_radiance(m, c));
 }
 
+/* The fog's opacity limited to what the snapshot says: no bit of other light changes. */
+static inline void limit_opacity(const nebel_snapshot *snapshot, nb_real transmittance[3], nb_real radiance[3])
+{
+    if (!(snapshot->max_opacity < 1)) return;
+    const nb_real most = REAL(snapshot->max_opacity), least = REAL(1 - snapshot->max_opacity);
+    for (int c = 0; c < 3; c++) {
+        const nb_mask beyond = transmittance[c] < least;
+        const nb_real limited = nb_min(radiance[c] * (most / nb_max(NB_F(1.0) - transmittance[c], most)), radiance[c]);
+        radiance[c] = nb_select(beyond, limited, radiance[c]);
+        transmittance[c] = nb_select(beyond, least, transmittance[c]);
+    }
+}
+
 /* Bounds of the absolute error: of transmittance, of radiance. */
 typedef struct bounds {
     nb_real transmittance, radiance;
@@ -437,15 +450,33 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
     return nb_select(grazes, NB_HUGE, bound);
 }
 
+/* What limited opacity adds to the error of radiance S: most / (1 - T) is off by most / (1 - T)^2 times the error of T, where it is
+ * below 1; but what it leaves is never more than S. That of T grows by the rounding of the limit alone. */
+static bounds limit_errors(const nebel_snapshot *snapshot, const gathered *g, bounds b)
+{
+    if (!(snapshot->max_opacity < 1)) return b;
+    const nb_real most = REAL(snapshot->max_opacity);
+    nb_real radiance = b.radiance;
+    for (int c = 0; c < 3; c++) {
+        const nb_real opacity = NB_F(1.0) - g->transmittance[c];
+        const nb_real least = nb_max(opacity - b.transmittance, most);
+        const nb_real steepness = nb_min(most / (least * least) * b.transmittance + NB_F(8.0) * NB_EPSILON, NB_F(1.0));
+        const nb_mask never = opacity + b.transmittance < most * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON);
+        radiance = nb_max(radiance, b.radiance + nb_select(never, NB_F(0.0), g->radiance[c] * steepness));
+    }
+    return (bounds){b.transmittance + NB_F(2.0) * NB_EPSILON, radiance};
+}
+
 /* The bound of the absolute error of all six numbers, with room for the rounding of its own arithmetic. */
 static nb_real reported_error(const nb_trace_job *job, const march *m, const gathered *g)
 {
     const nb_real own_rounding = NB_F(1.0) + NB_F(16.0) * NB_EPSILON;
     bounds b = bound_errors(m, g);
-    if (job->transmittance_only) return b.transmittance * own_rounding;
+    if (job->transmittance_only) return limit_errors(job->snapshot, g, b).transmittance * own_rounding;
     const nb_mask doubtful = nb_not(b.radiance <= REAL(job->promised));
     if (nb_any(doubtful))
         b.radiance = nb_select(doubtful, nb_min(b.radiance, bound_by_range(m, g, b.transmittance)), b.radiance);
+    b = limit_errors(job->snapshot, g, b);
     return nb_max(b.transmittance, b.radiance) * own_rounding;
 }
 
@@ -481,7 +512,7 @@ static allowance share_budget(const nb_trace_job *job)
     return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget), choose_ellipse(budget / radiance)};
 }
 
-/* The light along the rays of w->m, of which `count` count, the first of them by the number `first`. */
+/* The light along the rays of w->m before its opacity is limited, of which `count` count, the first of them by the number `first`. */
 static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first, size_t count, gathered *g)
 {
     job->failed = first;
@@ -621,9 +652,13 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
     if (result != NEBEL_OK) return result;
     nb_real error = reported_error(job, &w->m, &g);
 #if !defined(NB_DOUBLE)
+    limit_opacity(job->snapshot, g.transmittance, g.radiance);
     error = settle_doubts(job, &g, error, rays, job->ray_stride, count);
-#elif !defined(ASKS_QUAD)
+#else
+#if !defined(ASKS_QUAD)
     error = weigh_ends(job, w, may, &g, error);
+#endif
+    limit_opacity(job->snapshot, g.transmittance, g.radiance);
 #endif
     store_light(job, &g, error, first, count);
     return NEBEL_OK;

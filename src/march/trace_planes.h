@@ -197,11 +197,12 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
     gathered g;
     const nebel_result result = answer_packet(job, w, may, first, count, &g);
     if (result != NEBEL_OK) return result;
+    const nb_real error = job->wants_error ? reported_error(job, &w->m, &g) : NB_F(0.0);
     const nebel_light_planes *to = s->lights;
+    limit_opacity(job->snapshot, g.transmittance, g.radiance);
     store_colors(to->transmittance, to->transmittance_stride, first, count, g.transmittance);
     store_colors(to->in_scattering, to->in_scattering_stride, first, count, g.radiance);
     if (!job->wants_error) return NEBEL_OK;
-    const nb_real error = reported_error(job, &w->m, &g);
     nebel_ray rays[NB_WIDTH];
     if (nb_any(in_doubt(job, error))) unload_rays(s, &p, rays);
     store_floats(to->error, to->error_stride, first, count, settle_doubts(job, &g, error, rays, sizeof *rays, count));
@@ -345,6 +346,7 @@ FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way,
     }
     nb_real transmittance[3], radiance[3];
     light_piece(way, nb_select(inside, nb_narrow(leave - enter), NB_F(0.0)), transmittance, radiance);
+    limit_opacity(job->snapshot, transmittance, radiance);
     store_colors(to->transmittance, to->transmittance_stride, first, count, transmittance);
     store_colors(to->in_scattering, to->in_scattering_stride, first, count, radiance);
     return NEBEL_OK;

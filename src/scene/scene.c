@@ -17,6 +17,7 @@ enum {
     BACKGROUND,
     SUN,
     AMBIENT,
+    MAX_OPACITY,
     LIGHTS,
     MODELS,
     FOG,
@@ -27,8 +28,8 @@ enum {
 /* Their numbers are in the units of the file. */
 #define PLACED_SECTIONS (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA))
 
-static const char *const section_names[] = {"nebel",   "up",     "unit",   "camera", "background", "sun",
-                                            "ambient", "lights", "models", "fog",    "nebula"};
+static const char *const section_names[] = {"nebel",   "up",          "unit",   "camera", "background", "sun",
+                                            "ambient", "max_opacity", "lights", "models", "fog",        "nebula"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
@@ -84,6 +85,8 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
         return nb_read_sun(in, node);
     case AMBIENT:
         return nb_value_color(in->json, node, &nb_range_not_negative, data->ambient);
+    case MAX_OPACITY:
+        return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
     default:
         return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }
@@ -283,6 +286,7 @@ nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, n
     nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
     *snapshot = NULL;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
+    desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);

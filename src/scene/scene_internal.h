@@ -77,7 +77,7 @@ typedef struct nb_fog_node {
 } nb_fog_node;
 
 /* The keys that a scene may have. */
-enum { NB_SCENE_SECTIONS = 11 };
+enum { NB_SCENE_SECTIONS = 12 };
 
 /* What reading needs beside the scene itself. */
 typedef struct nb_scene_reader {

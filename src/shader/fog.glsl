@@ -710,6 +710,15 @@ nebel_light nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
 
 /* ---- the face ---------------------------------------------------------------------------------------------------------- */
 
+/* See nebel_set_max_opacity. */
+nebel_light nb_limit_opacity(nebel_light light, float most)
+{
+    nb_vec3 opacity = nb_splat3(1.0) - light.transmittance;
+    light.in_scattering *= nb_vec3(most / max(opacity.x, most), most / max(opacity.y, most), most / max(opacity.z, most));
+    light.transmittance = max(light.transmittance, nb_splat3(1.0 - most));
+    return light;
+}
+
 /* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
 nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
                            bool from_eye)
@@ -732,6 +741,7 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
             light.in_scattering = walked.in_scattering;
             if (covers) light.transmittance = walked.transmittance;
         }
+        if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
         light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
     }
     return light;

@@ -2,7 +2,7 @@
  * A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the bits of small numbers.
  * Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
  *
- * Word 0: media, what one step of an integral without a closed form may be off by, 0, 0.
+ * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, 0.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
@@ -70,7 +70,8 @@
 #define NB_HAS_SOFT_EDGE 4096
 #define NB_HAS_RADIAL 8192
 #define NB_HAS_DISTANCES 16384
-#define NB_HAS_ALL 32767
+#define NB_HAS_MAX_OPACITY 32768
+#define NB_HAS_ALL 65535
 #define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT_EDGE | NB_HAS_RADIAL)
 
 #endif

@@ -271,8 +271,9 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
                 NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS,
                 0,
                 {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};
-    words[0] = (nebel_word){
-        {(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)), 0, 0}};
+    words[0] =
+        (nebel_word){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
+                      (float)snapshot->max_opacity, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
         pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
@@ -326,7 +327,7 @@ static int is_mixed(const nebel_snapshot *snapshot)
 uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
 {
     if (snapshot == NULL) return NB_HAS_ALL;
-    uint32_t features = is_mixed(snapshot) ? NB_HAS_MIXED : 0;
+    uint32_t features = (is_mixed(snapshot) ? NB_HAS_MIXED : 0) | (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |
