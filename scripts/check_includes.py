@@ -45,7 +45,7 @@ FOREIGN = {
     "gl": {"epoxy/"},
     "tools": POSIX | {"omp.h", "epoxy/", "GLFW/", "imgui.h", "backends/"},
     "bench": POSIX | {"omp.h", "embree3/", "epoxy/"},
-    "examples": POSIX,
+    "examples": {"epoxy/", "GLFW/", "SDL.h"},
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')

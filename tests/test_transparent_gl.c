@@ -232,7 +232,7 @@ static void bind_opaque(unsigned program)
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glUseProgram(program);
-    glUniform1i(glGetUniformLocation(program, "opaque"), 0);
+    glUniform1i(glGetUniformLocation(program, "depth"), 0);
 }
 
 static void compare_taps(const fragment *f, const verdict *got, int *drawn)
@@ -252,8 +252,8 @@ static void try_taps(nb_gl_language language)
     static fragment fragments[FRAGMENTS];
     static verdict verdicts[FRAGMENTS];
     const char *const texts[] = {"#define NEBEL_TRANSPARENT\n"
-                                 "#define NEBEL_OPAQUE_DEPTH(at) textureLod(opaque, at, 0.0).x\n"
-                                 "uniform highp sampler2D opaque;\n",
+                                 "#define NEBEL_OPAQUE_DEPTH(at) textureLod(depth, at, 0.0).x\n"
+                                 "uniform highp sampler2D depth;\n",
                                  dialect_of(language), NULL};
     uint64_t state = 5;
     nb_gl gl;

@@ -168,12 +168,15 @@ float nebel_compare_taps(float depth, float center, nb_vec4 corners, nebel_tap_c
 }
 
 #ifdef NEBEL_OPAQUE_DEPTH
+/* Alone with a name of its own: the host's macro may use any other. */
+float nb_opaque_depth(nb_vec2 nb_place) { return NEBEL_OPAQUE_DEPTH(nb_place); }
+
 float nebel_five_taps(nb_vec2 place, float depth, nebel_tap_constants taps)
 {
     float o = taps.offset;
-    nb_vec4 corners = nb_vec4(NEBEL_OPAQUE_DEPTH(place + nb_vec2(-o, -o)), NEBEL_OPAQUE_DEPTH(place + nb_vec2(o, -o)),
-                              NEBEL_OPAQUE_DEPTH(place + nb_vec2(-o, o)), NEBEL_OPAQUE_DEPTH(place + nb_vec2(o, o)));
-    return nebel_compare_taps(depth, NEBEL_OPAQUE_DEPTH(place), corners, taps);
+    nb_vec4 corners = nb_vec4(nb_opaque_depth(place + nb_vec2(-o, -o)), nb_opaque_depth(place + nb_vec2(o, -o)),
+                              nb_opaque_depth(place + nb_vec2(-o, o)), nb_opaque_depth(place + nb_vec2(o, o)));
+    return nebel_compare_taps(depth, nb_opaque_depth(place), corners, taps);
 }
 #endif
 #endif

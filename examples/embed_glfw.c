@@ -1,0 +1,77 @@
+/* Fog over the picture of an engine in OpenGL 3.3: the engine draws into a colour and a depth texture, nebel_gl puts
+ * the fog over both, into the window. Left and right turn the camera, Escape ends.
+ *
+ *     cc embed_glfw.c $(pkg-config --cflags --libs nebel_gl glfw3 epoxy) -lm */
+#include <nebel/gl.h>
+
+#include "engine.h"
+
+#include <GLFW/glfw3.h>
+#include <string.h>
+
+/* Mist on the ground, and a ball of other fog within it. */
+static nebel_snapshot *make_fog(nebel_fog **fog)
+{
+    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_WORLD},
+                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = .6},
+                                    .extinction = {.25, .25, .25},
+                                    .source = {.5, .6, .7}};
+    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1.2, 2}, .radius = 1.5},
+                                    .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
+                                    .extinction = {.4, .8, 1.2},
+                                    .emission = {.7, .35, .1}};
+    nebel_snapshot *snapshot = NULL;
+    if (nebel_create_fog(&(nebel_fog_desc){0}, fog) == NEBEL_OK && nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK &&
+        nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
+        nebel_commit_fog(*fog, &snapshot);
+    return snapshot;
+}
+
+static GLFWwindow *open_window(void)
+{
+    if (!glfwInit()) return NULL;
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    glfwWindowHint(GLFW_SRGB_CAPABLE, GLFW_TRUE);
+    glfwWindowHint(GLFW_RESIZABLE, GLFW_FALSE);
+    GLFWwindow *const window = glfwCreateWindow(WIDTH, HEIGHT, "nebel: fog over a picture", NULL, NULL);
+    if (!window) return NULL;
+    glfwMakeContextCurrent(window);
+    glfwSetInputMode(window, GLFW_STICKY_KEYS, GLFW_TRUE);
+    return window;
+}
+
+int main(void)
+{
+    GLFWwindow *const window = open_window();
+    nebel_fog *fog = NULL;
+    nebel_snapshot *const snapshot = make_fog(&fog);
+    nebel_gl *passes = NULL;
+    if (!window || !snapshot || nebel_create_gl(&(nebel_gl_desc){0}, &passes) != NEBEL_OK) return 1;
+
+    engine host = engine_open_textures();
+    const nebel_gl_pass pass = {.color_texture = host.color, .depth_texture = host.depth};
+    glEnable(GL_FRAMEBUFFER_SRGB); /* the window shows sRGB */
+
+    nebel_result result = NEBEL_OK;
+    for (double angle = 0; result == NEBEL_OK && !glfwWindowShouldClose(window); glfwPollEvents()) {
+        angle += .02 * (glfwGetKey(window, GLFW_KEY_RIGHT) - glfwGetKey(window, GLFW_KEY_LEFT));
+        engine_turn(&host, angle);
+        engine_draw(&host);
+
+        nebel_view view = {.width = WIDTH, .height = HEIGHT};
+        memcpy(view.eye_from_world, host.eye_from_world, sizeof view.eye_from_world);
+        memcpy(view.clip_from_eye, host.clip_from_eye, sizeof view.clip_from_eye);
+        result = nebel_gl_set_fog(passes, snapshot, &view);
+        glBindFramebuffer(GL_FRAMEBUFFER, 0);
+        if (result == NEBEL_OK) result = nebel_gl_draw_fog(passes, &pass);
+        glfwSwapBuffers(window);
+        if (glfwGetKey(window, GLFW_KEY_ESCAPE)) glfwSetWindowShouldClose(window, GLFW_TRUE);
+    }
+    nebel_destroy_gl(passes);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+    glfwTerminate();
+    return result != NEBEL_OK;
+}

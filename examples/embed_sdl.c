@@ -1,0 +1,95 @@
+/* Fog in an engine's own shader, OpenGL 3.3 and SDL2: each fragment asks for the fog between the eye and itself while
+ * it is drawn (forward rendering). Needs no pass, no texture, and of nebel the core alone. Left and right turn the
+ * camera, Escape ends.
+ *
+ *     cc embed_sdl.c $(pkg-config --cflags --libs nebel sdl2 epoxy) -lm */
+#define SDL_MAIN_HANDLED
+#include <nebel/shader.h>
+
+#include "engine.h"
+
+#include <SDL.h>
+
+/* Mist on the ground, and a ball of other fog within it. */
+static nebel_snapshot *make_fog(nebel_fog **fog)
+{
+    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_WORLD},
+                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = .6},
+                                    .extinction = {.25, .25, .25},
+                                    .source = {.5, .6, .7}};
+    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1.2, 2}, .radius = 1.5},
+                                    .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
+                                    .extinction = {.4, .8, 1.2},
+                                    .emission = {.7, .35, .1}};
+    nebel_snapshot *snapshot = NULL;
+    if (nebel_create_fog(&(nebel_fog_desc){0}, fog) == NEBEL_OK && nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK &&
+        nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
+        nebel_commit_fog(*fog, &snapshot);
+    return snapshot;
+}
+
+static SDL_Window *open_window(void)
+{
+    if (SDL_Init(SDL_INIT_VIDEO) != 0) return NULL;
+    SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
+    SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
+    SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_CORE);
+    SDL_GL_SetAttribute(SDL_GL_FRAMEBUFFER_SRGB_CAPABLE, 1);
+    SDL_GL_SetAttribute(SDL_GL_DEPTH_SIZE, 24);
+    return SDL_CreateWindow("nebel: fog in a shader", 0, 0, WIDTH, HEIGHT, SDL_WINDOW_OPENGL);
+}
+
+/* Packed for the eye of this frame, into the uniform block that the text declares. */
+static nebel_result upload_fog(const nebel_snapshot *snapshot, const double eye[3])
+{
+    static nebel_word words[NEBEL_BLOCK_WORDS]; /* more fog than this goes into a texture: NEBEL_TEXTURE */
+    size_t count;
+    const nebel_result result = nebel_pack_fog(snapshot, eye, words, NEBEL_BLOCK_WORDS, &count);
+    glBufferData(GL_UNIFORM_BUFFER, sizeof words, words, GL_STREAM_DRAW);
+    return result;
+}
+
+int main(void)
+{
+    const char *const fragment_texts[] = {
+        "#version 330 core\n", nebel_shader_text(NEBEL_DIALECT_GLSL_330),
+        "flat in vec3 color;\n"
+        "in vec3 place;\n"
+        "out vec4 pixel;\n"
+        "void main()\n"
+        "{\n"
+        "    nebel_light fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
+        "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
+        "}\n"};
+    SDL_Window *const window = open_window();
+    const SDL_GLContext context = window ? SDL_GL_CreateContext(window) : NULL;
+    nebel_fog *fog = NULL;
+    nebel_snapshot *const snapshot = make_fog(&fog);
+    if (!context || !snapshot) return 1;
+
+    engine host = engine_open(3, fragment_texts);
+    unsigned block;
+    glGenBuffers(1, &block);
+    glBindBufferBase(GL_UNIFORM_BUFFER, 0, block); /* where nebel_fog_block is unless told otherwise */
+    glEnable(GL_FRAMEBUFFER_SRGB);                 /* the window shows sRGB */
+
+    const Uint8 *const keys = SDL_GetKeyboardState(NULL);
+    nebel_result result = NEBEL_OK;
+    int running = 1;
+    for (double angle = 0; result == NEBEL_OK && running;) {
+        for (SDL_Event event; SDL_PollEvent(&event);)
+            if (event.type == SDL_QUIT || (event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_ESCAPE))
+                running = 0;
+        angle += .02 * (keys[SDL_SCANCODE_RIGHT] - keys[SDL_SCANCODE_LEFT]);
+        engine_turn(&host, angle);
+        result = upload_fog(snapshot, host.eye);
+        engine_draw(&host);
+        SDL_GL_SwapWindow(window);
+    }
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+    SDL_GL_DeleteContext(context);
+    SDL_DestroyWindow(window);
+    SDL_Quit();
+    return result != NEBEL_OK;
+}

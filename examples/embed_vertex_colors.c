@@ -1,0 +1,77 @@
+/* Fog in an engine that takes vertex colours and nothing else, as OpenGL 1.1 does: the fog between the eye and each
+ * vertex comes from the CPU, and the hardware interpolates. Left and right turn the camera, Escape ends.
+ *
+ *     cc embed_vertex_colors.c $(pkg-config --cflags --libs nebel glfw3 epoxy) -lm */
+#include <nebel/nebel.h>
+
+#include "engine_fixed.h"
+
+#include <GLFW/glfw3.h>
+
+/* Mist on the ground, and a ball of other fog within it. */
+static nebel_snapshot *make_fog(nebel_fog **fog)
+{
+    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_WORLD},
+                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = .6},
+                                    .extinction = {.25, .25, .25},
+                                    .source = {.5, .6, .7}};
+    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1.2, 2}, .radius = 1.5},
+                                    .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
+                                    .extinction = {.4, .8, 1.2},
+                                    .emission = {.7, .35, .1}};
+    nebel_snapshot *snapshot = NULL;
+    if (nebel_create_fog(&(nebel_fog_desc){0}, fog) == NEBEL_OK && nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK &&
+        nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
+        nebel_commit_fog(*fog, &snapshot);
+    return snapshot;
+}
+
+/* A ray from the eye to each vertex: colour = transmittance * surface + in-scattering. */
+static nebel_result fog_vertices(const nebel_snapshot *fog, engine *host)
+{
+    static float way[3][MOST_VERTICES], length[MOST_VERTICES], t[3][MOST_VERTICES], s[3][MOST_VERTICES];
+    for (size_t i = 0; i < host->count; i++) {
+        for (int k = 0; k < 3; k++) way[k][i] = (float)((double)host->vertices[i].place[k] - host->eye[k]);
+        length[i] = sqrtf(way[0][i] * way[0][i] + way[1][i] * way[1][i] + way[2][i] * way[2][i]);
+    }
+    const nebel_ray_planes rays = {.origin = {host->eye[0], host->eye[1], host->eye[2]},
+                                   .direction_float = {way[0], way[1], way[2]},
+                                   .t_max = length};
+    const nebel_light_planes lights = {.transmittance = {t[0], t[1], t[2]}, .in_scattering = {s[0], s[1], s[2]}};
+    const nebel_result result = nebel_trace_planes(fog, NULL, host->count, &rays, &lights);
+    for (size_t i = 0; i < host->count; i++) {
+        engine_vertex *const v = &host->vertices[i];
+        for (int c = 0; c < 3; c++) v->color[c] = t[c][i] * v->surface[c] + s[c][i];
+    }
+    return result;
+}
+
+int main(void)
+{
+    static engine host;
+    nebel_fog *fog = NULL;
+    nebel_snapshot *const snapshot = make_fog(&fog);
+    if (!snapshot || !glfwInit()) return 1;
+    glfwWindowHint(GLFW_SRGB_CAPABLE, GLFW_TRUE);
+    glfwWindowHint(GLFW_RESIZABLE, GLFW_FALSE);
+    GLFWwindow *const window = glfwCreateWindow(WIDTH, HEIGHT, "nebel: fog in vertex colours", NULL, NULL);
+    if (!window) return 1;
+    glfwMakeContextCurrent(window);
+    glfwSetInputMode(window, GLFW_STICKY_KEYS, GLFW_TRUE);
+    engine_open(&host);
+    glEnable(GL_FRAMEBUFFER_SRGB); /* the window shows sRGB */
+
+    nebel_result result = NEBEL_OK;
+    for (double angle = 0; result == NEBEL_OK && !glfwWindowShouldClose(window); glfwPollEvents()) {
+        angle += .02 * (glfwGetKey(window, GLFW_KEY_RIGHT) - glfwGetKey(window, GLFW_KEY_LEFT));
+        engine_turn(&host, angle);
+        result = fog_vertices(snapshot, &host);
+        engine_draw(&host);
+        glfwSwapBuffers(window);
+        if (glfwGetKey(window, GLFW_KEY_ESCAPE)) glfwSetWindowShouldClose(window, GLFW_TRUE);
+    }
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+    glfwTerminate();
+    return result != NEBEL_OK;
+}
