@@ -68,8 +68,8 @@ static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const
     nebel_destroy_renderer(renderer);
 }
 
-static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
-                      picture_pair *pair)
+static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const picture_particles *particles,
+                      const nebel_camera *camera, uint32_t samples, picture_pair *pair)
 {
     nebel_gl_renderer *renderer = NULL;
     const nebel_gl_renderer_desc desc = {.log = {write_message, NULL}};
@@ -78,16 +78,26 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
     const nebel_gl_planes planes = {pair->gl.color, pair->gl.transmittance, pair->gl.in_scattering, pair->gl.depth,
                                     pair->gl.normal};
     assert_int_equal(nebel_create_gl_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
+    if (particles != NULL) {
+        assert_int_equal(nebel_set_gl_renderer_particles(renderer, particles->list, particles->count), NEBEL_OK);
+        assert_int_equal(nebel_set_gl_renderer_fog(renderer, particles->others), NEBEL_OK);
+    }
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
     assert_int_equal(nebel_gl_read_planes(renderer, &planes), NEBEL_OK);
     nebel_destroy_gl_renderer(renderer);
 }
 
+void picture_render_particles(const nebel_scene_data *scene, nebel_snapshot *fog, const picture_particles *particles,
+                              const nebel_camera *camera, uint32_t samples, picture_pair *pair)
+{
+    render_cpu(scene, fog, camera, samples, pair);
+    render_gl(scene, fog, particles, camera, samples, pair);
+}
+
 void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
                     picture_pair *pair)
 {
-    render_cpu(scene, fog, camera, samples, pair);
-    render_gl(scene, fog, camera, samples, pair);
+    picture_render_particles(scene, fog, NULL, camera, samples, pair);
 }
 
 /* ---- differences ---------------------------------------------------------------------------------------------------

@@ -16,7 +16,16 @@ typedef struct picture_pair {
 picture_pair picture_make(uint32_t width, uint32_t height);
 void picture_free(picture_pair *pair);
 
-/* Renders a scene by both. */
+/* Particles for OpenGL, which the CPU has in its fog; none at first. */
+typedef struct picture_particles {
+    const nebel_particle *list;
+    size_t count;
+    nebel_snapshot *others; /* the fog without them */
+} picture_particles;
+
+/* Renders a scene by both. particles NULL: none. */
+void picture_render_particles(const nebel_scene_data *scene, nebel_snapshot *fog, const picture_particles *particles,
+                              const nebel_camera *camera, uint32_t samples, picture_pair *pair);
 void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera, uint32_t samples,
                     picture_pair *pair);
 

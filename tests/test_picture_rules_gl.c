@@ -94,6 +94,65 @@ static void test_light_is_that_of_the_cpu(void **state)
     }
 }
 
+/* A few balls of every profile beside fog and over a floor, which some reach into; one holds the eye. They do not
+ * overlap. */
+static void make_particles(nebel_particle particles[9], nebel_volume_desc volumes[11], int grey)
+{
+    for (int i = 0; i < 9; i++) {
+        const double x = i % 3 - 1., z = i / 3 - 1.;
+        particles[i] = (nebel_particle){.center = {1.5 * x, -.7, 1.5 * z},
+                                        .radius = .4 + .03 * i,
+                                        .extinction = {1, grey ? 1 : 2.5, grey ? 1 : .2},
+                                        .emission = {.4, .1 * i, .3},
+                                        .profile = (nebel_particle_profile)(i % NEBEL_PARTICLE_COUNT)};
+    }
+    const double eye[3] = {3.1, 2, 5};
+    memcpy(particles[4].center, eye, sizeof eye);
+    for (int i = 0; i < 9; i++) volumes[2 + i] = nebel_particle_volume(&particles[i]);
+}
+
+static void check_particles(const stage *s, nb_gl_language language, int grey, nebel_projection projection)
+{
+    nebel_particle particles[9];
+    nebel_volume_desc volumes[11] = {
+        {.extinction = {.02, .03, .04}, .source = {.5, .6, .7}},
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, 0, 2.5}, .max = {9, 3, 4}}, .extinction = {.1, .1, .3}}};
+    nb_gl context;
+    picture_pair pair = picture_make(WIDTH, HEIGHT);
+    nebel_camera camera = s->camera;
+    nebel_scene_data scene = s->ball.scene;
+    make_particles(particles, volumes, grey);
+    scene.has_sun = 0; /* which particles do not dim in OpenGL */
+    camera.projection = projection;
+    nebel_snapshot *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
+    const picture_particles drawn = {particles, 9, others};
+    pass_open(&context, language);
+    picture_render_particles(&scene, all, &drawn, &camera, 1, &pair);
+    pass_close(&context);
+    const picture_difference d = picture_compare(&pair, 1);
+    print_message("%zu pixels with fog, %zu beyond 1/255, worst %.2g/255, color %.2g\n", d.fogged, d.beyond_step,
+                  255 * d.largest, d.color);
+    assert_true((double)d.beyond_step <= 1e-3 * (double)d.fogged);
+    assert_true(d.largest < 3. / 255);
+    picture_free(&pair);
+    nebel_release_snapshot(all);
+    nebel_release_snapshot(others);
+}
+
+static void test_particles_are_fog(void **state)
+{
+    (void)state;
+    static stage s;
+    set_stage(&s, (double[3]){0, 0, 0});
+    for (int i = 0; i < 2; i++) {
+        for (int grey = 0; grey < 2; grey++) {
+            check_particles(&s, languages[i], grey,
+                            i == grey ? NEBEL_PROJECTION_PERSPECTIVE : NEBEL_PROJECTION_ORTHOGRAPHIC);
+        }
+    }
+    nebel_release_snapshot(s.fog);
+}
+
 /* Many samples of both come close to the same mean; one sample does not. */
 static void test_samples_smooth_edges(void **state)
 {
@@ -227,9 +286,8 @@ static void test_what_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_light_is_that_of_the_cpu),
-        cmocka_unit_test(test_samples_smooth_edges),
-        cmocka_unit_test(test_state_neither_changes_nor_matters),
+        cmocka_unit_test(test_light_is_that_of_the_cpu), cmocka_unit_test(test_particles_are_fog),
+        cmocka_unit_test(test_samples_smooth_edges),     cmocka_unit_test(test_state_neither_changes_nor_matters),
         cmocka_unit_test(test_what_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -359,7 +359,7 @@ static nebel_result draw_frame(studio *all)
         .depth = all->samples[DEPTH],
         .normal = all->samples[NORMAL],
     };
-    return nb_gl_painter_draw(&all->painter, all->loaded.fog, &desc, &wanted);
+    return nb_gl_painter_draw(&all->painter, all->frame, &desc, &wanted);
 }
 
 static int open_gl(studio *all)

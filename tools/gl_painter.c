@@ -1,31 +1,53 @@
 #include "gl_painter.h"
 
+static nebel_result set_particles(const nb_gl_painter *painter)
+{
+    const nebel_scene *const scene = painter->loaded->scene;
+    const size_t count = nebel_scene_contents(scene)->particle_count;
+    nebel_particle *particles = NULL;
+    if (count == 0) return NEBEL_OK;
+    nebel_result result = nebel_make_scene_particles(scene, &particles);
+    if (result == NEBEL_OK) result = nebel_set_gl_renderer_particles(painter->renderer, particles, count);
+    nebel_free_scene_particles(scene, particles);
+    return result;
+}
+
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
                        nb_report_listener *listener)
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
-    *painter = (nb_gl_painter){.renderer = NULL};
-    if (nebel_scene_contents(loaded->scene)->particle_count > 0) {
-        return nb_report_failure(
-            "render: --device gl: %s has a nebula, which OpenGL does not draw in this version; say "
-            "--device cpu",
-            name);
-    }
+    *painter = (nb_gl_painter){.loaded = loaded};
     if (nb_gl_context_open(&painter->context, NB_GL_API_DESKTOP) != 0 &&
         nb_gl_context_open(&painter->context, NB_GL_API_ES) != 0) {
         return nb_report_failure("render: --device gl: %s; or say --device cpu", painter->context.fault);
     }
-    const nebel_result result =
-        nebel_create_gl_renderer(nebel_scene_contents(loaded->scene), loaded->fog, &desc, &painter->renderer);
+    nebel_result result =
+        nebel_create_gl_renderer(nebel_scene_contents(loaded->scene), NULL, &desc, &painter->renderer);
+    if (result == NEBEL_OK) result = set_particles(painter);
     if (result == NEBEL_OK) return NB_DONE;
+    nebel_destroy_gl_renderer(painter->renderer);
+    painter->renderer = NULL;
     nb_gl_context_close(&painter->context);
     return nb_report_result(listener, name, result);
 }
 
-nebel_result nb_gl_painter_draw(nb_gl_painter *painter, nebel_snapshot *fog, const nebel_gl_frame_desc *desc,
+/* Particles are drawn in another way than other fog. */
+static nebel_result set_fog(const nb_gl_painter *painter, double frame)
+{
+    nebel_snapshot *volumes = NULL;
+    if (nebel_scene_contents(painter->loaded->scene)->particle_count == 0) {
+        return nebel_set_gl_renderer_fog(painter->renderer, painter->loaded->fog);
+    }
+    nebel_result result = nebel_commit_scene_volumes_at(painter->loaded->scene, frame, &volumes);
+    if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(painter->renderer, volumes);
+    nebel_release_snapshot(volumes);
+    return result;
+}
+
+nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebel_gl_frame_desc *desc,
                                 const nebel_gl_planes *planes)
 {
-    nebel_result result = nebel_set_gl_renderer_fog(painter->renderer, fog);
+    nebel_result result = set_fog(painter, frame);
     if (result == NEBEL_OK) result = nebel_gl_render_frame(painter->renderer, desc);
     return result == NEBEL_OK ? nebel_gl_read_planes(painter->renderer, planes) : result;
 }

@@ -10,15 +10,16 @@
 typedef struct nb_gl_painter {
     nb_gl_context context;
     nebel_gl_renderer *renderer; /* NULL: there is no context */
+    const nb_load_result *loaded;
 } nb_gl_painter;
 
 /* Opens a context, of OpenGL ES where there is no OpenGL, and hands it the scene. NB_DONE; or NB_FAILED, said on
- * standard error, with nothing to close. */
+ * standard error, with nothing to close. `loaded` must outlive the painter. */
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
                        nb_report_listener *listener);
 
-/* Draws a frame and reads its planes. Returns a result; the log has said why. */
-nebel_result nb_gl_painter_draw(nb_gl_painter *painter, nebel_snapshot *fog, const nebel_gl_frame_desc *desc,
+/* Draws a frame with the fog that is loaded for it, and reads its planes. Returns a result; the log has said why. */
+nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebel_gl_frame_desc *desc,
                                 const nebel_gl_planes *planes);
 
 /* Fine with what a failed nb_gl_painter_open left, and with zeros. */

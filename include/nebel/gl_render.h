@@ -53,6 +53,15 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *renderer);
 /* The fog of the frames from now on. The snapshot is retained; NULL: none. Errors: ARGUMENT. */
 nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapshot *fog);
 
+/* The particles of the frames from now on, beside the fog and not among it: commit that with
+ * nebel_commit_scene_volumes_at. They are copied; count 0: none. Each is drawn as a ball whose transmittance and light
+ * up to the surface behind it have closed forms, from the farthest centre to the nearest: particles that overlap take
+ * their light from each other as if one were behind the other, and fog counts before a particle's middle. They do not
+ * dim the sun. O(count log count) for each frame, and what they cover. Errors: ARGUMENT, MEMORY, UNSUPPORTED (OpenGL ES
+ * without GL_EXT_float_blend). */
+nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
+                                             size_t count);
+
 typedef struct nebel_gl_frame_desc {
     nebel_camera camera;                                    /* not PANORAMA */
     uint32_t width, height;                                 /* pixels, 1 to GL_MAX_TEXTURE_SIZE */

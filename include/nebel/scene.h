@@ -145,6 +145,9 @@ nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, n
 /* The same at frame 0. */
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot);
 
+/* The same without the particles, for renderers that draw those in another way. */
+nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
+
 /* NULL is fine. */
 void nebel_destroy_scene(nebel_scene *scene);
 

@@ -210,6 +210,67 @@ static nebel_result draw_fog(const frame *f)
     return result == NEBEL_OK ? nebel_gl_draw_fog(r->eye_fog, &pass) : result;
 }
 
+/* ---- particles ---------------------------------------------------------------------------------------------------
+ */
+
+/* Grey particles at once; of others each color by itself, because blending has room for one factor. */
+static void draw_channels(const nebel_gl_renderer *r, unsigned program)
+{
+    const GLint channel = glGetUniformLocation(program, "scene_channel");
+    if (r->particles.is_grey) {
+        glUniform3f(channel, 1, 0, 0);
+        nb_particles_draw(&r->particles);
+        return;
+    }
+    for (int c = 0; c < 3; c++) {
+        glUniform3f(channel, c == 0, c == 1, c == 2);
+        glColorMask(c == 0, c == 1, c == 2, GL_FALSE);
+        nb_particles_draw(&r->particles);
+    }
+}
+
+static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned program)
+{
+    const int parallel = f->view.clip_from_eye[15] != 0;
+    const double *const eye = f->view.eye_from_world;
+    glUseProgram(program);
+    set_rays(f, program);
+    set_clip(f, program);
+    glUniform3f(glGetUniformLocation(program, "scene_forward"), parallel ? (float)-eye[2] : 0,
+                parallel ? (float)-eye[6] : 0, parallel ? (float)-eye[10] : 0);
+    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, f->renderer->targets.place);
+    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
+    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    if (fog->tiles == 0) return;
+    bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
+    glUniform2i(glGetUniformLocation(program, "tile_grid"), (GLint)fog->tile_size, (GLint)fog->tile_columns);
+}
+
+/* The light that comes through the fog of a sample, and what it adds, pass through each particle. */
+static nebel_result draw_particles(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nebel_gl_fog fog = {0};
+    unsigned program = 0;
+    if (r->particles.count == 0) return NEBEL_OK;
+    const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
+    nebel_result result = has_fog ? nebel_gl_get_fog(r->eye_fog, &fog) : NEBEL_OK;
+    if (result != NEBEL_OK) return result;
+    const nb_light_kind kind = {.of_particles = 1,
+                                .has_fog = has_fog,
+                                .in_texture = fog.texture != 0,
+                                .tiled = fog.tiles != 0,
+                                .features = fog.features};
+    result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
+    if (result != NEBEL_OK) return result;
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
+    nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
+    nb_state_layer(&r->context);
+    set_particles(f, &fog, program);
+    draw_channels(r, program);
+    return NEBEL_OK;
+}
+
 /* ---- the sun
  * ---------------------------------------------------------------------------------------------------------
  */
@@ -357,6 +418,7 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     draw_surfaces(f);
     if (sample == 0 && f->casts) result = prepare_sun(f);
     if (result == NEBEL_OK) result = draw_fog(f);
+    if (result == NEBEL_OK) result = draw_particles(f);
     return result == NEBEL_OK ? draw_light(f, sample) : result;
 }
 
@@ -369,11 +431,20 @@ static nebel_result report(const frame *f, uint32_t done)
     return nb_fail(&f->renderer->log, NEBEL_ERROR_LIMIT, "frame: stopped");
 }
 
+static nebel_result sort_particles(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const double *const eye = f->view.eye_from_world, forward[3] = {-eye[2], -eye[6], -eye[10]};
+    const int parallel = f->view.clip_from_eye[15] != 0;
+    return nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL);
+}
+
 static nebel_result draw_samples(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
+    if (result == NEBEL_OK && r->particles.count > 0) result = sort_particles(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {
         result = draw_sample(f, i);
         if (result == NEBEL_OK) result = report(f, i + 1);

@@ -91,6 +91,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
         nb_shading_delete(&r->shading);
         nb_shadows_delete(&r->shadows);
         nb_targets_delete(&r->targets);
+        nb_particles_delete(&r->particles);
         glDeleteVertexArrays(1, &r->vertex_array);
     }
     nebel_destroy_gl(r->eye_fog);
@@ -98,6 +99,8 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nebel_release_snapshot(r->fog);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.pixels);
+    nb_release(&r->allocator, r->particles.list);
+    nb_release(&r->allocator, r->particles.balls);
     const nebel_allocator allocator = r->allocator;
     nb_release(&allocator, r);
 }
@@ -109,6 +112,19 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *r, nebel_snapshot *fog
     nebel_release_snapshot(r->fog);
     r->fog = fog;
     return NEBEL_OK;
+}
+
+nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_particle *particles, size_t count)
+{
+    if (r == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (particles == NULL && count > 0) {
+        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "nebel_set_gl_renderer_particles: particles is NULL");
+    }
+    if (count > 0 && r->context.es && !epoxy_has_gl_extension("GL_EXT_float_blend")) {
+        return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                       "particles: OpenGL ES without GL_EXT_float_blend cannot blend light; use OpenGL");
+    }
+    return nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
 }
 
 /* ---- results -------------------------------------------------------------------------------------------------------

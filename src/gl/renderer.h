@@ -4,6 +4,7 @@
 
 #include "camera.h"
 #include "meshes.h"
+#include "particles.h"
 #include "scene_state.h"
 #include "shading.h"
 #include "shadows.h"
@@ -22,6 +23,7 @@ struct nebel_gl_renderer {
     nb_shading shading;
     nb_shadows shadows;
     nb_targets targets;
+    nb_particles particles;
     int has_frame;
 };
 

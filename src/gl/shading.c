@@ -209,6 +209,81 @@ static const char light_text[] =
     "    out_surface = hit * vec4(normal, place.x);\n"
     "}\n";
 
+/* ---- particles -----------------------------------------------------------------------------------------------------
+ */
+
+/* A square across the way to the ball that hides it: its silhouette is a circle d / sqrt(d^2 - r^2) times as wide as
+ * the ball. All the picture where the eye is inside, or nearly. */
+static const char particle_vertex_text[] =
+    "layout(location = 0) in vec4 ball_place;\n"      /* center, radius */
+    "layout(location = 1) in vec4 ball_extinction;\n" /* and profile */
+    "layout(location = 2) in vec4 ball_emission;\n"   /* and distance */
+    "uniform mat4 scene_clip;\n"
+    "uniform vec3 scene_forward;\n" /* 0 where rays meet in the eye */
+    "flat out vec4 place;\n"
+    "flat out vec4 extinction;\n"
+    "flat out vec4 emission;\n"
+    "void main()\n"
+    "{\n"
+    "    vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
+    "    bool parallel = dot(scene_forward, scene_forward) > 0.0;\n"
+    "    float d = length(ball_place.xyz), r = ball_place.w;\n"
+    "    vec3 way = parallel ? scene_forward : ball_place.xyz / max(d, 1e-30);\n"
+    "    vec3 axis = abs(way.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);\n"
+    "    vec3 right = normalize(cross(way, axis)), up = cross(right, way);\n"
+    "    float size = parallel ? r : r * d * inversesqrt(max((d - r) * (d + r), 1e-30));\n"
+    "    vec3 at = ball_place.xyz + 1.001 * size * (corner.x * right + corner.y * up);\n"
+    "    place = ball_place;\n"
+    "    extinction = ball_extinction;\n"
+    "    emission = ball_emission;\n"
+    "    gl_Position = !parallel && d < 1.05 * r ? vec4(corner, 0.0, 1.0) : scene_clip * vec4(at, 1.0);\n"
+    "}\n";
+
+/* Each color by itself where they are dimmed by different factors: blending has room for one. */
+static const char particle_text[] =
+    "flat in vec4 place;\n"
+    "flat in vec4 extinction;\n"
+    "flat in vec4 emission;\n"
+    "uniform highp sampler2D scene_place;\n"
+    "uniform vec3 scene_channel;\n"
+    "#ifdef NEBEL_TILES\n"
+    "uniform ivec2 tile_grid;\n" /* pixels in a tile, tiles in a row */
+    "#endif\n"
+    "layout(location = 0) out highp vec4 out_in_scattering;\n"
+    "layout(location = 1) out highp vec4 out_transmittance;\n"
+    "nebel_light fog_before(vec3 origin, vec3 direction, float t)\n"
+    "{\n"
+    "#if !defined(SCENE_FOG)\n"
+    "    nebel_light clear;\n"
+    "    clear.transmittance = vec3(1.0);\n"
+    "    clear.in_scattering = vec3(0.0);\n"
+    "    return clear;\n"
+    "#elif defined(NEBEL_TILES)\n"
+    "    ivec2 tile = ivec2(gl_FragCoord.xy) / tile_grid.x;\n"
+    "    int entry = 2 * (tile.x + tile.y * tile_grid.y);\n"
+    "    return nebel_trace_list(origin, direction, t, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
+    "#else\n"
+    "    return nebel_trace(origin, direction, t);\n"
+    "#endif\n"
+    "}\n"
+    "void main()\n"
+    "{\n"
+    "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
+    "    float surface = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
+    "    float end = surface > 0.0 ? surface : 1e18;\n"
+    "    int profile = int(extinction.w);\n"
+    "    float depth = profile == 1\n"
+    "        ? nebel_gaussian_length(origin, direction, end, place.xyz, place.w, place.w / 3.0)\n"
+    "        : nebel_ball_length(origin, direction, end, place.xyz, place.w, profile == 0 ? 2 : 0);\n"
+    "    if (!(depth > 0.0)) discard;\n"
+    "    float middle = clamp(dot(place.xyz - origin, direction), 0.0, end);\n"
+    "    nebel_blend blend = nebel_blend_medium(nebel_medium_light(depth, extinction.xyz, emission.xyz),\n"
+    "                                           fog_before(origin, direction, middle));\n"
+    "    float factor = dot(blend.factor, scene_channel);\n"
+    "    out_in_scattering = vec4(blend.source, factor);\n"
+    "    out_transmittance = vec4(0.0, 0.0, 0.0, factor);\n"
+    "}\n";
+
 /* ---- programs ------------------------------------------------------------------------------------------------------
  */
 
@@ -239,8 +314,9 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
 
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
-    (void)snprintf(text, size, "%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
+    (void)snprintf(text, size, "%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
                    nb_program_version(context), kind->has_fog ? "#define SCENE_FOG\n" : "",
+                   kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }
@@ -266,17 +342,19 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     char head[512];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const nb_texts vertex = {{nb_program_version(context), light_vertex_text}, 2};
-    const nb_texts fragment = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, light_text}, 5};
-    const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
+    const int particles = kind->of_particles;
+    const nb_texts vertex = {{nb_program_version(context), particles ? particle_vertex_text : light_vertex_text}, 2};
+    const nb_texts light = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, light_text}, 5};
+    const nb_texts particle = {{head, fog, ray_text, particle_text}, 4};
+    const nebel_result result = nb_program_build(log, &vertex, particles ? &particle : &light, name);
     if (result == NEBEL_OK) set_units(*name);
     return result;
 }
 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
-    return a->has_fog == b->has_fog && a->in_texture == b->in_texture && a->tiled == b->tiled &&
-           a->features == b->features;
+    return a->of_particles == b->of_particles && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
+           a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

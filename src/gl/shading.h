@@ -17,9 +17,10 @@ enum {
 
 enum { NB_CASCADES = 4 };
 
-/* What a program that lights is made for. */
+/* What a program that asks fog is made for. */
 typedef struct nb_light_kind {
-    int has_fog; /* between surfaces and the sun */
+    int of_particles; /* and the fog before them; else of surfaces, and the fog between them and the sun */
+    int has_fog;
     int in_texture, tiled;
     uint32_t features;
 } nb_light_kind;

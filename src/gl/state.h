@@ -40,6 +40,9 @@ void nb_state_clear(const nb_context *context, uint32_t x, uint32_t y, uint32_t 
 /* Blending of draw buffer 0: source + target * factor, alpha of the target as it is. */
 void nb_state_blend(const nb_context *context, GLenum factor);
 
+/* Blending of draw buffers 0 and 1: source + target * source's alpha. */
+void nb_state_layer(const nb_context *context);
+
 /* Blending of all four draw buffers: source + target, alpha too. */
 void nb_state_add(const nb_context *context);
 

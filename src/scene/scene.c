@@ -276,10 +276,10 @@ static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double
         const nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
         result = nebel_add_volume(fog, &volume, NULL);
     }
-    return result == NEBEL_OK ? add_particles(fog, scene) : result;
+    return result;
 }
 
-nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot)
+static nebel_result commit(const nebel_scene *scene, double frame, int with_particles, nebel_snapshot **snapshot)
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_fog *fog = NULL;
@@ -289,9 +289,20 @@ nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, n
     desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
+    if (result == NEBEL_OK && with_particles) result = add_particles(fog, scene);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);
     nebel_destroy_fog(fog);
     return result;
+}
+
+nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot)
+{
+    return commit(scene, frame, 1, snapshot);
+}
+
+nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot)
+{
+    return commit(scene, frame, 0, snapshot);
 }
 
 nebel_result nebel_commit_scene_fog(const nebel_scene *scene, nebel_snapshot **snapshot)

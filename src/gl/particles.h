@@ -1,0 +1,37 @@
+/* Particles of nebulae: balls before the eye, drawn from the farthest to the nearest into the fog of a sample. */
+#ifndef NB_GL_PARTICLES_H
+#define NB_GL_PARTICLES_H
+
+#include "context.h"
+
+#include <nebel/gl_render.h>
+
+/* As the eye sees one. */
+typedef struct nb_ball {
+    float center[3], radius; /* relative to the eye */
+    float extinction[3], profile;
+    float emission[3], distance;
+} nb_ball;
+
+typedef struct nb_particles {
+    nebel_particle *list; /* in the world */
+    nb_ball *balls;
+    size_t count;
+    int is_grey; /* every one takes all colours alike */
+    unsigned vertex_array, buffer;
+} nb_particles;
+
+/* Copies. What was there before goes. MEMORY. */
+nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
+                              const nebel_particle *list, size_t count);
+
+/* Sorts and hands them over as an eye sees them; `forward` where rays are parallel, else NULL. MEMORY. */
+nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, const double eye[3],
+                               const double *forward);
+
+void nb_particles_draw(const nb_particles *particles);
+
+/* In OpenGL. */
+void nb_particles_delete(const nb_particles *particles);
+
+#endif
