@@ -1,6 +1,6 @@
 #!/bin/bash
 # Compiles the shader texts as a host would include them: OpenGL's dialects with every source of words, Vulkan's and HLSL's
-# with declarations of their own.
+# with declarations of their own; and the shader of docs/shaders.md.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -101,6 +101,10 @@ HLSL
     printf '    return float4(light.transmittance + light.in_scattering, 1.0);\n}\n'
 } >"$work/fog.hlsl"
 verdict hlsl glslangValidator -D -S frag -e main -V "$work/fog.hlsl" -o "$work/fog.spv"
+
+text glsl_330 >"$work/glsl_330"
+sed -n '/^```glsl$/,/^```$/p' docs/shaders.md | sed '/^```/d' | sed -e "/^\/\/ here:/r $work/glsl_330" >"$work/docs.frag"
+verdict docs/shaders.md glslangValidator "$work/docs.frag"
 
 echo "check_shaders: $passed texts passed, $failed failed"
 [ "$failed" -eq 0 ]

@@ -85,7 +85,9 @@
  * it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be
  * defined as what nebel_pack_features says. The GLSL ES text makes highp the default precision.
  *
- * A direction of no length, a t_max that is not above 0, or a NaN in either gives transmittance 1 and no light. In-scattering is
+ * docs/shaders.md shows a complete shader, the same for Vulkan and HLSL, and says how exact and how fast all this is.
+ *
+ * A direction of no length, a t_max that is not above 0, or a NaN anywhere gives transmittance 1 and no light. In-scattering is
  * at most NEBEL_MOST_LIGHT, 65504 (the largest half) unless it was defined before: so emission without end stays a number.
  */
 #ifndef NEBEL_SHADER_H

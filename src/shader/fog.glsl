@@ -1,280 +1,9 @@
 /* The march in shading languages: what src/march does, for one ray, from the words of layout.h.
  *
  * Transmittance is a plain sum over media, and so is light where one medium or one radiance is met: most rays end there
- * (nb_sum_media). Where light of different colour mixes, or one medium takes away another's fog, nb_walk goes from event to event with a few slots
- * as memory; rays that meet more volumes than there are slots walk in windows, and through places where more overlap than that
- * they read everything again for each step: slower, never wrong.
- *
- * Everything is written for GLSL ES 3.00 and HLSL alike. Constant conditions on NB_HAS() leave out what NEBEL_FEATURES says that
- * the fog does not have. */
-#ifndef NEBEL_FEATURES
-#define NEBEL_FEATURES NB_HAS_ALL
-#endif
-#ifndef NEBEL_MOST_LIGHT
-#define NEBEL_MOST_LIGHT 65504.0
-#endif
-#define NB_HAS(feature) ((NEBEL_FEATURES & (feature)) != 0)
-
-struct nebel_light {
-    nb_vec3 transmittance;
-    nb_vec3 in_scattering;
-};
-
-struct nb_ray {
-    nb_vec3 origin;
-    nb_vec3 direction;
-    float t_max;
-    bool from_eye; /* distances along it count */
-};
-
-nb_vec3 nb_splat3(float x) { return nb_vec3(x, x, x); }
-nb_vec3 nb_exp3(nb_vec3 v) { return nb_vec3(nb_exp(v.x), nb_exp(v.y), nb_exp(v.z)); }
-nb_vec3 nb_exp_ratio3(nb_vec3 v) { return nb_vec3(nb_exp_ratio(v.x), nb_exp_ratio(v.y), nb_exp_ratio(v.z)); }
-float nb_largest(nb_vec3 v) { return max(max(v.x, v.y), v.z); }
-float nb_smallest(nb_vec3 v) { return min(min(v.x, v.y), v.z); }
-
-/* ---- shapes ------------------------------------------------------------------------------------------------------------ */
-
-/* The ray in a leaf's frame, without the way to the frame's origin. */
-nb_ray nb_turned_ray(int leaf, bool turned, nb_ray ray)
-{
-    nb_ray local = ray;
-    if (NB_HAS(NB_HAS_TURNED) && turned) {
-        nb_vec3 x = NEBEL_WORD(leaf + 3).xyz;
-        nb_vec3 y = NEBEL_WORD(leaf + 4).xyz;
-        nb_vec3 z = NEBEL_WORD(leaf + 5).xyz;
-        local.origin = nb_vec3(dot(x, ray.origin), dot(y, ray.origin), dot(z, ray.origin));
-        local.direction = nb_vec3(dot(x, ray.direction), dot(y, ray.direction), dot(z, ray.direction));
-    }
-    return local;
-}
-
-/* See nb_face in src/media/volume.h: whose ray it is that lies in a face. */
-float nb_face_tie(nb_vec3 normal)
-{
-    return normal.x != 0.0 ? normal.x : normal.y != 0.0 ? normal.y : normal.z;
-}
-
-nb_interval nb_planes_interval(int first, int count, nb_ray ray)
-{
-    nb_interval span = nb_interval_all();
-    for (int i = 0; i < count; i++) {
-        nb_vec4 face = NEBEL_WORD(first + i);
-        span = nb_interval_meet(span, nb_interval_half_space(ray.origin, ray.direction, face.xyz, face.w,
-                                                             nb_face_tie(face.xyz), 0.0, 8.0 * NB_EPSILON));
-    }
-    return span;
-}
-
-/* Makes the noise in the formulas of curved shapes 0: the ends as float has them, none widened by what it may have lost. */
-#define NB_NO_REACH (-NB_WEPSILON)
-
-nb_interval nb_leaf_interval(int leaf, nb_ray ray)
-{
-    nb_vec4 head = NEBEL_WORD(leaf);
-    int type = int(head.x);
-    bool turned = type >= NB_TYPE_TURNED;
-    if (turned) type -= NB_TYPE_TURNED;
-    nb_interval span = nb_interval_all();
-    if (NB_HAS(NB_HAS_PLANES) && type == NB_TYPE_PLANES) {
-        span = nb_planes_interval(int(head.z), int(head.y), ray);
-    } else if (type != NB_TYPE_WORLD) {
-        nb_ray local = nb_turned_ray(leaf, turned, ray);
-        nb_vec3 d = local.direction;
-        nb_vec3 place = NEBEL_WORD(leaf + 1).xyz;
-        nb_vec3 p = local.origin + place;
-        if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX)
-            span = nb_interval_box(local.origin, d, place, NEBEL_WORD(leaf + 2).xyz, 0.0);
-        else if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL)
-            span = nb_interval_ball(p, d, head.y, NB_NO_REACH);
-        else if (NB_HAS(NB_HAS_TUBE) && type == NB_TYPE_TUBE)
-            span = nb_interval_tube(p, d, NB_NO_REACH);
-        else if (NB_HAS(NB_HAS_CONE) && type == NB_TYPE_CONE)
-            span = nb_interval_cone(p, d, head.y, head.z, NB_NO_REACH);
-        else if (NB_HAS(NB_HAS_CAPSULE) && type == NB_TYPE_CAPSULE)
-            span = nb_interval_capsule(p, d, head.y, NB_NO_REACH);
-    }
-    return span;
-}
-
-/* A stretch of the ray on which it is inside a body; none where not enter < leave. */
-struct nb_stretch {
-    float enter, leave;
-};
-
-nb_stretch nb_stretch_of(float enter, float leave)
-{
-    nb_stretch s;
-    s.enter = enter;
-    s.leave = leave;
-    return s;
-}
-
-/* Where a body of several leaves, the first at `leaf`, next has the ray inside at or behind `from`: from event to event of its
- * leaves. The program's stack is the bits of an int. */
-nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
-{
-    float begin = -1.0;
-    float t = from;
-    while (t < ray.t_max) {
-        float next = ray.t_max;
-        int stack = 0;
-        for (int i = 0; i < count; i++) {
-            int at = leaf + NB_LEAF_WORDS * i;
-            nb_interval span = nb_leaf_interval(at, ray);
-            bool some = span.enter < span.leave;
-            if (some && span.enter > t) next = min(next, span.enter);
-            if (some && span.leave > t) next = min(next, span.leave);
-            stack = (stack << 1) | (span.enter <= t && span.leave > t ? 1 : 0);
-            for (int folds = int(NEBEL_WORD(at).w); folds > 1; folds >>= 1) {
-                int top = stack & 1;
-                stack >>= 1;
-                stack = (folds & 1) != 0 ? stack & (top | ~1) : stack | top;
-            }
-        }
-        bool inside = (stack & 1) != 0;
-        if (inside && begin < 0.0) begin = t;
-        if (!inside && begin >= 0.0) return nb_stretch_of(begin, t);
-        t = next;
-    }
-    return nb_stretch_of(begin < 0.0 ? ray.t_max : begin, ray.t_max);
-}
-
-/* Where the body of a medium next has the ray inside, at or behind `from`. */
-nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
-{
-    int at = medium + NB_MEDIUM_LEAF;
-    nb_stretch s;
-    if (NB_HAS(NB_HAS_DISTANCES) && ray.from_eye) {
-        from = max(from, NEBEL_WORD(medium + NB_MEDIUM_START).w);
-        ray.t_max = min(ray.t_max, NEBEL_WORD(medium + NB_MEDIUM_CUTOFF).w);
-    }
-    if (NB_HAS(NB_HAS_GROUP) && leaves > 1) {
-        nb_vec4 low = NEBEL_WORD(at);
-        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(at + 1).xyz, 0.0);
-        s = nb_stretch_of(from, from);
-        if (max(bounds.enter, from) < min(bounds.leave, ray.t_max)) s = nb_group_stretch(int(low.w), leaves, ray, from);
-    } else {
-        nb_interval span = nb_leaf_interval(at, ray);
-        s = nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
-    }
-    return s;
-}
-
-/* ---- profiles ---------------------------------------------------------------------------------------------------------- */
-
-/* A medium's density in coordinates along the ray, offset + slope s, s metres behind where it was asked for. */
-struct nb_profile {
-    int kind;
-    nb_vec3 offset;
-    nb_vec3 slope;
-    nb_vec3 size;  /* soft edge: half widths */
-    float level;   /* gaussian: m; radial: c */
-};
-
-/* Distance, in units of `scale`, from the closest approach of p + t d to the origin: coordinates along and square across. */
-nb_profile nb_round_profile(nb_profile profile, nb_vec3 p, nb_vec3 d, float scale, float start)
-{
-    float square = dot(d, d);
-    float closest = -dot(p, d) / max(square, NB_TINY);
-    nb_vec3 q = (p + d * closest) * scale;
-    profile.slope.x = sqrt(square) * scale;
-    profile.offset.x = (start - closest) * profile.slope.x;
-    profile.level = min(dot(q, q), 1e9);
-    return profile;
-}
-
-nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray, float start)
-{
-    nb_vec4 head = NEBEL_WORD(leaf);
-    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
-    nb_vec3 place = NEBEL_WORD(leaf + 1).xyz;
-    if (NB_HAS(NB_HAS_RADIAL) && profile.kind >= NB_KIND_RADIAL) {
-        profile = nb_round_profile(profile, local.origin + place, local.direction, 1.0 / head.y, start);
-        profile.level = 1.0 - profile.level;
-    } else if (NB_HAS(NB_HAS_SOFT_EDGE)) {
-        nb_vec3 high = NEBEL_WORD(leaf + 2).xyz;
-        profile.offset = (local.origin + local.direction * start - (place + high) * 0.5) * width;
-        profile.slope = local.direction * width;
-        profile.size = (high - place) * (0.5 * width);
-    }
-    return profile;
-}
-
-nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
-{
-    nb_profile profile;
-    profile.kind = kind;
-    profile.offset = nb_splat3(0.0);
-    profile.slope = nb_splat3(0.0);
-    profile.size = nb_splat3(0.0);
-    profile.level = 0.0;
-    if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT && kind != NB_KIND_EXCLUDE) {
-        nb_vec4 word = NEBEL_WORD(medium + 3);
-        if (NB_HAS(NB_HAS_SLOPE) && kind <= NB_KIND_LINEAR) {
-            profile.slope.x = dot(word.xyz, ray.direction);
-            profile.offset.x = word.w + dot(word.xyz, ray.origin) + profile.slope.x * start;
-        } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
-            profile = nb_round_profile(profile, word.xyz + ray.origin, ray.direction, word.w, start);
-        } else {
-            profile = nb_leaf_profile(profile, medium + NB_MEDIUM_LEAF, word.w, ray, start);
-        }
-    }
-    return profile;
-}
-
-float nb_density(nb_profile profile, float s)
-{
-    float density = 1.0;
-    if (NB_HAS(NB_HAS_PROFILE)) {
-        int kind = profile.kind;
-        float u = profile.offset.x + profile.slope.x * s;
-        if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_HEIGHT)
-            density = nb_height_density(u);
-        else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_HEIGHT_CAPPED)
-            density = nb_height_capped_density(u);
-        else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_LINEAR)
-            density = nb_linear_density(u);
-        else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN)
-            density = nb_gaussian_density(profile.level, u);
-        else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE)
-            density = nb_soft_edge_density(profile.offset + profile.slope * s, profile.size);
-        else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE)
-            density = nb_radial_density(profile.level, u, kind - NB_KIND_RADIAL + 1);
-    }
-    return density;
-}
-
-/* The density integrated from where the profile was asked for over h metres. */
-float nb_integral(nb_profile profile, float h)
-{
-    float integral = h;
-    if (NB_HAS(NB_HAS_PROFILE)) {
-        int kind = profile.kind;
-        float u = profile.offset.x;
-        float slope = profile.slope.x;
-        if (NB_HAS(NB_HAS_SLOPE) && kind != NB_KIND_CONSTANT && kind <= NB_KIND_HEIGHT_CAPPED) {
-            /* from the dense end, where a ray comes down from so far that its start has lost the digits of the height */
-            float end = u + slope * h;
-            bool down = slope < 0.0 && abs(end) < abs(u);
-            float from = down ? end : u;
-            float rise = down ? -slope : slope;
-            if (kind == NB_KIND_HEIGHT)
-                integral = nb_height_integral(from, rise, h).value;
-            else
-                integral = nb_height_capped_integral(from, rise, h).value;
-        } else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_LINEAR) {
-            integral = nb_linear_integral(u, slope, h).value;
-        } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
-            integral = nb_gaussian_integral(profile.level, u, u + slope * h, slope).value;
-        } else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE) {
-            integral = nb_soft_edge_integral(profile.offset, profile.slope, profile.size, h).value;
-        } else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE) {
-            integral = nb_radial_integral(profile.level, u, slope, h, kind - NB_KIND_RADIAL + 1).value;
-        }
-    }
-    return integral;
-}
+ * (nb_sum_media). Where light of different colour mixes, or one medium takes away another's fog, nb_walk goes from event to event
+ * with a few slots as memory; rays that meet more volumes than there are slots walk in windows, and through places where more
+ * overlap than that they read everything again for each step: slower, never wrong. */
 
 /* ---- sums over media --------------------------------------------------------------------------------------------------- */
 
@@ -312,7 +41,9 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     sum.covers = false;
     bool any = false;
     bool covering = false;
-    for (int i = 0; i < count; i++) {
+    int most = NB_HAS(NB_HAS_SEVERAL) ? count : 1; /* with one, all places in the words are constants */
+    for (int i = 0; i < most; i++) {
+        if (i >= count) break;
         int at = nb_medium_at(first + i, listed);
         nb_vec4 extinction = NEBEL_WORD(at);
         nb_vec4 radiance = NEBEL_WORD(at + 2);
@@ -350,24 +81,28 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
 
 /* ---- the walk ---------------------------------------------------------------------------------------------------------- */
 
-/* Stretches that the walk keeps at hand: the next ones of their media. */
-#define NB_SLOTS 16
-NB_GLOBAL int nb_slot_medium[NB_SLOTS];
-NB_GLOBAL float nb_slot_enter[NB_SLOTS];
-NB_GLOBAL float nb_slot_leave[NB_SLOTS];
+/* Stretches that the walk keeps at hand, the next ones of their media: enter, leave, the medium's word. The mask keeps drivers from
+ * unrolling every loop over them to the array's length. */
+#ifndef NEBEL_SLOTS
+#define NEBEL_SLOTS 32
+#endif
+NB_GLOBAL nb_vec3 nb_slots[NEBEL_SLOTS];
 
-void nb_set_slot(int k, int medium, nb_stretch s)
-{
-    nb_slot_medium[k] = medium;
-    nb_slot_enter[k] = s.enter;
-    nb_slot_leave[k] = s.leave;
-}
+nb_vec3 nb_slot(int k) { return nb_slots[k & (NEBEL_SLOTS - 1)]; }
+void nb_set_slot(int k, int medium, nb_stretch s) { nb_slots[k & (NEBEL_SLOTS - 1)] = nb_vec3(s.enter, s.leave, float(medium)); }
+bool nb_is_inside(nb_vec3 slot, float t) { return slot.x <= t && slot.y > t; }
 
-int nb_farthest_slot()
+int nb_farthest_slot(int used)
 {
     int farthest = 0;
-    for (int k = 1; k < NB_SLOTS; k++)
-        if (nb_slot_enter[k] > nb_slot_enter[farthest]) farthest = k;
+    float most = nb_slot(0).x;
+    for (int k = 1; k < used; k++) {
+        float enter = nb_slot(k).x;
+        if (enter > most) {
+            most = enter;
+            farthest = k;
+        }
+    }
     return farthest;
 }
 
@@ -379,15 +114,18 @@ struct nb_window {
 };
 
 /* Stretches behind t. The nearest of all media; or in a crowd, where more begin at t than there are slots, those of the media
- * from `begin` on until the slots are full. A stretch of a body of several leaves ends the window: another may follow. */
+ * from `begin` on until the slots are full. A stretch of a body of several leaves ends the window: another may follow. Without a
+ * crowd, a window that ends at t says that there is one. */
 nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin, float t, bool crowd)
 {
     nb_window window;
     window.used = 0;
     window.rest = count;
     window.end = ray.t_max;
+    int farthest = 0;
     for (int i = begin; i < count; i++) {
-        if (crowd && window.used == NB_SLOTS) {
+        if (window.end <= t) break;
+        if (crowd && window.used == NEBEL_SLOTS) {
             window.rest = i;
             break;
         }
@@ -396,18 +134,18 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
         nb_stretch s = nb_next_stretch(at, leaves, ray, t);
         if (!(s.enter < s.leave)) continue;
         if (NB_HAS(NB_HAS_GROUP) && leaves > 1) window.end = min(window.end, s.leave);
-        if (window.used < NB_SLOTS) {
+        if (window.used < NEBEL_SLOTS) {
             nb_set_slot(window.used, at, s);
             window.used++;
+            if (window.used == NEBEL_SLOTS) farthest = nb_farthest_slot(window.used);
             continue;
         }
-        int farthest = nb_farthest_slot();
-        float dropped = nb_slot_enter[farthest];
-        if (s.enter < dropped)
-            nb_set_slot(farthest, at, s);
-        else
-            dropped = s.enter;
+        float dropped = max(s.enter, nb_slot(farthest).x);
         window.end = min(window.end, dropped);
+        if (s.enter < dropped) {
+            nb_set_slot(farthest, at, s);
+            farthest = nb_farthest_slot(window.used);
+        }
     }
     return window;
 }
@@ -494,14 +232,15 @@ nb_piece nb_note_profile(nb_piece piece, nb_profile profile)
     return piece;
 }
 
-bool nb_is_in_slot(int k, float t)
-{
-    return nb_slot_enter[k] <= t && nb_slot_leave[k] > t;
-}
-
 bool nb_is_covered(int medium, int floor)
 {
     return NB_HAS(NB_HAS_COVER) && int(NEBEL_WORD(medium + 1).w) / NB_LIGHT_RANK < floor;
+}
+
+/* Whether a slot's medium is at t and not covered. */
+bool nb_is_there(nb_vec3 slot, nb_piece piece)
+{
+    return nb_is_inside(slot, piece.start) && !nb_is_covered(int(slot.z), piece.floor);
 }
 
 /* Finds what covers among the slots. Media come by rank, those that cover first, so that what earlier slots added up to ranks below a
@@ -510,8 +249,9 @@ nb_piece nb_cover_piece(nb_piece piece, int used)
 {
     int floor = piece.floor;
     for (int k = 0; k < used; k++) {
-        int flags = int(NEBEL_WORD(nb_slot_medium[k] + 1).w);
-        if ((flags & NB_LIGHT_COVERS) != 0 && nb_is_in_slot(k, piece.start)) floor = max(floor, flags / NB_LIGHT_RANK);
+        nb_vec3 slot = nb_slot(k);
+        int flags = int(NEBEL_WORD(int(slot.z) + 1).w);
+        if ((flags & NB_LIGHT_COVERS) != 0 && nb_is_inside(slot, piece.start)) floor = max(floor, flags / NB_LIGHT_RANK);
     }
     if (floor > piece.floor) {
         float end = piece.end;
@@ -521,14 +261,12 @@ nb_piece nb_cover_piece(nb_piece piece, int used)
     return piece;
 }
 
-nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray)
+nb_piece nb_note_slot(nb_piece piece, nb_vec3 slot, nb_ray ray)
 {
-    float enter = nb_slot_enter[k];
-    float leave = nb_slot_leave[k];
-    if (enter > piece.start) piece.end = min(piece.end, enter);
-    if (leave > piece.start) piece.end = min(piece.end, leave);
-    int at = nb_slot_medium[k];
-    if (nb_is_in_slot(k, piece.start) && !nb_is_covered(at, piece.floor)) {
+    if (slot.x > piece.start) piece.end = min(piece.end, slot.x);
+    if (slot.y > piece.start) piece.end = min(piece.end, slot.y);
+    if (nb_is_there(slot, piece)) {
+        int at = int(slot.z);
         nb_vec4 extinction = NEBEL_WORD(at);
         nb_vec4 light = NEBEL_WORD(at + 1);
         nb_vec3 radiance = NEBEL_WORD(at + 2).xyz;
@@ -549,28 +287,35 @@ nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray)
     return piece;
 }
 
-/* A leg, one step of h metres, `from` metres behind the start of its piece: optical depth up to each node and light there, and all its
- * light if nothing attenuated it. Steps without mixed light know the last node only. */
+/* A leg, one step of h metres, `from` metres behind the start of its piece: optical depth up to each node and light there, and
+ * all its light if nothing attenuated it. Legs without mixed light know the last node only. */
 struct nb_leg {
     float from, h;
     bool mixed;
+    int number; /* within its piece */
     nb_vec3 depth[NB_NODES];
     nb_vec3 density[NB_NODES];
     nb_vec3 light;
 };
 
-void nb_open_leg(inout nb_leg leg)
+nb_leg nb_open_leg(float from, float h, bool mixed, int number)
 {
+    nb_leg leg;
+    leg.from = from;
+    leg.h = h;
+    leg.mixed = mixed;
+    leg.number = number;
     leg.light = nb_splat3(0.0);
     for (int j = 0; j < NB_NODES; j++) {
         leg.depth[j] = nb_splat3(0.0);
         leg.density[j] = nb_splat3(0.0);
     }
+    return leg;
 }
 
-void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
+void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
 {
-    int at = nb_slot_medium[k];
+    int at = int(slot.z);
     nb_vec4 extinction = NEBEL_WORD(at);
     nb_vec3 light = NEBEL_WORD(at + 1).xyz;
     nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
@@ -584,21 +329,20 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
     }
 }
 
-/* Light through what lies before it, if the quotient of light and extinction were the same all along the leg. */
-nb_vec3 nb_step_light_even(nb_vec3 light, nb_vec3 depth, nb_vec3 before)
+/* What has been gathered up to a place on the ray. */
+struct nb_gathered {
+    nb_vec3 depth;
+    nb_vec3 radiance;
+};
+
+/* Light through what lies before it, if the quotient of light and extinction were the same all along the way. */
+nb_vec3 nb_light_even(nb_vec3 light, nb_vec3 depth, nb_vec3 before)
 {
-    return nb_exp3(-before) * light * nb_exp_ratio3(depth);
+    return nb_exp3(-before) * light * nb_attenuate(depth).mean;
 }
 
-nb_vec3 nb_step_light_mixed(nb_leg leg, nb_vec3 before)
-{
-    nb_vec3 sum = nb_splat3(0.0);
-    for (int j = 0; j < NB_NODES; j++) sum += nb_weight(j) * leg.density[j] * nb_exp3(-(before + leg.depth[j]));
-    return sum * leg.h;
-}
-
-/* How far nb_step_light_even may be off where that quotient varies within `spread`: most if all the brighter light came first.
- * Then s / 2 (1 - e^-x/2)^2 of optical depth x; and never more than half of what the step takes of its own light. */
+/* How far nb_light_even may be off where that quotient varies within `spread`: most if all the brighter light came first. Then
+ * s / 2 (1 - e^-x/2)^2 of optical depth x; and never more than half of what the way takes of its own light. */
 float nb_even_error(nb_vec3 light, nb_vec3 depth, nb_vec3 before, nb_vec3 spread)
 {
     nb_vec3 through = nb_exp3(-0.5 * depth);
@@ -607,105 +351,126 @@ float nb_even_error(nb_vec3 light, nb_vec3 depth, nb_vec3 before, nb_vec3 spread
     return nb_largest(nb_exp3(-before) * min(0.5 * spread * lost * lost, 0.5 * light * taken));
 }
 
-/* What one step of the rule bears: so much of optical depth and of change of the densities' logarithm together. */
-#define NB_STEP_BEARS 2.0
-#define NB_MOST_STEPS 32
+nb_vec3 nb_light_mixed(nb_leg leg, nb_vec3 before)
+{
+    nb_vec3 sum = nb_splat3(0.0);
+    for (int j = 0; j < NB_NODES; j++) sum += nb_weight(j) * leg.density[j] * nb_exp3(-(before + leg.depth[j]));
+    return sum * leg.h;
+}
+
+/* What one leg bears: so much of optical depth and of change of the densities' logarithm together. */
+#define NB_LEG_BEARS 2.0
+
+/* Then what is left of the piece counts as even. */
+#define NB_MOST_LEGS 32
+
+/* Nothing behind adds a bit to a picture. */
 #define NB_OPAQUE 17.0
 
-nebel_light nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
+/* Whether a leg counts as even. */
+bool nb_is_even(nb_leg leg, nb_piece piece, nb_vec3 before, float tolerance)
 {
-    nb_vec3 depth = nb_splat3(0.0);
-    nb_vec3 radiance = nb_splat3(0.0);
+    nb_vec3 spread = piece.emits ? nb_splat3(NB_HUGE) : piece.most - piece.least;
+    return !leg.mixed || leg.number >= NB_MOST_LEGS ||
+           nb_even_error(leg.light, leg.depth[NB_NODES - 1], before, spread) <= tolerance;
+}
+
+/* The leg after this one, or this one shorter where it does not fit; `rest` metres are left. Of legs that do not, first one on which
+ * the densities hardly change: then optical depth is in proportion to length. */
+nb_leg nb_next_leg(nb_leg leg, nb_piece piece, float rest, float strain, bool fits, bool even)
+{
+    float h = leg.h * min(2.0, 0.9 * NB_LEG_BEARS / strain);
+    if (!fits && piece.rate * leg.h > 0.6 * NB_LEG_BEARS) h = 0.5 * NB_LEG_BEARS / piece.rate;
+    if ((fits && even) || leg.number + 1 >= NB_MOST_LEGS) h = rest;
+    return nb_open_leg(fits ? leg.from + leg.h : leg.from, min(h, rest), leg.mixed, leg.number + 1);
+}
+
+/* Moves behind a leg, or makes it shorter. Returns what is left of the piece [m]. */
+float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, float tolerance, bool lit)
+{
+    nb_vec3 depth = leg.depth[NB_NODES - 1];
+    float strain = nb_largest(depth) + piece.rate * leg.h;
+    bool even = nb_is_even(leg, piece, g.depth, tolerance);
+    bool fits = even || strain <= NB_LEG_BEARS;
+    float rest = piece.end - piece.start - leg.from;
+    if (fits) {
+        if (lit) g.radiance += even ? nb_light_even(leg.light, depth, g.depth) : nb_light_mixed(leg, g.depth);
+        g.depth += depth;
+        rest -= leg.h;
+    }
+    leg = nb_next_leg(leg, piece, rest, strain, fits, even);
+    return rest;
+}
+
+/* The first leg of a piece: all of it. */
+nb_leg nb_first_leg(nb_piece piece, bool lit)
+{
+    bool uneven = piece.emits || nb_largest(piece.most - piece.least) > 0.0;
+    return nb_open_leg(0.0, piece.end - piece.start, lit && uneven && piece.present > 1, 0);
+}
+
+void nb_pass_piece(inout nb_gathered g, nb_piece piece, bool lit)
+{
+    float length = piece.end - piece.start;
+    nb_vec3 depth = piece.extinction * length;
+    if (lit) g.radiance += nb_light_even(piece.light * length, depth, g.depth);
+    g.depth += depth;
+}
+
+/* Each turn of the outer loop looks once at all media on the ray: to find the end of the next piece, or to sum a leg within one of
+ * varying density. So the shapes and profiles stand in the program once, not once for each purpose. */
+nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
+{
     float tolerance = NEBEL_WORD(0).y;
     float t = 0.0;
     bool crowd = false;
-    bool stepping = false; /* within a piece of varying density; else on the way to the end of a piece */
-    int steps = 0;
+    bool stepping = false;
+    nb_gathered g;
+    g.depth = nb_splat3(0.0);
+    g.radiance = nb_splat3(0.0);
     nb_piece piece = nb_open_piece(0.0, 0.0);
-    nb_leg leg;
-    leg.from = 0.0;
-    leg.h = 0.0;
-    leg.mixed = false;
-    nb_open_leg(leg);
+    nb_leg leg = nb_open_leg(0.0, 0.0, false, 0);
     nb_window window;
     window.used = 0;
     window.rest = count;
     window.end = 0.0;
-    while (t < ray.t_max && nb_smallest(depth) < NB_OPAQUE) {
-        if (stepping)
-            nb_open_leg(leg);
-        else
-            piece = nb_open_piece(t, ray.t_max);
+    while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE) {
+        bool on_leg = NB_HAS(NB_HAS_PROFILE) && stepping;
         bool stale = crowd || t >= window.end;
-        int next = 0;
-        while (next < count) {
-            if (stale) {
-                window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
-                if (!crowd && window.end <= t) {
-                    crowd = true;
-                    continue;
-                }
-            }
+        if (!on_leg) piece = nb_open_piece(t, ray.t_max);
+        for (int next = 0; next < count;) {
+            if (stale) window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
+            bool over_full = !crowd && window.end <= t;
+            crowd = crowd || over_full;
+            if (over_full) continue;
             next = window.rest;
             piece.end = min(piece.end, window.end);
-            if (NB_HAS(NB_HAS_COVER) && !stepping) piece = nb_cover_piece(piece, window.used);
+            if (NB_HAS(NB_HAS_COVER) && !on_leg) piece = nb_cover_piece(piece, window.used);
             for (int k = 0; k < window.used; k++) {
-                if (!stepping)
-                    piece = nb_note_slot(piece, k, ray);
-                else if (nb_is_in_slot(k, piece.start) && !nb_is_covered(nb_slot_medium[k], piece.floor))
-                    nb_add_slot(leg, piece, k, ray);
+                nb_vec3 slot = nb_slot(k);
+                if (!on_leg)
+                    piece = nb_note_slot(piece, slot, ray);
+                else if (nb_is_there(slot, piece))
+                    nb_add_slot(leg, piece, slot, ray);
             }
         }
-        float length = piece.end - piece.start;
-        bool over = true;
-        if (stepping) {
-            nb_vec3 within = leg.depth[NB_NODES - 1];
-            float rest = length - leg.from;
-            nb_vec3 spread = piece.emits ? nb_splat3(NB_HUGE) : piece.most - piece.least;
-            float strain = nb_largest(within) + piece.rate * leg.h;
-            bool even = !leg.mixed || steps >= NB_MOST_STEPS || nb_even_error(leg.light, within, depth, spread) <= tolerance;
-            bool fits = even || strain <= NB_STEP_BEARS;
-            float h = leg.h;
-            if (fits) {
-                if (lit) radiance += even ? nb_step_light_even(leg.light, within, depth) : nb_step_light_mixed(leg, depth);
-                depth += within;
-                leg.from += h;
-                rest -= h;
-                over = rest <= length * (4.0 * NB_EPSILON);
-                h = even ? rest : h * min(2.0, 0.9 * NB_STEP_BEARS / strain);
-            } else {
-                over = false;
-                /* first so short that the densities hardly change: then optical depth is in proportion to length */
-                bool steep = piece.rate * h > 0.6 * NB_STEP_BEARS;
-                h = steep ? 0.5 * NB_STEP_BEARS / piece.rate : h * (0.9 * NB_STEP_BEARS / strain);
-            }
-            steps++;
-            leg.h = steps >= NB_MOST_STEPS ? rest : min(h, rest);
-        } else if (piece.present > 0) {
-            if (NB_HAS(NB_HAS_PROFILE) && piece.varies) {
-                over = false;
-                stepping = true;
-                steps = 0;
-                leg.from = 0.0;
-                leg.h = length;
-                leg.mixed = lit && piece.present > 1 && (piece.emits || nb_largest(piece.most - piece.least) > 0.0);
-            } else {
-                nb_vec3 within = piece.extinction * length;
-                if (lit) radiance += nb_step_light_even(piece.light * length, within, depth);
-                depth += within;
-            }
-        }
+        bool foggy = piece.present > 0;
+        bool begins = NB_HAS(NB_HAS_PROFILE) && foggy && !on_leg && piece.varies;
+        bool over = !begins;
+        if (on_leg)
+            over = nb_end_leg(g, leg, piece, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
+        else if (begins)
+            leg = nb_first_leg(piece, lit);
+        else if (foggy)
+            nb_pass_piece(g, piece, lit);
+        stepping = !over;
         if (over) {
             t = piece.end;
-            stepping = false;
             if (crowd) window.end = t;
             crowd = false;
         }
     }
-    nebel_light light;
-    light.transmittance = nb_exp3(-depth);
-    light.in_scattering = radiance;
-    return light;
+    return g;
 }
 
 /* ---- the face ---------------------------------------------------------------------------------------------------------- */
@@ -731,15 +496,17 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
     nebel_light light;
     light.transmittance = nb_splat3(1.0);
     light.in_scattering = nb_splat3(0.0);
-    if (ray.t_max > 0.0 && dot(direction, direction) > 0.0) {
+    float square = dot(direction, direction);
+    if (t_max > 0.0 && square > 0.0 && nb_is_number(dot(origin, origin) + square + t_max)) {
         nb_media_sum sum = nb_sum_media(ray, first, count, listed);
-        light.transmittance = nb_exp3(-sum.depth);
-        light.in_scattering = sum.light * nb_exp_ratio3(sum.depth);
+        nb_attenuation attenuation = nb_attenuate(sum.depth);
+        light.transmittance = attenuation.left;
+        light.in_scattering = sum.light * attenuation.mean;
         bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
         if (covers || (NB_HAS(NB_HAS_MIXED) && lit && sum.mixed)) {
-            nebel_light walked = nb_walk(ray, first, count, listed, lit);
-            light.in_scattering = walked.in_scattering;
-            if (covers) light.transmittance = walked.transmittance;
+            nb_gathered walked = nb_walk(ray, first, count, listed, lit);
+            light.in_scattering = walked.radiance;
+            if (covers) light.transmittance = nb_exp3(-walked.depth);
         }
         if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
         light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));

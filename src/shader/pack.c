@@ -327,7 +327,8 @@ static int is_mixed(const nebel_snapshot *snapshot)
 uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
 {
     if (snapshot == NULL) return NB_HAS_ALL;
-    uint32_t features = (is_mixed(snapshot) ? NB_HAS_MIXED : 0) | (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0);
+    uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
+                        (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |

@@ -116,10 +116,10 @@ float nebel_gaussian_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_v
 
 nebel_light nebel_medium_light(float length, nb_vec3 extinction, nb_vec3 light)
 {
-    nb_vec3 depth = extinction * length;
+    nb_attenuation attenuation = nb_attenuate(extinction * length);
     nebel_light medium;
-    medium.transmittance = nb_exp3(-depth);
-    medium.in_scattering = min(light * length * nb_exp_ratio3(depth), nb_splat3(NEBEL_MOST_LIGHT));
+    medium.transmittance = attenuation.left;
+    medium.in_scattering = min(light * length * attenuation.mean, nb_splat3(NEBEL_MOST_LIGHT));
     return medium;
 }
 

@@ -1,0 +1,300 @@
+/* What one medium is along a ray, from the words of layout.h: where its shape is, and its density there. Written for GLSL ES 3.00
+ * and HLSL alike; fog.glsl follows. Constant conditions on NB_HAS() leave out what NEBEL_FEATURES says that the fog does not have. */
+#ifndef NEBEL_FEATURES
+#define NEBEL_FEATURES NB_HAS_ALL
+#endif
+#ifndef NEBEL_MOST_LIGHT
+#define NEBEL_MOST_LIGHT 65504.0
+#endif
+#define NB_HAS(feature) ((NEBEL_FEATURES & (feature)) != 0)
+
+struct nebel_light {
+    nb_vec3 transmittance;
+    nb_vec3 in_scattering;
+};
+
+struct nb_ray {
+    nb_vec3 origin;
+    nb_vec3 direction;
+    float t_max;
+    bool from_eye; /* distances along it count */
+};
+
+nb_vec3 nb_splat3(float x) { return nb_vec3(x, x, x); }
+nb_vec3 nb_exp3(nb_vec3 v) { return nb_vec3(nb_exp(v.x), nb_exp(v.y), nb_exp(v.z)); }
+/* By its bits: compilers take comparisons for granted that a NaN would fail. */
+bool nb_is_number(float x) { return (nb_to_bits(x) & 0x7fffffff) <= 0x7f800000; }
+float nb_largest(nb_vec3 v) { return max(max(v.x, v.y), v.z); }
+float nb_smallest(nb_vec3 v) { return min(min(v.x, v.y), v.z); }
+
+/* ---- attenuation ------------------------------------------------------------------------------------------------------- */
+
+/* What is left behind optical depth x, e^-x, and the mean on the way, (1 - e^-x) / x: nb_exp and nb_exp_ratio at the price of one. */
+struct nb_attenuation {
+    nb_vec3 left;
+    nb_vec3 mean;
+};
+
+nb_vec3 nb_attenuate1(float x)
+{
+    float y = max(-x, NB_EXP_MIN);
+    float n = nb_exp_steps(y);
+    float r = nb_exp_rest(y, n);
+    float s = nb_scale_pow2(1.0, n);
+    float q = r + (r * r) * nb_exp_tail(r);
+    return nb_vec3(s + s * q, x > NB_TINY ? ((1.0 - s) - s * q) / x : 1.0, 0.0);
+}
+
+nb_attenuation nb_attenuate(nb_vec3 depth)
+{
+    nb_vec3 x = nb_attenuate1(depth.x);
+    nb_vec3 y = nb_attenuate1(depth.y);
+    nb_vec3 z = nb_attenuate1(depth.z);
+    nb_attenuation a;
+    a.left = nb_vec3(x.x, y.x, z.x);
+    a.mean = nb_vec3(x.y, y.y, z.y);
+    return a;
+}
+
+/* ---- shapes ------------------------------------------------------------------------------------------------------------ */
+
+/* The ray in a leaf's frame, without the way to the frame's origin. */
+nb_ray nb_turned_ray(int leaf, bool turned, nb_ray ray)
+{
+    nb_ray local = ray;
+    if (NB_HAS(NB_HAS_TURNED) && turned) {
+        nb_vec3 x = NEBEL_WORD(leaf + 3).xyz;
+        nb_vec3 y = NEBEL_WORD(leaf + 4).xyz;
+        nb_vec3 z = NEBEL_WORD(leaf + 5).xyz;
+        local.origin = nb_vec3(dot(x, ray.origin), dot(y, ray.origin), dot(z, ray.origin));
+        local.direction = nb_vec3(dot(x, ray.direction), dot(y, ray.direction), dot(z, ray.direction));
+    }
+    return local;
+}
+
+/* See nb_face in src/media/volume.h: whose ray it is that lies in a face. */
+float nb_face_tie(nb_vec3 normal)
+{
+    return normal.x != 0.0 ? normal.x : normal.y != 0.0 ? normal.y : normal.z;
+}
+
+nb_interval nb_planes_interval(int first, int count, nb_ray ray)
+{
+    nb_interval span = nb_interval_all();
+    for (int i = 0; i < count; i++) {
+        nb_vec4 face = NEBEL_WORD(first + i);
+        span = nb_interval_meet(span, nb_interval_half_space(ray.origin, ray.direction, face.xyz, face.w,
+                                                             nb_face_tie(face.xyz), 0.0, 4.0 * NB_EPSILON));
+    }
+    return span;
+}
+
+/* Makes the noise in the formulas of curved shapes 0: the ends as float has them, none widened by what it may have lost. */
+#define NB_NO_REACH (-NB_WEPSILON)
+
+nb_interval nb_leaf_interval(int leaf, nb_ray ray)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    int type = int(head.x);
+    bool turned = type >= NB_TYPE_TURNED;
+    if (turned) type -= NB_TYPE_TURNED;
+    nb_interval span = nb_interval_all();
+    if (NB_HAS(NB_HAS_PLANES) && type == NB_TYPE_PLANES) {
+        span = nb_planes_interval(int(head.z), int(head.y), ray);
+    } else if (type != NB_TYPE_WORLD) {
+        nb_ray local = nb_turned_ray(leaf, turned, ray);
+        nb_vec3 d = local.direction;
+        nb_vec3 place = NEBEL_WORD(leaf + 1).xyz;
+        nb_vec3 p = local.origin + place;
+        if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX)
+            span = nb_interval_box(local.origin, d, place, NEBEL_WORD(leaf + 2).xyz, 0.0);
+        else if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL)
+            span = nb_interval_ball(p, d, head.y, NB_NO_REACH);
+        else if (NB_HAS(NB_HAS_TUBE) && type == NB_TYPE_TUBE)
+            span = nb_interval_tube(p, d, NB_NO_REACH);
+        else if (NB_HAS(NB_HAS_CONE) && type == NB_TYPE_CONE)
+            span = nb_interval_cone(p, d, head.y, head.z, NB_NO_REACH);
+        else if (NB_HAS(NB_HAS_CAPSULE) && type == NB_TYPE_CAPSULE)
+            span = nb_interval_capsule(p, d, head.y, NB_NO_REACH);
+    }
+    return span;
+}
+
+/* A stretch of the ray on which it is inside a body; none where not enter < leave. */
+struct nb_stretch {
+    float enter, leave;
+};
+
+nb_stretch nb_stretch_of(float enter, float leave)
+{
+    nb_stretch s;
+    s.enter = enter;
+    s.leave = leave;
+    return s;
+}
+
+/* Where a body of several leaves, the first at `leaf`, next has the ray inside at or behind `from`: from event to event of its
+ * leaves. The program's stack is the bits of an int. */
+nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
+{
+    float begin = -1.0;
+    float t = from;
+    while (t < ray.t_max) {
+        float next = ray.t_max;
+        int stack = 0;
+        for (int i = 0; i < count; i++) {
+            int at = leaf + NB_LEAF_WORDS * i;
+            nb_interval span = nb_leaf_interval(at, ray);
+            bool some = span.enter < span.leave;
+            if (some && span.enter > t) next = min(next, span.enter);
+            if (some && span.leave > t) next = min(next, span.leave);
+            stack = (stack << 1) | (span.enter <= t && span.leave > t ? 1 : 0);
+            for (int folds = int(NEBEL_WORD(at).w); folds > 1; folds >>= 1) {
+                int top = stack & 1;
+                stack >>= 1;
+                stack = (folds & 1) != 0 ? stack & (top | ~1) : stack | top;
+            }
+        }
+        bool inside = (stack & 1) != 0;
+        if (inside && begin < 0.0) begin = t;
+        if (!inside && begin >= 0.0) return nb_stretch_of(begin, t);
+        t = next;
+    }
+    return nb_stretch_of(begin < 0.0 ? ray.t_max : begin, ray.t_max);
+}
+
+/* Where the body of a medium next has the ray inside, at or behind `from`. */
+nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
+{
+    int at = medium + NB_MEDIUM_LEAF;
+    nb_stretch s;
+    if (NB_HAS(NB_HAS_DISTANCES) && ray.from_eye) {
+        from = max(from, NEBEL_WORD(medium + NB_MEDIUM_START).w);
+        ray.t_max = min(ray.t_max, NEBEL_WORD(medium + NB_MEDIUM_CUTOFF).w);
+    }
+    if (NB_HAS(NB_HAS_GROUP) && leaves > 1) {
+        nb_vec4 low = NEBEL_WORD(at);
+        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(at + 1).xyz, 0.0);
+        s = nb_stretch_of(from, from);
+        if (max(bounds.enter, from) < min(bounds.leave, ray.t_max)) s = nb_group_stretch(int(low.w), leaves, ray, from);
+    } else {
+        nb_interval span = nb_leaf_interval(at, ray);
+        s = nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
+    }
+    return s;
+}
+
+/* ---- profiles ---------------------------------------------------------------------------------------------------------- */
+
+/* A medium's density in coordinates along the ray, offset + slope s, s metres behind where it was asked for. */
+struct nb_profile {
+    int kind;
+    nb_vec3 offset;
+    nb_vec3 slope;
+    nb_vec3 size;  /* soft edge: half widths */
+    float level;   /* gaussian: m; radial: c */
+};
+
+/* Distance, in units of `scale`, from the closest approach of p + t d to the origin: coordinates along and square across. */
+nb_profile nb_round_profile(nb_profile profile, nb_vec3 p, nb_vec3 d, float scale, float start)
+{
+    float square = dot(d, d);
+    float closest = -dot(p, d) / max(square, NB_TINY);
+    nb_vec3 q = (p + d * closest) * scale;
+    profile.slope.x = sqrt(square) * scale;
+    profile.offset.x = (start - closest) * profile.slope.x;
+    profile.level = min(dot(q, q), 1e9);
+    return profile;
+}
+
+nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray, float start)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
+    nb_vec3 place = NEBEL_WORD(leaf + 1).xyz;
+    if (NB_HAS(NB_HAS_RADIAL) && profile.kind >= NB_KIND_RADIAL) {
+        profile = nb_round_profile(profile, local.origin + place, local.direction, 1.0 / head.y, start);
+        profile.level = 1.0 - profile.level;
+    } else if (NB_HAS(NB_HAS_SOFT_EDGE)) {
+        nb_vec3 high = NEBEL_WORD(leaf + 2).xyz;
+        profile.offset = (local.origin + local.direction * start - (place + high) * 0.5) * width;
+        profile.slope = local.direction * width;
+        profile.size = (high - place) * (0.5 * width);
+    }
+    return profile;
+}
+
+nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
+{
+    nb_profile profile;
+    profile.kind = kind;
+    profile.offset = nb_splat3(0.0);
+    profile.slope = nb_splat3(0.0);
+    profile.size = nb_splat3(0.0);
+    profile.level = 0.0;
+    if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT && kind != NB_KIND_EXCLUDE) {
+        nb_vec4 word = NEBEL_WORD(medium + 3);
+        if (NB_HAS(NB_HAS_SLOPE) && kind <= NB_KIND_LINEAR) {
+            profile.slope.x = dot(word.xyz, ray.direction);
+            profile.offset.x = word.w + dot(word.xyz, ray.origin) + profile.slope.x * start;
+        } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
+            profile = nb_round_profile(profile, word.xyz + ray.origin, ray.direction, word.w, start);
+        } else {
+            profile = nb_leaf_profile(profile, medium + NB_MEDIUM_LEAF, word.w, ray, start);
+        }
+    }
+    return profile;
+}
+
+float nb_density(nb_profile profile, float s)
+{
+    float density = 1.0;
+    if (NB_HAS(NB_HAS_PROFILE)) {
+        int kind = profile.kind;
+        float u = profile.offset.x + profile.slope.x * s;
+        if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_HEIGHT)
+            density = nb_height_density(u);
+        else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_HEIGHT_CAPPED)
+            density = nb_height_capped_density(u);
+        else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_LINEAR)
+            density = nb_linear_density(u);
+        else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN)
+            density = nb_gaussian_density(profile.level, u);
+        else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE)
+            density = nb_soft_edge_density(profile.offset + profile.slope * s, profile.size);
+        else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE)
+            density = nb_radial_density(profile.level, u, kind - NB_KIND_RADIAL + 1);
+    }
+    return density;
+}
+
+/* The density integrated from where the profile was asked for over h metres. */
+float nb_integral(nb_profile profile, float h)
+{
+    float integral = h;
+    if (NB_HAS(NB_HAS_PROFILE)) {
+        int kind = profile.kind;
+        float u = profile.offset.x;
+        float slope = profile.slope.x;
+        if (NB_HAS(NB_HAS_SLOPE) && kind != NB_KIND_CONSTANT && kind <= NB_KIND_HEIGHT_CAPPED) {
+            /* from the dense end, where a ray comes down from so far that its start has lost the digits of the height */
+            float end = u + slope * h;
+            bool down = slope < 0.0 && abs(end) < abs(u);
+            float from = down ? end : u;
+            float rise = down ? -slope : slope;
+            if (kind == NB_KIND_HEIGHT)
+                integral = nb_height_integral(from, rise, h).value;
+            else
+                integral = nb_height_capped_integral(from, rise, h).value;
+        } else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_LINEAR) {
+            integral = nb_linear_integral(u, slope, h).value;
+        } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
+            integral = nb_gaussian_integral(profile.level, u, u + slope * h, slope).value;
+        } else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE) {
+            integral = nb_soft_edge_integral(profile.offset, profile.slope, profile.size, h).value;
+        } else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE) {
+            integral = nb_radial_integral(profile.level, u, slope, h, kind - NB_KIND_RADIAL + 1).value;
+        }
+    }
+    return integral;
+}
