@@ -382,7 +382,7 @@ static void test_300_es_texture(void **state)
 static void test_300_es_block(void **state)
 {
     (void)state;
-    try_language(NB_GL_300ES, BLOCK, 5);
+    try_language(NB_GL_300ES, BLOCK, 1);
 }
 
 /* ---- very many, very far
