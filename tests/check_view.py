@@ -14,6 +14,7 @@ import unittest
 
 from check_cli import FOG, NEBEL, PictureCase, nebel
 
+ROUNDING = 0.004  # a byte; the window rounds to the nearest one, a PNG in a pattern
 WAIT = 120  # s; software OpenGL on a busy machine
 
 
@@ -100,15 +101,17 @@ class Viewer:
         return self.case.folder / re.findall(r"saved (nebel-\d+\.png)", self.log.read_text())[-1]
 
     def place(self, name):
-        """Where a control is: x, y, width, height."""
+        """Where a control is: x, y, width, height; once it stays there."""
         found = []
 
         def find():
-            found[:] = [line.split(" ", 4) for line in self.controls.read_text().splitlines() if line.endswith(" " + name)]
-            return found and found[0][4] == name
+            found.append([line[:-len(name) - 1] for line in self.controls.read_text().splitlines()
+                          if line.endswith(" " + name)])
+            time.sleep(0.3)
+            return len(found) > 1 and found[-1] and found[-1] == found[-2]
 
         self.wait(find, f"the control {name}")
-        return [int(number) for number in found[0][:4]]
+        return [int(number) for number in found[-1][0].split()]
 
     def press(self, name, share=0.5):
         x, y, width, height = self.place(name)
@@ -136,7 +139,7 @@ class PicturesTest(ViewTest):
     def test_the_picture_is_that_of_render(self):
         self.assert_done(self.render("render.png", "--device", "gl", "--size", "560x420"))
         viewer = Viewer(self)
-        self.assertTrue(self.same(viewer.take_picture(), self.folder / "render.png", 0.002))
+        self.assertTrue(self.same(viewer.take_picture(), self.folder / "render.png", ROUNDING))
         viewer.end()
 
     def test_screenshot_of_the_window(self):
@@ -145,7 +148,7 @@ class PicturesTest(ViewTest):
         self.assert_done(done)
         self.assertEqual(done.err, "")
         self.assert_done(self.render("render.png", "--device", "gl", "--size", "560x420"))
-        self.assertFalse(self.same(self.folder / "window.png", self.folder / "render.png", 0.002))
+        self.assertFalse(self.same(self.folder / "window.png", self.folder / "render.png", ROUNDING))
 
     def test_what_goes_wrong_at_the_start(self):
         self.assert_failed(nebel("view", self.scene, env={"DISPLAY": ""}), "no screen", "nebel render")
@@ -159,18 +162,89 @@ class CameraTest(ViewTest):
         first = viewer.take_picture()
         viewer.drag(400, 300, 450, 280)
         turned = viewer.take_picture()
-        self.assertFalse(self.same(first, turned, 0.002), "a drag turns")
+        self.assertFalse(self.same(first, turned, ROUNDING), "a drag turns")
         viewer.key("Home")
-        self.assertTrue(self.same(first, viewer.take_picture(), 0.002), "Home brings the camera back")
+        self.assertTrue(self.same(first, viewer.take_picture(), ROUNDING), "Home brings the camera back")
         ways = {"pan": lambda: viewer.drag(400, 300, 450, 280, 2), "look": lambda: viewer.drag(400, 300, 450, 280, 3),
                 "wheel": lambda: viewer.xdotool("mousemove", "--window", viewer.window, 400, 300, "click", 4, "sleep", 0.2),
                 "fly": lambda: viewer.xdotool("keydown", "w", "sleep", 0.3, "keyup", "w", "sleep", 0.2)}
         for name, act in ways.items():
             with self.subTest(name):
                 act()
-                self.assertFalse(self.same(first, viewer.take_picture(), 0.002))
+                self.assertFalse(self.same(first, viewer.take_picture(), ROUNDING))
                 viewer.press("Home")
-        self.assertTrue(self.same(first, viewer.take_picture(), 0.002))
+        self.assertTrue(self.same(first, viewer.take_picture(), ROUNDING))
+        viewer.end()
+
+    def test_the_window_changes_its_size(self):
+        viewer = Viewer(self)
+        viewer.take_picture()
+        viewer.xdotool("windowsize", "--sync", viewer.window, 300, 220, "sleep", 0.3)
+        self.assert_done(self.render("render.png", "--device", "gl", "--size", "300x220"))
+        self.assertTrue(self.same(viewer.take_picture(), self.folder / "render.png", ROUNDING))
+        viewer.end()
+
+
+class FogTest(ViewTest):
+    def draw(self, name):
+        self.assert_done(self.render(name, "--device", "gl", "--size", "560x420"))
+        return self.folder / name
+
+    def test_a_slider_changes_the_picture_and_the_file(self):
+        self.scene.write_text(self.scene.read_text().replace('"fog"', '/* thin */ "fog"'))
+        before = self.scene.read_text()
+        first = self.draw("first.png")
+        viewer = Viewer(self)
+        viewer.press("fog[0].visibility", 0.2)
+        changed = viewer.take_picture()
+        self.assertFalse(self.same(first, changed, ROUNDING))
+        self.assertEqual(self.scene.read_text(), before, "nothing is saved before it is asked for")
+        viewer.say(f"view: saved {self.scene}", lambda: viewer.press("Save"))
+        after = self.scene.read_text()
+        number = re.search(r'"extinction": ([0-9.e-]+)', after)
+        self.assertGreater(float(number[1]), 0.2)
+        self.assertEqual(after.replace(number[0], '"extinction": 0.1'), before, "one number has changed, and nothing else")
+        self.assertTrue(self.same(changed, self.draw("saved.png"), ROUNDING))
+        viewer.end()
+
+    def test_the_file_changes(self):
+        viewer = Viewer(self)
+        viewer.take_picture()
+        again = f"view: read {self.scene} again"
+        viewer.say(again, lambda: self.write_scene("scene.json", [{**FOG, "extinction": 0.4}], background=[0.2, 0.4, 0.8]))
+        self.assertTrue(self.same(viewer.take_picture(), self.draw("second.png"), ROUNDING))
+        viewer.say("scene.json:1:", lambda: self.scene.write_text("{"))
+        viewer.say(again, lambda: self.write_scene("scene.json", [FOG], ambient=1))
+        viewer.press("fog[0].visibility", 0.2)
+        mine = viewer.take_picture()
+        count = viewer.said(again)
+        self.write_scene("scene.json", [{**FOG, "extinction": 0.3}])
+        time.sleep(1)
+        self.assertTrue(self.same(viewer.take_picture(), mine, ROUNDING))
+        self.assertEqual(viewer.said(again), count, "changes are not lost because the file has others")
+        viewer.say(again, lambda: viewer.key("F5"))
+        self.assertTrue(self.same(viewer.take_picture(), self.draw("third.png"), ROUNDING))
+        viewer.end()
+
+
+class CompareTest(ViewTest):
+    def test_both_renderers_draw_the_same(self):
+        black = self.write_scene("black.json", [])
+        self.assert_done(nebel("render", black, "-o", "black.png", "--size", "560x420", cwd=self.folder))
+        black = self.folder / "black.png"
+        viewer = Viewer(self)
+        for plane in (1, 2, 3, 4):
+            with self.subTest(plane=plane):
+                viewer.key(plane)
+                drawn = viewer.take_picture()
+                self.assertFalse(self.same(drawn, black, 0.02))
+                viewer.key("c")
+                split = viewer.take_picture()
+                self.assertTrue(self.same(split, drawn, 0.05), "one sample and a line are the difference")
+                self.assertFalse(self.same(split, drawn, 0.0001))
+                viewer.key("c")
+                self.assertTrue(self.same(viewer.take_picture(), black, 0.03), "sixteen times the difference")
+                viewer.key("c")
         viewer.end()
 
 

@@ -151,6 +151,15 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 /* NULL is fine. */
 void nebel_destroy_scene(nebel_scene *scene);
 
+/* Writes changed numbers back into a scene file. `changed` is what nebel_scene_contents gave for this file, with other
+ * numbers in the camera, the background, the sun (where there is one), the ambient light, and in the volumes of origin WRITTEN, but for planes
+ * and parts of their shapes; the rest of it is not read. What is not as the file says is written in its place, in the file's own
+ * unit, axes and words (a visibility stays a visibility), with 15 digits; a key that is missing is added. Every other byte
+ * stays. The file is replaced as a whole, as by nebel_write_image, or left alone where nothing has changed. On an error it is as
+ * it was. Errors: as nebel_load_scene; ARGUMENT (the file has other volumes by now); VALUE (the file's word for the amount of a
+ * volume has none for 0); FORMAT also where the new numbers are no valid scene. */
+nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *changed);
+
 /* ---- pictures ------------------------------------------------------------------------------------------------------- */
 
 /* A picture of float planes, top row first: samples[(y * width + x) * channel_count + c]. */

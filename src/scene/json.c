@@ -108,6 +108,7 @@ static nb_json_node *add_node(reader *in, nb_json_type type)
     json->key = (nb_json_node){0};
     node->type = type;
     node->offset = start;
+    node->end = (uint32_t)in->end;
     if (json->depth > 0) link_child(json, (uint32_t)json->node_count);
     json->node_count++;
     return node;
@@ -165,6 +166,7 @@ static bool close_container(reader *in)
     nb_json *json = in->json;
     take_token(in);
     json->depth--;
+    json->nodes[json->open[json->depth]].end = (uint32_t)in->end;
     if (json->depth == 0) return json->desc.take(json, json->nodes, json->desc.user);
     return close_value(json, json->open[json->depth]);
 }

@@ -29,6 +29,7 @@ typedef struct nb_json_node {
     double number;
     uint32_t key_size, string_size;
     uint32_t offset, key_offset;
+    uint32_t end; /* of the value: the first byte behind it */
     uint32_t parent, next, first;
     uint32_t count; /* children so far */
     uint32_t index; /* place among the parent's children */

@@ -1,13 +1,11 @@
 /* Scenes: read, kept, given back. */
 #include "scene/file.h"
 #include "scene/path.h"
+#include "scene/save.h"
 #include "scene/scene_internal.h"
 
 #include <stdio.h>
 #include <string.h>
-
-/* The longest scene file. */
-#define TEXT_LIMIT ((size_t)1 << 30)
 
 enum {
     NEBEL,
@@ -92,9 +90,15 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     }
 }
 
+static bool read_fog(nb_scene_reader *in, const nb_json_node *node)
+{
+    const size_t index = in->scene->data.volume_count;
+    return nb_read_volume(in, node) && (in->save == NULL || nb_save_volume(in->save, in, node, index));
+}
+
 static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
 {
-    if (nb_json_has_key(array, "fog")) return nb_read_volume(in, node);
+    if (nb_json_has_key(array, "fog")) return read_fog(in, node);
     if (nb_json_has_key(array, "nebula")) return nb_read_nebula(in, node);
     if (nb_json_has_key(array, "models")) return nb_read_model(in, node);
     return nb_read_light(in, node);
@@ -119,8 +123,11 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
 {
     nb_scene_reader *in = user;
     const nb_json_node *parent = nb_json_parent(json, value);
-    if (parent == NULL) return check_whole(in, value);
-    return nb_json_parent(json, parent) == NULL ? read_section(in, value) : read_element(in, parent, value);
+    if (parent == NULL) return check_whole(in, value) && (in->save == NULL || nb_save_rest(in->save, in, value));
+    if (nb_json_parent(json, parent) != NULL) return read_element(in, parent, value);
+    if (!read_section(in, value)) return false;
+    if (in->save != NULL) nb_save_section(in->save, in, value);
+    return true;
 }
 
 void nb_read_keep_message(nebel_result result, const char *message, void *user)
@@ -130,10 +137,10 @@ void nb_read_keep_message(nebel_result result, const char *message, void *user)
     snprintf(in->core_message, sizeof in->core_message, "%s", message);
 }
 
-static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name)
+static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name, nb_save *save)
 {
     nb_json json;
-    nb_scene_reader in = {.json = &json, .scene = scene, .space = NB_SPACE_OURS};
+    nb_scene_reader in = {.json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS};
     const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_read_keep_message, &in}};
     const nb_json_desc desc = {.text = text,
                                .size = size,
@@ -178,22 +185,28 @@ static nebel_result check_arguments(const char *name, const void *text, size_t s
     return NEBEL_OK;
 }
 
-nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
-                               nebel_scene **scene)
+nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
+                            nb_save *save, nebel_scene **scene)
 {
     nebel_result result = check_arguments(name, text, size, desc, scene);
     if (result != NEBEL_OK) return result;
-    if (size > TEXT_LIMIT)
+    if (size > NB_SCENE_TEXT_LIMIT)
         return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "%s: larger than %zu bytes, the most that is read", name,
-                       TEXT_LIMIT);
+                       NB_SCENE_TEXT_LIMIT);
     nebel_scene *fresh = create_scene(desc);
     if (fresh == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", name);
-    result = read_scene(fresh, text, size, name);
+    result = read_scene(fresh, text, size, name, save);
     if (result == NEBEL_OK)
         *scene = fresh;
     else
         nebel_destroy_scene(fresh);
     return result;
+}
+
+nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
+                               nebel_scene **scene)
+{
+    return nb_scene_parse(text, size, name, desc, NULL, scene);
 }
 
 nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, nebel_scene **scene)
@@ -202,7 +215,7 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
     nebel_result result = check_arguments(path, path, 0, desc, scene);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
-    result = nb_file_read(&allocator, &desc->log, NULL, "scene", path, TEXT_LIMIT, &bytes);
+    result = nb_file_read(&allocator, &desc->log, NULL, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     result = nebel_parse_scene((const char *)bytes.data, bytes.size, path, desc, scene);
     nb_release(&allocator, bytes.data);

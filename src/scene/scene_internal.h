@@ -79,10 +79,16 @@ typedef struct nb_fog_node {
 /* The keys that a scene may have. */
 enum { NB_SCENE_SECTIONS = 12 };
 
+/* The longest scene file. */
+#define NB_SCENE_TEXT_LIMIT ((size_t)1 << 30)
+
+typedef struct nb_save nb_save;
+
 /* What reading needs beside the scene itself. */
 typedef struct nb_scene_reader {
     nb_json *json;
     nebel_scene *scene;
+    nb_save *save;                             /* what is to be written in the file; NULL: nothing */
     nb_space space;                            /* of the file's numbers */
     const nb_fog_node *node;                   /* of a model, whose fog is being read; NULL: the scene's own */
     nebel_fog *trial;                          /* takes every volume once, for the core's own checks */
@@ -92,6 +98,10 @@ typedef struct nb_scene_reader {
     size_t lit_offset;                         /* of the first albedo that is not 0; 0: none */
     char lit_path[NB_JSON_PATH];
 } nb_scene_reader;
+
+/* nebel_parse_scene; with `save`, notes what is to be changed in the text. */
+nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc, nb_save *save,
+                            nebel_scene **scene);
 
 bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);

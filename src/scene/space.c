@@ -127,19 +127,64 @@ void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
     camera->view_height *= space->unit;
 }
 
-static void restore_direction(const nb_space *space, double direction[3])
+/* ---- the other way
+ * --------------------------------------------------------------------------------------------------- */
+
+void nb_space_restore_direction(const nb_space *space, double direction[3])
 {
     if (!space->z_up) return;
     direction[2] = -direction[2];
     swap_y_and_z(direction);
 }
 
+static void restore_place(const nb_space *space, double place[3])
+{
+    nb_space_restore_direction(space, place);
+    for (int i = 0; i < 3; i++) place[i] /= space->unit;
+}
+
 void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
 {
-    restore_direction(space, camera->position);
-    restore_direction(space, camera->look_at);
-    restore_direction(space, camera->up);
-    scale_all(1 / space->unit, camera->position, 3);
-    scale_all(1 / space->unit, camera->look_at, 3);
+    restore_place(space, camera->position);
+    restore_place(space, camera->look_at);
+    nb_space_restore_direction(space, camera->up);
     camera->view_height /= space->unit;
+}
+
+static void restore_shape(const nb_space *space, nebel_shape *shape)
+{
+    nebel_transform *transform = &shape->transform;
+    const double back = 1 / space->unit, near = shape->min[2];
+    if (space->z_up) {
+        shape->min[2] = shape->max[2];
+        shape->max[2] = near;
+    }
+    double *const places[] = {transform->position, shape->min, shape->max,  shape->center,
+                              shape->from,         shape->to,  shape->point};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) restore_place(space, places[i]);
+    nb_space_restore_direction(space, transform->rotation);
+    nb_space_restore_direction(space, shape->normal);
+    convert_extents(space, 1, transform->scale);
+    convert_extents(space, back, shape->radii);
+    shape->radius *= back;
+    shape->radius_from *= back;
+    shape->radius_to *= back;
+}
+
+void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)
+{
+    const double back = 1 / space->unit;
+    nebel_density *density = &volume->density;
+    restore_shape(space, &volume->shape);
+    restore_place(space, density->from);
+    restore_place(space, density->to);
+    restore_place(space, density->center);
+    density->base *= back;
+    density->scale_height *= back;
+    density->sigma *= back;
+    density->distance *= back;
+    volume->start *= back;
+    volume->cutoff *= back;
+    scale_all(space->unit, volume->extinction, 3);
+    scale_all(space->unit, volume->emission, 3);
 }

@@ -27,6 +27,10 @@ void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula);
 void nb_space_convert_camera(const nb_space *space, nebel_camera *camera);
 
 /* The other way: from metres, y up, to the file's numbers. */
+void nb_space_restore_direction(const nb_space *space, double direction[3]);
 void nb_space_restore_camera(const nb_space *space, nebel_camera *camera);
+
+/* Planes and parts stay as they are. */
+void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume);
 
 #endif

@@ -1,5 +1,8 @@
 #include "draft.h"
 
+#include "navigate.h"
+
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,9 +18,13 @@ static nebel_result allocate(nb_draft *draft)
     const size_t count = draft->data.volume_count;
     draft->volumes = copy_array(draft->data.volumes, count, sizeof *draft->volumes);
     draft->good = copy_array(draft->data.volumes, count, sizeof *draft->good);
+    draft->written = copy_array(draft->data.volumes, count, sizeof *draft->written);
     draft->ids = calloc(count + 1, sizeof *draft->ids);
+    draft->file = draft->data;
     draft->data.volumes = draft->volumes;
-    return draft->volumes != NULL && draft->good != NULL && draft->ids != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    if (draft->volumes != NULL && draft->good != NULL && draft->written != NULL && draft->ids != NULL) return NEBEL_OK;
+    draft->log.write(NEBEL_ERROR_MEMORY, "memory is out for the scene", draft->log.user);
+    return NEBEL_ERROR_MEMORY;
 }
 
 static nebel_result add_particles(nb_draft *draft)
@@ -80,6 +87,7 @@ void nb_draft_close(nb_draft *draft)
     nebel_destroy_fog(draft->fog);
     free(draft->volumes);
     free(draft->good);
+    free(draft->written);
     free(draft->ids);
     nebel_destroy_scene(draft->scene);
     *draft = (nb_draft){.scene = NULL};
@@ -123,4 +131,56 @@ nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
 int nb_draft_is_moving(const nb_draft *draft, size_t volume)
 {
     return nebel_scene_volume_origin(draft->scene, volume) == NEBEL_VOLUME_MOVING;
+}
+
+/* ---- the file
+ * --------------------------------------------------------------------------------------------------------
+ */
+
+static int is_same(const double a[3], const double b[3])
+{
+    return memcmp(a, b, sizeof(double[3])) == 0;
+}
+
+int nb_draft_is_changed(const nb_draft *draft)
+{
+    const nebel_scene_data *const now = &draft->data, *const was = &draft->file;
+    for (size_t i = 0; i < now->volume_count; i++) {
+        if (nebel_scene_volume_origin(draft->scene, i) == NEBEL_VOLUME_WRITTEN &&
+            memcmp(&draft->volumes[i], &draft->written[i], sizeof *draft->written) != 0)
+            return 1;
+    }
+    return !is_same(now->background, was->background) || !is_same(now->ambient, was->ambient) ||
+           !is_same(now->sun_direction, was->sun_direction) || !is_same(now->sun_irradiance, was->sun_irradiance);
+}
+
+int nb_draft_can_save_camera(const nb_draft *draft)
+{
+    return draft->file.camera_key_count == 0 && draft->file.turntable_frames == 0 &&
+           draft->file.camera.projection != NEBEL_PROJECTION_PANORAMA;
+}
+
+/* To a hundred-thousandth of the distance: nobody sees the difference, and the file stays readable. */
+static nebel_camera round_camera(nebel_camera camera)
+{
+    const double step = pow(10, floor(log10(nb_navigate_distance(&camera))) - 5);
+    for (int i = 0; i < 3; i++) {
+        camera.position[i] = rint(camera.position[i] / step) * step;
+        camera.look_at[i] = rint(camera.look_at[i] / step) * step;
+    }
+    camera.view_height = rint(camera.view_height / step) * step;
+    return camera;
+}
+
+nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
+{
+    const nebel_scene_desc desc = {.log = draft->log};
+    nebel_scene_data changed = draft->data;
+    changed.camera = draft->file.camera;
+    if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = round_camera(draft->data.camera);
+    const nebel_result result = nebel_save_scene(path, &desc, &changed);
+    if (result != NEBEL_OK) return result;
+    draft->file = changed;
+    memcpy(draft->written, draft->volumes, changed.volume_count * sizeof *draft->written);
+    return NEBEL_OK;
 }

@@ -14,23 +14,24 @@ extern "C" {
 typedef struct nb_panel {
     const char *scene;          /* the file's name */
     const char *driver;         /* of OpenGL */
+    const nebel_scene *source;  /* as it was read */
     nebel_scene_data *data;     /* camera and light are changed in place */
     nebel_volume_desc *volumes; /* changed in place: those of `data` */
-    const nebel_volume_origin *origins;
     nb_look *look;
     double *frame;       /* of what moves */
-    double last_frame;   /* 0: nothing moves */
-    const char *message; /* "": none */
-    const char *picture; /* what of the picture is done */
-    double seconds;      /* that OpenGL took for the last one */
-    uint32_t particles;
-    int is_changed;        /* the draft is not what the file says */
+    int moves;           /* whether anything does */
+    int camera_is_keyed; /* ... the camera */
+    int saves_camera;
+    const char *message;   /* "": none */
+    const char *picture;   /* what of the picture is done */
+    double seconds;        /* that OpenGL took for the last one */
+    int is_changed;        /* something is not as the file says */
     int file_is_newer;     /* ... and the file has changed, too */
     int shown, help_shown; /* the controls, the list of keys */
 
     /* Answers of the last nb_panel_draw. */
     int fog_changed, light_changed, camera_changed, frame_changed, look_changed;
-    int wants_save, wants_reload, wants_home, wants_screenshot;
+    int wants_save, wants_reload, wants_home;
 } nb_panel;
 
 /* `window` is a GLFWwindow whose context of OpenGL is current; its callbacks are chained to. 0, or -1 where memory is

@@ -153,7 +153,8 @@ nebel_result nb_stage_draw(nb_stage *stage, const nebel_camera *camera, uint32_t
     if (moving) return draw_moving(stage, camera, width, height, look);
     if (stage->state == NB_STAGE_FINE) return NEBEL_OK;
     const int fine = stage->state == NB_STAGE_WHOLE;
-    const uint32_t samples = fine ? (uint32_t)look->samples : 1;
+    /* Beside the picture of the CPU one sample is enough: both look through the centres of the pixels then. */
+    const uint32_t samples = fine && look->compare == NB_LOOK_GL_ALONE ? (uint32_t)look->samples : 1;
     if (fine && samples == 1) {
         stage->state = NB_STAGE_FINE;
         return NEBEL_OK;

@@ -11,9 +11,12 @@
 #include "picture.h"
 #include "screen.h"
 #include "stage.h"
+#include "twin.h"
+#include "watch.h"
 #include "window.h"
 
 #include <stdio.h>
+#include <string.h>
 
 /* How long after the last movement the picture waits before it becomes whole [s]. */
 static const double rest = 0.15;
@@ -24,6 +27,9 @@ typedef struct viewer {
     nb_draft draft;
     nb_stage stage;
     nb_screen screen;
+    nb_twin *twin; /* NULL: nobody has asked for it yet */
+    int twin_is_stale, has_cpu;
+    nb_watch watch;
     nb_hands hands;
     nb_panel panel;
     nb_look look;
@@ -31,6 +37,7 @@ typedef struct viewer {
     nebel_log log;
     char message[512]; /* the last one, for the window */
     double moved;      /* when something changed last [s] */
+    double frame;
     int wants_picture, wants_window_picture;
 } viewer;
 
@@ -84,6 +91,7 @@ static nebel_result open_stage(viewer *all)
 static int open_viewer(viewer *all)
 {
     const nb_view_settings *const settings = all->settings;
+    nb_watch_take(&all->watch, settings->scene);
     nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
     if (result != NEBEL_OK) return fail(all, result);
     set_home(all);
@@ -98,6 +106,7 @@ static int open_viewer(viewer *all)
 
 static void close_viewer(viewer *all)
 {
+    nb_twin_close(all->twin);
     if (all->window.has_panel) nb_panel_close();
     nb_stage_close(&all->stage);
     nb_screen_close(&all->screen);
@@ -105,13 +114,14 @@ static void close_viewer(viewer *all)
     nb_draft_close(&all->draft);
 }
 
-/* ---- one turn
- * --------------------------------------------------------------------------------------------------------
+/* ---- changes
+ * ---------------------------------------------------------------------------------------------------------
  */
 
 static void note_change(viewer *all)
 {
     all->moved = all->window.time;
+    all->twin_is_stale = 1;
     if (all->stage.state > NB_STAGE_COARSE) all->stage.state = NB_STAGE_COARSE;
 }
 
@@ -120,13 +130,69 @@ static int is_moving(const viewer *all)
     return all->settings->screenshot == NULL && all->window.time - all->moved < rest;
 }
 
-static nebel_result commit(viewer *all)
+static void say(viewer *all, const char *words)
 {
-    const nebel_result result = nb_draft_commit(&all->draft);
-    if (result != NEBEL_OK && result != NEBEL_ERROR_VALUE) return result;
+    (void)snprintf(all->message, sizeof all->message, "%s", words);
+}
+
+/* What the fog does not take is undone and said; memory that is out ends the program. */
+static nebel_result use_fog(viewer *all, nebel_result committed)
+{
+    if (committed == NEBEL_ERROR_MEMORY) return committed;
     note_change(all);
     return nebel_set_gl_renderer_fog(all->stage.renderer, all->draft.snapshot);
 }
+
+static nebel_result commit(viewer *all)
+{
+    say(all, "");
+    return use_fog(all, nb_draft_commit(&all->draft));
+}
+
+/* The view stays where somebody has moved it, unless the file has another camera now. */
+static nebel_result read_again(viewer *all)
+{
+    nb_draft fresh;
+    const nebel_camera view = all->draft.data.camera, before = nebel_scene_contents(all->draft.scene)->camera;
+    say(all, "");
+    nb_watch_take(&all->watch, all->settings->scene);
+    all->panel.file_is_newer = 0;
+    if (nb_draft_open(all->settings->scene, all->draft.frame, &all->log, &fresh) != NEBEL_OK) return NEBEL_OK;
+    nb_twin_close(all->twin);
+    all->twin = NULL;
+    nb_stage_close(&all->stage);
+    nb_draft_close(&all->draft);
+    all->draft = fresh;
+    set_home(all);
+    if (memcmp(&before, &nebel_scene_contents(fresh.scene)->camera, sizeof before) == 0) all->draft.data.camera = view;
+    note_change(all);
+    nb_report_message("view: read %s again", all->settings->scene);
+    return open_stage(all);
+}
+
+static nebel_result watch_file(viewer *all)
+{
+    if (!nb_watch_is_changed(&all->watch, all->settings->scene)) return NEBEL_OK;
+    if (!nb_draft_is_changed(&all->draft)) return read_again(all);
+    all->panel.file_is_newer = 1;
+    return NEBEL_OK;
+}
+
+static void save(viewer *all)
+{
+    const char *const path = all->settings->scene;
+    const int was_newer = all->panel.file_is_newer;
+    say(all, "");
+    if (nb_draft_save(&all->draft, path, all->panel.saves_camera) != NEBEL_OK) return;
+    if (!was_newer) nb_watch_take(&all->watch, path); /* otherwise what else has changed there is read, too */
+    all->panel.file_is_newer = 0;
+    say(all, "Saved.");
+    nb_report_message("view: saved %s", path);
+}
+
+/* ---- one turn
+ * --------------------------------------------------------------------------------------------------------
+ */
 
 static void obey_keys(viewer *all)
 {
@@ -139,6 +205,7 @@ static void obey_keys(viewer *all)
     if (hands->wants_help) all->panel.help_shown = !all->panel.help_shown;
     if (hands->wants_panel) all->panel.shown = !all->panel.shown;
     if (hands->changed_look) note_change(all);
+    if (hands->wants_save) save(all);
     all->wants_picture |= hands->wants_picture;
     all->wants_window_picture |= hands->wants_window_picture;
     if (hands->wants_end) nb_window_end(&all->window);
@@ -148,8 +215,10 @@ static nebel_result obey_panel(viewer *all)
 {
     const nb_panel *const panel = &all->panel;
     if (panel->wants_home) all->draft.data.camera = all->home;
-    if (panel->camera_changed || panel->light_changed || panel->wants_home) note_change(all);
-    if (panel->look_changed) note_change(all);
+    if (panel->camera_changed || panel->light_changed || panel->wants_home || panel->look_changed) note_change(all);
+    if (panel->wants_save) save(all);
+    if (panel->wants_reload || all->hands.wants_reload) return read_again(all);
+    if (panel->frame_changed) return use_fog(all, nb_draft_set_frame(&all->draft, all->frame));
     return panel->fog_changed || panel->light_changed ? commit(all) : NEBEL_OK;
 }
 
@@ -157,14 +226,59 @@ static void fill_panel(viewer *all)
 {
     static const char *const states[] = {"", "moving: fewer pixels", "refining", "complete"};
     nb_panel *const panel = &all->panel;
+    const nebel_scene_data *const data = &all->draft.data;
     panel->scene = all->settings->scene;
     panel->driver = all->window.driver;
+    panel->source = all->draft.scene;
     panel->data = &all->draft.data;
     panel->volumes = all->draft.volumes;
     panel->look = &all->look;
+    all->frame = all->draft.frame;
+    panel->frame = &all->frame;
+    panel->camera_is_keyed = !nb_draft_can_save_camera(&all->draft);
+    panel->moves = data->moving_volume_count > 0 || data->camera_key_count > 0 || data->turntable_frames > 0;
+    panel->is_changed = nb_draft_is_changed(&all->draft);
     panel->message = all->message;
     panel->picture = states[all->stage.state];
     panel->seconds = all->stage.seconds;
+}
+
+/* ---- the CPU's picture
+ * ------------------------------------------------------------------------------------------------
+ */
+
+static void ask_twin(viewer *all)
+{
+    const nb_twin_wish wish = {.camera = all->draft.data.camera,
+                               .width = all->window.width,
+                               .height = all->window.height,
+                               .plane = all->look.plane,
+                               .light = all->draft.data,
+                               .fog = all->draft.snapshot};
+    if (all->twin == NULL) all->twin = nb_twin_open(&all->draft.data);
+    if (all->twin == NULL) {
+        say(all, "Memory or threads are out for the picture of the CPU.");
+        return;
+    }
+    nb_twin_ask(all->twin, &wish);
+    all->twin_is_stale = 0;
+}
+
+static void compare(viewer *all)
+{
+    nb_twin_picture picture;
+    if (all->look.compare == NB_LOOK_GL_ALONE) return;
+    if (all->twin_is_stale) ask_twin(all);
+    if (all->twin == NULL || !nb_twin_take(all->twin, &picture)) return;
+    nb_screen_set_cpu(&all->screen, picture.width, picture.height, picture.rgb);
+    all->has_cpu = 1;
+}
+
+static int is_complete(const viewer *all)
+{
+    if (all->stage.state != NB_STAGE_FINE) return 0;
+    return all->look.compare == NB_LOOK_GL_ALONE || all->twin == NULL ||
+           (!all->twin_is_stale && nb_twin_is_done(all->twin));
 }
 
 /* ---- pictures
@@ -186,7 +300,7 @@ static int take_pictures(viewer *all, int with_controls)
 {
     const char *const screenshot = all->settings->screenshot;
     int *const wanted = with_controls ? &all->wants_window_picture : &all->wants_picture;
-    if (all->stage.state != NB_STAGE_FINE) return NB_DONE;
+    if (!is_complete(all)) return NB_DONE;
     if (screenshot != NULL && with_controls) {
         nb_window_end(&all->window);
         return nb_picture_write(screenshot, all->window.width, all->window.height, &all->log);
@@ -199,7 +313,8 @@ static int take_pictures(viewer *all, int with_controls)
 static int show(viewer *all)
 {
     const nb_window *const window = &all->window;
-    nb_screen_draw(&all->screen, all->stage.texture, 0, &all->look, window->width, window->height);
+    compare(all);
+    nb_screen_draw(&all->screen, all->stage.texture, all->has_cpu, &all->look, window->width, window->height);
     int status = take_pictures(all, 0);
     fill_panel(all);
     nb_panel_draw(&all->panel, all->settings->controls);
@@ -211,7 +326,7 @@ static int show(viewer *all)
 static int turn(viewer *all)
 {
     nb_window *const window = &all->window;
-    nb_window_wait(window, is_moving(all) || all->stage.state != NB_STAGE_FINE || nb_hands_are_busy(&all->hands));
+    nb_window_wait(window, is_moving(all) || !is_complete(all) || nb_hands_are_busy(&all->hands));
     if (nb_window_is_lost(window)) {
         return nb_report_failure("view: the graphics driver was reset and its context is lost; start the viewer again");
     }
@@ -219,7 +334,9 @@ static int turn(viewer *all)
     if (window->was_resized) note_change(all);
     nb_hands_move(&all->hands, window, &all->draft.data.camera, &all->look);
     obey_keys(all);
-    const nebel_result result =
+    nebel_result result = watch_file(all);
+    if (result != NEBEL_OK) return fail(all, result);
+    result =
         nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &all->look, is_moving(all));
     if (result != NEBEL_OK) return fail(all, result);
     const int status = show(all);

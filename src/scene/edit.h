@@ -1,0 +1,62 @@
+/* Changes to a text: other numbers at the places of values, everything else as it was. */
+#ifndef NB_SCENE_EDIT_H
+#define NB_SCENE_EDIT_H
+
+#include "scene/file.h"
+#include "scene/json.h"
+
+typedef struct nb_edit_piece {
+    size_t offset, size; /* what goes */
+    char *words;         /* what comes in its place; in the edit's arena */
+} nb_edit_piece;
+
+/* The text lives as long as the edit. */
+typedef struct nb_edit {
+    const char *text;
+    size_t size;
+    nb_arena arena;
+    nb_edit_piece *pieces;
+    size_t count, capacity;
+    bool out_of_memory; /* one or more pieces are missing */
+} nb_edit;
+
+/* An object of the text, and the member behind which others may be added. */
+typedef struct nb_edit_object {
+    const nb_json_node *node;  /* NULL: not in the text */
+    size_t last_key, last_end; /* of its last member */
+} nb_edit_object;
+
+/* Of a tree that is complete; NULL: none. */
+nb_edit_object nb_edit_find(const nb_json *json, const nb_json_node *object);
+
+/* The member of that name; NULL: none. */
+const nb_json_node *nb_edit_member(const nb_json *json, const nb_json_node *object, const char *key);
+
+typedef enum nb_edit_style {
+    NB_EDIT_EACH,  /* of an array, the elements that change */
+    NB_EDIT_WHOLE, /* all of them: they mean something together */
+    NB_EDIT_AMOUNT /* each; three equal numbers may be one */
+} nb_edit_style;
+
+/* Puts numbers that are not what they were in the place of the key's value. A key that is missing is added. */
+void nb_edit_numbers(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, size_t count,
+                     const double *was, const double *now, nb_edit_style style);
+
+/* Puts a word in quotes in the place of the key's value, or adds it. */
+void nb_edit_word(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, const char *word);
+
+/* Adds a member whose value is given as JSON. */
+void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, const char *value);
+
+void nb_edit_replace(nb_edit *edit, const nb_json_node *node, const char *value);
+
+/* Writes 1 or more numbers as JSON. The text holds at least NB_EDIT_NUMBERS characters. */
+#define NB_EDIT_NUMBERS 128
+void nb_edit_write_numbers(size_t count, const double *numbers, nb_edit_style style, char *text);
+
+/* The text with all changes. False when memory is out. Free bytes->data with nb_release. */
+bool nb_edit_apply(nb_edit *edit, nb_bytes *bytes);
+
+void nb_edit_release(nb_edit *edit);
+
+#endif

@@ -1,0 +1,297 @@
+/* Numbers written back into scene files: what changes, and that nothing else does. */
+#define _POSIX_C_SOURCE 200809L
+
+#include "scene_help.h"
+
+#include <math.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/nebel_save_XXXXXX";
+
+static const char *file_path(void)
+{
+    static char path[128];
+    snprintf(path, sizeof path, "%s/scene.json", folder);
+    return path;
+}
+
+static void write_file(const char *text)
+{
+    FILE *file = fopen(file_path(), "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(text, 1, strlen(text), file), strlen(text));
+    assert_int_equal(fclose(file), 0);
+}
+
+static char *read_file(void)
+{
+    static char text[65536];
+    FILE *file = fopen(file_path(), "rb");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    return text;
+}
+
+/* A scene with volumes that can be changed. */
+typedef struct draft {
+    nebel_scene *scene;
+    nebel_scene_data data;
+    nebel_volume_desc volumes[8];
+} draft;
+
+static draft open_draft(const char *text)
+{
+    journal kept = {0};
+    const nebel_scene_desc desc = {.log = {remember, &kept}};
+    draft d = {0};
+    write_file(text);
+    if (nebel_load_scene(file_path(), &desc, &d.scene) != NEBEL_OK) fail_msg("%s", kept.last);
+    d.data = *nebel_scene_contents(d.scene);
+    for (size_t i = 0; i < d.data.volume_count; i++) d.volumes[i] = d.data.volumes[i];
+    return d;
+}
+
+static nebel_result save(draft *d, journal *kept)
+{
+    meter m;
+    const nebel_scene_desc desc = metered_desc(&m, kept);
+    d->data.volumes = d->volumes;
+    const nebel_result result = nebel_save_scene(file_path(), &desc, &d->data);
+    assert_int_equal(m.live, 0);
+    nebel_destroy_scene(d->scene);
+    return result;
+}
+
+static void check_saved(draft *d, const char *wanted)
+{
+    journal kept;
+    if (save(d, &kept) != NEBEL_OK) fail_msg("%s", kept.last);
+    assert_string_equal(read_file(), wanted);
+}
+
+#define SCENE(sections) "{ \"nebel\": 1,\n  " sections "\n}\n"
+#define BOX "\"shape\": {\"type\": \"box\", \"min\": [-1, -2, -3], \"max\": [1, 2.50, 3]}"
+
+/* ---- in place
+ * -------------------------------------------------------------------------------------------------------- */
+
+static void test_only_what_changes_is_written(void **state)
+{
+    (void)state;
+    static const char before[] = SCENE("// a remark\n \"fog\": [ {" BOX ",\t\"visibility\" : 1e1 /* thick */ ,\n"
+                                       " \"source\": \"#fff\"} ]"),
+                      after[] = SCENE("// a remark\n \"fog\": [ {\"shape\": {\"type\": \"box\", \"min\": [-1, -2, -3], "
+                                      "\"max\": [1, 2.75, 3]},\t\"visibility\" : 20 /* thick */ ,\n"
+                                      " \"source\": [0.5, 0.25, 1]} ]");
+    draft d = open_draft(before);
+    check_saved(&d, before);
+    d = open_draft(before);
+    d.volumes[0].shape.max[1] = 2.75;
+    for (int c = 0; c < 3; c++) d.volumes[0].extinction[c] = nebel_extinction_from_visibility(20, 0);
+    d.volumes[0].source[0] = .5;
+    d.volumes[0].source[1] = .25;
+    check_saved(&d, after);
+}
+
+static void test_amounts_keep_their_word(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [{" BOX ", \"extinction\": 0.1}, {" BOX
+                               ", \"mean_free_path\": [1, 2, 4]}, {" BOX ", \"contrast\": 0.02, \"visibility\": 5}]"));
+    for (int c = 0; c < 3; c++) d.volumes[0].extinction[c] = .2;
+    d.volumes[1].extinction[2] = .125;
+    d.volumes[2].extinction[1] = nebel_extinction_from_visibility(50, .02);
+    check_saved(&d, SCENE("\"fog\": [{" BOX ", \"extinction\": 0.2}, {" BOX ", \"mean_free_path\": [1, 2, 8]}, {" BOX
+                          ", \"contrast\": 0.02, \"visibility\": [5, 50, 5]}]"));
+}
+
+static void test_shapes_and_densities(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2, "
+                               "\"transform\": {\"scale\": 2}},"
+                               " \"density\": {\"type\": \"radial\", \"power\": 1}, \"extinction\": 1},"
+                               " {\"shape\": {\"type\": \"world\"}, \"density\": {\"type\": \"height\", "
+                               "\"scale_height\": 4, \"below\": \"grow\"},"
+                               " \"priority\": 1, \"extinction\": 1}]"));
+    d.volumes[0].shape.radius = 3;
+    d.volumes[0].shape.transform.scale[2] = 4;
+    d.volumes[0].shape.transform.position[0] = 7;
+    d.volumes[0].density.power = 3;
+    d.volumes[1].density.base = -.1;
+    d.volumes[1].density.below = NEBEL_BELOW_CONSTANT;
+    d.volumes[1].priority = 5;
+    check_saved(&d, SCENE("\"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 3, "
+                          "\"transform\": {\"scale\": "
+                          "[2, 2, 4], \"position\": [7, 0, 0]}},"
+                          " \"density\": {\"type\": \"radial\", \"power\": 3}, \"extinction\": 1},"
+                          " {\"shape\": {\"type\": \"world\"}, \"density\": {\"type\": \"height\", \"scale_height\": "
+                          "4, \"below\": \"constant\","
+                          " \"base\": -0.1},"
+                          " \"priority\": 5, \"extinction\": 1}]"));
+}
+
+/* ---- in addition
+ * ----------------------------------------------------------------------------------------------------- */
+
+static void test_keys_are_added_as_their_neighbours_stand(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [\n    {\n      " BOX ",\n      \"extinction\": 0.1 // thin\n    }\n  ]"));
+    d.volumes[0].source[1] = 1;
+    d.volumes[0].emission[0] = d.volumes[0].emission[1] = d.volumes[0].emission[2] = .5;
+    d.data.ambient[2] = .75;
+    d.data.camera.position[1] = 2;
+    check_saved(&d, SCENE("\"fog\": [\n    {\n      " BOX ",\n      \"extinction\": 0.1, // thin\n"
+                          "      \"source\": [0, 1, 0],\n      \"emission\": 0.5\n    }\n  ],\n"
+                          "  \"camera\": { \"position\": [0, 2, 0], \"look_at\": [0, 1.7, -1] },\n"
+                          "  \"ambient\": [0, 0, 0.75]"));
+}
+
+static void test_a_transform_is_added(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [{" BOX ", \"extinction\": 1}]"));
+    d.volumes[0].shape.transform.position[2] = 1.5;
+    check_saved(&d, SCENE("\"fog\": [{\"shape\": {\"type\": \"box\", \"min\": [-1, -2, -3], \"max\": [1, 2.50, 3], "
+                          "\"transform\": { \"position\": [0, 0, 1.5] }}, \"extinction\": 1}]"));
+}
+
+/* ---- camera and light
+ * ------------------------------------------------------------------------------------------------ */
+
+static void test_camera_and_light(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"camera\": {\"position\": [0, 1, 2]}, \"background\": \"#000\", \"ambient\": 1,\n"
+                               "  \"sun\": {\"direction\": [0, 2, 0], \"irradiance\": [1, 2, 3]}, \"fog\": []"));
+    d.data.camera.position[0] = 5;
+    d.data.camera.vertical_fov = 60;
+    d.data.background[0] = d.data.background[1] = d.data.background[2] = .5;
+    d.data.ambient[0] = 2;
+    d.data.sun_direction[0] = .6, d.data.sun_direction[1] = .8;
+    d.data.sun_irradiance[2] = 4;
+    check_saved(&d, SCENE("\"camera\": {\"position\": [5, 1, 2], \"look_at\": [0, 1, 1], \"vertical_fov\": 60}, "
+                          "\"background\": 0.5, \"ambient\": [2, 1, 1],\n"
+                          "  \"sun\": {\"direction\": [0.6, 0.8, 0], \"irradiance\": [1, 2, 4]}, \"fog\": []"));
+}
+
+/* ---- other units
+ * ----------------------------------------------------------------------------------------------------- */
+
+static void test_the_units_of_the_file(void **state)
+{
+    (void)state;
+    static const char before[] =
+        SCENE("\"up\": \"z\", \"unit\": 0.01, \"camera\": {\"position\": [100, 200, 300], \"look_at\": [0, 0, 0]},"
+              " \"fog\": [{" BOX ", \"visibility\": 500, \"emission\": 0.1}]");
+    draft d = open_draft(before);
+    check_saved(&d, before);
+    d = open_draft(before);
+    d.data.camera.position[1] = 7;
+    d.volumes[0].shape.max[1] = .07;
+    d.volumes[0].shape.max[2] = .04;
+    for (int c = 0; c < 3; c++) d.volumes[0].extinction[c] /= 2;
+    d.volumes[0].emission[0] = 20;
+    check_saved(
+        &d, SCENE("\"up\": \"z\", \"unit\": 0.01, \"camera\": {\"position\": [100, 200, 700], \"look_at\": [0, 0, 0]},"
+                  " \"fog\": [{\"shape\": {\"type\": \"box\", \"min\": [-1, -4, -3], \"max\": [1, 2.50, 7]}, "
+                  "\"visibility\": 1000, \"emission\": [0.2, 0.1, 0.1]}]"));
+}
+
+/* ---- what is not written
+ * ------------------------------------------------------------------------------------------ */
+
+static void test_volumes_that_are_made_of_something_else_stay(void **state)
+{
+    (void)state;
+    static const char before[] =
+        SCENE("\"fog\": [{" BOX ", \"extinction\": 1, \"keys\": [{\"frame\": 3, \"extinction\": 2}]}]");
+    draft d = open_draft(before);
+    d.volumes[0].extinction[0] = 7;
+    check_saved(&d, before);
+}
+
+/* The file is what it was after every error. */
+static void check_refused(const char *now, draft *d, nebel_result wanted, const char *message)
+{
+    journal kept;
+    write_file(now);
+    assert_int_equal(save(d, &kept), wanted);
+    if (strstr(kept.last, message) == NULL) fail_msg("%s", kept.last);
+    assert_string_equal(read_file(), now);
+}
+
+static void test_what_is_refused(void **state)
+{
+    (void)state;
+    static const char visible[] = SCENE("\"fog\": [{" BOX ", \"visibility\": 5}]"), none[] = SCENE("\"fog\": []"),
+                      ball[] =
+                          SCENE("\"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1}, "
+                                "\"visibility\": 5}]");
+    draft d = open_draft(visible);
+    d.volumes[0].extinction[1] = 0;
+    check_refused(visible, &d, NEBEL_ERROR_VALUE, "fog[0].visibility: cannot be written");
+    d = open_draft(visible);
+    d.volumes[0].shape.max[0] = -5;
+    check_refused(visible, &d, NEBEL_ERROR_FORMAT, "max[0]");
+    d = open_draft(visible);
+    check_refused(none, &d, NEBEL_ERROR_ARGUMENT, "0 volumes of fog where 1");
+    d = open_draft(visible);
+    check_refused(ball, &d, NEBEL_ERROR_ARGUMENT, "another volume");
+    d = open_draft(visible);
+    check_refused("{", &d, NEBEL_ERROR_FORMAT, "scene.json:");
+}
+
+static void test_memory_runs_out(void **state)
+{
+    (void)state;
+    static const char before[] = SCENE("\"ambient\": 1, \"fog\": [{" BOX ", \"visibility\": 5}]");
+    for (long fail_at = 0;; fail_at++) {
+        draft d = open_draft(before);
+        meter m;
+        journal kept;
+        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        m.fail_at = fail_at;
+        d.volumes[0].shape.max[0] = 5;
+        d.volumes[0].source[0] = 5;
+        d.data.volumes = d.volumes;
+        const nebel_result result = nebel_save_scene(file_path(), &desc, &d.data);
+        assert_int_equal(m.live, 0);
+        nebel_destroy_scene(d.scene);
+        if (result == NEBEL_OK) return;
+        assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        assert_string_equal(read_file(), before);
+    }
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) == NULL;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    unlink(file_path());
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_only_what_changes_is_written),
+        cmocka_unit_test(test_amounts_keep_their_word),
+        cmocka_unit_test(test_shapes_and_densities),
+        cmocka_unit_test(test_keys_are_added_as_their_neighbours_stand),
+        cmocka_unit_test(test_a_transform_is_added),
+        cmocka_unit_test(test_camera_and_light),
+        cmocka_unit_test(test_the_units_of_the_file),
+        cmocka_unit_test(test_volumes_that_are_made_of_something_else_stay),
+        cmocka_unit_test(test_what_is_refused),
+        cmocka_unit_test(test_memory_runs_out),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,219 @@
+#include "twin.h"
+
+#include <nebel/render.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <threads.h>
+
+/* The first picture has one pixel of so many either way; each that follows has half. */
+enum { COARSEST = 8 };
+
+struct nb_twin {
+    nebel_scene_data scene; /* of the thread, with the light of the wish */
+    thrd_t thread;
+    mtx_t lock; /* of all that follows */
+    cnd_t news;
+    nb_twin_wish wish;
+    int is_asked, is_ended, is_working, is_fresh;
+    nb_twin_picture made, taken;
+};
+
+/* ---- the thread
+ * ------------------------------------------------------------------------------------------------------
+ */
+
+typedef struct work {
+    nb_twin *twin;
+    nebel_renderer *renderer;
+    nb_twin_wish wish;
+    int may_stop;
+} work;
+
+static int is_out_of_date(nb_twin *twin)
+{
+    mtx_lock(&twin->lock);
+    const int is = twin->is_asked || twin->is_ended;
+    mtx_unlock(&twin->lock);
+    return is;
+}
+
+static int stop(size_t done, size_t total, void *user)
+{
+    const work *const w = user;
+    (void)done, (void)total;
+    return w->may_stop && is_out_of_date(w->twin);
+}
+
+static nebel_result render(work *w, const nb_twin_picture *picture)
+{
+    const size_t pixels = (size_t)picture->width * picture->height;
+    const nebel_frame_desc desc = {.camera = w->wish.camera,
+                                   .width = picture->width,
+                                   .height = picture->height,
+                                   .samples = 1,
+                                   .progress = stop,
+                                   .progress_user = w};
+    nebel_frame frame = {.color = NULL};
+    float **const planes[NB_LOOK_PLANES] = {&frame.color, &frame.transmittance, &frame.in_scattering, &frame.depth};
+    *planes[w->wish.plane] = picture->rgb;
+    const nebel_result result = nebel_render_frame(w->renderer, &desc, &frame);
+    if (result != NEBEL_OK || w->wish.plane != NB_LOOK_DEPTH) return result;
+    for (size_t i = pixels; i-- > 0;) {
+        const float depth = picture->rgb[i] < 1e18f ? picture->rgb[i] : 1e18f;
+        for (size_t c = 0; c < 3; c++) picture->rgb[3 * i + c] = depth;
+    }
+    return NEBEL_OK;
+}
+
+static void publish(nb_twin *twin, nb_twin_picture picture)
+{
+    mtx_lock(&twin->lock);
+    free(twin->made.rgb);
+    twin->made = picture;
+    twin->is_fresh = 1;
+    mtx_unlock(&twin->lock);
+}
+
+/* Nonzero: go on with the next one. */
+static int make_picture(work *w, uint32_t by)
+{
+    nb_twin_picture picture = {(w->wish.width + by - 1) / by, (w->wish.height + by - 1) / by, NULL};
+    picture.rgb = malloc(sizeof(float[3]) * picture.width * picture.height);
+    if (picture.rgb == NULL) return 0;
+    w->may_stop = by < COARSEST;
+    if (render(w, &picture) != NEBEL_OK) {
+        free(picture.rgb);
+        return 0;
+    }
+    publish(w->twin, picture);
+    return !is_out_of_date(w->twin);
+}
+
+/* The light goes over here, where no frame is under way. */
+static void take_light(nebel_scene_data *scene, const nebel_scene_data *light)
+{
+    memcpy(scene->background, light->background, sizeof scene->background);
+    memcpy(scene->ambient, light->ambient, sizeof scene->ambient);
+    memcpy(scene->sun_direction, light->sun_direction, sizeof scene->sun_direction);
+    memcpy(scene->sun_irradiance, light->sun_irradiance, sizeof scene->sun_irradiance);
+}
+
+static nebel_result prepare(work *w)
+{
+    nb_twin *const twin = w->twin;
+    const nebel_renderer_desc desc = {.threads = 0};
+    take_light(&twin->scene, &w->wish.light);
+    if (w->renderer != NULL) return nebel_set_renderer_fog(w->renderer, w->wish.fog);
+    return nebel_create_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
+}
+
+/* Waits for a wish; 0 at the end. */
+static int take_wish(work *w)
+{
+    nb_twin *const twin = w->twin;
+    mtx_lock(&twin->lock);
+    twin->is_working = 0;
+    while (!twin->is_asked && !twin->is_ended) cnd_wait(&twin->news, &twin->lock);
+    const int goes_on = !twin->is_ended;
+    if (goes_on) {
+        w->wish = twin->wish;
+        twin->wish.fog = NULL;
+        twin->is_asked = 0;
+        twin->is_working = 1;
+    }
+    mtx_unlock(&twin->lock);
+    return goes_on;
+}
+
+static int run(void *user)
+{
+    work w = {.twin = user};
+    while (take_wish(&w)) {
+        uint32_t by = COARSEST;
+        if (prepare(&w) == NEBEL_OK) {
+            while (make_picture(&w, by) && by > 1) by /= 2;
+        }
+        nebel_release_snapshot(w.wish.fog);
+    }
+    nebel_destroy_renderer(w.renderer);
+    return 0;
+}
+
+/* ---- the window's side
+ * ------------------------------------------------------------------------------------------------
+ */
+
+static int start(nb_twin *twin)
+{
+    if (mtx_init(&twin->lock, mtx_plain) != thrd_success) return -1;
+    if (cnd_init(&twin->news) == thrd_success) {
+        if (thrd_create(&twin->thread, run, twin) == thrd_success) return 0;
+        cnd_destroy(&twin->news);
+    }
+    mtx_destroy(&twin->lock);
+    return -1;
+}
+
+nb_twin *nb_twin_open(const nebel_scene_data *scene)
+{
+    nb_twin *const twin = calloc(1, sizeof *twin);
+    if (twin == NULL) return NULL;
+    twin->scene = *scene;
+    if (start(twin) == 0) return twin;
+    free(twin);
+    return NULL;
+}
+
+void nb_twin_close(nb_twin *twin)
+{
+    if (twin == NULL) return;
+    mtx_lock(&twin->lock);
+    twin->is_ended = 1;
+    cnd_signal(&twin->news);
+    mtx_unlock(&twin->lock);
+    (void)thrd_join(twin->thread, NULL);
+    nebel_release_snapshot(twin->wish.fog);
+    cnd_destroy(&twin->news);
+    mtx_destroy(&twin->lock);
+    free(twin->made.rgb);
+    free(twin->taken.rgb);
+    free(twin);
+}
+
+void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish)
+{
+    nebel_snapshot *const fog = nebel_retain_snapshot(wish->fog);
+    mtx_lock(&twin->lock);
+    nebel_snapshot *const before = twin->wish.fog;
+    twin->wish = *wish;
+    twin->wish.fog = fog;
+    twin->is_asked = 1;
+    cnd_signal(&twin->news);
+    mtx_unlock(&twin->lock);
+    nebel_release_snapshot(before);
+}
+
+int nb_twin_take(nb_twin *twin, nb_twin_picture *picture)
+{
+    mtx_lock(&twin->lock);
+    const int is_fresh = twin->is_fresh;
+    if (is_fresh) {
+        free(twin->taken.rgb);
+        twin->taken = twin->made;
+        twin->made.rgb = NULL;
+        twin->is_fresh = 0;
+    }
+    mtx_unlock(&twin->lock);
+    *picture = twin->taken;
+    return is_fresh;
+}
+
+int nb_twin_is_done(nb_twin *twin)
+{
+    mtx_lock(&twin->lock);
+    const int is = !twin->is_asked && !twin->is_working && !twin->is_fresh;
+    mtx_unlock(&twin->lock);
+    return is;
+}

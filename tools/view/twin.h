@@ -1,0 +1,41 @@
+/* The picture of the CPU beside that of OpenGL, made by a thread of its own: a few pixels at once, then more and more.
+ */
+#ifndef NB_TWIN_H
+#define NB_TWIN_H
+
+#include "look.h"
+
+#include <nebel/scene.h>
+
+typedef struct nb_twin nb_twin;
+
+/* What should be seen. Copied; the snapshot is retained. */
+typedef struct nb_twin_wish {
+    nebel_camera camera;
+    uint32_t width, height;
+    nb_look_plane plane;
+    nebel_scene_data light; /* sun, ambient and background of it */
+    nebel_snapshot *fog;
+} nb_twin_wish;
+
+typedef struct nb_twin_picture {
+    uint32_t width, height;
+    float *rgb; /* top row first; depth is in all three */
+} nb_twin_picture;
+
+/* The meshes and textures of `scene` must outlive the twin. NULL where memory or threads are out. */
+nb_twin *nb_twin_open(const nebel_scene_data *scene);
+
+/* Waits for the thread. NULL is fine. */
+void nb_twin_close(nb_twin *twin);
+
+/* In place of what was asked for before. */
+void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish);
+
+/* The latest picture, where there is one that was not taken yet: nonzero. It is good until the next call. */
+int nb_twin_take(nb_twin *twin, nb_twin_picture *picture);
+
+/* Whether nothing better than the last picture will come. */
+int nb_twin_is_done(nb_twin *twin);
+
+#endif
