@@ -132,7 +132,7 @@ static void test_bad_input(void **state)
     const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages)};
     random_fog_make(&fog, RANDOM_FOG_PARTS, 1);
     nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
-    const double eye[3] = {0, 0, 0}, nowhere[3] = {0, NAN, 0}, far[3] = {2e15, 0, 0};
+    const double eye[3] = {0, 0, 0}, nowhere[3] = {0, (double)NAN, 0}, far[3] = {2e15, 0, 0};
     static nebel_word words[4096];
     size_t count = 0;
     const size_t calls = memory.calls;

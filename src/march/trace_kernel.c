@@ -344,6 +344,7 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
         return g;
     }
     open_window(m, nb_any(watched));
+    if (nb_any(watched)) pass_ends(m, &g, t, watched); /* of fog that the ray may start in */
     piece p;
     while (next_piece(m, t, lanes, &p)) {
         const int foggy = mark_inside(m, &p);
