@@ -176,12 +176,19 @@ bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node
 /* ---- camera and light
  * ------------------------------------------------------------------------------------------------ */
 
+static bool is_same_camera(const nebel_camera *a, const nebel_camera *b)
+{
+    for (int i = 0; i < 3; i++)
+        if (a->position[i] != b->position[i] || a->look_at[i] != b->look_at[i] || a->up[i] != b->up[i]) return false;
+    return a->vertical_fov == b->vertical_fov && a->view_height == b->view_height && a->projection == b->projection;
+}
+
 /* Without a look_at of its own a camera looks ahead from wherever it is, so that one that moves needs one. */
 static void save_camera(nb_save *save, const nb_scene_reader *in)
 {
     const nb_json_node *camera = nb_edit_member(in->json, save->root.node, "camera");
     nebel_camera was = in->scene->data.camera, now = save->changed->camera;
-    if (memcmp(&was, &now, sizeof was) == 0) return;
+    if (is_same_camera(&was, &now)) return;
     nb_space_restore_camera(&in->space, &was);
     nb_space_restore_camera(&in->space, &now);
     if (nb_edit_member(in->json, camera, "look_at") == NULL) was.look_at[0] = HUGE_VAL;
