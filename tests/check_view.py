@@ -14,6 +14,9 @@ import unittest
 
 from check_cli import FOG, NEBEL, PictureCase, nebel
 
+# As in check_gl_device.py.
+os.environ["ASAN_OPTIONS"] = "detect_leaks=0"
+
 ROUNDING = 0.004  # a byte; the window rounds to the nearest one, a PNG in a pattern
 WAIT = 120  # s; software OpenGL on a busy machine
 
