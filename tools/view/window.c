@@ -119,10 +119,7 @@ int nb_window_open(nb_window *window, const char *title, uint32_t width, uint32_
     (void)snprintf(name, sizeof name, "%s - nebel", title);
     window->handle = make_window(name, width, height);
     if (window->handle == NULL) {
-        const int status = fail("no window with OpenGL 3.3 opens; update the driver, or install Mesa (Debian: "
-                                "libgl1-mesa-dri)");
-        glfwTerminate();
-        return status;
+        return fail("no window with OpenGL 3.3 opens; update the driver, or install Mesa (Debian: libgl1-mesa-dri)");
     }
     glfwMakeContextCurrent(window->handle);
     glfwSwapInterval(1);
@@ -135,11 +132,11 @@ int nb_window_open(nb_window *window, const char *title, uint32_t width, uint32_
     return NB_DONE;
 }
 
+/* GLFW stays until the program ends: it would unload libraries of X that never give back what they keep per display. */
 void nb_window_close(nb_window *window)
 {
     if (window->handle == NULL) return;
     glfwDestroyWindow(window->handle);
-    glfwTerminate();
     window->handle = NULL;
 }
 
