@@ -212,8 +212,13 @@ class FogTest(ViewTest):
 
     def test_the_file_changes(self):
         viewer = Viewer(self)
-        viewer.take_picture()
+        first = viewer.take_picture()
+        viewer.drag(400, 300, 450, 280)
+        turned = viewer.take_picture()
         again = f"view: read {self.scene} again"
+        viewer.say(again, lambda: self.scene.write_text(self.scene.read_text() + " "))
+        self.assertFalse(self.same(first, turned, ROUNDING))
+        self.assertTrue(self.same(viewer.take_picture(), turned, ROUNDING), "the view stays where it is")
         viewer.say(again, lambda: self.write_scene("scene.json", [{**FOG, "extinction": 0.4}], background=[0.2, 0.4, 0.8]))
         self.assertTrue(self.same(viewer.take_picture(), self.draw("second.png"), ROUNDING))
         viewer.say("scene.json:1:", lambda: self.scene.write_text("{"))

@@ -93,7 +93,8 @@ void nb_draft_close(nb_draft *draft)
     *draft = (nb_draft){.scene = NULL};
 }
 
-/* A change that the fog does not take is undone. */
+/* A change that the fog does not take is undone. Volumes are compared as bytes, so that their padding is copied, too.
+ */
 static nebel_result change_volumes(nb_draft *draft)
 {
     nebel_result first = NEBEL_OK;
@@ -101,9 +102,9 @@ static nebel_result change_volumes(nb_draft *draft)
         if (memcmp(&draft->volumes[i], &draft->good[i], sizeof *draft->good) == 0) continue;
         const nebel_result result = nebel_change_volume(draft->fog, draft->ids[i], &draft->volumes[i]);
         if (result == NEBEL_OK) {
-            draft->good[i] = draft->volumes[i];
+            memcpy(&draft->good[i], &draft->volumes[i], sizeof *draft->good);
         } else {
-            draft->volumes[i] = draft->good[i];
+            memcpy(&draft->volumes[i], &draft->good[i], sizeof *draft->good);
             if (first == NEBEL_OK) first = result;
         }
     }

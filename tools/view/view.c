@@ -149,6 +149,14 @@ static nebel_result commit(viewer *all)
     return use_fog(all, nb_draft_commit(&all->draft));
 }
 
+static int is_same_camera(const nebel_camera *a, const nebel_camera *b)
+{
+    const size_t size = sizeof a->position;
+    return memcmp(a->position, b->position, size) == 0 && memcmp(a->look_at, b->look_at, size) == 0 &&
+           memcmp(a->up, b->up, size) == 0 && a->vertical_fov == b->vertical_fov && a->view_height == b->view_height &&
+           a->projection == b->projection;
+}
+
 /* The view stays where somebody has moved it, unless the file has another camera now. */
 static nebel_result read_again(viewer *all)
 {
@@ -164,7 +172,7 @@ static nebel_result read_again(viewer *all)
     nb_draft_close(&all->draft);
     all->draft = fresh;
     set_home(all);
-    if (memcmp(&before, &nebel_scene_contents(fresh.scene)->camera, sizeof before) == 0) all->draft.data.camera = view;
+    if (is_same_camera(&before, &nebel_scene_contents(fresh.scene)->camera)) all->draft.data.camera = view;
     note_change(all);
     nb_report_message("view: read %s again", all->settings->scene);
     return open_stage(all);
