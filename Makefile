@@ -59,6 +59,7 @@ lint: all
 	@scripts/install_packages.sh build test lint
 	@python3 scripts/check_includes.py
 	@python3 scripts/check_style.py
+	@clang-format --dry-run -Werror $(SOURCES)
 	@scripts/check_formulas.sh
 	@scripts/check_shaders.sh
 	@scripts/check_symbols.sh $(BUILD)

@@ -115,7 +115,7 @@ size_t nb_embree_floor_bytes(const nb_embree_floor *floor)
     return bytes > 0 ? (size_t)bytes : 0;
 }
 
-/* ---- rays ------------------------------------------------------------------------------------------------------ */
+/* ---- rays ------------------------------------------------------------------------------------ */
 
 static void set_ray(const nb_embree_floor *floor, uint32_t packet, int lane, struct RTCRayHit16 *rays, int *valid)
 {

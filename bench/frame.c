@@ -96,7 +96,7 @@ static void add_rays(nb_figures *figures, const nb_studio *studio)
                                 .value = 1e-6 * (double)studio->rays.shadow_rays / studio->rays.shadow_seconds});
 }
 
-/* ---- the scenes in turn ---------------------------------------------------------------------------------------- */
+/* ---- the scenes in turn ---------------------------------------------------------------------- */
 
 enum { SETUPS = 4 };
 

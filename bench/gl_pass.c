@@ -23,8 +23,7 @@ typedef struct nb_gl_bench {
     double floor; /* seconds */
 } nb_gl_bench;
 
-/* ---- the picture ---------------------------------------------------------------------------------------------------
- */
+/* ---- the picture ----------------------------------------------------------------------------- */
 
 /* From (0, 16, 62) to (0, 6, 0), 50 degrees wide, as the benchmark scenes; depth from 0.1 m to 1 km. */
 static void set_view(nebel_view *view, uint32_t width, uint32_t height)
@@ -97,8 +96,7 @@ static int make_textures(nb_gl_bench *b)
     return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE ? 0 : -1;
 }
 
-/* ---- the floor -----------------------------------------------------------------------------------------------------
- */
+/* ---- the floor ------------------------------------------------------------------------------- */
 
 static const char floor_vertex[] = "#version 330 core\n"
                                    "void main() { gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, "
@@ -166,8 +164,7 @@ static double run_fog(void *user)
     return nb_clock_wall() - start;
 }
 
-/* ---- fog -----------------------------------------------------------------------------------------------------------
- */
+/* ---- fog ------------------------------------------------------------------------------------- */
 
 /* Volumes, and how many of them the ray of a pixel crosses on average, wherever its surface is. */
 typedef struct nb_fog_case {
@@ -265,8 +262,7 @@ static nebel_snapshot *make_fog(const nb_gl_bench *b, nb_fog_case *c)
     return snapshot;
 }
 
-/* ---- figures -------------------------------------------------------------------------------------------------------
- */
+/* ---- figures --------------------------------------------------------------------------------- */
 
 /* Fog and floor in turn. */
 static const char *measure(nb_gl_bench *b, nb_fog_case *c)

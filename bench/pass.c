@@ -30,7 +30,7 @@ typedef struct nb_pass {
     int threads;
 } nb_pass;
 
-/* ---- pictures ---------------------------------------------------------------------------------------------------- */
+/* ---- pictures -------------------------------------------------------------------------------- */
 
 static void set_rays(const nebel_camera *camera, nebel_pixels *pixels)
 {
@@ -117,8 +117,7 @@ static int fill_frames(nb_gallery *gallery)
     return status;
 }
 
-/* ---- contestants --------------------------------------------------------------------------------------------------
- */
+/* ---- contestants ----------------------------------------------------------------------------- */
 
 static void copy_rows(const nebel_pixels *frame, uint32_t first_row, uint32_t row_count)
 {
@@ -167,8 +166,7 @@ static double run_fog(void *user)
     return run_shares(pass, (int)pass->isa);
 }
 
-/* ---- figures ------------------------------------------------------------------------------------------------------
- */
+/* ---- figures --------------------------------------------------------------------------------- */
 
 static void add_figure(nb_figures *figures, const nb_pass *pass, double seconds, double floor)
 {

@@ -69,7 +69,7 @@ nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind)
     return snapshot;
 }
 
-/* ---- files ----------------------------------------------------------------------------------------------------- */
+/* ---- files ----------------------------------------------------------------------------------- */
 
 static FILE *open_in(const char *folder, const char *name)
 {

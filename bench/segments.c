@@ -38,7 +38,7 @@ typedef struct nb_entry {
     nebel_isa isa;
 } nb_entry;
 
-/* ---- what is fogged -------------------------------------------------------------------------------------------- */
+/* ---- what is fogged -------------------------------------------------------------------------- */
 
 typedef enum nb_setting {
     FOG_BANK = 0,   /* the box of scene A: three quarters of the points are above it */
@@ -113,7 +113,7 @@ static int make_field(const nb_terrain *terrain, nb_setting setting, size_t coun
     return commit_boxes(field);
 }
 
-/* ---- contestants ----------------------------------------------------------------------------------------------- */
+/* ---- contestants ----------------------------------------------------------------------------- */
 
 static double run_kernel(void *user)
 {
@@ -158,7 +158,7 @@ static int agree(const nb_field *field)
     return 1;
 }
 
-/* ---- figures --------------------------------------------------------------------------------------------------- */
+/* ---- figures --------------------------------------------------------------------------------- */
 
 static double million_per_second(const nb_field *field, double seconds)
 {

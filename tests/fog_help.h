@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- memory that counts, fails when told to, and poisons what it takes back ---- */
+/* ---- memory that counts, fails when told to, and poisons what it takes back ------------------ */
 
 enum { FOG_MEMORY_HEADER = 64, FOG_MEMORY_FRESH = 0xa5, FOG_MEMORY_STALE = 0xdd };
 
@@ -60,7 +60,7 @@ static inline nebel_allocator fog_memory_allocator(fog_memory *memory)
     return (nebel_allocator){fog_memory_allocate, fog_memory_release, memory};
 }
 
-/* ---- messages ---- */
+/* ---- messages -------------------------------------------------------------------------------- */
 
 typedef struct fog_messages {
     size_t count;
@@ -84,7 +84,7 @@ static inline nebel_log fog_messages_log(fog_messages *messages)
     return (nebel_log){fog_messages_write, messages};
 }
 
-/* ---- fog in one call ---- */
+/* ---- fog in one call ------------------------------------------------------------------------- */
 
 static inline nebel_snapshot *fog_commit(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t n)
 {
@@ -97,7 +97,7 @@ static inline nebel_snapshot *fog_commit(const nebel_fog_desc *desc, const nebel
     return snapshot;
 }
 
-/* ---- numbers: splitmix64 ---- */
+/* ---- numbers: splitmix64 --------------------------------------------------------------------- */
 
 static inline uint64_t dice_next(uint64_t *state)
 {

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- numbers ----------------------------------------------------------------------------------------------------- */
+/* ---- numbers --------------------------------------------------------------------------------- */
 
 static unsigned long long bits(nb_formula_dice *dice)
 {
@@ -53,7 +53,7 @@ long double nb_formula_round(nb_formula_digits digits, long double x)
     return x;
 }
 
-/* ---- vectors ----------------------------------------------------------------------------------------------------- */
+/* ---- vectors --------------------------------------------------------------------------------- */
 
 static long double dot(const long double *a, const long double *b)
 {
@@ -78,7 +78,7 @@ static void random_tangent(nb_formula_dice *dice, const long double n[3], long d
     for (int i = 0; i < 3; ++i) v[i] -= along * n[i];
 }
 
-/* ---- shapes ------------------------------------------------------------------------------------------------------ */
+/* ---- shapes ---------------------------------------------------------------------------------- */
 
 static void draw_box(nb_formula_dice *dice, long double *in)
 {
@@ -313,7 +313,7 @@ static void draw_ray(nb_formula_dice *dice, nb_formula formula, nb_formula_digit
     add_reach(formula, digits, in);
 }
 
-/* ---- profiles ---------------------------------------------------------------------------------------------------- */
+/* ---- profiles -------------------------------------------------------------------------------- */
 
 /* A slope per metre, sometimes level. */
 static long double draw_slope(nb_formula_dice *dice, long double low, long double high)
@@ -409,7 +409,7 @@ static void draw_integral(nb_formula_dice *dice, nb_formula formula, nb_formula_
     }
 }
 
-/* ---- values ------------------------------------------------------------------------------------------------------ */
+/* ---- values ---------------------------------------------------------------------------------- */
 
 static void draw_value(nb_formula_dice *dice, nb_formula formula, long double *in)
 {

@@ -21,7 +21,7 @@ static int fault(nb_gl *gl, const char *format, ...)
     return 0;
 }
 
-/* ---- the context ------------------------------------------------------------------------------------------------- */
+/* ---- the context ----------------------------------------------------------------------------- */
 
 static int create_context(nb_gl *gl)
 {
@@ -79,7 +79,7 @@ void nb_gl_describe(char *text, size_t size)
              (const char *)glGetString(GL_VERSION));
 }
 
-/* ---- the source -------------------------------------------------------------------------------------------------- */
+/* ---- the source ------------------------------------------------------------------------------ */
 
 /* A text that grows; `text` is NULL once memory or a file has failed. */
 typedef struct source {
@@ -142,7 +142,7 @@ static void append_variables(source *s, const char *kind, unsigned count)
     }
 }
 
-/* ---- programs ---------------------------------------------------------------------------------------------------- */
+/* ---- programs -------------------------------------------------------------------------------- */
 
 static unsigned compile_shader(nb_gl *gl, unsigned kind, const char *text)
 {
@@ -238,7 +238,7 @@ unsigned nb_gl_compile_texts(nb_gl *gl, const char *const *texts, const char *bo
     return compile_source(gl, s, body, inputs, outputs);
 }
 
-/* ---- evaluation -------------------------------------------------------------------------------------------------- */
+/* ---- evaluation ------------------------------------------------------------------------------ */
 
 static void bind_inputs(unsigned buffer, unsigned inputs, size_t count, const float *values)
 {

@@ -14,8 +14,7 @@
 
 enum { BUFFERS = 4, BLOCKS = 3 };
 
-/* ---- what glGet tells ----------------------------------------------------------------------------------------------
- */
+/* ---- what glGet tells ------------------------------------------------------------------------ */
 
 /* `count` numbers; `kind`: e everywhere, d OpenGL alone. */
 static const struct {
@@ -225,8 +224,7 @@ void odd_expect_same(const odd_snapshot *before, const odd_snapshot *after)
     }
 }
 
-/* ---- odd state -----------------------------------------------------------------------------------------------------
- */
+/* ---- odd state ------------------------------------------------------------------------------- */
 
 static GLuint make_program(int desktop)
 {

@@ -10,7 +10,7 @@ typedef oracle_real real;
 #define REAL(x) ((real)(x))
 #define LONG(x) ((long double)(x))
 
-/* ---- Gauss-Legendre: nodes, weights, and integrals from 0 to each node, on [0, 1] ---- */
+/* ---- Gauss-Legendre: nodes, weights, and integrals from 0 to each node, on [0, 1] ------------ */
 
 enum { NODES = 16 };
 
@@ -58,7 +58,7 @@ static void prepare_tables(void)
     tables_are_ready = 1;
 }
 
-/* ---- volumes on a ray ---- */
+/* ---- volumes on a ray ------------------------------------------------------------------------ */
 
 /* A profile along the ray. Everything that varies is kept as a value at t = 0 and a slope, or as a closest approach, so
  * that a short stretch can be evaluated in double from a starting value in long double. */
@@ -196,7 +196,7 @@ static void place_volume(trace *tr, volume *v, const oracle_line *ray)
     }
 }
 
-/* ---- densities at the nodes of a stretch ---- */
+/* ---- densities at the nodes of a stretch ----------------------------------------------------- */
 
 /* Where a density is what is left of two large numbers (the depth below a surface, an exponent), long double keeps what
  * is left; only that is rounded. */
@@ -251,7 +251,7 @@ static void fill_density(const volume *v, long double a, double h, double densit
     if (d->type == NEBEL_DENSITY_SOFT_EDGE) soft_edge_at(v, a, h, density);
 }
 
-/* ---- integration ---- */
+/* ---- integration ----------------------------------------------------------------------------- */
 
 /* Optical depth of a stretch and the radiance it sends to its near end. */
 typedef struct stretch {
@@ -390,9 +390,11 @@ static void add_guides(marks *m, const volume *v, real from, real to)
 {
     static const long double heights[] = {2, 8, 30, 100, 400}, sigmas[] = {1, 3, 7, 15};
     if (v->desc->density.type == NEBEL_DENSITY_HEIGHT && v->slope[0] != 0)
-        for (int i = 0; i < 5; i++) add_mark(m, (v->slope[0] > 0 ? from : to) + REAL(heights[i] / v->slope[0]), from, to);
+        for (int i = 0; i < 5; i++)
+            add_mark(m, (v->slope[0] > 0 ? from : to) + REAL(heights[i] / v->slope[0]), from, to);
     if (v->desc->density.type == NEBEL_DENSITY_GAUSSIAN)
-        for (int i = 0; i < 8; i++) add_mark(m, REAL(v->nearest + (i % 2 ? 1 : -1) * sigmas[i / 2] / v->speed), from, to);
+        for (int i = 0; i < 8; i++)
+            add_mark(m, REAL(v->nearest + (i % 2 ? 1 : -1) * sigmas[i / 2] / v->speed), from, to);
 }
 
 static void integrate_piece(trace *tr, real from, real to)
@@ -482,7 +484,8 @@ static int is_endless_light(const trace *tr)
     return 0;
 }
 
-/* The rule as it is written: nothing of a higher priority replaces it there, and nothing of its own or a higher one excludes it. */
+/* The rule as it is written: nothing of a higher priority replaces it there, and nothing of its own or a higher one
+ * excludes it. */
 static int is_fog_at(const trace *tr, size_t which, real t)
 {
     const nebel_volume_desc *const own = tr->volumes[which].desc;
@@ -522,7 +525,7 @@ static void pass_piece(trace *tr, real from, real to)
     integrate_piece(tr, from, last);
 }
 
-/* ---- the whole ray ---- */
+/* ---- the whole ray --------------------------------------------------------------------------- */
 
 static oracle_line line_of(const nebel_ray *ray)
 {

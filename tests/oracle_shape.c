@@ -60,7 +60,7 @@ int oracle_contains(const oracle_spans *spans, real t)
     return 0;
 }
 
-/* ---- frames ---- */
+/* ---- frames ---------------------------------------------------------------------------------- */
 
 /* The transpose of the rotation matrix of the quaternion, of any length: p = R^T p. */
 static void rotate_back(const double rotation[4], real p[3])
@@ -91,7 +91,7 @@ oracle_line oracle_to_local(const nebel_transform *transform, const oracle_line 
     return l;
 }
 
-/* ---- spans ---- */
+/* ---- spans ----------------------------------------------------------------------------------- */
 
 static void add_span(oracle_spans *spans, real from, real to)
 {
@@ -127,7 +127,7 @@ static void order_cuts(cuts *c, real end)
     qsort(c->at, c->count, sizeof *c->at, oracle_ascending);
 }
 
-/* ---- flat shapes: half spaces, one by one ---- */
+/* ---- flat shapes: half spaces, one by one ---------------------------------------------------- */
 
 /* Keeps what has normal . p <= distance. */
 static void clip(const oracle_line *l, const real normal[3], real distance, oracle_span *s, int *tie)
@@ -180,7 +180,7 @@ static oracle_spans inside_flat(const nebel_shape *shape, const oracle_line *l, 
     return spans;
 }
 
-/* ---- curved shapes: candidates, then a question in the middle ---- */
+/* ---- curved shapes: candidates, then a question in the middle -------------------------------- */
 
 /* A line with its origin moved to where it comes closest to the shape, so that far away no digits cancel. */
 typedef struct near_line {
@@ -342,7 +342,7 @@ static oracle_spans inside_curved(const nebel_shape *shape, const oracle_line *l
     return spans;
 }
 
-/* ---- bodies of parts ---- */
+/* ---- bodies of parts ------------------------------------------------------------------------- */
 
 static int parts_hold(const nebel_shape *shape, const oracle_spans *parts, real t)
 {

@@ -12,8 +12,7 @@
 
 #include <epoxy/gl.h>
 
-/* ---- the context ---------------------------------------------------------------------------------------------------
- */
+/* ---- the context ----------------------------------------------------------------------------- */
 
 static int errors;
 static char last_error[512];
@@ -69,8 +68,7 @@ int pass_count_objects(void)
     return count;
 }
 
-/* ---- textures ------------------------------------------------------------------------------------------------------
- */
+/* ---- textures -------------------------------------------------------------------------------- */
 
 static unsigned make_texture(int width, int height, GLenum internal, GLenum format, const float *texels)
 {
@@ -131,8 +129,7 @@ void pass_delete_framebuffer(unsigned framebuffer)
     glDeleteFramebuffers(1, &framebuffer);
 }
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------
- */
+/* ---- pictures -------------------------------------------------------------------------------- */
 
 const double pass_eye[3] = {4e4, 12, -7e4};
 
@@ -226,8 +223,7 @@ nebel_light pass_trace(const nebel_snapshot *fog, const pass_picture *picture, i
     return light;
 }
 
-/* ---- comparison ----------------------------------------------------------------------------------------------------
- */
+/* ---- comparison ------------------------------------------------------------------------------ */
 
 void pass_note(pass_difference *difference, const float *got, const double *wanted, int fogged)
 {

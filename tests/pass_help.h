@@ -8,8 +8,7 @@
 
 #include <nebel/gl.h>
 
-/* ---- the context ---------------------------------------------------------------------------------------------------
- */
+/* ---- the context ----------------------------------------------------------------------------- */
 
 /* Makes a context current and watches it. */
 void pass_open(nb_gl *context, nb_gl_language language);
@@ -27,8 +26,7 @@ void pass_close(nb_gl *context);
  * names. */
 int pass_count_objects(void);
 
-/* ---- textures ------------------------------------------------------------------------------------------------------
- */
+/* ---- textures -------------------------------------------------------------------------------- */
 
 /* Of floats: `components` 1, 4; depth: a depth buffer's format. The filters are what a new texture has. NULL: empty. */
 unsigned pass_color_texture(int width, int height, int components, const float *texels);
@@ -43,8 +41,7 @@ void pass_read(unsigned texture, int width, int height, float *texels);
 void pass_delete_texture(unsigned texture);
 void pass_delete_framebuffer(unsigned framebuffer);
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------
- */
+/* ---- pictures -------------------------------------------------------------------------------- */
 
 enum { PASS_WIDTH = 96, PASS_HEIGHT = 64, PASS_PIXELS = PASS_WIDTH * PASS_HEIGHT };
 
@@ -68,8 +65,7 @@ void pass_fill(pass_picture *picture);
 /* What nebel_trace says in double about the ray of a pixel up to what is stored there. */
 nebel_light pass_trace(const nebel_snapshot *fog, const pass_picture *picture, int x, int y);
 
-/* ---- comparison ----------------------------------------------------------------------------------------------------
- */
+/* ---- comparison ------------------------------------------------------------------------------ */
 
 typedef struct pass_difference {
     size_t fogged, beyond_step; /* pixels that contain fog, and those of them more than 1/255 off */

@@ -8,8 +8,7 @@
 
 #include "picture_help.h"
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------
- */
+/* ---- pictures -------------------------------------------------------------------------------- */
 
 static float *make_plane(const picture_pair *pair, size_t channels)
 {
@@ -100,8 +99,7 @@ void picture_render(const nebel_scene_data *scene, nebel_snapshot *fog, const ne
     picture_render_particles(scene, fog, NULL, camera, samples, pair);
 }
 
-/* ---- differences ---------------------------------------------------------------------------------------------------
- */
+/* ---- differences ----------------------------------------------------------------------------- */
 
 /* No number is farther off than any. */
 static double worse(double a, double b)
@@ -177,8 +175,7 @@ picture_difference picture_compare(const picture_pair *pair, double source)
     return all;
 }
 
-/* ---- report --------------------------------------------------------------------------------------------------------
- */
+/* ---- report ---------------------------------------------------------------------------------- */
 
 picture_report picture_report_open(const char *title)
 {

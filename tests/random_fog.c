@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- numbers: splitmix64 ---- */
+/* ---- numbers: splitmix64 --------------------------------------------------------------------- */
 
 static uint64_t next(uint64_t *state)
 {
@@ -65,7 +65,7 @@ static void random_unit(uint64_t *state, double v[3])
     for (int k = 0; k < 3; k++) v[k] /= length;
 }
 
-/* ---- shapes ---- */
+/* ---- shapes ---------------------------------------------------------------------------------- */
 
 static const nebel_shape_type leaves[] = {NEBEL_SHAPE_BOX,      NEBEL_SHAPE_SPHERE,     NEBEL_SHAPE_ELLIPSOID,
                                           NEBEL_SHAPE_CYLINDER, NEBEL_SHAPE_CAPSULE,    NEBEL_SHAPE_CONE,
@@ -137,7 +137,7 @@ static void make_parts(random_fog *fog, uint64_t *state, int level, nebel_shape 
     if (chance(state, .3)) add_transform(state, &s->transform);
 }
 
-/* ---- profiles and light ---- */
+/* ---- profiles and light ---------------------------------------------------------------------- */
 
 static void make_density(uint64_t *state, const nebel_shape *shape, nebel_density *d)
 {
@@ -181,7 +181,7 @@ static void make_level_density(uint64_t *state, nebel_density *d)
     d->to[1] += power_of_ten(state, -1, 3) * (chance(state, .5) ? 1 : -1);
 }
 
-/* ---- scenes ---- */
+/* ---- scenes ---------------------------------------------------------------------------------- */
 
 static void make_priority(uint64_t *state, nebel_volume_desc *v)
 {
@@ -269,7 +269,7 @@ void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed)
     if (seed % 4 == 3) fog->max_opacity = uniform(&state, .05, 1);
 }
 
-/* ---- rays ---- */
+/* ---- rays ------------------------------------------------------------------------------------ */
 
 /* A shape that is no union or intersection, and the way from its coordinates to the world's. */
 typedef struct target {
@@ -506,7 +506,7 @@ nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed)
     return ray;
 }
 
-/* ---- printing ---- */
+/* ---- printing -------------------------------------------------------------------------------- */
 
 static void print_vector(FILE *to, const char *key, const double *v, int n)
 {

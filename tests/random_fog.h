@@ -27,7 +27,7 @@ typedef struct random_fog {
     uint64_t seed;
     double ambient[3];
     double max_opacity; /* of one of four; 0: no limit. For those who ask for it */
-    double shift[3]; /* of everything */
+    double shift[3];    /* of everything */
     size_t count;
     nebel_volume_desc volumes[RANDOM_FOG_VOLUMES];
     size_t part_count, plane_count;

@@ -24,7 +24,7 @@ static nebel_fog *make_fog(fog_memory *memory, fog_messages *messages)
     return fog;
 }
 
-/* ---- volumes ---- */
+/* ---- volumes --------------------------------------------------------------------------------- */
 
 typedef struct bad_volume {
     nebel_volume_desc desc;
@@ -214,7 +214,7 @@ static void test_exclusions_read_their_shape_only(void **unused)
     nebel_destroy_fog(fog);
 }
 
-/* ---- the limits themselves are legal, one more is not ---- */
+/* ---- the limits themselves are legal, one more is not ---------------------------------------- */
 
 static nebel_result add_nested(nebel_fog *fog, int depth)
 {
@@ -319,7 +319,7 @@ static void test_the_smallest_and_largest_sizes_are_legal(void **unused)
     nebel_release_snapshot(snapshot);
 }
 
-/* ---- the fog itself ---- */
+/* ---- the fog itself -------------------------------------------------------------------------- */
 
 static void test_wrong_fog_is_refused(void **unused)
 {
@@ -347,7 +347,7 @@ static void test_wrong_fog_is_refused(void **unused)
     assert_int_equal(memory.calls, 0);
 }
 
-/* ---- nothing where something is needed ---- */
+/* ---- nothing where something is needed ------------------------------------------------------- */
 
 static void test_null_arguments_are_refused(void **unused)
 {
@@ -406,7 +406,7 @@ static void test_null_arguments_are_refused(void **unused)
     assert_int_equal(memory.live, 0);
 }
 
-/* ---- rays ---- */
+/* ---- rays ------------------------------------------------------------------------------------ */
 
 typedef struct bad_ray {
     nebel_ray ray;
@@ -540,7 +540,7 @@ static void test_instruction_sets_that_are_not_here_are_unsupported(void **unuse
     nebel_release_snapshot(snapshot);
 }
 
-/* ---- light without end ---- */
+/* ---- light without end ----------------------------------------------------------------------- */
 
 typedef struct endless_case {
     nebel_volume_desc volumes[2];
@@ -616,7 +616,7 @@ static void test_light_without_end_is_an_error_of_that_ray(void **unused)
     }
 }
 
-/* ---- opaque fog ---- */
+/* ---- opaque fog ------------------------------------------------------------------------------ */
 
 static void test_opaque_fog_shows_its_source(void **unused)
 {

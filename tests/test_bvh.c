@@ -51,7 +51,7 @@ static void invert(const segment *s, double inverse[3])
     for (int k = 0; k < 3; k++) inverse[k] = s->direction[k] == 0 ? 1e30 : 1 / s->direction[k];
 }
 
-/* ---- scenes ---- */
+/* ---- scenes ---------------------------------------------------------------------------------- */
 
 typedef enum scene_kind { CLOUD, FLAT, SAME, NESTED, GRID, LINE, POINT, STICKS, KIND_COUNT } scene_kind;
 
@@ -109,7 +109,7 @@ static segment random_segment(const nb_aabb *all, int n, double size, double shi
     return s;
 }
 
-/* ---- checks ---- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_allocator heap(void)
 {

@@ -20,7 +20,7 @@ static const char *const function_names[] = {
 #undef NAME
 };
 
-/* ---- numbers to try ---------------------------------------------------------------------------------------------- */
+/* ---- numbers to try -------------------------------------------------------------------------- */
 
 static uint64_t random_state;
 
@@ -42,7 +42,7 @@ static double random_unit(void)
     return (double)(random_bits() >> 11) * 0x1p-53;
 }
 
-/* ---- the truth --------------------------------------------------------------------------------------------------- */
+/* ---- the truth ------------------------------------------------------------------------------- */
 
 typedef long double truth(long double a, long double b);
 
@@ -147,7 +147,7 @@ static long double true_gauss_integral(long double a, long double b)
     return expl(-from * from) * one_sided_integral(from, to);
 }
 
-/* ---- exactness --------------------------------------------------------------------------------------------------- */
+/* ---- exactness ------------------------------------------------------------------------------- */
 
 /* One precision: both take and give doubles that it can hold. */
 typedef struct precision {
@@ -278,7 +278,7 @@ static void double_functions_are_exact_to_a_few_units(void **state)
     run_trials(&double_precision, -708.39, 709.08);
 }
 
-/* ---- hostile numbers --------------------------------------------------------------------------------------------- */
+/* ---- hostile numbers ------------------------------------------------------------------------- */
 
 static double once(const precision *p, nb_elementary function, double a, double b)
 {
@@ -384,7 +384,7 @@ static void exp_is_never_subnormal(void **state)
     }
 }
 
-/* ---- instruction sets -------------------------------------------------------------------------------------------- */
+/* ---- instruction sets ------------------------------------------------------------------------ */
 
 typedef struct level {
     const char *name;

@@ -29,9 +29,9 @@ typedef struct mode {
     size_t worst_ratio_case, worst_excess_case;
 } mode;
 
-/* These fogs and rays are made to be hard: most rays graze something, a sixth of them without end, some in fog of 1e4 per
- * metre. Where the last bits of the ray change the answer, double keeps its promise all the same; float may fail on one
- * of a thousand. */
+/* These fogs and rays are made to be hard: most rays graze something, a sixth of them without end, some in fog of 1e4
+ * per metre. Where the last bits of the ray change the answer, double keeps its promise all the same; float may fail on
+ * one of a thousand. */
 static mode modes[] = {
     {"double 2e-3", NEBEL_PRECISION_DOUBLE, 2e-3, 1e-8, 0, 0, 0, 0, 0, 0, 0, 0},
     {"double 1e-7", NEBEL_PRECISION_DOUBLE, 1e-7, 1e-8, 0, 0, 0, 0, 0, 0, 0, 0},

@@ -205,7 +205,7 @@ static nebel_ray make_ray(scene *s)
     return ray;
 }
 
-/* ---- what must hold ---- */
+/* ---- what must hold -------------------------------------------------------------------------- */
 
 static nebel_snapshot *commit(const scene *s, size_t *refused)
 {

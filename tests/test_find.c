@@ -29,7 +29,7 @@ static nebel_light trace_to(const nebel_snapshot *snapshot, const nebel_ray *ray
     return light;
 }
 
-/* ---- against known distances ---- */
+/* ---- against known distances ----------------------------------------------------------------- */
 
 /* Fog of scale height 50 m, 0.02 / m at the ground: check T05 of truth/physics.json. There z is up. */
 static void test_free_flight_in_height_fog_is_that_of_the_reference(void **unused)
@@ -143,7 +143,7 @@ static void test_strides_and_many_rays_change_nothing(void **unused)
     nebel_release_snapshot(snapshot);
 }
 
-/* ---- against nebel_trace ---- */
+/* ---- against nebel_trace --------------------------------------------------------------------- */
 
 typedef struct tally {
     size_t found, beyond, wrong, infinite_rays;

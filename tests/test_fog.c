@@ -9,7 +9,7 @@
 
 #include "fog_help.h"
 
-/* ---- one volume of every kind ---- */
+/* ---- one volume of every kind ---------------------------------------------------------------- */
 
 static const nebel_plane octahedron[] = {{{1, 1, 1}, 2},  {{1, 1, -1}, 2},  {{1, -1, 1}, 2},  {{1, -1, -1}, 2},
                                          {{-1, 1, 1}, 2}, {{-1, 1, -1}, 2}, {{-1, -1, 1}, 2}, {{-1, -1, -1}, 2}};
@@ -45,7 +45,7 @@ static const nebel_volume_desc kinds[] = {
 };
 enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
-/* ---- what a fog is, as its queries see it ---- */
+/* ---- what a fog is, as its queries see it ---------------------------------------------------- */
 
 enum { PROBES = 5 };
 
@@ -89,7 +89,7 @@ static void assert_different(const fingerprint *a, const fingerprint *b)
     assert_memory_not_equal(a, b, sizeof *a);
 }
 
-/* ---- every allocation fails once, alone and with all that follow ---- */
+/* ---- every allocation fails once, alone and with all that follow ----------------------------- */
 
 typedef struct bench {
     fog_memory memory;
@@ -231,7 +231,7 @@ static void test_committing_survives_lost_memory(void **unused)
     assert_true(fail_each_in_fog(commit, release, NULL, 40) >= 40);
 }
 
-/* ---- the same for queries ---- */
+/* ---- the same for queries -------------------------------------------------------------------- */
 
 enum { RAYS = 11, CROWD = 300 };
 
@@ -324,7 +324,7 @@ static void test_queries_survive_lost_memory(void **unused)
     }
 }
 
-/* ---- editing ---- */
+/* ---- editing --------------------------------------------------------------------------------- */
 
 static nebel_fog *plain_fog(void)
 {
@@ -480,7 +480,7 @@ static void test_empty_descriptions_are_valid(void **unused)
     nebel_destroy_fog(fog);
 }
 
-/* ---- names and texts ---- */
+/* ---- names and texts ------------------------------------------------------------------------- */
 
 static void test_the_version_is_that_of_the_header(void **unused)
 {

@@ -58,7 +58,7 @@ static void fill(nb_formula formula)
     }
 }
 
-/* ---- what may differ --------------------------------------------------------------------------------------------- */
+/* ---- what may differ ------------------------------------------------------------------------- */
 
 typedef struct worst {
     double relative; /* where the tolerance is 1e-5 */

@@ -100,7 +100,7 @@ static unsigned char *read_bytes(const char *path, size_t *size)
     return data;
 }
 
-/* ---- round trips ---- */
+/* ---- round trips ----------------------------------------------------------------------------- */
 
 static void test_exr_keeps_every_float(void **state)
 {
@@ -215,7 +215,7 @@ static void test_png_takes_any_number(void **state)
     unlink(in_folder("a.png"));
 }
 
-/* ---- PNG of other kinds ---- */
+/* ---- PNG of other kinds ---------------------------------------------------------------------- */
 
 static void write_png(const char *path, uint32_t width, uint32_t height, png_uint_32 format, const void *pixels)
 {
@@ -249,7 +249,7 @@ static void test_png_of_16_bit_and_with_alpha(void **state)
     unlink(in_folder("g.png"));
 }
 
-/* ---- OpenEXR of other kinds ---- */
+/* ---- OpenEXR of other kinds ------------------------------------------------------------------ */
 
 static void put_exr_header(exr_context_t exr, exr_storage_t storage, exr_pixel_type_t type,
                            const exr_attr_box2i_t *data, const exr_attr_box2i_t *display)
@@ -362,7 +362,7 @@ static void test_exr_shows_the_display_window(void **state)
     unlink(in_folder("t.exr"));
 }
 
-/* ---- broken pictures ---- */
+/* ---- broken pictures ------------------------------------------------------------------------- */
 
 static void break_file(const char *name, int truncate_only)
 {
@@ -442,7 +442,7 @@ static void test_what_is_no_picture(void **state)
     assert_int_equal(read_image(folder, &image, &kept), NEBEL_ERROR_FILE);
 }
 
-/* ---- writing ---- */
+/* ---- writing --------------------------------------------------------------------------------- */
 
 static void test_only_whole_pictures_are_written(void **state)
 {

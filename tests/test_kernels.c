@@ -19,7 +19,7 @@ static size_t segment_count = 50000;
 static size_t segment_count = 1000000;
 #endif
 
-/* ---- random fog and rays that hurt ------------------------------------------------------------------------------------ */
+/* ---- random fog and rays that hurt ----------------------------------------------------------- */
 
 static uint64_t state_of_dice = 20240607;
 
@@ -147,7 +147,7 @@ static nebel_ray random_ray(int i)
     return ray;
 }
 
-/* ---- the tests ------------------------------------------------------------------------------------------------------------ */
+/* ---- the tests ------------------------------------------------------------------------------- */
 
 enum { RAYS = 2000 };
 static nebel_ray rays[RAYS];
@@ -162,12 +162,12 @@ static nebel_result trace(const nebel_snapshot *fog, nebel_isa isa, size_t first
 static void print_difference(size_t i, nebel_isa isa)
 {
     const nebel_ray *r = &rays[i];
-    printf("ray %zu of this fog, %s: %.17g %.17g %.17g  %.17g %.17g %.17g  %.17g\n", i, nebel_isa_name(isa), r->origin[0],
-           r->origin[1], r->origin[2], r->direction[0], r->direction[1], r->direction[2], r->t_max);
+    printf("ray %zu of this fog, %s: %.17g %.17g %.17g  %.17g %.17g %.17g  %.17g\n", i, nebel_isa_name(isa),
+           r->origin[0], r->origin[1], r->origin[2], r->direction[0], r->direction[1], r->direction[2], r->t_max);
     for (int c = 0; c < 3; c++)
-        printf("  transmittance %.9g, not %.9g; in-scattering %.9g, not %.9g; error %.9g, not %.9g\n", found[i].transmittance[c],
-               expected[i].transmittance[c], found[i].in_scattering[c], expected[i].in_scattering[c], found[i].error,
-               expected[i].error);
+        printf("  transmittance %.9g, not %.9g; in-scattering %.9g, not %.9g; error %.9g, not %.9g\n",
+               found[i].transmittance[c], expected[i].transmittance[c], found[i].in_scattering[c],
+               expected[i].in_scattering[c], found[i].error, expected[i].error);
 }
 
 static void assert_same_lights(nebel_isa isa)
@@ -202,7 +202,8 @@ static void test_a_ray_gives_the_same_bits_in_any_company(void **state)
     (void)state;
     for (int round = 0; round < 20; round++) {
         nebel_snapshot *fog = random_fog();
-        for (int i = 0; i < RAYS; i++) rays[i] = random_ray(i + 1 - (i % 17 == 16)); /* none without end: no ray is an error */
+        for (int i = 0; i < RAYS; i++)
+            rays[i] = random_ray(i + 1 - (i % 17 == 16)); /* none without end: no ray is an error */
         if (trace(fog, NEBEL_ISA_DEFAULT, 0, RAYS, expected) == NEBEL_OK) {
             for (size_t i = 0; i < RAYS;) {
                 const size_t n = 1 + (size_t)pick(7);
@@ -248,13 +249,17 @@ static void test_segment_kernels_are_bit_equal_for_every_stride(void **state)
         nebel_snapshot *fog = boxes_of_fog(1 + round % 16);
         fill_points(from, POINTS);
         fill_points(to, 5 * POINTS / 3);
-        const nebel_segments segments = {.from = from, .from_stride = round % 2 ? 12 : 0, .to = to, .to_stride = round % 3 ? 12 : 20};
-        assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_SCALAR, round % 3, POINTS, &segments, reference, 4), NEBEL_OK);
+        const nebel_segments segments = {
+            .from = from, .from_stride = round % 2 ? 12 : 0, .to = to, .to_stride = round % 3 ? 12 : 20};
+        assert_int_equal(nebel_transmit_segments(fog, NEBEL_ISA_SCALAR, round % 3, POINTS, &segments, reference, 4),
+                         NEBEL_OK);
         for (int i = 0; i < POINTS; i++) assert_true(reference[i] >= 0 && reference[i] <= 1);
         for (nebel_isa isa = NEBEL_ISA_SSE2; isa < NEBEL_ISA_COUNT; isa++)
             for (size_t stride = 4; stride <= 8 && nebel_isa_available(isa); stride += 4) {
-                assert_int_equal(nebel_transmit_segments(fog, isa, round % 3, POINTS, &segments, out, stride), NEBEL_OK);
-                for (size_t i = 0; i < POINTS; i++) assert_memory_equal(&out[i * stride / 4], &reference[i], sizeof(float));
+                assert_int_equal(nebel_transmit_segments(fog, isa, round % 3, POINTS, &segments, out, stride),
+                                 NEBEL_OK);
+                for (size_t i = 0; i < POINTS; i++)
+                    assert_memory_equal(&out[i * stride / 4], &reference[i], sizeof(float));
             }
         nebel_release_snapshot(fog);
     }

@@ -64,7 +64,7 @@ static nebel_ray random_ray(uint64_t *state, double size)
     return ray;
 }
 
-/* ---- a million in the world ---- */
+/* ---- a million in the world ------------------------------------------------------------------ */
 
 static void assert_right(const nebel_snapshot *snapshot, const ball *balls, size_t n, const nebel_ray *ray, size_t *met)
 {
@@ -138,7 +138,7 @@ static void test_a_million_volumes_are_found_by_every_ray(void **unused)
     free(balls);
 }
 
-/* ---- thousands on one ray ---- */
+/* ---- thousands on one ray -------------------------------------------------------------------- */
 
 static void make_crowd(ball crowd[CROWD])
 {

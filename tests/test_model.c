@@ -103,7 +103,7 @@ static void face_normal(const nebel_mesh *mesh, size_t triangle, double normal[3
 
 static const char triangle_obj[] = "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";
 
-/* ---- places ---- */
+/* ---- places ---------------------------------------------------------------------------------- */
 
 static void test_scale_comes_first_then_rotation_then_position(void **state)
 {
@@ -164,7 +164,7 @@ static void test_loading_twice_changes_nothing(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- broken models ---- */
+/* ---- broken models --------------------------------------------------------------------------- */
 
 static void test_broken_models_are_named_with_the_reason(void **state)
 {
@@ -270,7 +270,7 @@ static void test_every_truncated_model_is_survived(void **state)
     }
 }
 
-/* ---- normals of models that have none ---- */
+/* ---- normals of models that have none -------------------------------------------------------- */
 
 static const char cube_ply[] =
     "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
@@ -441,7 +441,7 @@ static void test_triangles_with_two_corners_at_one_place_are_left_out(void **sta
     nebel_destroy_scene(scene);
 }
 
-/* ---- height fields ---- */
+/* ---- height fields --------------------------------------------------------------------------- */
 
 static void write_heights(const char *name, uint32_t width, uint32_t height, const uint16_t *values)
 {
@@ -524,7 +524,7 @@ static void test_what_is_no_height_map(void **state)
     assert_broken(HEIGHTS("none.png"), NEBEL_ERROR_FILE, "No such file or directory");
 }
 
-/* ---- memory ---- */
+/* ---- memory ---------------------------------------------------------------------------------- */
 
 static void test_every_failing_allocation_is_survived(void **state)
 {
@@ -554,7 +554,7 @@ static void test_every_failing_allocation_is_survived(void **state)
     }
 }
 
-/* ---- models of others ---- */
+/* ---- models of others ------------------------------------------------------------------------ */
 
 typedef struct known {
     const char *file;

@@ -67,7 +67,7 @@ static void test_numerical_and_closed_results_agree(void **unused)
     }
 }
 
-/* ---- textbook values, computed with 30 digits ---- */
+/* ---- textbook values, computed with 30 digits ------------------------------------------------ */
 
 static double depth_of(const nebel_shape *shape, const nebel_density *density, double extinction, nebel_ray ray)
 {

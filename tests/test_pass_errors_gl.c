@@ -24,8 +24,7 @@ static void expect_message(nebel_result result, nebel_result wanted, const char 
     messages.count = 0;
 }
 
-/* ---- a stage -------------------------------------------------------------------------------------------------------
- */
+/* ---- a stage --------------------------------------------------------------------------------- */
 
 typedef struct stage {
     nb_gl context;
@@ -82,8 +81,7 @@ static nebel_result draw(const stage *s)
     return nebel_gl_draw_fog(s->gl, &pass);
 }
 
-/* ---- contexts ------------------------------------------------------------------------------------------------------
- */
+/* ---- contexts -------------------------------------------------------------------------------- */
 
 static void test_no_context_is_said(void **state)
 {
@@ -166,8 +164,7 @@ static void test_a_lost_context_is_survived(void **state)
     pass_close(&s.context);
 }
 
-/* ---- drivers that fail ---------------------------------------------------------------------------------------------
- */
+/* ---- drivers that fail ----------------------------------------------------------------------- */
 
 static PFNGLSHADERSOURCEPROC true_shader_source;
 
@@ -259,8 +256,7 @@ static void test_a_driver_without_memory(void **state)
     close_stage(&s);
 }
 
-/* ---- memory --------------------------------------------------------------------------------------------------------
- */
+/* ---- memory ---------------------------------------------------------------------------------- */
 
 /* Everything once, with every allocation failing in turn. */
 static void test_memory_that_runs_out(void **state)
@@ -291,8 +287,7 @@ static void test_memory_that_runs_out(void **state)
     close_stage(&s);
 }
 
-/* ---- arguments -----------------------------------------------------------------------------------------------------
- */
+/* ---- arguments ------------------------------------------------------------------------------- */
 
 static void test_views_that_are_none(void **state)
 {

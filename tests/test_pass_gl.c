@@ -12,8 +12,7 @@
 
 static const range usual = {-1, 0}, zero_to_one = {0, 0}, reversed = {0, 1};
 
-/* ---- S and T -------------------------------------------------------------------------------------------------------
- */
+/* ---- S and T --------------------------------------------------------------------------------- */
 
 typedef struct split {
     float in_scattering[4 * PASS_PIXELS], transmittance[4 * PASS_PIXELS];
@@ -70,8 +69,7 @@ static void check_picture(nebel_gl *gl, const nebel_snapshot *fog, pass_picture 
     compare_split(fog, picture, &got, name);
 }
 
-/* ---- the stage -----------------------------------------------------------------------------------------------------
- */
+/* ---- the stage ------------------------------------------------------------------------------- */
 
 typedef struct stage {
     nb_gl context;
@@ -103,8 +101,7 @@ static void close_stage(stage *s)
 
 static const nb_gl_language languages[] = {NB_GL_330, NB_GL_300ES};
 
-/* ---- tests ---------------------------------------------------------------------------------------------------------
- */
+/* ---- tests ----------------------------------------------------------------------------------- */
 
 static void check_projections(nb_gl_language language)
 {
@@ -305,8 +302,7 @@ static void test_turning_the_camera_changes_no_fog(void **state)
     close_stage(&s);
 }
 
-/* ---- stored fog ----------------------------------------------------------------------------------------------------
- */
+/* ---- stored fog ------------------------------------------------------------------------------ */
 
 static void test_many_volumes_agree_with_trace(void **state)
 {
@@ -367,8 +363,7 @@ static void test_no_fog_is_clear(void **state)
     close_stage(&s);
 }
 
-/* ---- outputs -------------------------------------------------------------------------------------------------------
- */
+/* ---- outputs --------------------------------------------------------------------------------- */
 
 /* Larger than the picture, which lies at (CORNER_X, CORNER_Y). */
 enum {

@@ -17,8 +17,7 @@ enum { SAMPLES = 4, ALL = SAMPLES * PASS_PIXELS };
 static float places[SAMPLES][2];
 static float depths[ALL], colors[4 * ALL]; /* sample by sample, pixel by pixel */
 
-/* ---- multisampled textures, filled sample by sample ----------------------------------------------------------------
- */
+/* ---- multisampled textures, filled sample by sample ------------------------------------------ */
 
 static unsigned make_samples(GLenum format)
 {
@@ -104,8 +103,7 @@ static void fill_samples(unsigned framebuffer)
     glDeleteProgram(program); /* still current: a state that cannot be given back, and is no error */
 }
 
-/* ---- what should come out ------------------------------------------------------------------------------------------
- */
+/* ---- what should come out -------------------------------------------------------------------- */
 
 /* The picture as one sample of every pixel sees it: its pixels are where that sample is. */
 static void shift_picture(pass_picture *picture, const nebel_view *whole, int sample)
@@ -163,8 +161,7 @@ static void expect(const nebel_snapshot *fog, int i, double composed[4], double 
     }
 }
 
-/* ---- the test ------------------------------------------------------------------------------------------------------
- */
+/* ---- the test -------------------------------------------------------------------------------- */
 
 typedef struct stage {
     nb_gl context;

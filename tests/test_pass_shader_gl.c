@@ -15,8 +15,7 @@
 
 static const range usual = {-1, 0};
 
-/* ---- the host's program --------------------------------------------------------------------------------------------
- */
+/* ---- the host's program ---------------------------------------------------------------------- */
 
 static unsigned compile(GLenum kind, int count, const char *const *texts)
 {
@@ -76,8 +75,7 @@ static unsigned make_program(const nebel_gl_fog *fog, int es)
     return link(compile(GL_VERTEX_SHADER, 2, vertex), compile(GL_FRAGMENT_SHADER, 4, fragment));
 }
 
-/* ---- the words, as the driver wants them ---------------------------------------------------------------------------
- */
+/* ---- the words, as the driver wants them ----------------------------------------------------- */
 
 static void check_block(unsigned program)
 {
@@ -99,8 +97,7 @@ static void check_block(unsigned program)
     glUniformBlockBinding(program, block, 3);
 }
 
-/* ---- drawing -------------------------------------------------------------------------------------------------------
- */
+/* ---- drawing --------------------------------------------------------------------------------- */
 
 static float own[2][4 * PASS_PIXELS], theirs[2][4 * PASS_PIXELS];
 

@@ -30,8 +30,7 @@ typedef struct surface {
     float color[3], light[3], alpha, distance;
 } surface;
 
-/* ---- the truth -----------------------------------------------------------------------------------------------------
- */
+/* ---- the truth ------------------------------------------------------------------------------- */
 
 static double cover(const surface *s, int c, double behind)
 {
@@ -82,8 +81,7 @@ static void carry_light(const nebel_snapshot *fog, const line *way, const surfac
     }
 }
 
-/* ---- the host ------------------------------------------------------------------------------------------------------
- */
+/* ---- the host -------------------------------------------------------------------------------- */
 
 static const char fragment_text[] =
     "uniform highp sampler2D depth;\n"
@@ -200,8 +198,7 @@ static void draw_surface(unsigned program, path how, const surface *s)
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-/* ---- one against the other -----------------------------------------------------------------------------------------
- */
+/* ---- one against the other ------------------------------------------------------------------- */
 
 static surface random_surface(uint64_t *state, int mode, path how, double distance)
 {

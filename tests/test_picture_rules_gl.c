@@ -19,8 +19,7 @@ enum { WIDTH = 96, HEIGHT = 64, TEXELS = 16 };
 
 static const nb_gl_language languages[] = {NB_GL_330, NB_GL_300ES};
 
-/* ---- the scene: a ball over a textured floor ------------------------------------------------------------------------
- */
+/* ---- the scene: a ball over a textured floor ------------------------------------------------- */
 
 typedef struct stage {
     test_ball ball;
@@ -67,8 +66,7 @@ static void draw(nebel_gl_renderer *renderer, const stage *s, uint32_t samples, 
     assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){.color = color}), NEBEL_OK);
 }
 
-/* ---- tests ---------------------------------------------------------------------------------------------------------
- */
+/* ---- tests ----------------------------------------------------------------------------------- */
 
 /* Smooth normals, textures, shadows and fog in the sun's light, near the origin and far out. */
 static void test_light_is_that_of_the_cpu(void **state)

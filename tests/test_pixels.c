@@ -66,7 +66,8 @@ static double expected_byte(const nebel_light *light, int c, int pixel)
     return light->transmittance[c] * color[4 * pixel + c] + 255 * fmin(light->in_scattering[c], 1);
 }
 
-/* Half a step; 255 times the rounding of the weight, 2^-16, and of transmittance in float, 3e-6; and of the radiance, 2^-9. */
+/* Half a step; 255 times the rounding of the weight, 2^-16, and of transmittance in float, 3e-6; and of the radiance,
+ * 2^-9. */
 static const double largest_error = .5 + 255 * (0x1p-16 + 3e-6) + 0x1p-9;
 
 static void assert_fogged(const nebel_snapshot *fog, const nebel_pixels *p)
@@ -75,7 +76,8 @@ static void assert_fogged(const nebel_snapshot *fog, const nebel_pixels *p)
         nebel_ray ray = {.origin = {p->eye[0], p->eye[1], p->eye[2]}};
         double square = 0;
         for (int c = 0; c < 3; c++) {
-            ray.direction[c] = (double)p->corner[c] + i % WIDTH * (double)p->step_x[c] + i / WIDTH * (double)p->step_y[c];
+            ray.direction[c] =
+                (double)p->corner[c] + i % WIDTH * (double)p->step_x[c] + i / WIDTH * (double)p->step_y[c];
             square += ray.direction[c] * ray.direction[c];
         }
         ray.t_max = (double)depth[i] * (p->depth_type == NEBEL_DEPTH_RAY ? 1 : sqrt(square));
@@ -104,7 +106,8 @@ static void test_the_sky_is_right_where_ways_are_level(void **state)
     (void)state;
     static const nebel_volume_desc volumes[] = {
         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {1000, 15, -20}, .max = {1010, 20, -5}}, .extinction = {.1, .1, .1}},
-        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {990, 10, -60}, .max = {1005, 30, -30}}, .extinction = {.1, .1, .1}}};
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {990, 10, -60}, .max = {1005, 30, -30}},
+         .extinction = {.1, .1, .1}}};
     for (int boxes = 1; boxes <= 2; boxes++) {
         nebel_pixels p = make_picture(boxes == 1 ? NEBEL_DEPTH_AXIS : NEBEL_DEPTH_RAY);
         memcpy(p.corner, (const float[3]){-1, .5f, -1}, sizeof p.corner);
@@ -187,9 +190,10 @@ static void test_opaque_fog_shows_its_own_colour(void **state)
     nebel_snapshot *snapshot = NULL;
     const nebel_pixels p = make_picture(NEBEL_DEPTH_RAY);
     for (int i = 0; i < PIXELS; i++) depth[i] = 50;
-    const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {900, -80, -99}, .max = {1100, 120, 99}},
-                                      .extinction = {1e4, 1e4, 1e4},
-                                      .source = {0, 1, 3}};
+    const nebel_volume_desc volume = {
+        .shape = {.type = NEBEL_SHAPE_BOX, .min = {900, -80, -99}, .max = {1100, 120, 99}},
+        .extinction = {1e4, 1e4, 1e4},
+        .source = {0, 1, 3}};
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);

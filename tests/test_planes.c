@@ -188,7 +188,7 @@ static void test_planes_give_the_bits_of_structures(void **state)
     }
 }
 
-/* ---- what is wrong ----------------------------------------------------------------------------------------------- */
+/* ---- what is wrong --------------------------------------------------------------------------- */
 
 static nebel_snapshot *one_box(void)
 {
@@ -297,7 +297,8 @@ static void test_a_ray_of_no_length_may_be_anything(void **state)
     for (uint64_t seed = 0; seed < 300; seed++) {
         random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
         nebel_snapshot *snapshot = commit(&fog);
-        for (int shared = 0; shared < SHARE_END; shared++) compare_masked(&fog, snapshot, (sharing)shared, seed % 2 != 0);
+        for (int shared = 0; shared < SHARE_END; shared++)
+            compare_masked(&fog, snapshot, (sharing)shared, seed % 2 != 0);
         nebel_release_snapshot(snapshot);
     }
 }

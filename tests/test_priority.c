@@ -55,7 +55,7 @@ static void test_what_is_replaced_takes_nothing_away_where_it_is_gone(void **unu
     assert_depth(fog, 4, .1 * 3 + .2 * 2 + .05 * 2);
 }
 
-/* ---- the same fog said in other ways -------------------------------------------------------------------------- */
+/* ---- the same fog said in other ways --------------------------------------------------------- */
 
 enum { RAYS = 64 };
 

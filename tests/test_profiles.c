@@ -41,7 +41,7 @@ static const char *const formula_names[] = {
 
 static const long double pi = 3.14159265358979323846264338327950288L;
 
-/* ---- asking ------------------------------------------------------------------------------------------------------ */
+/* ---- asking ---------------------------------------------------------------------------------- */
 
 typedef struct estimate {
     long double value, error;
@@ -66,7 +66,7 @@ static void expect(const level *l, const char *what, long double got, long doubl
         fail_msg("%s in %s: %.20Lg instead of %.20Lg", what, l->name, got, wanted);
 }
 
-/* ---- the literature ---------------------------------------------------------------------------------------------- */
+/* ---- the literature -------------------------------------------------------------------------- */
 
 typedef struct slant {
     long double z, elevation, length, depth;
@@ -179,7 +179,7 @@ static void gathered_light_is_that_of_T15(void **state)
     }
 }
 
-/* ---- against quadrature ------------------------------------------------------------------------------------------ */
+/* ---- against quadrature ---------------------------------------------------------------------- */
 
 typedef struct worst {
     long double ratio, in[NB_FORMULA_INPUTS], value, truth, error;
@@ -230,7 +230,7 @@ static void told_errors_bound_the_true_ones(void **state)
         }
 }
 
-/* ---- the bad cases ----------------------------------------------------------------------------------------------- */
+/* ---- the bad cases --------------------------------------------------------------------------- */
 
 typedef struct wanted {
     long double in[4], value;
@@ -435,8 +435,7 @@ static void densities_are_those_of_the_integrals(void **state)
             }
 }
 
-/* ---- light and fog factors -----------------------------------------------------------------------------------------
- */
+/* ---- light and fog factors ------------------------------------------------------------------- */
 
 /* No fog gives what shines in it, thin fog loses no digit, opaque fog gives light / depth, all without a NaN. */
 static void gathering_from_nothing_to_opaque(void **state)

@@ -137,7 +137,7 @@ static void test_instruction_sets_and_grouping_change_no_bit(void **unused)
     }
 }
 
-/* ---- a volume in two halves that touch ---- */
+/* ---- a volume in two halves that touch ------------------------------------------------------- */
 
 /* The volume's shape and a half space on one side of a plane. */
 static void halve(const nebel_volume_desc *whole, const double point[3], const double normal[3],
@@ -259,7 +259,7 @@ static void test_cutting_a_box_into_two_boxes_changes_nothing(void **unused)
     }
 }
 
-/* ---- a ray in two pieces ---- */
+/* ---- a ray in two pieces --------------------------------------------------------------------- */
 
 static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(void **unused)
 {
@@ -297,7 +297,7 @@ static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(voi
     }
 }
 
-/* ---- everything 1e7 m away ---- */
+/* ---- everything 1e7 m away ------------------------------------------------------------------- */
 
 /* Coordinates that 1e7 can be added to without rounding. */
 static void snap(double v[3])

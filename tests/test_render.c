@@ -15,8 +15,7 @@ static void assert_pixel(const float *color, const double surface[3], const doub
     }
 }
 
-/* ---- surfaces in fog ------------------------------------------------------------------------------------------------
- */
+/* ---- surfaces in fog ------------------------------------------------------------------------- */
 
 static void test_wall_in_constant_fog(void **state)
 {

@@ -94,8 +94,7 @@ static inline void test_render(const nebel_scene_data *scene, nebel_snapshot *fo
     nebel_destroy_renderer(renderer);
 }
 
-/* ---- meshes --------------------------------------------------------------------------------------------------------
- */
+/* ---- meshes ---------------------------------------------------------------------------------- */
 
 /* A square of side 2 around (0, height, 0), facing up. */
 static const float test_square_positions[12] = {-1, 0, -1, -1, 0, 1, 1, 0, 1, 1, 0, -1};

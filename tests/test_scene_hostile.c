@@ -171,7 +171,7 @@ static void test_an_error_far_down_is_found_at_its_line(void **state)
     free(text);
 }
 
-/* ---- files ---- */
+/* ---- files ----------------------------------------------------------------------------------- */
 
 static nebel_result load(const char *path, journal *kept)
 {

@@ -57,7 +57,7 @@ static void transmit(const nebel_snapshot *snapshot, nebel_isa isa, int channel,
     for (int i = 0; i < COUNT; i++) assert_true(out[i] >= 0 && out[i] <= 1);
 }
 
-/* ---- right, for all fog ---- */
+/* ---- right, for all fog ---------------------------------------------------------------------- */
 
 static void test_segments_through_any_fog_are_what_the_trace_says(void **unused)
 {
@@ -138,7 +138,7 @@ static void test_both_ways_agree(void **unused)
     nebel_release_snapshot(by_march);
 }
 
-/* ---- any layout, any instruction set: the same bits ---- */
+/* ---- any layout, any instruction set: the same bits ------------------------------------------ */
 
 static void test_strides_and_instruction_sets_change_no_bit(void **unused)
 {
@@ -197,7 +197,7 @@ static void test_segments_may_start_at_one_place(void **unused)
     }
 }
 
-/* ---- segments that are none ---- */
+/* ---- segments that are none ------------------------------------------------------------------ */
 
 static void test_segments_with_a_nan_or_of_no_length_give_1(void **unused)
 {
@@ -245,7 +245,7 @@ static void test_nothing_is_written_beyond_the_last_segment(void **unused)
     nebel_release_snapshot(snapshot);
 }
 
-/* ---- very long ones ---- */
+/* ---- very long ones -------------------------------------------------------------------------- */
 
 static void test_long_segments_cross_all_fog(void **unused)
 {

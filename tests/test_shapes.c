@@ -42,7 +42,7 @@ static const char *const formula_names[] = {
 #undef NAME
 };
 
-/* ---- asking ------------------------------------------------------------------------------------------------------ */
+/* ---- asking ---------------------------------------------------------------------------------- */
 
 typedef struct interval {
     long double v[NB_FORMULA_OUTPUTS];
@@ -86,7 +86,7 @@ static void expect(const char *what, long double got, long double wanted, long d
     if (!(error <= tolerance * fabsl(wanted))) fail_msg("%s: %.20Lg instead of %.20Lg", what, got, wanted);
 }
 
-/* ---- closed forms ------------------------------------------------------------------------------------------------ */
+/* ---- closed forms ---------------------------------------------------------------------------- */
 
 typedef struct chord_case {
     long double p[3], d[3], t_max, chord;
@@ -208,7 +208,7 @@ static void plane_bodies_end_where_T03_says(void **state)
     }
 }
 
-/* ---- against twice the digits ------------------------------------------------------------------------------------ */
+/* ---- against twice the digits ---------------------------------------------------------------- */
 
 typedef struct quad_ray {
     nb_quad p[3], d[3];
@@ -359,7 +359,7 @@ static void slack_is_small_where_rays_do_not_graze(void **state)
         }
 }
 
-/* ---- the bad cases ----------------------------------------------------------------------------------------------- */
+/* ---- the bad cases --------------------------------------------------------------------------- */
 
 typedef struct span_case {
     long double p[3], d[3], shape[6], enter, leave; /* a miss leaves first */

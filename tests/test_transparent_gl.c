@@ -20,8 +20,7 @@ static const char *dialect_of(nb_gl_language language)
     return nebel_shader_text(language == NB_GL_330 ? NEBEL_DIALECT_GLSL_330 : NEBEL_DIALECT_GLSL_300_ES);
 }
 
-/* ---- soft particles ------------------------------------------------------------------------------------------------
- */
+/* ---- soft particles -------------------------------------------------------------------------- */
 
 enum { PARTICLES = 4000, GAUSSIAN = 4, ENDLESS, PROFILES };
 
@@ -134,8 +133,7 @@ static void test_particles_300_es(void **state)
     try_particles(NB_GL_300ES);
 }
 
-/* ---- five taps -----------------------------------------------------------------------------------------------------
- */
+/* ---- five taps ------------------------------------------------------------------------------- */
 
 enum { COLUMNS = 2048, ROWS = 1024, FRAGMENTS = 20000 };
 

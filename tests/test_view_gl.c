@@ -16,8 +16,7 @@
 
 enum { WIDTH = 640, HEIGHT = 400, COUNT = 512, INPUTS = 4, OUTPUTS = 8 };
 
-/* ---- evaluation ----------------------------------------------------------------------------------------------------
- */
+/* ---- evaluation ------------------------------------------------------------------------------ */
 
 static unsigned compile(nb_gl *gl)
 {
@@ -76,8 +75,7 @@ static miss miss_of(const nebel_rays *rays, int i, const long double point[3], d
     return (miss){sqrt(beside) / length, fabs((double)outputs[i][3] - along) / length, length};
 }
 
-/* ---- tests ---------------------------------------------------------------------------------------------------------
- */
+/* ---- tests ----------------------------------------------------------------------------------- */
 
 /* Turned, and far from the origin of the world. */
 static const double eye_place[3] = {4e6, -100, -7e6};
@@ -142,8 +140,7 @@ static void check_window(nb_gl *gl, unsigned program, int projection, range r, d
                   r.reversed ? " reversed" : "", first, last, worst.across, worst.along);
 }
 
-/* ---- depth in metres, logarithms, sky, starts ----------------------------------------------------------------------
- */
+/* ---- depth in metres, logarithms, sky, starts ------------------------------------------------ */
 
 /* The same pixels with another kind of depth, made from the points that window depth gave. */
 static void check_kind(nb_gl *gl, unsigned program, int projection, const nebel_depth_desc *depth)

@@ -11,7 +11,7 @@ static void give_up(const char *what, const char *where)
     exit(EXIT_FAILURE);
 }
 
-/* ---- JSON: places in the text instead of a tree ---- */
+/* ---- JSON: places in the text instead of a tree ---------------------------------------------- */
 
 static const char *skip_space(const char *s)
 {
@@ -129,7 +129,7 @@ static void vector_or(const char *s, const char *key, double out[3])
     if (value != NULL) numbers(value, out, 3);
 }
 
-/* ---- descriptions ---- */
+/* ---- descriptions ---------------------------------------------------------------------------- */
 
 static void read_transform(const char *s, nebel_transform *t)
 {

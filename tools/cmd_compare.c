@@ -72,8 +72,7 @@ typedef struct findings {
     size_t incomparable;      /* NaN or infinite in one only */
 } findings;
 
-/* ---- which channels ------------------------------------------------------------------------------------------------
- */
+/* ---- which channels -------------------------------------------------------------------------- */
 
 static int find_channel(const nebel_image *image, const char *name)
 {
@@ -137,8 +136,7 @@ static int choose_channels(const settings *wanted, pair *both)
                              wanted->paths[0]);
 }
 
-/* ---- the numbers ---------------------------------------------------------------------------------------------------
- */
+/* ---- the numbers ----------------------------------------------------------------------------- */
 
 static double sample_of(const pair *both, int which, size_t pixel, uint32_t channel)
 {
@@ -218,8 +216,7 @@ static void print_findings(const settings *wanted, const pair *both, const findi
         (void)printf("NaN or infinite in one picture only: %zu samples\n", found->incomparable);
 }
 
-/* ---- the difference picture ----------------------------------------------------------------------------------------
- */
+/* ---- the difference picture ------------------------------------------------------------------ */
 
 static float shade(double difference, double amplify, nb_target_kind kind)
 {
@@ -257,8 +254,7 @@ static int write_difference(const pair *both, const settings *wanted, nb_report_
     return result == NEBEL_OK ? NB_DONE : nb_report_result(listener, wanted->output, result);
 }
 
-/* ---- the command ---------------------------------------------------------------------------------------------------
- */
+/* ---- the command ----------------------------------------------------------------------------- */
 
 static int read_settings(nb_arguments *arguments, settings *wanted)
 {

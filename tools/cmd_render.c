@@ -82,8 +82,7 @@ typedef struct settings {
     nebel_renderer_desc renderer;
 } settings;
 
-/* ---- the call ------------------------------------------------------------------------------------------------------
- */
+/* ---- the call -------------------------------------------------------------------------------- */
 
 /* "A<separator>B", two whole numbers up to `most`. */
 static int read_pair(const char *text, char separator, uint32_t most, uint32_t *a, uint32_t *b)
@@ -197,8 +196,7 @@ static int check_targets(const settings *wanted)
     return NB_DONE;
 }
 
-/* ---- the pictures --------------------------------------------------------------------------------------------------
- */
+/* ---- the pictures ---------------------------------------------------------------------------- */
 
 /* The planes of a frame in the order of an EXR's channels. */
 typedef struct plane {

@@ -70,8 +70,7 @@ typedef struct settings {
     int threads;
 } settings;
 
-/* ---- reading -------------------------------------------------------------------------------------------------------
- */
+/* ---- reading --------------------------------------------------------------------------------- */
 
 static int report_line(size_t line, const char *problem)
 {
@@ -97,8 +96,7 @@ static int read_rays(nb_rays *rays)
     return status;
 }
 
-/* ---- tracing -------------------------------------------------------------------------------------------------------
- */
+/* ---- tracing --------------------------------------------------------------------------------- */
 
 /* Rays are traced in blocks: whoever is free takes the next one. */
 enum { BLOCK = 1024 };
@@ -177,8 +175,7 @@ static nebel_light *trace_all(const nebel_snapshot *fog, const nb_rays *rays, co
     return NULL;
 }
 
-/* ---- writing -------------------------------------------------------------------------------------------------------
- */
+/* ---- writing --------------------------------------------------------------------------------- */
 
 enum { COLUMNS = 7, SHARE = 2048, LINE_SIZE = COLUMNS * (NB_SHORTEST_SIZE + 1) };
 
@@ -254,8 +251,7 @@ static int write_lights(const nebel_light *lights, size_t count, const settings 
     return nb_output_status(error);
 }
 
-/* ---- the command ---------------------------------------------------------------------------------------------------
- */
+/* ---- the command ----------------------------------------------------------------------------- */
 
 /* -1 to go on, or the exit status. */
 static int read_settings(nb_arguments *arguments, settings *wanted)

@@ -13,8 +13,7 @@ static int fail(nb_gl_context *gl, const char *what)
     return -1;
 }
 
-/* ---- displays ------------------------------------------------------------------------------------------------------
- */
+/* ---- displays -------------------------------------------------------------------------------- */
 
 static int client_has(const char *extension)
 {
@@ -49,8 +48,7 @@ static int list_displays(EGLDisplay displays[DEVICES_MOST + 2])
     return count;
 }
 
-/* ---- contexts ------------------------------------------------------------------------------------------------------
- */
+/* ---- contexts -------------------------------------------------------------------------------- */
 
 static EGLContext make_context(EGLDisplay display, EGLConfig config, nb_gl_api api)
 {

@@ -8,8 +8,7 @@
 
 static const nb_option help_option = {"help", 'h', NULL, "Print this page."};
 
-/* ---- likely meanings ----------------------------------------------------------------------------------------------
- */
+/* ---- likely meanings ------------------------------------------------------------------------- */
 
 enum { LONGEST_NAME = 32 };
 
@@ -57,8 +56,7 @@ const char *nb_options_nearest(const char *word, const char *const *names, size_
     return nearest;
 }
 
-/* ---- taking the call apart -----------------------------------------------------------------------------------------
- */
+/* ---- taking the call apart ------------------------------------------------------------------- */
 
 /* The words still to be read. */
 typedef struct words {
@@ -180,8 +178,7 @@ int nb_options_parse(const nb_command *command, int count, char **words_given, n
     return -1;
 }
 
-/* ---- values --------------------------------------------------------------------------------------------------------
- */
+/* ---- values ---------------------------------------------------------------------------------- */
 
 void nb_options_reject(nb_arguments *arguments, int option, const char *problem)
 {
@@ -236,8 +233,7 @@ int nb_options_choice(nb_arguments *arguments, int option, const char *const *na
     return fallback;
 }
 
-/* ---- the help page -------------------------------------------------------------------------------------------------
- */
+/* ---- the help page --------------------------------------------------------------------------- */
 
 enum { HELP_COLUMN = 26 };
 

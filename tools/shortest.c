@@ -18,8 +18,7 @@ typedef struct power {
 
 static power powers[POWERS];
 
-/* ---- the table ----------------------------------------------------------------------------------------------------
- */
+/* ---- the table ------------------------------------------------------------------------------- */
 
 /* A natural number of up to 1280 bits, least significant word first. */
 enum { WORDS = 40 };
@@ -104,8 +103,7 @@ void nb_shortest_prepare(void)
     }
 }
 
-/* ---- the digits ---------------------------------------------------------------------------------------------------
- */
+/* ---- the digits ------------------------------------------------------------------------------ */
 
 typedef struct decimal {
     uint64_t digits;
@@ -176,8 +174,7 @@ static decimal shortest(binary number)
     return (decimal){s + (uint64_t)nearer_above, k};
 }
 
-/* ---- the text -----------------------------------------------------------------------------------------------------
- */
+/* ---- the text -------------------------------------------------------------------------------- */
 
 static size_t copy_text(char *text, const char *word)
 {

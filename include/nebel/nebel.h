@@ -4,9 +4,9 @@
  *
  *     pixel = transmittance * surface + in_scattering
  *
- * Along origin + t * direction, 0 <= t <= t_max (metres), every volume of fog has an extinction [1/m, RGB]: a shape times a
- * density profile times an amount. Volumes that overlap add. Where a closed form exists the answer is exact; elsewhere it
- * is integrated until a proven bound is below the tolerance, and `error` says what is left.
+ * Along origin + t * direction, 0 <= t <= t_max (metres), every volume of fog has an extinction [1/m, RGB]: a shape
+ * times a density profile times an amount. Volumes that overlap add. Where a closed form exists the answer is exact;
+ * elsewhere it is integrated until a proven bound is below the tolerance, and `error` says what is left.
  *
  * A first program:
  *
@@ -33,8 +33,8 @@
  * all zero is valid; a zero member means the default named beside it. Functions return NEBEL_OK (0) or a negative
  * nebel_result; what went wrong, where and how to mend it goes to the log callback. Without a callback nebel is silent.
  *
- * Threads: different fogs may be used from different threads at once. One fog belongs to one thread at a time. A snapshot
- * never changes and may be queried by any number of threads.
+ * Threads: different fogs may be used from different threads at once. One fog belongs to one thread at a time. A
+ * snapshot never changes and may be queried by any number of threads.
  */
 #ifndef NEBEL_NEBEL_H
 #define NEBEL_NEBEL_H
@@ -53,18 +53,18 @@ extern "C" {
 /* The version as text, "0.1.0". Never NULL; lives for ever; any thread. */
 const char *nebel_version(void);
 
-/* ---- results ------------------------------------------------------------------------------------------------------ */
+/* ---- results --------------------------------------------------------------------------------- */
 
 /* One list gives the enumeration and its texts. */
-#define NEBEL_RESULTS(X)                                                                           \
-    X(OK, 0, "success")                                                                            \
-    X(ERROR_ARGUMENT, -1, "an argument is not what the function takes")                            \
-    X(ERROR_MEMORY, -2, "memory could not be had")                                                 \
-    X(ERROR_VALUE, -3, "a value is outside its range")                                             \
-    X(ERROR_UNBOUNDED, -4, "a ray without end gathers infinite light")                             \
-    X(ERROR_LIMIT, -5, "a limit is exceeded")                                                      \
-    X(ERROR_FILE, -6, "a file could not be read or written")                                       \
-    X(ERROR_FORMAT, -7, "a file is not what it should be")                                         \
+#define NEBEL_RESULTS(X)                                                                                               \
+    X(OK, 0, "success")                                                                                                \
+    X(ERROR_ARGUMENT, -1, "an argument is not what the function takes")                                                \
+    X(ERROR_MEMORY, -2, "memory could not be had")                                                                     \
+    X(ERROR_VALUE, -3, "a value is outside its range")                                                                 \
+    X(ERROR_UNBOUNDED, -4, "a ray without end gathers infinite light")                                                 \
+    X(ERROR_LIMIT, -5, "a limit is exceeded")                                                                          \
+    X(ERROR_FILE, -6, "a file could not be read or written")                                                           \
+    X(ERROR_FORMAT, -7, "a file is not what it should be")                                                             \
     X(ERROR_UNSUPPORTED, -8, "this build or this version cannot do that")
 
 typedef enum nebel_result {
@@ -76,10 +76,11 @@ typedef enum nebel_result {
 /* The text of a result, in English. Never NULL, also for numbers that are no result; any thread. */
 const char *nebel_result_text(nebel_result result);
 
-/* ---- memory, messages, processors --------------------------------------------------------------------------------- */
+/* ---- memory, messages, processors ------------------------------------------------------------ */
 
 /* Memory from the caller. Both functions or neither (NULL: malloc and free). `allocate` returns memory aligned for any
- * object, or NULL; `release` takes what `allocate` gave, never NULL. They are called from the thread that called nebel. */
+ * object, or NULL; `release` takes what `allocate` gave, never NULL. They are called from the thread that called nebel.
+ */
 typedef struct nebel_allocator {
     void *(*allocate)(size_t size, void *user);
     void (*release)(void *memory, void *user);
@@ -99,7 +100,7 @@ typedef enum nebel_isa {
     NEBEL_ISA_DEFAULT = 0,
     NEBEL_ISA_SCALAR,
     NEBEL_ISA_SSE2,
-    NEBEL_ISA_AVX2, /* with FMA3; results do not use fused operations */
+    NEBEL_ISA_AVX2,   /* with FMA3; results do not use fused operations */
     NEBEL_ISA_AVX512, /* F, DQ, BW, VL */
     NEBEL_ISA_NEON,
     NEBEL_ISA_COUNT
@@ -112,7 +113,7 @@ int nebel_isa_available(nebel_isa isa);
  * numbers. Any thread. */
 const char *nebel_isa_name(nebel_isa isa);
 
-/* ---- describing fog ----------------------------------------------------------------------------------------------- */
+/* ---- describing fog -------------------------------------------------------------------------- */
 
 typedef enum nebel_shape_type {
     NEBEL_SHAPE_WORLD = 0,    /* everywhere */
@@ -154,7 +155,8 @@ typedef struct nebel_shape {
     double point[3], normal[3];    /* half space */
     const nebel_plane *planes;     /* convex: 1 to NEBEL_MAX_PLANES */
     size_t plane_count;
-    const struct nebel_shape *parts; /* union, intersection: 1 to NEBEL_MAX_LEAVES leaves in all, NEBEL_MAX_DEPTH deep */
+    const struct nebel_shape
+        *parts; /* union, intersection: 1 to NEBEL_MAX_LEAVES leaves in all, NEBEL_MAX_DEPTH deep */
     size_t part_count;
 } nebel_shape;
 
@@ -166,10 +168,10 @@ typedef struct nebel_shape {
  * soft edge follow the shape and its transform. */
 typedef enum nebel_density_type {
     NEBEL_DENSITY_CONSTANT = 0,
-    NEBEL_DENSITY_HEIGHT,   /* exp(-(y - base) / scale_height); `below` says what holds under the base */
-    NEBEL_DENSITY_LINEAR,   /* 0 at `from`, 1 at `to`, clamped, level across */
-    NEBEL_DENSITY_RADIAL,   /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
-    NEBEL_DENSITY_GAUSSIAN, /* exp(-r^2 / (2 sigma^2)) around center */
+    NEBEL_DENSITY_HEIGHT,    /* exp(-(y - base) / scale_height); `below` says what holds under the base */
+    NEBEL_DENSITY_LINEAR,    /* 0 at `from`, 1 at `to`, clamped, level across */
+    NEBEL_DENSITY_RADIAL,    /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
+    NEBEL_DENSITY_GAUSSIAN,  /* exp(-r^2 / (2 sigma^2)) around center */
     NEBEL_DENSITY_SOFT_EDGE, /* product over the axes of min(1, distance to the nearer face / distance); box only */
     NEBEL_DENSITY_COUNT
 } nebel_density_type;
@@ -193,16 +195,16 @@ typedef struct nebel_density {
 
 typedef enum nebel_operation {
     NEBEL_OPERATION_ADD = 0,
-    NEBEL_OPERATION_EXCLUDE, /* inside the shape there is no fog of this or a lower priority; no density, colours or amounts
-                                are read */
+    NEBEL_OPERATION_EXCLUDE, /* inside the shape there is no fog of this or a lower priority; no density, colours or
+                                amounts are read */
     NEBEL_OPERATION_REPLACE, /* inside the shape this fog is there, and none of a lower priority */
     NEBEL_OPERATION_COUNT
 } nebel_operation;
 
 /* One volume of fog. Colours are linear RGB.
  *
- * At each place a volume's fog is there unless one that replaces has a higher priority there, or one that excludes the same or a
- * higher one. What is there adds. */
+ * At each place a volume's fog is there unless one that replaces has a higher priority there, or one that excludes the
+ * same or a higher one. What is there adds. */
 typedef struct nebel_volume_desc {
     nebel_operation operation;
     int priority; /* any */
@@ -212,16 +214,16 @@ typedef struct nebel_volume_desc {
     double source[3];     /* radiance of opaque fog, >= 0: alone it gives source * (1 - transmittance) */
     double albedo[3];     /* 0..1: lit by the fog's ambient light, scattered evenly; not together with source */
     double emission[3];   /* radiance per metre, >= 0, where the density is 1 */
-    double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its operation;
-                             cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
+    double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
+                             operation; cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
 } nebel_volume_desc;
 
-/* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) / visibility.
- * contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when visibility is not
- * > 0 or contrast not within (0, 1). Any thread. */
+/* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) /
+ * visibility. contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when
+ * visibility is not > 0 or contrast not within (0, 1). Any thread. */
 double nebel_extinction_from_visibility(double visibility, double contrast);
 
-/* ---- fog that can be edited ---------------------------------------------------------------------------------------- */
+/* ---- fog that can be edited ------------------------------------------------------------------ */
 
 typedef struct nebel_fog nebel_fog;
 typedef struct nebel_snapshot nebel_snapshot;
@@ -230,7 +232,7 @@ typedef uint64_t nebel_volume_id; /* 0 is never one */
 typedef struct nebel_fog_desc {
     nebel_allocator allocator;
     nebel_log log;
-    double ambient[3]; /* radiance, the same from everywhere, >= 0; lights volumes with an albedo */
+    double ambient[3];  /* radiance, the same from everywhere, >= 0; lights volumes with an albedo */
     double max_opacity; /* 0 to 1; 0: 1. See nebel_set_max_opacity */
 } nebel_fog_desc;
 
@@ -241,11 +243,13 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog);
 /* Frees a fog; its snapshots live on. NULL is fine. */
 void nebel_destroy_fog(nebel_fog *fog);
 
-/* Adds a volume; its id in *id (NULL: not wanted). The description is copied. Cost: amortised O(1), plus the checks of a
- * convex body (linear in its planes on average). On an error nothing has changed. Errors: ARGUMENT, VALUE, LIMIT, MEMORY. */
+/* Adds a volume; its id in *id (NULL: not wanted). The description is copied. Cost: amortised O(1), plus the checks of
+ * a convex body (linear in its planes on average). On an error nothing has changed. Errors: ARGUMENT, VALUE, LIMIT,
+ * MEMORY. */
 nebel_result nebel_add_volume(nebel_fog *fog, const nebel_volume_desc *desc, nebel_volume_id *id);
 
-/* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; an unknown id is ARGUMENT. */
+/* Replaces the description of a volume, which keeps its id. Cost and errors as nebel_add_volume; an unknown id is
+ * ARGUMENT. */
 nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel_volume_desc *desc);
 
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
@@ -255,24 +259,27 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
- * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T). Every query
- * answers so. A look, not physics: the fog of a ray is no longer that of its parts. Cost O(1). Errors: ARGUMENT, VALUE. */
+ * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T).
+ * Every query answers so. A look, not physics: the fog of a ray is no longer that of its parts. Cost O(1). Errors:
+ * ARGUMENT, VALUE. */
 nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
 
-/* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the same
- * bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT, MEMORY. */
+/* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the
+ * same bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT,
+ * MEMORY. */
 nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
 
 /* One more owner of the snapshot; any thread. Returns its argument. */
 nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot);
 
-/* One owner less; the last one frees it, through the fog's allocator (which must still be usable). Any thread. NULL is fine. */
+/* One owner less; the last one frees it, through the fog's allocator (which must still be usable). Any thread. NULL is
+ * fine. */
 void nebel_release_snapshot(nebel_snapshot *snapshot);
 
 /* How many volumes the snapshot holds. */
 size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot);
 
-/* ---- asking ------------------------------------------------------------------------------------------------------- */
+/* ---- asking ---------------------------------------------------------------------------------- */
 
 typedef struct nebel_ray {
     double origin[3];    /* m */
@@ -283,9 +290,9 @@ typedef struct nebel_ray {
 typedef struct nebel_light {
     double transmittance[3]; /* RGB, 0..1 */
     double in_scattering[3]; /* RGB radiance, >= 0 */
-    double error;            /* bound of the absolute error of the six numbers. In double never more than the tolerance and 1e-8,
-                                in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
-                                touch a surface or run level with one to the last bits */
+    double error; /* bound of the absolute error of the six numbers. In double never more than the tolerance and 1e-8,
+                     in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
+                     touch a surface or run level with one to the last bits */
 } nebel_light;
 
 typedef enum nebel_precision {
@@ -295,90 +302,96 @@ typedef enum nebel_precision {
 
 typedef struct nebel_trace_desc {
     nebel_precision precision;
-    nebel_isa isa;        /* float only */
-    double tolerance;     /* > 0: absolute on transmittance; relative to max(1, largest source radiance) on in-scattering.
-                             0: 0.002. Closed forms stay exact whatever it is. */
-    size_t *failed_ray;   /* NULL, or where the index of a ray that is an error is written */
-    int transmittance_only; /* nonzero: in-scattering is not asked for and comes back 0; `error` is that of transmittance. Much
-                             cheaper where fog of different light varies along the ray; same bits of transmittance. */
-    int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as those to a
-                             light, since `start` and `cutoff` of a volume count from where a ray starts. */
+    nebel_isa isa;      /* float only */
+    double tolerance;   /* > 0: absolute on transmittance; relative to max(1, largest source radiance) on in-scattering.
+                           0: 0.002. Closed forms stay exact whatever it is. */
+    size_t *failed_ray; /* NULL, or where the index of a ray that is an error is written */
+    int transmittance_only; /* nonzero: in-scattering is not asked for and comes back 0; `error` is that of
+                             transmittance. Much cheaper where fog of different light varies along the ray; same bits of
+                             transmittance. */
+    int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
+                             those to a   light, since `start` and `cutoff` of a volume count from where a ray starts. */
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
 
-/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. rays and lights must not overlap.
- * A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and for every
- * way of splitting the rays into calls. Any thread.
- * Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN, infinite where it must not be, of no direction, of negative
- * t_max), UNSUPPORTED (isa not available), UNBOUNDED (emission in an endless volume that does not absorb), MEMORY (scratch
- * for very many volumes on one ray). On an error the contents of lights are undefined. */
+/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. rays and lights must not
+ * overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
+ * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN,
+ * infinite where it must not be, of no direction, of negative t_max), UNSUPPORTED (isa not available), UNBOUNDED
+ * (emission in an endless volume that does not absorb), MEMORY (scratch for very many volumes on one ray). On an error
+ * the contents of lights are undefined. */
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
                          size_t ray_stride, nebel_light *lights, size_t light_stride);
 
 /* Visibility: how far one sees along each ray until the transmittance of `channel` (0 red, 1 green, 2 blue) falls to
  * `transmittance` (0 < transmittance < 1): distances[i] in metres, INFINITY where it does not within t_max. In double
- * precision, to 1e-12 relative where the fog is not vanishing. `start` and `cutoff` of volumes count. Errors as nebel_trace. Any thread. */
+ * precision, to 1e-12 relative where the fog is not vanishing. `start` and `cutoff` of volumes count. Errors as
+ * nebel_trace. Any thread. */
 nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                       const nebel_ray *rays, size_t ray_stride, double *distances);
 
-/* ---- planes of rays in, planes of light out: the hot path of a renderer ---------------------------------------------- */
+/* ---- planes of rays in, planes of light out: the hot path of a renderer ---------------------- */
 
-/* n rays in caller memory, a plane for each coordinate. Neighbours in a plane are a stride apart, in bytes, a multiple of the
- * number's size; 0: without gaps. What all rays share costs nothing: those of a camera need no offset, those to the sun no planes
- * of directions. Planes of three are given all or none. */
+/* n rays in caller memory, a plane for each coordinate. Neighbours in a plane are a stride apart, in bytes, a multiple
+ * of the number's size; 0: without gaps. What all rays share costs nothing: those of a camera need no offset, those to
+ * the sun no planes of directions. Planes of three are given all or none. */
 typedef struct nebel_ray_planes {
-    double origin[3];                  /* m */
-    const float *offset[3];            /* m, from `origin` to where a ray starts; NULL: all start at `origin` */
+    double origin[3];       /* m */
+    const float *offset[3]; /* m, from `origin` to where a ray starts; NULL: all start at `origin` */
     size_t offset_stride;
-    double direction[3];               /* of all rays, any length but 0; not read where one of the next two is given */
-    const float *direction_float[3];   /* of each ray, any length but 0; NULL: see `direction` */
-    const double *direction_double[3]; /* the same, for fog so far away that a float's rounding of the way there shows */
+    double direction[3];             /* of all rays, any length but 0; not read where one of the next two is given */
+    const float *direction_float[3]; /* of each ray, any length but 0; NULL: see `direction` */
+    const double
+        *direction_double[3]; /* the same, for fog so far away that a float's rounding of the way there shows */
     size_t direction_stride;
-    const float *t_max;                /* m, >= 0; INFINITY is legal; NULL: rays without end. 0 masks a ray: nothing is asked, and its
-                                          other numbers may be anything */
+    const float *t_max; /* m, >= 0; INFINITY is legal; NULL: rays without end. 0 masks a ray: nothing is asked, and its
+                           other numbers may be anything */
     size_t t_max_stride;
 } nebel_ray_planes;
 
-/* Light in caller memory: planes like those of the rays, whose elements beyond n stay as they are. Every plane may be NULL: not
- * wanted. What is not wanted is not computed as far as possible; the error in particular costs more than the light of a box. */
+/* Light in caller memory: planes like those of the rays, whose elements beyond n stay as they are. Every plane may be
+ * NULL: not wanted. What is not wanted is not computed as far as possible; the error in particular costs more than the
+ * light of a box. */
 typedef struct nebel_light_planes {
     float *transmittance[3]; /* RGB, 0..1 */
     size_t transmittance_stride;
     float *in_scattering[3]; /* RGB radiance, >= 0 */
     size_t in_scattering_stride;
-    float *error;            /* bound of the absolute error: of all six numbers where a plane of in_scattering is given, else of
-                                transmittance */
+    float *error; /* bound of the absolute error: of all six numbers where a plane of in_scattering is given, else of
+                     transmittance */
     size_t error_stride;
 } nebel_light_planes;
 
-/* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of transmittance and
- * in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero) `isa`, `tolerance`,
- * `failed_ray` and `ignore_distances` are read. rays and lights must not overlap. Same bits for every isa and for every way of splitting the rays into
- * calls; a few hundred rays are enough for a call to be worth it. Any thread. Errors as nebel_trace. */
+/* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of
+ * transmittance and in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero)
+ * `isa`, `tolerance`, `failed_ray` and `ignore_distances` are read. rays and lights must not overlap. Same bits for
+ * every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be worth
+ * it. Any thread. Errors as nebel_trace. */
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
                                 const nebel_ray_planes *rays, const nebel_light_planes *lights);
 
-/* ---- segments in, transmittances out: the hot path of an engine ----------------------------------------------------- */
+/* ---- segments in, transmittances out: the hot path of an engine ------------------------------ */
 
-/* n segments in caller memory, from[i] to to[i], three floats each, relative to `origin` (so that floats suffice far from
- * the world's origin). Strides in bytes, multiples of 4; from_stride 0: all segments start at the same place. */
+/* n segments in caller memory, from[i] to to[i], three floats each, relative to `origin` (so that floats suffice far
+ * from the world's origin). Strides in bytes, multiples of 4; from_stride 0: all segments start at the same place. */
 typedef struct nebel_segments {
     double origin[3];
     const float *from;
     size_t from_stride;
     const float *to;
-    size_t to_stride; /* 0: 12 */
-    int ignore_distances; /* see nebel_trace_desc; 0: `start` and `cutoff` of volumes count from where a segment starts */
+    size_t to_stride;     /* 0: 12 */
+    int ignore_distances; /* see nebel_trace_desc; 0: `start` and `cutoff` of volumes count from where a segment starts
+                           */
 } nebel_segments;
 
-/* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in bytes
- * (0: 4). Boxes of constant density take the shortest way; everything else goes through nebel_trace in float. A segment
- * that holds a NaN gives 1. Same bits for every isa. Any thread. Errors as nebel_trace. */
+/* The transmittance of one colour channel over each segment, in float throughout: out[i] within 0..1, out_stride in
+ * bytes (0: 4). Boxes of constant density take the shortest way; everything else goes through nebel_trace in float. A
+ * segment that holds a NaN gives 1. Same bits for every isa. Any thread. Errors as nebel_trace. */
 nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa isa, int channel, size_t n,
                                      const nebel_segments *segments, float *out, size_t out_stride);
 
-/* ---- pixels in, pixels out: fog over a finished picture -------------------------------------------------------------- */
+/* ---- pixels in, pixels out: fog over a finished picture -------------------------------------- */
 
 typedef enum nebel_depth {
     NEBEL_DEPTH_AXIS = 0, /* how many times the pixel's way at depth 1: for a camera, the distance along its axis */
@@ -388,27 +401,27 @@ typedef enum nebel_depth {
 /* A picture in caller memory, its depth, and the rays it was seen along. Rows `pitch` bytes apart, 0: without gaps. */
 typedef struct nebel_pixels {
     double eye[3];                         /* m, where all rays start */
-    float corner[3], step_x[3], step_y[3]; /* the way from the eye to depth 1 through pixel (x, y), x and y counted from 0:
-                                              corner + x step_x + y step_y */
+    float corner[3], step_x[3], step_y[3]; /* the way from the eye to depth 1 through pixel (x, y), x and y counted from
+                                              0: corner + x step_x + y step_y */
     nebel_depth depth_type;
     uint32_t width, height; /* 1 to 65536 */
     const float *depth;     /* one per pixel; INFINITY where nothing is */
     size_t depth_pitch;
-    const uint8_t *color;   /* red, green, blue, alpha */
+    const uint8_t *color; /* red, green, blue, alpha */
     size_t color_pitch;
-    uint8_t *out;           /* may be color, with the same pitch */
+    uint8_t *out; /* may be color, with the same pitch */
     size_t out_pitch;
     uint32_t first_row, row_count; /* the rows to be done, for threads that share a picture; row_count 0: to the last */
 } nebel_pixels;
 
-/* out = transmittance * color + in-scattering, rounded to nearest, alpha as it is, in float throughout. Radiance 1 is 255, in
- * whatever encoding the picture has: physics asks for a linear one, old hardware blended sRGB as it stood. Boxes of constant
- * density that take all colours alike and have one source take the shortest way; everything else goes through nebel_trace in
- * float with the default tolerance. A pixel whose depth is a NaN or negative stays as it is. Same bits for every isa and for every way of
- * splitting the rows. Any thread. Errors as nebel_trace. */
+/* out = transmittance * color + in-scattering, rounded to nearest, alpha as it is, in float throughout. Radiance 1 is
+ * 255, in whatever encoding the picture has: physics asks for a linear one, old hardware blended sRGB as it stood.
+ * Boxes of constant density that take all colours alike and have one source take the shortest way; everything else goes
+ * through nebel_trace in float with the default tolerance. A pixel whose depth is a NaN or negative stays as it is.
+ * Same bits for every isa and for every way of splitting the rows. Any thread. Errors as nebel_trace. */
 nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, const nebel_pixels *pixels);
 
-/* ---- transparent surfaces in fog ------------------------------------------------------------------------------------ */
+/* ---- transparent surfaces in fog ------------------------------------------------------------- */
 
 /* What a surface does to the light L behind it. `color` and `alpha` are the surface's own, without fog. */
 typedef enum nebel_blend_mode {
@@ -420,18 +433,20 @@ typedef enum nebel_blend_mode {
     NEBEL_BLEND_COUNT
 } nebel_blend_mode;
 
-/* The pixel becomes source + factor * pixel. In OpenGL: the first and second colour of glBlendFunc(GL_ONE, GL_SRC1_COLOR). */
+/* The pixel becomes source + factor * pixel. In OpenGL: the first and second colour of glBlendFunc(GL_ONE,
+ * GL_SRC1_COLOR). */
 typedef struct nebel_blend {
     double source[3], factor[3];
 } nebel_blend;
 
-/* How to draw a transparent surface over a pixel that has its fog already: `fog` is the light of the way from the eye to the
- * surface. Exact for every mode, RGB transmittance, any fog behind and any stack of surfaces drawn from the back to the front,
- * as long as all of them and the pixel were fogged by the same fog. alpha is read by OVER and PREMULTIPLIED alone. An unknown mode leaves the
- * pixel as it is. Linear light. Source of the formulas: src/formulas/blend.inc. Any thread. */
+/* How to draw a transparent surface over a pixel that has its fog already: `fog` is the light of the way from the eye
+ * to the surface. Exact for every mode, RGB transmittance, any fog behind and any stack of surfaces drawn from the back
+ * to the front, as long as all of them and the pixel were fogged by the same fog. alpha is read by OVER and
+ * PREMULTIPLIED alone. An unknown mode leaves the pixel as it is. Linear light. Source of the formulas:
+ * src/formulas/blend.inc. Any thread. */
 nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_light *fog);
 
-/* ---- standard fog factors ------------------------------------------------------------------------------------------ */
+/* ---- standard fog factors -------------------------------------------------------------------- */
 
 /* f = (end - c) / (end - start), exp(-density c) or exp(-(density c)^2), clamped to [0, 1] last; colour = f surface +
  * (1 - f) fog. c is the distance or fog coordinate [m]. end == start gives a step: 1 below start, 0 from it on.

@@ -8,7 +8,8 @@
  *         nebel_add_volume(fog, &volume, NULL);
  *     }
  *
- * Particles overlap, absorb and shine exactly, in any order, among themselves and with all other fog. Link with libnebel.
+ * Particles overlap, absorb and shine exactly, in any order, among themselves and with all other fog. Link with
+ * libnebel.
  */
 #ifndef NEBEL_NEBULA_H
 #define NEBEL_NEBULA_H
@@ -44,21 +45,24 @@ typedef struct nebel_nebula_desc {
     nebel_shape shape;     /* particles start inside of it; bounded */
     nebel_density density; /* how thickly they are strewn there */
     size_t count;
-    const double (*points)[3]; /* m, `count` of them: where particles start, in place of shape and density, which are not read; NULL: those */
-    uint64_t seed;           /* the same particles for the same description, on every machine */
+    const double (*points)[3]; /* m, `count` of them: where particles start, in place of shape and density, which are
+                                  not read; NULL: those */
+    uint64_t seed;             /* the same particles for the same description, on every machine */
     nebel_particle_profile profile;
-    double size[2];          /* m, smallest and largest radius, > 0; as many of one octave as of the next. Both 0: 0.05, 0.2 */
-    double absorption[3];    /* 1/m at a particle's centre, >= 0 */
-    double emission[3];      /* radiance per metre at a particle's centre, >= 0 */
-    const double (*colors)[3]; /* factors of emission, >= 0, which drift through the cloud from the first to the last; NULL: 1 */
+    double size[2]; /* m, smallest and largest radius, > 0; as many of one octave as of the next. Both 0: 0.05, 0.2 */
+    double absorption[3]; /* 1/m at a particle's centre, >= 0 */
+    double emission[3];   /* radiance per metre at a particle's centre, >= 0 */
+    const double (
+        *colors)[3]; /* factors of emission, >= 0, which drift through the cloud from the first to the last; NULL: 1 */
     size_t color_count;
     double turbulence;      /* m, >= 0: how far eddies carry particles; 0: not at all */
-    double turbulence_size; /* m, > 0: the largest eddies, and how fast colours change. 0: a quarter of the extent of the shape or the points */
+    double turbulence_size; /* m, > 0: the largest eddies, and how fast colours change. 0: a quarter of the extent of
+                               the shape or the points */
 } nebel_nebula_desc;
 
 /* Strews desc->count particles. O(count / share of the shape's bounding box that is taken). Any thread.
- * Errors: ARGUMENT; MEMORY; VALUE (as for nebel_add_volume, a shape without bounds, or one in which no place is found; a point
- * that is not finite). */
+ * Errors: ARGUMENT; MEMORY; VALUE (as for nebel_add_volume, a shape without bounds, or one in which no place is found;
+ * a point that is not finite). */
 nebel_result nebel_scatter_nebula(const nebel_nebula_desc *desc, nebel_particle *particles);
 
 #ifdef __cplusplus

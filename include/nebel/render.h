@@ -4,9 +4,9 @@
  *     nebel_create_renderer(scene_data, fog, &(nebel_renderer_desc){0}, &renderer);
  *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
  *
- * Lambert surfaces lit by the sun (ray-traced shadows; the sunlight is attenuated by all fog on its way) and by the ambient
- * radiance; transmittance and in-scattering from nebel_trace in float. The same picture, bit for bit, for every thread count.
- * Link with libnebel_cpu and libnebel.
+ * Lambert surfaces lit by the sun (ray-traced shadows; the sunlight is attenuated by all fog on its way) and by the
+ * ambient radiance; transmittance and in-scattering from nebel_trace in float. The same picture, bit for bit, for every
+ * thread count. Link with libnebel_cpu and libnebel.
  */
 #ifndef NEBEL_RENDER_H
 #define NEBEL_RENDER_H
@@ -27,14 +27,14 @@ typedef struct nebel_renderer_desc {
     int threads;   /* 0: all */
 } nebel_renderer_desc;
 
-/* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else: the
- * snapshot is retained. fog NULL: none. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
+/* Builds the acceleration structure over the meshes of `scene`, which must outlive the renderer, as must nothing else:
+ * the snapshot is retained. fog NULL: none. Errors: ARGUMENT, VALUE, MEMORY, UNSUPPORTED. */
 nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_renderer_desc *desc,
                                    nebel_renderer **renderer);
 void nebel_destroy_renderer(nebel_renderer *renderer);
 
-/* The fog of the frames from now on, for fog that moves. The snapshot is retained; NULL: none. Not while a frame is rendered.
- * Errors: ARGUMENT. */
+/* The fog of the frames from now on, for fog that moves. The snapshot is retained; NULL: none. Not while a frame is
+ * rendered. Errors: ARGUMENT. */
 nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fog);
 
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
@@ -49,7 +49,8 @@ typedef struct nebel_frame_desc {
     void *progress_user;
 } nebel_frame_desc;
 
-/* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not wanted. */
+/* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not
+ * wanted. */
 typedef struct nebel_frame {
     float *color;         /* 3: transmittance * surface + in_scattering */
     float *transmittance; /* 3: mean over the samples */
@@ -63,9 +64,9 @@ typedef struct nebel_frame {
  * Errors: ARGUMENT, VALUE, MEMORY, UNBOUNDED, LIMIT (stopped by progress). */
 nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc *desc, const nebel_frame *frame);
 
-/* Exposure (stops; 0 leaves the light as it is), a filmic tone curve for each channel and the sRGB transfer function; n pixels
- * of 3 floats, out may be in. Black stays 0, middle grey 0.18 stays 0.18, 1 comes out as 0.70 before the transfer function,
- * the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
+/* Exposure (stops; 0 leaves the light as it is), a filmic tone curve for each channel and the sRGB transfer function; n
+ * pixels of 3 floats, out may be in. Black stays 0, middle grey 0.18 stays 0.18, 1 comes out as 0.70 before the
+ * transfer function, the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
 void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
 
 /* The Embree version this build uses, "Embree 3.13.5". Never NULL. */

@@ -20,7 +20,7 @@
 extern "C" {
 #endif
 
-/* ---- the scene ------------------------------------------------------------------------------------------------------ */
+/* ---- the scene ------------------------------------------------------------------------------- */
 
 typedef enum nebel_projection {
     NEBEL_PROJECTION_PERSPECTIVE = 0,
@@ -44,15 +44,15 @@ typedef struct nebel_camera_key {
 } nebel_camera_key;
 
 typedef struct nebel_mesh {
-    double origin[3];          /* m; positions are relative to it */
-    const float *positions;    /* 3 per vertex, m, already rotated and scaled */
-    const float *normals;      /* 3 per vertex, unit length; NULL: use the triangles' own */
-    const float *uvs;          /* 2 per vertex, v downwards as in the texture's rows; NULL: no texture */
-    const uint32_t *indices;   /* 3 per triangle, each < vertex_count */
+    double origin[3];        /* m; positions are relative to it */
+    const float *positions;  /* 3 per vertex, m, already rotated and scaled */
+    const float *normals;    /* 3 per vertex, unit length; NULL: use the triangles' own */
+    const float *uvs;        /* 2 per vertex, v downwards as in the texture's rows; NULL: no texture */
+    const uint32_t *indices; /* 3 per triangle, each < vertex_count */
     uint32_t vertex_count;
     uint32_t triangle_count;
-    float base_color[3];       /* linear reflectance, 0..1; multiplies the texture */
-    int32_t texture;           /* index into textures, or -1 */
+    float base_color[3]; /* linear reflectance, 0..1; multiplies the texture */
+    int32_t texture;     /* index into textures, or -1 */
 } nebel_mesh;
 
 typedef struct nebel_texture {
@@ -102,29 +102,29 @@ typedef struct nebel_scene_desc {
  * On an error *scene is NULL. Errors: ARGUMENT, FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY. */
 nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, nebel_scene **scene);
 
-/* The same from memory. `name` stands for the file in messages; relative paths in the scene start at its folder. The text
- * need not end in a zero byte. */
+/* The same from memory. `name` stands for the file in messages; relative paths in the scene start at its folder. The
+ * text need not end in a zero byte. */
 nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
                                nebel_scene **scene);
 
-/* Loads the models and height fields that the scene names. Idempotent. Not thread safe against readers of the same scene.
- * Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
+/* Loads the models and height fields that the scene names. Idempotent. Not thread safe against readers of the same
+ * scene. Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
 nebel_result nebel_load_scene_models(nebel_scene *scene);
 
 /* The contents; lives as long as the scene (mesh pointers change with nebel_load_scene_models). Never NULL. */
 const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene);
 
-/* The camera at a frame: standing, turning or between its keys (smooth cubic through the keys, still before the first and
- * after the last). */
+/* The camera at a frame: standing, turning or between its keys (smooth cubic through the keys, still before the first
+ * and after the last). */
 nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
 
-/* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the scene.
- * Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
+/* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
+ * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
 nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);
 void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles); /* NULL is fine */
 
-/* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no number leaves
- * its range. Its arrays are the scene's. index < contents->volume_count. */
+/* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no
+ * number leaves its range. Its arrays are the scene's. index < contents->volume_count. */
 nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame);
 
 /* What a volume comes from. */
@@ -138,8 +138,8 @@ typedef enum nebel_volume_origin {
 /* index < contents->volume_count. */
 nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index);
 
-/* A snapshot of the scene's fog at a frame, its nebulae's particles among it; release it with nebel_release_snapshot before the
- * scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT, MEMORY, VALUE, LIMIT. */
+/* A snapshot of the scene's fog at a frame, its nebulae's particles among it; release it with nebel_release_snapshot
+ * before the scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT, MEMORY, VALUE, LIMIT. */
 nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
 
 /* The same at frame 0. */
@@ -152,15 +152,16 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changed numbers back into a scene file. `changed` is what nebel_scene_contents gave for this file, with other
- * numbers in the camera, the background, the sun (where there is one), the ambient light, and in the volumes of origin WRITTEN, but for planes
- * and parts of their shapes; the rest of it is not read. What is not as the file says is written in its place, in the file's own
- * unit, axes and words (a visibility stays a visibility), with 15 digits; a key that is missing is added. Every other byte
- * stays. The file is replaced as a whole, as by nebel_write_image, or left alone where nothing has changed. On an error it is as
- * it was. Errors: as nebel_load_scene; ARGUMENT (the file has other volumes by now); VALUE (the file's word for the amount of a
- * volume has none for 0); FORMAT also where the new numbers are no valid scene. */
+ * numbers in the camera, the background, the sun (where there is one), the ambient light, and in the volumes of origin
+ * WRITTEN, but for planes and parts of their shapes; the rest of it is not read. What is not as the file says is
+ * written in its place, in the file's own unit, axes and words (a visibility stays a visibility), with 15 digits; a key
+ * that is missing is added. Every other byte stays. The file is replaced as a whole, as by nebel_write_image, or left
+ * alone where nothing has changed. On an error it is as it was. Errors: as nebel_load_scene; ARGUMENT (the file has
+ * other volumes by now); VALUE (the file's word for the amount of a volume has none for 0); FORMAT also where the new
+ * numbers are no valid scene. */
 nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *changed);
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------- */
+/* ---- pictures -------------------------------------------------------------------------------- */
 
 /* A picture of float planes, top row first: samples[(y * width + x) * channel_count + c]. */
 typedef struct nebel_image {
@@ -170,21 +171,22 @@ typedef struct nebel_image {
     float *samples;
 } nebel_image;
 
-/* Reads a PNG (8 or 16 bit; 0..1, values as stored) or EXR (scan lines or tiles, half, float or uint channels, sorted as R,
- * G, B, A, then the others by name). Free with nebel_free_image and the same allocator. Errors: FILE, FORMAT, LIMIT,
- * UNSUPPORTED, MEMORY. */
+/* Reads a PNG (8 or 16 bit; 0..1, values as stored) or EXR (scan lines or tiles, half, float or uint channels, sorted
+ * as R, G, B, A, then the others by name). Free with nebel_free_image and the same allocator. Errors: FILE, FORMAT,
+ * LIMIT, UNSUPPORTED, MEMORY. */
 nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image);
 void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image);
 
 /* Writes by the ending of `path`: .png takes channels R, G, B in 0..1, already in sRGB, 8 bit with an ordered rounding
- * (no dithering noise between runs); .exr takes every channel as 32-bit float, ZIP compressed. Regular files are written to a
- * temporary name beside the target and renamed; devices and pipes are written directly. On an error nothing of the target has
- * changed and no temporary file is left. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
+ * (no dithering noise between runs); .exr takes every channel as 32-bit float, ZIP compressed. Regular files are
+ * written to a temporary name beside the target and renamed; devices and pipes are written directly. On an error
+ * nothing of the target has changed and no temporary file is left. Errors: ARGUMENT, FILE, FORMAT (unknown ending),
+ * MEMORY. */
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image);
 
-/* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a temporary
- * file can be made beside the target (it is made, and removed) or the device is open to writing. The target does not change.
- * Thread safe. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
+/* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a
+ * temporary file can be made beside the target (it is made, and removed) or the device is open to writing. The target
+ * does not change. Thread safe. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc);
 
 /* What this build of libnebel_scene has: "Assimp 5.2.5, libpng 1.6.39, OpenEXR 3.1.5, yajl 2.1.0". Never NULL. */

@@ -3,41 +3,42 @@
  *     size_t count = 0;
  *     nebel_pack_fog(snapshot, camera_position, NULL, 0, &count);           // how many words?
  *     nebel_pack_fog(snapshot, camera_position, words, capacity, &count);   // each frame: 4 floats a word
- *     // upload the words into a uniform block of 16 KiB or a float texture, put nebel_shader_text() behind your #version line, and
+ *     // upload the words into a uniform block of 16 KiB or a float texture, put nebel_shader_text() behind your
+ * #version line, and
  *
  *     nebel_light fog = nebel_trace(vec3(0), direction, distance);          // in the shader
  *     color = fog.transmittance * color + fog.in_scattering;
  *
- * The text is made of the formulas that the C library is compiled from. It has no #version line, and every name in it begins
- * with nebel_, NEBEL_, nb_ or NB_. Positions are relative to the eye that the fog was packed for, so that float is enough
- * anywhere in the world. No graphics interface is called here: this works for OpenGL, OpenGL ES, WebGL, Vulkan and Direct3D alike;
- * nebel/gl.h does the rest for OpenGL.
+ * The text is made of the formulas that the C library is compiled from. It has no #version line, and every name in it
+ * begins with nebel_, NEBEL_, nb_ or NB_. Positions are relative to the eye that the fog was packed for, so that float
+ * is enough anywhere in the world. No graphics interface is called here: this works for OpenGL, OpenGL ES, WebGL,
+ * Vulkan and Direct3D alike; nebel/gl.h does the rest for OpenGL.
  *
  * What the text declares, in every dialect (vec3 is float3 in HLSL):
  *
  *     struct nebel_light { vec3 transmittance; vec3 in_scattering; };
  *     nebel_light nebel_trace(vec3 origin, vec3 direction, float t_max);
- *         Light along origin + t direction, 0 <= t <= t_max: origin in metres relative to the packed eye, direction of unit length,
- *         t_max in metres, 1e18 or more for an endless ray. All volumes, exact overlap, any number.
- *     nebel_light nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count);
- *         The same for the volumes NEBEL_INDEX(first) ... NEBEL_INDEX(first + count - 1) alone, ascending: see nebel_tiles.
- *     vec3 nebel_transmit(vec3 origin, vec3 direction, float t_max);
- *     vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first, int count);
- *         Transmittance alone.
- *     vec3 nebel_transmit_light(vec3 origin, vec3 direction, float t_max);
- *     vec3 nebel_transmit_light_list(vec3 origin, vec3 direction, float t_max, int first, int count);
- *         The same for a ray that does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not count.
+ *         Light along origin + t direction, 0 <= t <= t_max: origin in metres relative to the packed eye, direction of
+ * unit length, t_max in metres, 1e18 or more for an endless ray. All volumes, exact overlap, any number. nebel_light
+ * nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count); The same for the volumes
+ * NEBEL_INDEX(first) ... NEBEL_INDEX(first + count - 1) alone, ascending: see nebel_tiles. vec3 nebel_transmit(vec3
+ * origin, vec3 direction, float t_max); vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first,
+ * int count); Transmittance alone. vec3 nebel_transmit_light(vec3 origin, vec3 direction, float t_max); vec3
+ * nebel_transmit_light_list(vec3 origin, vec3 direction, float t_max, int first, int count); The same for a ray that
+ * does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not count.
  *
  * With NEBEL_VIEW defined before it, the text also declares, in every dialect:
  *
  *     struct nebel_sight { vec3 origin; vec3 direction; float t_max; };
  *     nebel_sight nebel_see(vec2 pixel, float depth);
- *         The ray of a pixel (gl_FragCoord.xy) up to the surface at `depth`, ready for nebel_trace; 1e18 where there is none.
- *         See nebel_view_rays. Where NEBEL_DEPTH_KIND is defined as the number of a nebel_depth_kind, the text knows no other; where
- *         NEBEL_FROM_EYE is, all rays start at the eye, as nebel_rays says. It reads NEBEL_RAY(i), a vec4 of nebel_rays; GLSL 3.30 and ES 3.00 declare
- *         `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];` unless the host defines NEBEL_RAY itself.
+ *         The ray of a pixel (gl_FragCoord.xy) up to the surface at `depth`, ready for nebel_trace; 1e18 where there is
+ * none. See nebel_view_rays. Where NEBEL_DEPTH_KIND is defined as the number of a nebel_depth_kind, the text knows no
+ * other; where NEBEL_FROM_EYE is, all rays start at the eye, as nebel_rays says. It reads NEBEL_RAY(i), a vec4 of
+ * nebel_rays; GLSL 3.30 and ES 3.00 declare `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];` unless the host defines
+ * NEBEL_RAY itself.
  *
- * With NEBEL_TRANSPARENT defined before it, the text also declares, in every dialect, what transparent surfaces and particles need:
+ * With NEBEL_TRANSPARENT defined before it, the text also declares, in every dialect, what transparent surfaces and
+ * particles need:
  *
  *     struct nebel_blend { vec3 source; vec3 factor; };
  *     nebel_blend nebel_blend_over(vec3 color, float alpha, nebel_light fog);
@@ -46,49 +47,48 @@
  *     nebel_blend nebel_blend_multiply(vec3 color, nebel_light fog);
  *     nebel_blend nebel_blend_screen(vec3 color, nebel_light fog);
  *     nebel_blend nebel_blend_medium(nebel_light medium, nebel_light fog);
- *         nebel_blend_surface for each mode, over a picture that has its fog already: `fog` is nebel_trace up to the surface, and the pixel
- *         becomes source + factor * pixel. MEDIUM is a particle: pixel behind times its transmittance, plus its own in-scattering.
- *         Two outputs, location 0 index 0 and 1: glBlendFuncSeparate(GL_ONE, GL_SRC1_COLOR, GL_ZERO, GL_ONE), all modes, draw from the
- *         back to the front; needs OpenGL 3.3 or GL_EXT_blend_func_extended.
- *     vec4 nebel_blend_grey(nebel_blend blend);
- *         Source, and the mean factor as alpha: glBlendFuncSeparate(GL_ONE, GL_SRC_ALPHA, GL_ZERO, GL_ONE), one output, everywhere.
- *         Exact where the factors of the colours are equal: over, premultiplied, additive; multiply, screen and medium if they are grey.
- *         Coloured ones without two outputs are drawn twice, exact too: first the factor with glBlendFunc(GL_ZERO, GL_SRC_COLOR), then
- *         the source with glBlendFunc(GL_ONE, GL_ONE).
- *     float nebel_ball_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, int power);
- *     float nebel_gaussian_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, float sigma);
- *         The density of a particle integrated along the ray from t = 0 to t_max [m], closed form: (1 - r^2)^power, r the distance from
- *         the centre in radii, power 0 (even) to 3; exp(-distance^2 / (2 sigma^2)) within the radius (1e18: without bound). With the
- *         t_max of nebel_see, that is with the opaque surface's depth, edges are soft because they are right. Radius and sigma > 0.
- *         Positions are floats: a particle 10,000 radii away still has its digits.
- *     nebel_light nebel_medium_light(float length, vec3 extinction, vec3 light);
- *         What so much of a medium does to light: extinction and radiance per metre where the density is 1 [1/m].
- *     struct nebel_tap_constants { float offset; float nothing; float edge; float margin; float brightness; };
- *     nebel_tap_constants nebel_default_taps();
- *         0.0005 of the screen, 100000, 0.5, 0.125, 1: constants of the classic comparison of a particle with the opaque depth around.
- *     vec2 nebel_screen_place(vec4 clip);
- *         Where clip space is on the screen, 0 to 1.
- *     float nebel_compare_taps(float depth, float center, vec4 corners, nebel_tap_constants taps);
- *         What to multiply a particle's colour by: `brightness`, or 0 where it is hidden. Depths are in metres along the camera's axis:
- *         the particle's, and those of the opaque picture at the pixel and `offset` away along both diagonals; below 0 nothing is
- *         there and `nothing` counts. Drawn where they differ by more than `edge`, and where none is nearer than depth - margin.
- *     float nebel_five_taps(vec2 place, float depth, nebel_tap_constants taps);
- *         The same with depths from NEBEL_OPAQUE_DEPTH(place), which the host defines before the text; else the function is not there.
+ *         nebel_blend_surface for each mode, over a picture that has its fog already: `fog` is nebel_trace up to the
+ * surface, and the pixel becomes source + factor * pixel. MEDIUM is a particle: pixel behind times its transmittance,
+ * plus its own in-scattering. Two outputs, location 0 index 0 and 1: glBlendFuncSeparate(GL_ONE, GL_SRC1_COLOR,
+ * GL_ZERO, GL_ONE), all modes, draw from the back to the front; needs OpenGL 3.3 or GL_EXT_blend_func_extended. vec4
+ * nebel_blend_grey(nebel_blend blend); Source, and the mean factor as alpha: glBlendFuncSeparate(GL_ONE, GL_SRC_ALPHA,
+ * GL_ZERO, GL_ONE), one output, everywhere. Exact where the factors of the colours are equal: over, premultiplied,
+ * additive; multiply, screen and medium if they are grey. Coloured ones without two outputs are drawn twice, exact too:
+ * first the factor with glBlendFunc(GL_ZERO, GL_SRC_COLOR), then the source with glBlendFunc(GL_ONE, GL_ONE). float
+ * nebel_ball_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, int power); float
+ * nebel_gaussian_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, float sigma); The density
+ * of a particle integrated along the ray from t = 0 to t_max [m], closed form: (1 - r^2)^power, r the distance from the
+ * centre in radii, power 0 (even) to 3; exp(-distance^2 / (2 sigma^2)) within the radius (1e18: without bound). With
+ * the t_max of nebel_see, that is with the opaque surface's depth, edges are soft because they are right. Radius and
+ * sigma > 0. Positions are floats: a particle 10,000 radii away still has its digits. nebel_light
+ * nebel_medium_light(float length, vec3 extinction, vec3 light); What so much of a medium does to light: extinction and
+ * radiance per metre where the density is 1 [1/m]. struct nebel_tap_constants { float offset; float nothing; float
+ * edge; float margin; float brightness; }; nebel_tap_constants nebel_default_taps(); 0.0005 of the screen, 100000, 0.5,
+ * 0.125, 1: constants of the classic comparison of a particle with the opaque depth around. vec2
+ * nebel_screen_place(vec4 clip); Where clip space is on the screen, 0 to 1. float nebel_compare_taps(float depth, float
+ * center, vec4 corners, nebel_tap_constants taps); What to multiply a particle's colour by: `brightness`, or 0 where it
+ * is hidden. Depths are in metres along the camera's axis: the particle's, and those of the opaque picture at the pixel
+ * and `offset` away along both diagonals; below 0 nothing is there and `nothing` counts. Drawn where they differ by
+ * more than `edge`, and where none is nearer than depth - margin. float nebel_five_taps(vec2 place, float depth,
+ * nebel_tap_constants taps); The same with depths from NEBEL_OPAQUE_DEPTH(place), which the host defines before the
+ * text; else the function is not there.
  *
  * Where the words come from: NEBEL_WORD(i), a vec4. By default (GLSL 3.30 and ES 3.00) the text declares
  *
  *     layout(std140) uniform nebel_fog_block { vec4 nebel_words[1024]; };
  *
- * with NEBEL_TEXTURE defined before it `uniform highp sampler2D nebel_fog_texture;`, rows of NEBEL_TEXTURE_WIDTH texels RGBA32F;
- * a host that defines NEBEL_WORD itself gets neither. The Vulkan and HLSL texts declare nothing: define NEBEL_WORD before them.
- * NEBEL_INDEX(i), an int, is only needed by the _list functions, which are there when it is defined; NEBEL_TILES makes GLSL define
- * it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be
- * defined as what nebel_pack_features says. The GLSL ES text makes highp the default precision.
+ * with NEBEL_TEXTURE defined before it `uniform highp sampler2D nebel_fog_texture;`, rows of NEBEL_TEXTURE_WIDTH texels
+ * RGBA32F; a host that defines NEBEL_WORD itself gets neither. The Vulkan and HLSL texts declare nothing: define
+ * NEBEL_WORD before them. NEBEL_INDEX(i), an int, is only needed by the _list functions, which are there when it is
+ * defined; NEBEL_TILES makes GLSL define it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of
+ * NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be defined as what nebel_pack_features says. The GLSL ES text
+ * makes highp the default precision.
  *
  * docs/shaders.md shows a complete shader, the same for Vulkan and HLSL, and says how exact and how fast all this is.
  *
- * A direction of no length, a t_max that is not above 0, or a NaN anywhere gives transmittance 1 and no light. In-scattering is
- * at most NEBEL_MOST_LIGHT, 65504 (the largest half) unless it was defined before: so emission without end stays a number.
+ * A direction of no length, a t_max that is not above 0, or a NaN anywhere gives transmittance 1 and no light.
+ * In-scattering is at most NEBEL_MOST_LIGHT, 65504 (the largest half) unless it was defined before: so emission without
+ * end stays a number.
  */
 #ifndef NEBEL_SHADER_H
 #define NEBEL_SHADER_H
@@ -110,41 +110,43 @@ typedef enum nebel_dialect {
 /* The text for a dialect, zero-terminated; lives for ever. NULL for an unknown number. Any thread. */
 const char *nebel_shader_text(nebel_dialect dialect);
 
-#define NEBEL_BLOCK_WORDS 1024    /* what the uniform block holds: 16 KiB, which every OpenGL ES 3.0 has */
-#define NEBEL_TEXTURE_WIDTH 1024  /* words in a row of the texture */
+#define NEBEL_BLOCK_WORDS 1024   /* what the uniform block holds: 16 KiB, which every OpenGL ES 3.0 has */
+#define NEBEL_TEXTURE_WIDTH 1024 /* words in a row of the texture */
 
 /* One word of packed fog: a vec4. */
 typedef struct nebel_word {
     float v[4];
 } nebel_word;
 
-/* Packs a snapshot for an eye [m]. *count receives the number of words needed; they are written when `capacity` is at least that.
- * Same snapshot and eye, same words. O(volumes and their parts). Any thread.
- * Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0, which only asks) or when more than
- * 2^24 words would be needed. */
+/* Packs a snapshot for an eye [m]. *count receives the number of words needed; they are written when `capacity` is at
+ * least that. Same snapshot and eye, same words. O(volumes and their parts). Any thread. Errors: ARGUMENT; LIMIT when
+ * capacity is too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words would be
+ * needed. */
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
                             size_t *count);
 
-/* What the fog has, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not name, and a
- * driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong answers; masks of
- * several snapshots may be joined with |. NULL gives everything. O(volumes and their parts). Any thread. */
+/* What the fog has, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
+ * name, and a driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong
+ * answers; masks of several snapshots may be joined with |. NULL gives everything. O(volumes and their parts). Any
+ * thread. */
 uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 
-/* ---- views ---------------------------------------------------------------------------------------------------------- */
+/* ---- views ----------------------------------------------------------------------------------- */
 
-/* How a picture is seen. Matrices are column-major, as OpenGL takes them, in double, so that a camera may be anywhere. Any
- * projection of points to clip space will do: perspective, orthographic, off-axis, reversed, infinite, with an oblique near
- * plane. */
+/* How a picture is seen. Matrices are column-major, as OpenGL takes them, in double, so that a camera may be anywhere.
+ * Any projection of points to clip space will do: perspective, orthographic, off-axis, reversed, infinite, with an
+ * oblique near plane. */
 typedef struct nebel_view {
-    double eye_from_world[16];  /* rotation and translation */
+    double eye_from_world[16]; /* rotation and translation */
     double clip_from_eye[16];
-    uint32_t width, height;     /* pixels, 1 to 65536 */
+    uint32_t width, height; /* pixels, 1 to 65536 */
 } nebel_view;
 
 /* What a texel of the host's depth picture holds. */
 typedef enum nebel_depth_kind {
     NEBEL_DEPTH_KIND_WINDOW = 0, /* what a depth buffer holds */
-    NEBEL_DEPTH_KIND_LOGARITHM,  /* log(1 + c w) / log(1 + c far), w from clip space: the logarithmic depth of large worlds */
+    NEBEL_DEPTH_KIND_LOGARITHM,  /* log(1 + c w) / log(1 + c far), w from clip space: the logarithmic depth of large
+                                    worlds */
     NEBEL_DEPTH_KIND_AXIS,       /* metres along the camera's axis */
     NEBEL_DEPTH_KIND_DISTANCE,   /* metres along the ray, from where rays start by default */
     NEBEL_DEPTH_KIND_COUNT
@@ -164,12 +166,12 @@ typedef enum nebel_start {
                             behind the eye */
 } nebel_start;
 
-/* The convention of the host's depth. {0} is OpenGL's own: clip z from -1 to 1, a depth range from 0 to 1. Reversed depth and
- * infinite far planes need no word here: the matrix tells. */
+/* The convention of the host's depth. {0} is OpenGL's own: clip z from -1 to 1, a depth range from 0 to 1. Reversed
+ * depth and infinite far planes need no word here: the matrix tells. */
 typedef struct nebel_depth_desc {
     nebel_depth_kind kind;
-    int zero_to_one;          /* nonzero: clip z reaches from 0 to 1 (glClipControl, Vulkan, Direct3D), not from -1 */
-    double range[2];          /* what glDepthRange was given, apart; both 0: 0 and 1 */
+    int zero_to_one;           /* nonzero: clip z reaches from 0 to 1 (glClipControl, Vulkan, Direct3D), not from -1 */
+    double range[2];           /* what glDepthRange was given, apart; both 0: 0 and 1 */
     double log_scale, log_far; /* LOGARITHM: c [1/m] and far [m], > 0; log_scale 0: 1 */
     nebel_sky sky;
     double sky_depth;
@@ -185,21 +187,21 @@ typedef struct nebel_rays {
     nebel_word words[NEBEL_RAY_WORDS];
 } nebel_rays;
 
-/* Computes, in double, what makes rays of pixels and lengths of depths. Pixel (x, y) counts from the lower left corner, as
- * gl_FragCoord does; its centre is at (x + .5, y + .5). A host whose rows count from the top negates the second row of
- * clip_from_eye. Parallel rays go along -z of eye space, others to where w is positive in clip space. `depth` NULL: {0}.
- * O(1). Any thread. Errors: ARGUMENT (a number that is not finite, a matrix that cannot be inverted, one whose rays neither
- * meet in a point nor are parallel with constant w; a size, a range, a kind that is none). */
+/* Computes, in double, what makes rays of pixels and lengths of depths. Pixel (x, y) counts from the lower left corner,
+ * as gl_FragCoord does; its centre is at (x + .5, y + .5). A host whose rows count from the top negates the second row
+ * of clip_from_eye. Parallel rays go along -z of eye space, others to where w is positive in clip space. `depth` NULL:
+ * {0}. O(1). Any thread. Errors: ARGUMENT (a number that is not finite, a matrix that cannot be inverted, one whose
+ * rays neither meet in a point nor are parallel with constant w; a size, a range, a kind that is none). */
 nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *depth, nebel_rays *rays);
 
-/* ---- tiles ----------------------------------------------------------------------------------------------------------- */
+/* ---- tiles ----------------------------------------------------------------------------------- */
 
-/* Which volumes each tile of the screen may see, so that many small volumes cost what a tile sees. Tiles are tile_size pixels
- * wide and high (a power of two, 4 to 256), counted from the lower left corner, row by row; tile k owns entries[2 k] = first and
- * entries[2 k + 1] = count, and the volumes of the tile are entries[first] ... entries[first + count - 1], ascending, as
- * nebel_trace_list takes them. *count receives the number of entries needed; they are written when capacity is at least that.
- * `view` must be the one of the eye that the fog was packed for. O(volumes + entries). Any thread.
- * Errors: ARGUMENT (a matrix that cannot be inverted or is not finite), MEMORY, LIMIT as nebel_pack_fog. */
+/* Which volumes each tile of the screen may see, so that many small volumes cost what a tile sees. Tiles are tile_size
+ * pixels wide and high (a power of two, 4 to 256), counted from the lower left corner, row by row; tile k owns
+ * entries[2 k] = first and entries[2 k + 1] = count, and the volumes of the tile are entries[first] ... entries[first +
+ * count - 1], ascending, as nebel_trace_list takes them. *count receives the number of entries needed; they are written
+ * when capacity is at least that. `view` must be the one of the eye that the fog was packed for. O(volumes + entries).
+ * Any thread. Errors: ARGUMENT (a matrix that cannot be inverted or is not finite), MEMORY, LIMIT as nebel_pack_fog. */
 nebel_result nebel_tile_volumes(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t tile_size,
                                 uint32_t *entries, size_t capacity, size_t *count);
 

@@ -27,7 +27,8 @@ void *nb_allocate_zero(const nebel_allocator *allocator, size_t count, size_t si
 /* NULL is fine. */
 void nb_release(const nebel_allocator *allocator, void *memory);
 
-/* Makes room for `wanted` elements in an array that holds `used` of `*capacity`; doubles. 0 on failure, nothing changed. */
+/* Makes room for `wanted` elements in an array that holds `used` of `*capacity`; doubles. 0 on failure, nothing
+ * changed. */
 int nb_grow(const nebel_allocator *allocator, void **array, size_t size, size_t used, size_t *capacity, size_t wanted);
 
 /* Hands a message to the caller's log and returns `result`, so that an error path is one line. */

@@ -7,13 +7,17 @@ int nb_cpu_supports(nebel_isa isa)
     __builtin_cpu_init();
     switch (isa) {
     case NEBEL_ISA_DEFAULT:
-    case NEBEL_ISA_SCALAR: return 1;
-    case NEBEL_ISA_SSE2: return __builtin_cpu_supports("sse2") != 0;
-    case NEBEL_ISA_AVX2: return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    case NEBEL_ISA_SCALAR:
+        return 1;
+    case NEBEL_ISA_SSE2:
+        return __builtin_cpu_supports("sse2") != 0;
+    case NEBEL_ISA_AVX2:
+        return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     case NEBEL_ISA_AVX512:
         return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
                __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
-    default: return 0;
+    default:
+        return 0;
     }
 }
 

@@ -12,7 +12,8 @@ const char *nebel_result_text(nebel_result result)
 {
     switch (result) {
 #define RESULT_TEXT(name, value, text)                                                                                 \
-    case NEBEL_##name: return text;
+    case NEBEL_##name:                                                                                                 \
+        return text;
         NEBEL_RESULTS(RESULT_TEXT)
 #undef RESULT_TEXT
     }

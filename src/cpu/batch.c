@@ -27,8 +27,8 @@ static void set_clear(nb_light_samples *samples)
     for (int i = 0; i < NB_BATCH; i++) samples->error[i] = 0;
 }
 
-/* From the ray's start, before it was advanced, to the hit or to infinity; 0 outside the picture, where nothing is asked.
- * In two loops: compilers do not speculate arithmetic. */
+/* From the ray's start, before it was advanced, to the hit or to infinity; 0 outside the picture, where nothing is
+ * asked. In two loops: compilers do not speculate arithmetic. */
 NB_CLONES static void set_distances(double advance, const nb_rays *rays, const nb_hits *hits, const int *inside,
                                     float *restrict distance)
 {
@@ -50,8 +50,10 @@ static nebel_ray_planes camera_rays(const nb_frame *frame, nb_scratch *scratch)
     for (int c = 0; c < 3; c++) {
         planes.origin[c] = frame->view.position[c];
         planes.direction[c] = frame->view.forward[c];
-        if (parallel) planes.offset[c] = scratch->offset[c];
-        else planes.direction_double[c] = scratch->rays.direction[c];
+        if (parallel)
+            planes.offset[c] = scratch->offset[c];
+        else
+            planes.direction_double[c] = scratch->rays.direction[c];
         for (int i = 0; i < NB_BATCH && parallel; i++) scratch->offset[c][i] = (float)scratch->rays.offset[c][i];
     }
     return planes;

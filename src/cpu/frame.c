@@ -13,8 +13,7 @@ typedef struct nb_state {
     nebel_result result; /* of the first that failed */
 } nb_state;
 
-/* ---- checks --------------------------------------------------------------------------------------------------------
- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *log)
 {
@@ -84,8 +83,7 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     return NEBEL_OK;
 }
 
-/* ---- regions -------------------------------------------------------------------------------------------------------
- */
+/* ---- regions --------------------------------------------------------------------------------- */
 
 static nebel_result render_batch(const nb_frame *frame, const nb_place *place, uint32_t first, uint32_t count,
                                  nb_scratch *scratch)

@@ -12,8 +12,7 @@ static const double smallest_cell = 1024;
 /* Positions of a mesh have themselves no more digits than its radius allows: finer cells would gain nothing. */
 static const double cell_in_radii = 8;
 
-/* ---- checks -------------------------------------------------------------------------------------------------------
- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_texture(const nebel_scene_data *scene, size_t number, const nebel_log *log)
 {
@@ -65,8 +64,7 @@ static nebel_result check_scene(const nebel_scene_data *scene, const nebel_log *
     return result;
 }
 
-/* ---- measures ------------------------------------------------------------------------------------------------------
- */
+/* ---- measures -------------------------------------------------------------------------------- */
 
 static float longest_edge(const nebel_mesh *mesh)
 {
@@ -109,8 +107,7 @@ static void measure(nb_geometry *geometry, nb_surface *surface)
     }
 }
 
-/* ---- Embree --------------------------------------------------------------------------------------------------------
- */
+/* ---- Embree ---------------------------------------------------------------------------------- */
 
 static void report(void *user, enum RTCError code, const char *text)
 {
@@ -159,8 +156,7 @@ static nebel_result make_device(nb_geometry *geometry, nebel_isa isa, int thread
     return NEBEL_OK;
 }
 
-/* ---- numbers of triangles ------------------------------------------------------------------------------------------
- */
+/* ---- numbers of triangles -------------------------------------------------------------------- */
 
 static size_t fans(size_t count)
 {
@@ -230,8 +226,7 @@ nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *sce
     return result == NEBEL_OK ? make_device(geometry, isa, threads) : result;
 }
 
-/* ---- building -------------------------------------------------------------------------------------------------------
- */
+/* ---- building -------------------------------------------------------------------------------- */
 
 /* The corners of all meshes in world coordinates. */
 static void world_bounds(const nb_geometry *geometry, double low[3], double high[3])

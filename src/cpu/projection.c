@@ -5,8 +5,7 @@
 /* Rectangles grow by this many pixels on every side: more than triangles do when they are rasterized. */
 static const double slack = 0x1p-12;
 
-/* ---- the view -------------------------------------------------------------------------------------------------------
- */
+/* ---- the view -------------------------------------------------------------------------------- */
 
 static void cross(const double a[3], const double b[3], double out[3])
 {
@@ -43,8 +42,7 @@ void nb_projection_set(nb_projection *projection, const nb_view *view)
     }
 }
 
-/* ---- vertices ------------------------------------------------------------------------------------------------------
- */
+/* ---- vertices -------------------------------------------------------------------------------- */
 
 enum { PIECE = 256, EVERYWHERE = INT16_MAX };
 
@@ -119,8 +117,7 @@ static void project_surface(const nb_projection *projection, const nb_picture *p
     }
 }
 
-/* ---- rectangles ----------------------------------------------------------------------------------------------------
- */
+/* ---- rectangles ------------------------------------------------------------------------------ */
 
 static inline void enlarge(const int16_t *restrict by, int16_t *restrict ends)
 {

@@ -21,8 +21,7 @@ void nb_raster_set(nb_raster *raster, nb_geometry *geometry, const nb_view *view
     nb_project_geometry(&raster->projection, picture, geometry, threads);
 }
 
-/* ---- corners -------------------------------------------------------------------------------------------------------
- */
+/* ---- corners --------------------------------------------------------------------------------- */
 
 /* The triangles of one surface by their IDs: neighbours mostly have the same. */
 typedef struct nb_owner {
@@ -51,8 +50,7 @@ static inline const uint32_t *indices_of(const nb_owner *owner, uint32_t id)
     return owner->indices + 3 * (size_t)(id - owner->first_id);
 }
 
-/* ---- triangles that a region may show ------------------------------------------------------------------------------
- */
+/* ---- triangles that a region may show -------------------------------------------------------- */
 
 enum { PENDING = 64 };
 
@@ -211,8 +209,7 @@ NB_CLONES static void fill(const nb_pending *pending, int orthographic, const fl
     }
 }
 
-/* ---- regions -------------------------------------------------------------------------------------------------------
- */
+/* ---- regions --------------------------------------------------------------------------------- */
 
 /* Most of the memory that a region needs is in no near cache. It is asked for before it is needed: the rectangles of
  * this many leaves, then the indices and then the positions of triangles. */
@@ -361,8 +358,7 @@ void nb_raster_region(const nb_raster *raster, uint32_t left, uint32_t top, uint
     flush(&walk);
 }
 
-/* ---- hits ----------------------------------------------------------------------------------------------------------
- */
+/* ---- hits ------------------------------------------------------------------------------------ */
 
 typedef struct nb_corners {
     float corner[3][3][NB_BATCH];

@@ -11,8 +11,7 @@ void nb_srgb_table_set(nb_srgb_table *table)
     }
 }
 
-/* ---- textures ------------------------------------------------------------------------------------------------------
- */
+/* ---- textures -------------------------------------------------------------------------------- */
 
 /* The part of a texture coordinate after the point; 0 for what has none. */
 static float wrap(float x)
@@ -54,8 +53,7 @@ static void sample_texture(const nebel_texture *texture, const nb_srgb_table *ta
     }
 }
 
-/* ---- points --------------------------------------------------------------------------------------------------------
- */
+/* ---- points ---------------------------------------------------------------------------------- */
 
 /* Unit normals of the triangles, turned to the camera, also for shading until smooth ones are known. Scaled by the
  * largest component first: squares of the areas of small and large triangles leave the range of float. */

@@ -2,7 +2,8 @@
 #ifndef NB_PRELUDE_C_H
 #define NB_PRELUDE_C_H
 
-/* clang-format off: one line for each word of the vocabulary, to be read as a table. */
+/* One line for each word of the vocabulary, to be read as a table. */
+/* clang-format off */
 
 #include <float.h>
 #include <math.h>
@@ -16,7 +17,7 @@
 #define NB_FUNCTION static inline
 #define NB_WIDTH 1
 
-/* ---- types and literals ------------------------------------------------------------------------------------------ */
+/* ---- types and literals ---------------------------------------------------------------------- */
 
 #ifdef NB_DOUBLE
 typedef double nb_scalar;
@@ -53,7 +54,7 @@ typedef nb_wscalar nb_wide;
 typedef int nb_mask;
 typedef int nb_wmask;
 
-/* ---- one lane ---------------------------------------------------------------------------------------------------- */
+/* ---- one lane -------------------------------------------------------------------------------- */
 
 #define nb_lane(v, i) ((void)(i), (v))
 
@@ -69,7 +70,7 @@ static inline nb_real nb_narrow(nb_wide x) { return (nb_real)x; }
 static inline nb_wmask nb_widen_mask(nb_mask m) { return m; }
 static inline nb_mask nb_narrow_mask(nb_wmask m) { return m; }
 
-/* ---- masks ------------------------------------------------------------------------------------------------------- */
+/* ---- masks ----------------------------------------------------------------------------------- */
 
 #define nb_mask_true 1
 #define nb_mask_false 0
@@ -91,7 +92,7 @@ static inline int nb_wall(nb_wmask m) { return m; }
 static inline nb_real nb_select(nb_mask m, nb_real a, nb_real b) { return m ? a : b; }
 static inline nb_wide nb_wselect(nb_wmask m, nb_wide a, nb_wide b) { return m ? a : b; }
 
-/* ---- arithmetic the machine has ---------------------------------------------------------------------------------- */
+/* ---- arithmetic the machine has -------------------------------------------------------------- */
 
 static inline nb_real nb_min(nb_real a, nb_real b) { return a < b ? a : b; }
 static inline nb_real nb_max(nb_real a, nb_real b) { return a > b ? a : b; }

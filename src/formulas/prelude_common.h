@@ -3,7 +3,8 @@
 #ifndef NB_PRELUDE_COMMON_H
 #define NB_PRELUDE_COMMON_H
 
-/* clang-format off: one line for each word of the vocabulary, to be read as a table. */
+/* One line for each word of the vocabulary, to be read as a table. */
+/* clang-format off */
 
 /* A structure that formulas return: NB_STRUCT(name) members NB_STRUCT_END(name). GLSL has no typedef. */
 #define NB_STRUCT(name) typedef struct name {

@@ -8,7 +8,8 @@
 #ifndef NB_PRELUDE_SIMD_H
 #define NB_PRELUDE_SIMD_H
 
-/* clang-format off: one line for each word of the vocabulary, to be read as a table. */
+/* One line for each word of the vocabulary, to be read as a table. */
+/* clang-format off */
 
 #include <stdint.h>
 #include <string.h>
@@ -21,7 +22,7 @@
 
 #define NB_FUNCTION static inline
 
-/* ---- the instruction sets ---------------------------------------------------------------------------------------- */
+/* ---- the instruction sets -------------------------------------------------------------------- */
 
 /* NB_STORAGE floats in a register, of which NB_WIDTH count. SSE2 keeps two floats beside two doubles in the lower half
  * of a register of four, because compilers treat registers of two floats badly. */
@@ -139,7 +140,7 @@
 #define NB_WIDE_MAX(a, b) NB_WIDE_OP(max)(a, b)
 #endif
 
-/* ---- types and literals ------------------------------------------------------------------------------------------ */
+/* ---- types and literals ---------------------------------------------------------------------- */
 
 typedef float nb_scalar;
 typedef float nb_real __attribute__((vector_size(4 * NB_STORAGE)));
@@ -155,7 +156,7 @@ static inline nb_real nb_splat(float x) { return x - (nb_real){0}; }
 static inline nb_bits nb_to_bits(nb_real x) { return (nb_bits)x; }
 static inline nb_real nb_from_bits(nb_bits bits) { return (nb_real)bits; }
 
-/* ---- real -------------------------------------------------------------------------------------------------------- */
+/* ---- real ------------------------------------------------------------------------------------ */
 
 #define nb_lane(v, i) ((v)[i])
 #define nb_mask_true (~(nb_mask){0})
@@ -187,7 +188,7 @@ static inline nb_real nb_load_lanes(const float *from)
 static inline void nb_store_lanes(float *to, nb_real x) { memcpy(to, &x, sizeof x); }
 #endif
 
-/* ---- wide -------------------------------------------------------------------------------------------------------- */
+/* ---- wide ------------------------------------------------------------------------------------ */
 
 #if defined(NB_FAST)
 

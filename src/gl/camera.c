@@ -8,8 +8,7 @@ static const double pi = 3.14159265358979323846;
  * their own depth, so that neither costs any digits. */
 static const double near_distance = 1e-6, far_distance = 1e9;
 
-/* ---- vectors -------------------------------------------------------------------------------------------------------
- */
+/* ---- vectors --------------------------------------------------------------------------------- */
 
 static double dot(const double a[3], const double b[3])
 {
@@ -44,8 +43,7 @@ static int is_finite(const double v[3])
     return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
 }
 
-/* ---- cameras -------------------------------------------------------------------------------------------------------
- */
+/* ---- cameras --------------------------------------------------------------------------------- */
 
 /* Across the view where `up` is along it: the axis that is farthest from it tells. */
 static void choose_right(const double forward[3], double right[3])
@@ -140,8 +138,7 @@ nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, ui
     return nb_fail(log, NEBEL_ERROR_VALUE, "camera: there is no projection %d", (int)camera->projection);
 }
 
-/* ---- samples -------------------------------------------------------------------------------------------------------
- */
+/* ---- samples --------------------------------------------------------------------------------- */
 
 /* The van der Corput sequence in base 2. */
 static double mirror(uint32_t i)

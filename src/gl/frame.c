@@ -210,8 +210,7 @@ static nebel_result draw_fog(const frame *f)
     return result == NEBEL_OK ? nebel_gl_draw_fog(r->eye_fog, &pass) : result;
 }
 
-/* ---- particles ---------------------------------------------------------------------------------------------------
- */
+/* ---- particles ------------------------------------------------------------------------------- */
 
 /* Grey particles at once; of others each color by itself, because blending has room for one factor. */
 static void draw_channels(const nebel_gl_renderer *r, unsigned program)

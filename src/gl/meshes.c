@@ -9,8 +9,7 @@ typedef struct vertex {
     float position[3], normal[3], uv[2], face[3];
 } vertex;
 
-/* ---- checks -------------------------------------------------------------------------------------------------------
- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_textures(const nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene)
 {
@@ -67,8 +66,7 @@ static nebel_result check_mesh(const nb_meshes *meshes, const nebel_scene_data *
     return check_indices(meshes, mesh, number);
 }
 
-/* ---- vertices ------------------------------------------------------------------------------------------------------
- */
+/* ---- vertices -------------------------------------------------------------------------------- */
 
 /* A mesh on its way to OpenGL. */
 typedef struct draft {
@@ -201,8 +199,7 @@ static void include_mesh(nb_meshes *meshes, const nb_mesh *made)
     }
 }
 
-/* ---- textures ------------------------------------------------------------------------------------------------------
- */
+/* ---- textures -------------------------------------------------------------------------------- */
 
 /* As the CPU renderer looks texels up: between four of them in linear light, without smaller versions. */
 static nebel_result make_texture(const nb_meshes *meshes, const nebel_texture *texture, unsigned *name)
@@ -216,8 +213,7 @@ static nebel_result make_texture(const nb_meshes *meshes, const nebel_texture *t
     return nb_context_check_memory(&meshes->log, "the textures; use smaller pictures");
 }
 
-/* ---- all ------------------------------------------------------------------------------------------------------------
- */
+/* ---- all ------------------------------------------------------------------------------------- */
 
 static nebel_result make_textures(nb_meshes *meshes, const nebel_scene_data *scene)
 {

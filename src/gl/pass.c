@@ -11,8 +11,7 @@ static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *wh
     return nb_fail(&gl->log, result, "nebel_gl_draw_fog: %s", what);
 }
 
-/* ---- what the host gave --------------------------------------------------------------------------------------------
- */
+/* ---- what the host gave ---------------------------------------------------------------------- */
 
 static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
 {
@@ -133,8 +132,7 @@ static nebel_result check_pass(const nebel_gl *gl, const nebel_gl_pass *pass)
     return result == NEBEL_OK ? check_framebuffer(gl, pass) : result;
 }
 
-/* ---- drawing -------------------------------------------------------------------------------------------------------
- */
+/* ---- drawing --------------------------------------------------------------------------------- */
 
 /* The host's state is saved around this. */
 typedef struct task {

@@ -127,8 +127,7 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_p
     return nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
 }
 
-/* ---- results -------------------------------------------------------------------------------------------------------
- */
+/* ---- results --------------------------------------------------------------------------------- */
 
 static nebel_result check_frame(const nebel_gl_renderer *r, const char *name)
 {

@@ -95,8 +95,7 @@ static const char shadow_vertex_text[] =
 
 static const char shadow_fragment_text[] = "void main() {}\n";
 
-/* ---- light ---------------------------------------------------------------------------------------------------------
- */
+/* ---- light ----------------------------------------------------------------------------------- */
 
 /* Each texel of the map is compared with the plane of the surface continued to the texel's centre, so that a surface
  * does not shade itself however it leans; the rest is for neighbours that rise above that plane, and for rounding. A
@@ -209,8 +208,7 @@ static const char light_text[] =
     "    out_surface = hit * vec4(normal, place.x);\n"
     "}\n";
 
-/* ---- particles -----------------------------------------------------------------------------------------------------
- */
+/* ---- particles ------------------------------------------------------------------------------- */
 
 /* A square across the way to the ball that hides it: its silhouette is a circle d / sqrt(d^2 - r^2) times as wide as
  * the ball. All the picture where the eye is inside, or nearly. */
@@ -284,8 +282,7 @@ static const char particle_text[] =
     "    out_transmittance = vec4(0.0, 0.0, 0.0, factor);\n"
     "}\n";
 
-/* ---- programs ------------------------------------------------------------------------------------------------------
- */
+/* ---- programs -------------------------------------------------------------------------------- */
 
 static const char *precision_of(const nb_context *context)
 {

@@ -68,8 +68,7 @@ static GLboolean indexed_switch(int by_index, GLenum name, GLuint index)
     return by_index ? glIsEnabledi(name, index) : glIsEnabled(name);
 }
 
-/* ---- reading -------------------------------------------------------------------------------------------------------
- */
+/* ---- reading --------------------------------------------------------------------------------- */
 
 static void save_units(const nb_context *c, nb_state *s)
 {
@@ -146,8 +145,7 @@ void nb_state_save(const nb_context *c, nb_state *s)
     if (!c->es) glGetIntegerv(GL_POLYGON_MODE, s->polygon_mode);
 }
 
-/* ---- writing -------------------------------------------------------------------------------------------------------
- */
+/* ---- writing --------------------------------------------------------------------------------- */
 
 static void restore_units(const nb_context *c, const nb_state *s)
 {
@@ -262,8 +260,7 @@ void nb_state_add(const nb_context *c)
     for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, blending);
 }
 
-/* ---- uploads -------------------------------------------------------------------------------------------------------
- */
+/* ---- uploads --------------------------------------------------------------------------------- */
 
 static int unpack_count(const nb_context *c)
 {

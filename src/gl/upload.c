@@ -4,8 +4,7 @@
 
 enum { TILE_SIZE = 1 << NB_GL_TILE_SHIFT, FEW_VOLUMES = 3 };
 
-/* ---- packing -------------------------------------------------------------------------------------------------------
- */
+/* ---- packing --------------------------------------------------------------------------------- */
 
 /* Whole rows of the texture, so that one call uploads all. What lies behind the last word is never read. */
 static size_t whole_rows(size_t count)
@@ -62,8 +61,7 @@ static nebel_result list_tiles(nebel_gl *gl, const nebel_snapshot *snapshot, siz
     }
 }
 
-/* ---- textures ------------------------------------------------------------------------------------------------------
- */
+/* ---- textures -------------------------------------------------------------------------------- */
 
 typedef struct texel_kind {
     GLenum internal, format, type;
@@ -114,8 +112,7 @@ static nebel_result fill_texture(const nebel_gl *gl, const texel_kind *kind, con
     return NEBEL_OK;
 }
 
-/* ---- the frame -----------------------------------------------------------------------------------------------------
- */
+/* ---- the frame ------------------------------------------------------------------------------- */
 
 /* Fresh memory each time: the last frame may still be reading the old one. */
 static nebel_result fill_block(nebel_gl *gl)

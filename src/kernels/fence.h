@@ -7,14 +7,14 @@ NB_INLINE nb_vec3 nb_most3(nb_vec3 a, nb_vec3 b)
     return nb_vec3(nb_max(a.x, b.x), nb_max(a.y, b.y), nb_max(a.z, b.z));
 }
 
-/* A start outside two planes is left behind by them where the other end is so, too: where on some axis sign * way is less than
- * bound. The sign is 0 where the start is between the planes. */
+/* A start outside two planes is left behind by them where the other end is so, too: where on some axis sign * way is
+ * less than bound. The sign is 0 where the start is between the planes. */
 typedef struct nb_fence {
     float sign[3], bound[3];
 } nb_fence;
 
-/* The margin covers the roundings of nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so that
- * leaving a box out changes no bit. */
+/* The margin covers the roundings of nb_cross_slab: beyond it a crossing comes out at 1 or more, or at 0 or less, so
+ * that leaving a box out changes no bit. */
 static nb_fence nb_make_fence(const nb_slabs *box)
 {
     const float margin = 1 - 0x1p-20f;
@@ -27,8 +27,8 @@ static nb_fence nb_make_fence(const nb_slabs *box)
     return made;
 }
 
-/* Whether all ways between low and high, lane by lane, miss the box; low and high are the same packet where `one` says so, a constant.
- * The order makes a NaN count as no miss, or leaves it to the axes after it. */
+/* Whether all ways between low and high, lane by lane, miss the box; low and high are the same packet where `one` says
+ * so, a constant. The order makes a NaN count as no miss, or leaves it to the axes after it. */
 NB_INLINE int nb_is_missed(const nb_fence *f, nb_vec3 low, nb_vec3 high, int one)
 {
     const nb_vec3 sign = nb_vec3(nb_splat(f->sign[0]), nb_splat(f->sign[1]), nb_splat(f->sign[2]));
@@ -39,7 +39,8 @@ NB_INLINE int nb_is_missed(const nb_fence *f, nb_vec3 low, nb_vec3 high, int one
 }
 
 /* The boxes that are not missed. Returns how many. */
-NB_INLINE size_t nb_list_boxes(const nb_fence *fences, size_t count, nb_vec3 low, nb_vec3 high, int one, unsigned char *list)
+NB_INLINE size_t nb_list_boxes(const nb_fence *fences, size_t count, nb_vec3 low, nb_vec3 high, int one,
+                               unsigned char *list)
 {
     size_t found = 0;
     for (size_t i = 0; i < count; i++) {

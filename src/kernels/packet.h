@@ -1,4 +1,5 @@
-/* Boxes and packets of segments, as the stream kernels see them. Included after formulas/elementary.inc, for float only. */
+/* Boxes and packets of segments, as the stream kernels see them. Included after formulas/elementary.inc, for float
+ * only. */
 #ifndef NB_KERNELS_PACKET_H
 #define NB_KERNELS_PACKET_H
 
@@ -12,9 +13,9 @@
 #define NB_JOIN_NAMES(a, b) a##b
 #define NB_SUFFIXED(prefix, suffix) NB_JOIN_NAMES(prefix, suffix)
 
-/* 2^x for x <= 0, 0 below -126.5 and 1 for a NaN: 2^n as an exponent times 2^f, |f| <= 1/2, by the weighted minimax polynomial that
- * scripts/fit_elementary.py finds, in Estrin's order, because packets wait for each other's results; relative error 3e-7. The lowest bits of `shifted` are n + bias, whatever else it holds is
- * shifted out. */
+/* 2^x for x <= 0, 0 below -126.5 and 1 for a NaN: 2^n as an exponent times 2^f, |f| <= 1/2, by the weighted minimax
+ * polynomial that scripts/fit_elementary.py finds, in Estrin's order, because packets wait for each other's results;
+ * relative error 3e-7. The lowest bits of `shifted` are n + bias, whatever else it holds is shifted out. */
 NB_INLINE nb_real nb_light_after(nb_real x)
 {
     const nb_real shifter = NB_INTEGER * NB_F(1.5) + NB_BIAS;
@@ -56,9 +57,9 @@ NB_INLINE nb_packet nb_make_packet(nb_vec3 from, nb_vec3 way)
     return (nb_packet){from, nb_vec3(NB_F(1.0) / way.x, NB_F(1.0) / way.y, NB_F(1.0) / way.z), nb_dot3(way, way)};
 }
 
-/* Where the ways cross two planes. A segment within a plane gets a NaN there, which nb_min and nb_max pass on as their second
- * argument and lose as their first: such a segment counts as inside the lower face and outside the upper one, so that faces belong to one
- * side as in nb_interval_slab. */
+/* Where the ways cross two planes. A segment within a plane gets a NaN there, which nb_min and nb_max pass on as their
+ * second argument and lose as their first: such a segment counts as inside the lower face and outside the upper one, so
+ * that faces belong to one side as in nb_interval_slab. */
 typedef struct nb_crossing {
     nb_real near, far;
 } nb_crossing;

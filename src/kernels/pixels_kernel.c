@@ -1,7 +1,8 @@
 /* Fog over a finished picture, compiled once per instruction set.
  *
- * Per pixel 8 bytes come and 4 go; 10 operations for the ray and 9 per box to find that a packet misses it. Where it does not, three
- * divisions, a square root, 5 operations for the ray, 20 per box, and 45 for exponential and blending. */
+ * Per pixel 8 bytes come and 4 go; 10 operations for the ray and 9 per box to find that a packet misses it. Where it
+ * does not, three divisions, a square root, 5 operations for the ray, 20 per box, and 45 for exponential and blending.
+ */
 #define NB_FAST
 
 #include "pixels.h"
@@ -16,7 +17,7 @@
 
 #include <string.h>
 
-/* ---- light -------------------------------------------------------------------------------------------------------------- */
+/* ---- light ----------------------------------------------------------------------------------- */
 
 /* From the eye to depth 1. */
 NB_INLINE nb_vec3 way_of(const float row[3], const float step[3], nb_real x)
@@ -37,11 +38,11 @@ NB_INLINE nb_real octaves_of(const nb_slabs *boxes, const unsigned char *list, s
     return octaves;
 }
 
-/* ---- blending ----------------------------------------------------------------------------------------------------------- */
+/* ---- blending -------------------------------------------------------------------------------- */
 
-/* light * color + (1 - light) * radiance. Colours have 8 more bits than the picture, light has 15: every product is below
- * 2^31, and differences may wrap around because their sum does not. Exact for a light of 0 and 1, rounded to nearest
- * otherwise, but for light's own rounding, 1 / 65536. */
+/* light * color + (1 - light) * radiance. Colours have 8 more bits than the picture, light has 15: every product is
+ * below 2^31, and differences may wrap around because their sum does not. Exact for a light of 0 and 1, rounded to
+ * nearest otherwise, but for light's own rounding, 1 / 65536. */
 typedef struct glow {
     nb_bits radiance;
     nb_bits opaque; /* the result for a light of 0, and half a step of the picture, which is 2^23 */
@@ -67,7 +68,7 @@ NB_INLINE nb_bits blend(nb_bits pixel, const glow fog[3], nb_real light)
     return (red >> 23) | ((green >> 15) & 0xff00u) | ((blue >> 7) & 0xff0000u) | (pixel & 0xff000000u);
 }
 
-/* ---- rows --------------------------------------------------------------------------------------------------------------- */
+/* ---- rows ------------------------------------------------------------------------------------ */
 
 /* What stays the same for a whole call, copied so that no store to the picture can change it. */
 typedef struct scene {
@@ -78,7 +79,8 @@ typedef struct scene {
     float step[3];
 } scene;
 
-NB_INLINE nb_bits fog_packet(const scene *s, const float row[3], nb_real x, nb_real depth, nb_bits pixels, int along_ray)
+NB_INLINE nb_bits fog_packet(const scene *s, const float row[3], nb_real x, nb_real depth, nb_bits pixels,
+                             int along_ray)
 {
     const nb_vec3 none = nb_vec3(nb_splat(0), nb_splat(0), nb_splat(0));
     const nb_vec3 way = way_of(row, s->step, x);

@@ -1,8 +1,8 @@
 /* Segments through boxes of constant density: the hot path of per-vertex fog, compiled once per instruction set.
  *
- * In float throughout: coordinates are relative to an origin near the viewer, and boxes are well conditioned. Per segment 12 or
- * 24 bytes come and 4 go; 9 operations to find that a packet from one eye misses a box, and where it does not, 3 divisions, a square
- * root and 8 operations for the way, 20 per box and 19 for the exponential. */
+ * In float throughout: coordinates are relative to an origin near the viewer, and boxes are well conditioned. Per
+ * segment 12 or 24 bytes come and 4 go; 9 operations to find that a packet from one eye misses a box, and where it does
+ * not, 3 divisions, a square root and 8 operations for the way, 20 per box and 19 for the exponential. */
 #define NB_FAST
 
 #include "transmit.h"
@@ -34,7 +34,8 @@ static nb_vec3 load_points(const float *base, size_t stride, size_t first, size_
     return nb_vec3(nb_load_lanes(lane[0]), nb_load_lanes(lane[1]), nb_load_lanes(lane[2]));
 }
 
-/* The same for a full packet of points that lie one after the other: three loads and shuffles instead of 3 NB_WIDTH loads. */
+/* The same for a full packet of points that lie one after the other: three loads and shuffles instead of 3 NB_WIDTH
+ * loads. */
 #if NB_WIDTH == 4
 NB_INLINE nb_vec3 load_packed(const float *p)
 {
@@ -83,10 +84,11 @@ NB_INLINE nb_vec3 load_packed(const float *p)
 }
 #endif
 
-/* ---- a packet --------------------------------------------------------------------------------------------------------- */
+/* ---- a packet -------------------------------------------------------------------------------- */
 
 /* Light over the ways through the boxes named in `list`. */
-NB_INLINE nb_real transmit_packet(const nb_slabs *boxes, const unsigned char *list, size_t count, nb_vec3 from, nb_vec3 way)
+NB_INLINE nb_real transmit_packet(const nb_slabs *boxes, const unsigned char *list, size_t count, nb_vec3 from,
+                                  nb_vec3 way)
 {
     const nb_packet p = nb_make_packet(from, way);
     nb_real octaves = NB_F(0.0);
@@ -98,14 +100,13 @@ NB_INLINE nb_real transmit_packet(const nb_slabs *boxes, const unsigned char *li
     return nb_light_after(octaves * nb_sqrt(p.square));
 }
 
-/* ---- streams ---------------------------------------------------------------------------------------------------------- */
+/* ---- streams --------------------------------------------------------------------------------- */
 
 static void store_points(const nb_transmit_job *job, size_t first, size_t count, nb_real value)
 {
     float lane[NB_WIDTH];
     nb_store_lanes(lane, value);
-    for (size_t i = 0; i < count; i++)
-        *(float *)(void *)((char *)job->out + (first + i) * job->out_stride) = lane[i];
+    for (size_t i = 0; i < count; i++) *(float *)(void *)((char *)job->out + (first + i) * job->out_stride) = lane[i];
 }
 
 /* Copies, which no store to the output can change; relative to the start where all segments share it. */
@@ -116,7 +117,7 @@ static void set_slabs(const nb_transmit_job *job, nb_slabs *boxes)
         boxes[i] = nb_make_slabs(&job->boxes[i], job->from_stride == 0 ? job->from : zero);
 }
 
-/* ---- what comes later ---------------------------------------------------------------------------------------------------- */
+/* ---- what comes later ------------------------------------------------------------------------ */
 
 /* So many segments have three cache lines of points and one of results; so many, three pages and one. */
 enum { LINE = 16, PAGE = 1024 };
@@ -131,9 +132,10 @@ NB_INLINE void fetch_points(const float *points, size_t next, size_t line)
     for (size_t k = 0; k < 3; k++) __builtin_prefetch(beyond(points, 3 * next + line + PAGE * k), 0);
 }
 
-/* Before the first of every LINE segments: asks memory for what the next PAGE of them needs there, one line of each of its pages.
- * Processors fetch ahead by themselves, but begin anew in every page and only once its address is translated, and packets are too
- * long for them to get there in time. Several pages at once keep as many requests under way as memory takes. */
+/* Before the first of every LINE segments: asks memory for what the next PAGE of them needs there, one line of each of
+ * its pages. Processors fetch ahead by themselves, but begin anew in every page and only once its address is
+ * translated, and packets are too long for them to get there in time. Several pages at once keep as many requests under
+ * way as memory takes. */
 NB_INLINE void fetch_ahead(const nb_transmit_job *job, size_t i)
 {
     const size_t line = i % PAGE, next = i - line + PAGE;
@@ -143,10 +145,11 @@ NB_INLINE void fetch_ahead(const nb_transmit_job *job, size_t i)
     __builtin_prefetch(beyond(job->out, next + line), 1);
 }
 
-/* ---- from one place ---------------------------------------------------------------------------------------------------- */
+/* ---- from one place -------------------------------------------------------------------------- */
 
-/* Packets on their way through one box: each call of advance does a third of the work, on three packets. The chain of operations of
- * a packet takes 140 cycles and its work 25, and processors hold too few waiting operations to fill the difference. */
+/* Packets on their way through one box: each call of advance does a third of the work, on three packets. The chain of
+ * operations of a packet takes 140 cycles and its work 25, and processors hold too few waiting operations to fill the
+ * difference. */
 typedef struct pipeline {
     nb_packet packet;
     nb_real exponent; /* of the packet before */
@@ -208,8 +211,8 @@ static size_t transmit_fan(const nb_transmit_job *job, const nb_slabs *boxes, co
     return i;
 }
 
-/* Asking costs half as much as a box itself. With many boxes it is done for blocks of packets at once; with few, blocks would
- * keep memory waiting while arithmetic is done. */
+/* Asking costs half as much as a box itself. With many boxes it is done for blocks of packets at once; with few, blocks
+ * would keep memory waiting while arithmetic is done. */
 enum { PACKETS = 8, FEW_BOXES = 4 };
 
 typedef struct block {
@@ -262,7 +265,7 @@ static size_t transmit_from_one_place(const nb_transmit_job *job, const nb_slabs
     return job->box_count < FEW_BOXES ? transmit_fan(job, boxes, fences) : transmit_blocks(job, boxes, fences);
 }
 
-/* ---- any segments ------------------------------------------------------------------------------------------------------ */
+/* ---- any segments ---------------------------------------------------------------------------- */
 
 static void list_all(unsigned char *list)
 {

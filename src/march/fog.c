@@ -62,7 +62,8 @@ static nb_slot *take_slot(nebel_fog *fog)
     if (fog->free_count > 0) return &fog->slots[fog->first_free - 1];
     if (fog->slot_count >= UINT32_MAX) return NULL;
     void *slots = fog->slots;
-    if (!nb_grow(&fog->allocator, &slots, sizeof *fog->slots, fog->slot_count, &fog->slot_capacity, fog->slot_count + 1))
+    if (!nb_grow(&fog->allocator, &slots, sizeof *fog->slots, fog->slot_count, &fog->slot_capacity,
+                 fog->slot_count + 1))
         return NULL;
     fog->slots = slots;
     fog->slots[fog->slot_count] = (nb_slot){.generation = 1};
@@ -108,7 +109,8 @@ nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (desc == NULL) return lacks_description(fog);
     nb_slot *slot = slot_of(fog, id);
-    if (slot == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
+    if (slot == NULL)
+        return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume volume;
     const nebel_result result = nb_volume_resolve(&fog->allocator, &fog->log, desc, &volume);
     if (result != NEBEL_OK) return result;
@@ -121,7 +123,8 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id)
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     nb_slot *slot = slot_of(fog, id);
-    if (slot == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
+    if (slot == NULL)
+        return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume_free(&fog->allocator, &slot->volume);
     slot->used = 0;
     if (++slot->generation == 0) return NEBEL_OK; /* this slot's ids are used up: it is never taken again */

@@ -30,11 +30,12 @@ static nb_pixels_fn *kernel_for(nebel_isa isa)
 {
     nb_pixels_fn *found = NULL;
     for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa)) found = kernels[i].fog;
+        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa))
+            found = kernels[i].fog;
     return found;
 }
 
-/* ---- checks ------------------------------------------------------------------------------------------------------------- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static const char *fault_of_rays(const nebel_pixels *p)
 {
@@ -49,7 +50,8 @@ static const char *fault_of_rays(const nebel_pixels *p)
 static const char *fault_of(const nebel_pixels *p)
 {
     if (p->depth == NULL || p->color == NULL || p->out == NULL) return "depth, color and out must not be NULL";
-    if (p->width < 1 || p->width > 65536 || p->height < 1 || p->height > 65536) return "width and height must be 1 to 65536";
+    if (p->width < 1 || p->width > 65536 || p->height < 1 || p->height > 65536)
+        return "width and height must be 1 to 65536";
     const size_t row = 4 * (size_t)p->width;
     if ((p->depth_pitch != 0 && p->depth_pitch < row) || (p->color_pitch != 0 && p->color_pitch < row) ||
         (p->out_pitch != 0 && p->out_pitch < row))
@@ -78,7 +80,7 @@ static nb_pixels_job make_job(const nebel_pixels *p)
     return job;
 }
 
-/* ---- through the march -------------------------------------------------------------------------------------------------- */
+/* ---- through the march ----------------------------------------------------------------------- */
 
 enum { BATCH = 64 };
 
@@ -123,7 +125,8 @@ static nebel_result trace_batch(const nebel_snapshot *snapshot, const nebel_trac
     }
     const nebel_result result = nebel_trace(snapshot, desc, count, rays, sizeof *rays, lights, sizeof *lights);
     if (result != NEBEL_OK) return result;
-    for (uint32_t i = 0; i < count; i++) blend(&lights[i], colors + 4 * (size_t)(first + i), out + 4 * (size_t)(first + i));
+    for (uint32_t i = 0; i < count; i++)
+        blend(&lights[i], colors + 4 * (size_t)(first + i), out + 4 * (size_t)(first + i));
     return NEBEL_OK;
 }
 
@@ -139,7 +142,7 @@ static nebel_result trace_pixels(const nebel_snapshot *snapshot, nebel_isa isa, 
     return NEBEL_OK;
 }
 
-/* ---- the public query --------------------------------------------------------------------------------------------------- */
+/* ---- the public query ------------------------------------------------------------------------ */
 
 static void set_radiance(const nebel_snapshot *snapshot, nb_pixels_job *job)
 {
@@ -156,7 +159,8 @@ nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, con
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pixels: %s", fault);
     nb_pixels_fn *kernel = kernel_for(isa);
     if (kernel == NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(isa));
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
+                       nebel_isa_name(isa));
     nb_pixels_job job = make_job(pixels);
     nb_fog_box boxes[NB_FOG_BOXES];
     if (!nb_boxes_have_one_color(snapshot) || !nb_boxes_list(snapshot, pixels->eye, 0, 0, boxes))

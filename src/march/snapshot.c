@@ -102,7 +102,8 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
 {
     if (snapshot != NULL) *snapshot = NULL;
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (snapshot == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
+    if (snapshot == NULL)
+        return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
     nebel_snapshot *s = nb_allocate_zero(&fog->allocator, 1, sizeof *s);
     if (s == NULL) return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "snapshot: out of memory");
     s->allocator = fog->allocator;

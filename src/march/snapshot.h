@@ -14,7 +14,8 @@ typedef struct nb_medium {
     double light[3];    /* radiance * extinction + emission: radiance per metre at density 1 */
     double densest;     /* largest channel of the extinction */
     double brightest;   /* largest channel of light */
-    double proportion;  /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1; for margins */
+    double proportion;  /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
+                           for margins */
     int emits;
 } nb_medium;
 
@@ -28,8 +29,8 @@ struct nebel_snapshot {
     double max_opacity;      /* 1 where there is no limit */
     size_t endless_count;    /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
-    nb_bvh bvh;              /* over the others */
-    uint32_t *bounded;       /* the media that the tree's boxes stand for */
+    nb_bvh bvh;        /* over the others */
+    uint32_t *bounded; /* the media that the tree's boxes stand for */
     size_t bounded_count;
 };
 

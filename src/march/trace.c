@@ -29,7 +29,8 @@ static nb_trace_fn *kernel_for(nebel_isa isa)
 {
     nb_trace_fn *found = NULL;
     for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa)) found = kernels[i].trace;
+        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa))
+            found = kernels[i].trace;
     return found;
 }
 
@@ -41,12 +42,18 @@ int nebel_isa_available(nebel_isa isa)
 const char *nebel_isa_name(nebel_isa isa)
 {
     switch (isa) {
-    case NEBEL_ISA_SCALAR: return "scalar";
-    case NEBEL_ISA_SSE2: return "sse2";
-    case NEBEL_ISA_AVX2: return "avx2";
-    case NEBEL_ISA_AVX512: return "avx512";
-    case NEBEL_ISA_NEON: return "neon";
-    default: return "default";
+    case NEBEL_ISA_SCALAR:
+        return "scalar";
+    case NEBEL_ISA_SSE2:
+        return "sse2";
+    case NEBEL_ISA_AVX2:
+        return "avx2";
+    case NEBEL_ISA_AVX512:
+        return "avx512";
+    case NEBEL_ISA_NEON:
+        return "neon";
+    default:
+        return "default";
     }
 }
 
@@ -102,7 +109,8 @@ static nebel_ray ray_in_planes(const nebel_ray_planes *planes, size_t i)
     for (int c = 0; c < 3; c++) {
         ray.origin[c] = planes->origin[c];
         ray.direction[c] = planes->direction[c];
-        if (planes->offset[c] != NULL) ray.origin[c] += element(planes->offset[c], sizeof(float), planes->offset_stride, i);
+        if (planes->offset[c] != NULL)
+            ray.origin[c] += element(planes->offset[c], sizeof(float), planes->offset_stride, i);
         if (planes->direction_float[c] != NULL)
             ray.direction[c] = element(planes->direction_float[c], sizeof(float), planes->direction_stride, i);
         if (planes->direction_double[c] != NULL)
@@ -131,7 +139,8 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
     }
     if (result == NEBEL_ERROR_UNBOUNDED)
         return nb_fail(&job->snapshot->log, result,
-                       "ray %zu: gathers infinite light; fog that emits without end must absorb, or t_max be finite", job->failed);
+                       "ray %zu: gathers infinite light; fog that emits without end must absorb, or t_max be finite",
+                       job->failed);
     return nb_fail(&job->snapshot->log, result, "ray %zu: out of memory for the fog it meets", job->failed);
 }
 
@@ -140,13 +149,15 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
 #define DOUBLE_ROUNDING 1e-8
 
 /* Asks `kernel`, NULL where there is none, about a job that says where rays and lights are. */
-static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, nb_trace_fn *kernel, nb_trace_job *job)
+static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, nb_trace_fn *kernel,
+                        nb_trace_job *job)
 {
     const double tolerance = desc->tolerance == 0 ? NEBEL_DEFAULT_TOLERANCE : desc->tolerance;
     if (!(tolerance > 0 && isfinite(tolerance)))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "tolerance: must be finite and more than 0");
     if (kernel == NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here", nebel_isa_name(desc->isa));
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
+                       nebel_isa_name(desc->isa));
     job->snapshot = snapshot;
     job->budget = tolerance * fmax(1, snapshot->largest_radiance);
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
@@ -173,7 +184,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
     return run(snapshot, desc, n, is_float ? kernel_for(desc->isa) : nb_trace_double, &job);
 }
 
-/* ---- planes ------------------------------------------------------------------------------------------------------ */
+/* ---- planes ---------------------------------------------------------------------------------- */
 
 /* Planes of three are given all or none. */
 static int is_broken(const void *x, const void *y, const void *z)
@@ -227,20 +238,18 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
     return run(snapshot, asked, n, kernel_for(asked->isa), &job);
 }
 
-/* ---- visibility -------------------------------------------------------------------------------------------------- */
+/* ---- visibility ------------------------------------------------------------------------------ */
 
 nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double transmittance, int channel, size_t n,
                                       const nebel_ray *rays, size_t ray_stride, double *distances)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (n > 0 && distances == NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "distances: must not be NULL");
+    if (n > 0 && distances == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "distances: must not be NULL");
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, NULL);
     if (valid != NEBEL_OK) return valid;
     if (!(transmittance > 0 && transmittance < 1))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "transmittance: must be within 0 and 1");
-    if (channel < 0 || channel > 2)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
+    if (channel < 0 || channel > 2) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     if (transmittance < 1 - snapshot->max_opacity) {
         for (size_t i = 0; i < n; i++) distances[i] = HUGE_VAL;
         return NEBEL_OK;

@@ -1,8 +1,8 @@
 /* Rays that come nowhere near a medium: asked before anything dear is. Included by trace_kernel.c after trace_packet.h.
  *
- * Leaving a medium out must change no bit of the light, so its bounds are taken with a margin that covers the rounding of
- * every crossing: distances times roundings, more by its shape's proportions in a frame that scales, and by the square
- * root where a ray grazes. What slack does to the reported error is not covered. */
+ * Leaving a medium out must change no bit of the light, so its bounds are taken with a margin that covers the rounding
+ * of every crossing: distances times roundings, more by its shape's proportions in a frame that scales, and by the
+ * square root where a ray grazes. What slack does to the reported error is not covered. */
 #define SCENE_MARGIN 1e-5
 
 /* Whether a slab lies before the start or beyond the end of ways that go `reach` across it; both times `length`. */

@@ -1,7 +1,7 @@
 /* Visibility: where along a ray the optical depth reaches a value. Included by the double kernels only.
  *
- * Optical depth never falls along a ray, and is exact at every point, so the piece that holds the place is found by the march
- * and the place in it by Newton's method, kept inside a shrinking bracket. */
+ * Optical depth never falls along a ray, and is exact at every point, so the piece that holds the place is found by the
+ * march and the place in it by Newton's method, kept inside a shrinking bracket. */
 
 /* Optical depth of one channel over h metres of a marked piece, and the extinction at its end. */
 static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real h, nb_real *extinction)
@@ -24,8 +24,8 @@ static nb_real middle_of(nb_real low, nb_real high)
     return low == 0 && high > NB_F(1.0) ? nb_min(NB_F(1.0), middle) : middle;
 }
 
-/* The h within `length` at which the depth is `wanted`. A step of Newton's that is not half the one before would come too late:
- * down an exponential it moves by one scale height each time. */
+/* The h within `length` at which the depth is `wanted`. A step of Newton's that is not half the one before would come
+ * too late: down an exponential it moves by one scale height each time. */
 static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real length, nb_real wanted)
 {
     nb_real low = NB_F(0.0), high = length, h = NB_F(0.5) * length, last = length;
@@ -33,8 +33,10 @@ static nb_real find_in_piece(const march *m, int channel, nb_wide start, nb_real
         nb_real extinction;
         const nb_real excess = depth_within(m, channel, start, h, &extinction) - wanted;
         if (excess == 0) return h;
-        if (excess > 0) high = h;
-        else low = h;
+        if (excess > 0)
+            high = h;
+        else
+            low = h;
         const nb_real newton = h - excess / extinction;
         const int trusted = newton > low && newton < high && nb_abs(newton - h) <= NB_F(0.5) * last;
         const int close = nb_abs(excess) <= NB_F(1e-3) * wanted;

@@ -1,8 +1,8 @@
-/* The march, compiled once per instruction set, once as the double reference, and once for the rays that this cannot decide:
- * packets of rays in, light out.
+/* The march, compiled once per instruction set, once as the double reference, and once for the rays that this cannot
+ * decide: packets of rays in, light out.
  *
- * NB_SUFFIX names the one symbol; everything else is static. Every lane's arithmetic is independent of the others, so a ray
- * gives the same bits alone, in any company and in any width. */
+ * NB_SUFFIX names the one symbol; everything else is static. Every lane's arithmetic is independent of the others, so a
+ * ray gives the same bits alone, in any company and in any width. */
 #if defined(NB_ISA_DOUBLE) || defined(NB_ISA_QUAD)
 #define NB_DOUBLE
 #endif
@@ -37,7 +37,7 @@
 #define JOIN_NAMES(a, b) a##b
 #define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
 
-/* ---- memory for very many media on one ray ---------------------------------------------------------------------------- */
+/* ---- memory for very many media on one ray --------------------------------------------------- */
 
 /* Most rays meet few media: their contacts live on the stack. Beyond that the job takes memory once and keeps it. */
 #define STACK_CONTACTS 24
@@ -51,7 +51,7 @@ typedef struct workspace {
     double lasts[STACK_CONTACTS];
     size_t contact_capacity, span_capacity;
     void *contact_memory, *window_memory, *span_memory; /* as allocated; NULL while the stack suffices */
-    uint32_t *found;                    /* media that the packet may meet, by index */
+    uint32_t *found;                                    /* media that the packet may meet, by index */
     size_t found_count, found_capacity;
     march m;
 } workspace;
@@ -77,7 +77,8 @@ static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t
 {
     march *m = &w->m;
     nb_release(allocator, w->window_memory);
-    w->window_memory = nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + 2 * sizeof *m->window);
+    w->window_memory =
+        nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + 2 * sizeof *m->window);
     if (w->window_memory == NULL) return 0;
     m->stretches = w->window_memory;
     m->lasts = (double *)(void *)(m->stretches + capacity);
@@ -133,7 +134,7 @@ static void close_workspace(workspace *w, const nebel_allocator *allocator)
     nb_release(allocator, w->found);
 }
 
-/* ---- rays in ------------------------------------------------------------------------------------------------------------- */
+/* ---- rays in --------------------------------------------------------------------------------- */
 
 static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
 {
@@ -157,8 +158,8 @@ static nb_wvec3 normalized(nb_wvec3 d)
     return divided(d, nb_wlength3(d));
 }
 
-/* Directions so long or short that their squares overflow or vanish, taken near 1 by a power of two: which is exact, so that
- * ordinary lanes keep their bits. */
+/* Directions so long or short that their squares overflow or vanish, taken near 1 by a power of two: which is exact, so
+ * that ordinary lanes keep their bits. */
 static nb_wvec3 tamed(nb_wvec3 d)
 {
     double lane[3][NB_WIDTH];
@@ -192,7 +193,8 @@ static packet load_packet(const nebel_ray *rays, size_t stride, size_t count)
         }
         t_max[i] = i >= count ? 0 : ray->t_max > 1e18 ? 1e18 : ray->t_max;
     }
-    const nb_wvec3 way = nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2]));
+    const nb_wvec3 way =
+        nb_wvec3(nb_wload_lanes(direction[0]), nb_wload_lanes(direction[1]), nb_wload_lanes(direction[2]));
     return (packet){nb_wvec3(nb_wload_lanes(origin[0]), nb_wload_lanes(origin[1]), nb_wload_lanes(origin[2])),
                     unit_vector(way), nb_wload_lanes(t_max)};
 }
@@ -275,7 +277,7 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
     return 1;
 }
 
-/* ---- light out ------------------------------------------------------------------------------------------------------------ */
+/* ---- light out ------------------------------------------------------------------------------- */
 
 /* Beyond this optical depth exp gives 0 in this precision, and nothing behind adds a bit. */
 #if defined(NB_DOUBLE)
@@ -287,8 +289,13 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 static gathered nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
-    return (gathered){{zero, zero, zero}, {one, one, one},    {zero, zero, zero}, {zero, zero, zero},
-                      {zero, zero, zero}, {zero, zero, zero}, zero};
+    return (gathered){{zero, zero, zero},
+                      {one, one, one},
+                      {zero, zero, zero},
+                      {zero, zero, zero},
+                      {zero, zero, zero},
+                      {zero, zero, zero},
+                      zero};
 }
 
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
@@ -326,8 +333,8 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
 
 static int is_single(const march *m)
 {
-    return m->contact_count == 1 && m->span_count == 1 &&
-           nb_volume_has_fog(&m->contacts[0].medium->body) && !nb_any(ends_matter(m));
+    return m->contact_count == 1 && m->span_count == 1 && nb_volume_has_fog(&m->contacts[0].medium->body) &&
+           !nb_any(ends_matter(m));
 }
 
 /* From event to event along all rays at once. */
@@ -395,8 +402,8 @@ typedef struct bounds {
     nb_real transmittance, radiance;
 } bounds;
 
-/* exp(-depth) is steepest on the thin side, so the transmittance errs most where the optical depth is less by its error. Ends that
- * are watched have been counted on the way. */
+/* exp(-depth) is steepest on the thin side, so the transmittance errs most where the optical depth is less by its
+ * error. Ends that are watched have been counted on the way. */
 static bounds bound_errors(const march *m, const gathered *g)
 {
     const nb_mask watched = ends_matter(m);
@@ -410,7 +417,8 @@ static bounds bound_errors(const march *m, const gathered *g)
         const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
         const nb_real other = (NB_F(4.0) * NB_EPSILON + m->event_count * LEAST_DOUBT) * g->transmittance[c];
         transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + other);
-        radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT + g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
+        radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT +
+                                        g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
     /* fog that the ray may only graze is not among what it met */
     const nb_mask grazes = largest(m->grazing_ends.light) > NB_F(0.0);
@@ -426,8 +434,8 @@ static nb_real opaque_radiance(const contact *k, int c)
     return nb_select(k->extinction[c] > NB_F(0.0), ratio, k->light[c] * NB_HUGE);
 }
 
-/* Another bound, which holds whatever the ends and the integration do: all light comes from media that give between the least and
- * the most light per extinction, so that the radiance is between these two times 1 - T. */
+/* Another bound, which holds whatever the ends and the integration do: all light comes from media that give between the
+ * least and the most light per extinction, so that the radiance is between these two times 1 - T. */
 static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmittance_error)
 {
     const nb_mask grazes = largest(m->grazing_ends.light) + largest(m->grazing_ends.depth) > NB_F(0.0);
@@ -437,7 +445,8 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
         for (size_t i = 0; i < m->contact_count; i++) {
             const contact *k = &m->contacts[i];
             if (!nb_volume_has_fog(&k->medium->body)) continue;
-            const nb_mask counts = nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
+            const nb_mask counts =
+                nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
             const nb_real radiance = opaque_radiance(k, c);
             least = nb_select(counts, nb_min(radiance, least), least);
             most = nb_select(counts, nb_max(radiance, most), most);
@@ -451,8 +460,8 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
     return nb_select(grazes, NB_HUGE, bound);
 }
 
-/* What limited opacity adds to the error of radiance S: most / (1 - T) is off by most / (1 - T)^2 times the error of T, where it is
- * below 1; but what it leaves is never more than S. That of T grows by the rounding of the limit alone. */
+/* What limited opacity adds to the error of radiance S: most / (1 - T) is off by most / (1 - T)^2 times the error of T,
+ * where it is below 1; but what it leaves is never more than S. That of T grows by the rounding of the limit alone. */
 static bounds limit_errors(const nebel_snapshot *snapshot, const gathered *g, bounds b)
 {
     if (!(snapshot->max_opacity < 1)) return b;
@@ -510,11 +519,14 @@ static allowance share_budget(const nb_trace_job *job)
 {
     const double budget = job->budget, most = job->snapshot->largest_radiance;
     const double radiance = most > 1 ? most : 1;
-    return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget), choose_ellipse(budget / radiance)};
+    return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget),
+                       choose_ellipse(budget / radiance)};
 }
 
-/* The light along the rays of w->m before its opacity is limited, of which `count` count, the first of them by the number `first`. */
-static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first, size_t count, gathered *g)
+/* The light along the rays of w->m before its opacity is limited, of which `count` count, the first of them by the
+ * number `first`. */
+static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first, size_t count,
+                                  gathered *g)
 {
     job->failed = first;
     w->m.wants_error = job->wants_error;
@@ -535,13 +547,14 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     return NEBEL_OK;
 }
 
-/* ---- doubts ------------------------------------------------------------------------------------------------------ */
+/* ---- doubts ---------------------------------------------------------------------------------- */
 
-/* Rays that touch a surface, or run level with it, to the last digits of a precision have no good answer in it. But they are exact
- * numbers, so that more digits give one.
+/* Rays that touch a surface, or run level with it, to the last digits of a precision have no good answer in it. But
+ * they are exact numbers, so that more digits give one.
  *
- * Float keeps its light, whose bits depend on nothing else, and learns from double how good it is. Double takes the answer with
- * more digits instead of its own, whatever is asked of the ray, so that its bits, too, depend on nothing else. */
+ * Float keeps its light, whose bits depend on nothing else, and learns from double how good it is. Double takes the
+ * answer with more digits instead of its own, whatever is asked of the ray, so that its bits, too, depend on nothing
+ * else. */
 #if !defined(ASKS_QUAD)
 
 static nb_mask in_doubt(const nb_trace_job *job, nb_real error)
@@ -578,8 +591,8 @@ static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const n
 }
 
 /* The error where the lanes in doubt are settled; `rays` are the packet's. */
-static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real error, const nebel_ray *rays, size_t stride,
-                             size_t count)
+static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real error, const nebel_ray *rays,
+                             size_t stride, size_t count)
 {
     const nb_mask doubtful = in_doubt(job, error);
     if (!nb_any(doubtful)) return error;
@@ -619,8 +632,8 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
 
 enum { MOST_MARCHES = 8 };
 
-/* Ends 1e15 m away are in doubt by millimetres even here. The same light, marched again with its radiance known, has a smaller error, from
- * which the next march learns. */
+/* Ends 1e15 m away are in doubt by millimetres even here. The same light, marched again with its radiance known, has a
+ * smaller error, from which the next march learns. */
 static nb_real weigh_ends(nb_trace_job *job, workspace *w, const allowance *may, const gathered *g, nb_real error)
 {
     if (job->transmittance_only) return error;

@@ -1,42 +1,50 @@
 /* Media of different light in a density that varies: the one case without a closed form.
  *
- * Over a step of the ray the radiance is the integral of e^-depth(t) * light(t), whose optical depth is still exact at every
- * point. Between kinks the integrand is an entire function of t, so n Gauss points on a step of length h err by at most
+ * Over a step of the ray the radiance is the integral of e^-depth(t) * light(t), whose optical depth is still exact at
+ * every point. Between kinks the integrand is an entire function of t, so n Gauss points on a step of length h err by
+ * at most
  *
  *     (h / 2) 64 M / (15 (1 - r^-2) r^2n),      M >= |integrand| on the Bernstein ellipse of parameter r
  *
- * (Trefethen, Approximation Theory and Approximation Practice, theorem 19.3), and M has a bound in closed form for every profile. So the step is
- * chosen by a proof, not by comparing two guesses: it is halved until the bound fits the budget. Two cruder rules, whose bounds are
- * better for steps that hardly attenuate or hardly differ, may take a step before that. */
+ * (Trefethen, Approximation Theory and Approximation Practice, theorem 19.3), and M has a bound in closed form for
+ * every profile. So the step is chosen by a proof, not by comparing two guesses: it is halved until the bound fits the
+ * budget. Two cruder rules, whose bounds are better for steps that hardly attenuate or hardly differ, may take a step
+ * before that. */
 
 #define NODE_COUNT 6
 #define MOST_STEPS 4096
 
 /* Abscissas and weights on [0, 1]: Abramowitz and Stegun, table 25.4, n = 6. */
 #define NODES                                                                                                          \
-    {NB_F(0.033765242898423986), NB_F(0.169395306766867743), NB_F(0.380690406958401546),                               \
-     NB_F(0.619309593041598454), NB_F(0.830604693233132257), NB_F(0.966234757101576014)}
+    {                                                                                                                  \
+        NB_F(0.033765242898423986), NB_F(0.169395306766867743), NB_F(0.380690406958401546),                            \
+            NB_F(0.619309593041598454), NB_F(0.830604693233132257), NB_F(0.966234757101576014)                         \
+    }
 #define WEIGHTS                                                                                                        \
-    {NB_F(0.085662246189585173), NB_F(0.180380786524069304), NB_F(0.233956967286345524),                               \
-     NB_F(0.233956967286345524), NB_F(0.180380786524069304), NB_F(0.085662246189585173)}
+    {                                                                                                                  \
+        NB_F(0.085662246189585173), NB_F(0.180380786524069304), NB_F(0.233956967286345524),                            \
+            NB_F(0.233956967286345524), NB_F(0.180380786524069304), NB_F(0.085662246189585173)                         \
+    }
 
-/* [n][i]: the integral up to node n of the polynomial that is 1 at node i and 0 at the other nodes. Derived with 40 digits. */
+/* [n][i]: the integral up to node n of the polynomial that is 1 at node i and 0 at the other nodes. Derived with 40
+ * digits. */
 static const double up_to_node[NODE_COUNT][NODE_COUNT] = {
-    {0.042831123094792586, -0.014763725997197412, 0.0093250507064777512, -0.0056688580494835119,
-     0.0028544333150993351, -0.00081278017126476211},
-    {0.092673491430378863, 0.090190393262034652, -0.020300102293239586, 0.010363156240246424,
-     -0.0048871929280376715, 0.0013555610554850618},
-    {0.082247922612843874, 0.19603216233324501, 0.11697848364317276, -0.020482527745656098,
-     0.0079899918996623357, -0.0020756257848663342},
-    {0.087737871974451507, 0.17239079462440697, 0.25443949503200162, 0.11697848364317276,
-     -0.015651375809175702, 0.0034143235767412987},
-    {0.084306685134100111, 0.18526797945210698, 0.22359381104609910, 0.25425706957958511,
-     0.090190393262034652, -0.0070112452407936907},
-    {0.086475026360849935, 0.17752635320896997, 0.23962582533582904, 0.22463191657986777,
-     0.19514451252126672, 0.042831123094792586}};
+    {0.042831123094792586, -0.014763725997197412, 0.0093250507064777512, -0.0056688580494835119, 0.0028544333150993351,
+     -0.00081278017126476211},
+    {0.092673491430378863, 0.090190393262034652, -0.020300102293239586, 0.010363156240246424, -0.0048871929280376715,
+     0.0013555610554850618},
+    {0.082247922612843874, 0.19603216233324501, 0.11697848364317276, -0.020482527745656098, 0.0079899918996623357,
+     -0.0020756257848663342},
+    {0.087737871974451507, 0.17239079462440697, 0.25443949503200162, 0.11697848364317276, -0.015651375809175702,
+     0.0034143235767412987},
+    {0.084306685134100111, 0.18526797945210698, 0.22359381104609910, 0.25425706957958511, 0.090190393262034652,
+     -0.0070112452407936907},
+    {0.086475026360849935, 0.17752635320896997, 0.23962582533582904, 0.22463191657986777, 0.19514451252126672,
+     0.042831123094792586}};
 
 /* The parameter to begin with: so wide that a step over which the integrand hardly grows in the ellipse fits a budget
- * relative to the radiance. A step that does not fit gets a wider ellipse as it gets shorter, so that any budget is met. */
+ * relative to the radiance. A step that does not fit gets a wider ellipse as it gets shorter, so that any budget is
+ * met. */
 #define WIDEST_ELLIPSE 64.0
 
 static nb_real choose_ellipse(double budget)
@@ -60,8 +68,8 @@ static nb_wide soft_axis_ceiling(nb_wide q, nb_wide rise)
     return nb_wselect(level, q, q + rise);
 }
 
-/* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that stays level
- * is the same number on all of it. */
+/* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that
+ * stays level is the same number on all of it. */
 static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, nb_real across)
 {
     const nebel_density *density = &k->medium->body.density;
@@ -94,7 +102,8 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
                          soft_axis_ceiling(nb_soft_axis(q.y, k->size.y), nb_wabs(k->slope.y) * wide) *
                          soft_axis_ceiling(nb_soft_axis(q.z, k->size.z), nb_wabs(k->slope.z) * wide));
     }
-    default: return NB_F(1.0);
+    default:
+        return NB_F(1.0);
     }
 }
 
@@ -104,8 +113,8 @@ typedef struct step {
     nb_real length;
     piece_sum sum;
     nb_real least[3], most[3]; /* light per extinction of the media there */
-    nb_real behind[3];    /* transmittance at its end */
-    nb_real drop;         /* largest loss of transmittance over it */
+    nb_real behind[3];         /* transmittance at its end */
+    nb_real drop;              /* largest loss of transmittance over it */
     nb_real gauss_bound;
     nb_real crude_bound[2];
 } step;
@@ -154,8 +163,8 @@ static nb_mask find_range(const march *m, step *s)
     return emits;
 }
 
-/* [0]: all light attenuated by something between the transmittances at both ends. [1]: light per extinction between the least and
- * the most radiant medium, which holds where nothing shines without absorbing. */
+/* [0]: all light attenuated by something between the transmittances at both ends. [1]: light per extinction between the
+ * least and the most radiant medium, which holds where nothing shines without absorbing. */
 static void bound_crude(const march *m, step *s, const gathered *g)
 {
     nb_real spread = NB_F(0.0);
@@ -175,7 +184,8 @@ static piece_sum sum_step(const march *m, nb_wide start, nb_real length)
     return sum;
 }
 
-static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length, const piece_sum *sum)
+static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length,
+                     const piece_sum *sum)
 {
     step s = {.start = start, .length = length, .sum = *sum, .drop = NB_F(0.0)};
     s.crude_bound[0] = NB_F(0.0);
@@ -188,20 +198,24 @@ static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide
     return s;
 }
 
-/* Profiles that are polynomials between kinks, of a degree below the number of nodes: the polynomial through their values there is they. */
+/* Profiles that are polynomials between kinks, of a degree below the number of nodes: the polynomial through their
+ * values there is they. */
 static int is_polynomial(const nebel_density *density)
 {
     switch (density->type) {
     case NEBEL_DENSITY_CONSTANT:
     case NEBEL_DENSITY_LINEAR:
-    case NEBEL_DENSITY_SOFT_EDGE: return 1;
-    case NEBEL_DENSITY_RADIAL: return density->power <= 2;
-    default: return 0;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return 1;
+    case NEBEL_DENSITY_RADIAL:
+        return density->power <= 2;
+    default:
+        return 0;
     }
 }
 
-/* A node of a step: its place, light per metre, the optical depth up to it where it is known, and the extinction of the media whose
- * optical depth is still to be had from their extinction at all nodes. */
+/* A node of a step: its place, light per metre, the optical depth up to it where it is known, and the extinction of the
+ * media whose optical depth is still to be had from their extinction at all nodes. */
 typedef struct node {
     nb_real h, share; /* m from the start of the step, and as a part of it */
     nb_real light[3], depth[3], extinction[3];
@@ -281,8 +295,8 @@ static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
     g->radiance_error = g->radiance_error + nb_select(lanes, most + nb_min(s->gauss_bound, crude), NB_F(0.0));
 }
 
-/* What the whole march may spend, and how it is shared out: by the loss of transmittance, by length, and a little for each
- * piece's last step, so that a vanishing tail is not halved for ever. */
+/* What the whole march may spend, and how it is shared out: by the loss of transmittance, by length, and a little for
+ * each piece's last step, so that a vanishing tail is not halved for ever. */
 typedef struct allowance {
     int transmittance_only; /* nothing to spend it on */
     nb_real drop_share, length_share, last_share;
@@ -301,8 +315,8 @@ static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
 }
 
 /* Halves the step in every lane until its bound fits. `whole` is the sum of the piece. */
-static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, nb_wide start, nb_real length,
-                     nb_mask pending, nb_real *ellipse, const piece_sum *whole)
+static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, nb_wide start,
+                     nb_real length, nb_mask pending, nb_real *ellipse, const piece_sum *whole)
 {
     for (;;) {
         const int is_whole = nb_wall(start == p->start) && nb_all(length == p->length);
@@ -319,9 +333,11 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
     }
 }
 
-/* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. Steps that never fit (their
- * number is bounded) end in one crude step, across whatever kinks are left, whose honest bound the error then shows. */
-static void gather_mixed(const march *m, const piece *p, const piece_sum *whole, nb_mask lanes, const allowance *may, gathered *g)
+/* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. Steps that never fit
+ * (their number is bounded) end in one crude step, across whatever kinks are left, whose honest bound the error then
+ * shows. */
+static void gather_mixed(const march *m, const piece *p, const piece_sum *whole, nb_mask lanes, const allowance *may,
+                         gathered *g)
 {
     nb_wide t = p->start;
     nb_real guess = p->length, ellipse = may->ellipse;

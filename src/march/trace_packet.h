@@ -1,5 +1,5 @@
-/* A packet of rays and the fog on it: intervals of every leaf that any of them meets, and the profile of every medium in
- * coordinates along the ray. Included by trace_kernel.c once the vocabulary of formulas/prelude.h is there. */
+/* A packet of rays and the fog on it: intervals of every leaf that any of them meets, and the profile of every medium
+ * in coordinates along the ray. Included by trace_kernel.c once the vocabulary of formulas/prelude.h is there. */
 
 /* The double reference keeps the digits that resolving had. */
 #if defined(NB_QUAD)
@@ -26,7 +26,7 @@ typedef struct packet {
 } packet;
 
 typedef struct leaf_span {
-    nb_wide enter, leave; /* clipped to where the medium acts; enter >= leave where there is nothing */
+    nb_wide enter, leave;             /* clipped to where the medium acts; enter >= leave where there is nothing */
     nb_real enter_slack, leave_slack; /* by how much they may be off */
 } leaf_span;
 
@@ -36,7 +36,7 @@ typedef struct contact {
     size_t first_span;
     nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];
-    double least_slack; /* the length over which the medium's extinction and light come to 1 */
+    double least_slack;     /* the length over which the medium's extinction and light come to 1 */
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths */
     nb_real level;          /* gaussian: m; radial: c */
@@ -56,24 +56,25 @@ typedef struct known {
 
 typedef struct march {
     packet rays;
-    int wants_error; /* 0: media that no ray comes near may be left out */
+    int wants_error;    /* 0: media that no ray comes near may be left out */
     const known *total; /* NULL the first time */
     int ignores_distances;
     size_t contact_count, span_count;
     contact *contacts;
     leaf_span *spans;
-    nb_real event_count;          /* two for every leaf that the lane's ray meets, whatever its company meets */
-    ends all_ends;                /* what the ends may do if nothing attenuates it, */
-    ends grazing_ends;            /* and those of them that are no events */
+    nb_real event_count; /* two for every leaf that the lane's ray meets, whatever its company meets */
+    ends all_ends;       /* what the ends may do if nothing attenuates it, */
+    ends grazing_ends;   /* and those of them that are no events */
 
     uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_window.h */
     size_t window_count;
-    uint32_t *present; /* of the window those within the current piece in any lane: from present_first to window_count */
+    uint32_t
+        *present; /* of the window those within the current piece in any lane: from present_first to window_count */
     size_t present_first;
-    double window_end; /* up to here they are all there are */
+    double window_end;         /* up to here they are all there are */
     struct stretch *stretches; /* of all contacts, by their first places */
-    double *lasts;         /* of all contacts */
-    size_t entered;        /* how many of the stretches the window has had */
+    double *lasts;             /* of all contacts */
+    size_t entered;            /* how many of the stretches the window has had */
 } march;
 
 static nb_wvec3 wide_vector(const double v[3])
@@ -125,12 +126,13 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
 {
     double size = 0;
     for (int i = 0; i < 3; i++) size += fabs(leaf->low[i]) + fabs(leaf->high[i]);
-    const nb_wide reach = leaf->aligned ? WIDE(ORIGIN_ERROR(leaf)) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
+    const nb_wide reach =
+        leaf->aligned ? WIDE(ORIGIN_ERROR(leaf)) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
     return nb_interval_box(local->p, local->d, wide_vector(leaf->low), wide_vector(leaf->high), reach);
 }
 
-/* A turned direction is off by roundings of its length, not of its components: far crossings of a plane it nearly runs along move by
- * more than the formula, which sees exact components, can tell. */
+/* A turned direction is off by roundings of its length, not of its components: far crossings of a plane it nearly runs
+ * along move by more than the formula, which sees exact components, can tell. */
 static nb_interval turned_half_space(nb_interval half_space, nb_wvec3 n, nb_wvec3 d)
 {
     const nb_wide lengths = (nb_wabs(n.x) + nb_wabs(n.y) + nb_wabs(n.z)) * (nb_wabs(d.x) + nb_wabs(d.y) + nb_wabs(d.z));
@@ -161,17 +163,22 @@ static nb_interval leaf_interval(const packet *rays, const nb_volume *body, cons
     if (leaf->type == NB_LEAF_WORLD) return nb_interval_all();
     const local_ray local = localize(rays, leaf);
     switch (leaf->type) {
-    case NB_LEAF_PLANES: return planes_interval(body, leaf, &local);
-    case NB_LEAF_BOX: return box_interval(leaf, &local);
-    case NB_LEAF_BALL: return nb_interval_ball(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
-    case NB_LEAF_TUBE: return nb_interval_tube(local.p, local.d, local.reach);
+    case NB_LEAF_PLANES:
+        return planes_interval(body, leaf, &local);
+    case NB_LEAF_BOX:
+        return box_interval(leaf, &local);
+    case NB_LEAF_BALL:
+        return nb_interval_ball(local.p, local.d, WIDE(FRAME(leaf, radius)), local.reach);
+    case NB_LEAF_TUBE:
+        return nb_interval_tube(local.p, local.d, local.reach);
     case NB_LEAF_CONE:
         return nb_interval_cone(local.p, local.d, WIDE(FRAME(leaf, radius)), WIDE(FRAME(leaf, slope)), local.reach);
-    default: return nb_interval_capsule(local.p, local.d, WIDE(FRAME(leaf, length)), local.reach);
+    default:
+        return nb_interval_capsule(local.p, local.d, WIDE(FRAME(leaf, length)), local.reach);
     }
 }
 
-/* ---- profiles in coordinates along the ray --------------------------------------------------------------------------- */
+/* ---- profiles in coordinates along the ray --------------------------------------------------- */
 
 static void height_contact(contact *k, const packet *rays, const nebel_density *density)
 {
@@ -224,19 +231,31 @@ static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *lea
     k->offset = nb_wscale3(nb_wsub3(local.p, middle), inverse);
     k->slope = nb_wscale3(local.d, inverse);
     k->size = nb_wscale3(nb_wsub3(high, low), NB_W(0.5) * inverse);
-    k->noise = nb_narrow(local.reach * inverse) * NB_F(6.0) + NB_F(64.0) * nb_narrow(NB_WEPSILON * (k->size.x + k->size.y + k->size.z));
+    k->noise = nb_narrow(local.reach * inverse) * NB_F(6.0) +
+               NB_F(64.0) * nb_narrow(NB_WEPSILON * (k->size.x + k->size.y + k->size.z));
 }
 
 static void profile_contact(contact *k, const packet *rays)
 {
     const nb_volume *body = &k->medium->body;
     switch (body->density.type) {
-    case NEBEL_DENSITY_HEIGHT: height_contact(k, rays, &body->density); break;
-    case NEBEL_DENSITY_LINEAR: linear_contact(k, rays, &body->density); break;
-    case NEBEL_DENSITY_GAUSSIAN: gaussian_contact(k, rays, &body->density); break;
-    case NEBEL_DENSITY_RADIAL: radial_contact(k, rays, &body->leaves[0]); break;
-    case NEBEL_DENSITY_SOFT_EDGE: soft_edge_contact(k, rays, &body->leaves[0], body->density.distance); break;
-    default: break;
+    case NEBEL_DENSITY_HEIGHT:
+        height_contact(k, rays, &body->density);
+        break;
+    case NEBEL_DENSITY_LINEAR:
+        linear_contact(k, rays, &body->density);
+        break;
+    case NEBEL_DENSITY_GAUSSIAN:
+        gaussian_contact(k, rays, &body->density);
+        break;
+    case NEBEL_DENSITY_RADIAL:
+        radial_contact(k, rays, &body->leaves[0]);
+        break;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        soft_edge_contact(k, rays, &body->leaves[0], body->density.distance);
+        break;
+    default:
+        break;
     }
 }
 
@@ -253,16 +272,21 @@ static nb_real contact_density(const contact *k, nb_wide t)
     case NEBEL_DENSITY_HEIGHT:
         return density->below == NEBEL_BELOW_GROW ? nb_height_density(coordinate(k, t))
                                                   : nb_height_capped_density(coordinate(k, t));
-    case NEBEL_DENSITY_LINEAR: return nb_linear_density(coordinate(k, t));
-    case NEBEL_DENSITY_GAUSSIAN: return nb_gaussian_density(k->level, coordinate(k, t));
-    case NEBEL_DENSITY_RADIAL: return nb_radial_density(k->level, coordinate(k, t), density->power);
+    case NEBEL_DENSITY_LINEAR:
+        return nb_linear_density(coordinate(k, t));
+    case NEBEL_DENSITY_GAUSSIAN:
+        return nb_gaussian_density(k->level, coordinate(k, t));
+    case NEBEL_DENSITY_RADIAL:
+        return nb_radial_density(k->level, coordinate(k, t), density->power);
     case NEBEL_DENSITY_SOFT_EDGE:
         return nb_soft_edge_density(nb_wadd3(k->offset, nb_wscale3(k->slope, t)), k->size);
-    default: return NB_F(1.0);
+    default:
+        return NB_F(1.0);
     }
 }
 
-/* The density a part `share` of the way through a step: in float, which the coordinates of a step are small enough for. */
+/* The density a part `share` of the way through a step: in float, which the coordinates of a step are small enough for.
+ */
 static nb_real contact_density_within(const contact *k, nb_wide start, nb_real length, nb_real share)
 {
     const nebel_density *density = &k->medium->body.density;
@@ -293,14 +317,18 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
         return density->below == NEBEL_BELOW_GROW ? nb_height_integral(from, rise, h)
                                                   : nb_height_capped_integral(from, rise, h);
     }
-    case NEBEL_DENSITY_LINEAR: return nb_linear_integral(u, slope, h);
+    case NEBEL_DENSITY_LINEAR:
+        return nb_linear_integral(u, slope, h);
     case NEBEL_DENSITY_GAUSSIAN:
         return nb_gaussian_integral(k->level, u, coordinate(k, start + nb_widen(h)), slope);
-    case NEBEL_DENSITY_RADIAL: return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
+    case NEBEL_DENSITY_RADIAL:
+        return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
     case NEBEL_DENSITY_SOFT_EDGE:
-        return blur(nb_soft_edge_integral(nb_wadd3(k->offset, nb_wscale3(k->slope, start)), k->slope, k->size, nb_widen(h)),
-                    k->noise, h);
-    default: return nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON));
+        return blur(
+            nb_soft_edge_integral(nb_wadd3(k->offset, nb_wscale3(k->slope, start)), k->slope, k->size, nb_widen(h)),
+            k->noise, h);
+    default:
+        return nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON));
     }
 }
 
@@ -324,7 +352,7 @@ static int grows_without_bound(const nebel_density *density)
     return density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_GROW;
 }
 
-/* ---- meeting the fog ---------------------------------------------------------------------------------------------------- */
+/* ---- meeting the fog ------------------------------------------------------------------------- */
 
 /* How dense a medium may be within slack of t, for what an uncertain end there may do. */
 static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
@@ -332,13 +360,16 @@ static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
     const nebel_density *density = &k->medium->body.density;
     const nb_wide rounding = (nb_wabs(k->offset.x) + nb_wabs(k->slope.x * t)) * (NB_W(4.0) * NB_WEPSILON);
     const nb_real u = coordinate(k, t);
-    const nb_real reach = nb_abs(nb_narrow(k->slope.x)) * slack + nb_narrow(rounding) + nb_abs(u) * (NB_F(4.0) * NB_EPSILON);
+    const nb_real reach =
+        nb_abs(nb_narrow(k->slope.x)) * slack + nb_narrow(rounding) + nb_abs(u) * (NB_F(4.0) * NB_EPSILON);
     const nb_real nearest = nb_max(nb_abs(u) - reach, NB_F(0.0));
     switch (density->type) {
     case NEBEL_DENSITY_HEIGHT:
         return density->below == NEBEL_BELOW_GROW ? nb_height_density(u - reach) : nb_height_capped_density(u - reach);
-    case NEBEL_DENSITY_LINEAR: return nb_linear_density(u + reach);
-    case NEBEL_DENSITY_GAUSSIAN: return nb_gaussian_density(k->level * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON), nearest);
+    case NEBEL_DENSITY_LINEAR:
+        return nb_linear_density(u + reach);
+    case NEBEL_DENSITY_GAUSSIAN:
+        return nb_gaussian_density(k->level * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON), nearest);
     case NEBEL_DENSITY_RADIAL:
         return nb_min(nb_radial_density(k->level, nearest, density->power) + k->noise, NB_F(1.0));
     case NEBEL_DENSITY_SOFT_EDGE: {
@@ -346,7 +377,8 @@ static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
         const nb_real width = nb_narrow(nb_wabs(k->slope.x) + nb_wabs(k->slope.y) + nb_wabs(k->slope.z)) * slack;
         return nb_min(nb_soft_edge_density(q, k->size) + width + k->noise, NB_F(1.0));
     }
-    default: return NB_F(1.0);
+    default:
+        return NB_F(1.0);
     }
 }
 
@@ -361,13 +393,14 @@ static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
     const nb_real weight = slack * end_density(k, t, slack);
     for (int c = 0; c < 3; c++) {
         sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
-        const nb_real seen = nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
+        const nb_real seen =
+            nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
         sum->light[c] = sum->light[c] + seen * k->light[c];
     }
 }
 
-/* An end of a leaf may be off by slack. The end of a medium that covers moves the fog of every medium of a lower rank that is
- * there, too; those were met before, as ranks ascend. */
+/* An end of a leaf may be off by slack. The end of a medium that covers moves the fog of every medium of a lower rank
+ * that is there, too; those were met before, as ranks ascend. */
 static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_real slack)
 {
     if (nb_volume_has_fog(&k->medium->body)) add_end_of(sum, k, t, slack);
@@ -392,8 +425,8 @@ static part part_of_rays(const march *m, const nb_volume *body)
     return (part){WIDE(body->start), nb_wmin(m->rays.t_max, WIDE(body->cutoff))};
 }
 
-/* Where lanes can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside them
- * must not split the ray, or its bits would depend on whether its company brought the body here. */
+/* Where lanes can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside
+ * them must not split the ray, or its bits would depend on whether its company brought the body here. */
 static part part_in_bounds(const packet *rays, const nb_volume *body, const part *acts)
 {
     if (body->leaf_count == 1) return *acts;
@@ -422,7 +455,8 @@ static nb_wide slack_that_matters(const contact *k, nb_wide slack)
     return nb_wselect(slack < least, NB_W(0.0), slack);
 }
 
-/* Clips a leaf's interval to where the medium acts. Ends have slack as far as they may move where the ray and the body are. */
+/* Clips a leaf's interval to where the medium acts. Ends have slack as far as they may move where the ray and the body
+ * are. */
 static leaf_span clip_interval(const contact *k, const nb_interval *raw, const part *acts, const part *bounds)
 {
     const nb_wide first = slack_that_matters(k, raw->enter_slack), last = slack_that_matters(k, raw->leave_slack);

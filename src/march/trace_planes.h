@@ -8,7 +8,7 @@
 #define FORCE_INLINE static inline __attribute__((always_inline))
 #define NEVER_INLINE static __attribute__((noinline))
 
-/* ---- planes ------------------------------------------------------------------------------------------------------ */
+/* ---- planes ---------------------------------------------------------------------------------- */
 
 /* Of `count` numbers the lanes beyond repeat the first. */
 NEVER_INLINE nb_real gather_floats(const float *plane, size_t stride, size_t first, size_t count)
@@ -63,8 +63,10 @@ FORCE_INLINE nb_wvec3 load_double_vectors(const double *const plane[3], size_t s
 FORCE_INLINE void store_floats(float *plane, size_t stride, size_t first, size_t count, nb_real x)
 {
     if (plane == NULL) return;
-    if (stride == sizeof *plane && count == NB_WIDTH) nb_store_lanes(plane + first, x);
-    else scatter_floats(plane, stride, first, count, x);
+    if (stride == sizeof *plane && count == NB_WIDTH)
+        nb_store_lanes(plane + first, x);
+    else
+        scatter_floats(plane, stride, first, count, x);
 }
 
 FORCE_INLINE void store_colors(float *const plane[3], size_t stride, size_t first, size_t count, const nb_real color[3])
@@ -74,7 +76,7 @@ FORCE_INLINE void store_colors(float *const plane[3], size_t stride, size_t firs
     store_floats(plane[2], stride, first, count, color[2]);
 }
 
-/* ---- rays -------------------------------------------------------------------------------------------------------- */
+/* ---- rays ------------------------------------------------------------------------------------ */
 
 /* What the rays of a call share. */
 typedef struct stream {
@@ -181,11 +183,10 @@ static void unload_rays(const stream *s, const loaded *p, nebel_ray rays[NB_WIDT
     double lane[7][NB_WIDTH];
     for (int k = 0; k < 7; k++) nb_wstore_lanes(lane[k], numbers[k]);
     for (size_t i = 0; i < NB_WIDTH; i++)
-        rays[i] = (nebel_ray){
-            {lane[0][i], lane[1][i], lane[2][i]}, {lane[3][i], lane[4][i], lane[5][i]}, lane[6][i]};
+        rays[i] = (nebel_ray){{lane[0][i], lane[1][i], lane[2][i]}, {lane[3][i], lane[4][i], lane[5][i]}, lane[6][i]};
 }
 
-/* ---- the march --------------------------------------------------------------------------------------------------- */
+/* ---- the march ------------------------------------------------------------------------------- */
 
 static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowance *may, const stream *s, size_t first,
                                  size_t count)
@@ -209,7 +210,7 @@ static nebel_result march_planes(nb_trace_job *job, workspace *w, const allowanc
     return NEBEL_OK;
 }
 
-/* ---- the straight way -------------------------------------------------------------------------------------------- */
+/* ---- the straight way ------------------------------------------------------------------------ */
 
 typedef struct straight {
     const nb_medium *medium;
@@ -264,7 +265,7 @@ static void open_straight(straight *way, const nb_trace_job *job, const stream *
 
 /* leaf_interval for one caller, so that what computes slack falls away. */
 __attribute__((flatten)) NEVER_INLINE void cross_leaf(const packet *rays, const nb_volume *body, nb_wide *enter,
-                                                nb_wide *leave)
+                                                      nb_wide *leave)
 {
     const nb_interval raw = leaf_interval(rays, body, &body->leaves[0]);
     *enter = raw.enter;
@@ -352,7 +353,7 @@ FORCE_INLINE nebel_result trace_straight(nb_trace_job *job, const straight *way,
     return NEBEL_OK;
 }
 
-/* ---- all rays ---------------------------------------------------------------------------------------------------- */
+/* ---- all rays -------------------------------------------------------------------------------- */
 
 static nebel_result trace_planes(nb_trace_job *job, workspace *w, const allowance *may)
 {

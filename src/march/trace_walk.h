@@ -6,9 +6,9 @@ typedef struct gathered {
     nb_real transmittance[3]; /* exp(-depth) */
     nb_real radiance[3];
     nb_real depth_error[3];
-    nb_real ends_depth[3];    /* that of ends which were weighed against what lies behind them */
-    nb_real least_depth[3];   /* what the optical depth is at least, in spite of ends farther on */
-    nb_real radiance_error;   /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
+    nb_real ends_depth[3];  /* that of ends which were weighed against what lies behind them */
+    nb_real least_depth[3]; /* what the optical depth is at least, in spite of ends farther on */
+    nb_real radiance_error; /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
 } gathered;
 
 /* A piece between two neighbouring events. */
@@ -23,8 +23,8 @@ typedef struct piece_sum {
     nb_real depth[3], light[3]; /* optical depth; radiance it would add if nothing attenuated it */
     nb_real depth_error[3], light_error[3];
     nb_real relative_error; /* of the worst integral, 1 at most */
-    nb_mask present; /* some medium is there */
-    nb_mask mixed;   /* the quotient of light and extinction changes along the piece: no closed form */
+    nb_mask present;        /* some medium is there */
+    nb_mask mixed;          /* the quotient of light and extinction changes along the piece: no closed form */
 } piece_sum;
 
 /* The next event after t, NB_WFAR * 2 where there is none: the sentinel must lie beyond an endless ray's end. */
@@ -51,8 +51,8 @@ static int fold_step(nb_step step, nb_mask *stack, int top)
     return top - 1;
 }
 
-/* The next piece of each lane that is in `lanes`; those whose next event lies beyond the window wait for it to move. Returns 0 when no lane
- * has a piece left. */
+/* The next piece of each lane that is in `lanes`; those whose next event lies beyond the window wait for it to move.
+ * Returns 0 when no lane has a piece left. */
 static int next_piece(march *m, nb_wide t, nb_wmask lanes, piece *p)
 {
     for (;;) {
@@ -85,7 +85,8 @@ static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
     return stack[0];
 }
 
-/* Marks which media's fog is there. Returns whether any is. From the highest rank down: what covers takes away what ranks below it. */
+/* Marks which media's fog is there. Returns whether any is. From the highest rank down: what covers takes away what
+ * ranks below it. */
 static int mark_inside(march *m, const piece *p)
 {
     nb_mask covered = nb_not(p->lanes), covered_below = covered;
@@ -158,11 +159,12 @@ static piece_sum sum_piece(const march *m, const piece *p)
     return sum;
 }
 
-/* By what factor the light of a piece may be off through the optical depth before it and in it; where all is opaque only the relative
- * error of the latter counts. */
+/* By what factor the light of a piece may be off through the optical depth before it and in it; where all is opaque
+ * only the relative error of the latter counts. */
 static nb_real attenuation_error(const gathered *g, const piece_sum *sum, int c)
 {
-    return nb_min(g->depth_error[c] + nb_min(sum->depth_error[c], sum->relative_error), NB_F(1.0)) + NB_F(32.0) * NB_EPSILON;
+    return nb_min(g->depth_error[c] + nb_min(sum->depth_error[c], sum->relative_error), NB_F(1.0)) +
+           NB_F(32.0) * NB_EPSILON;
 }
 
 /* The closed form: light (1 - e^-depth) / depth, seen through what lies before. */
@@ -189,14 +191,15 @@ static void pass_piece(gathered *g, const piece_sum *sum)
     }
 }
 
-/* Lanes in which the ends may matter: there they are counted where they are, seen through the fog before them; elsewhere their
- * plain sum is small enough to report. */
+/* Lanes in which the ends may matter: there they are counted where they are, seen through the fog before them;
+ * elsewhere their plain sum is small enough to report. */
 static nb_mask ends_matter(const march *m)
 {
     return largest(m->all_ends.depth) + largest(m->all_ends.light) > NB_F(16.0) * NB_EPSILON;
 }
 
-/* Within slack of t, whatever ends with slack of their own do: where the body may be somewhere, and where it is everywhere. */
+/* Within slack of t, whatever ends with slack of their own do: where the body may be somewhere, and where it is
+ * everywhere. */
 typedef struct presence {
     nb_mask may, must;
 } presence;
@@ -229,8 +232,8 @@ static presence body_near(const march *m, const contact *k, size_t which, nb_wid
     return (presence){most[0], least[0]};
 }
 
-/* Whether an end of a leaf within slack of t may be an end of the body: not where other leaves hold the body together there, or
- * leave it out. */
+/* Whether an end of a leaf within slack of t may be an end of the body: not where other leaves hold the body together
+ * there, or leave it out. */
 static nb_mask may_end_body(const march *m, const contact *k, size_t which, nb_wide t, nb_wide slack)
 {
     const presence near = body_near(m, k, which, t, slack);
@@ -244,12 +247,14 @@ static nb_mask is_covered_near(const march *m, const contact *k, nb_wide t, nb_w
     for (size_t i = m->window_count; i-- > 0;) {
         const contact *other = in_window(m, i);
         if (other->medium->body.rank <= k->medium->body.rank) break;
-        if (nb_volume_covers(&other->medium->body)) covered = nb_or(covered, body_near(m, other, NO_LEAF, t, slack).must);
+        if (nb_volume_covers(&other->medium->body))
+            covered = nb_or(covered, body_near(m, other, NO_LEAF, t, slack).must);
     }
     return covered;
 }
 
-/* Ends at t, and what those that may already lie before t may take from the fog there: where fog begins it can only be more. */
+/* Ends at t, and what those that may already lie before t may take from the fog there: where fog begins it can only be
+ * more. */
 typedef struct passing {
     nb_wide t;
     nb_mask lanes;
@@ -257,10 +262,10 @@ typedef struct passing {
     nb_real weighed[3];
 } passing;
 
-/* Moving an end brings light and takes as much from the light behind, which is all the same where fog begins that is opaque further
- * on. Where the radiance is known but for its error, so is what lies behind: ends are moved one by one, the farthest first, and each
- * changes the radiance by no more than |light T - depth (S - S before)|, depth times the error, and what others do to that within the
- * slack. */
+/* Moving an end brings light and takes as much from the light behind, which is all the same where fog begins that is
+ * opaque further on. Where the radiance is known but for its error, so is what lies behind: ends are moved one by one,
+ * the farthest first, and each changes the radiance by no more than |light T - depth (S - S before)|, depth times the
+ * error, and what others do to that within the slack. */
 static void weigh_end(const march *m, const gathered *g, passing *p, const contact *k, nb_wide end, nb_real slack)
 {
     const nb_wide wide_slack = nb_widen(slack);
@@ -292,8 +297,8 @@ static void weigh_end(const march *m, const gathered *g, passing *p, const conta
     }
 }
 
-static void pass_end(const march *m, const gathered *g, passing *p, const contact *k, size_t leaf, nb_wide end, nb_real slack,
-                     int fog_ends)
+static void pass_end(const march *m, const gathered *g, passing *p, const contact *k, size_t leaf, nb_wide end,
+                     nb_real slack, int fog_ends)
 {
     if (!nb_any(slack > NB_F(0.0))) return;
     const nb_wide wide_slack = nb_widen(slack);
@@ -348,7 +353,8 @@ static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum
     for (size_t i = m->present_first; i < m->window_count && nb_any(open); i++) {
         const contact *k = present(m, i);
         if (!k->medium->emits) continue;
-        const nb_mask here = nb_and(open, nb_and(k->inside, contact_integral(k, p->start, p->length).value >= NB_F(0.5) * NB_FAR));
+        const nb_mask here =
+            nb_and(open, nb_and(k->inside, contact_integral(k, p->start, p->length).value >= NB_F(0.5) * NB_FAR));
         for (int c = 0; c < 3; c++)
             if (k->medium->body.emission[c] > 0) endless = nb_or(endless, nb_and(here, sum->depth[c] < NB_F(1.0)));
     }

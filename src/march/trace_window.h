@@ -1,8 +1,8 @@
 /* Which media the walk along the rays looks at: where very many lie on them, only those about the place where it is.
  *
- * Media are sorted by where the packet first enters one. All lanes walk up to the first entry that the window does not hold, then the
- * window moves on: it lets go of what they have left behind and takes in what comes next. A lane's events and sums are those it would
- * have without windows, because what a window leaves out adds nothing there. */
+ * Media are sorted by where the packet first enters one. All lanes walk up to the first entry that the window does not
+ * hold, then the window moves on: it lets go of what they have left behind and takes in what comes next. A lane's
+ * events and sums are those it would have without windows, because what a window leaves out adds nothing there. */
 
 /* Below this many media it is quicker to look at all. */
 #define FEW_CONTACTS 16

@@ -48,8 +48,8 @@ static inline nb_affine nb_affine_from_transform(const nebel_transform *t)
     if (n > 0) {
         const nb_quad s = 2 / n;
         const nb_quad m[9] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
-                                  s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
-                                  s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
+                              s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
+                              s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
         for (int i = 0; i < 9; i++) a.matrix[i] = m[i];
     }
     const int scaled = t->scale[0] != 0 || t->scale[1] != 0 || t->scale[2] != 0;

@@ -48,7 +48,8 @@ nebel_result nb_check_color(const nebel_log *log, const char *what, const double
 {
     for (int i = 0; i < 3; i++)
         if (!(color[i] >= 0 && color[i] <= largest))
-            return nb_fail(log, NEBEL_ERROR_VALUE, "%s: every channel must be within 0 and %g; it is %g", what, largest, color[i]);
+            return nb_fail(log, NEBEL_ERROR_VALUE, "%s: every channel must be within 0 and %g; it is %g", what, largest,
+                           color[i]);
     return NEBEL_OK;
 }
 
@@ -143,27 +144,35 @@ static nebel_result check_shape(const nebel_log *log, const nebel_shape *shape, 
     if (++*leaves > NEBEL_MAX_LEAVES)
         return nb_fail(log, NEBEL_ERROR_LIMIT, "shape: more than %d parts", NEBEL_MAX_LEAVES);
     switch (shape->type) {
-    case NEBEL_SHAPE_WORLD: return NEBEL_OK;
+    case NEBEL_SHAPE_WORLD:
+        return NEBEL_OK;
     case NEBEL_SHAPE_HALF_SPACE:
         if (!is_place(shape->point)) return bad(log, "half space point", PLACE_RULE);
         return is_direction(shape->normal) ? NEBEL_OK : bad(log, "half space normal", DIRECTION_RULE);
-    case NEBEL_SHAPE_BOX: return check_box(log, shape);
+    case NEBEL_SHAPE_BOX:
+        return check_box(log, shape);
     case NEBEL_SHAPE_SPHERE:
-    case NEBEL_SHAPE_ELLIPSOID: return check_round(log, shape);
+    case NEBEL_SHAPE_ELLIPSOID:
+        return check_round(log, shape);
     case NEBEL_SHAPE_CYLINDER:
     case NEBEL_SHAPE_CAPSULE:
-    case NEBEL_SHAPE_CONE: return check_axis(log, shape);
-    case NEBEL_SHAPE_CONVEX: return check_convex(log, shape);
-    default: return nb_fail(log, NEBEL_ERROR_ARGUMENT, "shape: type %d is unknown", (int)shape->type);
+    case NEBEL_SHAPE_CONE:
+        return check_axis(log, shape);
+    case NEBEL_SHAPE_CONVEX:
+        return check_convex(log, shape);
+    default:
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "shape: type %d is unknown", (int)shape->type);
     }
 }
 
 static nebel_result check_density(const nebel_log *log, const nebel_density *density, const nebel_shape *shape)
 {
     switch (density->type) {
-    case NEBEL_DENSITY_CONSTANT: return NEBEL_OK;
+    case NEBEL_DENSITY_CONSTANT:
+        return NEBEL_OK;
     case NEBEL_DENSITY_HEIGHT:
-        if (!(fabs(density->base) <= NB_LARGEST_LENGTH)) return bad(log, "height base", "must be finite, at most 1e15 m");
+        if (!(fabs(density->base) <= NB_LARGEST_LENGTH))
+            return bad(log, "height base", "must be finite, at most 1e15 m");
         if (density->below != NEBEL_BELOW_GROW && density->below != NEBEL_BELOW_CONSTANT)
             return nb_fail(log, NEBEL_ERROR_ARGUMENT, "height below: %d is unknown", (int)density->below);
         return is_extent(density->scale_height) ? NEBEL_OK : bad(log, "scale height", EXTENT_RULE);
@@ -181,7 +190,8 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
     case NEBEL_DENSITY_SOFT_EDGE:
         if (shape->type != NEBEL_SHAPE_BOX) return bad(log, "soft edge", "needs a box");
         return is_extent(density->distance) ? NEBEL_OK : bad(log, "soft edge distance", EXTENT_RULE);
-    default: return nb_fail(log, NEBEL_ERROR_ARGUMENT, "density: type %d is unknown", (int)density->type);
+    default:
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "density: type %d is unknown", (int)density->type);
     }
 }
 
@@ -198,7 +208,8 @@ static nebel_result check_light(const nebel_log *log, const nebel_volume_desc *d
 
 static nebel_result check_distances(const nebel_log *log, const nebel_volume_desc *desc)
 {
-    if (!(desc->start >= 0 && desc->start <= NB_LARGEST_LENGTH)) return bad(log, "start", "must be a distance from 0 to 1e15 m");
+    if (!(desc->start >= 0 && desc->start <= NB_LARGEST_LENGTH))
+        return bad(log, "start", "must be a distance from 0 to 1e15 m");
     if (!(desc->cutoff == 0 || (desc->cutoff > desc->start && desc->cutoff <= NB_LARGEST_LENGTH)))
         return bad(log, "cutoff", "must be 0, for none, or more than start and at most 1e15 m");
     return NEBEL_OK;

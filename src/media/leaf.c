@@ -11,8 +11,8 @@ static void widen_point(const double v[3], nb_quad out[3])
     for (int i = 0; i < 3; i++) out[i] = (nb_quad)v[i];
 }
 
-/* `local` after the world's matrix, plus its offset. A turned point is rounded to a few units of its last digit, the sum by
- * what it leaves (Knuth's two-sum), an offset only where it is no double as the caller gave it. */
+/* `local` after the world's matrix, plus its offset. A turned point is rounded to a few units of its last digit, the
+ * sum by what it leaves (Knuth's two-sum), an offset only where it is no double as the caller gave it. */
 static void set_origin(nb_leaf *leaf, const nb_affine *world, const nb_quad local[3])
 {
     nb_quad turned[3] = {local[0], local[1], local[2]};
@@ -41,8 +41,9 @@ static void set_origin(nb_leaf *leaf, const nb_affine *world, const nb_quad loca
 static int invert_frame(const nb_affine *world, const nb_quad shaping[9], nb_quad matrix[9])
 {
     nb_affine back = nb_affine_identity();
-    const nb_affine shape = {{shaping[0], shaping[1], shaping[2], shaping[3], shaping[4], shaping[5], shaping[6],
-                              shaping[7], shaping[8]}, {0, 0, 0}};
+    const nb_affine shape = {
+        {shaping[0], shaping[1], shaping[2], shaping[3], shaping[4], shaping[5], shaping[6], shaping[7], shaping[8]},
+        {0, 0, 0}};
     memcpy(matrix, shaping, sizeof shape.matrix);
     if (nb_affine_is_shift(world)) return 1;
     if (!nb_affine_invert_matrix(world, back.matrix)) return 0;
@@ -161,8 +162,7 @@ static void across(const nb_quad axis[3], nb_quad u[3], nb_quad v[3])
     u[smallest] = 0;
     u[j] = -axis[k] / length;
     u[k] = axis[j] / length;
-    for (int i = 0; i < 3; i++)
-        v[i] = axis[(i + 1) % 3] * u[(i + 2) % 3] - axis[(i + 2) % 3] * u[(i + 1) % 3];
+    for (int i = 0; i < 3; i++) v[i] = axis[(i + 1) % 3] * u[(i + 2) % 3] - axis[(i + 2) % 3] * u[(i + 1) % 3];
 }
 
 /* Encloses the two end discs (or balls, for a capsule) of a body around an axis. */
@@ -201,7 +201,7 @@ static int set_axis_body(nb_leaf *leaf, const nebel_shape *shape, const nb_affin
 {
     const int cone = shape->type == NEBEL_SHAPE_CONE;
     const nb_quad radii[2] = {(nb_quad)(cone ? shape->radius_from : shape->radius),
-                                  (nb_quad)(cone ? shape->radius_to : shape->radius)};
+                              (nb_quad)(cone ? shape->radius_to : shape->radius)};
     nb_quad basis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, from[3], square = 0, axis[3];
     widen_point(shape->from, from);
     for (int i = 0; i < 3; i++) {
@@ -301,12 +301,19 @@ nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, con
             high[i] = HUGE_VAL;
         }
         break;
-    case NEBEL_SHAPE_BOX: regular = set_box(leaf, shape, world, low, high); break;
+    case NEBEL_SHAPE_BOX:
+        regular = set_box(leaf, shape, world, low, high);
+        break;
     case NEBEL_SHAPE_SPHERE:
-    case NEBEL_SHAPE_ELLIPSOID: regular = set_ball(leaf, shape, world, low, high); break;
+    case NEBEL_SHAPE_ELLIPSOID:
+        regular = set_ball(leaf, shape, world, low, high);
+        break;
     case NEBEL_SHAPE_HALF_SPACE:
-    case NEBEL_SHAPE_CONVEX: return set_planes(log, leaf, shape, world, faces, low, high);
-    default: regular = set_axis_body(leaf, shape, world, low, high); break;
+    case NEBEL_SHAPE_CONVEX:
+        return set_planes(log, leaf, shape, world, faces, low, high);
+    default:
+        regular = set_axis_body(leaf, shape, world, low, high);
+        break;
     }
     return regular ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
 }

@@ -48,9 +48,11 @@ typedef struct builder {
     nb_counts used;
 } builder;
 
-static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3], double high[3]);
+static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3],
+                              double high[3]);
 
-static nebel_result add_leaf(builder *b, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+static nebel_result add_leaf(builder *b, const nebel_shape *shape, const nb_affine *world, double low[3],
+                             double high[3])
 {
     nb_leaf *leaf = &b->volume->leaves[b->used.leaves++];
     const nebel_result result =
@@ -60,7 +62,8 @@ static nebel_result add_leaf(builder *b, const nebel_shape *shape, const nb_affi
     return result;
 }
 
-static nebel_result add_group(builder *b, const nebel_shape *shape, const nb_affine *world, double low[3], double high[3])
+static nebel_result add_group(builder *b, const nebel_shape *shape, const nb_affine *world, double low[3],
+                              double high[3])
 {
     const int any = shape->type == NEBEL_SHAPE_UNION;
     for (size_t i = 0; i < shape->part_count; i++) {
@@ -83,7 +86,8 @@ static int is_moved(const nebel_transform *t)
     return t->rotation[3] != 0;
 }
 
-static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3], double high[3])
+static nebel_result add_shape(builder *b, const nebel_shape *shape, const nb_affine *above, double low[3],
+                              double high[3])
 {
     nb_affine world = *above;
     if (is_moved(&shape->transform)) {
@@ -107,13 +111,18 @@ static nebel_density resolve_density(const nebel_density *from)
         memcpy(to.from, from->from, sizeof to.from);
         memcpy(to.to, from->to, sizeof to.to);
         break;
-    case NEBEL_DENSITY_RADIAL: to.power = from->power; break;
+    case NEBEL_DENSITY_RADIAL:
+        to.power = from->power;
+        break;
     case NEBEL_DENSITY_GAUSSIAN:
         memcpy(to.center, from->center, sizeof to.center);
         to.sigma = from->sigma;
         break;
-    case NEBEL_DENSITY_SOFT_EDGE: to.distance = from->distance; break;
-    default: break;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        to.distance = from->distance;
+        break;
+    default:
+        break;
     }
     return to;
 }
@@ -193,11 +202,11 @@ static int compare_sizes(size_t a, size_t b)
 
 static int compare_density(const nebel_density *a, const nebel_density *b)
 {
-    const double x[] = {(double)a->type, (double)a->below, a->base,  a->scale_height, a->from[0],  a->from[1],
-                        a->from[2],      a->to[0],         a->to[1], a->to[2],        a->power,    a->center[0],
+    const double x[] = {(double)a->type, (double)a->below, a->base,  a->scale_height, a->from[0], a->from[1],
+                        a->from[2],      a->to[0],         a->to[1], a->to[2],        a->power,   a->center[0],
                         a->center[1],    a->center[2],     a->sigma, a->distance};
-    const double y[] = {(double)b->type, (double)b->below, b->base,  b->scale_height, b->from[0],  b->from[1],
-                        b->from[2],      b->to[0],         b->to[1], b->to[2],        b->power,    b->center[0],
+    const double y[] = {(double)b->type, (double)b->below, b->base,  b->scale_height, b->from[0], b->from[1],
+                        b->from[2],      b->to[0],         b->to[1], b->to[2],        b->power,   b->center[0],
                         b->center[1],    b->center[2],     b->sigma, b->distance};
     return compare_numbers(x, y, sizeof x / sizeof *x);
 }
@@ -227,7 +236,8 @@ static int compare_body(const nb_volume *a, const nb_volume *b)
 {
     int order = compare_sizes(a->leaf_count, b->leaf_count);
     if (order == 0) order = compare_sizes(a->step_count, b->step_count);
-    for (size_t i = 0; i < a->step_count && order == 0; i++) order = (a->steps[i] > b->steps[i]) - (a->steps[i] < b->steps[i]);
+    for (size_t i = 0; i < a->step_count && order == 0; i++)
+        order = (a->steps[i] > b->steps[i]) - (a->steps[i] < b->steps[i]);
     for (size_t i = 0; i < a->leaf_count && order == 0; i++) order = compare_leaf(&a->leaves[i], &b->leaves[i]);
     for (size_t i = 0; i < a->face_count && order == 0; i++) {
         order = compare_numbers(a->faces[i].normal, b->faces[i].normal, 3);

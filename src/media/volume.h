@@ -1,7 +1,9 @@
-/* A volume as the core keeps it: checked, every default resolved, every shape a set of convex leaves in frames of their own.
+/* A volume as the core keeps it: checked, every default resolved, every shape a set of convex leaves in frames of their
+ * own.
  *
- * A leaf gives one interval on a ray. Unions and intersections are a postfix program over the leaves' membership, so that
- * the partition of a ray needs no algebra of intervals: it evaluates the program between two neighbouring events. */
+ * A leaf gives one interval on a ray. Unions and intersections are a postfix program over the leaves' membership, so
+ * that the partition of a ray needs no algebra of intervals: it evaluates the program between two neighbouring events.
+ */
 #ifndef NB_MEDIA_VOLUME_H
 #define NB_MEDIA_VOLUME_H
 
@@ -16,40 +18,41 @@
 
 typedef enum nb_leaf_type {
     NB_LEAF_WORLD,
-    NB_LEAF_PLANES,  /* n.x <= d for each plane */
-    NB_LEAF_BOX,     /* low <= x < high */
-    NB_LEAF_BALL,    /* |x| <= radius */
-    NB_LEAF_TUBE,    /* x^2 + y^2 <= 1, 0 <= z <= 1 */
-    NB_LEAF_CONE,    /* x^2 + y^2 <= (radius + slope z)^2, 0 <= z <= 1 */
-    NB_LEAF_CAPSULE  /* within 1 of the z axis from 0 to length */
+    NB_LEAF_PLANES, /* n.x <= d for each plane */
+    NB_LEAF_BOX,    /* low <= x < high */
+    NB_LEAF_BALL,   /* |x| <= radius */
+    NB_LEAF_TUBE,   /* x^2 + y^2 <= 1, 0 <= z <= 1 */
+    NB_LEAF_CONE,   /* x^2 + y^2 <= (radius + slope z)^2, 0 <= z <= 1 */
+    NB_LEAF_CAPSULE /* within 1 of the z axis from 0 to length */
 } nb_leaf_type;
 
-/* normal.x <= distance, the largest component of the normal within 0.5 and 1. `tie` decides for rays that lie in the face: the body with tie < 0 owns it, so that of
- * two bodies that touch there exactly one does. */
+/* normal.x <= distance, the largest component of the normal within 0.5 and 1. `tie` decides for rays that lie in the
+ * face: the body with tie < 0 owns it, so that of two bodies that touch there exactly one does. */
 typedef struct nb_face {
     double normal[3], distance, tie;
 } nb_face;
 
 typedef struct nb_leaf {
     nb_leaf_type type;
-    int aligned;             /* the matrix is the identity */
-    double origin[3];        /* local = matrix (world - origin) */
-    double origin_rest[3];   /* what rounding to double took from the origin */
-    double origin_error;     /* what resolving and rounding may have lost of it */
-    double matrix[9];        /* row by row */
+    int aligned;                                                 /* the matrix is the identity */
+    double origin[3];                                            /* local = matrix (world - origin) */
+    double origin_rest[3];                                       /* what rounding to double took from the origin */
+    double origin_error;                                         /* what resolving and rounding may have lost of it */
+    double matrix[9];                                            /* row by row */
     long double exact_origin[3], exact_rest[3], exact_matrix[9]; /* the same for the double reference */
     nb_quad quad_origin[3], quad_matrix[9];                      /* the same as resolved */
-    double resolved_error;   /* what resolving may have lost of the origin */
-    double scale;            /* largest row length of the matrix */
-    double low[3], high[3];  /* box */
-    double radius, slope;    /* ball, cone */
-    double length;           /* capsule */
+    double resolved_error;                                       /* what resolving may have lost of the origin */
+    double scale;                                                /* largest row length of the matrix */
+    double low[3], high[3];                                      /* box */
+    double radius, slope;                                        /* ball, cone */
+    double length;                                               /* capsule */
     long double exact_radius, exact_slope, exact_length;
     nb_quad quad_radius, quad_slope, quad_length;
     size_t first_face, face_count; /* planes: into the volume's faces */
 } nb_leaf;
 
-/* A postfix program over leaf membership: LEAF pushes the next leaf, the others fold the two topmost results into one. */
+/* A postfix program over leaf membership: LEAF pushes the next leaf, the others fold the two topmost results into one.
+ */
 typedef enum nb_step { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_step;
 
 /* The deepest stack a program needs. */
@@ -94,8 +97,8 @@ int nb_volume_copy(const nebel_allocator *allocator, const nb_volume *from, nb_v
 
 void nb_volume_free(const nebel_allocator *allocator, nb_volume *volume);
 
-/* A total order on what volumes are, whatever the order they were added in: the canonical order of summation. By rank first,
- * and what covers before what does not. */
+/* A total order on what volumes are, whatever the order they were added in: the canonical order of summation. By rank
+ * first, and what covers before what does not. */
 int nb_volume_compare(const nb_volume *a, const nb_volume *b);
 
 #endif

@@ -100,8 +100,8 @@ typedef struct nb_scene_reader {
 } nb_scene_reader;
 
 /* nebel_parse_scene; with `save`, notes what is to be changed in the text. */
-nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc, nb_save *save,
-                            nebel_scene **scene);
+nebel_result nb_scene_parse(const char *text, size_t size, const char *name, const nebel_scene_desc *desc,
+                            nb_save *save, nebel_scene **scene);
 
 bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);

@@ -5,7 +5,7 @@
  * with a few slots as memory; rays that meet more volumes than there are slots walk in windows, and through places where more
  * overlap than that they read everything again for each step: slower, never wrong. */
 
-/* ---- sums over media --------------------------------------------------------------------------------------------------- */
+/* ---- sums over media ------------------------------------------------------------------------- */
 
 /* The word of the medium that stands at `i` of all media, or of the host's list. */
 int nb_medium_at(int i, bool listed)
@@ -79,7 +79,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     return sum;
 }
 
-/* ---- the walk ---------------------------------------------------------------------------------------------------------- */
+/* ---- the walk -------------------------------------------------------------------------------- */
 
 /* Stretches that the walk keeps at hand, the next ones of their media: enter, leave, the medium's word. The mask keeps drivers from
  * unrolling every loop over them to the array's length. */
@@ -473,7 +473,7 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
     return g;
 }
 
-/* ---- the face ---------------------------------------------------------------------------------------------------------- */
+/* ---- the face -------------------------------------------------------------------------------- */
 
 /* See nebel_set_max_opacity. */
 nebel_light nb_limit_opacity(nebel_light light, float most)

@@ -1,27 +1,26 @@
-/* What the words of packed fog mean. pack.c writes them, fog.glsl reads them: this text is compiled as C, GLSL and HLSL.
- * A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the bits of small numbers.
- * Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
+/* What the words of packed fog mean. pack.c writes them, fog.glsl reads them: this text is compiled as C, GLSL and
+ * HLSL. A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the bits of
+ * small numbers. Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
  *
  * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, 0.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
- *     1  light per metre at density 1 (radiance times extinction, plus emission), 1 where there is emission, plus 2 where it covers,
- *        plus 4 times its rank, counted from 0: what covers takes away the fog of every lower rank
- *     2  radiance of opaque fog, leaves
- *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye, 1 / (sqrt(2) sigma);
- *        soft edge: 1 / distance
- *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
- *     The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does not [m].
+ *     1  light per metre at density 1 (radiance times extinction, plus emission), 1 where there is emission, plus 2
+ * where it covers, plus 4 times its rank, counted from 0: what covers takes away the fog of every lower rank 2 radiance
+ * of opaque fog, leaves 3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre
+ * to the eye, 1 / (sqrt(2) sigma); soft edge: 1 / distance 4  its only leaf; of a body of several: bounds low, first
+ * leaf's word; bounds high The last number of words 5 and 6 is where along a ray it starts to act and where it ends,
+ * 1e18 where it does not [m].
  *
  * A leaf, NB_LEAF_WORDS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
  *     1  the eye in the leaf's frame; box: low
  *     2  box: high
  *     3  the matrix, row by row; where the type says that it is turned
- * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where both must
- * hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule; number of faces and
- * first face's word of planes. A face is one word: normal and distance, which are the world's. */
+ * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
+ * both must hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule;
+ * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's. */
 #ifndef NB_SHADER_LAYOUT_H
 #define NB_SHADER_LAYOUT_H
 
@@ -62,10 +61,10 @@
 #define NB_HAS_CONE 16
 #define NB_HAS_CAPSULE 32
 #define NB_HAS_TURNED 64
-#define NB_HAS_GROUP 128   /* a body of several leaves */
-#define NB_HAS_COVER 256   /* exclude or replace */
-#define NB_HAS_MIXED 512   /* two media of different light, or one of two that shines */
-#define NB_HAS_SLOPE 1024  /* height, linear */
+#define NB_HAS_GROUP 128  /* a body of several leaves */
+#define NB_HAS_COVER 256  /* exclude or replace */
+#define NB_HAS_MIXED 512  /* two media of different light, or one of two that shines */
+#define NB_HAS_SLOPE 1024 /* height, linear */
 #define NB_HAS_GAUSSIAN 2048
 #define NB_HAS_SOFT_EDGE 4096
 #define NB_HAS_RADIAL 8192

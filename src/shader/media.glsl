@@ -27,7 +27,7 @@ bool nb_is_number(float x) { return (nb_to_bits(x) & 0x7fffffff) <= 0x7f800000; 
 float nb_largest(nb_vec3 v) { return max(max(v.x, v.y), v.z); }
 float nb_smallest(nb_vec3 v) { return min(min(v.x, v.y), v.z); }
 
-/* ---- attenuation ------------------------------------------------------------------------------------------------------- */
+/* ---- attenuation ----------------------------------------------------------------------------- */
 
 /* What is left behind optical depth x, e^-x, and the mean on the way, (1 - e^-x) / x: nb_exp and nb_exp_ratio at the price of one. */
 struct nb_attenuation {
@@ -56,7 +56,7 @@ nb_attenuation nb_attenuate(nb_vec3 depth)
     return a;
 }
 
-/* ---- shapes ------------------------------------------------------------------------------------------------------------ */
+/* ---- shapes ---------------------------------------------------------------------------------- */
 
 /* The ray in a leaf's frame, without the way to the frame's origin. */
 nb_ray nb_turned_ray(int leaf, bool turned, nb_ray ray)
@@ -184,7 +184,7 @@ nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
     return s;
 }
 
-/* ---- profiles ---------------------------------------------------------------------------------------------------------- */
+/* ---- profiles -------------------------------------------------------------------------------- */
 
 /* A medium's density in coordinates along the ray, offset + slope s, s metres behind where it was asked for. */
 struct nb_profile {

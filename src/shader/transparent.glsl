@@ -1,7 +1,7 @@
 /* Transparent surfaces and particles in fog. Part of the shader text where NEBEL_TRANSPARENT is defined. */
 #ifdef NEBEL_TRANSPARENT
 
-/* ---- blending: nb_blend for three colours ------------------------------------------------------------------------------ */
+/* ---- blending: nb_blend for three colours ---------------------------------------------------- */
 
 struct nebel_blend {
     nb_vec3 source;
@@ -68,7 +68,7 @@ nb_vec4 nebel_blend_grey(nebel_blend blend)
     return nb_vec4(blend.source.x, blend.source.y, blend.source.z, dot(blend.factor, nb_splat3(1.0 / 3.0)));
 }
 
-/* ---- particles: the piece of a ball or a Gaussian that lies before the opaque surface ------------------------------------ */
+/* ---- particles: the piece of a ball or a Gaussian that lies before the opaque surface -------- */
 
 /* The ray by its closest approach to a centre: t there, the square of the distance, |direction|, and where it is inside. */
 struct nb_approach {
@@ -123,7 +123,7 @@ nebel_light nebel_medium_light(float length, nb_vec3 extinction, nb_vec3 light)
     return medium;
 }
 
-/* ---- the comparison of depth at five places ---------------------------------------------------------------------------- */
+/* ---- the comparison of depth at five places -------------------------------------------------- */
 
 struct nebel_tap_constants {
     float offset;

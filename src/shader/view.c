@@ -39,8 +39,7 @@ typedef struct bundle {
     double w0, w1;
 } bundle;
 
-/* ---- vectors -------------------------------------------------------------------------------------------------------
- */
+/* ---- vectors --------------------------------------------------------------------------------- */
 
 static double dot(const double a[3], const double b[3])
 {
@@ -94,8 +93,7 @@ static int all_finite(const double *numbers, size_t count)
     return 1;
 }
 
-/* ---- the bundle of rays --------------------------------------------------------------------------------------------
- */
+/* ---- the bundle of rays ---------------------------------------------------------------------- */
 
 static void meet_in_a_point(double r[4][4], double determinant, bundle *rays)
 {
@@ -153,8 +151,7 @@ static void scale_bundle(bundle *rays, double by)
     rays->w1 *= by;
 }
 
-/* ---- from eye space to the world -----------------------------------------------------------------------------------
- */
+/* ---- from eye space to the world ------------------------------------------------------------- */
 
 /* The inverse of the first three columns, by columns; 0 where there is none. */
 static int invert(const double eye_from_world[16], double columns[3][3])
@@ -186,8 +183,7 @@ static void turn_vector(double columns[3][3], linear_vector *v)
     turn(columns, v->y);
 }
 
-/* ---- words ---------------------------------------------------------------------------------------------------------
- */
+/* ---- words ----------------------------------------------------------------------------------- */
 
 /* In pixels from the lower left corner instead of halves of the picture from its middle. */
 static void put_number(const nebel_view *view, linear a, nebel_word *word)

@@ -1,5 +1,5 @@
-/* As much of cmocka's face as the kernel tests use, for processors that this system has no cmocka for. A failed assertion
- * ends its test and the program goes on with the next, as there. */
+/* As much of cmocka's face as the kernel tests use, for processors that this system has no cmocka for. A failed
+ * assertion ends its test and the program goes on with the next, as there. */
 #ifndef NB_TESTS_CROSS_CMOCKA_H
 #define NB_TESTS_CROSS_CMOCKA_H
 
@@ -23,7 +23,10 @@ static inline void cross_require(int holds, const char *what, const char *file, 
     longjmp(cross_end_of_test, 1);
 }
 
-static inline void cross_skip(void) { longjmp(cross_end_of_test, 2); }
+static inline void cross_skip(void)
+{
+    longjmp(cross_end_of_test, 2);
+}
 
 static inline int cross_run_group(const struct CMUnitTest *tests, size_t count)
 {
@@ -43,7 +46,10 @@ static inline int cross_run_group(const struct CMUnitTest *tests, size_t count)
 
 #define CROSS_REQUIRE(condition, what) cross_require((condition) ? 1 : 0, what, __FILE__, __LINE__)
 
-#define cmocka_unit_test(function) {#function, function}
+#define cmocka_unit_test(function)                                                                                     \
+    {                                                                                                                  \
+#function, function                                                                                            \
+    }
 #define cmocka_run_group_tests(tests, setup, teardown) cross_run_group(tests, sizeof tests / sizeof tests[0])
 #define skip() cross_skip()
 #define print_message(...) printf(__VA_ARGS__)
