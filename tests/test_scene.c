@@ -325,6 +325,21 @@ static void test_the_order_of_sections_does_not_matter(void **state)
     nebel_destroy_scene(scene);
 }
 
+static void test_the_files_of_a_scene_are_named(void **state)
+{
+    (void)state;
+    nebel_scene *scene = NULL;
+    static const char text[] = "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"a/b.obj\"}, {\"heightfield\": "
+                               "{\"file\": \"/c.png\", \"size\": [1, 1], \"height\": 1}}]}";
+    assert_int_equal(nebel_parse_scene(text, strlen(text), "here/scene.json", &(nebel_scene_desc){0}, &scene),
+                     NEBEL_OK);
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(data->file_count, 2);
+    assert_string_equal(data->files[0], "here/a/b.obj");
+    assert_string_equal(data->files[1], "/c.png");
+    nebel_destroy_scene(scene);
+}
+
 static void test_numbers_are_read_exactly(void **state)
 {
     (void)state;
@@ -422,6 +437,7 @@ int main(void)
         cmocka_unit_test(test_the_fog_of_the_scene_answers_rays),
         cmocka_unit_test(test_the_fog_of_the_scene_hides_no_more_than_it_may),
         cmocka_unit_test(test_the_order_of_sections_does_not_matter),
+        cmocka_unit_test(test_the_files_of_a_scene_are_named),
         cmocka_unit_test(test_numbers_are_read_exactly),
         cmocka_unit_test(test_the_libraries_are_named),
         cmocka_unit_test(test_a_nebula_is_fog),

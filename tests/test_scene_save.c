@@ -38,6 +38,9 @@ typedef struct draft {
     nebel_scene *scene;
     nebel_scene_data data;
     nebel_volume_desc volumes[8];
+    const char *names[8];
+    nebel_nebula_desc nebulae[2];
+    const size_t *sources;
 } draft;
 
 static draft open_draft(const char *text)
@@ -48,7 +51,11 @@ static draft open_draft(const char *text)
     write_file(text);
     if (nebel_load_scene(file_path(), &desc, &d.scene) != NEBEL_OK) fail_msg("%s", kept.last);
     d.data = *nebel_scene_contents(d.scene);
-    for (size_t i = 0; i < d.data.volume_count; i++) d.volumes[i] = d.data.volumes[i];
+    for (size_t i = 0; i < d.data.volume_count; i++) {
+        d.volumes[i] = d.data.volumes[i];
+        d.names[i] = d.data.volume_names[i];
+    }
+    for (size_t i = 0; i < d.data.nebula_count; i++) d.nebulae[i] = d.data.nebulae[i];
     return d;
 }
 
@@ -57,7 +64,10 @@ static nebel_result save(draft *d, journal *kept)
     meter m;
     const nebel_scene_desc desc = metered_desc(&m, kept);
     d->data.volumes = d->volumes;
-    const nebel_result result = nebel_save_scene(file_path(), &desc, &d->data);
+    d->data.volume_names = d->names;
+    d->data.nebulae = d->nebulae;
+    const nebel_result result =
+        nebel_save_scene(file_path(), &desc, nebel_scene_contents(d->scene), &d->data, d->sources);
     assert_int_equal(m.live, 0);
     nebel_destroy_scene(d->scene);
     return result;
@@ -200,6 +210,189 @@ static void test_the_units_of_the_file(void **state)
                   "\"visibility\": 1000, \"emission\": [0.2, 0.1, 0.1]}]"));
 }
 
+/* ---- volumes that come and go
+ * --------------------------------------------------------------------------------------- */
+
+#define THIN "{" BOX ", \"extinction\": 0.1}"
+#define THICK "{" BOX ", \"extinction\": 7}"
+
+static void take_out(draft *d, size_t index)
+{
+    static size_t sources[8];
+    const size_t count = --d->data.volume_count;
+    for (size_t i = 0; i < count; i++) {
+        sources[i] = (d->sources != NULL ? d->sources : (const size_t[]){0, 1, 2, 3})[i + (i >= index)];
+        d->volumes[i] = d->volumes[i + (i >= index)];
+        d->names[i] = d->names[i + (i >= index)];
+    }
+    d->sources = sources;
+}
+
+static void test_volumes_leave(void **state)
+{
+    (void)state;
+    static const char lines[] = SCENE("\"fog\": [\n    " THIN ", // first, with a comma\n    " THICK "\n  ]");
+    draft d = open_draft(SCENE("\"fog\": [ " THIN ", " THICK ", " THIN " ]"));
+    take_out(&d, 1);
+    check_saved(&d, SCENE("\"fog\": [ " THIN ", " THIN " ]"));
+    d = open_draft(SCENE("\"fog\": [ " THIN ", " THICK ", " THIN " ]"));
+    take_out(&d, 2);
+    take_out(&d, 0);
+    check_saved(&d, SCENE("\"fog\": [ " THICK " ]"));
+    d = open_draft(SCENE("\"fog\": [ " THIN ", " THICK " ]"));
+    take_out(&d, 0);
+    take_out(&d, 0);
+    check_saved(&d, SCENE("\"fog\": [  ]"));
+    d = open_draft(lines);
+    take_out(&d, 1);
+    check_saved(&d, SCENE("\"fog\": [\n    " THIN " // first, with a comma\n    \n  ]"));
+    d = open_draft(lines);
+    take_out(&d, 0);
+    check_saved(&d, SCENE("\"fog\": [\n     // first, with a comma\n    " THICK "\n  ]"));
+}
+
+/* One of each shape and density, so that every word is read again as it was written. */
+static void test_volumes_come(void **state)
+{
+    (void)state;
+    static const size_t sources[] = {NEBEL_NEW_VOLUME};
+    static const char *const shapes[] = {
+        "{ \"type\": \"world\" }",
+        "{ \"type\": \"half_space\", \"point\": [0, 1, 0], \"normal\": [0, 1, 0] }",
+        "{ \"type\": \"sphere\", \"center\": [0, 0, 2], \"radius\": 3, \"transform\": { \"position\": [1, 2, 3] } }",
+        "{ \"type\": \"ellipsoid\", \"center\": [0, 0, 0], \"radii\": [1, 2, 3] }",
+        "{ \"type\": \"cylinder\", \"radius\": 1, \"from\": [0, 0, 0], \"to\": [0, 1, 0] }",
+        "{ \"type\": \"cone\", \"from\": [0, 0, 0], \"to\": [0, 1, 0], \"radius_from\": 0, \"radius_to\": 2 }",
+        "{ \"type\": \"convex\", \"planes\": [[1, 0, 0, 2], [0, 1, 0, 0.5]] }",
+        "{ \"type\": \"union\", \"shapes\": [{ \"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1, "
+        "\"transform\": { \"scale\": [1, 2, 1] } }, { \"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1] }] }"};
+    static const char *const others[] = {
+        ", \"density\": { \"type\": \"height\", \"base\": 2, \"scale_height\": 5, \"below\": \"constant\" }, "
+        "\"extinction\": 0.5, \"albedo\": [0.5, 0.25, 1], \"start\": 1, \"cutoff\": 8 }",
+        ", \"density\": { \"type\": \"linear\", \"from\": [0, 0, 0], \"to\": [0, 4, 0] }, \"extinction\": 0 }",
+        ", \"density\": { \"type\": \"radial\", \"power\": 2 }, \"extinction\": [1, 2, 3], \"source\": 0.5 }",
+        ", \"density\": { \"type\": \"gaussian\", \"center\": [0, 1, 0], \"sigma\": 2 }, \"extinction\": 1, "
+        "\"emission\": 3 }",
+    };
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        char wanted[1024];
+        const char *other = i == 2 ? others[2] : others[i % 4 == 2 ? 0 : i % 4];
+        (void)snprintf(wanted, sizeof wanted, SCENE("\"fog\": [{ \"name\": \"a \\\"b\\\"\", \"shape\": %s%s]"),
+                       shapes[i], other);
+        draft d = open_draft(wanted);
+        const nebel_scene_data made = d.data;
+        write_file(SCENE("\"fog\": []"));
+        draft empty = open_draft(SCENE("\"fog\": []"));
+        empty.volumes[0] = made.volumes[0];
+        empty.names[0] = made.volume_names[0];
+        empty.data.volume_count = 1;
+        empty.sources = sources;
+        check_saved(&empty, wanted);
+        nebel_destroy_scene(d.scene);
+    }
+}
+
+static void test_volumes_come_behind_the_others(void **state)
+{
+    (void)state;
+    static const size_t sources[] = {1, NEBEL_NEW_VOLUME, NEBEL_NEW_VOLUME};
+    draft d = open_draft(SCENE("\"up\": \"z\", \"unit\": 0.5, \"fog\": [\n    " THIN ",\n    " THICK "\n  ]"));
+    d.volumes[0] = d.volumes[1];
+    d.volumes[2] = d.volumes[1];
+    d.names[2] = "";
+    d.volumes[1].operation = NEBEL_OPERATION_EXCLUDE;
+    d.volumes[1].priority = -2;
+    d.data.volume_count = 3;
+    d.sources = sources;
+    check_saved(&d,
+                SCENE("\"up\": \"z\", \"unit\": 0.5, \"fog\": [\n    " THICK ",\n    { \"operation\": \"exclude\", "
+                      "\"priority\": -2, \"shape\": { \"type\": \"box\", \"min\": [-1, -2, -3], \"max\": [1, 2.5, "
+                      "3] } },\n    { \"shape\": { \"type\": \"box\", \"min\": [-1, -2, -3], \"max\": [1, 2.5, 3] }, "
+                      "\"extinction\": 7 }\n  ]"));
+}
+
+static void test_another_kind_is_written_as_a_whole(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [ {" BOX ", /* soft */ \"visibility\": 5}, " THIN " ]"));
+    d.volumes[0].shape.type = NEBEL_SHAPE_SPHERE;
+    d.volumes[0].shape.radius = 2;
+    for (int c = 0; c < 3; c++) d.volumes[0].extinction[c] = .5;
+    d.names[1] = "thin";
+    check_saved(&d, SCENE("\"fog\": [ { \"shape\": { \"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2 }, "
+                          "\"extinction\": 0.5 }, {" BOX ", \"extinction\": 0.1, \"name\": \"thin\"} ]"));
+}
+
+static void test_keys_that_have_become_wrong_go(void **state)
+{
+    (void)state;
+    draft d =
+        open_draft(SCENE("\"fog\": [{\"cutoff\": 5, \"contrast\": 0.1, " BOX ", \"visibility\": 5}, {" BOX
+                         ", \"source\": 1, \"mean_free_path\": 4, \"start\": 1, \"cutoff\": 9}, {" BOX
+                         ", \"extinction\": 1, \"albedo\": 1, \"phase\": {\"type\": \"rayleigh\"}, \"priority\": 1}]"));
+    d.volumes[0].cutoff = d.volumes[1].cutoff = 0;
+    for (int c = 0; c < 3; c++) {
+        d.volumes[0].extinction[c] = d.volumes[1].source[c] = d.volumes[2].albedo[c] = 0;
+        d.volumes[1].albedo[c] = .25;
+        d.volumes[2].source[c] = .5;
+    }
+    d.volumes[1].extinction[0] = 0;
+    check_saved(&d, SCENE("\"fog\": [{" BOX ", \"extinction\": 0}, {" BOX
+                          ", \"extinction\": [0, 0.25, 0.25], \"start\": 1, \"albedo\": 0.25}, {" BOX
+                          ", \"extinction\": 1, \"priority\": 1, \"source\": 0.5}]"));
+}
+
+static void test_parts_and_planes(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE(
+        "\"up\": \"z\", \"unit\": 0.1, \"fog\": [{\"shape\": {\"type\": \"union\", \"shapes\": [{\"type\": "
+        "\"sphere\", \"center\": [1, 2, 3], \"radius\": 2}, {\"type\": \"convex\", \"planes\": [[1, 0, 0, 20], [0, "
+        "0, 1, 5]]}]}, \"extinction\": 1}]"));
+    nebel_shape parts[2] = {d.volumes[0].shape.parts[0], d.volumes[0].shape.parts[1]};
+    nebel_plane planes[2] = {parts[1].planes[0], parts[1].planes[1]};
+    parts[0].center[1] = .7;
+    parts[0].transform.position[0] = .5;
+    planes[1].normal[2] = -.5;
+    planes[1].distance = 2;
+    parts[1].planes = planes;
+    d.volumes[0].shape.parts = parts;
+    check_saved(
+        &d, SCENE("\"up\": \"z\", \"unit\": 0.1, \"fog\": [{\"shape\": {\"type\": \"union\", \"shapes\": "
+                  "[{\"type\": \"sphere\", \"center\": [1, 2, 7], \"radius\": 2, \"transform\": { \"position\": [5, "
+                  "0, 0] }}, {\"type\": \"convex\", \"planes\": [[1, 0, 0, 20], [0, 0.5, 1, 20]]}]}, "
+                  "\"extinction\": 1}]"));
+}
+
+static void test_nebulae(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"max_opacity\": 0.5, \"unit\": 0.1, \"fog\": [], \"nebula\": [ {\"shape\": {\"type\": "
+                               "\"sphere\", \"center\": [0, 0, 0], \"radius\": 20}, \"count\": 10, \"turbulence\": 3, "
+                               "\"turbulence_size\": 4, \"size\": [1, 2]} ]"));
+    d.data.max_opacity = .75;
+    d.nebulae[0].shape.radius = 3;
+    d.nebulae[0].count = 20;
+    d.nebulae[0].seed = 7;
+    d.nebulae[0].size[1] = .5;
+    d.nebulae[0].profile = NEBEL_PARTICLE_BALL;
+    d.nebulae[0].turbulence_size = 0;
+    for (int c = 0; c < 3; c++) d.nebulae[0].emission[c] = 10;
+    check_saved(&d, SCENE("\"max_opacity\": 0.75, \"unit\": 0.1, \"fog\": [], \"nebula\": [ {\"shape\": {\"type\": "
+                          "\"sphere\", \"center\": [0, 0, 0], \"radius\": 30}, \"count\": 20, \"turbulence\": 3, "
+                          "\"size\": [1, 5], \"emission\": 1, \"seed\": 7, \"profile\": \"ball\"} ]"));
+}
+
+/* What somebody else has changed meanwhile stays. */
+static void test_other_changes_of_the_file_stay(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"ambient\": 1, \"fog\": [" THIN "]"));
+    d.volumes[0].source[0] = 1;
+    write_file(SCENE("\"ambient\": 2, \"fog\": [{" BOX ", \"extinction\": 0.3}]"));
+    check_saved(&d, SCENE("\"ambient\": 2, \"fog\": [{" BOX ", \"extinction\": 0.3, \"source\": [1, 0, 0]}]"));
+}
+
 /* ---- what is not written
  * ------------------------------------------------------------------------------------------ */
 
@@ -231,13 +424,16 @@ static void test_what_is_refused(void **state)
                           SCENE("\"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1}, "
                                 "\"visibility\": 5}]");
     draft d = open_draft(visible);
-    d.volumes[0].extinction[1] = 0;
-    check_refused(visible, &d, NEBEL_ERROR_VALUE, "fog[0].visibility: cannot be written");
-    d = open_draft(visible);
     d.volumes[0].shape.max[0] = -5;
     check_refused(visible, &d, NEBEL_ERROR_FORMAT, "max[0]");
     d = open_draft(visible);
     check_refused(none, &d, NEBEL_ERROR_ARGUMENT, "0 volumes of fog where 1");
+    d = open_draft(visible);
+    d.sources = (const size_t[]){1};
+    check_refused(visible, &d, NEBEL_ERROR_ARGUMENT, "must ascend");
+    d = open_draft(visible);
+    d.data.volume_count = 0;
+    check_refused(visible, &d, NEBEL_ERROR_ARGUMENT, "must ascend");
     d = open_draft(visible);
     check_refused(ball, &d, NEBEL_ERROR_ARGUMENT, "another volume");
     d = open_draft(visible);
@@ -256,8 +452,13 @@ static void test_memory_runs_out(void **state)
         m.fail_at = fail_at;
         d.volumes[0].shape.max[0] = 5;
         d.volumes[0].source[0] = 5;
+        d.volumes[1] = d.volumes[0];
+        d.names[1] = "a \"new\" one";
         d.data.volumes = d.volumes;
-        const nebel_result result = nebel_save_scene(file_path(), &desc, &d.data);
+        d.data.volume_names = d.names;
+        d.data.volume_count = 2;
+        const nebel_result result = nebel_save_scene(file_path(), &desc, nebel_scene_contents(d.scene), &d.data,
+                                                     (const size_t[]){0, NEBEL_NEW_VOLUME});
         assert_int_equal(m.live, 0);
         nebel_destroy_scene(d.scene);
         if (result == NEBEL_OK) return;
@@ -289,6 +490,14 @@ int main(void)
         cmocka_unit_test(test_a_transform_is_added),
         cmocka_unit_test(test_camera_and_light),
         cmocka_unit_test(test_the_units_of_the_file),
+        cmocka_unit_test(test_volumes_leave),
+        cmocka_unit_test(test_volumes_come),
+        cmocka_unit_test(test_volumes_come_behind_the_others),
+        cmocka_unit_test(test_another_kind_is_written_as_a_whole),
+        cmocka_unit_test(test_keys_that_have_become_wrong_go),
+        cmocka_unit_test(test_parts_and_planes),
+        cmocka_unit_test(test_nebulae),
+        cmocka_unit_test(test_other_changes_of_the_file_stay),
         cmocka_unit_test(test_volumes_that_are_made_of_something_else_stay),
         cmocka_unit_test(test_what_is_refused),
         cmocka_unit_test(test_memory_runs_out),

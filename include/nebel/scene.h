@@ -85,6 +85,9 @@ typedef struct nebel_scene_data {
     const char *const *nebula_names;
     size_t particle_count; /* of all nebulae */
 
+    size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
+    const char *const *files; /* as they are opened, once for each time they are named */
+
     size_t mesh_count; /* 0 until nebel_load_scene_models */
     const nebel_mesh *meshes;
     size_t texture_count;
@@ -151,15 +154,23 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 /* NULL is fine. */
 void nebel_destroy_scene(nebel_scene *scene);
 
-/* Writes changed numbers back into a scene file. `changed` is what nebel_scene_contents gave for this file, with other
- * numbers in the camera, the background, the sun (where there is one), the ambient light, and in the volumes of origin
- * WRITTEN, but for planes and parts of their shapes; the rest of it is not read. What is not as the file says is
- * written in its place, in the file's own unit, axes and words (a visibility stays a visibility), with 15 digits; a key
- * that is missing is added. Every other byte stays. The file is replaced as a whole, as by nebel_write_image, or left
+/* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
+ * of it with other numbers in the camera, the background, the sun (where there is one), the ambient light, max_opacity,
+ * the nebulae (but for points and colours), and with other names, numbers or kinds of volumes of origin WRITTEN. Its
+ * volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
+ * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
+ * MOVING. sources NULL: the same volumes.
+ *
+ * What differs between the two is written in its place, in the file's own unit, axes and words (a visibility stays a
+ * visibility, where the fog is not of extinction 0), with 15 digits; a key that is missing is added, one that has
+ * become wrong goes. A volume of another operation, shape or density than before is written anew as a whole, new ones
+ * stand behind the others. Every other byte stays. The file is replaced as a whole, as by nebel_write_image, or left
  * alone where nothing has changed. On an error it is as it was. Errors: as nebel_load_scene; ARGUMENT (the file has
- * other volumes by now); VALUE (the file's word for the amount of a volume has none for 0); FORMAT also where the new
- * numbers are no valid scene. */
-nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *changed);
+ * other volumes or nebulae than `before`; a volume that cannot leave); FORMAT also where the new numbers are no valid
+ * scene. */
+#define NEBEL_NEW_VOLUME SIZE_MAX
+nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *before,
+                              const nebel_scene_data *changed, const size_t *sources);
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 

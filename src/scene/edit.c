@@ -1,12 +1,16 @@
 #include "scene/edit.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+
+/* A volume has no more members than this. */
+enum { NB_EDIT_MEMBERS = 32 };
 
 /* ---- pieces
  * ---------------------------------------------------------------------------------------------------------- */
 
-static void add_piece(nb_edit *edit, size_t offset, size_t size, const char *words)
+void nb_edit_put(nb_edit *edit, size_t offset, size_t size, const char *words)
 {
     void *pieces = edit->pieces;
     char *copy = nb_arena_copy_text(&edit->arena, words, strlen(words));
@@ -91,7 +95,7 @@ void nb_edit_write_numbers(size_t count, const double *numbers, nb_edit_style st
 
 void nb_edit_replace(nb_edit *edit, const nb_json_node *node, const char *value)
 {
-    add_piece(edit, node->offset, node->end - node->offset, value);
+    nb_edit_put(edit, node->offset, node->end - node->offset, value);
 }
 
 const nb_json_node *nb_edit_member(const nb_json *json, const nb_json_node *object, const char *key)
@@ -139,11 +143,30 @@ static bool has_comma(const nb_edit *edit, size_t offset)
     return false;
 }
 
+/* Words that may be of any length: printed twice, once for their size. */
+NB_PRINTF(4, 5) static void put_words(nb_edit *edit, size_t offset, size_t size, const char *format, ...)
+{
+    va_list arguments, again;
+    va_start(arguments, format);
+    va_copy(again, arguments);
+    const int length = vsnprintf(NULL, 0, format, arguments);
+    va_end(arguments);
+    char *words = length < 0 ? NULL : nb_allocate(&edit->arena.allocator, (size_t)length + 1, 1);
+    if (words != NULL) {
+        vsnprintf(words, (size_t)length + 1, format, again);
+        nb_edit_put(edit, offset, size, words);
+    } else {
+        edit->out_of_memory = true;
+    }
+    va_end(again);
+    nb_release(&edit->arena.allocator, words);
+}
+
 /* A new member stands behind the last one as that one's key stands behind what is before it: on a line of its own or on
  * the same. A remark stays with the value that it follows. */
 void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, const char *value)
 {
-    char words[4 * NB_EDIT_NUMBERS + 128], gap[64] = " ";
+    char gap[64] = " ";
     size_t start = object->last_key;
     while (start > 0 && is_blank(edit->text[start - 1])) start--;
     const size_t gap_size = object->last_key - start;
@@ -151,16 +174,91 @@ void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, c
     const size_t behind = skip_remark(edit, object->last_end);
     if (behind > object->last_end && strchr(gap, '\n') == NULL) strcpy(gap, "\n");
     const bool is_second = has_comma(edit, object->last_end);
-    if (!is_second) add_piece(edit, object->last_end, 0, ",");
-    snprintf(words, sizeof words, "%s%s\"%s\": %s", is_second ? "," : "", gap, key, value);
-    add_piece(edit, behind, 0, words);
+    if (!is_second) nb_edit_put(edit, object->last_end, 0, ",");
+    put_words(edit, behind, 0, "%s%s\"%s\": %s", is_second ? "," : "", gap, key, value);
+}
+
+/* ---- what goes
+ * ------------------------------------------------------------------------------------------------------- */
+
+/* The first comma from `at` on that is in no remark. Between two elements there is one. */
+static size_t find_comma(const nb_edit *edit, size_t at)
+{
+    while (at < edit->size && edit->text[at] != ',') {
+        const char *line_end = NULL;
+        const size_t left = edit->size - at;
+        if (left > 1 && memcmp(edit->text + at, "//", 2) == 0) {
+            line_end = memchr(edit->text + at, '\n', left);
+            at = line_end != NULL ? (size_t)(line_end - edit->text) : edit->size;
+        } else if (left > 1 && memcmp(edit->text + at, "/*", 2) == 0) {
+            at += 2;
+            while (at + 2 < edit->size && memcmp(edit->text + at, "*/", 2) != 0) at++;
+            at += 2;
+        } else {
+            at++;
+        }
+    }
+    return at;
+}
+
+static bool is_all_blank(const nb_edit *edit, size_t from, size_t to)
+{
+    while (from < to && is_blank(edit->text[from])) from++;
+    return from == to;
+}
+
+/* The piece from `from` to `to`, without what stands between `gap` and `gap_end` in it where that is not blank. */
+static void cut(nb_edit *edit, size_t from, size_t gap, size_t gap_end, size_t to)
+{
+    if (is_all_blank(edit, gap, gap_end)) {
+        nb_edit_put(edit, from, to - from, "");
+        return;
+    }
+    nb_edit_put(edit, from, gap - from, "");
+    nb_edit_put(edit, gap_end, to - gap_end, "");
+}
+
+/* Behind one that stays, the comma before it goes as well; otherwise the one behind it. */
+void nb_edit_remove(nb_edit *edit, const nb_edit_span *spans, size_t count)
+{
+    bool has_kept = false;
+    for (size_t i = 0; i < count; i++) {
+        const nb_edit_span *span = &spans[i];
+        if (!span->goes) {
+            has_kept = true;
+        } else if (has_kept) {
+            const size_t comma = find_comma(edit, spans[i - 1].end);
+            cut(edit, comma, comma + 1, span->offset, span->end);
+        } else if (i + 1 < count) {
+            const size_t comma = find_comma(edit, span->end), next = spans[i + 1].offset;
+            cut(edit, span->offset, span->end, comma, is_all_blank(edit, comma + 1, next) ? next : comma + 1);
+        } else {
+            nb_edit_put(edit, span->offset, span->end - span->offset, "");
+        }
+    }
+}
+
+static bool is_among(const nb_json_node *node, const char *const *keys)
+{
+    while (*keys != NULL && !nb_json_has_key(node, *keys)) keys++;
+    return *keys != NULL;
+}
+
+void nb_edit_remove_members(nb_edit *edit, const nb_json *json, const nb_json_node *object, const char *const *keys)
+{
+    nb_edit_span spans[NB_EDIT_MEMBERS];
+    size_t count = 0;
+    for (const nb_json_node *node = nb_json_first(json, object); node != NULL && count < NB_EDIT_MEMBERS;
+         node = nb_json_next(json, node))
+        spans[count++] = (nb_edit_span){node->key_offset, node->end, is_among(node, keys)};
+    nb_edit_remove(edit, spans, count);
 }
 
 /* ---- numbers
  * --------------------------------------------------------------------------------------------------------- */
 
-static void replace_elements(nb_edit *edit, const nb_json *json, const nb_json_node *array, const double *was,
-                             const double *now)
+void nb_edit_elements(nb_edit *edit, const nb_json *json, const nb_json_node *array, const double *was,
+                      const double *now)
 {
     char text[NB_EDIT_NUMBERS];
     size_t i = 0;
@@ -178,7 +276,7 @@ void nb_edit_numbers(nb_edit *edit, const nb_json *json, const nb_edit_object *o
     if (memcmp(was, now, count * sizeof *was) == 0) return;
     const nb_json_node *node = nb_edit_member(json, object->node, key);
     if (node != NULL && node->type == NB_JSON_ARRAY && node->count == count && style != NB_EDIT_WHOLE) {
-        replace_elements(edit, json, node, was, now);
+        nb_edit_elements(edit, json, node, was, now);
         return;
     }
     nb_edit_write_numbers(count, now, style, text);
@@ -188,13 +286,28 @@ void nb_edit_numbers(nb_edit *edit, const nb_json *json, const nb_edit_object *o
         nb_edit_add(edit, object, key, text);
 }
 
+bool nb_edit_write_text(const nebel_allocator *allocator, nb_bytes *bytes, const char *text)
+{
+    bool good = nb_bytes_write(allocator, bytes, bytes->size, "\"", 1);
+    for (; *text != '\0' && good; text++) {
+        char escaped[8];
+        const char *form = *text == '"' || *text == '\\' ? "\\%c" : (unsigned char)*text < 0x20 ? "\\u%04x" : "%c";
+        const int size = snprintf(escaped, sizeof escaped, form, *text);
+        good = nb_bytes_write(allocator, bytes, bytes->size, escaped, (size_t)size);
+    }
+    return good && nb_bytes_write(allocator, bytes, bytes->size, "\"", 1);
+}
+
 void nb_edit_word(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, const char *word)
 {
-    char text[NB_EDIT_NUMBERS];
+    const nebel_allocator *allocator = &edit->arena.allocator;
     const nb_json_node *node = nb_edit_member(json, object->node, key);
-    snprintf(text, sizeof text, "\"%s\"", word);
-    if (node != NULL)
-        nb_edit_replace(edit, node, text);
+    nb_bytes text = {0};
+    if (!nb_edit_write_text(allocator, &text, word) || !nb_bytes_write(allocator, &text, text.size, "", 1))
+        edit->out_of_memory = true;
+    else if (node != NULL)
+        nb_edit_replace(edit, node, (const char *)text.data);
     else
-        nb_edit_add(edit, object, key, text);
+        nb_edit_add(edit, object, key, (const char *)text.data);
+    nb_release(allocator, text.data);
 }

@@ -42,13 +42,36 @@ typedef enum nb_edit_style {
 void nb_edit_numbers(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, size_t count,
                      const double *was, const double *now, nb_edit_style style);
 
-/* Puts a word in quotes in the place of the key's value, or adds it. */
+/* The same for the elements of an array of numbers. */
+void nb_edit_elements(nb_edit *edit, const nb_json *json, const nb_json_node *array, const double *was,
+                      const double *now);
+
+/* Puts a text in quotes in the place of the key's value, or adds it. */
 void nb_edit_word(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const char *key, const char *word);
 
 /* Adds a member whose value is given as JSON. */
 void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, const char *value);
 
 void nb_edit_replace(nb_edit *edit, const nb_json_node *node, const char *value);
+
+/* One of the elements of an array, or of the members of an object with their keys, and whether it goes. */
+typedef struct nb_edit_span {
+    size_t offset, end;
+    bool goes;
+} nb_edit_span;
+
+/* Takes elements or members out, with the commas and blanks that joined them. `spans` are all that the array or object
+ * has, in their order. Remarks between them stay. What is added behind the last one that stays is added before. */
+void nb_edit_remove(nb_edit *edit, const nb_edit_span *spans, size_t count);
+
+/* The same for members that go by their names; NULL ends the list. Names that are not there are no matter. */
+void nb_edit_remove_members(nb_edit *edit, const nb_json *json, const nb_json_node *object, const char *const *keys);
+
+/* Puts words in the place of any piece of the text. */
+void nb_edit_put(nb_edit *edit, size_t offset, size_t size, const char *words);
+
+/* Appends a text in quotes, with what must be escaped. False when memory is out. */
+bool nb_edit_write_text(const nebel_allocator *allocator, nb_bytes *bytes, const char *text);
 
 /* Writes 1 or more numbers as JSON. The text holds at least NB_EDIT_NUMBERS characters. */
 #define NB_EDIT_NUMBERS 128

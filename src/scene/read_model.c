@@ -26,6 +26,17 @@ static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
     return tail != NULL ? nb_path_join(&in->scene->arena, in->json->desc.name, tail) : NULL;
 }
 
+static bool keep_file(nebel_scene *scene, const char *file)
+{
+    void *files = (void *)scene->files;
+    const size_t count = scene->data.file_count;
+    const bool room = nb_grow(&scene->allocator, &files, sizeof file, count, &scene->file_capacity, count + 1);
+    scene->files = files;
+    if (!room) return false;
+    scene->files[scene->data.file_count++] = file;
+    return true;
+}
+
 static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
 {
     nb_arena *arena = &in->scene->arena;
@@ -35,7 +46,7 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_so
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; must be the path of a file");
     model->file = nb_path_join(arena, in->scene->folder, file);
     model->where = describe_place(in, node);
-    if (model->file != NULL && model->where != NULL) return true;
+    if (model->file != NULL && model->where != NULL && keep_file(in->scene, model->file)) return true;
     return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
 }
 

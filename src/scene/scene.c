@@ -96,10 +96,16 @@ static bool read_fog(nb_scene_reader *in, const nb_json_node *node)
     return nb_read_volume(in, node) && (in->save == NULL || nb_save_volume(in->save, in, node, index));
 }
 
+static bool read_nebula(nb_scene_reader *in, const nb_json_node *node)
+{
+    const size_t index = in->scene->data.nebula_count;
+    return nb_read_nebula(in, node) && (in->save == NULL || nb_save_nebula(in->save, in, node, index));
+}
+
 static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
 {
     if (nb_json_has_key(array, "fog")) return read_fog(in, node);
-    if (nb_json_has_key(array, "nebula")) return nb_read_nebula(in, node);
+    if (nb_json_has_key(array, "nebula")) return read_nebula(in, node);
     if (nb_json_has_key(array, "models")) return nb_read_model(in, node);
     return nb_read_light(in, node);
 }
@@ -159,6 +165,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     scene->data.volume_names = scene->volume_names;
     scene->data.nebulae = scene->nebulae;
     scene->data.nebula_names = scene->nebula_names;
+    scene->data.files = scene->files;
     return result;
 }
 
@@ -336,5 +343,6 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, scene->nebulae);
     nb_release(&allocator, (void *)scene->nebula_names);
     nb_release(&allocator, scene->models);
+    nb_release(&allocator, (void *)scene->files);
     nb_release(&allocator, scene);
 }

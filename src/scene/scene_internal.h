@@ -61,6 +61,9 @@ struct nebel_scene {
     const char **nebula_names;
     size_t nebula_capacity, nebula_name_capacity;
 
+    const char **files;
+    size_t file_capacity;
+
     nb_model_source *models;
     size_t model_count, model_capacity;
     nb_model_set loaded;

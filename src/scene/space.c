@@ -151,7 +151,7 @@ void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
     camera->view_height /= space->unit;
 }
 
-static void restore_shape(const nb_space *space, nebel_shape *shape)
+void nb_space_restore_shape(const nb_space *space, nebel_shape *shape)
 {
     nebel_transform *transform = &shape->transform;
     const double back = 1 / space->unit, near = shape->min[2];
@@ -171,11 +171,15 @@ static void restore_shape(const nb_space *space, nebel_shape *shape)
     shape->radius_to *= back;
 }
 
-void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)
+void nb_space_restore_plane(const nb_space *space, nebel_plane *plane)
+{
+    nb_space_restore_direction(space, plane->normal);
+    plane->distance /= space->unit;
+}
+
+static void restore_density(const nb_space *space, nebel_density *density)
 {
     const double back = 1 / space->unit;
-    nebel_density *density = &volume->density;
-    restore_shape(space, &volume->shape);
     restore_place(space, density->from);
     restore_place(space, density->to);
     restore_place(space, density->center);
@@ -183,8 +187,25 @@ void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)
     density->scale_height *= back;
     density->sigma *= back;
     density->distance *= back;
-    volume->start *= back;
-    volume->cutoff *= back;
+}
+
+void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)
+{
+    nb_space_restore_shape(space, &volume->shape);
+    restore_density(space, &volume->density);
+    volume->start /= space->unit;
+    volume->cutoff /= space->unit;
     scale_all(space->unit, volume->extinction, 3);
     scale_all(space->unit, volume->emission, 3);
+}
+
+void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula)
+{
+    nb_space_restore_shape(space, &nebula->shape);
+    restore_density(space, &nebula->density);
+    scale_all(space->unit, nebula->absorption, 3);
+    scale_all(space->unit, nebula->emission, 3);
+    scale_all(1 / space->unit, nebula->size, 2);
+    nebula->turbulence /= space->unit;
+    nebula->turbulence_size /= space->unit;
 }

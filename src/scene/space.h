@@ -30,7 +30,11 @@ void nb_space_convert_camera(const nb_space *space, nebel_camera *camera);
 void nb_space_restore_direction(const nb_space *space, double direction[3]);
 void nb_space_restore_camera(const nb_space *space, nebel_camera *camera);
 
+void nb_space_restore_plane(const nb_space *space, nebel_plane *plane);
+
 /* Planes and parts stay as they are. */
+void nb_space_restore_shape(const nb_space *space, nebel_shape *shape);
 void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume);
+void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula);
 
 #endif

@@ -179,7 +179,7 @@ nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
     nebel_scene_data changed = draft->data;
     changed.camera = draft->file.camera;
     if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = round_camera(draft->data.camera);
-    const nebel_result result = nebel_save_scene(path, &desc, &changed);
+    const nebel_result result = nebel_save_scene(path, &desc, nebel_scene_contents(draft->scene), &changed, NULL);
     if (result != NEBEL_OK) return result;
     draft->file = changed;
     memcpy(draft->written, draft->volumes, changed.volume_count * sizeof *draft->written);

@@ -1,0 +1,34 @@
+/* Which keys of the file hold which numbers of a volume. */
+#ifndef NB_SCENE_SAVE_PLACES_H
+#define NB_SCENE_SAVE_PLACES_H
+
+#include "scene/edit.h"
+
+#include <nebel/nebula.h>
+
+typedef struct nb_place {
+    const char *key;
+    size_t offset, count; /* in its structure; of doubles */
+    nb_edit_style style;
+} nb_place;
+
+/* Tables of places, which end in one without a key; masks say which places a type has, bit i for places[i]. */
+extern const nb_place nb_volume_places[], nb_shape_places[], nb_transform_places[], nb_density_places[],
+    nb_nebula_places[];
+extern const unsigned nb_shape_masks[NEBEL_SHAPE_COUNT], nb_density_masks[NEBEL_DENSITY_COUNT];
+extern const char *const nb_shape_names[NEBEL_SHAPE_COUNT], *const nb_density_names[NEBEL_DENSITY_COUNT],
+                                                                *const nb_operation_names[NEBEL_OPERATION_COUNT],
+                                                                    *const nb_below_names[2],
+                                                                        *const nb_profile_names[NEBEL_PARTICLE_COUNT];
+
+#define NB_ALL_PLACES (~0u)
+
+const double *nb_place_numbers(const void *structure, const nb_place *place);
+
+/* Whether any bit differs: nothing is lost in a comparison. */
+bool nb_place_differs(const void *was, const void *now, const nb_place *place);
+
+/* The transform that does nothing. */
+extern const nebel_transform nb_plain_transform;
+
+#endif
