@@ -93,6 +93,14 @@ static const struct {
     {GL_PROVOKING_VERTEX, 1, 'd'},
     {GL_CLAMP_READ_COLOR, 1, 'd'},
     {GL_PRIMITIVE_RESTART_INDEX, 1, 'd'},
+    {GL_PROGRAM_PIPELINE_BINDING, 1, 'e'},
+    {GL_TRANSFORM_FEEDBACK_BINDING, 1, 'e'},
+    {GL_TRANSFORM_FEEDBACK_ACTIVE, 1, 'e'},
+    {GL_TRANSFORM_FEEDBACK_PAUSED, 1, 'e'},
+    {GL_DRAW_INDIRECT_BUFFER_BINDING, 1, 'e'},
+    {GL_SHADER_STORAGE_BUFFER_BINDING, 1, 'e'},
+    {GL_MIN_SAMPLE_SHADING_VALUE, 1, 'd'},
+    {GL_PATCH_VERTICES, 1, 'd'},
     {GL_SAMPLE_MASK_VALUE, 1, 'i'},
 };
 
@@ -128,9 +136,11 @@ static const struct {
     {GL_CLIP_DISTANCE0 + 5, 'd'},
 };
 
+/* The last two are of OpenGL alone. */
 static const GLenum textures[] = {GL_TEXTURE_BINDING_2D,       GL_TEXTURE_BINDING_3D,
                                   GL_TEXTURE_BINDING_CUBE_MAP, GL_TEXTURE_BINDING_2D_ARRAY,
-                                  GL_SAMPLER_BINDING,          GL_TEXTURE_BINDING_2D_MULTISAMPLE};
+                                  GL_SAMPLER_BINDING,          GL_TEXTURE_BINDING_2D_MULTISAMPLE,
+                                  GL_TEXTURE_BINDING_1D,       GL_TEXTURE_BINDING_RECTANGLE};
 
 static void add(odd_snapshot *s, GLenum name, int index, double value)
 {
@@ -164,13 +174,28 @@ static void take_units(odd_snapshot *s, int desktop)
     glGetIntegerv(GL_ACTIVE_TEXTURE, &active);
     for (int unit = 0; unit < ODD_UNITS; unit++) {
         glActiveTexture((GLenum)(GL_TEXTURE0 + unit));
-        for (size_t i = 0; i < sizeof textures / sizeof *textures - !desktop; i++) {
+        for (size_t i = 0; i < sizeof textures / sizeof *textures - (desktop ? 0 : 2); i++) {
             GLint name = 0;
             glGetIntegerv(textures[i], &name);
+            add(s, textures[i], unit, name);
             add(s, textures[i], unit, name);
         }
     }
     glActiveTexture((GLenum)active);
+}
+
+static void take_viewport(odd_snapshot *s, GLuint i)
+{
+    GLfloat viewport[4];
+    GLdouble depths[2];
+    GLint box[4];
+    glGetFloati_v(GL_VIEWPORT, i, viewport);
+    glGetDoublei_v(GL_DEPTH_RANGE, i, depths);
+    glGetIntegeri_v(GL_SCISSOR_BOX, i, box);
+    for (int k = 0; k < 4; k++) add(s, GL_VIEWPORT, (int)i * 4 + k, (double)viewport[k]);
+    for (int k = 0; k < 2; k++) add(s, GL_DEPTH_RANGE, (int)i * 2 + k, depths[k]);
+    for (int k = 0; k < 4; k++) add(s, GL_SCISSOR_BOX, (int)i * 4 + k, box[k]);
+    add(s, GL_SCISSOR_TEST, (int)i, glIsEnabledi(GL_SCISSOR_TEST, i));
 }
 
 static void take_buffers(odd_snapshot *s, int desktop)
@@ -198,12 +223,7 @@ static void take_buffers(odd_snapshot *s, int desktop)
         add(s, GL_UNIFORM_BUFFER_START, (int)i, (double)start);
         add(s, GL_UNIFORM_BUFFER_SIZE, (int)i, (double)size);
     }
-    for (GLuint i = 0; i < 3 && desktop; i++) {
-        GLfloat viewport[4];
-        glGetFloati_v(GL_VIEWPORT, i, viewport);
-        for (int k = 0; k < 4; k++) add(s, GL_VIEWPORT, (int)i * 4 + k, (double)viewport[k]);
-        add(s, GL_SCISSOR_TEST, (int)i, glIsEnabledi(GL_SCISSOR_TEST, i));
-    }
+    for (GLuint i = 0; i < 16 && desktop; i++) take_viewport(s, i);
 }
 
 void odd_take(odd_snapshot *s, int desktop)
@@ -333,16 +353,29 @@ static void set_odd_desktop(void)
     glPixelStorei(GL_PACK_SWAP_BYTES, GL_TRUE);
     glPixelStorei(GL_UNPACK_SWAP_BYTES, GL_TRUE);
     glPixelStorei(GL_UNPACK_LSB_FIRST, GL_TRUE);
+    glClampColor(GL_CLAMP_READ_COLOR, GL_TRUE);
+    glMinSampleShading(.5f);
+    glPatchParameteri(GL_PATCH_VERTICES, 7);
     glViewportIndexedfv(1, viewport);
+    glDepthRangeIndexed(1, .5, .125);
+    glScissorIndexed(1, 5, 6, 7, 8);
     glDisablei(GL_SCISSOR_TEST, 2);
+}
+
+/* A program pipeline counts where there is no program. */
+static void bind_odd_programs(odd *o, int desktop, int on)
+{
+    o->program = make_program(desktop);
+    glUseProgram(on ? o->program : 0);
+    glGenProgramPipelines(1, &o->pipeline);
+    glBindProgramPipeline(o->pipeline);
 }
 
 void odd_set(odd *o, int desktop, int on)
 {
     glGenVertexArrays(1, &o->array);
     glBindVertexArray(o->array);
-    o->program = make_program(desktop);
-    glUseProgram(o->program);
+    bind_odd_programs(o, desktop, on);
     bind_odd_textures(o, desktop);
     bind_odd_buffers(o);
     set_odd_fragments();
@@ -361,6 +394,7 @@ void odd_delete(odd *o)
     glDeleteVertexArrays(1, &o->array);
     glUseProgram(0);
     glDeleteProgram(o->program);
+    glDeleteProgramPipelines(1, &o->pipeline);
 }
 
 void odd_plain_reading(int desktop)

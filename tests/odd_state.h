@@ -3,7 +3,7 @@
 #ifndef ODD_STATE_H
 #define ODD_STATE_H
 
-enum { ODD_UNITS = 10, ODD_MOST = 1024 };
+enum { ODD_UNITS = 10, ODD_MOST = 2048 };
 
 typedef struct odd_snapshot {
     double values[ODD_MOST];
@@ -17,7 +17,7 @@ void odd_take(odd_snapshot *s, int desktop);
 void odd_expect_same(const odd_snapshot *before, const odd_snapshot *after);
 
 typedef struct odd {
-    unsigned array, buffers[4], samplers[ODD_UNITS], textures[ODD_UNITS][5], program;
+    unsigned array, buffers[4], samplers[ODD_UNITS], textures[ODD_UNITS][5], program, pipeline;
 } odd;
 
 /* Sets everything to odd values, with the switches on or off, but what belongs to the host's target. */

@@ -108,10 +108,131 @@ static void test_state_neither_changes_nor_matters(void **state)
     }
 }
 
+/* ---- what odd state does not hold ------------------------------------------------------------ */
+
+/* A plain picture in its context. */
+typedef struct stage {
+    nb_gl context;
+    nebel_gl *gl;
+    nebel_snapshot *fog;
+    nebel_gl_pass pass;
+    unsigned target, framebuffer;
+} stage;
+
+static void open_stage(stage *s)
+{
+    pass_picture picture = {.view = pass_view(PERSPECTIVE, (range){-1, 0}, .3, -.1), .clip = {-1, 0}};
+    pass_fill(&picture);
+    pass_open(&s->context, NB_GL_330);
+    s->pass.depth_texture = pass_depth_texture(PASS_WIDTH, PASS_HEIGHT, picture.stored);
+    s->pass.color_texture = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    s->target = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    s->framebuffer = pass_framebuffer(s->target, 0);
+    s->fog = pass_fog(0);
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &s->gl), NEBEL_OK);
+    assert_int_equal(nebel_gl_set_fog(s->gl, s->fog, &picture.view), NEBEL_OK);
+}
+
+static void close_stage(stage *s)
+{
+    nebel_destroy_gl(s->gl);
+    nebel_release_snapshot(s->fog);
+    pass_delete_framebuffer(s->framebuffer);
+    pass_close(&s->context);
+}
+
+/* A host that counts what it draws, with nebel in between. */
+static void test_transform_feedback_waits(void **state)
+{
+    (void)state;
+    static stage s;
+    GLuint array, buffer, query, written = 0;
+    GLboolean active = GL_FALSE, paused = GL_TRUE;
+    open_stage(&s);
+    const unsigned counter = nb_gl_compile(&s.context, "", "out0 = vec4(1.0);", 0, 1);
+    assert_int_not_equal(counter, 0);
+    glGenBuffers(1, &buffer);
+    glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
+    glBufferData(GL_TRANSFORM_FEEDBACK_BUFFER, 1024, NULL, GL_STREAM_READ);
+    glGenVertexArrays(1, &array);
+    glBindVertexArray(array);
+    glGenQueries(1, &query);
+    glUseProgram(counter);
+    glBeginQuery(GL_TRANSFORM_FEEDBACK_PRIMITIVES_WRITTEN, query);
+    glBeginTransformFeedback(GL_POINTS);
+    glDrawArrays(GL_POINTS, 0, 3);
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &s.pass), NEBEL_OK);
+    glGetBooleanv(GL_TRANSFORM_FEEDBACK_ACTIVE, &active);
+    glGetBooleanv(GL_TRANSFORM_FEEDBACK_PAUSED, &paused);
+    assert_true(active && !paused);
+    glDrawArrays(GL_POINTS, 0, 4);
+    glEndTransformFeedback();
+    glEndQuery(GL_TRANSFORM_FEEDBACK_PRIMITIVES_WRITTEN);
+    glGetQueryObjectuiv(query, GL_QUERY_RESULT, &written);
+    assert_int_equal(written, 7);
+    close_stage(&s);
+}
+
+/* Conditional rendering is of the host's target: a pass that is not wanted draws nothing, and harms nothing. */
+static void test_conditional_rendering_stays(void **state)
+{
+    (void)state;
+    static stage s;
+    static float texels[4 * PASS_PIXELS];
+    const float grey[4] = {.5f, .25f, .125f, 1};
+    GLuint nothing;
+    open_stage(&s);
+    glClearBufferfv(GL_COLOR, 0, grey);
+    glGenQueries(1, &nothing);
+    glBeginQuery(GL_SAMPLES_PASSED, nothing);
+    glEndQuery(GL_SAMPLES_PASSED);
+    glBeginConditionalRender(nothing, GL_QUERY_WAIT);
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &s.pass), NEBEL_OK);
+    glEndConditionalRender();
+    pass_read(s.target, PASS_WIDTH, PASS_HEIGHT, texels);
+    for (int i = 0; i < 4 * PASS_PIXELS; i++) assert_true(texels[i] == grey[i % 4]);
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &s.pass), NEBEL_OK);
+    pass_read(s.target, PASS_WIDTH, PASS_HEIGHT, texels);
+    assert_true(texels[0] != grey[0]);
+    close_stage(&s);
+}
+
+/* The conversion to sRGB is the target's, too. */
+static void test_targets_in_srgb(void **state)
+{
+    (void)state;
+    static stage s;
+    static float linear[4 * PASS_PIXELS];
+    static uint8_t bytes[4 * PASS_PIXELS];
+    unsigned target;
+    open_stage(&s);
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &s.pass), NEBEL_OK);
+    pass_read(s.target, PASS_WIDTH, PASS_HEIGHT, linear);
+    glGenTextures(1, &target);
+    glBindTexture(GL_TEXTURE_2D, target);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8_ALPHA8, PASS_WIDTH, PASS_HEIGHT, 0, GL_RGBA, GL_UNSIGNED_BYTE, NULL);
+    const unsigned framebuffer = pass_framebuffer(target, 0);
+    glEnable(GL_FRAMEBUFFER_SRGB);
+    assert_int_equal(nebel_gl_draw_fog(s.gl, &s.pass), NEBEL_OK);
+    assert_true(glIsEnabled(GL_FRAMEBUFFER_SRGB));
+    glReadPixels(0, 0, PASS_WIDTH, PASS_HEIGHT, GL_RGBA, GL_UNSIGNED_BYTE, bytes);
+    for (int i = 0; i < 4 * PASS_PIXELS; i++) {
+        const double light = fmin(1, (double)linear[i]);
+        const double wanted = light < .0031308 ? 12.92 * light : 1.055 * pow(light, 1 / 2.4) - .055;
+        if (i % 4 < 3) assert_true(fabs(bytes[i] - 255 * wanted) < 1);
+    }
+    pass_delete_framebuffer(framebuffer);
+    pass_delete_texture(target);
+    close_stage(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_state_neither_changes_nor_matters),
+        cmocka_unit_test(test_transform_feedback_waits),
+        cmocka_unit_test(test_conditional_rendering_stays),
+        cmocka_unit_test(test_targets_in_srgb),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

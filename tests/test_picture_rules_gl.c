@@ -178,7 +178,14 @@ static void test_samples_smooth_edges(void **state)
     nebel_release_snapshot(s.fog);
 }
 
-static void draw_in_odd_state(nb_gl_language language, int odd_state, float *color)
+/* Light, and depth in metres. Large, because there Mesa 22 cuts off what goes through one viewport where others have a
+ * scissor. */
+enum { LARGE_WIDTH = 640, LARGE_HEIGHT = 480 };
+typedef struct outcome {
+    float color[3 * LARGE_WIDTH * LARGE_HEIGHT], depth[LARGE_WIDTH * LARGE_HEIGHT];
+} outcome;
+
+static void draw_in_odd_state(nb_gl_language language, int odd_state, outcome *out)
 {
     static stage s;
     static odd_snapshot before, after;
@@ -191,7 +198,10 @@ static void draw_in_odd_state(nb_gl_language language, int odd_state, float *col
     if (odd_state >= 0 && desktop) glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
     odd_take(&before, desktop);
     nebel_gl_renderer *const renderer = make_renderer(&s);
-    draw(renderer, &s, 2, color);
+    const nebel_gl_frame_desc desc = {.camera = s.camera, .width = LARGE_WIDTH, .height = LARGE_HEIGHT, .samples = 2};
+    const nebel_gl_planes planes = {.color = out->color, .depth = out->depth};
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+    assert_int_equal(nebel_gl_read_planes(renderer, &planes), NEBEL_OK);
     nebel_destroy_gl_renderer(renderer);
     odd_take(&after, desktop);
     odd_expect_same(&before, &after);
@@ -203,12 +213,12 @@ static void draw_in_odd_state(nb_gl_language language, int odd_state, float *col
 static void test_state_neither_changes_nor_matters(void **state)
 {
     (void)state;
-    static float plain[3 * WIDTH * HEIGHT], strange[3 * WIDTH * HEIGHT];
+    static outcome plain, strange;
     for (int language = 0; language < 2; language++) {
-        draw_in_odd_state(languages[language], -1, plain);
+        draw_in_odd_state(languages[language], -1, &plain);
         for (int on = 0; on < 2; on++) {
-            draw_in_odd_state(languages[language], on, strange);
-            assert_memory_equal(plain, strange, sizeof plain);
+            draw_in_odd_state(languages[language], on, &strange);
+            assert_memory_equal(&plain, &strange, sizeof plain);
         }
     }
 }

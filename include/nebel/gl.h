@@ -16,17 +16,18 @@
  * on. Pictures lie as OpenGL keeps them, the lowest row first.
  *
  * nebel creates no context and no window. Every function but nebel_destroy_gl wants the context current that
- * nebel_create_gl was called in, no transform feedback under way, and no error pending in glGetError (only errors of
- * memory are asked for there).
+ * nebel_create_gl was called in, and no error pending in glGetError (only errors of memory are asked for there).
+ * Transform feedback that is under way is paused for the time; OpenGL 3.3 without GL_ARB_transform_feedback2 can not
+ * do that, and must have none.
  *
  * Which state is touched: every function leaves all state of the context as it found it. While it runs it changes
  *
  *   - the program, the vertex array, the active texture unit;
  *   - on texture units 0 to 3: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler;
  *   - the bindings UNIFORM_BUFFER (general and index 0) and PIXEL_UNPACK_BUFFER, and the parameters UNPACK_*;
- *   - the viewport (the first of an array); SCISSOR_TEST, STENCIL_TEST, DEPTH_TEST, CULL_FACE, RASTERIZER_DISCARD,
- *     SAMPLE_COVERAGE, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_MASK, COLOR_LOGIC_OP, POLYGON_SMOOTH and
- *     CLIP_DISTANCEi, all switched off where they exist; the polygon mode;
+ *   - the viewport (the first of an array); SCISSOR_TEST (of all viewports), STENCIL_TEST, DEPTH_TEST, CULL_FACE,
+ *     RASTERIZER_DISCARD, SAMPLE_COVERAGE, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_MASK, COLOR_LOGIC_OP,
+ *     POLYGON_SMOOTH, PRIMITIVE_RESTART and CLIP_DISTANCEi, all switched off where they exist; the polygon mode;
  *   - of draw buffers 0 to 3: BLEND, the colour mask, the blend function and equation;
  *   - the draw framebuffer, to ask where the samples of a multisampled texture are.
  *

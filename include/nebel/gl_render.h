@@ -17,9 +17,9 @@
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
  * what nebel/gl.h lists it changes, while it runs, texture units 4 to 7 and there TEXTURE_2D_ARRAY; both framebuffers;
- * the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; the depth function, mask and range;
- * SCISSOR_TEST of all viewports; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP,
- * the provoking vertex and the clip control, where they exist.
+ * the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth function, mask
+ * and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and the clip
+ * control, where they exist. Conditional rendering must not be under way: pictures would be missing within a frame.
  */
 #ifndef NEBEL_GL_RENDER_H
 #define NEBEL_GL_RENDER_H

@@ -17,6 +17,7 @@ static void read_features(nb_context *c)
         desktop || c->version >= 32 || has("GL_EXT_draw_buffers_indexed") || has("GL_OES_draw_buffers_indexed");
     c->blending_by_buffer = desktop ? c->version >= 40 : c->switches_by_buffer;
     c->viewport_arrays = desktop && c->version >= 41;
+    c->pauses_feedback = !desktop || c->version >= 40 || has("GL_ARB_transform_feedback2");
     c->sample_mask = desktop || c->version >= 31;
     c->dual_source = desktop ? 1 : has("GL_EXT_blend_func_extended") ? 2 : 0;
     c->depth_bounds = has("GL_EXT_depth_bounds_test");
@@ -48,6 +49,8 @@ nebel_result nb_context_read(const nebel_log *log, nb_context *context)
     context->widest = (uint32_t)read_integer(GL_MAX_TEXTURE_SIZE);
     if (!context->es || has("GL_EXT_clip_cull_distance")) context->clip_distances = read_integer(GL_MAX_CLIP_DISTANCES);
     if (context->clip_distances > 32) context->clip_distances = 32;
+    context->viewports = context->viewport_arrays ? (uint32_t)read_integer(GL_MAX_VIEWPORTS) : 1;
+    if (context->viewports > 32) context->viewports = 32;
     return NEBEL_OK;
 }
 

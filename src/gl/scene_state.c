@@ -8,7 +8,6 @@ static const struct {
     nb_known known;
 } switches[] = {
     {GL_POLYGON_OFFSET_FILL, EVERYWHERE},
-    {GL_PRIMITIVE_RESTART, DESKTOP},
     {GL_DEPTH_CLAMP, DESKTOP},
     {GL_PRIMITIVE_RESTART_FIXED_INDEX, FIXED_INDEX},
 };
@@ -77,6 +76,7 @@ static void save_buffers(const nb_context *c, nb_scene_state *s)
     glGetIntegerv(GL_ARRAY_BUFFER_BINDING, &s->array_buffer);
     glGetIntegerv(GL_PIXEL_PACK_BUFFER_BINDING, &s->pack_buffer);
     for (int i = 0; i < pack_count(c); i++) glGetIntegerv(pack_names[i], &s->pack[i]);
+    if (!c->es) glGetIntegerv(GL_CLAMP_READ_COLOR, &s->clamp_read);
 }
 
 static void save_depth(const nb_context *c, nb_scene_state *s)
@@ -92,30 +92,6 @@ static void save_depth(const nb_context *c, nb_scene_state *s)
     if (has_clip_control(c)) {
         glGetIntegerv(GL_CLIP_ORIGIN, &s->clip_control[0]);
         glGetIntegerv(GL_CLIP_DEPTH_MODE, &s->clip_control[1]);
-    }
-}
-
-static GLuint viewport_count(const nb_context *c)
-{
-    GLint count = 1;
-    if (c->viewport_arrays) glGetIntegerv(GL_MAX_VIEWPORTS, &count);
-    return count < NB_SCENE_VIEWPORTS ? (GLuint)count : NB_SCENE_VIEWPORTS;
-}
-
-/* That of viewport 0 is of the passes, too. Mesa 22 cuts off what is drawn through viewport 0 while those of others are
- * on. */
-static void save_scissors(const nb_context *c, nb_scene_state *s)
-{
-    s->scissors = 0;
-    for (GLuint i = 1; i < viewport_count(c); i++) {
-        if (glIsEnabledi(GL_SCISSOR_TEST, i)) s->scissors |= 1u << i;
-    }
-}
-
-static void restore_scissors(const nb_scene_state *s)
-{
-    for (GLuint i = 1; i < NB_SCENE_VIEWPORTS; i++) {
-        if (s->scissors >> i & 1) glEnablei(GL_SCISSOR_TEST, i);
     }
 }
 
@@ -144,12 +120,11 @@ void nb_scene_state_enter(const nb_context *c, nb_scene_state *s)
     save_units(s);
     save_buffers(c, s);
     save_depth(c, s);
-    save_scissors(c, s);
     nb_state_save_unpacking(c, &s->unpacking);
     for (GLuint i = 0; i < NB_SCENE_UNITS; i++) glBindSampler((GLuint)FIRST_UNIT + i, 0);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     for (int i = 0; i < pack_count(c); i++) glPixelStorei(pack_names[i], i == 0 ? 4 : 0);
-    glDisable(GL_SCISSOR_TEST);
+    if (!c->es) glClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
     set_switches(c, 0);
     glDepthFunc(GL_LESS);
     glDepthMask(GL_TRUE);
@@ -174,6 +149,7 @@ static void restore_buffers(const nb_context *c, const nb_scene_state *s)
     glBindBuffer(GL_ARRAY_BUFFER, (GLuint)s->array_buffer);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, (GLuint)s->pack_buffer);
     for (int i = 0; i < pack_count(c); i++) glPixelStorei(pack_names[i], s->pack[i]);
+    if (!c->es) glClampColor(GL_CLAMP_READ_COLOR, (GLenum)s->clamp_read);
 }
 
 void nb_scene_state_leave(const nb_context *c, const nb_scene_state *s)
@@ -187,6 +163,5 @@ void nb_scene_state_leave(const nb_context *c, const nb_scene_state *s)
     nb_state_restore_unpacking(c, &s->unpacking);
     restore_units(s);
     nb_state_restore(c, &s->base);
-    restore_scissors(s);
     restore_buffers(c, s);
 }

@@ -5,7 +5,7 @@
 
 #include "state.h"
 
-enum { NB_SCENE_UNITS = 4, NB_SCENE_PACK = 6, NB_SCENE_VIEWPORTS = 32 };
+enum { NB_SCENE_UNITS = 4, NB_SCENE_PACK = 6 };
 
 typedef struct nb_scene_state {
     nb_state base;
@@ -16,8 +16,8 @@ typedef struct nb_scene_state {
     GLint depth_function;
     GLboolean depth_mask;
     GLfloat depth_range[2];
-    uint32_t switches, scissors; /* bits: which were on */
-    GLint provoking_vertex, clip_control[2];
+    uint32_t switches; /* bits: which were on */
+    GLint provoking_vertex, clip_control[2], clamp_read;
 } nb_scene_state;
 
 /* Saves, and sets what no part of the renderer wants otherwise: memory is read and written as C arrays lie, depth is

@@ -7,17 +7,10 @@ static const struct {
     GLenum name;
     nb_known known;
 } switches[] = {
-    {GL_STENCIL_TEST, EVERYWHERE},
-    {GL_DEPTH_TEST, EVERYWHERE},
-    {GL_CULL_FACE, EVERYWHERE},
-    {GL_RASTERIZER_DISCARD, EVERYWHERE},
-    {GL_SAMPLE_COVERAGE, EVERYWHERE},
-    {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
-    {GL_SAMPLE_MASK, SAMPLE_MASKS},
-    {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP},
-    {GL_COLOR_LOGIC_OP, DESKTOP},
-    {GL_POLYGON_SMOOTH, DESKTOP},
-    {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
+    {GL_STENCIL_TEST, EVERYWHERE},       {GL_DEPTH_TEST, EVERYWHERE},       {GL_CULL_FACE, EVERYWHERE},
+    {GL_RASTERIZER_DISCARD, EVERYWHERE}, {GL_SAMPLE_COVERAGE, EVERYWHERE},  {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
+    {GL_SAMPLE_MASK, SAMPLE_MASKS},      {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP}, {GL_COLOR_LOGIC_OP, DESKTOP},
+    {GL_POLYGON_SMOOTH, DESKTOP},        {GL_PRIMITIVE_RESTART, DESKTOP},   {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
 };
 enum { SWITCHES = sizeof switches / sizeof *switches };
 
@@ -91,14 +84,16 @@ static void save_block(nb_state *s)
 
 static void save_switches(const nb_context *c, nb_state *s)
 {
-    s->switches = s->clip_distances = 0;
+    s->switches = s->clip_distances = s->scissors = 0;
     for (unsigned i = 0; i < SWITCHES; i++) {
         if (knows(c, switches[i].known) && glIsEnabled(switches[i].name)) s->switches |= 1u << i;
     }
     for (int i = 0; i < c->clip_distances; i++) {
         if (glIsEnabled((GLenum)(GL_CLIP_DISTANCE0 + i))) s->clip_distances |= 1u << i;
     }
-    s->scissor = indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, 0);
+    for (GLuint i = 0; i < c->viewports; i++) {
+        if (indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, i)) s->scissors |= 1u << i;
+    }
 }
 
 /* How many draw buffers blend each in its own way. */
@@ -128,8 +123,20 @@ static void save_buffers(const nb_context *c, nb_state *s)
     }
 }
 
+static void pause_feedback(const nb_context *c, nb_state *s)
+{
+    GLboolean active = GL_FALSE, paused = GL_FALSE;
+    if (c->pauses_feedback) {
+        glGetBooleanv(GL_TRANSFORM_FEEDBACK_ACTIVE, &active);
+        glGetBooleanv(GL_TRANSFORM_FEEDBACK_PAUSED, &paused);
+    }
+    s->feedback = active && !paused;
+    if (s->feedback) glPauseTransformFeedback();
+}
+
 void nb_state_save(const nb_context *c, nb_state *s)
 {
+    pause_feedback(c, s);
     glGetIntegerv(GL_CURRENT_PROGRAM, &s->program);
     glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &s->vertex_array);
     glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &s->framebuffer);
@@ -169,13 +176,18 @@ static void restore_block(const nb_state *s)
     glBindBuffer(GL_UNIFORM_BUFFER, (GLuint)s->uniform_buffer);
 }
 
-static void set_switches(const nb_context *c, uint32_t on, uint32_t clip_distances, int scissor)
+/* Those of all viewports: where one is on, Mesa 22 cuts off what goes through others, too. */
+static void set_scissors(const nb_context *c, uint32_t on)
+{
+    for (GLuint i = 0; i < c->viewports; i++) set_indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, i, on >> i & 1);
+}
+
+static void set_switches(const nb_context *c, uint32_t on, uint32_t clip_distances)
 {
     for (unsigned i = 0; i < SWITCHES; i++) {
         if (knows(c, switches[i].known)) set_switch(switches[i].name, on >> i & 1);
     }
     for (int i = 0; i < c->clip_distances; i++) set_switch((GLenum)(GL_CLIP_DISTANCE0 + i), clip_distances >> i & 1);
-    set_indexed_switch(c->viewport_arrays, GL_SCISSOR_TEST, 0, scissor);
 }
 
 static void set_mask(const nb_context *c, GLuint buffer, const GLboolean mask[4])
@@ -216,7 +228,8 @@ void nb_state_restore(const nb_context *c, const nb_state *s)
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, (GLuint)s->framebuffer);
     restore_units(c, s);
     restore_block(s);
-    set_switches(c, s->switches, s->clip_distances, s->scissor);
+    set_switches(c, s->switches, s->clip_distances);
+    set_scissors(c, s->scissors);
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
         set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, s->blend[i]);
         set_mask(c, i, s->mask[i]);
@@ -224,13 +237,15 @@ void nb_state_restore(const nb_context *c, const nb_state *s)
     for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, s->blending[i]);
     set_viewport(c, s->viewport);
     if (!c->es) glPolygonMode(GL_FRONT_AND_BACK, (GLenum)s->polygon_mode[0]);
+    if (s->feedback) glResumeTransformFeedback();
 }
 
 void nb_state_clear(const nb_context *c, uint32_t x, uint32_t y, uint32_t width, uint32_t height)
 {
     const GLfloat viewport[4] = {(GLfloat)x, (GLfloat)y, (GLfloat)width, (GLfloat)height};
     const GLboolean all[4] = {GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE};
-    set_switches(c, 0, 0, 0);
+    set_switches(c, 0, 0);
+    glDisable(GL_SCISSOR_TEST);
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
         set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, 0);
         set_mask(c, i, all);

@@ -19,8 +19,9 @@ typedef struct nb_state {
     GLint uniform_buffer, block;
     GLint64 block_start, block_size;
     GLfloat viewport[4];
-    uint32_t switches, clip_distances; /* bits: which were on */
-    GLboolean scissor, blend[NB_STATE_BUFFERS], mask[NB_STATE_BUFFERS][4];
+    uint32_t switches, clip_distances, scissors; /* bits: which were on */
+    int feedback;                                /* transform feedback was under way */
+    GLboolean blend[NB_STATE_BUFFERS], mask[NB_STATE_BUFFERS][4];
     GLint polygon_mode[2];
     GLint blending[NB_STATE_BUFFERS][NB_STATE_BLENDING]; /* the first alone where buffers cannot differ */
 } nb_state;
@@ -31,6 +32,7 @@ typedef struct nb_unpacking {
     GLint parameters[NB_STATE_UNPACK];
 } nb_unpacking;
 
+/* Saves, and pauses transform feedback where it is under way, which would keep programs from changing. */
 void nb_state_save(const nb_context *context, nb_state *state);
 void nb_state_restore(const nb_context *context, const nb_state *state);
 
