@@ -182,11 +182,13 @@ def wait_for(condition, folder, what):
     sys.exit(f"check_hosts: {what} within two minutes")
 
 
-def settled(folder):
+def settled(program, folder):
     """Waits until two photographs in a row are the same and not black."""
     last = [None]
 
     def is_still(picture):
+        if program.poll() is not None:
+            sys.exit(f"check_hosts: {program.args[0]} ended by itself, status {program.returncode}")
         still = last[0] is not None and picture.max() > 0 and (picture == last[0]).all()
         last[0] = picture
         return still
@@ -214,7 +216,7 @@ def check(name, wanted, step, share, key, output):
         # Drivers and window systems leak; what nebel leaks the tests without a window would find.
         program = subprocess.Popen([BUILD / "examples" / name], env=dict(os.environ, ASAN_OPTIONS="detect_leaks=0"))
         try:
-            picture = settled(folder)
+            picture = settled(program, folder)
             press("keydown", key)
             other = wait_for(lambda now: (np.abs(now - picture).max(-1) > 8).mean() > .002, folder, f"{name}: {key} did nothing")
             press("keyup", key)
@@ -244,5 +246,6 @@ def main():
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--inside"]:
         main()
-    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", f"-screen 0 {WIDTH}x{HEIGHT}x24", sys.executable, __file__, "--inside"]
-              + sys.argv[1:])
+    # A server begins anew when its last client leaves, and turns away who comes just then, unless told not to.
+    os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", f"-screen 0 {WIDTH}x{HEIGHT}x24 -noreset", sys.executable, __file__,
+                           "--inside"] + sys.argv[1:])
