@@ -69,7 +69,8 @@ function(nebel_add_shader_text result)
 endfunction()
 
 function(nebel_add_core)
-    nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c)
+    nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c
+        src/classic/*.c)
     nebel_add_shader_text(text)
     list(APPEND sources ${text})
     nebel_add_kernels(kernel_objects definitions)

@@ -18,7 +18,7 @@ ROOMS = {
     "media": {"base", "formulas"},
     "march": {"base", "formulas", "media", "kernels"},
     "shader": {"base", "formulas", "media", "march"},
-    "classic": {"base", "march", "media"},
+    "classic": {"base", "formulas", "kernels", "march", "media"},
     "nebula": {"base", "formulas", "march", "media"},
     "planet": {"base", "march", "media"},
     "scene": {"base"},

@@ -1,5 +1,6 @@
 # The tests of the core's queries with random fog, and with threads of their own.
 find_package(Threads REQUIRED)
+target_sources(test_classic_vertices PRIVATE random_fog.c)
 target_sources(test_distances PRIVATE random_fog.c)
 target_sources(test_find PRIVATE random_fog.c)
 target_sources(test_opacity PRIVATE random_fog.c)
