@@ -516,10 +516,10 @@ static void test_samples_are_stratified(void **state)
     static uint8_t columns[NB_PIXELS][64], rows[NB_PIXELS][64], cells[NB_PIXELS][64];
     const nb_sample_range range = nb_sample_range_of(64);
     for (uint32_t s = 0; s < 64; s++) {
-        nb_sample_region(s, 64, 128, 320, &points);
+        nb_sample_region(s, 64, &points);
         for (uint32_t i = 0; i < NB_PIXELS; i++) {
             const float x = points.x[i] - (float)nb_lane_x(i), y = points.y[i] - (float)nb_lane_y(i);
-            assert_true(x >= range.low && x < range.high && y >= range.low && y < range.high);
+            assert_true(x >= range.low && x <= range.high && y >= range.low && y <= range.high);
             columns[i][(int)(x * 64)]++;
             rows[i][(int)(y * 64)]++;
             cells[i][(int)(x * 8) + 8 * (int)(y * 8)]++;
@@ -548,6 +548,34 @@ static void test_an_edge_through_a_pixel_covers_half_of_it(void **state)
         assert_float_equal(picture.planes.color[0], .5f, 1e-6);
         assert_float_equal(picture.planes.normal[1], .5f, 1e-6);
         assert_float_equal(picture.planes.depth[0], 3, 1e-5);
+    }
+    test_picture_free(&picture);
+}
+
+/* How much of a row the square covers falls evenly from row to row, and never rises: steps, no noise. */
+static void test_a_leaning_edge_is_even(void **state)
+{
+    (void)state;
+    nebel_mesh square = test_square();
+    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &square, .ambient = {2, 2, 2}};
+    nebel_camera camera = test_camera(1, 3, .1, 1, 0, .1);
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.view_height = .1;
+    camera.up[0] = -.02;
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    test_picture picture = test_picture_make(8, 64);
+    for (uint32_t samples = 2; samples <= 16; samples++) {
+        double above = 8, first = 0;
+        test_render(&scene, NULL, &plain, &camera, samples, &picture);
+        for (uint32_t y = 0; y < 64; y++) {
+            double covered = 0;
+            for (uint32_t x = 0; x < 8; x++) covered += (double)picture.planes.color[3 * (8 * y + x)];
+            if (y == 0) first = covered;
+            assert_true(covered <= above + 1e-5);
+            assert_true(fabs(covered - first + .02 * y) <= 2. / samples);
+            above = covered;
+        }
     }
     test_picture_free(&picture);
 }
@@ -598,6 +626,7 @@ int main(void)
         cmocka_unit_test(test_background_behind_endless_fog),
         cmocka_unit_test(test_samples_are_stratified),
         cmocka_unit_test(test_an_edge_through_a_pixel_covers_half_of_it),
+        cmocka_unit_test(test_a_leaning_edge_is_even),
         cmocka_unit_test(test_means_of_planes_add_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

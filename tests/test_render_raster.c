@@ -70,7 +70,7 @@ static void compare_picture(nebel_renderer *renderer, const nebel_camera *camera
     nb_raster_set(&raster, geometry, &view, &(nb_picture){width, height, nb_sample_range_of(samples)}, 1);
     for (uint32_t top = 0; top + SIDE <= height; top += SIDE) {
         for (uint32_t left = 0; left + SIDE <= width; left += SIDE) {
-            for (uint32_t s = 0; s < samples; s++) nb_sample_region(s, samples, left, top, &both->points[s]);
+            for (uint32_t s = 0; s < samples; s++) nb_sample_region(s, samples, &both->points[s]);
             nb_raster_region(&raster, left, top, samples, both->points, both->seen);
             for (uint32_t s = 0; s < samples; s++) compare_sample(geometry, &view, left, top, s, both);
         }

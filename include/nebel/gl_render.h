@@ -10,10 +10,9 @@
  *     nebel_destroy_gl_renderer(renderer);
  *
  * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun, which is attenuated by all fog
- * on its way, and by the ambient radiance; colour = transmittance * surface + in-scattering. With one sample per pixel
- * both renderers look through the centres of the pixels; with more, both use the same (0,2)-sequence, which the CPU
- * renderer shifts for each pixel and this one does not. Shadows come from maps fitted to what is seen, so their edges
- * are a texel of the map wide. No panoramas. Link with libnebel_gl and libnebel.
+ * on its way, and by the ambient radiance; colour = transmittance * surface + in-scattering. Both renderers look
+ * through the same points of each pixel. Shadows come from maps fitted to what is seen, so their edges are a texel of
+ * the map wide. No panoramas. Link with libnebel_gl and libnebel.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
  * what nebel/gl.h lists it changes, while it runs, texture units 4 to 7 and there TEXTURE_2D_ARRAY; both framebuffers;

@@ -43,7 +43,8 @@ typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);
 typedef struct nebel_frame_desc {
     nebel_camera camera;
     uint32_t width, height; /* pixels, 1 to 32768 */
-    uint32_t samples;       /* per pixel, 1 to 4096; 0: 4. Stratified, box filter. */
+    uint32_t samples;       /* per pixel, 1 to 4096; 0: 4. Stratified, the same in every
+                               pixel; of one sample the centre. Box filter. */
     double tolerance;       /* as in nebel_trace_desc */
     nebel_progress_fn progress;
     void *progress_user;

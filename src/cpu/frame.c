@@ -101,7 +101,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
                                    nb_scratch *scratch)
 {
     for (uint32_t s = 0; s < count; s++) {
-        nb_sample_region(first + s, frame->samples, left, top, &scratch->points_of_region[s]);
+        nb_sample_region(first + s, frame->samples, &scratch->points_of_region[s]);
     }
     if (frame->rasters) {
         nb_raster_region(&frame->raster, left, top, count, scratch->points_of_region, scratch->seen);

@@ -140,41 +140,13 @@ nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, ui
 
 /* ---- samples --------------------------------------------------------------------------------- */
 
-/* The van der Corput sequence in base 2. */
-static double mirror(uint32_t i)
-{
-    double x = 0;
-    for (double half = .5; i != 0; i >>= 1, half *= .5) x += i & 1 ? half : 0;
-    return x;
-}
-
-/* The second dimension of the Sobol sequence: column k of its matrix is row k of Pascal's triangle modulo 2. */
-static double sobol(uint32_t i)
-{
-    uint32_t digits = 0;
-    for (uint32_t column = 1u << 31; i != 0; i >>= 1, column ^= column >> 1) {
-        if (i & 1) digits ^= column;
-    }
-    return digits * 0x1p-32;
-}
-
-nb_place nb_camera_place(uint32_t index, uint32_t count)
-{
-    double x = 0, y = 0;
-    for (uint32_t i = 0; i < count; i++) {
-        x += mirror(i);
-        y += sobol(i);
-    }
-    return (nb_place){mirror(index) + .5 - x / count, sobol(index) + .5 - y / count};
-}
-
-nebel_view nb_camera_move(const nebel_view *view, nb_place place)
+nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point)
 {
     nebel_view moved = *view;
     for (int column = 0; column < 4; column++) {
         const double w = view->clip_from_eye[4 * column + 3];
-        moved.clip_from_eye[4 * column] += (1 - 2 * place.x) / view->width * w;
-        moved.clip_from_eye[4 * column + 1] += (1 - 2 * place.y) / view->height * w;
+        moved.clip_from_eye[4 * column] += (1 - 2 * point.x) / view->width * w;
+        moved.clip_from_eye[4 * column + 1] += (2 * point.y - 1) / view->height * w;
     }
     return moved;
 }

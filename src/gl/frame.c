@@ -407,8 +407,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
 
 static nebel_result draw_sample(frame *f, uint32_t sample)
 {
-    const nb_place place = nb_camera_place(sample, f->samples);
-    f->sample_view = nb_camera_move(&f->view, place);
+    f->sample_view = nb_camera_move(&f->view, nb_pixel_sample(sample, f->samples));
     nebel_result result = nebel_view_rays(&f->sample_view, NULL, &f->rays);
     if (result != NEBEL_OK) {
         return nb_fail(&f->renderer->log, NEBEL_ERROR_VALUE,
