@@ -129,6 +129,12 @@ int nb_truth_inside(nb_formula shape, const long double *in, const nb_quad x[3])
     }
 }
 
+/* A place outside all events, as far from the last as that is from 0: one metre would drown in its digits. */
+static nb_quad beyond(nb_quad last, nb_quad sign)
+{
+    return last + sign * (1 + (last < 0 ? -last : last));
+}
+
 nb_quad_interval nb_truth_interval(nb_formula shape, const long double *in, const nb_quad p[3], const nb_quad d[3])
 {
     const body b = body_of(in);
@@ -136,7 +142,10 @@ nb_quad_interval nb_truth_interval(nb_formula shape, const long double *in, cons
     nb_quad_interval span = {0, 0, 0};
     for (int i = 0; i <= e.count; ++i) {
         const nb_quad from = i > 0 ? e.t[i - 1] : (nb_quad)-1e18L, to = i < e.count ? e.t[i] : (nb_quad)1e18L;
-        const nb_quad middle = i > 0 && i < e.count ? (from + to) / 2 : i > 0 ? from + 1 : e.count > 0 ? to - 1 : 0;
+        const nb_quad middle = i > 0 && i < e.count ? (from + to) / 2
+                               : i > 0              ? beyond(from, 1)
+                               : e.count > 0        ? beyond(to, -1)
+                                                    : 0;
         nb_quad x[3];
         for (int k = 0; k < 3; ++k) x[k] = p[k] + d[k] * middle;
         if (!(from < to) || !nb_truth_inside(shape, in, x)) continue;
