@@ -2,6 +2,7 @@
 #include "trace_kernel.h"
 
 #include "base/cpu.h"
+#include "base/precision.h"
 
 #include <math.h>
 
@@ -162,7 +163,10 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     job->budget = tolerance * fmax(1, snapshot->largest_radiance);
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
     job->count = n;
-    return explain(job, kernel(job), desc->failed_ray);
+    const unsigned precision = nb_full_precision();
+    const nebel_result result = kernel(job);
+    nb_restore_precision(precision);
+    return explain(job, result, desc->failed_ray);
 }
 
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
@@ -255,6 +259,8 @@ nebel_result nebel_find_transmittance(const nebel_snapshot *snapshot, double tra
         return NEBEL_OK;
     }
     nb_find_job job = {snapshot, -log(transmittance), channel, n, rays, ray_stride, distances};
+    const unsigned precision = nb_full_precision();
     const nebel_result result = nb_find_double(&job);
+    nb_restore_precision(precision);
     return result == NEBEL_OK ? result : nb_fail(&snapshot->log, result, "rays: out of memory for the fog they meet");
 }

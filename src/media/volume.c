@@ -1,6 +1,7 @@
 #include "volume.h"
 
 #include "affine.h"
+#include "base/precision.h"
 #include "check.h"
 #include "leaf.h"
 
@@ -165,7 +166,9 @@ nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log
     }
     builder b = {log, volume, {0, 0, 0}};
     const nb_affine world = nb_affine_identity();
+    const unsigned precision = nb_full_precision();
     const nebel_result result = add_shape(&b, &desc->shape, &world, volume->low, volume->high);
+    nb_restore_precision(precision);
     if (result != NEBEL_OK) nb_volume_free(allocator, volume);
     return result;
 }

@@ -1,6 +1,7 @@
 #include <nebel/nebula.h>
 
 #include "base/base.h"
+#include "base/precision.h"
 #include "eddies.h"
 #include "media/density.h"
 
@@ -211,6 +212,7 @@ nebel_result nebel_scatter_nebula(const nebel_nebula_desc *desc, nebel_particle 
     nebel_result result = check_desc(desc);
     if (result == NEBEL_OK) result = open_cloud(desc, &from);
     if (result != NEBEL_OK) return result;
+    const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < desc->count && result == NEBEL_OK; i++) {
         if (!make_particle(&from, i, &particles[i]))
             result = nb_fail(
@@ -218,6 +220,7 @@ nebel_result nebel_scatter_nebula(const nebel_nebula_desc *desc, nebel_particle 
                 "nebula: no place for particle %zu in %d tries; its shape is empty or thin, or its density nearly 0", i,
                 MOST_TRIES);
     }
+    nb_restore_precision(precision);
     if (desc->points == NULL) nb_volume_free(&from.allocator, &from.volume);
     return result;
 }

@@ -1,6 +1,7 @@
 /* Fog as words: every place is brought to the eye in long double before it becomes float. */
 #include "layout.h"
 
+#include "base/precision.h"
 #include "march/snapshot.h"
 
 #include <nebel/shader.h>
@@ -274,10 +275,12 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     words[0] =
         (nebel_word){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
                       (float)snapshot->max_opacity, 0}};
+    const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
         pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
     }
+    nb_restore_precision(precision);
     return NEBEL_OK;
 }
 
