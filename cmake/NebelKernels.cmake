@@ -19,6 +19,21 @@ else()
     set(nebel_levels scalar)
 endif()
 
+# gcc aligns the stack to 16 bytes on 64-bit Windows but moves wide vectors there as if it were to 32 or 64 (gcc bug 54412; Debian's
+# gcc is mended). Assemblers since binutils 2.38 can make unaligned moves of these, as fast where the address is aligned.
+if(MINGW AND CMAKE_C_COMPILER_ID STREQUAL GNU AND "avx2" IN_LIST nebel_levels)
+    include(CheckCCompilerFlag)
+    set(unaligned_moves -Wa,-muse-unaligned-vector-move)
+    check_c_compiler_flag(${unaligned_moves} NEBEL_HAVE_UNALIGNED_MOVES)
+    if(NEBEL_HAVE_UNALIGNED_MOVES)
+        list(APPEND nebel_flags_avx2 ${unaligned_moves})
+        list(APPEND nebel_flags_avx512 ${unaligned_moves})
+    else()
+        message(STATUS "nebel: built without AVX2 and AVX-512; on Windows gcc needs binutils 2.38 for them")
+        list(REMOVE_ITEM nebel_levels avx2 avx512)
+    endif()
+endif()
+
 # The condition of formulas/quad.h.
 include(CheckCSourceCompiles)
 check_c_source_compiles("#include <float.h>

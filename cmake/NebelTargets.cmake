@@ -2,6 +2,10 @@
 
 set(nebel_warnings -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Wshadow -Wstrict-prototypes
     -Wmissing-prototypes)
+if(MINGW)
+    # isfinite, isnan and their kin are macros there, with a conversion to each type in branches that are not taken.
+    list(APPEND nebel_warnings -Wno-float-conversion)
+endif()
 if(NEBEL_WERROR)
     list(APPEND nebel_warnings -Werror)
 endif()

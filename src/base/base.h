@@ -6,7 +6,10 @@
 
 #include <stdarg.h>
 
-#if defined(__GNUC__)
+#if defined(__MINGW32__)
+/* "printf" would mean Microsoft's, which knows no %zu. */
+#define NB_PRINTF(text, first) __attribute__((format(gnu_printf, text, first)))
+#elif defined(__GNUC__)
 #define NB_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define NB_PRINTF(text, first)

@@ -1,8 +1,9 @@
-/* As much of cmocka's face as the kernel tests use, for processors that this system has no cmocka for. A failed
+/* As much of cmocka's face as the core's tests use, for processors and systems that Debian has no cmocka for. A failed
  * assertion ends its test and the program goes on with the next, as there. */
 #ifndef NB_TESTS_CROSS_CMOCKA_H
 #define NB_TESTS_CROSS_CMOCKA_H
 
+#include <math.h>
 #include <setjmp.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -44,6 +45,12 @@ static inline int cross_run_group(const struct CMUnitTest *tests, size_t count)
     return failed;
 }
 
+/* As cmocka compares: a NaN is near nothing. */
+static inline int cross_is_near(float a, float b, float epsilon)
+{
+    return fabsf(a - b) <= epsilon;
+}
+
 #define CROSS_REQUIRE(condition, what) cross_require((condition) ? 1 : 0, what, __FILE__, __LINE__)
 
 #define cmocka_unit_test(function)                                                                                     \
@@ -65,6 +72,9 @@ static inline int cross_run_group(const struct CMUnitTest *tests, size_t count)
 #define assert_ptr_equal(a, b) CROSS_REQUIRE((a) == (b), #a " == " #b)
 #define assert_in_range(a, low, high) CROSS_REQUIRE((a) >= (low) && (a) <= (high), #a " in " #low " to " #high)
 #define assert_string_equal(a, b) CROSS_REQUIRE(strcmp(a, b) == 0, #a " == " #b)
+#define assert_string_not_equal(a, b) CROSS_REQUIRE(strcmp(a, b) != 0, #a " is not " #b)
 #define assert_memory_equal(a, b, size) CROSS_REQUIRE(memcmp(a, b, size) == 0, #a " equals " #b)
+#define assert_memory_not_equal(a, b, size) CROSS_REQUIRE(memcmp(a, b, size) != 0, #a " differs from " #b)
+#define assert_float_equal(a, b, epsilon) CROSS_REQUIRE(cross_is_near(a, b, epsilon), #a " is near " #b)
 
 #endif

@@ -1,0 +1,21 @@
+# The core's tests for another system: with cross/cmocka.h, because Debian has cmocka for its own processors only, and run by
+# CMAKE_CROSSCOMPILING_EMULATOR. A test belongs to the core unless it uses a header of the layers above.
+find_package(Threads REQUIRED)
+
+nebel_glob(sources test_*.c)
+foreach(source IN LISTS sources)
+    file(STRINGS ${source} includes REGEX "^#include")
+    if(includes MATCHES "(scene|render|gl|gl_[a-z]+|decimal|shortest)\\.h|epoxy|(scene|pass|picture)_help|cpu/")
+        continue()
+    endif()
+    get_filename_component(name ${source} NAME_WE)
+    nebel_add_program(${name} ${source} nebel_internal m)
+    target_include_directories(${name} PRIVATE cross)
+    target_compile_definitions(${name} PRIVATE NEBEL_SOURCE="${PROJECT_SOURCE_DIR}")
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES TIMEOUT 600)
+endforeach()
+
+foreach(part IN ITEMS elementary fog formula oracle)
+    include(${part}.cmake)
+endforeach()
