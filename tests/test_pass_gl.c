@@ -18,7 +18,7 @@ typedef struct split {
     float in_scattering[4 * PASS_PIXELS], transmittance[4 * PASS_PIXELS];
 } split;
 
-static void draw_split(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture *picture, split *out)
+static void draw_split(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, split *out)
 {
     const int width = (int)picture->view.width, height = (int)picture->view.height;
     const int window = picture->depth.kind == NEBEL_DEPTH_KIND_WINDOW;
@@ -61,7 +61,7 @@ static void compare_split(const nebel_snapshot *fog, const pass_picture *picture
     assert_true(difference.largest <= 3. / 255);
 }
 
-static void check_picture(nebel_gl *gl, const nebel_snapshot *fog, pass_picture *picture, const char *name)
+static void check_picture(nebel_gl *gl, nebel_snapshot *fog, pass_picture *picture, const char *name)
 {
     static split got;
     pass_fill(picture);
@@ -215,7 +215,7 @@ static void agree(agreement *a, const split *first, size_t i, const split *secon
     if (!(off <= a->largest)) a->largest = off;
 }
 
-static agreement compare_tiles(nebel_gl *gl, const nebel_snapshot *fog)
+static agreement compare_tiles(nebel_gl *gl, nebel_snapshot *fog)
 {
     enum { TILE = 16 };
     static split whole, part;
@@ -391,7 +391,7 @@ static void fill_sheet(const pass_picture *picture)
 }
 
 /* Draws over a sheet that holds the colours already where the output blends, else zeros. */
-static void draw_sheet(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture *picture, nebel_gl_output output)
+static void draw_sheet(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, nebel_gl_output output)
 {
     static const float zeros[4 * SHEET];
     const int blends = output != NEBEL_GL_OUTPUT_COMPOSE;

@@ -32,8 +32,8 @@ static GLuint attach_depth_and_stencil(void)
 }
 
 /* All functions, in the state as it is, between two snapshots of it. */
-static void use_all(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture *picture, unsigned depth,
-                    unsigned color, const unsigned targets[2], nebel_gl_output output, int desktop)
+static void use_all(nebel_gl *gl, nebel_snapshot *fog, const pass_picture *picture, unsigned depth, unsigned color,
+                    const unsigned targets[2], nebel_gl_output output, int desktop)
 {
     static odd_snapshot before, after;
     nebel_gl *made = NULL;
@@ -54,8 +54,7 @@ static void use_all(nebel_gl *gl, const nebel_snapshot *fog, const pass_picture 
 }
 
 /* What a pass draws in a state. */
-static void draw_in(nebel_gl *gl, const nebel_snapshot *fog, int desktop, int odd_state, nebel_gl_output output,
-                    outcome *out)
+static void draw_in(nebel_gl *gl, nebel_snapshot *fog, int desktop, int odd_state, nebel_gl_output output, outcome *out)
 {
     static float color_texels[4 * PASS_PIXELS];
     odd o;

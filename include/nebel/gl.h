@@ -69,11 +69,13 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl);
 void nebel_destroy_gl(nebel_gl *gl);
 
 /* Hands over the fog as one eye sees it: packed relative to the eye of `view`, with lists of volumes per screen tile
- * where there are more than a few. It holds until the next call; the snapshot is not needed any longer. Snapshot NULL:
- * no fog. O(volumes + tiles), plus what the driver takes for the upload. Errors: ARGUMENT (also a view that
- * nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more volumes than the largest
- * texture holds), UNSUPPORTED (the context is another one, or lost). On an error there is no fog. */
-nebel_result nebel_gl_set_fog(nebel_gl *gl, const nebel_snapshot *snapshot, const nebel_view *view);
+ * where there are more than a few. It holds until the next call, and the snapshot is retained until then. Snapshot
+ * NULL: no fog. O(volumes + tiles), plus what the driver takes for the upload; nothing is packed again where snapshot
+ * and eye are those of the last call, to the last bit, and nothing at all is done where the view is, too. Errors:
+ * ARGUMENT (also a view that nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
+ * volumes than the largest texture holds), UNSUPPORTED (the context is another one, or lost). On an error there is no
+ * fog. */
+nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view);
 
 typedef enum nebel_gl_output {
     NEBEL_GL_OUTPUT_COMPOSE = 0, /* transmittance * color + in-scattering; alpha of the colour texture */

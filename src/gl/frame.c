@@ -1,6 +1,7 @@
 /* A frame of the scene renderer. Sample after sample, each through other places of the pixels: surfaces with their
  * properties; once, shadow maps around what the first sample sees; the fog up to the surfaces; the light of all that.
  */
+#include "gl.h"
 #include "renderer.h"
 
 #include <math.h>
@@ -206,8 +207,8 @@ static nebel_result draw_fog(const frame *f)
     const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
                                 .depth_texture = r->targets.place,
                                 .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
-    const nebel_result result = nebel_gl_set_fog(r->eye_fog, r->fog, &f->sample_view);
-    return result == NEBEL_OK ? nebel_gl_draw_fog(r->eye_fog, &pass) : result;
+    const nebel_result result = nebel_gl_set_fog(r->eye_fog, r->fog, &f->view);
+    return result == NEBEL_OK ? nb_gl_draw_fog(r->eye_fog, &pass, &f->sample_view) : result;
 }
 
 /* ---- particles ------------------------------------------------------------------------------- */

@@ -75,6 +75,7 @@ void nebel_destroy_gl(nebel_gl *gl)
     const nebel_log silent = {0};
     if (nb_context_check(&silent, gl->vertex_array) == NEBEL_OK) delete_objects(gl);
     nebel_release_snapshot(gl->empty);
+    nebel_release_snapshot(gl->packed);
     nb_release(&gl->allocator, gl->programs.list);
     nb_release(&gl->allocator, gl->words);
     nb_release(&gl->allocator, gl->entries);

@@ -16,7 +16,8 @@ struct nebel_gl {
     uint32_t texture_rows, tile_rows; /* allocated */
     nb_programs programs;
 
-    int has_fog; /* what follows is of the last nebel_gl_set_fog, and that went well */
+    int has_fog;            /* what follows is of the last nebel_gl_set_fog, and that went well */
+    nebel_snapshot *packed; /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
     nebel_view view;
     nebel_gl_fog fog;
     nebel_word *words;
@@ -24,6 +25,10 @@ struct nebel_gl {
     uint32_t *entries;
     size_t entry_capacity;
 };
+
+/* nebel_gl_draw_fog along the rays of another view, whose pixels lie within those of the view that the fog was set for.
+ */
+nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nebel_view *view);
 
 /* The number of a tile's pixels in a row is 2 to this. */
 enum { NB_GL_TILE_SHIFT = 4 };

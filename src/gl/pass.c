@@ -244,11 +244,16 @@ nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     if (pass == NULL) return fail(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
     if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
+    return nb_gl_draw_fog(gl, pass, &gl->view);
+}
+
+nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nebel_view *view)
+{
     nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
     if (result == NEBEL_OK) result = check_pass(gl, pass);
     if (result != NEBEL_OK) return result;
     task t = {.gl = gl, .pass = pass};
-    if (nebel_view_rays(&gl->view, &pass->depth, &t.rays) != NEBEL_OK) {
+    if (nebel_view_rays(view, &pass->depth, &t.rays) != NEBEL_OK) {
         return fail(gl, NEBEL_ERROR_ARGUMENT, "the depth convention is none, or does not fit the view's projection");
     }
     nb_state state;

@@ -2,6 +2,8 @@
 #include "gl.h"
 #include "state.h"
 
+#include <string.h>
+
 enum { TILE_SIZE = 1 << NB_GL_TILE_SHIFT, FEW_VOLUMES = 3 };
 
 /* ---- packing --------------------------------------------------------------------------------- */
@@ -147,17 +149,53 @@ static nebel_result upload_tiles(nebel_gl *gl, size_t count)
     return result;
 }
 
-static nebel_result upload(nebel_gl *gl, size_t entry_count)
+static nebel_result upload(nebel_gl *gl, int with_words, size_t entry_count)
 {
     nb_unpacking unpacking;
+    nebel_result result = NEBEL_OK;
     nb_state_save_unpacking(&gl->context, &unpacking);
-    nebel_result result = upload_words(gl);
+    if (with_words) result = upload_words(gl);
     if (result == NEBEL_OK && entry_count > 0) result = upload_tiles(gl, entry_count);
     nb_state_restore_unpacking(&gl->context, &unpacking);
     return result;
 }
 
-nebel_result nebel_gl_set_fog(nebel_gl *gl, const nebel_snapshot *snapshot, const nebel_view *view)
+static int is_same_view(const nebel_view *a, const nebel_view *b)
+{
+    return a->width == b->width && a->height == b->height &&
+           memcmp(a->eye_from_world, b->eye_from_world, sizeof a->eye_from_world) == 0 &&
+           memcmp(a->clip_from_eye, b->clip_from_eye, sizeof a->clip_from_eye) == 0;
+}
+
+/* The snapshot stays with the gl, so that no other can have its address. */
+static void keep(nebel_gl *gl, nebel_snapshot *snapshot)
+{
+    if (snapshot != NULL) (void)nebel_retain_snapshot(snapshot);
+    nebel_release_snapshot(gl->packed);
+    gl->packed = snapshot;
+}
+
+/* Where neither the fog nor the eye is another one the words stay, and in the same view the tiles, too. */
+static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view, const double eye[3])
+{
+    const int has_words = gl->packed == snapshot && memcmp(gl->fog.eye, eye, sizeof gl->fog.eye) == 0;
+    size_t entry_count = 0;
+    nebel_result result = NEBEL_OK;
+    if (has_words && is_same_view(&gl->view, view)) return NEBEL_OK;
+    gl->view = *view;
+    if (!has_words) {
+        gl->fog = (nebel_gl_fog){.eye = {eye[0], eye[1], eye[2]}, .features = nebel_pack_features(snapshot)};
+        result = pack(gl, snapshot);
+    }
+    if (result == NEBEL_OK && nebel_snapshot_volume_count(snapshot) > FEW_VOLUMES) {
+        result = list_tiles(gl, snapshot, &entry_count);
+    }
+    if (result == NEBEL_OK) result = upload(gl, !has_words, entry_count);
+    keep(gl, result == NEBEL_OK ? snapshot : NULL);
+    return result;
+}
+
+nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view)
 {
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     gl->has_fog = 0;
@@ -172,15 +210,7 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, const nebel_snapshot *snapshot, cons
                        "eye_from_world is a rotation and a translation, clip_from_eye a projection",
                        (unsigned)view->width, (unsigned)view->height);
     }
-    if (snapshot == NULL) snapshot = gl->empty;
-    gl->view = *view;
-    gl->fog = (nebel_gl_fog){.eye = {rays.eye[0], rays.eye[1], rays.eye[2]}, .features = nebel_pack_features(snapshot)};
-    size_t entry_count = 0;
-    result = pack(gl, snapshot);
-    if (result == NEBEL_OK && nebel_snapshot_volume_count(snapshot) > FEW_VOLUMES) {
-        result = list_tiles(gl, snapshot, &entry_count);
-    }
-    if (result == NEBEL_OK) result = upload(gl, entry_count);
+    result = prepare(gl, snapshot != NULL ? snapshot : gl->empty, view, rays.eye);
     gl->has_fog = result == NEBEL_OK;
     return result;
 }

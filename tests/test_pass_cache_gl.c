@@ -1,0 +1,219 @@
+/* Nothing is packed, listed or handed to OpenGL again that the last call has left there: functions of OpenGL are
+ * replaced by ones that count. What is drawn is compared with what a new nebel_gl draws. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "pass_help.h"
+
+#include <epoxy/gl.h>
+#include <nebel/gl_render.h>
+
+/* ---- counting -------------------------------------------------------------------------------- */
+
+static PFNGLBUFFERSUBDATAPROC true_buffer;
+static PFNGLTEXSUBIMAGE2DPROC true_texture;
+static int words, tiles; /* uploads */
+
+static void EPOXY_CALLSPEC count_buffer(GLenum target, GLintptr offset, GLsizeiptr size, const void *data)
+{
+    words++;
+    true_buffer(target, offset, size, data);
+}
+
+static void EPOXY_CALLSPEC count_texture(GLenum target, GLint level, GLint x, GLint y, GLsizei width, GLsizei height,
+                                         GLenum format, GLenum type, const void *data)
+{
+    if (format == GL_RED_INTEGER) {
+        tiles++;
+    } else {
+        words++;
+    }
+    true_texture(target, level, x, y, width, height, format, type, data);
+}
+
+/* Functions are loaded when they are first called, and can be replaced from then on. */
+static void load_functions(void)
+{
+    GLuint buffer, texture;
+    const float texel[4] = {0};
+    glGenBuffers(1, &buffer);
+    glBindBuffer(GL_UNIFORM_BUFFER, buffer);
+    glBufferData(GL_UNIFORM_BUFFER, sizeof texel, NULL, GL_STREAM_DRAW);
+    glBufferSubData(GL_UNIFORM_BUFFER, 0, sizeof texel, texel);
+    glDeleteBuffers(1, &buffer);
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, 1, 1, 0, GL_RGBA, GL_FLOAT, NULL);
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, 1, 1, GL_RGBA, GL_FLOAT, texel);
+    glDeleteTextures(1, &texture);
+}
+
+static void start_counting(void)
+{
+    load_functions();
+    true_buffer = epoxy_glBufferSubData;
+    true_texture = epoxy_glTexSubImage2D;
+    epoxy_glBufferSubData = count_buffer;
+    epoxy_glTexSubImage2D = count_texture;
+    words = tiles = 0;
+}
+
+static void stop_counting(void)
+{
+    epoxy_glBufferSubData = true_buffer;
+    epoxy_glTexSubImage2D = true_texture;
+}
+
+static void expect_uploads(int of_words, int of_tiles)
+{
+    assert_int_equal(words, of_words);
+    assert_int_equal(tiles, of_tiles);
+    words = tiles = 0;
+}
+
+/* ---- passes ---------------------------------------------------------------------------------- */
+
+static const range usual = {-1, 0};
+
+static void draw(nebel_gl *gl, float texels[4 * PASS_PIXELS])
+{
+    static float none[PASS_PIXELS];
+    for (int i = 0; i < PASS_PIXELS; i++) none[i] = 1;
+    const unsigned depth = pass_depth_texture(PASS_WIDTH, PASS_HEIGHT, none);
+    const unsigned target = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    const unsigned second = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    const unsigned framebuffer = pass_framebuffer(target, second);
+    const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = depth};
+    assert_int_equal(nebel_gl_draw_fog(gl, &pass), NEBEL_OK);
+    pass_read(target, PASS_WIDTH, PASS_HEIGHT, texels);
+    pass_delete_framebuffer(framebuffer);
+    pass_delete_texture(depth);
+    pass_delete_texture(target);
+    pass_delete_texture(second);
+}
+
+/* Sets the fog, which must take so many uploads and draw what a nebel_gl draws that knows nothing yet. */
+static void check(nebel_gl *gl, nebel_snapshot *fog, const nebel_view *view, int of_words, int of_tiles)
+{
+    static float got[4 * PASS_PIXELS], wanted[4 * PASS_PIXELS];
+    nebel_gl *fresh = NULL;
+    start_counting();
+    assert_int_equal(nebel_gl_set_fog(gl, fog, view), NEBEL_OK);
+    expect_uploads(of_words, of_tiles);
+    stop_counting();
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &fresh), NEBEL_OK);
+    assert_int_equal(nebel_gl_set_fog(fresh, fog, view), NEBEL_OK);
+    draw(gl, got);
+    draw(fresh, wanted);
+    assert_memory_equal(got, wanted, sizeof got);
+    nebel_destroy_gl(fresh);
+}
+
+/* Whether the eye is the same to the last bit; the way from a turned or widened view to its eye has roundings. */
+static int moves(const nebel_view *from, const nebel_view *to)
+{
+    nebel_rays a, b;
+    assert_int_equal(nebel_view_rays(from, NULL, &a), NEBEL_OK);
+    assert_int_equal(nebel_view_rays(to, NULL, &b), NEBEL_OK);
+    return memcmp(a.eye, b.eye, sizeof a.eye) != 0;
+}
+
+/* In the end another snapshot of the same fog, which counts as another. */
+static void check_fog(nebel_gl *gl, int more, int of_tiles)
+{
+    const nebel_view first = pass_view(PERSPECTIVE, usual, 0, 0);
+    nebel_snapshot *fog = pass_fog(more);
+    check(gl, fog, &first, 1, of_tiles);
+    check(gl, fog, &first, 0, 0);
+    nebel_view view = first;
+    view.clip_from_eye[0] *= 2;
+    assert_false(moves(&first, &view));
+    check(gl, fog, &view, 0, of_tiles);
+    view.width /= 2;
+    check(gl, fog, &view, 0, of_tiles);
+    view = pass_view(PERSPECTIVE, usual, .4, -.1);
+    check(gl, fog, &view, moves(&first, &view), of_tiles);
+    view.eye_from_world[12] += .5;
+    check(gl, fog, &view, 1, of_tiles);
+    nebel_release_snapshot(fog);
+    fog = pass_fog(more);
+    check(gl, fog, &view, 1, of_tiles);
+    nebel_release_snapshot(fog);
+}
+
+static void test_passes_hand_over_what_is_new(void **state)
+{
+    (void)state;
+    nb_gl context;
+    nebel_gl *gl = NULL;
+    const nebel_view view = pass_view(PERSPECTIVE, usual, .3, -.1);
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);
+    check(gl, NULL, &view, 1, 0);
+    check(gl, NULL, &view, 0, 0);
+    check_fog(gl, -1, 0);
+    check_fog(gl, 60, 1);
+    nebel_destroy_gl(gl);
+    pass_close(&context);
+}
+
+/* An error forgets what was there. */
+static void test_errors_are_not_kept(void **state)
+{
+    (void)state;
+    nb_gl context;
+    nebel_gl *gl = NULL;
+    nebel_view view = pass_view(PERSPECTIVE, usual, .3, -.1);
+    nebel_snapshot *const fog = pass_fog(60);
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);
+    check(gl, fog, &view, 1, 1);
+    view.height = 0;
+    assert_int_equal(nebel_gl_set_fog(gl, fog, &view), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_gl_draw_fog(gl, &(nebel_gl_pass){0}), NEBEL_ERROR_ARGUMENT);
+    view.height = PASS_HEIGHT;
+    check(gl, fog, &view, 0, 0);
+    nebel_destroy_gl(gl);
+    nebel_release_snapshot(fog);
+    pass_close(&context);
+}
+
+/* ---- the scene renderer ---------------------------------------------------------------------- */
+
+/* All samples of all frames of a camera that stands still. */
+static void test_samples_share_the_fog(void **state)
+{
+    (void)state;
+    nb_gl context;
+    nebel_gl_renderer *renderer = NULL;
+    nebel_snapshot *const fog = pass_fog(60);
+    const nebel_scene_data scene = {.ambient = {1, 1, 1}};
+    nebel_gl_frame_desc frame = {
+        .camera = {.look_at = {4e4, 12, -7e4 - 9}, .up = {0, 1, 0}, .vertical_fov = 60}, .width = 64, .height = 48};
+    memcpy(frame.camera.position, pass_eye, sizeof frame.camera.position);
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_create_gl_renderer(&scene, fog, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
+    start_counting();
+    for (int i = 0; i < 3; i++) assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    expect_uploads(1, 1);
+    stop_counting();
+    nebel_destroy_gl_renderer(renderer);
+    nebel_release_snapshot(fog);
+    pass_close(&context);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_passes_hand_over_what_is_new),
+        cmocka_unit_test(test_errors_are_not_kept),
+        cmocka_unit_test(test_samples_share_the_fog),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
