@@ -9,6 +9,7 @@ import pathlib
 import pty
 import random
 import re
+import resource
 import shutil
 import signal
 import struct
@@ -279,7 +280,7 @@ class TraceTest(Case):
         outputs = {self.trace(RAY, "--precision", "float", "--isa", name).out for name in names}
         self.assertEqual(len(outputs), 1)
         for name in {"scalar", "sse2", "avx2", "avx512", "neon"} - set(names):
-            self.assert_failed(self.trace(RAY, "--precision", "float", "--isa", name), name, "not available")
+            self.assert_misused(self.trace(RAY, "--precision", "float", "--isa", name), name, "not available")
         self.assert_misused(self.trace(RAY, "--isa", "scalar"), "--isa", "float")
         self.assert_misused(self.trace(RAY, "-p", "float", "--isa", "avx3"), "avx3", "did you mean 'avx2'?")
         self.assert_misused(self.trace(RAY, "-p", "half"), "half", "double, float")
@@ -347,6 +348,38 @@ class RenderTest(PictureCase):
         self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">II", data[16:24]), (64, 36))
         self.assertEqual(self.files(), sorted(self.given + ["a.png"]))
+
+    def test_streams(self):
+        words = ["render", self.scene, "--size", "64x36", "-o"]
+        for name in ("-", "/dev/stdout"):
+            done = subprocess.run([NEBEL, *map(str, words), name], capture_output=True, timeout=120)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertTrue(done.stdout.startswith(b"\x89PNG\r\n") and done.stdout.endswith(b"IEND\xaeB`\x82"))
+        with open(self.folder / "log", "wb") as log:
+            log.write(b"old")
+            log.flush()
+            self.assert_done(nebel(*words, "-", stdout=log))
+        self.assertEqual((self.folder / "log").read_bytes(), b"old" + done.stdout)
+        self.assert_done(nebel(*words, "/dev/null"))
+        self.assert_failed(nebel(*words, "/dev/full"), "/dev/full", "No space left")
+        self.assert_misused(nebel(*words, "-", "--aov"), "--aov")
+        self.assert_misused(nebel(*words, "-", "--frames", "0-1"), "--output")
+
+    def test_a_limit_of_file_size_leaves_nothing(self):
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        for name in ("a.png", "a.exr"):
+            self.assert_failed(self.render(name, "--size", "640x360", preexec_fn=limit), name, "too large")
+        self.assertEqual(self.files(), self.given)
+
+    def test_memory_that_is_out_is_named(self):
+        if "AddressSanitizer" in nebel("info").out:
+            self.skipTest("AddressSanitizer needs more address space than the limit leaves")
+        limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (150 << 20, 150 << 20))
+        done = self.render("a.png", preexec_fn=limit)
+        if done.returncode == 127:
+            self.skipTest("the libraries alone need more than the limit leaves")
+        self.assert_failed(done, "out of memory")
+        self.assertNotIn("processor", done.err)
 
     def test_exr_and_its_layers(self):
         self.assert_done(self.render("a.exr"))

@@ -557,6 +557,36 @@ static void test_devices_and_pipes_are_written_and_stay(void **state)
     free(image.samples);
 }
 
+/* What has no ending that says more. */
+static void test_streams_take_png_from_where_they_stand(void **state)
+{
+    (void)state;
+    journal kept;
+    char name[64], bytes[16] = "";
+    nebel_image image = make_image(2, 2, 3, rgb_names);
+    const int file = open(in_folder("log"), O_RDWR | O_CREAT | O_APPEND, 0600);
+    assert_int_equal(write(file, "old", 3), 3);
+    snprintf(name, sizeof name, "/dev/fd/%d", file);
+    assert_int_equal(nebel_find_image_format(name), NEBEL_IMAGE_PNG);
+    assert_int_equal(check_path(name, &kept), NEBEL_OK);
+    assert_int_equal(write_image(name, &image, &kept), NEBEL_OK);
+    assert_int_equal(pread(file, bytes, 11, 0), 11);
+    assert_memory_equal(bytes, "old\x89PNG\r\n\x1a\n", 11);
+    close(file);
+    const int closed = open(in_folder("log"), O_RDONLY);
+    snprintf(name, sizeof name, "/dev/fd/%d", closed);
+    assert_int_equal(check_path(name, &kept), NEBEL_ERROR_FILE);
+    assert_non_null(strstr(kept.last, "not open to writing"));
+    close(closed);
+    assert_int_equal(nebel_find_image_format("/dev/null"), NEBEL_IMAGE_PNG);
+    assert_int_equal(write_image("/dev/full", &image, &kept), NEBEL_ERROR_FILE);
+    assert_int_equal(nebel_find_image_format(in_folder("log")), NEBEL_IMAGE_NONE);
+    assert_int_equal(nebel_find_image_format(in_folder("none")), NEBEL_IMAGE_NONE);
+    assert_int_equal(nebel_find_image_format(in_folder("")), NEBEL_IMAGE_NONE);
+    unlink(in_folder("log"));
+    free(image.samples);
+}
+
 static void test_a_failure_leaves_everything_as_it_was(void **state)
 {
     (void)state;
@@ -660,6 +690,7 @@ int main(void)
         cmocka_unit_test(test_a_target_is_replaced_with_its_mode_and_the_umask_holds),
         cmocka_unit_test(test_a_link_stays_and_its_target_is_replaced),
         cmocka_unit_test(test_devices_and_pipes_are_written_and_stay),
+        cmocka_unit_test(test_streams_take_png_from_where_they_stand),
         cmocka_unit_test(test_a_failure_leaves_everything_as_it_was),
         cmocka_unit_test(test_a_folder_without_permission_is_an_error),
         cmocka_unit_test(test_every_failing_allocation_is_survived),

@@ -22,12 +22,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { OUTPUT, SIZE, SAMPLES, EXPOSURE, FRAME, FRAMES, AOV, TOLERANCE, METHOD, DEVICE, ISA, THREADS, QUIET };
 
 static const nb_option options[] = {
     [OUTPUT] = {"output", 'o', "FILE",
-                "The picture: .png (tone mapped, sRGB, 8 bit) or .exr\n(linear light, float). Needed."},
+                "The picture: .png (tone mapped, sRGB, 8 bit) or .exr\n(linear light, float); -: PNG to standard "
+                "output.\nNeeded."},
     [SIZE] = {"size", 's', "WxH", "Pixels, each side 1 to 32768, 2^28 in all (--aov:\n2^26). Default: 1280x720."},
     [SAMPLES] = {"samples", 0, "N", "Samples for each pixel, 1 to 4096. Default: 4."},
     [EXPOSURE] = {"exposure", 'e', "EV", "Stops, -20 to 20: 1 doubles the light. PNG only.\nDefault: 0."},
@@ -74,7 +76,7 @@ enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, L
 
 typedef struct settings {
     const char *scene, *output;
-    nb_target_kind kind;
+    nebel_image_format format;
     uint32_t width, height, samples;
     double exposure, tolerance;
     uint32_t first_frame, last_frame;
@@ -122,6 +124,8 @@ static void read_frames(nb_arguments *arguments, settings *wanted)
     nb_options_reject(arguments, FRAMES, "is no range such as 0-95, of frames up to 1000000");
 }
 
+static const char standard_output[] = "/dev/stdout";
+
 static void read_output(nb_arguments *arguments, settings *wanted)
 {
     wanted->output = arguments->values[OUTPUT];
@@ -130,13 +134,16 @@ static void read_output(nb_arguments *arguments, settings *wanted)
         arguments->misused = 1;
         return;
     }
-    wanted->kind = nb_target_find_kind(wanted->output);
-    if (wanted->kind == NB_TARGET_NONE) nb_options_reject(arguments, OUTPUT, "ends neither in .png nor in .exr");
+    if (strcmp(wanted->output, "-") == 0) wanted->output = standard_output;
+    if (strcmp(wanted->output, standard_output) == 0 && isatty(STDOUT_FILENO))
+        nb_options_reject(arguments, OUTPUT, "is a terminal; send the picture to a file or to a program");
+    wanted->format = nebel_find_image_format(wanted->output);
+    if (wanted->format == NEBEL_IMAGE_NONE) nb_options_reject(arguments, OUTPUT, "ends neither in .png nor in .exr");
     const char *const fault = wanted->many_frames ? nb_pattern_find_fault(wanted->output) : NULL;
     if (fault != NULL) nb_options_reject(arguments, OUTPUT, fault);
-    if (wanted->kind == NB_TARGET_PNG && wanted->aov)
+    if (wanted->format == NEBEL_IMAGE_PNG && wanted->aov)
         nb_options_reject(arguments, OUTPUT, "is no .exr; --aov needs one");
-    if (wanted->kind == NB_TARGET_EXR && arguments->values[EXPOSURE] != NULL) {
+    if (wanted->format == NEBEL_IMAGE_EXR && arguments->values[EXPOSURE] != NULL) {
         nb_options_reject(arguments, EXPOSURE, "is for PNG; an EXR keeps the light as it is");
     }
 }
@@ -172,7 +179,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     read_output(arguments, wanted);
     read_device(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
-    return nb_isa_check("render", wanted->renderer.isa) == NB_DONE ? -1 : NB_FAILED;
+    return -1;
 }
 
 /* The file name of a frame; free it. NULL after a message. */
@@ -296,7 +303,7 @@ static int write_picture(studio *all, const char *name)
         for (uint32_t c = 0; c < planes[i].channels; c++) names[image.channel_count++] = planes[i].names[c];
     }
     image.samples = all->interleaved != NULL ? all->interleaved : all->samples[COLOR];
-    if (wanted->kind == NB_TARGET_PNG) nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
+    if (wanted->format == NEBEL_IMAGE_PNG) nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
     const nebel_scene_desc desc = {.log = nb_report_log(&all->listener)};
     const nebel_result result = nebel_write_image(name, &desc, &image);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, name, result);

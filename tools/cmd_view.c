@@ -2,10 +2,13 @@
 #include "commands.h"
 #include "decimal.h"
 #include "report.h"
+#include "target.h"
 
 #if defined(NEBEL_HAVE_VIEWER)
 #include "view/view.h"
 #endif
+
+#include <nebel/scene.h>
 
 #include <string.h>
 
@@ -59,7 +62,10 @@ static int view(nb_arguments *arguments)
     wanted.frame = nb_options_number(arguments, FRAME, 0, 1000000, 0);
     wanted.screenshot = arguments->values[SCREENSHOT];
     wanted.controls = arguments->values[CONTROLS];
+    if (wanted.screenshot != NULL && nebel_find_image_format(wanted.screenshot) == NEBEL_IMAGE_NONE)
+        nb_options_reject(arguments, SCREENSHOT, "ends neither in .png nor in .exr");
     if (arguments->misused) return nb_report_misuse("view", "view: nothing was done");
+    if (wanted.screenshot != NULL && nb_target_check(wanted.screenshot) != NB_DONE) return NB_FAILED;
     return nb_view_run(&wanted);
 }
 #else

@@ -6,12 +6,9 @@
 
 #include <nebel/nebel.h>
 
-/* The value of an option --isa; DEFAULT where it is not given. An unknown name is reported as the other options' values
- * are. */
+/* The value of an option --isa; DEFAULT where it is not given. What is unknown, or what this processor or this build
+ * does not have, is reported as the other options' values are. */
 nebel_isa nb_isa_choose(nb_arguments *arguments, int option);
-
-/* NB_DONE, or NB_FAILED with a message where this processor or this build does not have it. */
-int nb_isa_check(const char *command, nebel_isa isa);
 
 /* What DEFAULT stands for on this processor. */
 nebel_isa nb_isa_best(void);

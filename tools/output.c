@@ -14,6 +14,7 @@
 void nb_output_prepare(void)
 {
     (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN);
     for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; descriptor++) {
         if (fcntl(descriptor, F_GETFD) != -1 || errno != EBADF) continue;
         /* The lowest free number is this one. Read only: a write to it fails as it would have when closed. */

@@ -5,7 +5,8 @@
 #include <stddef.h>
 
 /* Standard streams that the caller left closed are opened to nothing, so that no file of ours takes their number:
- * reading from such a stream finds the end, writing to it is an error. A closed pipe becomes an error of the write. */
+ * reading from such a stream finds the end, writing to it is an error. A closed pipe, or a file at its
+ * largest size (ulimit -f), becomes an error of the write. */
 void nb_output_prepare(void);
 
 /* Writes all of it. Returns 0, or the errno of what went wrong. */

@@ -188,11 +188,21 @@ typedef struct nebel_image {
 nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image);
 void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image);
 
-/* Writes by the ending of `path`: .png takes channels R, G, B in 0..1, already in sRGB, 8 bit with an ordered rounding
- * (no dithering noise between runs); .exr takes every channel as 32-bit float, ZIP compressed. Regular files are
- * written to a temporary name beside the target and renamed; devices and pipes are written directly. On an error
- * nothing of the target has changed and no temporary file is left. Errors: ARGUMENT, FILE, FORMAT (unknown ending),
- * MEMORY. */
+typedef enum nebel_image_format {
+    NEBEL_IMAGE_NONE = 0, /* a name of neither ending */
+    NEBEL_IMAGE_PNG, /* channels R, G, B in 0..1, already in sRGB: 8 bit with an ordered rounding, the same in every
+                        run */
+    NEBEL_IMAGE_EXR  /* every channel as 32-bit float, ZIP compressed */
+} nebel_image_format;
+
+/* What nebel_write_image writes at `path`: by the ending of the name, .png or .exr in any case. A device, a pipe or
+ * what is open already (/dev/stdout, /dev/fd/3) takes PNG where its name has neither. Thread safe. */
+nebel_image_format nebel_find_image_format(const char *path);
+
+/* Regular files are written to a temporary name beside the target and renamed, so that on an error nothing of the
+ * target has changed and no temporary file is left. Devices and pipes are written directly; /dev/stdout, /dev/stderr
+ * and /dev/fd/N are written on from where they stand. Where a limit of the size of files may be met, ignore SIGXFSZ.
+ * Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, const nebel_image *image);
 
 /* Whether nebel_write_image is likely to succeed at `path`, to be asked before the work: the ending is known, and a

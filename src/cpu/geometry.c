@@ -143,15 +143,23 @@ static const char *isa_option(nebel_isa isa)
     }
 }
 
+/* Memory that is out is reported where it is for all that the renderer takes. */
+static nebel_result fail_device(const nb_geometry *geometry, const char *options)
+{
+    const enum RTCError error = rtcGetDeviceError(NULL);
+    const nebel_result result = result_of(error);
+    if (result == NEBEL_ERROR_MEMORY) return result;
+    return nb_fail(&geometry->log, result, "Embree does not start with \"%s\": %s", options,
+                   error == RTC_ERROR_UNSUPPORTED_CPU ? "this processor lacks the instruction set"
+                                                      : "too little memory or too few threads may be had");
+}
+
 static nebel_result make_device(nb_geometry *geometry, nebel_isa isa, int threads)
 {
     char options[64];
     snprintf(options, sizeof options, "threads=%d%s", threads, isa_option(isa));
     geometry->device = rtcNewDevice(options);
-    if (geometry->device == NULL) {
-        return nb_fail(&geometry->log, result_of(rtcGetDeviceError(NULL)),
-                       "Embree does not start with \"%s\" on this processor", options);
-    }
+    if (geometry->device == NULL) return fail_device(geometry, options);
     rtcSetDeviceErrorFunction(geometry->device, report, &geometry->log);
     return NEBEL_OK;
 }

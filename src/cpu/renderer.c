@@ -76,7 +76,9 @@ nebel_result nebel_create_renderer(const nebel_scene_data *scene, nebel_snapshot
     result = set_up(made, desc->isa);
     if (result != NEBEL_OK) {
         if (result == NEBEL_ERROR_MEMORY)
-            nb_fail(&desc->log, result, "renderer: out of memory; use fewer triangles or threads");
+            nb_fail(
+                &desc->log, result,
+                "renderer: out of memory; free some, raise its limit (ulimit -v), or use fewer triangles or threads");
         nebel_destroy_renderer(made);
         return result;
     }

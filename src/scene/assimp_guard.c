@@ -121,6 +121,7 @@ nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason)
     static const char unknown[] = "No suitable reader";
     const char *file = load->source->file, *suffix = suffix_of(file);
     if (reason == NULL || reason[0] == '\0') reason = "its parts contradict each other";
+    if (strstr(reason, "bad_alloc") != NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     size_t size = strlen(reason);
     while (size > 0 && (reason[size - 1] == '.' || reason[size - 1] == '\n')) size--;
     if (strncmp(reason, unknown, sizeof unknown - 1) != 0)

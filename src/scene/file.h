@@ -4,6 +4,8 @@
 
 #include "base/base.h"
 
+#include <stdbool.h>
+
 typedef struct nb_bytes {
     unsigned char *data;
     size_t size, capacity;
@@ -28,6 +30,9 @@ nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *lo
 /* Whether nb_file_write is likely to do it: whether a file can be made in the folder, which is tried, or the device is
  * open to writing. What is at the path does not change. Errors: FILE, MEMORY. */
 nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log, const char *path);
+
+/* Whether nb_file_write writes there directly: a device, a pipe, a socket, or what is open already. */
+bool nb_file_is_direct(const char *path);
 
 /* Appends, growing; false when memory is out. */
 int nb_bytes_write(const nebel_allocator *allocator, nb_bytes *bytes, size_t offset, const void *data, size_t size);

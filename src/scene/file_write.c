@@ -7,6 +7,7 @@
 #include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sys/stat.h>
@@ -83,9 +84,33 @@ static int write_all(int file, const nb_bytes *bytes)
     return 0;
 }
 
+/* The open file that a path stands for, or -1. */
+static int descriptor_of(const char *path)
+{
+    static const char *const folders[] = {"/dev/fd/", "/proc/self/fd/"};
+    if (strcmp(path, "/dev/stdout") == 0) return STDOUT_FILENO;
+    if (strcmp(path, "/dev/stderr") == 0) return STDERR_FILENO;
+    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
+        const size_t size = strlen(folders[i]);
+        const char *name = path + size;
+        if (strncmp(path, folders[i], size) != 0) continue;
+        const size_t digits = strspn(name, "0123456789");
+        if (digits > 0 && digits < 9 && name[digits] == '\0') return atoi(name);
+    }
+    return -1;
+}
+
+/* What is open already goes on from where it stands: opened anew it would lose what was appended to. */
+static int open_directly(const char *path)
+{
+    const int descriptor = descriptor_of(path);
+    if (descriptor >= 0) return fcntl(descriptor, F_DUPFD_CLOEXEC, 0);
+    return open(path, O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY);
+}
+
 static int write_directly(const char *path, const nb_bytes *bytes)
 {
-    const int file = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY);
+    const int file = open_directly(path);
     if (file < 0) return errno;
     const int error = write_all(file, bytes);
     return close(file) != 0 && error == 0 ? errno : error;
@@ -113,6 +138,27 @@ static bool is_open_file(const char *path)
     return false;
 }
 
+static bool is_direct(const char *path, const struct stat *status)
+{
+    return !S_ISDIR(status->st_mode) && (!S_ISREG(status->st_mode) || is_open_file(path));
+}
+
+bool nb_file_is_direct(const char *path)
+{
+    struct stat status;
+    return stat(path, &status) == 0 && is_direct(path, &status);
+}
+
+/* 0 or an error number. */
+static int check_writing(const char *path)
+{
+    const int descriptor = descriptor_of(path);
+    if (descriptor < 0) return access(path, W_OK) == 0 ? 0 : errno;
+    const int flags = fcntl(descriptor, F_GETFL);
+    if (flags < 0) return errno;
+    return (flags & O_ACCMODE) == O_RDONLY ? EBADF : 0;
+}
+
 /* What is at a path, and where its bytes go. */
 typedef struct target {
     const char *path; /* symbolic links followed, unless it is written directly */
@@ -127,10 +173,10 @@ static int find_target(nb_arena *arena, const char *path, target *found)
     found->exists = stat(path, &found->status) == 0;
     if (!found->exists && errno != ENOENT) return errno;
     if (found->exists && S_ISDIR(found->status.st_mode)) return EISDIR;
-    found->is_direct = found->exists && (!S_ISREG(found->status.st_mode) || is_open_file(path));
+    found->is_direct = found->exists && is_direct(path, &found->status);
     if (!found->is_direct) found->path = follow_links(arena, path);
     if (found->path == NULL) return errno;
-    return found->exists && access(found->path, W_OK) != 0 ? errno : 0;
+    return found->exists ? check_writing(found->path) : 0;
 }
 
 static int write_file(nb_arena *arena, const char *path, const nb_bytes *bytes)
@@ -166,6 +212,7 @@ static nebel_result fail(nb_arena *arena, const nebel_log *log, const char *path
     if (error == ENOMEM) return nb_fail(log, NEBEL_ERROR_MEMORY, "cannot write \"%s\": out of memory", path);
     if (error == EISDIR)
         return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": it is a folder; name a file in it", path);
+    if (error == EBADF) return nb_fail(log, NEBEL_ERROR_FILE, "cannot write \"%s\": it is not open to writing", path);
     const char *folder = nb_path_folder(arena, path);
     struct stat status;
     if (error == ENOENT && path[0] != '\0' && folder != NULL && folder[0] != '\0') {

@@ -118,6 +118,14 @@ static bool ends_in(const char *path, const char *ending)
     return size > length && strcasecmp(path + size - length, ending) == 0;
 }
 
+nebel_image_format nebel_find_image_format(const char *path)
+{
+    if (path == NULL) return NEBEL_IMAGE_NONE;
+    if (ends_in(path, ".png")) return NEBEL_IMAGE_PNG;
+    if (ends_in(path, ".exr")) return NEBEL_IMAGE_EXR;
+    return nb_file_is_direct(path) ? NEBEL_IMAGE_PNG : NEBEL_IMAGE_NONE;
+}
+
 static const char *find_fault(const nebel_image *image)
 {
     if (image->width == 0 || image->height == 0 || image->channel_count == 0) return "it has no samples";
@@ -148,9 +156,14 @@ static nebel_result fail_ending(const nb_codec *codec)
 
 static nebel_result encode(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes)
 {
-    if (ends_in(codec->name, ".png")) return nb_png_write_image(codec, image, bytes);
-    if (ends_in(codec->name, ".exr")) return nb_exr_write_image(codec, image, bytes);
-    return fail_ending(codec);
+    switch (nebel_find_image_format(codec->name)) {
+    case NEBEL_IMAGE_PNG:
+        return nb_png_write_image(codec, image, bytes);
+    case NEBEL_IMAGE_EXR:
+        return nb_exr_write_image(codec, image, bytes);
+    default:
+        return fail_ending(codec);
+    }
 }
 
 nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc)
@@ -159,7 +172,7 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
     const nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
     const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
-    if (!ends_in(path, ".png") && !ends_in(path, ".exr")) return fail_ending(&codec);
+    if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);
 }
 

@@ -24,6 +24,7 @@ typedef struct spot {
     size_t at;    /* what is wrong; size: the end of the file */
     size_t comma; /* before it, where one must be */
     expectation expected;
+    const nb_json_node *about; /* what messages name; NULL: the innermost of what is open */
 } spot;
 
 /* ---- the text
@@ -105,7 +106,8 @@ static const nb_json_node *innermost(const nb_json *json)
 static void fail(const spot *wrong, size_t at, const char *message)
 {
     char path[NB_JSON_PATH] = "";
-    if (wrong->json->depth > 0) nb_json_path(wrong->json, innermost(wrong->json), path);
+    const nb_json_node *about = wrong->about != NULL ? wrong->about : innermost(wrong->json);
+    if (about != NULL) nb_json_path(wrong->json, about, path);
     nb_json_fail_at(wrong->json, NEBEL_ERROR_FORMAT, at, path, "%s", message);
 }
 
@@ -223,7 +225,8 @@ static void explain_word(const spot *wrong, const char *what)
     const bool is_signed = given.text[0] == '-' || given.text[0] == '+';
     const word name = {given.text + is_signed, given.size - is_signed};
     if (WORD_IS(name, "nan", "inf", "infinity", "1.#inf", "1.#qnan"))
-        FAIL(wrong, wrong->at, "JSON has no %.*s; write a number, or leave the key out", given.size, given.text);
+        FAIL(wrong, wrong->at, "JSON has no %.*s; write a finite number such as 0.5 or 2e3, or leave it out",
+             given.size, given.text);
     else if (WORD_IS(name, "true", "false", "null"))
         FAIL(wrong, wrong->at, "%.*s is written in small letters", given.size, given.text);
     else if (is_signed || given.text[0] == '.')
@@ -310,22 +313,14 @@ static void explain_colon(const spot *wrong)
 
 static void explain_missing_value(const spot *wrong)
 {
-    const word key = pending_key(wrong);
-    FAIL(wrong, wrong->at, "the key \"%.*s\" has no value; write one before the %c", key.size, key.text,
-         wrong->text[wrong->at]);
+    FAIL(wrong, wrong->at, "the key has no value; write one before the %c", wrong->text[wrong->at]);
 }
 
-static void explain_value(const spot *wrong)
+static void explain_wrong_value(const spot *wrong)
 {
     const char found = wrong->text[wrong->at];
     if (found == '"')
         explain_string(wrong);
-    else if (found == ',' && wrong->expected != VALUE)
-        FAIL(wrong, wrong->at, "a comma too many; remove it");
-    else if (found == ']' && wrong->expected == NEXT_VALUE)
-        explain_trailing_comma(wrong);
-    else if ((found == '}' || found == ']') && wrong->expected != VALUE)
-        explain_bracket(wrong);
     else if (found == '}' || found == ']' || found == ',')
         explain_missing_value(wrong);
     else if (is_digit(found))
@@ -334,6 +329,25 @@ static void explain_value(const spot *wrong)
         explain_word(wrong, "texts");
     else
         explain_character(wrong, "a value must stand here: a number, \"text\", [...] or {...}");
+}
+
+static void explain_value(const spot *wrong)
+{
+    const char found = wrong->text[wrong->at];
+    if (found == ',' && wrong->expected != VALUE) {
+        FAIL(wrong, wrong->at, "a comma too many; remove it");
+    } else if (found == ']' && wrong->expected == NEXT_VALUE) {
+        explain_trailing_comma(wrong);
+    } else if ((found == '}' || found == ']') && wrong->expected != VALUE) {
+        explain_bracket(wrong);
+    } else {
+        spot value = *wrong;
+        nb_json_node missing = wrong->json->key; /* without a key in an array */
+        missing.parent = wrong->json->open[wrong->json->depth - 1];
+        missing.index = innermost(wrong->json)->count;
+        value.about = &missing;
+        explain_wrong_value(&value);
+    }
 }
 
 static void explain_separator(const spot *wrong)
@@ -346,7 +360,9 @@ static void explain_separator(const spot *wrong)
     } else if (wrong->at == wrong->end && is_word(before) && is_word(found)) {
         size_t start = wrong->end;
         while (start > 0 && is_word(wrong->text[start - 1])) start--;
-        explain_number(wrong, start);
+        spot number = *wrong;
+        number.about = &wrong->json->nodes[wrong->json->node_count - 1];
+        explain_number(&number, start);
     } else if (found == ':') {
         FAIL(wrong, wrong->at, "a colon stands between a key and its value only; in { } write \"key\": value");
     } else if (found == '"' || found == '{' || found == '[' || is_word(found)) {
@@ -418,7 +434,7 @@ static bool take_separator(spot *wrong)
 void nb_json_explain(nb_json *json, size_t end)
 {
     size_t comment = 0;
-    spot wrong = {json, json->desc.text, json->desc.size, end, 0, 0, expect_after_token(json)};
+    spot wrong = {json, json->desc.text, json->desc.size, end, 0, 0, expect_after_token(json), NULL};
     wrong.at = nb_json_skip_blanks(json, end, &comment);
     if (take_separator(&wrong)) wrong.at = nb_json_skip_blanks(json, wrong.at + 1, &comment);
     if (wrong.at > wrong.size)
