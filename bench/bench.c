@@ -5,10 +5,10 @@
 /* The process first: see bench/process.c. */
 typedef const char *group_fn(const nb_bench_desc *desc, nb_figures *figures);
 
-const char *const nb_bench_groups[] = {"process", "segments", "frame", "pass", "particles", NULL};
+const char *const nb_bench_groups[] = {"process", "segments", "vertices", "frame", "pass", "particles", NULL};
 
-static group_fn *const functions[] = {nb_bench_process, nb_bench_segments, nb_bench_frame, nb_bench_pass,
-                                      nb_bench_particles};
+static group_fn *const functions[] = {nb_bench_process, nb_bench_segments, nb_bench_vertices,
+                                      nb_bench_frame,   nb_bench_pass,     nb_bench_particles};
 
 int nb_bench_run(const nb_bench_desc *desc, nb_figures *figures, const char **fault)
 {

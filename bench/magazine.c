@@ -52,9 +52,9 @@ static float distance_in_fog(float in, float out, float vertex)
 }
 
 static float depth_of_vertex(const nb_old_camera *camera, const nb_old_box *boxes, size_t box_count,
-                             const nb_old_vertex *vertex)
+                             const nb_old_vector *p)
 {
-    const nb_old_vector *o = &camera->position, *p = &vertex->position;
+    const nb_old_vector *o = &camera->position;
     const nb_old_vector way = {p->x - o->x, p->y - o->y, p->z - o->z};
     const float length = sqrtf(way.x * way.x + way.y * way.y + way.z * way.z);
     if (length == 0) return 0;
@@ -72,6 +72,16 @@ void nb_magazine_fog(const nb_old_camera *camera, const nb_old_box *boxes, size_
                      size_t vertex_count)
 {
     for (size_t i = 0; i < vertex_count; i++) {
-        vertices[i].transmittance = expf(-depth_of_vertex(camera, boxes, box_count, &vertices[i]));
+        vertices[i].transmittance = expf(-depth_of_vertex(camera, boxes, box_count, &vertices[i].position));
+    }
+}
+
+void nb_magazine_color(const nb_old_camera *camera, const nb_old_box *boxes, size_t box_count, const float color[3],
+                       nb_old_colored_vertex *vertices, size_t vertex_count)
+{
+    for (size_t i = 0; i < vertex_count; i++) {
+        const float amount = 1 - expf(-depth_of_vertex(camera, boxes, box_count, &vertices[i].position));
+        for (int c = 0; c < 3; c++) vertices[i].color[c] = (unsigned char)(255 * amount * color[c] + .5f);
+        vertices[i].color[3] = (unsigned char)(255 * amount + .5f);
     }
 }

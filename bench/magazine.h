@@ -15,6 +15,12 @@ typedef struct nb_old_vertex {
     float transmittance; /* out */
 } nb_old_vertex;
 
+typedef struct nb_old_colored_vertex {
+    nb_old_vector position, normal;
+    float u, v;
+    unsigned char color[4]; /* out: fog times its color, fog */
+} nb_old_colored_vertex;
+
 typedef struct nb_old_camera {
     nb_old_vector position;
 } nb_old_camera;
@@ -26,5 +32,8 @@ typedef struct nb_old_box {
 
 void nb_magazine_fog(const nb_old_camera *camera, const nb_old_box *boxes, size_t box_count, nb_old_vertex *vertices,
                      size_t vertex_count);
+
+void nb_magazine_color(const nb_old_camera *camera, const nb_old_box *boxes, size_t box_count, const float color[3],
+                       nb_old_colored_vertex *vertices, size_t vertex_count);
 
 #endif

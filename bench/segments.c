@@ -1,4 +1,5 @@
 /* Transmittance over many segments from one eye, against the same by the magazine's code and against memory. */
+#include "boxes.h"
 #include "groups.h"
 #include "magazine.h"
 #include "measure.h"
@@ -11,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BOXES_MOST = 16, LARGE = 64 << 20 };
+enum { LARGE = 64 << 20 };
 
 static const float eye[3] = {0, 16, 62};
 
@@ -27,8 +28,7 @@ typedef struct nb_field {
     float *points; /* 3 each */
     float *found;
     nb_old_vertex *vertices;
-    nb_old_box boxes[BOXES_MOST];
-    size_t box_count;
+    nb_boxes boxes;
     nebel_snapshot *fog;
     int rounds; /* in one measurement */
 } nb_field;
@@ -39,46 +39,6 @@ typedef struct nb_entry {
 } nb_entry;
 
 /* ---- what is fogged -------------------------------------------------------------------------- */
-
-typedef enum nb_setting {
-    FOG_BANK = 0,   /* the box of scene A: three quarters of the points are above it */
-    FOG_OVER_ALL,   /* one box that holds all points: nothing can be left out */
-    FOG_IN_PATCHES, /* sixteen boxes */
-    SETTINGS
-} nb_setting;
-
-static const char *const setting_names[SETTINGS] = {"a fog bank", "fog over all", "16 boxes"};
-
-static void set_boxes(nb_field *field, nb_setting setting)
-{
-    const float y = setting == FOG_OVER_ALL ? 13 : 3, size = setting == FOG_OVER_ALL ? 51 : 45;
-    field->box_count = setting == FOG_IN_PATCHES ? BOXES_MOST : 1;
-    field->boxes[0] = (nb_old_box){{-size, -3, -size}, {size, y, size}, .05f};
-    for (size_t i = 0; i < field->box_count && setting == FOG_IN_PATCHES; i++) {
-        const float x = (float)(i % 4) * 24 - 46, z = (float)(i / 4) * 24 - 46;
-        field->boxes[i] = (nb_old_box){{x, -3, z}, {x + 20, y, z + 20}, .05f};
-    }
-}
-
-static int commit_boxes(nb_field *field)
-{
-    nebel_fog *fog = NULL;
-    nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
-    for (size_t i = 0; i < field->box_count && result == NEBEL_OK; i++) {
-        const nb_old_box *const box = &field->boxes[i];
-        const double e = (double)box->extinction;
-        const nebel_volume_desc volume = {
-            .shape = {.type = NEBEL_SHAPE_BOX,
-                      .min = {(double)box->low.x, (double)box->low.y, (double)box->low.z},
-                      .max = {(double)box->high.x, (double)box->high.y, (double)box->high.z}},
-            .extinction = {e, e, e},
-            .source = {.7, .7, .5}};
-        result = nebel_add_volume(fog, &volume, NULL);
-    }
-    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &field->fog);
-    nebel_destroy_fog(fog);
-    return result == NEBEL_OK ? 0 : -1;
-}
 
 static void copy_points(const nb_terrain *terrain, nb_field *field)
 {
@@ -108,9 +68,10 @@ static int make_field(const nb_terrain *terrain, nb_setting setting, size_t coun
     field->found = malloc(sizeof(float) * field->count);
     if (with_vertices) field->vertices = malloc(sizeof(nb_old_vertex) * field->count);
     if (field->points == NULL || field->found == NULL || (with_vertices && field->vertices == NULL)) return -1;
-    set_boxes(field, setting);
+    nb_boxes_set(setting, &field->boxes);
     copy_points(terrain, field);
-    return commit_boxes(field);
+    field->fog = nb_boxes_commit(&field->boxes);
+    return field->fog != NULL ? 0 : -1;
 }
 
 /* ---- contestants ----------------------------------------------------------------------------- */
@@ -135,7 +96,7 @@ static double run_magazine(void *user)
     const nb_old_camera camera = {{eye[0], eye[1], eye[2]}};
     const double start = nb_clock_cpu();
     for (int i = 0; i < c->field->rounds; i++) {
-        nb_magazine_fog(&camera, c->field->boxes, c->field->box_count, c->field->vertices, c->field->count);
+        nb_magazine_fog(&camera, c->field->boxes.list, c->field->boxes.count, c->field->vertices, c->field->count);
     }
     return nb_clock_cpu() - start;
 }
@@ -239,7 +200,7 @@ static const char *measure_setting(const nb_terrain *terrain, nb_setting setting
     nb_field field = {.rounds = desc->quick ? 1 : 8};
     const char *fault = out_of_memory;
     if (make_field(terrain, setting, 0, 1, &field) == 0) {
-        fault = measure_against_magazine(&field, setting_names[setting], desc->quick ? 1 : 15, figures);
+        fault = measure_against_magazine(&field, nb_setting_names[setting], desc->quick ? 1 : 15, figures);
     }
     free_field(&field);
     return fault;
@@ -250,7 +211,7 @@ static const char *measure_memory(const nb_terrain *terrain, size_t count, const
 {
     nb_field field = {.rounds = desc->quick || count > 0 ? 1 : 16};
     const char *fault = out_of_memory;
-    if (make_field(terrain, FOG_BANK, count, 0, &field) == 0) {
+    if (make_field(terrain, NB_FOG_BANK, count, 0, &field) == 0) {
         fault = measure_against_memory(&field, desc->quick ? 1 : 15, figures, name);
     }
     free_field(&field);
@@ -262,7 +223,8 @@ const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures)
     nb_terrain terrain;
     if (nb_terrain_make(desc->quick ? 64 : 512, &terrain) != 0) return out_of_memory;
     const char *fault = NULL;
-    for (int i = 0; i < SETTINGS && fault == NULL; i++) fault = measure_setting(&terrain, (nb_setting)i, desc, figures);
+    for (int i = 0; i < NB_SETTINGS && fault == NULL; i++)
+        fault = measure_setting(&terrain, (nb_setting)i, desc, figures);
     if (fault == NULL) fault = measure_memory(&terrain, 0, "the terrain's points", desc, figures);
     if (fault == NULL && !desc->quick) {
         fault = measure_memory(&terrain, LARGE / (3 * sizeof(float)) + 1, "64 MiB of points", desc, figures);

@@ -1,6 +1,6 @@
 #!/bin/bash
-# check_qemu.sh BUILD: the kernels on processors that this machine is not. test_kernels and test_pixels for aarch64 (NEON), and of
-# BUILD on x86 models without AVX2, without AVX, and with AVX2; there the dispatcher must pick a level that the model has.
+# check_qemu.sh BUILD: the kernels on processors that this machine is not. test_kernels, test_pixels and test_classic_vertices for
+# aarch64 (NEON), and of BUILD on x86 models without AVX2, without AVX, and with AVX2; there the dispatcher must pick a level that the model has.
 set -euo pipefail
 
 build=$(cd "${1:?usage: check_qemu.sh BUILD}" && pwd)
@@ -19,7 +19,7 @@ run_aarch64() {
     local name=$1
     aarch64-linux-gnu-gcc -std=c11 -O2 -ffp-contract=off -fno-math-errno -static -DNEBEL_SOURCE="\"$source\"" \
         -I"$source/tests/cross" -I"$source/include" -I"$source/src" \
-        "$source/tests/$name.c" "$cross/libnebel.a" -lm -o "$cross/$name"
+        "$source/tests/$name.c" "$source/tests/random_fog.c" "$cross/libnebel.a" -lm -o "$cross/$name"
     qemu-aarch64 "$cross/$name" $segments
 }
 
@@ -33,7 +33,7 @@ if ! build_aarch64; then
     exit 1
 fi
 models=(aarch64 Conroe Nehalem Haswell)
-tests=(test_kernels test_pixels)
+tests=(test_kernels test_pixels test_classic_vertices)
 declare -A running
 for model in "${models[@]}"; do
     for name in "${tests[@]}"; do

@@ -25,7 +25,7 @@ static const char about[] = "Measures, and prints each figure beside a floor mea
 static const nb_option options[] = {
     {"device", 'd', "NAME",
      "cpu (default), or gl: fog over pictures in OpenGL,\non a graphics processor or in Mesa's software"},
-    {"group", 'g', "NAME", "only one group: process, segments, frame,\npass or particles"},
+    {"group", 'g', "NAME", "only one group: process, segments, vertices,\nframe, pass or particles"},
     {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
     {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
 };

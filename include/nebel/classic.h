@@ -13,7 +13,7 @@
  *     nebel_fog_vertices(snapshot, NULL, count, &points, &alpha, 1);
  *
  * `world_view` brings the mesh to the camera, and the snapshot's fog is placed in the coordinates of the mesh.
- * Nothing here calls a graphics interface; OpenGL passes are in nebel/gl.h.
+ * docs/classic.md shows how programs use it. Nothing here calls a graphics interface; OpenGL passes are in nebel/gl.h.
  *
  * A number that is no number (NaN) gives no fog, f = 1, throughout.
  */

@@ -92,14 +92,22 @@ static const unsigned char *position_at(const nebel_vertices *vertices, size_t i
     return (const unsigned char *)vertices->positions + i * vertices->position_stride;
 }
 
+/* So far ahead, two pages, memory is asked for a structure that will be read and written. */
+static void fetch_ahead(const unsigned char *structure)
+{
+    __builtin_prefetch((const void *)((uintptr_t)structure + 8192), 1);
+}
+
 /* The block's positions one after the other: where they are, or copied. */
 static const float *gather_points(const nebel_vertices *vertices, block *b)
 {
-    const size_t size = 3 * sizeof(float);
+    const size_t size = 3 * sizeof(float), stride = vertices->position_stride;
     const unsigned char *from = position_at(vertices, b->first);
-    if (vertices->position_stride == size && (uintptr_t)from % _Alignof(float) == 0)
-        return (const float *)(const void *)from;
-    for (size_t i = 0; i < b->count; i++, from += vertices->position_stride) memcpy(b->points + 3 * i, from, size);
+    if (stride == size && (uintptr_t)from % _Alignof(float) == 0) return (const float *)(const void *)from;
+    for (size_t i = 0; i < b->count; i++, from += stride) {
+        fetch_ahead(from);
+        memcpy(b->points + 3 * i, from, size);
+    }
     return b->points;
 }
 
