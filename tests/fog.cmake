@@ -2,6 +2,7 @@
 find_package(Threads REQUIRED)
 target_sources(test_classic_vertices PRIVATE random_fog.c)
 target_sources(test_distances PRIVATE random_fog.c)
+target_sources(test_edges PRIVATE random_fog.c)
 target_sources(test_find PRIVATE random_fog.c)
 target_sources(test_opacity PRIVATE random_fog.c)
 target_sources(test_planes PRIVATE random_fog.c)

@@ -1,4 +1,5 @@
 #include "oracle.h"
+#include "oracle_edge.h"
 #include "oracle_shape.h"
 
 #include <math.h>
@@ -69,6 +70,7 @@ typedef struct volume {
     long double nearest, square;    /* gaussian, radial: t of the closest approach, squared radius there */
     long double speed;              /* radii per metre */
     double light[3];                /* per metre at density 1 */
+    oracle_edge edge;               /* soft edge of what is no box */
 } volume;
 
 typedef struct trace {
@@ -158,6 +160,14 @@ static void place_radial(volume *v, const oracle_line *ray)
     set_approach(v, l.o, l.d);
 }
 
+static void place_edge(trace *tr, volume *v, const oracle_line *ray)
+{
+    real cuts[ORACLE_EDGE_CUTS];
+    v->edge = oracle_edge_of(&v->desc->shape, v->desc->density.distance, ray);
+    const size_t n = oracle_edge_cuts(&v->edge, cuts);
+    for (size_t i = 0; i < n; i++) add_cut(tr, cuts[i]);
+}
+
 /* Per axis: the distance from the middle; kinks where the edges begin and where the nearer face changes. */
 static void place_soft_edge(trace *tr, volume *v, const oracle_line *ray)
 {
@@ -189,7 +199,10 @@ static void place_volume(trace *tr, volume *v, const oracle_line *ray)
         place_radial(v, ray);
         break;
     case NEBEL_DENSITY_SOFT_EDGE:
-        place_soft_edge(tr, v, ray);
+        if (v->desc->shape.type == NEBEL_SHAPE_BOX)
+            place_soft_edge(tr, v, ray);
+        else
+            place_edge(tr, v, ray);
         break;
     default:
         break;
@@ -203,6 +216,10 @@ static void place_volume(trace *tr, volume *v, const oracle_line *ray)
 static void soft_edge_at(const volume *v, long double a, double h, double density[NODES])
 {
     const nebel_shape *const shape = &v->desc->shape;
+    if (shape->type != NEBEL_SHAPE_BOX) {
+        for (int i = 0; i < NODES; i++) density[i] = oracle_edge_density(&v->edge, a + LONG(h * node[i]));
+        return;
+    }
     for (int i = 0; i < NODES; i++) density[i] = 1;
     for (int k = 0; k < 3; k++) {
         const long double start = v->start[k] + v->slope[k] * a, slope = v->slope[k];
@@ -446,6 +463,8 @@ static double final_density(const volume *v)
         return density_of_height(LONG(slope > 0 ? HUGE_VAL : slope < 0 ? -HUGE_VAL : start), d->below);
     case NEBEL_DENSITY_LINEAR:
         return slope > 0 ? 1 : slope < 0 ? 0 : fmin(1, fmax(0, start));
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return oracle_edge_final(&v->edge);
     default:
         return 0;
     }

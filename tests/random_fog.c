@@ -156,6 +156,10 @@ static void make_density(uint64_t *state, const nebel_shape *shape, nebel_densit
     d->power = 1 + below(state, 3);
     d->sigma = uniform(state, 1.5, 6);
     d->distance = uniform(state, .3, 4);
+    /* by digits that are there already, so that other numbers stay what they were */
+    const int has_surface = shape->type != NEBEL_SHAPE_WORLD && shape->type < NEBEL_SHAPE_UNION;
+    if (has_surface && d->type != NEBEL_DENSITY_RADIAL && fmod(d->sigma * 1e3, 1) < .4)
+        d->type = NEBEL_DENSITY_SOFT_EDGE;
 }
 
 static void make_light(uint64_t *state, random_fog_kind kind, nebel_volume_desc *v)

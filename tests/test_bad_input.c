@@ -122,7 +122,7 @@ static const bad_volume bad_volumes[] = {
     {{DENSITY(GAUSSIAN, .center = {0, 0, 0})}, VALUE, "sigma", "1e-15"},
     {{DENSITY(GAUSSIAN, .sigma = NOT_A_NUMBER)}, VALUE, "sigma", "1e-15"},
     {{DENSITY(GAUSSIAN, .sigma = 1, .center = {ENDLESS, 0, 0})}, VALUE, "gaussian center", "finite"},
-    {{SHAPE(SPHERE, .radius = 1), DENSITY(SOFT_EDGE, .distance = 1)}, VALUE, "soft edge", "box"},
+    {{DENSITY(SOFT_EDGE, .distance = 1)}, VALUE, "soft edge", "surface"},
     {{SHAPE(BOX, .max = {1, 1, 1}), DENSITY(SOFT_EDGE, .distance = 0)}, VALUE, "soft edge distance", "1e-15"},
     /* light */
     {{.extinction = {.1, -.1, .1}}, VALUE, "extinction", "-0.1"},

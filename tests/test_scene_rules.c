@@ -238,7 +238,7 @@ static void test_what_no_density_has(void **state)
         {FORMAT, DENSITY("\"type\": `\"radial\""),
          "fog[0].density.type: \"radial\" does not fit this shape; it needs a sphere"},
         {FORMAT, DENSITY("\"type\": `\"soft_edge\", \"distance\": 1"),
-         "fog[0].density.type: \"soft_edge\" does not fit this shape; it needs a box"},
+         "fog[0].density.type: \"soft_edge\" does not fit this shape; it needs a shape with a surface"},
         {FORMAT, DENSITY("\"type\": \"height\", \"scale_height\": `0"), "fog[0].density.scale_height: is 0; must be"},
         {FORMAT, DENSITY("\"type\": \"height\", \"scale_height\": 1, \"below\": `\"none\""),
          "fog[0].density.below: unknown; must be one of: grow, constant"},

@@ -288,6 +288,24 @@ static void try_camera(tracer *t, random_fog_kind kind, uint64_t seed)
     try_fog(t, kinds[kind], seed);
 }
 
+/* One body with a soft edge at a time, in haze of another colour, so that every kink matters to the light. */
+static void test_soft_edges_in_haze(void **unused)
+{
+    (void)unused;
+    tracer t;
+    open_tracer(&t, NB_GL_300ES, BLOCK, "", trace_body);
+    for (uint64_t seed = 0; seed < 60; seed++) {
+        random_fog_make(&fog, RANDOM_FOG_OVERLAP, seed);
+        fog.count = 2;
+        fog.max_opacity = 0;
+        fog.volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .3 + (double)(seed % 7)};
+        char name[32];
+        snprintf(name, sizeof name, "soft shape %d", (int)fog.volumes[1].shape.type);
+        if (fog.volumes[1].shape.type != NEBEL_SHAPE_WORLD) try_fog(&t, name, seed);
+    }
+    nb_gl_close(&t.gl);
+}
+
 /* Priorities and fog that replaces, among so many that some places hold more than the walk's slots. */
 static void rank_volumes(uint64_t seed)
 {
@@ -731,6 +749,7 @@ int main(void)
         cmocka_unit_test(test_330_block),
         cmocka_unit_test(test_300_es_texture),
         cmocka_unit_test(test_300_es_block),
+        cmocka_unit_test(test_soft_edges_in_haze),
         cmocka_unit_test(test_priorities_among_many),
         cmocka_unit_test(test_rays_to_a_light_know_no_distances),
         cmocka_unit_test(test_more_than_slots),

@@ -172,10 +172,28 @@ typedef enum nebel_density_type {
     NEBEL_DENSITY_LINEAR,    /* 0 at `from`, 1 at `to`, clamped, level across */
     NEBEL_DENSITY_RADIAL,    /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
     NEBEL_DENSITY_GAUSSIAN,  /* exp(-r^2 / (2 sigma^2)) around center */
-    NEBEL_DENSITY_SOFT_EDGE, /* product over the axes of min(1, distance to the nearer face / distance); box only */
+    NEBEL_DENSITY_SOFT_EDGE, /* 0 on the surface, 1 from `distance` within: see below; not world or groups */
     NEBEL_DENSITY_COUNT
 } nebel_density_type;
 
+/* NEBEL_DENSITY_SOFT_EDGE, with e = `distance` and all lengths in the shape's own coordinates. The density is a
+ * polynomial along a ray between kinks, so that integrals are exact; near edges and in tapering bodies it is not quite
+ * the distance to the surface.
+ *
+ * Box: product over the axes of min(1, distance to the nearer face / e).
+ *
+ * Half space, convex: the least of the faces' min(1, distance to the face / e).
+ *
+ * Sphere, ellipsoid: min(1, g (1 - r^2)), r the distance from the centre in terms of the surface's in that direction.
+ *
+ * Capsule: min(1, g (1 - r^2)), r the distance from the axis in terms of the radius.
+ *
+ * Cylinder, cone: min(1, g (w^2 - r^2)) min(1, distance to the nearer end / e), r the distance from the axis and w the
+ * radius there, in terms of the larger radius: a cone's edge is deeper where it is thin, and fades out at an apex.
+ *
+ * g = 1 / (1 - (1 - f)^2), f = min(1, e / R), R the radius, the larger one of a cone, the least one of an ellipsoid:
+ * 1 from e within; where e > R at the centre alone. Where flat faces are nearer to each other than 2 e the density
+ * stays below 1. */
 typedef enum nebel_below {
     NEBEL_BELOW_GROW = 0, /* the exponential goes on under the base */
     NEBEL_BELOW_CONSTANT  /* 1 under the base */

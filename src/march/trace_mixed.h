@@ -68,6 +68,47 @@ static nb_wide soft_axis_ceiling(nb_wide q, nb_wide rise)
     return nb_wselect(level, q, q + rise);
 }
 
+/* For a quadratic that is `value` in the middle, changes by `slope` there and bends by `bend`: it, clamped to at
+ * most 1. */
+static nb_wide quadratic_ceiling(nb_wide value, nb_wide slope, nb_wide bend, nb_wide along)
+{
+    const nb_wide most = nb_wmax(value, NB_W(0.0)) + along * (nb_wabs(slope) + along * nb_wabs(bend));
+    return nb_wselect(value >= NB_W(1.0), NB_W(1.0), most);
+}
+
+static nb_wide round_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+{
+    const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, middle)), side = k->side;
+    const nb_wide depth = side.x + q.x * (side.y + side.z * q.x), slope = side.y + NB_W(2.0) * side.z * q.x;
+    if (nb_leaf_edge_form(edge_leaf(k)) == NB_EDGE_CAPPED)
+        return quadratic_ceiling(depth, slope, side.z, along) *
+               soft_axis_ceiling(nb_soft_axis(q.y, k->size.x), nb_wabs(k->slope.y) * along);
+    const nb_wide past = nb_wmax(nb_wabs(q.y) - k->size.x, NB_W(0.0));
+    const nb_wide falls = NB_W(2.0) * past * nb_wabs(k->slope.y), bends = k->slope.y * k->slope.y;
+    return quadratic_ceiling(depth - past * past, nb_wabs(slope) + falls, nb_wabs(side.z) + bends, along);
+}
+
+static nb_wide planes_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+{
+    const edge_line lowest = lowest_line(k, middle);
+    return nb_wmax(lowest.depth, NB_W(0.0)) + nb_wabs(lowest.slope) * along;
+}
+
+static nb_wide box_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+{
+    const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, middle));
+    return soft_axis_ceiling(nb_soft_axis(q.x, k->size.x), nb_wabs(k->slope.x) * along) *
+           soft_axis_ceiling(nb_soft_axis(q.y, k->size.y), nb_wabs(k->slope.y) * along) *
+           soft_axis_ceiling(nb_soft_axis(q.z, k->size.z), nb_wabs(k->slope.z) * along);
+}
+
+static nb_wide soft_edge_ceiling(const contact *k, nb_wide middle, nb_wide along)
+{
+    const nb_leaf *leaf = edge_leaf(k);
+    if (leaf->type == NB_LEAF_PLANES) return planes_edge_ceiling(k, middle, along);
+    return is_round(leaf) ? round_edge_ceiling(k, middle, along) : box_edge_ceiling(k, middle, along);
+}
+
 /* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that
  * stays level is the same number on all of it. */
 static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, nb_real across)
@@ -95,13 +136,8 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
         for (int i = 1; i < density->power; i++) power = power * base;
         return power;
     }
-    case NEBEL_DENSITY_SOFT_EDGE: {
-        const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, middle));
-        const nb_wide wide = nb_widen(along);
-        return nb_narrow(soft_axis_ceiling(nb_soft_axis(q.x, k->size.x), nb_wabs(k->slope.x) * wide) *
-                         soft_axis_ceiling(nb_soft_axis(q.y, k->size.y), nb_wabs(k->slope.y) * wide) *
-                         soft_axis_ceiling(nb_soft_axis(q.z, k->size.z), nb_wabs(k->slope.z) * wide));
-    }
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return nb_narrow(soft_edge_ceiling(k, middle, nb_widen(along)));
     default:
         return NB_F(1.0);
     }

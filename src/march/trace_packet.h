@@ -38,10 +38,12 @@ typedef struct contact {
     nb_real extinction[3], light[3], radiance[3];
     double least_slack;     /* the length over which the medium's extinction and light come to 1 */
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
-    nb_wvec3 size;          /* soft edge: half widths */
+    nb_wvec3 size;          /* soft edge: half widths of a box; `ends` of a round body */
     nb_real level;          /* gaussian: m; radial: c */
     nb_real noise;          /* of the density, from the rounding of the frame */
     nb_mask inside;         /* within the current piece of the ray */
+    nb_wvec3 side;          /* soft edge of a round body */
+    double steepest;        /* soft edge: density per metre at most */
 } contact;
 
 /* What ends that may be off can do to optical depth and to radiance. */
@@ -222,7 +224,64 @@ static void radial_contact(contact *k, const packet *rays, const nb_leaf *leaf)
     k->noise = nb_narrow(local.reach * inverse) * REAL(2 * k->medium->body.density.power);
 }
 
-static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+/* Soft edges are made in one way for boxes, in one for round bodies, in one for planes. */
+static const nb_leaf *edge_leaf(const contact *k)
+{
+    return &k->medium->body.leaves[0];
+}
+
+static int is_round(const nb_leaf *leaf)
+{
+    return leaf->type != NB_LEAF_BOX && leaf->type != NB_LEAF_PLANES;
+}
+
+/* The components of a vector of length 1 come to at most sqrt(3). */
+#define MOST_COMPONENTS 1.7320508075688773
+
+/* The slopes of an edge along the axes of the leaf's frame come to at most `steepest`; what rounds in that frame is off
+ * by `reach` along each. */
+static void set_steepest(contact *k, const nb_leaf *leaf, const local_ray *local, double steepest)
+{
+    k->steepest = steepest * leaf->scale;
+    k->noise = nb_narrow(local->reach * WIDE(4 * steepest)) + NB_F(64.0) * nb_narrow(WIDE(1 + steepest) * NB_WEPSILON);
+}
+
+static void round_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf)
+{
+    const local_ray local = localize(rays, leaf);
+    const nb_edge *made = &k->medium->body.edge;
+    const int ball = leaf->type == NB_LEAF_BALL, capsule = leaf->type == NB_LEAF_CAPSULE;
+    const nb_wide unit = ball ? NB_W(1.0) / WIDE(FRAME(leaf, radius)) : NB_W(1.0);
+    const nb_wide one = NB_W(1.0);
+    const nb_round_edge edge =
+        nb_round_edge_of(nb_wscale3(local.p, unit), nb_wscale3(local.d, unit), ball ? one : WIDE(FRAME(leaf, radius)),
+                         WIDE(FRAME(leaf, slope)), capsule ? WIDE(FRAME(leaf, length)) : one, WIDE(made->gain),
+                         WIDE(made->steepness), WIDE(made->inner), nb_leaf_edge_form(leaf));
+    k->side = edge.side;
+    k->offset = edge.q;
+    k->slope = edge.k;
+    k->size = edge.ends;
+    const double flanks = 2 * made->gain * (MOST_COMPONENTS + fabs(leaf->slope)) / (ball ? leaf->radius : 1);
+    set_steepest(k, leaf, &local, flanks + (ball || capsule ? 0 : made->steepness));
+}
+
+/* The ray in the leaf's frame; size.x: 1 / distance. */
+static void planes_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+{
+    const local_ray local = localize(rays, leaf);
+    k->offset = local.p;
+    k->slope = local.d;
+    k->size = nb_wvec3(NB_W(1.0) / WIDE(width), NB_W(0.0), NB_W(0.0));
+    set_steepest(k, leaf, &local, MOST_COMPONENTS / width);
+    double farthest = 0;
+    for (size_t i = 0; i < leaf->face_count; i++) {
+        const nb_face *face = &k->medium->body.faces[leaf->first_face + i];
+        farthest = fmax(farthest, fabs(face->distance) * face->inverse_length);
+    }
+    k->noise = k->noise + nb_narrow(WIDE(8 * farthest / width) * NB_WEPSILON);
+}
+
+static void box_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
 {
     const local_ray local = localize(rays, leaf);
     const nb_wide inverse = NB_W(1.0) / WIDE(width);
@@ -233,6 +292,16 @@ static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *lea
     k->size = nb_wscale3(nb_wsub3(high, low), NB_W(0.5) * inverse);
     k->noise = nb_narrow(local.reach * inverse) * NB_F(6.0) +
                NB_F(64.0) * nb_narrow(NB_WEPSILON * (k->size.x + k->size.y + k->size.z));
+}
+
+static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *leaf, double width)
+{
+    if (leaf->type == NB_LEAF_BOX)
+        box_edge_contact(k, rays, leaf, width);
+    else if (leaf->type == NB_LEAF_PLANES)
+        planes_edge_contact(k, rays, leaf, width);
+    else
+        round_edge_contact(k, rays, leaf);
 }
 
 static void profile_contact(contact *k, const packet *rays)
@@ -259,6 +328,155 @@ static void profile_contact(contact *k, const packet *rays)
     }
 }
 
+static nb_estimate blur(nb_estimate estimate, nb_real noise, nb_real h)
+{
+    estimate.error = estimate.error + noise * h;
+    return estimate;
+}
+
+/* ---- soft edges of planes: the least of the faces' ------------------------------------------ */
+
+/* How deep the ray is behind something, in units of the edge, and how that changes per metre. */
+typedef struct edge_line {
+    nb_wide depth, slope;
+} edge_line;
+
+static edge_line face_line(const contact *k, size_t i, nb_wide t)
+{
+    const nb_volume *body = &k->medium->body;
+    const nb_face *face = &body->faces[body->leaves[0].first_face + i];
+    const nb_wvec3 normal = wide_vector(face->normal);
+    const nb_wide scale = k->size.x * WIDE(face->inverse_length);
+    const nb_wide along = nb_wdot3(normal, nb_wadd3(k->offset, nb_wscale3(k->slope, t)));
+    return (edge_line){(WIDE(face->distance) - along) * scale, -(nb_wdot3(normal, k->slope) * scale)};
+}
+
+/* What rounding may do to a depth: the farther a ray has come, the more its direction counts. */
+static nb_wide plane_noise(const contact *k, nb_wide t)
+{
+    return nb_widen(k->noise) + nb_wabs(t) * (WIDE(8 * k->steepest) * NB_WEPSILON);
+}
+
+/* The lowest just behind t; where several are as low but for their noise, the one that falls fastest. The first is the
+ * plateau. */
+static edge_line lowest_line(const contact *k, nb_wide t)
+{
+    const size_t count = edge_leaf(k)->face_count;
+    nb_wide least = NB_W(1.0);
+    for (size_t i = 0; i < count; i++) least = nb_wmin(face_line(k, i, t).depth, least);
+    const nb_wide nearly = least + plane_noise(k, t);
+    edge_line lowest = {NB_W(1.0), nb_wselect(nearly >= NB_W(1.0), NB_W(0.0), NB_WFAR)};
+    for (size_t i = 0; i < count; i++) {
+        const edge_line line = face_line(k, i, t);
+        const nb_wmask lower = nb_wand(line.depth <= nearly, line.slope < lowest.slope);
+        lowest.depth = nb_wselect(lower, line.depth, lowest.depth);
+        lowest.slope = nb_wselect(lower, line.slope, lowest.slope);
+    }
+    lowest.depth = least;
+    return lowest;
+}
+
+static nb_wide crossing_of(const edge_line *lowest, const edge_line *other, nb_wide t, nb_wide next)
+{
+    const nb_wide way =
+        nb_wmax(other->depth - lowest->depth, NB_W(0.0)) * nb_wrcp_bounded(lowest->slope - other->slope);
+    const nb_wide least = nb_wabs(t) * (NB_W(4.0) * NB_WEPSILON) + NB_WTINY; /* so that a walk gets on */
+    const nb_wide crossing = t + nb_wmax(way, least);
+    return nb_wselect(nb_wand(other->slope < lowest->slope, crossing < next), crossing, next);
+}
+
+static nb_wide planes_edge_kink(const contact *k, nb_wide t)
+{
+    const edge_line lowest = lowest_line(k, t), plateau = {NB_W(1.0), NB_W(0.0)};
+    nb_wide next = crossing_of(&lowest, &plateau, t, NB_WFAR);
+    for (size_t i = 0; i < edge_leaf(k)->face_count; i++) {
+        const edge_line line = face_line(k, i, t);
+        next = crossing_of(&lowest, &line, t, next);
+    }
+    return next;
+}
+
+/* How deep a place is behind the nearest face. */
+static nb_wide planes_depth(const contact *k, nb_wide t)
+{
+    nb_wide least = NB_WFAR;
+    for (size_t i = 0; i < edge_leaf(k)->face_count; i++) least = nb_wmin(face_line(k, i, t).depth, least);
+    return least;
+}
+
+static nb_real density_of_depth(nb_wide depth)
+{
+    return nb_narrow(nb_wclamp(depth, NB_W(0.0), NB_W(1.0)));
+}
+
+/* What noise may do to the density: nothing on the plateau. */
+static nb_real noise_of_depth(const contact *k, nb_wide t, nb_wide depth)
+{
+    const nb_wide noise = plane_noise(k, t);
+    return nb_narrow(nb_wselect(depth >= NB_W(1.0) + noise, NB_W(0.0), nb_wmin(noise, NB_W(1.0))));
+}
+
+/* Trapezoids from kink to kink: the least of linear functions is concave, so that there are no more kinks than faces
+ * and one. Noise grows linearly along a trapezoid, and at its start kinks within the noise are passed over. */
+static nb_estimate planes_edge_integral(const contact *k, nb_wide start, nb_real h)
+{
+    const size_t most = 2 * edge_leaf(k)->face_count + 4;
+    const nb_wide stop = start + nb_widen(h);
+    nb_wide t = start, depth = planes_depth(k, start);
+    nb_real value = NB_F(0.0), error = NB_F(0.0);
+    for (size_t i = 0; i < most && nb_wany(t < stop); i++) {
+        const nb_wide end = i + 1 < most ? nb_wmin(planes_edge_kink(k, t), stop) : stop;
+        const nb_wide end_depth = planes_depth(k, end);
+        const nb_real half = NB_F(0.5) * nb_narrow(nb_wmax(end - t, NB_W(0.0)));
+        value = value + half * (density_of_depth(depth) + density_of_depth(end_depth));
+        error = error + half * (NB_F(3.0) * noise_of_depth(k, t, depth) + noise_of_depth(k, end, end_depth));
+        depth = end_depth;
+        t = nb_wmax(end, t);
+    }
+    return nb_estimate_of(value, error + value * (NB_F(16.0) * NB_EPSILON));
+}
+
+/* ---- any profile ---------------------------------------------------------------------------- */
+
+static nb_real soft_edge_density(const contact *k, nb_wide t)
+{
+    const nb_leaf *leaf = edge_leaf(k);
+    if (leaf->type == NB_LEAF_PLANES) return density_of_depth(planes_depth(k, t));
+    const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, t));
+    if (is_round(leaf)) return nb_round_edge_density(k->side, q, k->size.x, nb_leaf_edge_form(leaf));
+    return nb_soft_edge_density(q, k->size);
+}
+
+static nb_estimate soft_edge_integral(const contact *k, nb_wide start, nb_real h)
+{
+    const nb_leaf *leaf = edge_leaf(k);
+    if (leaf->type == NB_LEAF_PLANES) return planes_edge_integral(k, start, h);
+    const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, start));
+    if (!is_round(leaf)) return blur(nb_soft_edge_integral(q, k->slope, k->size, nb_widen(h)), k->noise, h);
+    return blur(nb_round_edge_integral(k->side, q, k->slope, k->size, nb_leaf_edge_form(leaf), nb_widen(h)), k->noise,
+                h);
+}
+
+static nb_wide soft_edge_kink(const contact *k, nb_wide t)
+{
+    const nb_leaf *leaf = edge_leaf(k);
+    if (leaf->type == NB_LEAF_PLANES) return planes_edge_kink(k, t);
+    if (is_round(leaf)) return nb_round_edge_kink(k->offset, k->slope, k->size, nb_leaf_edge_form(leaf), t);
+    return nb_soft_edge_kink(k->offset, k->slope, k->size, t);
+}
+
+static nb_real soft_edge_noise(const contact *k, nb_wide t)
+{
+    return edge_leaf(k)->type == NB_LEAF_PLANES ? nb_narrow(plane_noise(k, t)) : k->noise;
+}
+
+/* How much a soft edge may rise over h metres. */
+static nb_real soft_edge_rise(const contact *k, nb_real h)
+{
+    if (edge_leaf(k)->type != NB_LEAF_BOX) return REAL(k->steepest) * h;
+    return nb_narrow(nb_wabs(k->slope.x) + nb_wabs(k->slope.y) + nb_wabs(k->slope.z)) * h;
+}
+
 /* Coordinates at t, narrowed only here, where they are small again for a shape that is far away. */
 static nb_real coordinate(const contact *k, nb_wide t)
 {
@@ -279,7 +497,7 @@ static nb_real contact_density(const contact *k, nb_wide t)
     case NEBEL_DENSITY_RADIAL:
         return nb_radial_density(k->level, coordinate(k, t), density->power);
     case NEBEL_DENSITY_SOFT_EDGE:
-        return nb_soft_edge_density(nb_wadd3(k->offset, nb_wscale3(k->slope, t)), k->size);
+        return soft_edge_density(k, t);
     default:
         return NB_F(1.0);
     }
@@ -294,12 +512,6 @@ static nb_real contact_density_within(const contact *k, nb_wide start, nb_real l
     if (density->type != NEBEL_DENSITY_RADIAL) return contact_density(k, start + nb_widen(length * share));
     const nb_real u = coordinate(k, start) + nb_narrow(k->slope.x) * length * share;
     return nb_radial_density(k->level, u, density->power);
-}
-
-static nb_estimate blur(nb_estimate estimate, nb_real noise, nb_real h)
-{
-    estimate.error = estimate.error + noise * h;
-    return estimate;
 }
 
 /* The density integrated from start over h metres. */
@@ -324,9 +536,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
     case NEBEL_DENSITY_RADIAL:
         return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
     case NEBEL_DENSITY_SOFT_EDGE:
-        return blur(
-            nb_soft_edge_integral(nb_wadd3(k->offset, nb_wscale3(k->slope, start)), k->slope, k->size, nb_widen(h)),
-            k->noise, h);
+        return soft_edge_integral(k, start, h);
     default:
         return nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON));
     }
@@ -336,7 +546,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
 static nb_wide contact_kink(const contact *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
-    if (density->type == NEBEL_DENSITY_SOFT_EDGE) return nb_soft_edge_kink(k->offset, k->slope, k->size, t);
+    if (density->type == NEBEL_DENSITY_SOFT_EDGE) return soft_edge_kink(k, t);
     const int linear = density->type == NEBEL_DENSITY_LINEAR;
     if (!linear && !(density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)) return NB_WFAR;
     const nb_wide inverse = nb_wrcp_bounded(k->slope.x);
@@ -372,11 +582,8 @@ static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
         return nb_gaussian_density(k->level * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON), nearest);
     case NEBEL_DENSITY_RADIAL:
         return nb_min(nb_radial_density(k->level, nearest, density->power) + k->noise, NB_F(1.0));
-    case NEBEL_DENSITY_SOFT_EDGE: {
-        const nb_wvec3 q = nb_wadd3(k->offset, nb_wscale3(k->slope, t));
-        const nb_real width = nb_narrow(nb_wabs(k->slope.x) + nb_wabs(k->slope.y) + nb_wabs(k->slope.z)) * slack;
-        return nb_min(nb_soft_edge_density(q, k->size) + width + k->noise, NB_F(1.0));
-    }
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return nb_min(soft_edge_density(k, t) + soft_edge_rise(k, slack) + soft_edge_noise(k, t), NB_F(1.0));
     default:
         return NB_F(1.0);
     }
@@ -509,6 +716,7 @@ static void meet_medium(march *m, const nb_medium *medium)
     k->medium = medium;
     k->first_span = m->span_count;
     k->noise = NB_F(0.0);
+    k->steepest = 0;
     for (int c = 0; c < 3; c++) {
         k->extinction[c] = REAL(medium->body.extinction[c]);
         k->light[c] = REAL(medium->light[c]);

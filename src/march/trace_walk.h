@@ -25,6 +25,7 @@ typedef struct piece_sum {
     nb_real relative_error; /* of the worst integral, 1 at most */
     nb_mask present;        /* some medium is there */
     nb_mask mixed;          /* the quotient of light and extinction changes along the piece: no closed form */
+    nb_mask even;           /* all media there give the same light per extinction */
 } piece_sum;
 
 /* The next event after t, NB_WFAR * 2 where there is none: the sentinel must lie beyond an endless ray's end. */
@@ -131,7 +132,7 @@ static piece_sum no_sum(void)
 {
     const nb_real zero = NB_F(0.0);
     return (piece_sum){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero,
-                       nb_mask_false,      nb_mask_false};
+                       nb_mask_false,      nb_mask_false,      nb_mask_false};
 }
 
 /* A piece is mixed where some density varies and not all media give the same light per extinction. */
@@ -156,6 +157,7 @@ static piece_sum sum_piece(const march *m, const piece *p)
     }
     sum.present = seen;
     sum.mixed = nb_and(uneven, varies);
+    sum.even = nb_not(uneven);
     return sum;
 }
 
@@ -167,15 +169,32 @@ static nb_real attenuation_error(const gathered *g, const piece_sum *sum, int c)
            NB_F(32.0) * NB_EPSILON;
 }
 
+/* Where light is radiance times extinction a piece adds radiance (1 - e^-depth), which does not change where all is
+ * opaque; e^-y <= 1 / (1 + y + y^2 / 2). */
+static nb_real even_error(const gathered *g, const piece_sum *sum, int c)
+{
+    const nb_real radiance = sum->light[c] / nb_max(sum->depth[c], NB_TINY);
+    const nb_real least = nb_max(sum->depth[c] - sum->depth_error[c], NB_F(0.0));
+    const nb_real attenuation = NB_F(1.0) + least * (NB_F(1.0) + NB_F(0.5) * least);
+    return g->transmittance[c] * radiance * nb_min(sum->depth_error[c], NB_F(1.0)) / attenuation;
+}
+
 /* The closed form: light (1 - e^-depth) / depth, seen through what lies before. */
 static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
 {
+    const nb_mask loose = nb_and(nb_and(lanes, sum->even), sum->relative_error > NB_F(1024.0) * NB_EPSILON);
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real ratio = nb_select(lanes, g->transmittance[c] * nb_exp_ratio(sum->depth[c]), NB_F(0.0));
         const nb_real light = ratio * sum->light[c];
         g->radiance[c] = g->radiance[c] + light;
-        most = nb_max(most, ratio * sum->light_error[c] + light * attenuation_error(g, sum, c));
+        nb_real error = ratio * sum->light_error[c] + light * attenuation_error(g, sum, c);
+        if (nb_any(loose)) {
+            const nb_real before = nb_min(g->depth_error[c], NB_F(1.0)) + NB_F(32.0) * NB_EPSILON;
+            const nb_real even = even_error(g, sum, c) + light * before;
+            error = nb_select(nb_and(loose, sum->depth[c] > NB_TINY), nb_min(error, even), error);
+        }
+        most = nb_max(most, error);
     }
     g->radiance_error = g->radiance_error + most;
 }

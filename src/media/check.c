@@ -188,7 +188,9 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
         if (!is_place(density->center)) return bad(log, "gaussian center", PLACE_RULE);
         return is_extent(density->sigma) ? NEBEL_OK : bad(log, "gaussian sigma", EXTENT_RULE);
     case NEBEL_DENSITY_SOFT_EDGE:
-        if (shape->type != NEBEL_SHAPE_BOX) return bad(log, "soft edge", "needs a box");
+        if (shape->type == NEBEL_SHAPE_WORLD || shape->type == NEBEL_SHAPE_UNION ||
+            shape->type == NEBEL_SHAPE_INTERSECTION)
+            return bad(log, "soft edge", "needs a shape with a surface that is no union or intersection");
         return is_extent(density->distance) ? NEBEL_OK : bad(log, "soft edge distance", EXTENT_RULE);
     default:
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "density: type %d is unknown", (int)density->type);

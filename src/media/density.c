@@ -111,6 +111,46 @@ static double soft_edge_density(const nb_volume *volume, const double place[3])
     return nb_soft_edge_density(nb_wscale3(nb_wsub3(p, middle), inverse), size);
 }
 
+/* In a leaf's frame, which has a radius of 1. */
+static double round_edge_density(const nb_volume *volume, const double place[3])
+{
+    const nb_leaf *leaf = &volume->leaves[0];
+    const nb_edge *edge = &volume->edge;
+    const int ball = leaf->type == NB_LEAF_BALL;
+    const nb_wvec3 p = nb_wscale3(to_leaf(leaf, place), ball ? 1 / (nb_wide)leaf->radius : 1);
+    const nb_round_edge at =
+        nb_round_edge_of(p, nb_wvec3(0, 0, 0), ball ? 1 : (nb_wide)leaf->radius, (nb_wide)leaf->slope,
+                         leaf->type == NB_LEAF_CAPSULE ? (nb_wide)leaf->length : 1, (nb_wide)edge->gain,
+                         (nb_wide)edge->steepness, (nb_wide)edge->inner, nb_leaf_edge_form(leaf));
+    return nb_round_edge_density(at.side, at.q, at.ends.x, nb_leaf_edge_form(leaf));
+}
+
+static double planes_edge_density(const nb_volume *volume, const double place[3])
+{
+    const nb_leaf *leaf = &volume->leaves[0];
+    const nb_wvec3 p = to_leaf(leaf, place);
+    double least = 1;
+    for (size_t i = 0; i < leaf->face_count; i++) {
+        const nb_face *face = &volume->faces[leaf->first_face + i];
+        const double along =
+            face->normal[0] * (double)p.x + face->normal[1] * (double)p.y + face->normal[2] * (double)p.z;
+        least = fmin(least, (face->distance - along) * face->inverse_length / volume->density.distance);
+    }
+    return fmax(least, 0);
+}
+
+static double edge_density(const nb_volume *volume, const double place[3])
+{
+    switch (volume->leaves[0].type) {
+    case NB_LEAF_BOX:
+        return soft_edge_density(volume, place);
+    case NB_LEAF_PLANES:
+        return planes_edge_density(volume, place);
+    default:
+        return round_edge_density(volume, place);
+    }
+}
+
 double nb_density_at(const nb_volume *volume, const double place[3])
 {
     const nebel_density *density = &volume->density;
@@ -127,7 +167,7 @@ double nb_density_at(const nb_volume *volume, const double place[3])
     case NEBEL_DENSITY_GAUSSIAN:
         return nb_gaussian_density(square_distance(place, density->center) / (2 * density->sigma * density->sigma), 0);
     case NEBEL_DENSITY_SOFT_EDGE:
-        return soft_edge_density(volume, place);
+        return edge_density(volume, place);
     default:
         return 1;
     }

@@ -237,6 +237,8 @@ static void set_face(nb_face *face, const double normal[3], double distance)
     for (int i = 0; i < 3; i++) face->normal[i] = ldexp(normal[i], -exponent);
     face->distance = ldexp(distance, -exponent);
     face->tie = tie_of(normal);
+    face->inverse_length = 1 / sqrt(face->normal[0] * face->normal[0] + face->normal[1] * face->normal[1] +
+                                    face->normal[2] * face->normal[2]);
 }
 
 /* The faces in world coordinates relative to the leaf's origin, for the bounds. */

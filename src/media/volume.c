@@ -128,6 +128,26 @@ static nebel_density resolve_density(const nebel_density *from)
     return to;
 }
 
+static double distance_between(const double a[3], const double b[3])
+{
+    return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+}
+
+static nb_edge resolve_edge(const nebel_shape *shape, double distance)
+{
+    double radius = shape->radius;
+    if (shape->type == NEBEL_SHAPE_ELLIPSOID) radius = fmin(fmin(shape->radii[0], shape->radii[1]), shape->radii[2]);
+    if (shape->type == NEBEL_SHAPE_CONE) radius = fmax(shape->radius_from, shape->radius_to);
+    const double depth = fmin(distance / radius, 1);
+    return (nb_edge){1 / (depth * (2 - depth)), distance_between(shape->from, shape->to) / distance, 1 - depth};
+}
+
+static int is_round(const nebel_shape *shape)
+{
+    return shape->type == NEBEL_SHAPE_SPHERE || shape->type == NEBEL_SHAPE_ELLIPSOID ||
+           shape->type == NEBEL_SHAPE_CYLINDER || shape->type == NEBEL_SHAPE_CAPSULE || shape->type == NEBEL_SHAPE_CONE;
+}
+
 static void resolve_light(const nebel_volume_desc *desc, nb_volume *volume)
 {
     for (int i = 0; i < 3; i++) {
@@ -162,6 +182,8 @@ nebel_result nb_volume_resolve(const nebel_allocator *allocator, const nebel_log
     if (!allocate_arrays(allocator, volume)) return nb_fail(log, NEBEL_ERROR_MEMORY, "volume: out of memory");
     if (nb_volume_has_fog(volume)) {
         volume->density = resolve_density(&desc->density);
+        if (desc->density.type == NEBEL_DENSITY_SOFT_EDGE && is_round(&desc->shape))
+            volume->edge = resolve_edge(&desc->shape, desc->density.distance);
         resolve_light(desc, volume);
     }
     builder b = {log, volume, {0, 0, 0}};
@@ -258,6 +280,8 @@ int nb_volume_compare(const nb_volume *a, const nb_volume *b)
     if (order == 0) order = compare_numbers(a->albedo, b->albedo, 3);
     if (order == 0) order = compare_numbers(a->emission, b->emission, 3);
     if (order == 0) order = compare_density(&a->density, &b->density);
+    if (order == 0) order = compare_numbers(&a->edge.gain, &b->edge.gain, 1);
+    if (order == 0) order = compare_numbers(&a->edge.steepness, &b->edge.steepness, 1);
     if (order == 0) order = compare_numbers(&a->start, &b->start, 1);
     if (order == 0) order = compare_numbers(&a->cutoff, &b->cutoff, 1);
     return order == 0 ? compare_body(a, b) : order;

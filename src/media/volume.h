@@ -30,6 +30,7 @@ typedef enum nb_leaf_type {
  * face: the body with tie < 0 owns it, so that of two bodies that touch there exactly one does. */
 typedef struct nb_face {
     double normal[3], distance, tie;
+    double inverse_length; /* of the normal */
 } nb_face;
 
 typedef struct nb_leaf {
@@ -58,10 +59,16 @@ typedef enum nb_step { NB_STEP_LEAF, NB_STEP_ANY, NB_STEP_ALL } nb_step;
 /* The deepest stack a program needs. */
 #define NB_STEP_STACK (NEBEL_MAX_DEPTH + 2)
 
+/* The numbers of a soft edge, see nb_round_edge in formulas/profiles.inc. */
+typedef struct nb_edge {
+    double gain, steepness, inner;
+} nb_edge;
+
 typedef struct nb_volume {
     nebel_operation operation;
     int64_t rank; /* one that covers takes away the fog of every lower rank: see nb_volume_covers */
     nebel_density density;
+    nb_edge edge; /* soft edges of round bodies */
     double extinction[3], source[3], albedo[3], emission[3];
     int lit; /* albedo rather than source */
     size_t leaf_count, face_count, step_count;
@@ -90,6 +97,12 @@ static inline int nb_volume_covers(const nb_volume *volume)
 static inline int nb_volume_has_distances(const nb_volume *volume)
 {
     return volume->start > 0 || volume->cutoff <= NB_LARGEST_LENGTH;
+}
+
+/* How the soft edge of a round body is made: the forms of formulas/profiles.inc. */
+static inline int nb_leaf_edge_form(const nb_leaf *leaf)
+{
+    return leaf->type == NB_LEAF_BALL ? 0 : leaf->type == NB_LEAF_CAPSULE ? 2 : 1;
 }
 
 /* A copy with arrays of its own. 0 when memory is out. */

@@ -42,7 +42,8 @@ static bool check_type(nb_json *json, const nb_json_node *node, int type, nebel_
                             "this version has no \"%s\" densities; use one of the others", type_names[type]);
     if (type == NEBEL_DENSITY_RADIAL && shape != NEBEL_SHAPE_SPHERE && shape != NEBEL_SHAPE_ELLIPSOID)
         return fail_shape(json, node, "a sphere or an ellipsoid");
-    if (type == NEBEL_DENSITY_SOFT_EDGE && shape != NEBEL_SHAPE_BOX) return fail_shape(json, node, "a box");
+    if (type == NEBEL_DENSITY_SOFT_EDGE && (shape == NEBEL_SHAPE_WORLD || shape >= NEBEL_SHAPE_UNION))
+        return fail_shape(json, node, "a shape with a surface that is no union or intersection");
     return true;
 }
 

@@ -185,6 +185,9 @@ float nb_profile_kink(nb_profile profile, float near)
     float kink = NB_FAR;
     if (NB_HAS(NB_HAS_SOFT_EDGE) && profile.kind == NB_KIND_SOFT_EDGE)
         kink = nb_soft_edge_kink(profile.offset, profile.slope, profile.size, near);
+    if (NB_HAS(NB_HAS_SOFT_ROUND) && profile.kind == NB_KIND_SOFT_ROUND)
+        kink = nb_round_edge_kink(profile.offset, profile.slope, profile.size, profile.form, near);
+    if (NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES) kink = nb_planes_kink(profile, near);
     if (NB_HAS(NB_HAS_SLOPE) && (profile.kind == NB_KIND_LINEAR || profile.kind == NB_KIND_HEIGHT_CAPPED)) {
         float inverse = nb_rcp_bounded(profile.slope.x);
         float zero = -profile.offset.x * inverse;
@@ -320,11 +323,16 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
     nb_vec3 light = NEBEL_WORD(at + 1).xyz;
     nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
     profile.offset += profile.slope * leg.from;
+    /* linear within a piece, which ends at kinks: dear to find for many faces */
+    bool flat_sided = NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES;
+    float first = 0.0;
+    if (flat_sided) first = nb_planes_density(profile, 0.0);
     for (int j = leg.mixed ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
         float s = leg.h * nb_node(j);
-        float length = nb_integral(profile, s);
+        float density = nb_density(profile, s);
+        float length = flat_sided ? 0.5 * s * (first + density) : nb_integral(profile, s);
         leg.depth[j] += extinction.xyz * length;
-        leg.density[j] += light * nb_density(profile, s);
+        leg.density[j] += light * density;
         if (j == NB_NODES - 1) leg.light += light * length;
     }
 }

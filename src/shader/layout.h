@@ -1,17 +1,21 @@
-/* What the words of packed fog mean. pack.c writes them, fog.glsl reads them: this text is compiled as C, GLSL and
- * HLSL. A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the bits of
- * small numbers. Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
+/* What the words of packed fog mean. pack.c writes them, media.glsl and fog.glsl read them: this text is compiled as C,
+ * GLSL and HLSL. A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the
+ * bits of small numbers. Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
  *
  * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, 0.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
- *     1  light per metre at density 1 (radiance times extinction, plus emission), 1 where there is emission, plus 2
- * where it covers, plus 4 times its rank, counted from 0: what covers takes away the fog of every lower rank 2 radiance
- * of opaque fog, leaves 3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre
- * to the eye, 1 / (sqrt(2) sigma); soft edge: 1 / distance 4  its only leaf; of a body of several: bounds low, first
- * leaf's word; bounds high The last number of words 5 and 6 is where along a ray it starts to act and where it ends,
- * 1e18 where it does not [m].
+ *     1  light per metre at density 1 (radiance times extinction, plus emission), flags and rank: 1 where there is
+ *        emission, plus 2 where it covers, plus 4 times its rank, counted from 0: what covers takes away the fog of
+ *        every lower rank
+ *     2  radiance of opaque fog, leaves
+ *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye,
+ *        1 / (sqrt(2) sigma); soft edge of a box: three unused, 1 / distance; of a round body: gain, steepness and
+ *        inner of nb_edge, one unused; of planes: unused
+ *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
+ *        The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does
+ *        not [m].
  *
  * A leaf, NB_LEAF_WORDS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
@@ -20,7 +24,8 @@
  *     3  the matrix, row by row; where the type says that it is turned
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
  * both must hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule;
- * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's. */
+ * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's.
+ * Faces with a soft edge are scaled: a place is distance - normal . place edges deep. */
 #ifndef NB_SHADER_LAYOUT_H
 #define NB_SHADER_LAYOUT_H
 
@@ -36,9 +41,11 @@
 #define NB_KIND_HEIGHT_CAPPED 2 /* 1 below the base */
 #define NB_KIND_LINEAR 3
 #define NB_KIND_GAUSSIAN 4
-#define NB_KIND_SOFT_EDGE 5
-#define NB_KIND_RADIAL 6 /* plus power - 1, 0 to 2 */
-#define NB_KIND_EXCLUDE 9
+#define NB_KIND_SOFT_EDGE 5 /* of a box */
+#define NB_KIND_SOFT_ROUND 6
+#define NB_KIND_SOFT_PLANES 7
+#define NB_KIND_RADIAL 8 /* plus power - 1, 0 to 2 */
+#define NB_KIND_EXCLUDE 11
 
 #define NB_LIGHT_EMITS 1
 #define NB_LIGHT_COVERS 2
@@ -71,7 +78,10 @@
 #define NB_HAS_DISTANCES 16384
 #define NB_HAS_MAX_OPACITY 32768
 #define NB_HAS_SEVERAL 65536 /* more than one medium */
-#define NB_HAS_ALL 131071
-#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT_EDGE | NB_HAS_RADIAL)
+#define NB_HAS_SOFT_ROUND 131072
+#define NB_HAS_SOFT_PLANES 262144
+#define NB_HAS_ALL 524287
+#define NB_HAS_SOFT (NB_HAS_SOFT_EDGE | NB_HAS_SOFT_ROUND | NB_HAS_SOFT_PLANES)
+#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL)
 
 #endif

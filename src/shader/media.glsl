@@ -193,6 +193,10 @@ struct nb_profile {
     nb_vec3 slope;
     nb_vec3 size;  /* soft edge: half widths */
     float level;   /* gaussian: m; radial: c */
+    nb_vec3 side;  /* soft edge of a round body: see nb_round_edge; of planes it has offset and slope of the ray */
+    int form;
+    int first;     /* planes */
+    int count;
 };
 
 /* Distance, in units of `scale`, from the closest approach of p + t d to the origin: coordinates along and square across. */
@@ -204,6 +208,36 @@ nb_profile nb_round_profile(nb_profile profile, nb_vec3 p, nb_vec3 d, float scal
     profile.slope.x = sqrt(square) * scale;
     profile.offset.x = (start - closest) * profile.slope.x;
     profile.level = min(dot(q, q), 1e9);
+    return profile;
+}
+
+nb_profile nb_planes_profile(nb_profile profile, int leaf, nb_ray ray, float start)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    profile.count = int(head.y);
+    profile.first = int(head.z);
+    profile.offset = ray.origin + ray.direction * start;
+    profile.slope = ray.direction;
+    return profile;
+}
+
+nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_ray ray, float start)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    int type = int(head.x);
+    nb_ray local = nb_turned_ray(leaf, type >= NB_TYPE_TURNED, ray);
+    if (type >= NB_TYPE_TURNED) type -= NB_TYPE_TURNED;
+    float unit = type == NB_TYPE_BALL ? 1.0 / head.y : 1.0;
+    float radius = type == NB_TYPE_CONE ? head.y : 1.0;
+    float slope = type == NB_TYPE_CONE ? head.z : 0.0;
+    float extent = type == NB_TYPE_CAPSULE ? head.y : 1.0;
+    profile.form = type == NB_TYPE_BALL ? NB_EDGE_BALL : type == NB_TYPE_CAPSULE ? NB_EDGE_CAPSULE : NB_EDGE_CAPPED;
+    nb_vec3 p = (local.origin + NEBEL_WORD(leaf + 1).xyz + local.direction * start) * unit;
+    nb_round_edge edge = nb_round_edge_of(p, local.direction * unit, radius, slope, extent, word.x, word.y, word.z, profile.form);
+    profile.side = edge.side;
+    profile.offset = edge.q;
+    profile.slope = edge.k;
+    profile.size = edge.ends;
     return profile;
 }
 
@@ -232,6 +266,10 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
     profile.slope = nb_splat3(0.0);
     profile.size = nb_splat3(0.0);
     profile.level = 0.0;
+    profile.side = nb_splat3(0.0);
+    profile.form = 0;
+    profile.first = 0;
+    profile.count = 0;
     if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT && kind != NB_KIND_EXCLUDE) {
         nb_vec4 word = NEBEL_WORD(medium + 3);
         if (NB_HAS(NB_HAS_SLOPE) && kind <= NB_KIND_LINEAR) {
@@ -239,11 +277,69 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
             profile.offset.x = word.w + dot(word.xyz, ray.origin) + profile.slope.x * start;
         } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
             profile = nb_round_profile(profile, word.xyz + ray.origin, ray.direction, word.w, start);
+        } else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND) {
+            profile = nb_round_body_profile(profile, medium + NB_MEDIUM_LEAF, word, ray, start);
+        } else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES) {
+            profile = nb_planes_profile(profile, medium + NB_MEDIUM_LEAF, ray, start);
         } else {
             profile = nb_leaf_profile(profile, medium + NB_MEDIUM_LEAF, word.w, ray, start);
         }
     }
     return profile;
+}
+
+/* Soft edges of planes, as in src/march/trace_packet.h: the least of the faces' depths is linear from kink to kink. */
+float nb_planes_density(nb_profile profile, float s)
+{
+    nb_vec3 place = profile.offset + profile.slope * s;
+    float least = 1.0;
+    for (int i = 0; i < profile.count; i++) {
+        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        least = min(least, face.w - dot(face.xyz, place));
+    }
+    return max(least, 0.0);
+}
+
+/* What float loses of a depth. */
+#define NB_EDGE_NOISE 3e-5
+
+float nb_planes_kink(nb_profile profile, float s)
+{
+    nb_vec3 place = profile.offset + profile.slope * s;
+    float least = 1.0;
+    for (int i = 0; i < profile.count; i++) {
+        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        least = min(least, face.w - dot(face.xyz, place));
+    }
+    float lowest = least + NB_EDGE_NOISE >= 1.0 ? 0.0 : NB_FAR;
+    for (int i = 0; i < profile.count; i++) {
+        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        if (face.w - dot(face.xyz, place) <= least + NB_EDGE_NOISE) lowest = min(lowest, -dot(face.xyz, profile.slope));
+    }
+    float way = lowest > 0.0 ? (1.0 - least) / lowest : NB_FAR;
+    for (int i = 0; i < profile.count; i++) {
+        nb_vec4 face = NEBEL_WORD(profile.first + i);
+        float slope = -dot(face.xyz, profile.slope);
+        if (slope < lowest) way = min(way, max(face.w - dot(face.xyz, place) - least, 0.0) / (lowest - slope));
+    }
+    return s + max(way, abs(s) * (4.0 * NB_EPSILON) + 1e-9);
+}
+
+float nb_planes_integral(nb_profile profile, float h)
+{
+    float t = 0.0;
+    float density = nb_planes_density(profile, 0.0);
+    float integral = 0.0;
+    int most = 2 * profile.count + 4;
+    for (int i = 0; i < most; i++) {
+        if (!(t < h)) break;
+        float end = i + 1 < most ? min(nb_planes_kink(profile, t), h) : h;
+        float next = nb_planes_density(profile, end);
+        integral += 0.5 * (end - t) * (density + next);
+        density = next;
+        t = end;
+    }
+    return integral;
 }
 
 float nb_density(nb_profile profile, float s)
@@ -262,6 +358,10 @@ float nb_density(nb_profile profile, float s)
             density = nb_gaussian_density(profile.level, u);
         else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE)
             density = nb_soft_edge_density(profile.offset + profile.slope * s, profile.size);
+        else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND)
+            density = nb_round_edge_density(profile.side, profile.offset + profile.slope * s, profile.size.x, profile.form);
+        else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES)
+            density = nb_planes_density(profile, s);
         else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE)
             density = nb_radial_density(profile.level, u, kind - NB_KIND_RADIAL + 1);
     }
@@ -292,6 +392,11 @@ float nb_integral(nb_profile profile, float h)
             integral = nb_gaussian_integral(profile.level, u, u + slope * h, slope).value;
         } else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE) {
             integral = nb_soft_edge_integral(profile.offset, profile.slope, profile.size, h).value;
+        } else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND) {
+            integral =
+                nb_round_edge_integral(profile.side, profile.offset, profile.slope, profile.size, profile.form, h).value;
+        } else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES) {
+            integral = nb_planes_integral(profile, h);
         } else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE) {
             integral = nb_radial_integral(profile.level, u, slope, h, kind - NB_KIND_RADIAL + 1).value;
         }

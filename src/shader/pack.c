@@ -75,8 +75,9 @@ static void way_to_eye(const packer *p, const nb_leaf *leaf, long double way[3])
     for (int i = 0; i < 3; i++) way[i] = (p->eye[i] - leaf->exact_origin[i]) - leaf->exact_rest[i];
 }
 
-/* In the world's axes around the eye; the power of two keeps the largest component near 1 and changes no digit. */
-static void pack_face(const nb_leaf *leaf, const nb_face *face, const long double way[3], nebel_word *word)
+/* In the world's axes around the eye; the power of two keeps the largest component near 1 and changes no digit. A soft
+ * edge has units of its own: `edge` is how deep it is, 0 where there is none. */
+static void pack_face(const nb_leaf *leaf, const nb_face *face, const long double way[3], double edge, nebel_word *word)
 {
     long double normal[3], largest = 0, distance = (long double)face->distance;
     for (int i = 0; i < 3; i++) {
@@ -87,18 +88,20 @@ static void pack_face(const nb_leaf *leaf, const nb_face *face, const long doubl
     }
     int exponent;
     frexpl(largest, &exponent);
-    for (int i = 0; i < 3; i++) word->v[i] = (float)ldexpl(normal[i], -exponent);
-    word->v[3] = narrow(ldexpl(distance, -exponent));
+    const long double scale = edge > 0 ? (long double)(face->inverse_length / edge) : ldexpl(1, -exponent);
+    for (int i = 0; i < 3; i++) word->v[i] = narrow(normal[i] * scale);
+    word->v[3] = narrow(distance * scale);
 }
 
 static void pack_faces(packer *p, const nb_volume *body, const nb_leaf *leaf, nebel_word *word)
 {
     long double way[3];
+    const double edge = body->density.type == NEBEL_DENSITY_SOFT_EDGE ? body->density.distance : 0;
     way_to_eye(p, leaf, way);
     word->v[1] = (float)leaf->face_count;
     word->v[2] = (float)p->used;
     for (size_t i = 0; i < leaf->face_count; i++)
-        pack_face(leaf, &body->faces[leaf->first_face + i], way, &p->words[p->used++]);
+        pack_face(leaf, &body->faces[leaf->first_face + i], way, edge, &p->words[p->used++]);
 }
 
 static void pack_frame(const packer *p, const nb_leaf *leaf, nebel_word *word)
@@ -170,7 +173,9 @@ static int kind_of(const nb_volume *body)
     case NEBEL_DENSITY_GAUSSIAN:
         return NB_KIND_GAUSSIAN;
     case NEBEL_DENSITY_SOFT_EDGE:
-        return NB_KIND_SOFT_EDGE;
+        return body->leaves[0].type == NB_LEAF_BOX      ? NB_KIND_SOFT_EDGE
+               : body->leaves[0].type == NB_LEAF_PLANES ? NB_KIND_SOFT_PLANES
+                                                        : NB_KIND_SOFT_ROUND;
     case NEBEL_DENSITY_RADIAL:
         return NB_KIND_RADIAL + body->density.power - 1;
     default:
@@ -209,6 +214,9 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
         word->v[3] = narrow(0.70710678118654752440L / (long double)density->sigma);
         break;
     case NEBEL_DENSITY_SOFT_EDGE:
+        word->v[0] = (float)body->edge.gain;
+        word->v[1] = (float)body->edge.steepness;
+        word->v[2] = (float)body->edge.inner;
         word->v[3] = narrow(1 / (long double)density->distance);
         break;
     default:
@@ -306,6 +314,8 @@ static uint32_t features_of_kind(int kind)
     if (kind <= NB_KIND_LINEAR) return NB_HAS_SLOPE;
     if (kind == NB_KIND_GAUSSIAN) return NB_HAS_GAUSSIAN;
     if (kind == NB_KIND_SOFT_EDGE) return NB_HAS_SOFT_EDGE;
+    if (kind == NB_KIND_SOFT_ROUND) return NB_HAS_SOFT_ROUND;
+    if (kind == NB_KIND_SOFT_PLANES) return NB_HAS_SOFT_PLANES;
     return kind == NB_KIND_EXCLUDE ? 0 : NB_HAS_RADIAL;
 }
 
