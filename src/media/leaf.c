@@ -241,8 +241,9 @@ static void set_face(nb_face *face, const double normal[3], double distance)
                                     face->normal[2] * face->normal[2]);
 }
 
-/* The faces in world coordinates relative to the leaf's origin, for the bounds. */
-static int bound_faces(const nb_leaf *leaf, const nb_face *faces, double low[3], double high[3])
+/* The faces in world coordinates relative to the leaf's origin, for the bounds; side -1: turned around. 0: the body is
+ * empty. */
+static int bound_faces(const nb_leaf *leaf, const nb_face *faces, int side, double low[3], double high[3])
 {
     double planes[NEBEL_MAX_PLANES][4];
     for (size_t k = 0; k < leaf->face_count; k++) {
@@ -252,7 +253,7 @@ static int bound_faces(const nb_leaf *leaf, const nb_face *faces, double low[3],
             for (int j = 0; j < 3; j++) n[i] += leaf->exact_matrix[3 * j + i] * (long double)face->normal[j];
             square += n[i] * n[i];
         }
-        const long double length = sqrtl(square);
+        const long double length = side * sqrtl(square);
         for (int i = 0; i < 3; i++) planes[k][i] = (double)(n[i] / length);
         planes[k][3] = (double)((long double)face->distance / length);
     }
@@ -281,9 +282,10 @@ static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_
     for (size_t i = 0; i < leaf->face_count && !half_space; i++)
         set_face(&faces[i], shape->planes[i].normal, shape->planes[i].distance);
     if (!set_frame(leaf, world, center, no_shaping)) return nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
-    if (!bound_faces(leaf, faces, low, high))
-        return nb_fail(log, NEBEL_ERROR_VALUE, "convex: no point is inside all planes; the body is empty");
-    return NEBEL_OK;
+    if (bound_faces(leaf, faces, 1, low, high)) return NEBEL_OK;
+    return nb_fail(log, NEBEL_ERROR_VALUE, "convex: no point is inside all planes; the body is empty%s",
+                   bound_faces(leaf, faces, -1, low, high) ? ": its normals point inwards, they must point out of it"
+                                                           : "");
 }
 
 nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, const nb_affine *world, nb_face *faces,
