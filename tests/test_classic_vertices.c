@@ -138,6 +138,36 @@ static void test_boxes_have_the_bits_of_segments(void **unused)
     }
 }
 
+/* Boxes that the stream kernel takes for their factors, but not for their light; of colours other than each other's,
+ * and an extinction other in each channel. */
+static void test_boxes_of_several_colors_have_their_own_light(void **unused)
+{
+    (void)unused;
+    uint64_t state = 8;
+    const points p = random_points(&state, 15);
+    nebel_volume_desc boxes[] = {box_of(-5, -5, -5, 5, 5, 5, .1), box_of(0, -8, 2, 9, 3, 8, .07)};
+    for (int tinted = 0; tinted < 2; tinted++) {
+        for (int c = 0; c < 3; c++) {
+            boxes[1].source[c] = .2 + .1 * c;
+            if (tinted) boxes[0].extinction[c] = .05 + .1 * c;
+        }
+        nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){0}, boxes, 2);
+        const nebel_vertices vertices = {.positions = p.at, .eye = {-11, 2, 9}};
+        for (int channel = 0; channel < 3; channel++) {
+            static float factor[COUNT], color[COUNT][4];
+            fog_points(snapshot, &(nebel_vertex_desc){.channel = channel}, &vertices, NEBEL_VERTEX_FACTOR, factor);
+            fog_points(snapshot, &(nebel_vertex_desc){.channel = channel}, &vertices, NEBEL_VERTEX_RGBA_FLOAT, color);
+            for (int i = 0; i < COUNT; i++) {
+                const nebel_light light = trace_vertex(snapshot, &vertices, p.at[i]);
+                assert_true(fabs((double)factor[i] - light.transmittance[channel]) <= 2e-5);
+                assert_true(fabs(1 - (double)color[i][3] - light.transmittance[channel]) <= 2e-5);
+                for (int c = 0; c < 3; c++) assert_true(fabs((double)color[i][c] - light.in_scattering[c]) <= 2e-5);
+            }
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
 /* ---- formats --------------------------------------------------------------------------------- */
 
 static unsigned char byte_of(double x)
@@ -663,6 +693,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_vertices_in_any_fog_are_what_the_trace_says),
         cmocka_unit_test(test_boxes_have_the_bits_of_segments),
+        cmocka_unit_test(test_boxes_of_several_colors_have_their_own_light),
         cmocka_unit_test(test_formats_say_the_same),
         cmocka_unit_test(test_halves_are_rounded_upwards),
         cmocka_unit_test(test_structures_splits_and_instruction_sets_change_no_bit),

@@ -1,12 +1,15 @@
 #include "cpu.h"
 
+#include "levels.h"
+
+#include <stddef.h>
+
 #if defined(__x86_64__) || defined(__i386__)
 
-int nb_cpu_supports(nebel_isa isa)
+static int is_supported(nebel_isa isa)
 {
     __builtin_cpu_init();
     switch (isa) {
-    case NEBEL_ISA_DEFAULT:
     case NEBEL_ISA_SCALAR:
         return 1;
     case NEBEL_ISA_SSE2:
@@ -23,12 +26,23 @@ int nb_cpu_supports(nebel_isa isa)
 
 #else
 
-int nb_cpu_supports(nebel_isa isa)
+static int is_supported(nebel_isa isa)
 {
 #if defined(__aarch64__)
     if (isa == NEBEL_ISA_NEON) return 1; /* part of the architecture */
 #endif
-    return isa == NEBEL_ISA_DEFAULT || isa == NEBEL_ISA_SCALAR;
+    return isa == NEBEL_ISA_SCALAR;
 }
 
 #endif
+
+nebel_isa nb_cpu_choose(nebel_isa isa)
+{
+#define LEVEL(NAME, suffix) NEBEL_ISA_##NAME,
+    static const nebel_isa levels[] = {NB_LEVELS(LEVEL)};
+#undef LEVEL
+    nebel_isa chosen = NEBEL_ISA_COUNT;
+    for (size_t i = 0; i < sizeof levels / sizeof *levels; i++)
+        if ((isa == NEBEL_ISA_DEFAULT || isa == levels[i]) && is_supported(levels[i])) chosen = levels[i];
+    return chosen;
+}

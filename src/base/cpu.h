@@ -1,10 +1,11 @@
-/* Which instruction sets this processor and its operating system allow. */
+/* Which instruction sets this build, this processor and its operating system allow. */
 #ifndef NB_BASE_CPU_H
 #define NB_BASE_CPU_H
 
 #include <nebel/nebel.h>
 
-/* 1 when the processor can run `isa`; says nothing of what the build holds. DEFAULT and SCALAR always can. */
-int nb_cpu_supports(nebel_isa isa);
+/* The instruction set to run: `isa`, or for DEFAULT the best one; NEBEL_ISA_COUNT where this build or this processor
+ * has not got it. */
+nebel_isa nb_cpu_choose(nebel_isa isa);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "base/base.h"
 #include "base/cpu.h"
+#include "base/levels.h"
 #include "classic/layout.h"
 #include "kernels/transmit.h"
 #include "kernels/vertices.h"
@@ -17,35 +18,10 @@ _Static_assert((int)NEBEL_CURVE_TABLE == (int)NB_CURVE_TABLE &&
                    (int)NEBEL_VERTEX_SPECULAR_ALPHA == (int)NB_VERTEX_SPECULAR_ALPHA,
                "the kernel's lists are those of the public face");
 
-typedef struct level {
-    nebel_isa isa;
-    nb_transmit_fn *transmit;
-    nb_vertices_fn *write;
-} level;
-
-static const level levels[] = {
-    {NEBEL_ISA_SCALAR, nb_transmit_scalar, nb_vertices_scalar},
-#if defined(NB_HAVE_NEON)
-    {NEBEL_ISA_NEON, nb_transmit_neon, nb_vertices_neon},
-#endif
-#if defined(NB_HAVE_SSE2)
-    {NEBEL_ISA_SSE2, nb_transmit_sse2, nb_vertices_sse2},
-#endif
-#if defined(NB_HAVE_AVX2)
-    {NEBEL_ISA_AVX2, nb_transmit_avx2, nb_vertices_avx2},
-#endif
-#if defined(NB_HAVE_AVX512)
-    {NEBEL_ISA_AVX512, nb_transmit_avx512, nb_vertices_avx512},
-#endif
-};
-
-static const level *find_level(nebel_isa isa)
-{
-    const level *found = NULL;
-    for (size_t i = 0; i < sizeof levels / sizeof *levels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == levels[i].isa) && nb_cpu_supports(levels[i].isa)) found = &levels[i];
-    return found;
-}
+#define TRANSMIT(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,
+#define WRITE(NAME, suffix) [NEBEL_ISA_##NAME] = nb_vertices_##suffix,
+static nb_transmit_fn *const transmit_kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(TRANSMIT)};
+static nb_vertices_fn *const write_kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(WRITE)};
 
 /* ---- descriptions ---------------------------------------------------------------------------- */
 
@@ -68,7 +44,7 @@ nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vert
 /* What holds for all blocks of a call. */
 typedef struct call {
     const nebel_snapshot *snapshot;
-    const level *level;
+    nebel_isa level; /* chosen */
     nebel_vertex_desc desc;
     nebel_vertices vertices;
     float start[3];   /* the eye from the origin of the positions */
@@ -146,8 +122,8 @@ static nebel_result trace_block(const call *c, block *b)
 static void transmit_block(const call *c, block *b)
 {
     const size_t size = 3 * sizeof(float);
-    c->level->transmit(&(nb_transmit_job){c->boxes, c->snapshot->medium_count, b->count, c->start,
-                                          gather_points(&c->vertices, b), 0, size, sizeof(float), b->factor});
+    transmit_kernels[c->level](&(nb_transmit_job){c->boxes, c->snapshot->medium_count, b->count, c->start,
+                                                  gather_points(&c->vertices, b), 0, size, sizeof(float), b->factor});
 }
 
 /* A last packet reaches beyond the vertices, and is to find numbers there. */
@@ -187,7 +163,7 @@ static void write_block(const call *c, const nebel_vertex_output *outputs, size_
         job.kind = (nb_vertex_kind)outputs[i].format;
         job.stride = nb_layout_stride(&outputs[i]);
         job.data = (unsigned char *)outputs[i].data + b->first * job.stride;
-        c->level->write(&job);
+        write_kernels[c->level](&job);
         job.curve = NB_CURVE_PHYSICAL;
     }
 }
@@ -262,8 +238,8 @@ nebel_result nebel_fog_vertices(const nebel_snapshot *snapshot, const nebel_vert
     if (result != NEBEL_OK) return nb_fail(&snapshot->log, result, "vertices: the description is not valid");
     const char *fault = fault_of(&c, n, outputs, output_count);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "vertices: %s", fault);
-    c.level = find_level(c.desc.isa);
-    if (c.level == NULL)
+    c.level = nb_cpu_choose(c.desc.isa);
+    if (c.level == NEBEL_ISA_COUNT)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(c.desc.isa));
     if (c.vertices.position_stride == 0) c.vertices.position_stride = 3 * sizeof(float);

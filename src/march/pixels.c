@@ -2,38 +2,14 @@
 #include "boxes.h"
 
 #include "base/cpu.h"
+#include "base/levels.h"
 #include "kernels/pixels.h"
 
 #include <math.h>
 #include <string.h>
 
-static const struct {
-    nebel_isa isa;
-    nb_pixels_fn *fog;
-} kernels[] = {
-    {NEBEL_ISA_SCALAR, nb_pixels_scalar},
-#if defined(NB_HAVE_NEON)
-    {NEBEL_ISA_NEON, nb_pixels_neon},
-#endif
-#if defined(NB_HAVE_SSE2)
-    {NEBEL_ISA_SSE2, nb_pixels_sse2},
-#endif
-#if defined(NB_HAVE_AVX2)
-    {NEBEL_ISA_AVX2, nb_pixels_avx2},
-#endif
-#if defined(NB_HAVE_AVX512)
-    {NEBEL_ISA_AVX512, nb_pixels_avx512},
-#endif
-};
-
-static nb_pixels_fn *kernel_for(nebel_isa isa)
-{
-    nb_pixels_fn *found = NULL;
-    for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa))
-            found = kernels[i].fog;
-    return found;
-}
+#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_pixels_##suffix,
+static nb_pixels_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
 
 /* ---- checks ---------------------------------------------------------------------------------- */
 
@@ -157,7 +133,7 @@ nebel_result nebel_fog_pixels(const nebel_snapshot *snapshot, nebel_isa isa, con
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     const char *fault = pixels != NULL ? fault_of(pixels) : "must not be NULL";
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pixels: %s", fault);
-    nb_pixels_fn *kernel = kernel_for(isa);
+    nb_pixels_fn *kernel = kernels[nb_cpu_choose(isa)];
     if (kernel == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(isa));

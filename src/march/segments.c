@@ -3,37 +3,13 @@
 #include "snapshot.h"
 
 #include "base/cpu.h"
+#include "base/levels.h"
 #include "kernels/transmit.h"
 
 #include <math.h>
 
-static const struct {
-    nebel_isa isa;
-    nb_transmit_fn *transmit;
-} kernels[] = {
-    {NEBEL_ISA_SCALAR, nb_transmit_scalar},
-#if defined(NB_HAVE_NEON)
-    {NEBEL_ISA_NEON, nb_transmit_neon},
-#endif
-#if defined(NB_HAVE_SSE2)
-    {NEBEL_ISA_SSE2, nb_transmit_sse2},
-#endif
-#if defined(NB_HAVE_AVX2)
-    {NEBEL_ISA_AVX2, nb_transmit_avx2},
-#endif
-#if defined(NB_HAVE_AVX512)
-    {NEBEL_ISA_AVX512, nb_transmit_avx512},
-#endif
-};
-
-static nb_transmit_fn *kernel_for(nebel_isa isa)
-{
-    nb_transmit_fn *found = NULL;
-    for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa))
-            found = kernels[i].transmit;
-    return found;
-}
+#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,
+static nb_transmit_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
 
 static const float *point_at(const float *base, size_t stride, size_t i)
 {
@@ -102,7 +78,7 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
         if (!(fabs(segments->origin[c]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "segments origin: must be finite and at most 1e15 m away");
-    nb_transmit_fn *kernel = kernel_for(isa);
+    nb_transmit_fn *kernel = kernels[nb_cpu_choose(isa)];
     if (kernel == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(isa));

@@ -2,42 +2,17 @@
 #include "trace_kernel.h"
 
 #include "base/cpu.h"
+#include "base/levels.h"
 #include "base/precision.h"
 
 #include <math.h>
 
-/* C first, then ascending: the last one that runs is the default. */
-static const struct {
-    nebel_isa isa;
-    nb_trace_fn *trace;
-} kernels[] = {
-    {NEBEL_ISA_SCALAR, nb_trace_scalar},
-#if defined(NB_HAVE_NEON)
-    {NEBEL_ISA_NEON, nb_trace_neon},
-#endif
-#if defined(NB_HAVE_SSE2)
-    {NEBEL_ISA_SSE2, nb_trace_sse2},
-#endif
-#if defined(NB_HAVE_AVX2)
-    {NEBEL_ISA_AVX2, nb_trace_avx2},
-#endif
-#if defined(NB_HAVE_AVX512)
-    {NEBEL_ISA_AVX512, nb_trace_avx512},
-#endif
-};
-
-static nb_trace_fn *kernel_for(nebel_isa isa)
-{
-    nb_trace_fn *found = NULL;
-    for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++)
-        if ((isa == NEBEL_ISA_DEFAULT || isa == kernels[i].isa) && nb_cpu_supports(kernels[i].isa))
-            found = kernels[i].trace;
-    return found;
-}
+#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_trace_##suffix,
+static nb_trace_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
 
 int nebel_isa_available(nebel_isa isa)
 {
-    return kernel_for(isa) != NULL;
+    return nb_cpu_choose(isa) != NEBEL_ISA_COUNT;
 }
 
 const char *nebel_isa_name(nebel_isa isa)
@@ -185,7 +160,7 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
                         .ray_stride = ray_stride,
                         .lights = lights,
                         .light_stride = light_stride};
-    return run(snapshot, desc, n, is_float ? kernel_for(desc->isa) : nb_trace_double, &job);
+    return run(snapshot, desc, n, is_float ? kernels[nb_cpu_choose(desc->isa)] : nb_trace_double, &job);
 }
 
 /* ---- planes ---------------------------------------------------------------------------------- */
@@ -239,7 +214,7 @@ nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trac
                         .wants_error = to.error != NULL,
                         .ray_planes = &from,
                         .light_planes = &to};
-    return run(snapshot, asked, n, kernel_for(asked->isa), &job);
+    return run(snapshot, asked, n, kernels[nb_cpu_choose(asked->isa)], &job);
 }
 
 /* ---- visibility ------------------------------------------------------------------------------ */

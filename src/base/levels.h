@@ -1,0 +1,32 @@
+/* The instruction sets that this build has kernels for. */
+#ifndef NB_BASE_LEVELS_H
+#define NB_BASE_LEVELS_H
+
+#if defined(NB_HAVE_NEON)
+#define NB_LEVEL_NEON(X) X(NEON, neon)
+#else
+#define NB_LEVEL_NEON(X)
+#endif
+
+#if defined(NB_HAVE_SSE2)
+#define NB_LEVEL_SSE2(X) X(SSE2, sse2)
+#else
+#define NB_LEVEL_SSE2(X)
+#endif
+
+#if defined(NB_HAVE_AVX2)
+#define NB_LEVEL_AVX2(X) X(AVX2, avx2)
+#else
+#define NB_LEVEL_AVX2(X)
+#endif
+
+#if defined(NB_HAVE_AVX512)
+#define NB_LEVEL_AVX512(X) X(AVX512, avx512)
+#else
+#define NB_LEVEL_AVX512(X)
+#endif
+
+/* X(NAME, suffix) for each: C first, then ascending. */
+#define NB_LEVELS(X) X(SCALAR, scalar) NB_LEVEL_NEON(X) NB_LEVEL_SSE2(X) NB_LEVEL_AVX2(X) NB_LEVEL_AVX512(X)
+
+#endif
