@@ -77,7 +77,7 @@ class Case(unittest.TestCase):
 
 class CallingTest(Case):
     def test_help_and_version_go_to_standard_output(self):
-        for words in (["--help"], ["-h"], ["--version"], ["help"], ["help", "trace"], *([command, "--help"] for command in COMMANDS),
+        for words in (["--help"], ["-h"], ["--version"], ["help"], ["help", "help"], ["help", "trace"], *([command, "--help"] for command in COMMANDS),
                       *([command, "-h"] for command in COMMANDS)):
             done = nebel(*words)
             self.assert_done(done)

@@ -189,8 +189,11 @@ static void test_files_that_are_no_models_are_told_what_they_are(void **state)
     assert_broken("\"file\": \"empty.obj\"", NEBEL_ERROR_FORMAT, "empty.obj\" is empty; copy or export it again");
     assert_broken("\"file\": \"empty.glb\"", NEBEL_ERROR_FORMAT, "empty.glb\" is empty; copy or export it again");
     assert_broken("\"file\": \"cut.ply\"", NEBEL_ERROR_FORMAT, "begins like PLY, but its header does not end");
-    assert_broken("\"file\": \"text.glb\"", NEBEL_ERROR_FORMAT,
-                  "text.glb\" cannot be read: its content is not what .glb in its name promises");
+    assert_broken("\"file\": \"text.glb\"", NEBEL_ERROR_FORMAT, "text.glb\" is called .glb, but is no binary glTF");
+    write_text("text.gltf", "hello");
+    assert_broken("\"file\": \"text.gltf\"", NEBEL_ERROR_FORMAT,
+                  "text.gltf\" cannot be read: its content is not what .gltf in its name promises");
+    assert_broken("\"file\": \"/dev/null\"", NEBEL_ERROR_FILE, "it is a device, a pipe or a socket; name a file");
     assert_broken("\"file\": \"no.format\"", NEBEL_ERROR_FORMAT,
                   "no.format\" cannot be read: neither its name nor its content tells a known format; names may end in "
                   ".glb, .gltf, .obj, .ply");
@@ -605,10 +608,10 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"t.obj",    "t.mtl",     "empty.obj", "points.obj", "bad.obj",
-                                        "text.glb", "no.format", "nan.ply",   "cut.ply",    "h.png",
-                                        "thin.png", "text.png",  "color.png", "cube.ply",   "fold.ply",
-                                        "cone.ply", "bowl.ply",  "empty.glb", "cut.glb",    "glb.obj"};
+    static const char *const names[] = {"t.obj",     "t.mtl",     "empty.obj", "points.obj", "bad.obj",  "text.glb",
+                                        "text.gltf", "no.format", "nan.ply",   "cut.ply",    "h.png",    "thin.png",
+                                        "text.png",  "color.png", "cube.ply",  "fold.ply",   "cone.ply", "bowl.ply",
+                                        "empty.glb", "cut.glb",   "glb.obj"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) unlink(in_folder(names[i]));
     return rmdir(folder);
 }

@@ -265,7 +265,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     if (wanted->amplify == 0) nb_options_reject(arguments, AMPLIFY, "is not more than 0");
     wanted->fail_above = nb_options_number(arguments, FAIL_ABOVE, 0, (double)INFINITY, (double)INFINITY);
     if (wanted->output != NULL && nebel_find_image_format(wanted->output) == NEBEL_IMAGE_NONE) {
-        nb_options_reject(arguments, OUTPUT, "ends neither in .png nor in .exr");
+        nb_options_reject(arguments, OUTPUT, "is no name that ends in .png or .exr");
     }
     return arguments->misused ? nb_report_misuse("compare", "compare: nothing was done") : -1;
 }

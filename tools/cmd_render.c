@@ -138,7 +138,8 @@ static void read_output(nb_arguments *arguments, settings *wanted)
     if (strcmp(wanted->output, standard_output) == 0 && isatty(STDOUT_FILENO))
         nb_options_reject(arguments, OUTPUT, "is a terminal; send the picture to a file or to a program");
     wanted->format = nebel_find_image_format(wanted->output);
-    if (wanted->format == NEBEL_IMAGE_NONE) nb_options_reject(arguments, OUTPUT, "ends neither in .png nor in .exr");
+    if (wanted->format == NEBEL_IMAGE_NONE)
+        nb_options_reject(arguments, OUTPUT, "is no name that ends in .png or .exr");
     const char *const fault = wanted->many_frames ? nb_pattern_find_fault(wanted->output) : NULL;
     if (fault != NULL) nb_options_reject(arguments, OUTPUT, fault);
     if (wanted->format == NEBEL_IMAGE_PNG && wanted->aov)

@@ -55,10 +55,15 @@ static const nb_command *find_command(const char *name)
     return NULL;
 }
 
+static int asks_for_help(const char *word)
+{
+    return strcmp(word, help_option) == 0 || strcmp(word, "-h") == 0 || strcmp(word, "help") == 0;
+}
+
 /* "nebel help", "nebel help COMMAND", and the same with --help. */
 static int help_with(int count, char **words)
 {
-    if (count == 0) return print_help();
+    if (count == 0 || asks_for_help(words[0])) return print_help();
     const nb_command *const command = find_command(words[0]);
     if (command == NULL) return reject_command(words[0]);
     nb_options_print_help(command);
@@ -75,8 +80,7 @@ static int run(int count, char **words)
 {
     if (count == 0) return nb_report_misuse(NULL, "a command is missing");
     const char *const word = words[0];
-    const int wants_help = strcmp(word, help_option) == 0 || strcmp(word, "-h") == 0 || strcmp(word, "help") == 0;
-    if (wants_help) return help_with(count - 1, words + 1);
+    if (asks_for_help(word)) return help_with(count - 1, words + 1);
     if (strcmp(word, version_option) == 0) return print_version();
     const nb_command *const command = find_command(word);
     return command != NULL ? command->run(count - 1, words + 1) : reject_command(word);

@@ -54,8 +54,9 @@ static int read_number(nb_rays *rays, const char *text, size_t size, int which, 
         return reject(rays, "%s is '%.*s%s', which no 64-bit number holds; write a smaller one", number_names[which],
                       shown, text, more);
     case NB_DECIMAL_MALFORMED:
-        return reject(rays, "%s is '%.*s%s', which is no number; write a decimal number such as 1, -0.5 or 2e3",
-                      number_names[which], shown, text, more);
+        return reject(rays, "%s is '%.*s%s', which is no number; write a decimal number such as 1, -0.5 or 2e3%s",
+                      number_names[which], shown, text, more,
+                      memchr(text, ',', size) != NULL ? "; blanks or tabs stand between them, no commas" : "");
     }
     if (which != TMAX && isinf(*number)) {
         return reject(rays, "%s is infinite; only tmax may be inf", number_names[which]);

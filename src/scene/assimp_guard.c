@@ -100,7 +100,11 @@ static nebel_result check_head(const nb_model_load *load, const file_head *head)
         return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" is empty; copy or export it again",
                              load->source->file);
     if (begins_with(head, "ply") || begins_with(head, "PLY")) return check_ply(load, head);
-    return begins_with(head, "glTF") ? check_glb(load, head) : NEBEL_OK;
+    if (begins_with(head, "glTF")) return check_glb(load, head);
+    if (strcasecmp(suffix_of(load->source->file), ".glb") != 0) return NEBEL_OK;
+    return nb_model_fail(load, NEBEL_ERROR_FORMAT,
+                         "the model \"%s\" is called .glb, but is no binary glTF; copy or export it again",
+                         load->source->file);
 }
 
 nebel_result nb_assimp_check_file(const nb_model_load *load)

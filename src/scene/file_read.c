@@ -20,7 +20,10 @@ nebel_result nb_file_check(const nebel_log *log, const char *where, const char *
     struct stat status;
     if (stat(path, &status) != 0) return fail(log, where, what, path, errno);
     if (S_ISDIR(status.st_mode)) return fail(log, where, what, path, EISDIR);
-    if (!S_ISREG(status.st_mode)) return fail(log, where, what, path, EINVAL);
+    if (!S_ISREG(status.st_mode))
+        return nb_fail(log, NEBEL_ERROR_FILE,
+                       "%s%scannot read the %s \"%s\": it is a device, a pipe or a socket; name a file",
+                       where != NULL ? where : "", where != NULL ? ": " : "", what, path);
     return access(path, R_OK) == 0 ? NEBEL_OK : fail(log, where, what, path, errno);
 }
 
