@@ -1,6 +1,5 @@
-/* What Direct3D 9 does with fog. The colours were recorded on Windows by the fog tests of Wine 8.5 (dlls/d3d9), the
- * tolerances with them: facts, evaluated here by hand from the same inputs. */
-#include <nebel/classic.h>
+/* Direct3D 9 fog: its states, what was recorded of it on Windows (d3d9_facts.h), and what no device was asked. */
+#include "d3d9_facts.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -13,7 +12,7 @@
 
 static const double not_a_number = (double)NAN;
 
-enum { RED = 0xff0000, GREEN = 0x00ff00, BLUE = 0x0000ff, YELLOW = 0xffff00 };
+enum { GREEN = 0x00ff00 };
 
 /* ---- states ---------------------------------------------------------------------------------- */
 
@@ -86,26 +85,13 @@ static void test_floats_arrive_as_bit_patterns(void **unused)
     assert_true(fog.fog_start == 12.5f && fog.fog_end == -3 && fog.fog_density == .0625f);
 }
 
-/* ---- colours --------------------------------------------------------------------------------- */
+/* ---- facts ----------------------------------------------------------------------------------- */
 
-/* The object's colour 0xRRGGBB under the fog at factor f. */
-static int pixel_of(const nebel_d3d9_fog *fog, int object, double f)
-{
-    double rgb[3];
-    float pixel[4] = {(float)(object >> 16 & 255) / 255, (float)(object >> 8 & 255) / 255, (float)(object & 255) / 255,
-                      1};
-    nebel_get_d3d9_color(fog, rgb);
-    nebel_blend_fog_factor(f, pixel, rgb, pixel);
-    int color = 0;
-    for (int c = 0; c < 3; c++) color = color << 8 | (int)(pixel[c] * 255 + .5f);
-    return color;
-}
-
-static void assert_color(int found, int wanted, int most)
+static void assert_color(const char *what, int found, int wanted, int most)
 {
     for (int shift = 0; shift <= 16; shift += 8)
         if (abs((found >> shift & 255) - (wanted >> shift & 255)) > most)
-            fail_msg("%06x is not %06x within %d", (unsigned)found, (unsigned)wanted, most);
+            fail_msg("%s: %06x is not %06x within %d", what, (unsigned)found, (unsigned)wanted, most);
 }
 
 static double fixed(const nebel_d3d9_fog *fog, double x, double y, double z, double alpha)
@@ -126,126 +112,52 @@ static double shaded(const nebel_d3d9_fog *fog, double fog_register)
     return nebel_compute_d3d9_vertex_factor(fog, &vertex);
 }
 
-/* A quad at z of the fixed pipeline, specular alpha ff, projection affine: device depth is z, too. */
-static void assert_quad(const nebel_d3d9_fog *fog, int object, double z, int wanted, int most)
-{
-    const double f = nebel_compute_d3d9_pixel_factor(fog, fixed(fog, 0, 0, z, 1), z);
-    assert_color(pixel_of(fog, object, f), wanted, most);
-}
-
-static void assert_transformed_quad(const nebel_d3d9_fog *fog, int object, double z, int wanted, int most)
-{
-    const double f = nebel_compute_d3d9_pixel_factor(fog, transformed(fog, 1), z);
-    assert_color(pixel_of(fog, object, f), wanted, most);
-}
-
-static void test_fog_test(void **unused)
+static void test_recorded_facts(void **unused)
 {
     (void)unused;
-    nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_NONE, 0, 1, 1);
-    assert_quad(&fog, RED, .1, RED, 0);
-    set(&fog, NEBEL_D3DRS_FOGVERTEXMODE, NEBEL_D3DFOG_LINEAR);
-    assert_quad(&fog, RED, 1, GREEN, 1);
-    assert_transformed_quad(&fog, YELLOW, 1, YELLOW, 0);
-    set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_LINEAR);
-    assert_transformed_quad(&fog, YELLOW, 1, GREEN, 1);
-}
-
-static void test_fog_test_start_at_the_end_and_beyond(void **unused)
-{
-    (void)unused;
-    nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_LINEAR, 512, 512, 1);
-    assert_quad(&fog, RED, .1, GREEN, 1);
-    assert_quad(&fog, RED, 1, GREEN, 1);
-    assert_transformed_quad(&fog, YELLOW, 1, YELLOW, 0);
-    fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_LINEAR, .8f, .2f, 1);
-    assert_quad(&fog, BLUE, .1, GREEN, 1);
-    assert_quad(&fog, BLUE, .7, 0x002bd4, 2);
-    assert_quad(&fog, BLUE, .4, 0x00aa55, 2);
-    assert_quad(&fog, BLUE, .9, BLUE, 0);
-}
-
-/* The world moves z by -.5; then the world by +1 and the projection by -1. Table fog goes by the z that comes out. */
-static void test_fog_test_table_fog_goes_by_device_depth(void **unused)
-{
-    (void)unused;
-    const nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_NONE, 0, 1, 1);
-    static const struct {
-        double z, world, projection;
-        int wanted, most;
-    } quads[] = {{.5, -.5, 0, RED, 4}, {1.5, -.5, 0, GREEN, 1}, {.1, 1, -1, 0xe51900, 4}, {1, 1, -1, GREEN, 1}};
-    for (size_t i = 0; i < 4; i++) {
-        const double camera = quads[i].z + quads[i].world, device = camera + quads[i].projection;
-        const double f = nebel_compute_d3d9_pixel_factor(&fog, fixed(&fog, 0, 0, camera, 1), device);
-        assert_color(pixel_of(&fog, RED, f), quads[i].wanted, quads[i].most);
+    for (size_t i = 0; i < d3d9_fact_count; i++) {
+        const d3d9_fact *fact = &d3d9_facts[i];
+        const double f = d3d9_factor_of(&fact->fog, &fact->quad, fact->probe);
+        assert_color(fact->test, d3d9_color_of(&fact->fog, fact->object, f), fact->wanted, fact->most);
     }
 }
 
-static void test_fog_test_range_fog_is_for_vertices_alone(void **unused)
+static void test_recorded_ramps(void **unused)
 {
     (void)unused;
-    nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_NONE, .75f, .75001f, 1);
-    set(&fog, NEBEL_D3DRS_RANGEFOGENABLE, 1);
-    for (int corner = 0; corner < 4; corner++) {
-        const double x = corner & 1 ? 1 : -1, y = corner & 2 ? 1 : -1;
-        set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_LINEAR);
-        set(&fog, NEBEL_D3DRS_FOGVERTEXMODE, NEBEL_D3DFOG_NONE);
-        const double table = nebel_compute_d3d9_pixel_factor(&fog, fixed(&fog, x, y, .5, 1), .5);
-        assert_color(pixel_of(&fog, RED, table), RED, 0);
-        set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_NONE);
-        set(&fog, NEBEL_D3DRS_FOGVERTEXMODE, NEBEL_D3DFOG_LINEAR);
-        const double vertex = nebel_compute_d3d9_pixel_factor(&fog, fixed(&fog, x, y, .5, 1), .5);
-        assert_color(pixel_of(&fog, RED, vertex), GREEN, 1);
+    for (int i = 0; i < D3D9_RAMP_COUNT; i++) {
+        const d3d9_ramp *ramp = &d3d9_ramps[i];
+        for (uint32_t mode = ramp->first_mode; mode <= ramp->last_mode; mode++)
+            for (int step = 0; step < D3D9_RAMP_STEPS; step++) {
+                const nebel_d3d9_fog fog = d3d9_ramp_fog(ramp, mode);
+                const d3d9_quad quad = d3d9_ramp_quad(ramp, step);
+                assert_color("ramp", d3d9_color_of(&fog, D3D9_RAMP_OBJECT, d3d9_factor_of(&fog, &quad, 0)),
+                             ramp->wanted[step], D3D9_RAMP_MOST);
+            }
     }
 }
 
-/* ---- shaders --------------------------------------------------------------------------------- */
-
-enum { STEPS = 11, SHADER_TOLERANCE = 13 };
-
-static const int linear_steps[STEPS] = {0xff0000, 0xff0000, 0xdf2000, 0xbf4000, 0x9f6000, 0x7f8000,
-                                        0x5fa000, 0x40bf00, 0x20df00, 0x00ff00, 0x00ff00};
-static const int exp_steps[STEPS] = {0xff0000, 0xe71800, 0xd12e00, 0xbd4200, 0xab5400, 0x9b6400,
-                                     0x8d7200, 0x7f8000, 0x738c00, 0x689700, 0x5ea100};
-static const int exp2_steps[STEPS] = {0xfd0200, 0xf50200, 0xf50a00, 0xe91600, 0xd92600, 0xc73800,
-                                      0xb24d00, 0x9c6300, 0x867900, 0x728d00, 0x5ea100};
-static const int register_steps[STEPS] = {0xff0000, 0xfe0100, 0xde2100, 0xbf4000, 0x9f6000, 0x7f8000,
-                                          0x5fa000, 0x3fc000, 0x1fe000, 0x00ff00, 0x00ff00};
-
-static double z_of_step(int step)
-{
-    return .001 + step / 10.02;
-}
-
-static void assert_steps(const nebel_d3d9_fog *fog, int with_shader, const int *wanted)
-{
-    for (int i = 0; i < STEPS; i++) {
-        const double z = z_of_step(i);
-        const double f = with_shader ? shaded(fog, (.9 - z) * 1.25) : fixed(fog, 0, 0, z, 1);
-        assert_color(pixel_of(fog, RED, nebel_compute_d3d9_pixel_factor(fog, f, z)), wanted[i], SHADER_TOLERANCE);
-    }
-}
-
-static void test_fog_with_shader_test(void **unused)
+static void test_recorded_vertices(void **unused)
 {
     (void)unused;
-    for (uint32_t vertex = NEBEL_D3DFOG_NONE; vertex <= NEBEL_D3DFOG_LINEAR; vertex++) {
-        nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_LINEAR, vertex, .1f, .9f, 1);
-        assert_steps(&fog, 0, linear_steps);
-        assert_steps(&fog, 1, linear_steps);
-        set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_EXP);
-        assert_steps(&fog, 0, exp_steps);
-        assert_steps(&fog, 1, exp_steps);
-        set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_EXP2);
-        assert_steps(&fog, 0, exp2_steps);
-        assert_steps(&fog, 1, exp2_steps);
-        set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_NONE);
-        assert_steps(&fog, 1, register_steps);
-        const double f = nebel_compute_d3d9_pixel_factor(&fog, shaded(&fog, 0), .5); /* a shader that writes no oFog */
-        assert_color(pixel_of(&fog, RED, f), GREEN, 0);
-    }
-    const nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_LINEAR, .1f, .9f, 1);
-    assert_steps(&fog, 0, linear_steps); /* a pixel shader alone */
+    for (int i = 0; i < D3D9_VERTEX_FACT_COUNT; i++)
+        for (uint32_t table = 0; table <= NEBEL_D3DFOG_LINEAR; table++) {
+            nebel_d3d9_fog fog = make(GREEN, table, d3d9_vertex_facts[i].vertex_mode, 0, 1, 1);
+            set(&fog, NEBEL_D3DRS_RANGEFOGENABLE, d3d9_vertex_facts[i].range);
+            const int byte = (int)(255 * fixed(&fog, .5, 0, .375, .5) + .5);
+            assert_in_range(byte, d3d9_vertex_facts[i].wanted - 1, d3d9_vertex_facts[i].wanted + 1);
+        }
+}
+
+/* ---- what is left ---------------------------------------------------------------------------- */
+
+static void test_table_fog_goes_by_w_in_perspective(void **unused)
+{
+    (void)unused;
+    const float identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    const float perspective[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1.01f, 1, 0, 0, -.1f, 0};
+    assert_false(nebel_d3d9_uses_w(identity));
+    assert_true(nebel_d3d9_uses_w(perspective));
 }
 
 static void test_the_fog_register_is_clamped(void **unused)
@@ -254,103 +166,6 @@ static void test_the_fog_register_is_clamped(void **unused)
     const nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_EXP, 0, 1, 1);
     assert_true(shaded(&fog, 1.5) == 1 && shaded(&fog, -.5) == 0 && shaded(&fog, .25) == .25);
 }
-
-static void test_fog_special(void **unused)
-{
-    (void)unused;
-    nebel_d3d9_fog fog = make(RED, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_LINEAR, .5f, .5f, 1);
-    const double left = .49, right = .51;
-    assert_quad(&fog, GREEN, left, RED, 1);
-    assert_quad(&fog, GREEN, right, RED, 1);
-    set(&fog, NEBEL_D3DRS_FOGTABLEMODE, NEBEL_D3DFOG_LINEAR);
-    assert_quad(&fog, GREEN, left, GREEN, 1);
-    assert_quad(&fog, GREEN, right, RED, 1);
-}
-
-/* ---- over a triangle ------------------------------------------------------------------------- */
-
-/* z from 0 at the left to 1 at the right, specular alpha from ff to 00. */
-static int interpolated(const nebel_d3d9_fog *fog, double x)
-{
-    const double f = (1 - x) * fixed(fog, 0, 0, 0, 1) + x * fixed(fog, 0, 0, 1, 0);
-    return pixel_of(fog, BLUE, nebel_compute_d3d9_pixel_factor(fog, f, x));
-}
-
-static void test_fog_interpolation(void **unused)
-{
-    (void)unused;
-    static const struct {
-        uint32_t table, vertex;
-        int middle;
-    } cases[] = {{NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_NONE, 0x007f80},
-                 {NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_EXP, 0x007f80},
-                 {NEBEL_D3DFOG_EXP, NEBEL_D3DFOG_NONE, 0x00ea15},
-                 {NEBEL_D3DFOG_EXP, NEBEL_D3DFOG_EXP, 0x00ea15}};
-    for (size_t i = 0; i < 4; i++) {
-        const nebel_d3d9_fog fog = make(GREEN, cases[i].table, cases[i].vertex, 0, 1, 5);
-        assert_color(interpolated(&fog, 0), BLUE, 2);
-        assert_color(interpolated(&fog, .5), cases[i].middle, 2);
-        assert_color(interpolated(&fog, 1), 0x00fd02, 2);
-    }
-}
-
-/* ---- depth ----------------------------------------------------------------------------------- */
-
-static void test_negative_fixed_function_fog(void **unused)
-{
-    (void)unused;
-    nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_NONE, 0, 1, 1);
-    assert_transformed_quad(&fog, RED, -.5, RED, 2);
-    fog = make(GREEN, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_NONE, -1, 0, 1);
-    assert_transformed_quad(&fog, RED, -.5, 0x808000, 2);
-    fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_LINEAR, 0, 1, 1);
-    assert_quad(&fog, RED, -.5, 0x808000, 2);
-    fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_LINEAR, -1, 0, 1);
-    assert_quad(&fog, RED, -.5, GREEN, 2);
-    fog = make(GREEN, NEBEL_D3DFOG_NONE, NEBEL_D3DFOG_EXP, 0, 1, 1);
-    assert_quad(&fog, RED, -.5, 0x9b6400, 2);
-}
-
-static void test_table_fog_zw(void **unused)
-{
-    (void)unused;
-    const float identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    const float perspective[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1.01f, 1, 0, 0, -.1f, 0};
-    static const struct {
-        double z, rhw;
-        int wanted;
-    } quads[] = {{.7, 0, 0x4cb200}, {.7, .3, 0x4cb200}, {.7, 3, 0x4cb200}, {.3, 0, 0xb24c00}};
-    const nebel_d3d9_fog fog = make(GREEN, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_NONE, 0, 1, 1);
-    assert_false(nebel_d3d9_uses_w(identity));
-    assert_true(nebel_d3d9_uses_w(perspective));
-    for (size_t i = 0; i < 4; i++) {
-        const double depth = nebel_d3d9_uses_w(identity) ? 1 / quads[i].rhw : quads[i].z;
-        const double f = nebel_compute_d3d9_pixel_factor(&fog, transformed(&fog, 1), depth);
-        assert_color(pixel_of(&fog, RED, f), quads[i].wanted, 2);
-    }
-}
-
-/* ProcessVertices of DirectDraw 7: world z .75, view z .5, vertex (.5, 0, 1), material specular alpha .5; the alpha
- * byte of specular. Table fog never changes it. */
-static void test_fog_process_vertices(void **unused)
-{
-    (void)unused;
-    static const struct {
-        uint32_t vertex, range;
-        int byte;
-    } cases[] = {{NEBEL_D3DFOG_NONE, 0, 0x80},   {NEBEL_D3DFOG_EXP, 0, 0xaf},   {NEBEL_D3DFOG_EXP2, 0, 0xde},
-                 {NEBEL_D3DFOG_LINEAR, 0, 0x9f}, {NEBEL_D3DFOG_NONE, 1, 0x80},  {NEBEL_D3DFOG_EXP, 1, 0x88},
-                 {NEBEL_D3DFOG_EXP2, 1, 0xad},   {NEBEL_D3DFOG_LINEAR, 1, 0x60}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        for (uint32_t table = 0; table <= NEBEL_D3DFOG_LINEAR; table++) {
-            nebel_d3d9_fog fog = make(GREEN, table, cases[i].vertex, 0, 1, 1);
-            set(&fog, NEBEL_D3DRS_RANGEFOGENABLE, cases[i].range);
-            const double f = fixed(&fog, .5, 0, 1 * .75 * .5, .5);
-            assert_in_range((int)(255 * f + .5), cases[i].byte - 1, cases[i].byte + 1);
-        }
-}
-
-/* ---- what is left ---------------------------------------------------------------------------- */
 
 static void test_fog_switched_off_is_none(void **unused)
 {
@@ -400,17 +215,11 @@ int main(void)
         cmocka_unit_test(test_a_new_device_has_the_documented_states),
         cmocka_unit_test(test_states_that_are_none_change_nothing),
         cmocka_unit_test(test_floats_arrive_as_bit_patterns),
-        cmocka_unit_test(test_fog_test),
-        cmocka_unit_test(test_fog_test_start_at_the_end_and_beyond),
-        cmocka_unit_test(test_fog_test_table_fog_goes_by_device_depth),
-        cmocka_unit_test(test_fog_test_range_fog_is_for_vertices_alone),
-        cmocka_unit_test(test_fog_with_shader_test),
+        cmocka_unit_test(test_recorded_facts),
+        cmocka_unit_test(test_recorded_ramps),
+        cmocka_unit_test(test_recorded_vertices),
+        cmocka_unit_test(test_table_fog_goes_by_w_in_perspective),
         cmocka_unit_test(test_the_fog_register_is_clamped),
-        cmocka_unit_test(test_fog_special),
-        cmocka_unit_test(test_fog_interpolation),
-        cmocka_unit_test(test_negative_fixed_function_fog),
-        cmocka_unit_test(test_table_fog_zw),
-        cmocka_unit_test(test_fog_process_vertices),
         cmocka_unit_test(test_fog_switched_off_is_none),
         cmocka_unit_test(test_the_alpha_of_the_fog_color_is_ignored),
         cmocka_unit_test(test_any_bits_give_a_factor),
