@@ -137,6 +137,18 @@ static void print_nebulae(const nebel_scene_data *scene)
     }
 }
 
+static void print_cells(const nebel_cells_desc *cells)
+{
+    if (cells == NULL) return;
+    size_t fogged = 0;
+    for (size_t i = 0; i < cells->cell_count; i++) fogged += cells->cells[i].density > 0;
+    (void)printf("cells: %zu, %zu of them with fog, ", cells->cell_count, fogged);
+    if (cells->portals != NULL)
+        (void)printf("%zu portal%s\n", cells->portal_count, cells->portal_count == 1 ? "" : "s");
+    else
+        (void)printf("portals wherever they touch\n");
+}
+
 /* Where 5 % of the light of the green channel is left, straight ahead: the meteorological range in uniform fog. NaN:
  * unknown. */
 static double visibility_of(const nebel_scene_data *scene, const nebel_snapshot *fog)
@@ -197,7 +209,7 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
 {
     size_t volumes = 0;
     for (size_t i = 0; i < scene->volume_count; i++) volumes += scene->volumes[i].operation != NEBEL_OPERATION_EXCLUDE;
-    if (volumes == 0 && scene->nebula_count == 0) (void)printf("warning: there is no fog\n");
+    if (volumes == 0 && scene->nebula_count == 0 && scene->cells == NULL) (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
     const int lit = (scene->has_sun && !is_black(scene->sun_irradiance)) || !is_black(scene->ambient);
     if (scene->mesh_count > 0 && !lit) (void)printf("warning: no sun and no ambient light: the models are black\n");
@@ -216,6 +228,7 @@ int nb_info_print_scene(const char *path)
     print_models(scene);
     print_volumes(scene);
     print_nebulae(scene);
+    print_cells(scene->cells);
     print_visibility(visibility);
     warn_of_volumes(scene);
     warn_of_scene(scene, visibility);

@@ -13,6 +13,7 @@
 #ifndef NEBEL_SCENE_H
 #define NEBEL_SCENE_H
 
+#include <nebel/cells.h>
 #include <nebel/nebel.h>
 #include <nebel/nebula.h>
 
@@ -85,6 +86,9 @@ typedef struct nebel_scene_data {
     const char *const *nebula_names;
     size_t particle_count; /* of all nebulae */
 
+    const nebel_cells_desc *cells; /* good for nebel_create_cells; allocator and log are not set. NULL: none */
+    const char *const *cell_names; /* UTF-8; "" where the file gives none */
+
     size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
     const char *const *files; /* as they are opened, once for each time they are named */
 
@@ -141,8 +145,9 @@ typedef enum nebel_volume_origin {
 /* index < contents->volume_count. */
 nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index);
 
-/* A snapshot of the scene's fog at a frame, its nebulae's particles among it; release it with nebel_release_snapshot
- * before the scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT, MEMORY, VALUE, LIMIT. */
+/* A snapshot of the scene's fog at a frame, its nebulae's particles and, as exact fog, its cells among it; release it
+ * with nebel_release_snapshot before the scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT,
+ * MEMORY, VALUE, LIMIT. */
 nebel_result nebel_commit_scene_fog_at(const nebel_scene *scene, double frame, nebel_snapshot **snapshot);
 
 /* The same at frame 0. */
@@ -156,7 +161,8 @@ void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
  * of it with other numbers in the camera, the background, the sun (where there is one), the ambient light, max_opacity,
- * the nebulae (but for points and colours), and with other names, numbers or kinds of volumes of origin WRITTEN. Its
+ * the nebulae (but for points and colours), the cells (but for names and portals; model, span and grouping, too), and
+ * with other names, numbers or kinds of volumes of origin WRITTEN. Its
  * volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
  * MOVING. sources NULL: the same volumes.
@@ -166,7 +172,7 @@ void nebel_destroy_scene(nebel_scene *scene);
  * become wrong goes. A volume of another operation, shape or density than before is written anew as a whole, new ones
  * stand behind the others. Every other byte stays. The file is replaced as a whole, as by nebel_write_image, or left
  * alone where nothing has changed. On an error it is as it was. Errors: as nebel_load_scene; ARGUMENT (the file has
- * other volumes or nebulae than `before`; a volume that cannot leave); FORMAT also where the new numbers are no valid
+ * other volumes, nebulae or cells than `before`; a volume that cannot leave); FORMAT also where the new numbers are no valid
  * scene. */
 #define NEBEL_NEW_VOLUME SIZE_MAX
 nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *before,

@@ -18,11 +18,12 @@ struct nb_save {
     bool has_added; /* an entry to an array without any */
 };
 
-/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, or a nebula has been read,
- * while its tree is there. */
+/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula or the cells have
+ * been read, while the tree is there. */
 void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
 bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t first);
 bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
+bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
 
 /* After everything. */
 bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *root);

@@ -71,6 +71,12 @@ const nb_place nb_nebula_places[] = {
     END,
 };
 
+const nb_place nb_cell_places[] = {
+    PLACE(nebel_cell, density, 1, NB_EDIT_EACH),
+    PLACE(nebel_cell, color, 3, NB_EDIT_AMOUNT),
+    END,
+};
+
 const char *const nb_shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_space", "box",         "sphere",
                                                        "ellipsoid", "cylinder",   "capsule",     "cone",
                                                        "convex",    "union",      "intersection"};
@@ -79,6 +85,8 @@ const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
 const char *const nb_profile_names[NEBEL_PARTICLE_COUNT] = {"soft", "gaussian", "ball"};
+const char *const nb_cell_model_names[NEBEL_CELL_MODEL_COUNT] = {"linear", "exponential"};
+const char *const nb_cell_span_names[NEBEL_SPAN_COUNT] = {"ray", "depth", "faithful"};
 
 const double *nb_place_numbers(const void *structure, const nb_place *place)
 {

@@ -20,14 +20,17 @@ enum {
     MODELS,
     FOG,
     NEBULA,
+    CELLS,
     SECTION_COUNT = NB_SCENE_SECTIONS
 };
 
 /* Their numbers are in the units of the file. */
-#define PLACED_SECTIONS (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA))
+#define PLACED_SECTIONS                                                                                                \
+    (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA) | NB_BIT(CELLS))
 
-static const char *const section_names[] = {"nebel",   "up",          "unit",   "camera", "background", "sun",
-                                            "ambient", "max_opacity", "lights", "models", "fog",        "nebula"};
+static const char *const section_names[] = {"nebel", "up",      "unit",        "camera", "background",
+                                            "sun",   "ambient", "max_opacity", "lights", "models",
+                                            "fog",   "nebula",  "cells"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
@@ -85,6 +88,8 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
         return nb_value_color(in->json, node, &nb_range_not_negative, data->ambient);
     case MAX_OPACITY:
         return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
+    case CELLS:
+        return nb_read_cells(in, node) && (in->save == NULL || nb_save_cells(in->save, in, node));
     default:
         return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }
@@ -299,6 +304,16 @@ static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double
     return result;
 }
 
+static nebel_result add_cells(nebel_fog *fog, const nebel_cells_desc *cells)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; cells != NULL && i < cells->cell_count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_cell_volume(&cells->cells[i]);
+        if (cells->cells[i].density > 0) result = nebel_add_volume(fog, &volume, NULL);
+    }
+    return result;
+}
+
 static nebel_result commit(const nebel_scene *scene, double frame, int with_particles, nebel_snapshot **snapshot)
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -309,6 +324,7 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
+    if (result == NEBEL_OK) result = add_cells(fog, scene->data.cells);
     if (result == NEBEL_OK && with_particles) result = add_particles(fog, scene);
     if (result == NEBEL_OK) result = nebel_commit_fog(fog, snapshot);
     nebel_destroy_fog(fog);

@@ -116,6 +116,12 @@ void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     nebula->turbulence_size *= space->unit;
 }
 
+void nb_space_convert_cell(const nb_space *space, nebel_cell *cell)
+{
+    convert_shape(space, &cell->shape);
+    cell->density /= space->unit;
+}
+
 /* ---- camera
  * ---------------------------------------------------------------------------------------------------------- */
 
@@ -208,4 +214,10 @@ void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     scale_all(1 / space->unit, nebula->size, 2);
     nebula->turbulence /= space->unit;
     nebula->turbulence_size /= space->unit;
+}
+
+void nb_space_restore_cell(const nb_space *space, nebel_cell *cell)
+{
+    nb_space_restore_shape(space, &cell->shape);
+    cell->density *= space->unit;
 }

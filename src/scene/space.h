@@ -23,6 +23,7 @@ void nb_space_convert_placement(const nb_space *space, double position[3], doubl
 /* Parts and planes, too: they must be memory that may be written to. */
 void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume);
 void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula);
+void nb_space_convert_cell(const nb_space *space, nebel_cell *cell);
 
 void nb_space_convert_camera(const nb_space *space, nebel_camera *camera);
 
@@ -36,5 +37,6 @@ void nb_space_restore_plane(const nb_space *space, nebel_plane *plane);
 void nb_space_restore_shape(const nb_space *space, nebel_shape *shape);
 void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume);
 void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula);
+void nb_space_restore_cell(const nb_space *space, nebel_cell *cell);
 
 #endif
