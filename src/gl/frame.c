@@ -314,7 +314,9 @@ static nebel_result prepare_sun(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nb_shadows_turn(&r->shadows, f->light.sun_direction);
-    nebel_result result = nb_shadows_fit(&r->shadows, &r->allocator, &r->log, &r->targets, &f->rays, &r->meshes);
+    glBindVertexArray(r->vertex_array);
+    nebel_result result = nb_shadows_fit(&r->shadows, &r->context, &r->allocator, &r->log, r->shading.survey,
+                                         &r->targets, &f->rays, &r->meshes);
     if (result != NEBEL_OK) return result;
     f->casts = r->shadows.seen_low[0] < r->shadows.seen_high[0];
     if (!f->casts) return NEBEL_OK;

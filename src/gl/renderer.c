@@ -98,7 +98,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nebel_destroy_gl(r->sun_fog);
     nebel_release_snapshot(r->fog);
     nb_release(&r->allocator, r->shading.lights);
-    nb_release(&r->allocator, r->shadows.pixels);
+    nb_release(&r->allocator, r->shadows.blocks);
     nb_release(&r->allocator, r->particles.list);
     nb_release(&r->allocator, r->particles.balls);
     const nebel_allocator allocator = r->allocator;

@@ -1,5 +1,7 @@
 #include "shading.h"
 
+#include "targets.h"
+
 #include <epoxy/gl.h>
 #include <stdio.h>
 
@@ -282,6 +284,27 @@ static const char particle_text[] =
     "    out_transmittance = vec4(0.0, 0.0, 0.0, factor);\n"
     "}\n";
 
+/* ---- the survey ------------------------------------------------------------------------------ */
+
+/* Of each block of pixels the nearest and the farthest surface; 0 where there is none. */
+static const char survey_text[] = "uniform highp sampler2D scene_place;\n"
+                                  "uniform ivec2 scene_size;\n"
+                                  "out highp vec4 out_distances;\n"
+                                  "void main()\n"
+                                  "{\n"
+                                  "    ivec2 first = ivec2(gl_FragCoord.xy) * NB_SURVEY_BLOCK;\n"
+                                  "    ivec2 end = min(first + NB_SURVEY_BLOCK, scene_size);\n"
+                                  "    float nearest = 0.0, farthest = 0.0;\n"
+                                  "    for (int y = first.y; y < end.y; y++) {\n"
+                                  "        for (int x = first.x; x < end.x; x++) {\n"
+                                  "            float t = texelFetch(scene_place, ivec2(x, y), 0).x;\n"
+                                  "            if (t > 0.0) nearest = nearest > 0.0 ? min(nearest, t) : t;\n"
+                                  "            farthest = max(farthest, t);\n"
+                                  "        }\n"
+                                  "    }\n"
+                                  "    out_distances = vec4(nearest, farthest, 0.0, 0.0);\n"
+                                  "}\n";
+
 /* ---- programs -------------------------------------------------------------------------------- */
 
 static const char *precision_of(const nb_context *context)
@@ -299,13 +322,20 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
     const nb_texts surface_fragment = {{version, precision, ray_text, surface_fragment_text}, 4};
+    char block[64];
+    (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
+    const nb_texts survey_vertex = {{version, light_vertex_text}, 2};
+    const nb_texts survey_fragment = {{version, precision, block, survey_text}, 4};
     const nb_texts shadow_vertex = {{version, shadow_vertex_text}, 2};
     const nb_texts shadow_fragment = {{version, shadow_fragment_text}, 2};
     nebel_result result = nb_program_build(log, &surface_vertex, &surface_fragment, &shading->surface);
+    if (result == NEBEL_OK) result = nb_program_build(log, &survey_vertex, &survey_fragment, &shading->survey);
     if (result == NEBEL_OK) result = nb_program_build(log, &shadow_vertex, &shadow_fragment, &shading->shadow);
     if (result != NEBEL_OK) return result;
     glUseProgram(shading->surface);
     set_unit(shading->surface, "scene_texture", NB_UNIT_REFLECTANCE);
+    glUseProgram(shading->survey);
+    set_unit(shading->survey, "scene_place", NB_UNIT_PLACE);
     return NEBEL_OK;
 }
 
@@ -375,6 +405,7 @@ nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *contex
 void nb_shading_delete(const nb_shading *shading)
 {
     glDeleteProgram(shading->surface);
+    glDeleteProgram(shading->survey);
     glDeleteProgram(shading->shadow);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

@@ -1,5 +1,5 @@
-/* The programs of the scene renderer: surfaces into their properties, surfaces into shadow maps, and properties into
- * light. */
+/* The programs of the scene renderer: surfaces into their properties, distances into a survey of them, surfaces
+ * into shadow maps, and properties into light. */
 #ifndef NB_GL_SHADING_H
 #define NB_GL_SHADING_H
 
@@ -31,7 +31,7 @@ typedef struct nb_light_program {
 } nb_light_program;
 
 typedef struct nb_shading {
-    unsigned surface, shadow;
+    unsigned surface, survey, shadow;
     nb_light_program *lights;
     size_t light_count, light_capacity;
 } nb_shading;

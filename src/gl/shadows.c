@@ -13,11 +13,12 @@ typedef struct rectangle {
     double low[2], high[2];
 } rectangle;
 
-/* The surfaces of a picture. */
+/* The surfaces of a picture, block by block of pixels: the nearest and the farthest of each. */
 typedef struct survey {
     const nebel_rays *rays;
-    const float *pixels;
-    uint32_t width, height;
+    const float *blocks;    /* four floats each */
+    uint32_t columns, rows; /* of blocks */
+    uint32_t width, height; /* pixels */
     double nearest, farthest;
     rectangle seen[NB_CASCADES];
 } survey;
@@ -55,14 +56,13 @@ void nb_shadows_turn(nb_shadows *shadows, const double sun[3])
 
 static void find_distances(survey *s)
 {
-    const size_t count = (size_t)s->width * s->height;
+    const size_t count = (size_t)s->columns * s->rows;
     s->nearest = HUGE_VAL;
     s->farthest = 0;
     for (size_t i = 0; i < count; i++) {
-        const double t = (double)s->pixels[4 * i];
-        if (!(t > 0)) continue;
-        s->nearest = fmin(s->nearest, t);
-        s->farthest = fmax(s->farthest, t);
+        if (!(s->blocks[4 * i] > 0)) continue;
+        s->nearest = fmin(s->nearest, (double)s->blocks[4 * i]);
+        s->farthest = fmax(s->farthest, (double)s->blocks[4 * i + 1]);
     }
 }
 
@@ -76,34 +76,71 @@ static void set_ends(nb_shadows *shadows, const survey *s)
     shadows->ends[NB_CASCADES - 1] = HUGE_VALF;
 }
 
-static int cascade_of(const nb_shadows *shadows, double t)
-{
-    int k = 0;
-    while (k < NB_CASCADES - 1 && t > (double)shadows->ends[k]) k++;
-    return k;
-}
-
 /* words + x words + y words */
 static void combine(const nebel_word words[3], double x, double y, double v[3])
 {
     for (int i = 0; i < 3; i++) v[i] = (double)words[0].v[i] + x * (double)words[1].v[i] + y * (double)words[2].v[i];
 }
 
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The rays through the corners of a block. Distances along a ray are `size` times the steps along its way. */
+typedef struct beam {
+    double origin[4][3], way[4][3];
+    double least_size, most_size;
+} beam;
+
+/* Of a length, which bends away from its tangent plane, that plane is a lower bound, and the corners an upper. */
+static beam make_beam(const survey *s, uint32_t column, uint32_t row)
+{
+    beam b = {.least_size = HUGE_VAL};
+    const double left = column * (double)NB_SURVEY_BLOCK, low = row * (double)NB_SURVEY_BLOCK;
+    const double right = fmin(left + NB_SURVEY_BLOCK, s->width), high = fmin(low + NB_SURVEY_BLOCK, s->height);
+    double middle[3];
+    combine(s->rays->words + 3, .5 * (left + right), .5 * (low + high), middle);
+    const double size = sqrt(dot(middle, middle));
+    for (int i = 0; i < 4; i++) {
+        const double x = i & 1 ? right : left, y = i & 2 ? high : low;
+        combine(s->rays->words, x, y, b.origin[i]);
+        combine(s->rays->words + 3, x, y, b.way[i]);
+        b.least_size = fmin(b.least_size, dot(middle, b.way[i]) / size);
+        b.most_size = fmax(b.most_size, sqrt(dot(b.way[i], b.way[i])));
+    }
+    return b;
+}
+
+/* Light coordinates are affine along each of two ways across the beam and one along it: the corners bound them. */
+static void include_beam(const nb_shadows *shadows, const beam *b, double near, double far, rectangle *seen)
+{
+    const double steps[2] = {near / b->most_size, far / b->least_size};
+    for (int i = 0; i < 8; i++) {
+        double at[2];
+        for (int k = 0; k < 2; k++) {
+            at[k] = dot(shadows->across[k], b->origin[i / 2]) + steps[i & 1] * dot(shadows->across[k], b->way[i / 2]);
+        }
+        include(seen, at);
+    }
+}
+
+/* Surfaces may be anywhere between the nearest and the farthest of their block. */
 static void find_rectangles(const nb_shadows *shadows, survey *s)
 {
     for (int k = 0; k < NB_CASCADES; k++) s->seen[k] = nothing();
-    for (uint32_t y = 0; y < s->height; y++) {
-        for (uint32_t x = 0; x < s->width; x++) {
-            const double t = (double)s->pixels[4 * ((size_t)y * s->width + x)];
-            if (!(t > 0)) continue;
-            double origin[3], way[3], at[2] = {0, 0};
-            combine(s->rays->words, x + .5, y + .5, origin);
-            combine(s->rays->words + 3, x + .5, y + .5, way);
-            const double step = t / sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);
-            for (int i = 0; i < 3; i++) {
-                for (int k = 0; k < 2; k++) at[k] += shadows->across[k][i] * (origin[i] + step * way[i]);
+    for (uint32_t row = 0; row < s->rows; row++) {
+        for (uint32_t column = 0; column < s->columns; column++) {
+            const float *const block = s->blocks + 4 * ((size_t)row * s->columns + column);
+            if (!(block[0] > 0)) continue;
+            const beam b = make_beam(s, column, row);
+            double from = 0;
+            for (int k = 0; k < NB_CASCADES; k++) {
+                const double near = fmax(from, (double)block[0]),
+                             far = fmin((double)shadows->ends[k], (double)block[1]);
+                if (near <= far) include_beam(shadows, &b, near, far, &s->seen[k]);
+                from = (double)shadows->ends[k];
             }
-            include(&s->seen[cascade_of(shadows, t)], at);
         }
     }
 }
@@ -159,32 +196,51 @@ static void find_heights(nb_shadows *shadows, const double eye[3], const nb_mesh
     shadows->high = (float)high + shadows->rounding;
 }
 
-static int read_places(nb_shadows *shadows, const nebel_allocator *allocator, const nb_targets *targets)
+static void draw_survey(const nb_context *context, unsigned program, const nb_targets *targets)
 {
-    const size_t wanted = 4 * (size_t)targets->width * targets->height;
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, targets->survey_buffer);
+    nb_state_clear(context, 0, 0, targets->survey_width, targets->survey_height);
+    glUseProgram(program);
+    glUniform2i(glGetUniformLocation(program, "scene_size"), (GLint)targets->width, (GLint)targets->height);
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_PLACE);
+    glBindTexture(GL_TEXTURE_2D, targets->place);
+    glBindSampler(NB_UNIT_PLACE, 0);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+static int read_survey(nb_shadows *shadows, const nebel_allocator *allocator, const nb_targets *targets)
+{
+    const size_t wanted = 4 * (size_t)targets->survey_width * targets->survey_height;
     if (wanted > shadows->capacity) {
-        nb_release(allocator, shadows->pixels);
-        shadows->pixels = nb_allocate(allocator, wanted, sizeof *shadows->pixels);
-        shadows->capacity = shadows->pixels != NULL ? wanted : 0;
+        nb_release(allocator, shadows->blocks);
+        shadows->blocks = nb_allocate(allocator, wanted, sizeof *shadows->blocks);
+        shadows->capacity = shadows->blocks != NULL ? wanted : 0;
     }
-    if (shadows->pixels == NULL) return 0;
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, targets->surface_buffer);
-    glReadPixels(0, 0, (GLsizei)targets->width, (GLsizei)targets->height, GL_RGBA, GL_FLOAT, shadows->pixels);
+    if (shadows->blocks == NULL) return 0;
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, targets->survey_buffer);
+    glReadPixels(0, 0, (GLsizei)targets->survey_width, (GLsizei)targets->survey_height, GL_RGBA, GL_FLOAT,
+                 shadows->blocks);
     return 1;
 }
 
-nebel_result nb_shadows_fit(nb_shadows *shadows, const nebel_allocator *allocator, const nebel_log *log,
-                            const nb_targets *targets, const nebel_rays *rays, const nb_meshes *meshes)
+nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, const nebel_allocator *allocator,
+                            const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
+                            const nb_meshes *meshes)
 {
-    survey s = {.rays = rays, .width = targets->width, .height = targets->height};
+    survey s = {.rays = rays,
+                .columns = targets->survey_width,
+                .rows = targets->survey_height,
+                .width = targets->width,
+                .height = targets->height};
     for (int i = 0; i < 2; i++) {
         shadows->seen_low[i] = HUGE_VAL;
         shadows->seen_high[i] = -HUGE_VAL;
     }
-    if (!read_places(shadows, allocator, targets)) {
+    draw_survey(context, program, targets);
+    if (!read_survey(shadows, allocator, targets)) {
         return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory; ask for fewer pixels");
     }
-    s.pixels = shadows->pixels;
+    s.blocks = shadows->blocks;
     find_distances(&s);
     if (!(s.farthest > 0)) return NEBEL_OK;
     set_ends(shadows, &s);

@@ -17,16 +17,19 @@ typedef struct nb_shadows {
     float low, high;                  /* of everything that may cast shadows, against the light */
     float rounding;                   /* what heights may be off by [m] */
     double seen_low[2], seen_high[2]; /* of all surfaces that are seen; low above high: there are none */
-    float *pixels;                    /* places read back */
+    float *blocks;                    /* the survey, read back */
     size_t capacity;
 } nb_shadows;
 
 /* The axes of a sun in this direction. */
 void nb_shadows_turn(nb_shadows *shadows, const double sun[3]);
 
-/* Looks through the surfaces of targets, whose pixels have these rays, and lays the maps. MEMORY. */
-nebel_result nb_shadows_fit(nb_shadows *shadows, const nebel_allocator *allocator, const nebel_log *log,
-                            const nb_targets *targets, const nebel_rays *rays, const nb_meshes *meshes);
+/* Surveys the surfaces of targets, whose pixels have these rays, and lays the maps. `program` is that of the survey;
+ * the current vertex array has no attributes that matter. What is read back, and waited for, is a 64th of the picture.
+ * MEMORY. */
+nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, const nebel_allocator *allocator,
+                            const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
+                            const nb_meshes *meshes);
 
 /* Draws the maps. Depth is tested afterwards. MEMORY, UNSUPPORTED. */
 nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, const nebel_log *log, unsigned program,

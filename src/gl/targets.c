@@ -2,7 +2,7 @@
 
 #include <epoxy/gl.h>
 
-static unsigned make_texture(const nb_targets *t, GLenum internal, GLenum format, GLenum type)
+static unsigned make_texture(uint32_t width, uint32_t height, GLenum internal, GLenum format, GLenum type)
 {
     unsigned name = 0;
     glGenTextures(1, &name);
@@ -12,13 +12,13 @@ static unsigned make_texture(const nb_targets *t, GLenum internal, GLenum format
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
-    glTexImage2D(GL_TEXTURE_2D, 0, (GLint)internal, (GLsizei)t->width, (GLsizei)t->height, 0, format, type, NULL);
+    glTexImage2D(GL_TEXTURE_2D, 0, (GLint)internal, (GLsizei)width, (GLsizei)height, 0, format, type, NULL);
     return name;
 }
 
 static unsigned make_floats(const nb_targets *t)
 {
-    return make_texture(t, GL_RGBA32F, GL_RGBA, GL_FLOAT);
+    return make_texture(t->width, t->height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
 }
 
 static int make_buffer(unsigned *name, const unsigned *textures, int count, unsigned depth)
@@ -39,7 +39,7 @@ static int make_buffers(nb_targets *t)
 {
     const unsigned surfaces[] = {t->place, t->normal, t->reflectance}, fog[] = {t->in_scattering, t->transmittance};
     return make_buffer(&t->surface_buffer, surfaces, 3, t->depth) && make_buffer(&t->fog_buffer, fog, 2, 0) &&
-           make_buffer(&t->picture_buffer, t->picture, 4, 0);
+           make_buffer(&t->picture_buffer, t->picture, 4, 0) && make_buffer(&t->survey_buffer, &t->survey, 1, 0);
 }
 
 nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width, uint32_t height)
@@ -48,13 +48,16 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
     nb_targets_delete(t);
     t->width = width;
     t->height = height;
-    t->depth = make_texture(t, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT);
+    t->depth = make_texture(width, height, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT);
     t->place = make_floats(t);
     t->normal = make_floats(t);
-    t->reflectance = make_texture(t, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
+    t->reflectance = make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
     t->in_scattering = make_floats(t);
     t->transmittance = make_floats(t);
     for (int i = 0; i < 4; i++) t->picture[i] = make_floats(t);
+    t->survey_width = (width + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
+    t->survey_height = (height + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
+    t->survey = make_texture(t->survey_width, t->survey_height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
     nebel_result result = nb_context_check_memory(log, "the picture; ask for fewer pixels");
     if (result == NEBEL_OK && !make_buffers(t)) {
         result = nb_fail(log, NEBEL_ERROR_UNSUPPORTED, "OpenGL: the driver (%s) does not draw into textures of floats",
@@ -66,10 +69,11 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
 
 void nb_targets_delete(nb_targets *t)
 {
-    const GLuint textures[] = {t->depth, t->place, t->normal, t->reflectance, t->in_scattering, t->transmittance};
-    const GLuint buffers[] = {t->surface_buffer, t->fog_buffer, t->picture_buffer};
-    glDeleteFramebuffers(3, buffers);
-    glDeleteTextures(6, textures);
+    const GLuint textures[] = {t->depth,         t->place,         t->normal, t->reflectance,
+                               t->in_scattering, t->transmittance, t->survey};
+    const GLuint buffers[] = {t->surface_buffer, t->fog_buffer, t->picture_buffer, t->survey_buffer};
+    glDeleteFramebuffers(4, buffers);
+    glDeleteTextures(7, textures);
     glDeleteTextures(4, t->picture);
     *t = (nb_targets){0};
 }

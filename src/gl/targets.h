@@ -4,6 +4,9 @@
 
 #include "context.h"
 
+/* Pixels of a block of the survey, either way. */
+enum { NB_SURVEY_BLOCK = 8 };
+
 /* Pictures of one size, the lowest row first. */
 typedef struct nb_targets {
     uint32_t width, height; /* 0: there are none */
@@ -12,7 +15,9 @@ typedef struct nb_targets {
     unsigned normal, reflectance;          /* rgb */
     unsigned in_scattering, transmittance; /* of one sample */
     unsigned picture[4];                   /* color, transmittance, in-scattering, surface: see nebel_gl_textures */
-    unsigned surface_buffer, fog_buffer, picture_buffer;
+    unsigned survey;                       /* a texel for each block: distances of the nearest and the farthest */
+    uint32_t survey_width, survey_height;
+    unsigned surface_buffer, fog_buffer, picture_buffer, survey_buffer;
 } nb_targets;
 
 /* Makes them for a size; those of another size go. Changes the bindings of TEXTURE_2D on the active unit and of the
