@@ -340,7 +340,7 @@ static void test_passes_that_cannot_be_drawn(void **state)
     pass = pass_of(&s);
     pass.samples = 4;
     pass.output = NEBEL_GL_OUTPUT_BLEND;
-    refuse(&s, pass, NEBEL_ERROR_UNSUPPORTED, "NEBEL_GL_OUTPUT_COMPOSE");
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "the target has 0 samples, not 4");
     pass.output = NEBEL_GL_OUTPUT_COMPOSE;
     pass.samples = 33;
     refuse(&s, pass, NEBEL_ERROR_LIMIT, "32 samples");

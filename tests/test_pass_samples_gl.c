@@ -1,4 +1,5 @@
-/* Multisampled depth and colour: the mean over the samples of what each sees, at its own place in the pixel. */
+/* Multisampled depth and colour: the mean over the samples of what each sees, at its own place in the pixel; and each
+ * sample of a target by itself. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -242,10 +243,94 @@ static void test_the_mean_of_samples_has_no_outlines(void **state)
     close_stage(&s);
 }
 
+/* ---- over a target of samples ---------------------------------------------------------------- */
+
+/* A multisampled picture with the colours, to blend over; its framebuffer is bound. */
+static unsigned make_target(unsigned *texture)
+{
+    const unsigned depth = make_samples(GL_DEPTH_COMPONENT32F);
+    *texture = make_samples(GL_RGBA32F);
+    const unsigned whole = bind_samples(depth, *texture);
+    fill_samples(whole);
+    pass_delete_framebuffer(whole);
+    pass_delete_texture(depth);
+    unsigned framebuffer;
+    glGenFramebuffers(1, &framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    glFramebufferTexture(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, *texture, 0);
+    return framebuffer;
+}
+
+/* The mean of the bound framebuffer's samples. */
+static void resolve(unsigned framebuffer, float *texels)
+{
+    const unsigned mean = pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL);
+    const unsigned target = pass_framebuffer(mean, 0);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+    glBlitFramebuffer(0, 0, PASS_WIDTH, PASS_HEIGHT, 0, 0, PASS_WIDTH, PASS_HEIGHT, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    pass_read(mean, PASS_WIDTH, PASS_HEIGHT, texels);
+    pass_delete_framebuffer(target);
+    pass_delete_texture(mean);
+}
+
+/* With state of the host that would keep samples away. */
+static void blend(stage *s, nebel_gl_output output, float *texels)
+{
+    unsigned texture;
+    GLint mask = 0;
+    const unsigned framebuffer = make_target(&texture);
+    const nebel_gl_pass pass = {.output = output, .depth_texture = s->depth, .samples = SAMPLES};
+    glDisable(GL_MULTISAMPLE);
+    glSampleMaski(0, 2);
+    assert_int_equal(nebel_gl_draw_fog(s->gl, &pass), NEBEL_OK);
+    glGetIntegeri_v(GL_SAMPLE_MASK_VALUE, 0, &mask);
+    assert_true(mask == 2 && !glIsEnabled(GL_SAMPLE_MASK) && !glIsEnabled(GL_MULTISAMPLE));
+    glEnable(GL_MULTISAMPLE);
+    resolve(framebuffer, texels);
+    pass_delete_framebuffer(framebuffer);
+    pass_delete_texture(texture);
+    pass_expect_no_errors();
+}
+
+static void expect_blended(const nebel_snapshot *fog, int i, int grey, double wanted[3])
+{
+    memset(wanted, 0, 3 * sizeof *wanted);
+    for (int s = 0; s < SAMPLES; s++) {
+        const nebel_light light = pass_trace(fog, &pictures[s], i % PASS_WIDTH, i / PASS_WIDTH);
+        const double *const t = light.transmittance, mean = (t[0] + t[1] + t[2]) / 3;
+        for (int c = 0; c < 3; c++) {
+            const double color = (double)colors[4 * (i * SAMPLES + s) + c];
+            wanted[c] += ((grey ? mean : t[c]) * color + light.in_scattering[c]) / SAMPLES;
+        }
+    }
+}
+
+static void test_each_sample_is_blended_by_itself(void **state)
+{
+    (void)state;
+    static float got[4 * PASS_PIXELS];
+    stage s = open_stage();
+    for (int grey = 0; grey < 2; grey++) {
+        pass_difference everywhere = {0, 0, 0};
+        blend(&s, grey ? NEBEL_GL_OUTPUT_BLEND_GREY : NEBEL_GL_OUTPUT_BLEND, got);
+        for (int i = 0; i < PASS_PIXELS; i++) {
+            double wanted[3], alpha = 0;
+            expect_blended(s.fog, i, grey, wanted);
+            pass_note(&everywhere, got + 4 * i, wanted, 1);
+            for (int k = 0; k < SAMPLES; k++) alpha += (double)colors[4 * (i * SAMPLES + k) + 3] / SAMPLES;
+            assert_true(fabs((double)got[4 * i + 3] - alpha) < 1e-5);
+        }
+        print_message("%zu pixels, worst %.1e\n", everywhere.fogged, everywhere.largest);
+        assert_int_equal(everywhere.beyond_step, 0);
+    }
+    close_stage(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_the_mean_of_samples_has_no_outlines),
+        cmocka_unit_test(test_each_sample_is_blended_by_itself),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

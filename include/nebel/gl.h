@@ -27,9 +27,10 @@
  *   - the bindings UNIFORM_BUFFER (general and index 0) and PIXEL_UNPACK_BUFFER, and the parameters UNPACK_*;
  *   - the viewport (the first of an array); SCISSOR_TEST (of all viewports), STENCIL_TEST, DEPTH_TEST, CULL_FACE,
  *     RASTERIZER_DISCARD, SAMPLE_COVERAGE, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_MASK, COLOR_LOGIC_OP,
- *     POLYGON_SMOOTH, PRIMITIVE_RESTART and CLIP_DISTANCEi, all switched off where they exist; the polygon mode;
+ *     POLYGON_SMOOTH, MULTISAMPLE, PRIMITIVE_RESTART and CLIP_DISTANCEi, all switched off where they exist; the polygon
+ * mode;
  *   - of draw buffers 0 to 3: BLEND, the colour mask, the blend function and equation;
- *   - the draw framebuffer, to ask where the samples of a multisampled texture are.
+ *   - the sample mask; the draw framebuffer, to ask where the samples of a multisampled texture are.
  *
  * What stays as the host has set it, because it belongs to the target: FRAMEBUFFER_SRGB, DITHER, the draw buffers, the
  * clip control, conditional rendering, and occlusion queries. Depth and stencil are never written.
@@ -94,17 +95,18 @@ typedef struct nebel_gl_pass {
     unsigned color_texture; /* COMPOSE only; not the target */
     uint32_t samples; /* of the depth texture, and of the colour texture in COMPOSE: 0 or 1: no multisampling; else
                          both are multisampled with so many. COMPOSE gives the mean of what the samples see, SPLIT
-                         the means of both. OpenGL only */
+                         the means of both; BLEND and BLEND_GREY want a target of as many samples, and blend each
+                         of them by itself. OpenGL only */
     nebel_depth_desc depth; /* {0}: OpenGL's own */
     uint32_t x, y;          /* lower left pixel of the picture, in the textures and in the target alike */
 } nebel_gl_pass;
 
 /* Draws the fog of nebel_gl_set_fog over the pixels of its view.
  * Errors: ARGUMENT (no fog was set; a name that is no texture; a texture that is too small or of other samples, where
- * the context can tell; a colour texture that is also the target; a framebuffer that is incomplete or whose draw
- * buffers do not fit the output; a depth convention that nebel_view_rays refuses), MEMORY, UNSUPPORTED (multisampled
- * textures in OpenGL ES 3.0, BLEND where the context cannot, BLEND with samples; a shader that the driver does not
- * take, with the driver's words; the context is another one, or lost). On an error nothing was drawn. */
+ * the context can tell; a colour texture that is also the target; a framebuffer that is incomplete, whose draw
+ * buffers do not fit the output, or whose samples do not; a depth convention that nebel_view_rays refuses), MEMORY,
+ * UNSUPPORTED (multisampled textures in OpenGL ES 3.0, BLEND where the context cannot; a shader that the driver does
+ * not take, with the driver's words; the context is another one, or lost). On an error nothing was drawn. */
 nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass);
 
 /* The fog of nebel_gl_set_fog, for the host's own shaders. */

@@ -13,6 +13,11 @@ static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *wh
 
 /* ---- what the host gave ---------------------------------------------------------------------- */
 
+static int is_by_sample(const nebel_gl_pass *pass)
+{
+    return pass->samples > 1 && (pass->output == NEBEL_GL_OUTPUT_BLEND || pass->output == NEBEL_GL_OUTPUT_BLEND_GREY);
+}
+
 static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
 {
     if (pass->samples <= 1) return NEBEL_OK;
@@ -22,12 +27,21 @@ static nebel_result check_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
                     "and set samples to 0");
     }
     if (pass->samples > NB_SAMPLES_MOST) return fail(gl, NEBEL_ERROR_LIMIT, "more than 32 samples");
-    if (pass->output != NEBEL_GL_OUTPUT_COMPOSE && pass->output != NEBEL_GL_OUTPUT_SPLIT) {
-        return fail(gl, NEBEL_ERROR_UNSUPPORTED,
-                    "blending over samples would leave outlines; use NEBEL_GL_OUTPUT_COMPOSE with the multisampled "
-                    "color texture");
-    }
     return NEBEL_OK;
+}
+
+/* What is blended sample by sample needs a target that has them. */
+static nebel_result check_target_samples(const nebel_gl *gl, const nebel_gl_pass *pass)
+{
+    GLint samples = 0;
+    if (!is_by_sample(pass)) return NEBEL_OK;
+    glGetIntegerv(GL_SAMPLES, &samples);
+    if ((uint32_t)samples == pass->samples) return NEBEL_OK;
+    return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
+                   "nebel_gl_draw_fog: the target has %d samples, not %u: what %u samples see cannot be blended over a "
+                   "color that has been resolved without leaving outlines; draw into the multisampled target and "
+                   "resolve it afterwards, or use NEBEL_GL_OUTPUT_COMPOSE with the multisampled color texture",
+                   (int)samples, (unsigned)pass->samples, (unsigned)pass->samples);
 }
 
 static nebel_result check_output(const nebel_gl *gl, const nebel_gl_pass *pass)
@@ -118,7 +132,8 @@ static nebel_result check_framebuffer(const nebel_gl *gl, const nebel_gl_pass *p
                        "nebel_gl_draw_fog: the draw framebuffer is not complete (status 0x%x); bind the target first",
                        status);
     }
-    const nebel_result result = check_draw_buffers(gl, pass);
+    nebel_result result = check_target_samples(gl, pass);
+    if (result == NEBEL_OK) result = check_draw_buffers(gl, pass);
     return result == NEBEL_OK ? check_feedback(gl, pass) : result;
 }
 
@@ -196,7 +211,7 @@ static void set_samples(const task *t, GLuint target_framebuffer)
     GLfloat places[NB_SAMPLES_MOST][2] = {{0}};
     read_places(t->gl, t->pass, places);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_framebuffer);
-    glUniform1i(t->program->sample_count, (GLint)t->pass->samples);
+    glUniform2i(t->program->sample_range, 0, (GLint)t->pass->samples);
     glUniform2fv(t->program->sample_places, (GLsizei)t->pass->samples, places[0]);
 }
 
@@ -207,6 +222,18 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     glUniform2i(p->corner, (GLint)t->pass->x, (GLint)t->pass->y);
     if (t->gl->fog.tiles != 0) glUniform2i(p->tiling, NB_GL_TILE_SHIFT, (GLint)t->gl->fog.tile_columns);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
+}
+
+static void draw_triangles(const task *t)
+{
+    const uint32_t turns = is_by_sample(t->pass) ? t->pass->samples : 1;
+    for (uint32_t i = 0; i < turns; i++) {
+        if (is_by_sample(t->pass)) {
+            nb_state_choose_sample(i);
+            glUniform2i(t->program->sample_range, (GLint)i, (GLint)i + 1);
+        }
+        glDrawArrays(GL_TRIANGLES, 0, 3);
+    }
 }
 
 static nebel_result draw(const task *t, GLuint target_framebuffer)
@@ -220,7 +247,7 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
     glUseProgram(t->program->name);
     glBindVertexArray(t->gl->vertex_array);
     set_uniforms(t, target_framebuffer);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
+    draw_triangles(t);
     return NEBEL_OK;
 }
 

@@ -23,7 +23,7 @@ static const char fragment_text[] =
     "#endif\n"
     "#ifdef PASS_MULTISAMPLED\n"
     "uniform highp sampler2DMS pass_depth;\n"
-    "uniform int pass_sample_count;\n"
+    "uniform ivec2 pass_sample_range;\n" /* the first, and the one behind the last */
     "uniform vec2 pass_sample_places[32];\n"
     "#define PASS_COLOR highp sampler2DMS\n"
     "#else\n"
@@ -80,13 +80,13 @@ static const char fragment_text[] =
     "#ifdef PASS_MULTISAMPLED\n"
     "    vec3 transmittance = vec3(0.0), in_scattering = vec3(0.0);\n"
     "    vec4 composed = vec4(0.0);\n"
-    "    for (int s = 0; s < pass_sample_count; s++) {\n"
+    "    for (int s = pass_sample_range.x; s < pass_sample_range.y; s++) {\n"
     "        nebel_light fog = pass_fog(low + pass_sample_places[s], texelFetch(pass_depth, texel, s).x);\n"
     "        transmittance += fog.transmittance;\n"
     "        in_scattering += fog.in_scattering;\n"
     "        composed += pass_over(fog, texel, s);\n"
     "    }\n"
-    "    float share = 1.0 / float(pass_sample_count);\n"
+    "    float share = 1.0 / float(pass_sample_range.y - pass_sample_range.x);\n"
     "    pass_write(share * transmittance, share * in_scattering, share * composed);\n"
     "#else\n"
     "    nebel_light fog = pass_fog(low + 0.5, texelFetch(pass_depth, texel, 0).x);\n"
@@ -188,7 +188,7 @@ static void set_uniforms(nb_program *program)
     program->rays = glGetUniformLocation(name, "nebel_rays");
     program->corner = glGetUniformLocation(name, "pass_corner");
     program->tiling = glGetUniformLocation(name, "pass_tiling");
-    program->sample_count = glGetUniformLocation(name, "pass_sample_count");
+    program->sample_range = glGetUniformLocation(name, "pass_sample_range");
     program->sample_places = glGetUniformLocation(name, "pass_sample_places");
     glUseProgram(name);
     glUniform1i(glGetUniformLocation(name, "nebel_fog_texture"), NB_UNIT_FOG);

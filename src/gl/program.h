@@ -34,7 +34,7 @@ typedef struct nb_program_kind {
 typedef struct nb_program {
     nb_program_kind kind;
     unsigned name;
-    int rays, corner, tiling, sample_count, sample_places; /* where its uniforms are; -1: it has none such */
+    int rays, corner, tiling, sample_range, sample_places; /* where its uniforms are; -1: it has none such */
 } nb_program;
 
 typedef struct nb_programs {

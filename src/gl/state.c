@@ -7,10 +7,19 @@ static const struct {
     GLenum name;
     nb_known known;
 } switches[] = {
-    {GL_STENCIL_TEST, EVERYWHERE},       {GL_DEPTH_TEST, EVERYWHERE},       {GL_CULL_FACE, EVERYWHERE},
-    {GL_RASTERIZER_DISCARD, EVERYWHERE}, {GL_SAMPLE_COVERAGE, EVERYWHERE},  {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
-    {GL_SAMPLE_MASK, SAMPLE_MASKS},      {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP}, {GL_COLOR_LOGIC_OP, DESKTOP},
-    {GL_POLYGON_SMOOTH, DESKTOP},        {GL_PRIMITIVE_RESTART, DESKTOP},   {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
+    {GL_STENCIL_TEST, EVERYWHERE},
+    {GL_DEPTH_TEST, EVERYWHERE},
+    {GL_CULL_FACE, EVERYWHERE},
+    {GL_RASTERIZER_DISCARD, EVERYWHERE},
+    {GL_SAMPLE_COVERAGE, EVERYWHERE},
+    {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
+    {GL_SAMPLE_MASK, SAMPLE_MASKS},
+    {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP},
+    {GL_COLOR_LOGIC_OP, DESKTOP},
+    {GL_POLYGON_SMOOTH, DESKTOP},
+    {GL_MULTISAMPLE, DESKTOP},
+    {GL_PRIMITIVE_RESTART, DESKTOP},
+    {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
 };
 enum { SWITCHES = sizeof switches / sizeof *switches };
 
@@ -149,7 +158,9 @@ void nb_state_save(const nb_context *c, nb_state *s)
     } else {
         glGetFloatv(GL_VIEWPORT, s->viewport);
     }
-    if (!c->es) glGetIntegerv(GL_POLYGON_MODE, s->polygon_mode);
+    if (c->es) return;
+    glGetIntegerv(GL_POLYGON_MODE, s->polygon_mode);
+    glGetIntegeri_v(GL_SAMPLE_MASK_VALUE, 0, &s->sample_mask);
 }
 
 /* ---- writing --------------------------------------------------------------------------------- */
@@ -236,7 +247,10 @@ void nb_state_restore(const nb_context *c, const nb_state *s)
     }
     for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, s->blending[i]);
     set_viewport(c, s->viewport);
-    if (!c->es) glPolygonMode(GL_FRONT_AND_BACK, (GLenum)s->polygon_mode[0]);
+    if (!c->es) {
+        glPolygonMode(GL_FRONT_AND_BACK, (GLenum)s->polygon_mode[0]);
+        glSampleMaski(0, (GLbitfield)s->sample_mask);
+    }
     if (s->feedback) glResumeTransformFeedback();
 }
 
@@ -273,6 +287,13 @@ void nb_state_add(const nb_context *c)
     const GLint blending[NB_STATE_BLENDING] = {GL_ONE, GL_ONE, GL_ONE, GL_ONE, GL_FUNC_ADD, GL_FUNC_ADD};
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, 1);
     for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, blending);
+}
+
+void nb_state_choose_sample(uint32_t sample)
+{
+    glEnable(GL_MULTISAMPLE);
+    glEnable(GL_SAMPLE_MASK);
+    glSampleMaski(0, 1u << sample);
 }
 
 /* ---- uploads --------------------------------------------------------------------------------- */

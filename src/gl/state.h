@@ -22,7 +22,7 @@ typedef struct nb_state {
     uint32_t switches, clip_distances, scissors; /* bits: which were on */
     int feedback;                                /* transform feedback was under way */
     GLboolean blend[NB_STATE_BUFFERS], mask[NB_STATE_BUFFERS][4];
-    GLint polygon_mode[2];
+    GLint polygon_mode[2], sample_mask;
     GLint blending[NB_STATE_BUFFERS][NB_STATE_BLENDING]; /* the first alone where buffers cannot differ */
 } nb_state;
 
@@ -44,6 +44,9 @@ void nb_state_blend(const nb_context *context, GLenum factor);
 
 /* Blending of draw buffers 0 and 1: source + target * source's alpha. */
 void nb_state_layer(const nb_context *context);
+
+/* Fragments go to one sample of each pixel alone. OpenGL only. */
+void nb_state_choose_sample(uint32_t sample);
 
 /* Blending of all four draw buffers: source + target, alpha too. */
 void nb_state_add(const nb_context *context);
