@@ -28,10 +28,18 @@ static int create_context(nb_gl *gl)
     const EGLint desktop[] = {
         EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    const EGLint compatible[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                 3,
+                                 EGL_CONTEXT_MINOR_VERSION,
+                                 3,
+                                 EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                 EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT,
+                                 EGL_NONE};
     const EGLint embedded[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 0, EGL_NONE};
-    const int is_desktop = gl->language == NB_GL_330;
-    if (!eglBindAPI(is_desktop ? EGL_OPENGL_API : EGL_OPENGL_ES_API)) return fault(gl, "EGL has no such API");
-    gl->context = eglCreateContext(gl->display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, is_desktop ? desktop : embedded);
+    const EGLint *const lists[] = {desktop, embedded, compatible};
+    const EGLenum api = gl->language == NB_GL_300ES ? EGL_OPENGL_ES_API : EGL_OPENGL_API;
+    if (!eglBindAPI(api)) return fault(gl, "EGL has no such API");
+    gl->context = eglCreateContext(gl->display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, lists[gl->language]);
     if (gl->context == EGL_NO_CONTEXT) return fault(gl, "eglCreateContext: error 0x%x", (unsigned)eglGetError());
     if (!eglMakeCurrent(gl->display, EGL_NO_SURFACE, EGL_NO_SURFACE, gl->context)) {
         eglDestroyContext(gl->display, gl->context);

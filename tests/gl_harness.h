@@ -13,7 +13,8 @@
 
 #include <stddef.h>
 
-typedef enum nb_gl_language { NB_GL_330, NB_GL_300ES } nb_gl_language;
+/* COMPATIBILITY has the fixed pipeline of OpenGL 1.x, too; nothing is evaluated in it. */
+typedef enum nb_gl_language { NB_GL_330, NB_GL_300ES, NB_GL_COMPATIBILITY } nb_gl_language;
 
 typedef struct nb_gl {
     void *display, *context;
