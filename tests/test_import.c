@@ -22,6 +22,16 @@ static void assert_grey(const double *got, double wanted)
     assert_vector(got, wanted, wanted, wanted);
 }
 
+static nebel_light light_along(const nebel_scene *scene, const nebel_ray *ray)
+{
+    nebel_snapshot *fog = NULL;
+    nebel_light light;
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, ray, sizeof *ray, &light, sizeof light), NEBEL_OK);
+    nebel_release_snapshot(fog);
+    return light;
+}
+
 static const nebel_volume_desc *import(const char *text, size_t count, nebel_scene **scene)
 {
     *scene = parse_good(text);
@@ -62,6 +72,45 @@ static void test_unreal_height_fog(void **state)
     assert_number(fog->density.scale_height, 1 / (0.02 * ln2));
     nebel_destroy_scene(scene);
     (void)import(IMPORT("\"type\": \"unreal_height_fog\", \"FogDensity\": 0"), 0, &scene);
+    nebel_destroy_scene(scene);
+}
+
+/* HeightFogCommon.ush in its own units, for a ray in the plane of x and z that is not level. */
+static double unreal_transmittance(const double from[2], const double to[2], double start, double max_opacity)
+{
+    const double length = hypot(to[0] - from[0], to[1] - from[1]);
+    const double excluded = start / length, density = 0.3 / 1000, falloff = 0.5 / 1000, height = 100;
+    const double z = from[1] + excluded * (to[1] - from[1]), rise = to[1] - z;
+    const double integral = density * exp2(-falloff * (z - height)) * (1 - exp2(-falloff * rise)) / (falloff * rise);
+    return fmax(exp2(-integral * (1 - excluded) * length), 1 - max_opacity);
+}
+
+static void test_unreal_start_and_largest_opacity(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog =
+        import(IMPORT("\"type\": \"unreal_height_fog\", \"FogDensity\": 0.3, \"FogHeightFalloff\": 0.5, "
+                      "\"RelativeLocation\": [0, 0, 100], \"StartDistance\": 700, \"FogMaxOpacity\": 0.8, "
+                      "\"FogInscatteringLuminance\": [1, 2, 3]"),
+               1, &scene);
+    assert_number(fog->start, 7);
+    assert_number(nebel_scene_contents(scene)->max_opacity, .8);
+    const double places[][2] = {{2000, 170}, {2000, 900}, {9000, -300}, {60000, 4000}};
+    for (int i = 0; i < 4; i++) {
+        const double x = places[i][0] / 100, y = (places[i][1] - 150) / 100;
+        const double transmittance = unreal_transmittance((const double[]){0, 150}, places[i], 700, .8);
+        const nebel_light light = light_along(scene, &(nebel_ray){{0, 1.5, 0}, {x, y, 0}, hypot(x, y)});
+        assert_number(light.transmittance[0], transmittance);
+        for (int c = 0; c < 3; c++) assert_number(light.in_scattering[c], (c + 1) * (1 - transmittance));
+    }
+    nebel_destroy_scene(scene);
+    (void)import(IMPORT("\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": 0"), 0, &scene);
+    nebel_destroy_scene(scene);
+    (void)import("{\"nebel\": 1, \"fog\": [{\"import\": {\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": 0.5}}], "
+                 "\"max_opacity\": 0.25}",
+                 1, &scene);
+    assert_number(nebel_scene_contents(scene)->max_opacity, .25);
     nebel_destroy_scene(scene);
 }
 
@@ -113,7 +162,7 @@ static void test_godot_fog_volume(void **state)
     const nebel_volume_desc *fog =
         import(IMPORT("\"type\": \"godot_fog_volume\", \"shape\": 1, \"size\": [4, 6, 2], \"density\": 0.5, "
                       "\"albedo\": [1, 0, 1], "
-                      "\"emission\": [0, 1, 0], \"height_falloff\": 0.25, \"edge_fade\": 0.1, "
+                      "\"emission\": [0, 1, 0], \"height_falloff\": 0.25, \"edge_fade\": 0.4, "
                       "\"transform\": [0, 0, 2, 0, 1, 0, -1, 0, 0, 10, 20, 30]"),
                1, &scene);
     assert_int_equal(fog->shape.type, NEBEL_SHAPE_CONE);
@@ -135,14 +184,60 @@ static void test_godot_fog_volume(void **state)
                                               NEBEL_SHAPE_BOX, NEBEL_SHAPE_WORLD};
     for (int i = 0; i < 5; i++) {
         char text[200];
-        snprintf(text, sizeof text, IMPORT("\"type\": \"godot_fog_volume\", \"size\": [2, 4, 6], \"shape\": %d"), i);
+        snprintf(text, sizeof text,
+                 IMPORT("\"type\": \"godot_fog_volume\", \"size\": [2, 4, 6], \"edge_fade\": 0, \"shape\": %d"), i);
         fog = import(text, 1, &scene);
         assert_int_equal(fog->shape.type, types[i]);
         if (i == 0) assert_vector(fog->shape.radii, 1, 2, 3);
         if (i == 2) assert_number(fog->shape.radius, 1);
         if (i == 3) assert_vector(fog->shape.min, -1, -2, -3);
+        assert_int_equal(fog->density.type, NEBEL_DENSITY_CONSTANT);
         nebel_destroy_scene(scene);
     }
+}
+
+/* fog_material.cpp along a ray through a box of 4 x 2 x 6 m: the mean of many places. */
+static double godot_depth(const nebel_ray *ray, double fade)
+{
+    enum { PLACES = 200000 };
+    const double half[3] = {2, 1, 3};
+    double sum = 0;
+    for (int i = 0; i < PLACES; i++) {
+        double depth = 1;
+        for (int k = 0; k < 3; k++)
+            depth = fmin(depth, half[k] - fabs(ray->origin[k] + ray->direction[k] * ray->t_max * (i + .5) / PLACES));
+        if (depth > 0) sum += pow(depth, fade);
+    }
+    return sum * ray->t_max / PLACES;
+}
+
+static void test_godot_edge_fade(void **state)
+{
+    (void)state;
+    static const double fades[] = {1, .1, .5, 2};
+    nebel_scene *scene;
+    for (int i = 0; i < 4; i++) {
+        char text[200];
+        snprintf(text, sizeof text,
+                 IMPORT("\"type\": \"godot_fog_volume\", \"density\": 0.5, \"size\": [4, 2, 6], \"edge_fade\": %g"),
+                 fades[i]);
+        (void)import(text, 1, &scene);
+        /* through the middles of faces as much, and where it is linear everywhere */
+        const nebel_ray rays[] = {{{.3, -4, .4}, {0, 1, 0}, 9}, {{-.3, .4, -5}, {.6, 0, .8}, 9}};
+        for (int r = 0; r < (fades[i] == 1 ? 2 : 1); r++) {
+            const double depth = -log(light_along(scene, &rays[r]).transmittance[0]) / .5;
+            assert_true(fabs(depth - godot_depth(&rays[r], fades[i])) < 1e-3);
+        }
+        nebel_destroy_scene(scene);
+    }
+    const nebel_volume_desc *fog =
+        import(IMPORT("\"type\": \"godot_fog_volume\", \"shape\": 0, \"size\": [4, 2, 6]"), 1, &scene);
+    assert_int_equal(fog->density.type, NEBEL_DENSITY_SOFT_EDGE);
+    assert_number(fog->density.distance, .2 / 1.1); /* the engine's 0.1 */
+    nebel_destroy_scene(scene);
+    fog = import(IMPORT("\"type\": \"godot_fog_volume\", \"shape\": 4"), 1, &scene);
+    assert_int_equal(fog->density.type, NEBEL_DENSITY_CONSTANT);
+    nebel_destroy_scene(scene);
 }
 
 /* ---- Unity
@@ -186,6 +281,57 @@ static void test_hdrp_local_volumetric_fog(void **state)
     fog = import(IMPORT(LOCAL "\"size\": [10, 20, 5], \"positiveFade\": [0, 0, 0], \"negativeFade\": [0, 0, 0]"), 1,
                  &scene);
     assert_int_equal(fog->density.type, NEBEL_DENSITY_CONSTANT);
+    assert_int_equal(fog->operation, NEBEL_OPERATION_ADD);
+    nebel_destroy_scene(scene);
+}
+
+/* ComputeFadeFactor, for the fades below, summed along x. */
+static double hdrp_depth(double y, double z)
+{
+    const double across = fmin((2 - fabs(y)) / .4, 1) * fmin((5 - fabs(z)) / 2, 1);
+    return across * (10 - 3);
+}
+
+static void test_hdrp_fades_of_each_axis(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    (void)import(
+        IMPORT(LOCAL "\"size\": [10, 4, 10], \"positiveFade\": [0.3, 0.1, 0.2], \"negativeFade\": [0.3, 0.1, 0.2]"), 1,
+        &scene);
+    for (int i = 0; i < 9; i++) {
+        const double y = .95 * (i % 3), z = 2.1 * (i / 3);
+        const nebel_light light = light_along(scene, &(nebel_ray){{-9, y, z}, {1, 0, 0}, 20});
+        assert_number(light.transmittance[0], exp(-hdrp_depth(y, z) / 4));
+    }
+    nebel_destroy_scene(scene);
+    (void)import(IMPORT(LOCAL "\"size\": [10, 4, 10], \"positiveFade\": [0.3, 0, 0], \"negativeFade\": [0.3, 0, 0]"), 1,
+                 &scene);
+    const nebel_light light = light_along(scene, &(nebel_ray){{-9, 1.9, 4.9}, {1, 0, 0}, 20});
+    assert_number(light.transmittance[0], exp(-7. / 4));
+    nebel_destroy_scene(scene);
+}
+
+#define HARD "\"size\": [4, 4, 4], \"positiveFade\": [0, 0, 0], \"negativeFade\": [0, 0, 0]"
+
+/* The global fog lies under all, then volumes by their priorities. */
+static void test_hdrp_overwrites_what_ranks_below(void **state)
+{
+    (void)state;
+    nebel_scene *scene;
+    const nebel_volume_desc *fog = import(
+        FOG("\"import\": {\"type\": \"hdrp_fog\", \"meanFreePath\": 20, \"baseHeight\": 50}}, {\"import\": {" LOCAL HARD
+            ", \"blendingMode\": 0, \"distanceFadeStart\": 30, \"distanceFadeEnd\": 30}}, {\"import\": {" LOCAL HARD
+            ", \"priority\": 3, \"localPosition\": [-1, 0, 0]}"),
+        3, &scene);
+    assert_int_equal(fog[1].operation, NEBEL_OPERATION_REPLACE);
+    assert_int_equal(fog[1].priority, 0);
+    assert_number(fog[1].cutoff, 30);
+    assert_int_equal(fog[2].operation, NEBEL_OPERATION_ADD);
+    assert_int_equal(fog[2].priority, 3);
+    /* of 10 m of global fog 4 m are overwritten; the other adds 4 m of its own */
+    const nebel_light light = light_along(scene, &(nebel_ray){{-5, 0, 0}, {1, 0, 0}, 10});
+    assert_number(light.transmittance[0], exp(-6. / 20 - 4. / 4 - 4. / 4));
     nebel_destroy_scene(scene);
 }
 
@@ -251,11 +397,18 @@ static void test_what_no_import_has(void **state)
          "fog[0].shape: unknown key; imported fog has: name, import, source"},
         {FORMAT, IMPORT("\"type\": \"unreal_height_fog\", `\"FogDensty\": 1"),
          "fog[0].import.FogDensty: unknown key; an unreal_height_fog has: type, FogDensity,"},
-        {UNSUPPORTED, IMPORT("\"type\": \"unreal_height_fog\", \"StartDistance\": `100"),
-         "fog[0].import.StartDistance: is 100; it depends on where the camera is, and fog here does not, so it must be "
-         "0"},
-        {UNSUPPORTED, IMPORT("\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": `0.7"),
-         "fog[0].import.FogMaxOpacity: is 0.7; fog here has no"},
+        {UNSUPPORTED, IMPORT("\"type\": \"unreal_height_fog\", \"FogCutoffDistance\": `100"),
+         "fog[0].import.FogCutoffDistance: is 100; behind it the engine draws no fog at all, also not what lies "
+         "before, "
+         "so it must be 0"},
+        {UNSUPPORTED, IMPORT("\"type\": \"unreal_height_fog\", \"EndDistance\": `100"),
+         "fog[0].import.EndDistance: is 100; the engine measures it along the ground"},
+        {FORMAT, IMPORT("\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": `1.5"),
+         "fog[0].import.FogMaxOpacity: is 1.5; must be"},
+        {UNSUPPORTED,
+         FOG("\"import\": {\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": 0.5}}, {\"import\": `{\"type\": "
+             "\"unreal_height_fog\", \"FogMaxOpacity\": 0.75}"),
+         "fog[1].import: has a largest opacity of 0.75, and other fog has 0.5; all fog here has one"},
         {FORMAT, IMPORT("\"type\": \"unreal_height_fog\", \"SecondFogData\": {`\"density\": 1}"),
          "fog[0].import.SecondFogData.density: unknown key; SecondFogData has: FogDensity,"},
         {FORMAT, IMPORT("\"type\": \"unreal_local_fog_volume\", `\"HeightFogExtinction\": 1"),
@@ -275,16 +428,20 @@ static void test_what_no_import_has(void **state)
         {FORMAT, IMPORT("\"type\": \"hdrp_fog\", \"meanFreePath\": `0"),
          "fog[0].import.meanFreePath: is 0; must be a number > 0"},
         {UNSUPPORTED,
-         IMPORT(LOCAL "\"size\": [2, 2, 4], \"positiveFade\": `[0.1, 0.1, 0.1], \"negativeFade\": [0.1, 0.1, 0.1]"),
-         "fog[0].import.positiveFade: fades over 0.2 m at one face and 0.4 m at another"},
+         IMPORT(LOCAL "\"size\": [2, 2, 4], \"positiveFade\": [0.1, 0.1, 0.1], \"negativeFade\": `[0.1, 0.25, 0.1]"),
+         "fog[0].import.negativeFade: fades over 0.5 m at one face and 0.2 m at the one opposite"},
+        {UNSUPPORTED, IMPORT(LOCAL HARD ", \"distanceFadeStart\": `20"),
+         "fog[0].import.distanceFadeStart: fades from 20 m to 10000 m from the eye; fog here ends at one distance"},
+        {UNSUPPORTED, IMPORT(LOCAL HARD ", \"invertFade\": `1"),
+         "fog[0].import.invertFade: is 1; fog here is inside its shape, so it must be 0"},
         {UNSUPPORTED,
          IMPORT(LOCAL "\"size\": [2, 2, 2], \"positiveFade\": [0.1, 0.1, 0.1], \"negativeFade\": [0.1, 0.1, 0.1], "
                       "\"falloffMode\": `1"),
          "fog[0].import.falloffMode: is 1; only the linear"},
         {UNSUPPORTED,
          IMPORT(LOCAL "\"size\": [2, 2, 2], \"positiveFade\": [0.1, 0.1, 0.1], \"negativeFade\": [0.1, 0.1, 0.1], "
-                      "\"blendingMode\": `0"),
-         "fog[0].import.blendingMode: is 0; volumes here add"},
+                      "\"blendingMode\": `3"),
+         "fog[0].import.blendingMode: is 3; fog here overwrites, 0, or adds, 1"},
         {FORMAT, FOG("\"import\": `{\"type\": \"bevy_distance_fog\", \"color\": 1}"), "fog[0].import: has \"density\""},
         {UNSUPPORTED, IMPORT("\"type\": \"bevy_distance_fog\", \"extinction\": 1, \"inscattering\": `2"),
          "fog[0].import.inscattering: differs from"},
@@ -298,11 +455,15 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_unreal_height_fog),
+        cmocka_unit_test(test_unreal_start_and_largest_opacity),
         cmocka_unit_test(test_unreal_local_fog_volume),
         cmocka_unit_test(test_godot_fog),
         cmocka_unit_test(test_godot_fog_volume),
+        cmocka_unit_test(test_godot_edge_fade),
         cmocka_unit_test(test_hdrp_fog),
         cmocka_unit_test(test_hdrp_local_volumetric_fog),
+        cmocka_unit_test(test_hdrp_fades_of_each_axis),
+        cmocka_unit_test(test_hdrp_overwrites_what_ranks_below),
         cmocka_unit_test(test_bevy),
         cmocka_unit_test(test_a_source_stands_for_the_lights_of_the_engine),
         cmocka_unit_test(test_what_no_import_has),

@@ -8,6 +8,7 @@
 typedef struct nb_import {
     nebel_volume_desc volumes[2]; /* those not 0: `count` of them */
     size_t count;
+    double max_opacity; /* of all fog; 0: no limit */
 } nb_import;
 
 /* One for each type of import; `node` is its object. */

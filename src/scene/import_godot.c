@@ -93,6 +93,38 @@ static void set_shape(nebel_shape *shape, int kind, const double size[3])
     shape->radius = shape->radius_from = fmin(size[0], size[2]) / 2;
 }
 
+/* The engine's density is the depth below the surface, in terms of half the least size, to the power of `fade`. A soft
+ * edge rises linearly; this one has as much fog on the way from a face to that depth, and is the same where the power
+ * is 1. */
+static double edge_of(const double size[3], double fade)
+{
+    const double depth = fmin(size[0], fmin(size[1], size[2])) / 2;
+    return fade <= 1 ? depth * 2 * fade / (1 + fade) : depth * (1 + fade) / 2;
+}
+
+/* The nearest face counts, as in the engine; the soft edge of a box is the product over its axes. */
+static bool make_faces(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
+{
+    nebel_plane *planes = nb_arena_allocate(&in->scene->arena, 6, sizeof *planes);
+    if (planes == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    for (int i = 0; i < 3; i++) {
+        planes[2 * i] = planes[2 * i + 1] = (nebel_plane){.distance = shape->max[i]};
+        planes[2 * i].normal[i] = 1;
+        planes[2 * i + 1].normal[i] = -1;
+    }
+    shape->type = NEBEL_SHAPE_CONVEX;
+    shape->planes = planes;
+    shape->plane_count = 6;
+    return true;
+}
+
+static bool soften(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume, double edge)
+{
+    if (edge == 0 || volume->shape.type == NEBEL_SHAPE_WORLD) return true;
+    volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = edge};
+    return volume->shape.type != NEBEL_SHAPE_BOX || make_faces(in, node, &volume->shape);
+}
+
 /* Three rows of the basis, then the origin, as in a scene file. */
 static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transform *transform)
 {
@@ -117,7 +149,7 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     int shape = BOX;
-    double size[3] = {2, 2, 2}, density = 1, falloff = 0, emission[3] = {0}, fade;
+    double size[3] = {2, 2, 2}, density = 1, falloff = 0, emission[3] = {0}, fade = 0.1;
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(0);
     for (int c = 0; c < 3; c++) volume->albedo[c] = 1;
@@ -134,8 +166,8 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
         volume->extinction[c] = density;
         volume->emission[c] = emission[c] * density;
     }
-    if (falloff > 0)
-        nb_import_set_height(volume, volume->shape.transform.position[1], 1 / (falloff * ln2), NEBEL_BELOW_CONSTANT);
     fog->count = 1;
+    if (falloff == 0) return soften(in, node, volume, edge_of(size, fade));
+    nb_import_set_height(volume, volume->shape.transform.position[1], 1 / (falloff * ln2), NEBEL_BELOW_CONSTANT);
     return true;
 }

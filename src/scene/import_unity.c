@@ -1,6 +1,7 @@
 /* Unity's High Definition Render Pipeline: the Fog override, local volumetric fog. Metres, y up, left-handed. */
 #include "scene/import.h"
 
+#include <limits.h>
 #include <math.h>
 
 bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
@@ -20,6 +21,7 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
         return false;
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(1 / path);
+    volume->priority = INT_MIN; /* what any local volume may overwrite */
     nb_import_set_height(volume, base, per_depth * fmax(least_depth, top - base), NEBEL_BELOW_CONSTANT);
     for (int c = 0; c < 3; c++) volume->albedo[c] = albedo[c];
     fog->count = 1;
@@ -29,24 +31,67 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
 /* ---- local fog
  * ------------------------------------------------------------------------------------------------------- */
 
-/* Fades are fractions of the size. One distance, the same at every face, is the soft edge of a box: the product of both
- * faces of an axis is the nearer one's as long as the two do not meet. */
-static bool read_fade(nb_json *json, const nb_json_node *const fades[2], const double size[3], double *distance)
+/* Fades are fractions of the size. The product of both faces of an axis is the soft edge of the nearer one as long as
+ * the two do not meet. */
+static bool read_fades(nb_json *json, const nb_json_node *const fades[2], const double size[3], double edges[3])
 {
     static const nb_range half = {0, .5, false, "a fraction of the size, from 0 to 0.5"};
-    *distance = -1;
-    for (int f = 0; f < 2; f++) {
-        double fade[3] = {.1, .1, .1};
-        if (!nb_value_numbers(json, fades[f], &half, 3, fade)) return false;
-        for (int i = 0; i < 3; i++) {
-            if (*distance < 0) *distance = fade[i] * size[i];
-            if (fabs(fade[i] * size[i] - *distance) > 1e-5 * *distance)
-                return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, fades[f],
-                                    "fades over %.15g m at one face and %.15g m at another; they must be the same",
-                                    *distance, fade[i] * size[i]);
-        }
+    double positive[3] = {0}, negative[3] = {0};
+    if (!nb_value_numbers(json, fades[0], &half, 3, positive) || !nb_value_numbers(json, fades[1], &half, 3, negative))
+        return false;
+    for (int i = 0; i < 3; i++) {
+        edges[i] = positive[i] * size[i];
+        if (fabs(positive[i] - negative[i]) > 1e-5 * positive[i])
+            return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, fades[1],
+                                "fades over %.15g m at one face and %.15g m at the one opposite; they must be the same",
+                                negative[i] * size[i], edges[i]);
     }
     return true;
+}
+
+/* A soft edge has one distance in the shape's coordinates, where a scale makes it the axis' own: 1. A face that does
+ * not fade does so over the last millionth. */
+static void set_faded_box(nebel_volume_desc *volume, const double size[3], const double edges[3])
+{
+    const int fades = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
+    const int even = fabs(edges[1] - edges[0]) <= 1e-5 * edges[0] && fabs(edges[2] - edges[0]) <= 1e-5 * edges[0];
+    volume->shape.type = NEBEL_SHAPE_BOX;
+    if (fades) volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = even ? edges[0] : 1};
+    for (int i = 0; i < 3; i++) {
+        const double unit = even ? 1 : fmax(edges[i], 1e-6 * size[i]);
+        volume->shape.transform.scale[i] = unit;
+        volume->shape.max[i] = size[i] / 2 / unit;
+        volume->shape.min[i] = -volume->shape.max[i];
+    }
+}
+
+/* Fog may fade over distances from the eye; where both are one it ends there. Left out: nowhere. */
+static bool read_distances(nb_json *json, const nb_json_node *const distances[2], double *cutoff)
+{
+    double start = 10000, end = 10000; /* the engine's */
+    if (distances[0] == NULL && distances[1] == NULL) return true;
+    if (!nb_value_number(json, distances[0], &nb_range_positive, &start) ||
+        !nb_value_number(json, distances[1], &nb_range_positive, &end))
+        return false;
+    *cutoff = end;
+    return start == end || nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, distances[distances[0] == NULL],
+                                        "fades from %.15g m to %.15g m from the eye; fog here ends at one distance, so "
+                                        "they must be the same",
+                                        start, end);
+}
+
+/* What overwrites replaces all of lower priority, its own edges included; the rest of the modes are no sums. */
+static bool read_blending(nb_json *json, const nb_json_node *mode, const nb_json_node *priority,
+                          nebel_volume_desc *volume)
+{
+    enum { OVERWRITE, ADDITIVE, MULTIPLY, MIN, MAX };
+    int blending = ADDITIVE;
+    if (!nb_value_integer(json, mode, OVERWRITE, MAX, &blending) ||
+        !nb_value_integer(json, priority, INT_MIN + 1, INT_MAX, &volume->priority))
+        return false;
+    if (blending == OVERWRITE) volume->operation = NEBEL_OPERATION_REPLACE;
+    return blending <= ADDITIVE ||
+           nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, mode, "is %d; fog here overwrites, 0, or adds, 1", blending);
 }
 
 /* Right-handed by turning x round, as Unity's glTF exporters do. */
@@ -59,10 +104,37 @@ static void mirror(double position[3], double rotation[4])
 
 bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, PATH, ALBEDO, SIZE, POSITIVE_FADE, NEGATIVE_FADE, FALLOFF, BLENDING, POSITION, ROTATION, COUNT };
-    static const char *const names[] = {"type",          "meanFreePath", "albedo",      "size",
-                                        "positiveFade",  "negativeFade", "falloffMode", "blendingMode",
-                                        "localPosition", "localRotation"};
+    enum {
+        TYPE,
+        PATH,
+        ALBEDO,
+        SIZE,
+        POSITIVE_FADE,
+        NEGATIVE_FADE,
+        INVERT,
+        FALLOFF,
+        FADE_START,
+        FADE_END,
+        BLENDING,
+        PRIORITY,
+        POSITION,
+        ROTATION,
+        COUNT
+    };
+    static const char *const names[] = {"type",
+                                        "meanFreePath",
+                                        "albedo",
+                                        "size",
+                                        "positiveFade",
+                                        "negativeFade",
+                                        "invertFade",
+                                        "falloffMode",
+                                        "distanceFadeStart",
+                                        "distanceFadeEnd",
+                                        "blendingMode",
+                                        "priority",
+                                        "localPosition",
+                                        "localRotation"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1,
                                  NB_BIT(SIZE) | NB_BIT(POSITIVE_FADE) | NB_BIT(NEGATIVE_FADE),
                                  "an hdrp_local_volumetric_fog"};
@@ -70,26 +142,23 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
     nb_json *json = in->json;
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(0);
-    double path = 10, size[3] = {10, 10, 10}, *albedo = volume->albedo, distance;
+    double path = 10, size[3] = {10, 10, 10}, edges[3], *albedo = volume->albedo;
     nebel_transform *transform = &volume->shape.transform;
     for (int c = 0; c < 3; c++) albedo[c] = 1;
     if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[PATH], &nb_range_positive, &path) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
         !nb_value_numbers(json, found[SIZE], &nb_range_positive, 3, size) ||
-        !read_fade(json, &found[POSITIVE_FADE], size, &distance) ||
+        !read_fades(json, &found[POSITIVE_FADE], size, edges) ||
+        !nb_import_refuse_other(json, found[INVERT], 0, "fog here is inside its shape") ||
         !nb_import_refuse_other(json, found[FALLOFF], 0, "only the linear falloff has a closed form") ||
-        !nb_import_refuse_other(json, found[BLENDING], 1, "volumes here add") ||
+        !read_distances(json, &found[FADE_START], &volume->cutoff) ||
+        !read_blending(json, found[BLENDING], found[PRIORITY], volume) ||
         !nb_value_vector(json, found[POSITION], transform->position) ||
         !nb_value_rotation(json, found[ROTATION], transform->rotation))
         return false;
     mirror(transform->position, transform->rotation);
-    volume->shape.type = NEBEL_SHAPE_BOX;
-    for (int i = 0; i < 3; i++) {
-        volume->extinction[i] = 1 / path;
-        volume->shape.max[i] = size[i] / 2;
-        volume->shape.min[i] = -size[i] / 2;
-    }
-    if (distance > 0) volume->density = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = distance};
+    set_faded_box(volume, size, edges);
+    for (int c = 0; c < 3; c++) volume->extinction[c] = 1 / path;
     fog->count = 1;
     return true;
 }

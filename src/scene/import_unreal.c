@@ -20,11 +20,13 @@ static void convert_location(double location[3])
 /* The shader's line integral over 2^(-f (z - h)) leaves out 1 / ln 2, and transmittance is 2 to the power of its
  * negative: the extinction is (ln 2)^2 times the density. Both settings are scaled by 1/1000 per cm, which is 1/10 per
  * m. */
-static void add_layer(nb_import *fog, double density, double falloff, double height, const double color[3])
+static void add_layer(nb_import *fog, double density, double falloff, double height, double start,
+                      const double color[3])
 {
     if (density == 0) return;
     nebel_volume_desc *layer = &fog->volumes[fog->count++];
     *layer = nb_import_world(ln2 * ln2 * density / 10);
+    layer->start = start;
     if (falloff > 0) nb_import_set_height(layer, height, 10 / (falloff * ln2), NEBEL_BELOW_GROW);
     for (int c = 0; c < 3; c++) layer->source[c] = color[c];
 }
@@ -47,29 +49,32 @@ static bool read_second(nb_json *json, const nb_json_node *node, layer *second)
 
 bool nb_import_unreal_height_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, DENSITY, FALLOFF, SECOND, COLOR, START, CUTOFF, OPACITY, LOCATION, COUNT };
+    enum { TYPE, DENSITY, FALLOFF, SECOND, COLOR, START, END, CUTOFF, OPACITY, LOCATION, COUNT };
     static const char *const names[] = {
-        "type",          "FogDensity",        "FogHeightFalloff", "SecondFogData",   "FogInscatteringLuminance",
-        "StartDistance", "FogCutoffDistance", "FogMaxOpacity",    "RelativeLocation"};
+        "type",          "FogDensity",  "FogHeightFalloff",  "SecondFogData", "FogInscatteringLuminance",
+        "StartDistance", "EndDistance", "FogCutoffDistance", "FogMaxOpacity", "RelativeLocation"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_height_fog"};
-    static const char *const from_eye = "it depends on where the camera is, and fog here does not";
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
     layer first = {0.02, 0.2, 0}, second = {0, 0.2, 0};
-    double color[3] = {0}, location[3] = {0};
+    double color[3] = {0}, location[3] = {0}, start = 0, opacity = 1;
     if (!nb_value_members(json, node, &keys, found) ||
         !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &first.density) ||
         !nb_value_number(json, found[FALLOFF], &nb_range_not_negative, &first.falloff) ||
         !read_second(json, found[SECOND], &second) ||
         !nb_value_color(json, found[COLOR], &nb_range_not_negative, color) ||
-        !nb_import_refuse_other(json, found[START], 0, from_eye) ||
-        !nb_import_refuse_other(json, found[CUTOFF], 0, from_eye) ||
-        !nb_import_refuse_other(json, found[OPACITY], 1, "fog here has no largest opacity") ||
+        !nb_value_number(json, found[START], &nb_range_not_negative, &start) ||
+        !nb_import_refuse_other(json, found[END], 0, "the engine measures it along the ground") ||
+        !nb_import_refuse_other(json, found[CUTOFF], 0,
+                                "behind it the engine draws no fog at all, also not what lies before") ||
+        !nb_value_number(json, found[OPACITY], &nb_range_fraction, &opacity) ||
         !nb_value_vector(json, found[LOCATION], location))
         return false;
     convert_location(location);
-    add_layer(fog, first.density, first.falloff, location[1], color);
-    add_layer(fog, second.density, second.falloff, location[1] + 0.01 * second.offset, color);
+    if (opacity == 0) return true;
+    if (opacity < 1) fog->max_opacity = opacity;
+    add_layer(fog, first.density, first.falloff, location[1], 0.01 * start, color);
+    add_layer(fog, second.density, second.falloff, location[1] + 0.01 * second.offset, 0.01 * start, color);
     return true;
 }
 

@@ -343,6 +343,17 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
     return nb_read_try(in, found[1], "", volume) && keep_volume(in, found[1], volume, name, NEBEL_VOLUME_IMPORTED);
 }
 
+static bool keep_opacity(nb_scene_reader *in, const nb_json_node *node, double max_opacity)
+{
+    if (max_opacity == 0) return true;
+    const double before = in->imported_opacity;
+    in->imported_opacity = max_opacity;
+    return before == 0 || before == max_opacity ||
+           nb_json_fail(in->json, NEBEL_ERROR_UNSUPPORTED, node,
+                        "has a largest opacity of %.15g, and other fog has %.15g; all fog here has one", max_opacity,
+                        before);
+}
+
 static bool read_imported(nb_scene_reader *in, const nb_json_node *node)
 {
     static const char *const names[] = {"name", "import", "source"};
@@ -351,7 +362,8 @@ static bool read_imported(nb_scene_reader *in, const nb_json_node *node)
     const char *name = "";
     nb_import fog = {.count = 0};
     if (!nb_value_members(in->json, node, &keys, found) ||
-        !nb_value_text(in->json, found[0], &in->scene->arena, &name) || !nb_read_import(in, found[1], &fog))
+        !nb_value_text(in->json, found[0], &in->scene->arena, &name) || !nb_read_import(in, found[1], &fog) ||
+        !keep_opacity(in, found[1], fog.max_opacity))
         return false;
     for (size_t i = 0; i < fog.count; i++)
         if (!keep_imported(in, found, &fog.volumes[i], name)) return false;

@@ -123,6 +123,7 @@ static bool check_whole(nb_scene_reader *in, const nb_json_node *root)
     if (missing != 0)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, root, "the key \"%s\" is missing; a scene needs it",
                             (missing & NB_BIT(NEBEL)) != 0 ? "nebel" : "fog");
+    if ((in->seen & NB_BIT(MAX_OPACITY)) == 0) in->scene->data.max_opacity = in->imported_opacity;
     if (in->lit_offset == 0 || (sun[0] == 0 && sun[1] == 0 && sun[2] == 0)) return true;
     return nb_json_fail_at(
         in->json, NEBEL_ERROR_UNSUPPORTED, in->lit_offset, in->lit_path,
