@@ -45,7 +45,7 @@ FOREIGN = {
     "gl": {"epoxy/"},
     "tools": POSIX | {"omp.h", "epoxy/", "GLFW/", "imgui.h", "backends/"},
     "bench": POSIX | {"omp.h", "embree3/", "epoxy/"},
-    "examples": {"epoxy/", "GLFW/", "SDL.h"},
+    "examples": {"epoxy/", "GLFW/", "SDL.h", "windows.h", "d3d9.h"},
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')

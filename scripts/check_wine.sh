@@ -21,7 +21,7 @@ fi
 
 build_windows() {
     cmake -S "$source" -B "$windows" --toolchain "$source/cmake/mingw-w64.cmake" -DNEBEL_WERROR=ON -DNEBEL_BUILD_SCENE=OFF \
-        -DNEBEL_BUILD_CPU=OFF -DNEBEL_BUILD_GL=OFF -DNEBEL_BUILD_EXAMPLES=OFF \
+        -DNEBEL_BUILD_CPU=OFF -DNEBEL_BUILD_GL=OFF \
         -DCMAKE_CROSSCOMPILING_EMULATOR="$wine"
     cmake --build "$windows" -j "$(nproc)"
 }
@@ -38,10 +38,15 @@ start_wine() {
     xvfb-run -a "$wine" wineboot -i
 }
 
+stop_wine() {
+    wineserver -k || true
+    wineserver -w
+}
+
 if ! build_windows >"$build/windows.log" 2>&1; then
     cat "$build/windows.log"
     exit 1
 fi
-trap 'wineserver -k || true' EXIT
+trap stop_wine EXIT
 start_wine </dev/null >"$build/wine.log" 2>&1
-xvfb-run -a -s "-screen 0 640x480x24" ctest --test-dir "$windows" --output-on-failure --no-tests=error -j 2
+xvfb-run -a -s "-screen 0 640x480x24" ctest --test-dir "$windows" --output-on-failure --no-tests=error -j 2 2>&1
