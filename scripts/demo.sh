@@ -1,5 +1,6 @@
 #!/bin/bash
-# demo.sh BUILD: renders every example scene into BUILD/demo and says where the pictures are.
+# demo.sh BUILD: renders every example scene into BUILD/demo and says where the pictures are. The name of a scene of a classic
+# technique begins with that of its method.
 set -euo pipefail
 
 source=$(cd "$(dirname "$0")/.." && pwd)
@@ -17,7 +18,11 @@ mkdir -p "$pictures"
 for scene in "${scenes[@]}"; do
     name=$(basename "$scene" .json)
     echo "demo: $name"
-    "$build/nebel" render "$scene" -o "$pictures/$name.png"
+    case $name in
+        cells-*) method=cells ;;
+        *) method=exact ;;
+    esac
+    "$build/nebel" render "$scene" -o "$pictures/$name.png" --method "$method"
 done
 
 echo

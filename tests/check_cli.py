@@ -399,6 +399,26 @@ class RenderTest(PictureCase):
         self.assert_done(self.render("a.exr"))
         self.assertIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
 
+    def test_fog_in_cells(self):
+        self.assert_failed(self.render("a.exr", "--method", "cells"), "scene.json", 'no section "cells"')
+        room = {"shape": {"type": "box", "min": [-9, -9, 1], "max": [9, 9, 4]}, "density": 0.1, "color": 0.5}
+        hall = {"shape": {"type": "box", "min": [-9, -9, -9], "max": [9, 9, 1]}}
+        more = {"models": [{"file": "triangle.obj"}], "cells": {"cells": [room, hall]},
+                "camera": {"position": [0, 0, 6], "look_at": [0, 0, 0]}}
+        self.scene = self.write_scene("cells.json", [FOG], **more)
+        done = self.render("a.exr", "--method", "cells", "--aov")
+        self.assert_done(done)
+        self.assertIn('note: ', done.err)
+        self.assertIn('draws the section "cells" alone', done.err)
+        self.assertNotIn(b"error\0", (self.folder / "a.exr").read_bytes())
+        self.scene = self.write_scene("cells.json", [], **more)
+        self.assertNotIn("note", self.render("a.exr", "--method", "cells").err)
+        self.assert_done(self.render("b.exr", "--method", "cells-pixel"))
+        self.assert_done(self.render("c.exr"))
+        for other in "bc":
+            self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / f"{other}.exr").out)
+        self.assertIn("cells: 2, 1 of them with fog, portals wherever they touch", nebel("info", self.scene).out)
+
     def test_quiet(self):
         done = self.render("a.png", "--quiet")
         self.assert_done(done)
@@ -430,7 +450,9 @@ class RenderTest(PictureCase):
         for samples in ("0", "4097", "2.5", "-1"):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
-        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel")
+        self.assert_misused(self.render("a.png", "--method", "cells", "--device", "gl"), "--method", "--device cpu")
+        self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assertEqual(self.files(), self.given)
 
     def test_places_that_cannot_be_written_are_found_before_the_work(self):

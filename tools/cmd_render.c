@@ -42,7 +42,9 @@ static const nb_option options[] = {
     [TOLERANCE] = {"tolerance", 0, "E",
                    "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
-    [METHOD] = {"method", 0, "NAME", "exact, the only one in this version."},
+    [METHOD] = {"method", 0, "NAME",
+                "exact (default); cells: the scene's cells and\ntheir portals alone, fogged the classic way at the\n"
+                "vertices of surfaces; cells-pixel: the same at\neach pixel."},
     [DEVICE] = {"device", 0, "NAME",
                 "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
                 "--threads with gl."},
@@ -81,6 +83,7 @@ typedef struct settings {
     double exposure, tolerance;
     uint32_t first_frame, last_frame;
     int many_frames, aov, quiet, gl;
+    enum { EXACT, CELLS, CELLS_PIXEL } method;
     nebel_renderer_desc renderer;
 } settings;
 
@@ -152,15 +155,20 @@ static void read_output(nb_arguments *arguments, settings *wanted)
 static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
-    static const char *const methods[] = {"exact", NULL};
+    static const char *const methods[] = {[EXACT] = "exact", [CELLS] = "cells", [CELLS_PIXEL] = "cells-pixel", NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
-    (void)nb_options_choice(arguments, METHOD, methods, 0);
+    const int method = nb_options_choice(arguments, METHOD, methods, EXACT);
+    wanted->method = method == CELLS ? CELLS : method == CELLS_PIXEL ? CELLS_PIXEL : EXACT;
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
     for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
         if (arguments->values[of_cpu[i]] != NULL) {
             nb_options_reject(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
         }
     }
+    if (wanted->gl && wanted->method != EXACT)
+        nb_options_reject(arguments, METHOD, "is for --device cpu; with gl there is exact alone");
+    if (wanted->method != EXACT && arguments->values[TOLERANCE] != NULL)
+        nb_options_reject(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
 
 /* -1 to go on, or the exit status. */
@@ -231,6 +239,7 @@ typedef struct studio {
     nb_report_listener listener;
     nb_load_result loaded;
     nebel_renderer *renderer; /* of the CPU */
+    nebel_cells *cells;       /* of the methods of that name */
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter painter; /* of OpenGL */
 #endif
@@ -247,11 +256,16 @@ static float *allocate_pixels(const settings *wanted, uint32_t channels)
     return malloc((size_t)wanted->width * wanted->height * channels * sizeof(float));
 }
 
-/* OpenGL knows no bound of its error. */
+/* Neither OpenGL nor classic fog knows a bound of its error. */
+static int has_error(const settings *wanted)
+{
+    return !wanted->gl && wanted->method == EXACT;
+}
+
 static int count_planes(const settings *wanted)
 {
     if (!wanted->aov) return 1;
-    return wanted->gl ? ERROR : PLANES;
+    return has_error(wanted) ? PLANES : ERROR;
 }
 
 static int allocate_planes(studio *all)
@@ -276,6 +290,7 @@ static void free_studio(studio *all)
     for (int i = 0; i < PLANES; i++) free(all->samples[i]);
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
+    nebel_destroy_cells(all->cells);
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter_close(&all->painter);
 #endif
@@ -298,7 +313,7 @@ static int write_picture(studio *all, const char *name)
     const size_t pixels = (size_t)wanted->width * wanted->height;
     const char *names[CHANNELS_AOV];
     nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
-    const uint32_t of = wanted->gl ? CHANNELS_AOV - 1 : CHANNELS_AOV;
+    const uint32_t of = has_error(wanted) ? CHANNELS_AOV : CHANNELS_AOV - 1;
     for (int i = 0; i < PLANES && all->samples[i] != NULL; i++) {
         if (all->interleaved != NULL) interleave(all, i, image.channel_count, of);
         for (uint32_t c = 0; c < planes[i].channels; c++) names[image.channel_count++] = planes[i].names[c];
@@ -432,6 +447,42 @@ static void note_stillness(const nebel_scene *scene, const settings *wanted)
                       wanted->scene);
 }
 
+/* What the scene has beside its cells is not drawn. */
+static void note_other_fog(const nebel_scene_data *scene, const settings *wanted)
+{
+    if (wanted->quiet || (scene->volume_count == 0 && scene->nebula_count == 0)) return;
+    nb_report_message("note: %s: --method cells draws the section \"cells\" alone; \"fog\" and \"nebula\" are left out",
+                      wanted->scene);
+}
+
+static int open_cells(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    if (wanted->method == EXACT) return NB_DONE;
+    if (scene->cells == NULL)
+        return nb_report_failure("render: %s: there is no section \"cells\" for --method cells; add one, or say "
+                                 "--method exact",
+                                 wanted->scene);
+    note_other_fog(scene, wanted);
+    nebel_cells_desc desc = *scene->cells;
+    desc.log = nb_report_log(&all->listener);
+    nebel_result result = nebel_create_cells(&desc, &all->cells);
+    if (result == NEBEL_OK)
+        result = nebel_set_renderer_cells(all->renderer, all->cells,
+                                          wanted->method == CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL);
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
+}
+
+static int open_renderer(studio *all)
+{
+    nebel_renderer_desc desc = all->wanted->renderer;
+    desc.log = nb_report_log(&all->listener);
+    const nebel_result result =
+        nebel_create_renderer(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->renderer);
+    return result == NEBEL_OK ? open_cells(all) : nb_report_result(&all->listener, all->wanted->scene, result);
+}
+
 static int set_up(studio *all)
 {
     const settings *const wanted = all->wanted;
@@ -440,12 +491,7 @@ static int set_up(studio *all)
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
     status = allocate_planes(all);
     if (status != NB_DONE) return status;
-    if (wanted->gl) return open_gl(all);
-    nebel_renderer_desc desc = wanted->renderer;
-    desc.log = nb_report_log(&all->listener);
-    const nebel_result result =
-        nebel_create_renderer(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->renderer);
-    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
+    return wanted->gl ? open_gl(all) : open_renderer(all);
 }
 
 static void summarize(const settings *wanted, double seconds)

@@ -11,6 +11,7 @@
 #ifndef NEBEL_RENDER_H
 #define NEBEL_RENDER_H
 
+#include <nebel/cells.h>
 #include <nebel/nebel.h>
 #include <nebel/scene.h>
 
@@ -36,6 +37,19 @@ void nebel_destroy_renderer(nebel_renderer *renderer);
 /* The fog of the frames from now on, for fog that moves. The snapshot is retained; NULL: none. Not while a frame is
  * rendered. Errors: ARGUMENT. */
 nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fog);
+
+/* Where the fog of cells is computed. */
+typedef enum nebel_cell_stage {
+    NEBEL_CELLS_PER_VERTEX = 0, /* and interpolated over each triangle, with perspective, as hardware does */
+    NEBEL_CELLS_PER_PIXEL,
+    NEBEL_CELL_STAGE_COUNT
+} nebel_cell_stage;
+
+/* Fogs surfaces by cells from now on, in place of the snapshot's fog: an alpha polygon of nebel_fog_cells over each.
+ * Classic: where no surface is there is no fog, and sunlight comes through undimmed. Of a frame, `error` is then 0. Of
+ * an orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. The cells must
+ * outlive the frames; NULL: the snapshot's fog again. Not while a frame is rendered. Errors: ARGUMENT, MEMORY. */
+nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells, nebel_cell_stage stage);
 
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
 typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);

@@ -212,6 +212,8 @@ static nebel_result make_surface(nb_geometry *geometry, const nebel_mesh *mesh)
 {
     nb_surface *surface = &geometry->surfaces[geometry->surface_count++];
     surface->mesh = mesh;
+    surface->first_vertex = geometry->vertex_count;
+    geometry->vertex_count += mesh->vertex_count;
     surface->positions = nb_allocate(&geometry->allocator, mesh->vertex_count + (size_t)1, 3 * sizeof(float));
     surface->ends = nb_allocate(&geometry->allocator, mesh->vertex_count, 4 * sizeof *surface->ends);
     if (surface->positions == NULL || surface->ends == NULL) return NEBEL_ERROR_MEMORY;

@@ -27,7 +27,8 @@ typedef struct nb_surface {
     int16_t *ends;         /* 4 per vertex: like those of a node, in the picture that is being rasterized */
     float low[3], high[3]; /* corners of the mesh around its own origin */
     float longest_edge;
-    uint32_t first_id; /* of its triangles in the geometry, a multiple of NB_FAN */
+    size_t first_vertex; /* among the vertices of all surfaces */
+    uint32_t first_id;   /* of its triangles in the geometry, a multiple of NB_FAN */
 } nb_surface;
 
 typedef struct nb_geometry {
@@ -39,6 +40,7 @@ typedef struct nb_geometry {
     float bounds_min[3], bounds_max[3]; /* relative to origin; 0 where there are no triangles */
     double largest_radius;              /* of a mesh around its own origin */
     size_t surface_count;
+    size_t vertex_count;  /* of all surfaces */
     nb_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
     uint32_t *owners;     /* the surface of NB_FAN triangles whose IDs follow each other */
     void *nodes;

@@ -95,6 +95,20 @@ nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fo
     return NEBEL_OK;
 }
 
+nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells, nebel_cell_stage stage)
+{
+    if (renderer == NULL || stage < 0 || stage >= NEBEL_CELL_STAGE_COUNT) return NEBEL_ERROR_ARGUMENT;
+    if (cells != NULL && stage == NEBEL_CELLS_PER_VERTEX && renderer->vertex_fog == NULL) {
+        renderer->vertex_fog =
+            nb_allocate(&renderer->allocator, renderer->geometry.vertex_count, sizeof *renderer->vertex_fog);
+        if (renderer->vertex_fog == NULL)
+            return nb_fail(&renderer->log, NEBEL_ERROR_MEMORY, "renderer: out of memory for fog at vertices");
+    }
+    renderer->cells = cells;
+    renderer->cell_stage = stage;
+    return NEBEL_OK;
+}
+
 void nebel_destroy_renderer(nebel_renderer *renderer)
 {
     if (renderer == NULL) return;
@@ -102,5 +116,6 @@ void nebel_destroy_renderer(nebel_renderer *renderer)
     nb_geometry_free(&renderer->geometry);
     if (renderer->fog != NULL) nebel_release_snapshot(renderer->fog);
     nb_release(&allocator, renderer->scratch_memory);
+    nb_release(&allocator, renderer->vertex_fog);
     nb_release(&allocator, renderer);
 }

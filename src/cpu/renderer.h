@@ -35,11 +35,19 @@ typedef struct nb_scratch {
     uint32_t hit_counts[NB_PIXELS];       /* samples of a pixel that met a surface */
 } nb_scratch;
 
+/* What fog does to a vertex: the light that it adds, and what it hides. */
+typedef struct nb_vertex_fog {
+    float color[3], alpha;
+} nb_vertex_fog;
+
 struct nebel_renderer {
     nebel_allocator allocator;
     nebel_log log;
     const nebel_scene_data *scene;
-    nebel_snapshot *fog; /* NULL: none */
+    nebel_snapshot *fog;      /* NULL: none */
+    const nebel_cells *cells; /* in place of the fog; NULL: none */
+    nebel_cell_stage cell_stage;
+    nb_vertex_fog *vertex_fog; /* of all surfaces, for the frame that is rendered; NULL until cells ask for it */
     nebel_isa fog_isa;
     int threads;
     nb_geometry geometry;

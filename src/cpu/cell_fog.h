@@ -1,0 +1,13 @@
+/* The fog of cells on surfaces, per vertex or per pixel. */
+#ifndef NB_CPU_CELL_FOG_H
+#define NB_CPU_CELL_FOG_H
+
+#include "renderer.h"
+
+/* The fog of every vertex, for the view of the frame. */
+void nb_cell_fog_set_vertices(const nb_frame *frame);
+
+/* Transmittance and in-scattering of a batch whose hits are known; where nothing is hit there is no fog. */
+void nb_cell_fog_trace(const nb_frame *frame, nb_scratch *scratch);
+
+#endif
