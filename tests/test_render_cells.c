@@ -123,6 +123,35 @@ static void test_pixels_are_what_the_cells_say(void **state)
     test_picture_free(&picture);
 }
 
+/* The exponential model along the ray is the exact fog of the same cells. */
+static void test_exponential_pixels_are_exact(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_floor();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = test_camera(-3, 5, 6, 1, 0, -1);
+    const nebel_volume_desc volumes[] = {nebel_cell_volume(&rooms[0]), nebel_cell_volume(&rooms[1])};
+    const nebel_cells_desc desc = {.cells = rooms, .cell_count = 3, .model = NEBEL_CELL_EXPONENTIAL, .ungrouped = 1};
+    nebel_cells *cells = NULL;
+    nebel_snapshot *fog = test_fog(2, volumes);
+    test_picture classic = test_picture_make(40, 30), exact = test_picture_make(40, 30);
+    int fogged = 0;
+    assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_OK);
+    render_cells(&scene, cells, NEBEL_CELLS_PER_PIXEL, 2, &camera, &classic);
+    test_render(&scene, fog, &(nebel_renderer_desc){0}, &camera, 1, &exact);
+    for (size_t i = 0; i < 40 * 30; i++) {
+        if (!isfinite(classic.planes.depth[i])) continue; /* classic fog is on surfaces alone */
+        for (size_t c = 3 * i; c < 3 * i + 3; c++)
+            assert_near((double)classic.planes.color[c], (double)exact.planes.color[c], 2e-6);
+        fogged += classic.planes.transmittance[3 * i] < .9f;
+    }
+    assert_true(fogged > 300);
+    nebel_release_snapshot(fog);
+    nebel_destroy_cells(cells);
+    test_picture_free(&classic);
+    test_picture_free(&exact);
+}
+
 /* Gouraud: linear over the triangle in the world, which is not linear in the picture. The square's diagonal goes from
  * (-5, -5) to (5, 5). */
 static void test_between_vertices_alpha_is_linear_in_the_world(void **state)
@@ -259,6 +288,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pixels_are_what_the_cells_say),
+        cmocka_unit_test(test_exponential_pixels_are_exact),
         cmocka_unit_test(test_between_vertices_alpha_is_linear_in_the_world),
         cmocka_unit_test(test_what_is_not_fogged),
         cmocka_unit_test(test_other_projections),

@@ -172,8 +172,8 @@ void nebel_destroy_scene(nebel_scene *scene);
  * become wrong goes. A volume of another operation, shape or density than before is written anew as a whole, new ones
  * stand behind the others. Every other byte stays. The file is replaced as a whole, as by nebel_write_image, or left
  * alone where nothing has changed. On an error it is as it was. Errors: as nebel_load_scene; ARGUMENT (the file has
- * other volumes, nebulae or cells than `before`; a volume that cannot leave); FORMAT also where the new numbers are no valid
- * scene. */
+ * other volumes, nebulae or cells than `before`; a volume that cannot leave); FORMAT also where the new numbers are no
+ * valid scene. */
 #define NEBEL_NEW_VOLUME SIZE_MAX
 nebel_result nebel_save_scene(const char *path, const nebel_scene_desc *desc, const nebel_scene_data *before,
                               const nebel_scene_data *changed, const size_t *sources);
