@@ -44,7 +44,8 @@ static const nb_option options[] = {
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
     [METHOD] = {"method", 0, "NAME",
                 "exact (default); cells: the scene's cells and\ntheir portals alone, fogged the classic way at the\n"
-                "vertices of surfaces; cells-pixel: the same at\neach pixel."},
+                "vertices of surfaces; cells-pixel: the same at\neach pixel; five-tap, of --device gl: particles "
+                "meet\nsurfaces by the classic comparison of five depths."},
     [DEVICE] = {"device", 0, "NAME",
                 "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
                 "--threads with gl."},
@@ -76,6 +77,8 @@ static const char examples[] = "Examples:\n"
 /* Pictures of more samples are not written. */
 enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, LAST_FRAME = 1000000 };
 
+typedef enum method { EXACT, CELLS, CELLS_PIXEL, FIVE_TAP } method;
+
 typedef struct settings {
     const char *scene, *output;
     nebel_image_format format;
@@ -83,7 +86,7 @@ typedef struct settings {
     double exposure, tolerance;
     uint32_t first_frame, last_frame;
     int many_frames, aov, quiet, gl;
-    enum { EXACT, CELLS, CELLS_PIXEL } method;
+    method method;
     nebel_renderer_desc renderer;
 } settings;
 
@@ -155,18 +158,20 @@ static void read_output(nb_arguments *arguments, settings *wanted)
 static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
-    static const char *const methods[] = {[EXACT] = "exact", [CELLS] = "cells", [CELLS_PIXEL] = "cells-pixel", NULL};
+    static const char *const methods[] = {
+        [EXACT] = "exact", [CELLS] = "cells", [CELLS_PIXEL] = "cells-pixel", [FIVE_TAP] = "five-tap", NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
-    const int method = nb_options_choice(arguments, METHOD, methods, EXACT);
-    wanted->method = method == CELLS ? CELLS : method == CELLS_PIXEL ? CELLS_PIXEL : EXACT;
+    wanted->method = (method)nb_options_choice(arguments, METHOD, methods, EXACT);
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
     for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
         if (arguments->values[of_cpu[i]] != NULL) {
             nb_options_reject(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
         }
     }
-    if (wanted->gl && wanted->method != EXACT)
-        nb_options_reject(arguments, METHOD, "is for --device cpu; with gl there is exact alone");
+    if (wanted->gl && (wanted->method == CELLS || wanted->method == CELLS_PIXEL))
+        nb_options_reject(arguments, METHOD, "is for --device cpu; with gl there are exact and five-tap");
+    if (!wanted->gl && wanted->method == FIVE_TAP)
+        nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
     if (wanted->method != EXACT && arguments->values[TOLERANCE] != NULL)
         nb_options_reject(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
@@ -372,6 +377,7 @@ static nebel_result draw_frame(studio *all)
         .samples = all->wanted->samples,
         .progress = show_progress,
         .progress_user = all,
+        .method = all->wanted->method == FIVE_TAP ? NEBEL_GL_METHOD_FIVE_TAP : NEBEL_GL_METHOD_EXACT,
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[COLOR],

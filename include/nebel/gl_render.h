@@ -61,15 +61,40 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapsh
 nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
                                              size_t count);
 
+/* How particles meet the surfaces that reach into them. */
+typedef enum nebel_gl_method {
+    NEBEL_GL_METHOD_EXACT = 0, /* each counts up to the surface, in closed form */
+    NEBEL_GL_METHOD_FIVE_TAP,  /* each is a disc through its middle, across the view: all of it or nothing, by the
+                                  classic comparison of depth at five places */
+    NEBEL_GL_METHOD_COUNT
+} nebel_gl_method;
+
+/* Constants of FIVE_TAP, as those of nebel_five_taps in nebel/shader.h: a disc is drawn where the depths of the opaque
+ * picture at the pixel and at four diagonal neighbours differ by more than `edge`, and where none of them is nearer
+ * than the disc's own depth less `margin`. Depth is the distance along the camera's axis. */
+typedef struct nebel_gl_taps {
+    double offset;     /* of the neighbours, as a share of the picture either way, >= 0 */
+    double nothing;    /* depth where there is no surface [m] */
+    double edge;       /* m, >= 0 */
+    double margin;     /* m */
+    double brightness; /* what light of drawn particles is multiplied by, >= 0 */
+} nebel_gl_taps;
+
+/* 0.0005, 100000, 0.5, 0.125, 1. Any thread. */
+nebel_gl_taps nebel_gl_default_taps(void);
+
 typedef struct nebel_gl_frame_desc {
     nebel_camera camera;                                    /* not PANORAMA */
     uint32_t width, height;                                 /* pixels, 1 to GL_MAX_TEXTURE_SIZE */
     uint32_t samples;                                       /* per pixel, 1 to 4096; 0: 4 */
     int (*progress)(size_t done, size_t total, void *user); /* after each sample; nonzero stops the frame. NULL: none */
     void *progress_user;
+    nebel_gl_method method;    /* of particles */
+    const nebel_gl_taps *taps; /* of FIVE_TAP; NULL: nebel_gl_default_taps */
 } nebel_gl_frame_desc;
 
-/* Draws a frame into textures of the renderer. Errors: ARGUMENT, VALUE (a camera or light as for nebel_render_frame),
+/* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or
+ * light as for nebel_render_frame; taps that are not finite or negative),
  * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (a panorama; more than one
  * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
  * lost). */

@@ -65,6 +65,20 @@ static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
     return NEBEL_OK;
 }
 
+static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    if ((unsigned)desc->method >= NEBEL_GL_METHOD_COUNT) {
+        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: there is no method %d", (int)desc->method);
+    }
+    const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
+    if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
+        isfinite(taps.offset + taps.nothing + taps.edge + taps.margin + taps.brightness)) {
+        return NEBEL_OK;
+    }
+    return nb_fail(&r->log, NEBEL_ERROR_VALUE,
+                   "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
+}
+
 static int is_light(const double rgb[3])
 {
     return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
@@ -98,6 +112,7 @@ static nebel_result set_frame(frame *f)
     f->samples = desc->samples != 0 ? desc->samples : 4;
     nebel_result result = check_size(r, desc);
     if (result == NEBEL_OK) result = check_samples(r, f->samples);
+    if (result == NEBEL_OK) result = check_method(r, desc);
     if (result == NEBEL_OK) result = set_lighting(r->scene, &f->light, &r->log);
     if (result == NEBEL_OK) result = nebel_gl_camera_view(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
@@ -213,6 +228,21 @@ static nebel_result draw_fog(const frame *f)
 
 /* ---- particles ------------------------------------------------------------------------------- */
 
+nebel_gl_taps nebel_gl_default_taps(void)
+{
+    return (nebel_gl_taps){.offset = .0005, .nothing = 100000, .edge = .5, .margin = .125, .brightness = 1};
+}
+
+static void set_taps(const frame *f, unsigned program)
+{
+    const double *const eye = f->view.eye_from_world;
+    const nebel_gl_taps taps = f->desc->taps != NULL ? *f->desc->taps : nebel_gl_default_taps();
+    glUniform3f(glGetUniformLocation(program, "scene_axis"), (float)-eye[2], (float)-eye[6], (float)-eye[10]);
+    glUniform4f(glGetUniformLocation(program, "scene_taps"), (float)taps.offset, (float)taps.nothing, (float)taps.edge,
+                (float)taps.margin);
+    glUniform1f(glGetUniformLocation(program, "scene_brightness"), (float)taps.brightness);
+}
+
 /* Grey particles at once; of others each color by itself, because blending has room for one factor. */
 static void draw_channels(const nebel_gl_renderer *r, unsigned program)
 {
@@ -238,6 +268,7 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     set_clip(f, program);
     glUniform3f(glGetUniformLocation(program, "scene_forward"), parallel ? (float)-eye[2] : 0,
                 parallel ? (float)-eye[6] : 0, parallel ? (float)-eye[10] : 0);
+    if (f->desc->method == NEBEL_GL_METHOD_FIVE_TAP) set_taps(f, program);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, f->renderer->targets.place);
     if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
@@ -257,6 +288,7 @@ static nebel_result draw_particles(const frame *f)
     nebel_result result = has_fog ? nebel_gl_get_fog(r->eye_fog, &fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     const nb_light_kind kind = {.of_particles = 1,
+                                .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
                                 .has_fog = has_fog,
                                 .in_texture = fog.texture != 0,
                                 .tiled = fog.tiles != 0,

@@ -244,7 +244,13 @@ static const char particle_text[] =
     "flat in vec4 place;\n"
     "flat in vec4 extinction;\n"
     "flat in vec4 emission;\n"
+    "#ifndef SCENE_FIVE_TAPS\n"
     "uniform highp sampler2D scene_place;\n"
+    "#else\n"
+    "uniform vec3 scene_axis;\n"
+    "uniform vec4 scene_taps;\n" /* offset, nothing, edge, margin */
+    "uniform float scene_brightness;\n"
+    "#endif\n"
     "uniform vec3 scene_channel;\n"
     "#ifdef NEBEL_TILES\n"
     "uniform ivec2 tile_grid;\n" /* pixels in a tile, tiles in a row */
@@ -266,11 +272,40 @@ static const char particle_text[] =
     "    return nebel_trace(origin, direction, t);\n"
     "#endif\n"
     "}\n"
+    "#ifdef SCENE_FIVE_TAPS\n"
+    "float opaque_depth(vec2 place)\n"
+    "{\n"
+    "    ivec2 size = textureSize(scene_place, 0), texel = clamp(ivec2(floor(place * vec2(size))), ivec2(0), size - "
+    "1);\n"
+    "    vec2 pixel = vec2(texel) + 0.5;\n"
+    "    float t = texelFetch(scene_place, texel, 0).x;\n"
+    "    return t > 0.0 ? dot(ray_origin(pixel) + t * ray_direction(pixel), scene_axis) : -1.0;\n"
+    "}\n"
+    "float brightness()\n"
+    "{\n"
+    "    nebel_tap_constants taps;\n"
+    "    taps.offset = scene_taps.x;\n"
+    "    taps.nothing = scene_taps.y;\n"
+    "    taps.edge = scene_taps.z;\n"
+    "    taps.margin = scene_taps.w;\n"
+    "    taps.brightness = 1.0;\n"
+    "    vec2 at = gl_FragCoord.xy / vec2(textureSize(scene_place, 0));\n"
+    "    if (!(nebel_five_taps(at, dot(place.xyz, scene_axis), taps) > 0.0)) discard;\n"
+    "    return scene_brightness;\n"
+    "}\n"
+    "float ray_end() { return 1e18; }\n"
+    "#else\n"
+    "float brightness() { return 1.0; }\n"
+    "float ray_end()\n"
+    "{\n"
+    "    float surface = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
+    "    return surface > 0.0 ? surface : 1e18;\n"
+    "}\n"
+    "#endif\n"
     "void main()\n"
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
-    "    float surface = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
-    "    float end = surface > 0.0 ? surface : 1e18;\n"
+    "    float end = ray_end();\n"
     "    int profile = int(extinction.w);\n"
     "    float depth = profile == 1\n"
     "        ? nebel_gaussian_length(origin, direction, end, place.xyz, place.w, place.w / 3.0)\n"
@@ -280,9 +315,15 @@ static const char particle_text[] =
     "    nebel_blend blend = nebel_blend_medium(nebel_medium_light(depth, extinction.xyz, emission.xyz),\n"
     "                                           fog_before(origin, direction, middle));\n"
     "    float factor = dot(blend.factor, scene_channel);\n"
-    "    out_in_scattering = vec4(blend.source, factor);\n"
+    "    out_in_scattering = vec4(brightness() * blend.source, factor);\n"
     "    out_transmittance = vec4(0.0, 0.0, 0.0, factor);\n"
     "}\n";
+
+/* The comparison asks this of the host: it stands before the fog's text. */
+static const char five_tap_text[] = "#define SCENE_FIVE_TAPS\n"
+                                    "#define NEBEL_OPAQUE_DEPTH(at) opaque_depth(at)\n"
+                                    "uniform highp sampler2D scene_place;\n"
+                                    "float opaque_depth(vec2 place);\n";
 
 /* ---- the survey ------------------------------------------------------------------------------ */
 
@@ -372,7 +413,7 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const int particles = kind->of_particles;
     const nb_texts vertex = {{nb_program_version(context), particles ? particle_vertex_text : light_vertex_text}, 2};
     const nb_texts light = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, light_text}, 5};
-    const nb_texts particle = {{head, fog, ray_text, particle_text}, 4};
+    const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog, ray_text, particle_text}, 5};
     const nebel_result result = nb_program_build(log, &vertex, particles ? &particle : &light, name);
     if (result == NEBEL_OK) set_units(*name);
     return result;
@@ -380,8 +421,8 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
-    return a->of_particles == b->of_particles && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
-           a->tiled == b->tiled && a->features == b->features;
+    return a->of_particles == b->of_particles && a->five_taps == b->five_taps && a->has_fog == b->has_fog &&
+           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

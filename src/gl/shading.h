@@ -20,6 +20,7 @@ enum { NB_CASCADES = 4 };
 /* What a program that asks fog is made for. */
 typedef struct nb_light_kind {
     int of_particles; /* and the fog before them; else of surfaces, and the fog between them and the sun */
+    int five_taps;    /* particles are discs, which are there or not */
     int has_fog;
     int in_texture, tiled;
     uint32_t features;
