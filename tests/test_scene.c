@@ -374,11 +374,11 @@ static void test_numbers_are_read_exactly(void **state)
         snprintf(number, sizeof number, "%.*g", 1 + i % 17, value);
         const char *decimal = (size_t)i < sizeof hard / sizeof *hard ? hard[i] : number;
         if (!isfinite(strtod(decimal, NULL))) continue;
-        snprintf(text, sizeof text, "{\"nebel\":1,\"fog\":[],\"camera\":{\"position\":[%s,0,0]}}", decimal);
+        snprintf(text, sizeof text, "{\"nebel\":1,\"fog\":[],\"camera\":{\"look_at\":[%s,0,-5]}}", decimal);
         nebel_scene *scene = NULL;
         if (nebel_parse_scene(text, strlen(text), "n", &(nebel_scene_desc){0}, &scene) != NEBEL_OK)
             fail_msg("%s", text);
-        const double got = nebel_scene_contents(scene)->camera.position[0], wanted = strtod(decimal, NULL);
+        const double got = nebel_scene_contents(scene)->camera.look_at[0], wanted = strtod(decimal, NULL);
         if (memcmp(&got, &wanted, sizeof got) != 0) fail_msg("%s was read as %.17g", decimal, got);
         nebel_destroy_scene(scene);
     }

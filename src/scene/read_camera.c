@@ -1,6 +1,8 @@
 /* The sections "camera", its turntable and its keys. */
 #include "scene/scene_internal.h"
 
+#include <math.h>
+
 enum { POSITION, LOOK_AT, UP, VERTICAL_FOV, VIEW_HEIGHT, PROJECTION, TURNTABLE, KEYS, FRAME, CAMERA_KEY_COUNT };
 
 static const char *const names[] = {"position",   "look_at",   "up",   "vertical_fov", "view_height",
@@ -75,10 +77,22 @@ static bool read_key(nb_json *json, const nb_json_node *node, const double *ahea
            read_view(json, node, found, ahead, &key->camera);
 }
 
+/* Rays of the core begin no further away [m]. */
+static bool is_near(const nebel_camera *camera)
+{
+    const double farthest = 1e15;
+    bool near = true;
+    for (int i = 0; i < 3; i++) near = near && fabs(camera->position[i]) <= farthest;
+    return near;
+}
+
 /* Checks of the file's numbers come before, so that they speak of these. */
 static bool convert_camera(nb_scene_reader *in, const nb_json_node *node, nebel_camera *camera)
 {
     nb_space_convert_camera(&in->space, camera);
+    if (!is_near(camera))
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
+                            "is too far away; its position must lie within 1e15 m of the origin on every axis");
     if (nb_camera_is_apart(camera) && nb_camera_is_upright(camera)) return true;
     return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has numbers that \"unit\" makes too large");
 }

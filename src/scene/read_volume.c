@@ -136,7 +136,7 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
                                 "a volume has \"source\" or \"albedo\", not both; remove one");
     if (found[PHASE] != NULL && found[ALBEDO] == NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[PHASE], "belongs to \"albedo\", which is absent");
-    if (!nb_value_color(json, found[SOURCE], &nb_range_not_negative, volume->source) ||
+    if (!nb_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) || !nb_read_phase(in, found[PHASE]) ||
         !nb_value_color(json, found[EMISSION], &nb_range_not_negative, volume->emission))
         return false;
@@ -338,7 +338,7 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
 {
     static const double black[3] = {0};
     if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
-    if (!nb_value_color(in->json, found[2], &nb_range_not_negative, volume->source)) return false;
+    if (!nb_value_color(in->json, found[2], &nb_range_light, volume->source)) return false;
     remember_lit(in, found[1], volume->albedo);
     return nb_read_try(in, found[1], "", volume) && keep_volume(in, found[1], volume, name, NEBEL_VOLUME_IMPORTED);
 }

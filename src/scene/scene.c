@@ -85,7 +85,7 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     case SUN:
         return nb_read_sun(in, node);
     case AMBIENT:
-        return nb_value_color(in->json, node, &nb_range_not_negative, data->ambient);
+        return nb_value_color(in->json, node, &nb_range_light, data->ambient);
     case MAX_OPACITY:
         return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
     case CELLS:

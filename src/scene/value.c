@@ -7,6 +7,7 @@
 const nb_range nb_range_any = {-HUGE_VAL, HUGE_VAL, false, "a number"};
 const nb_range nb_range_positive = {0, HUGE_VAL, true, "a number > 0"};
 const nb_range nb_range_not_negative = {0, HUGE_VAL, false, "a number >= 0"};
+const nb_range nb_range_light = {0, 1e9, false, "a number from 0 to 1e9"};
 const nb_range nb_range_fraction = {0, 1, false, "a number from 0 to 1"};
 
 /* ---- names

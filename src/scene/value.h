@@ -48,6 +48,7 @@ typedef struct nb_range {
 } nb_range;
 
 extern const nb_range nb_range_any, nb_range_positive, nb_range_not_negative, nb_range_fraction;
+extern const nb_range nb_range_light; /* what the core takes as radiance */
 
 bool nb_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value);
 bool nb_value_integer(nb_json *json, const nb_json_node *node, int low, int high, int *value);
