@@ -181,16 +181,15 @@ static void check_formats(const nebel_snapshot *snapshot, const nebel_vertex_des
     uint64_t state = 4;
     static points p;
     static float factor[COUNT], coordinate[COUNT], color[COUNT][4];
-    static unsigned char bytes[COUNT][4], specular[COUNT][4];
+    static unsigned char bytes[COUNT][4], specular[COUNT][4], alpha[COUNT][4];
     p = random_points(&state, 12);
     const nebel_vertices vertices = {.positions = p.at, .eye = {1, 2, 11}};
     memset(specular, 0x5a, sizeof specular);
-    const nebel_vertex_output outputs[] = {{NEBEL_VERTEX_SPECULAR_ALPHA, specular, 0},
-                                           {NEBEL_VERTEX_RGBA8, bytes, 0},
-                                           {NEBEL_VERTEX_RGBA_FLOAT, color, 0},
-                                           {NEBEL_VERTEX_COORDINATE, coordinate, 0},
-                                           {NEBEL_VERTEX_FACTOR, factor, 0}};
-    assert_int_equal(nebel_fog_vertices(snapshot, desc, COUNT, &vertices, outputs, 5), NEBEL_OK);
+    memset(alpha, 0xa5, sizeof alpha);
+    const nebel_vertex_output outputs[] = {
+        {NEBEL_VERTEX_SPECULAR_ALPHA, specular, 0}, {NEBEL_VERTEX_RGBA8, bytes, 0}, {NEBEL_VERTEX_RGBA_FLOAT, color, 0},
+        {NEBEL_VERTEX_COORDINATE, coordinate, 0},   {NEBEL_VERTEX_ALPHA, alpha, 0}, {NEBEL_VERTEX_FACTOR, factor, 0}};
+    assert_int_equal(nebel_fog_vertices(snapshot, desc, COUNT, &vertices, outputs, 6), NEBEL_OK);
     int partly = 0;
     for (int i = 0; i < COUNT; i++) {
         const double f = (double)factor[i];
@@ -201,6 +200,7 @@ static void check_formats(const nebel_snapshot *snapshot, const nebel_vertex_des
         for (int c = 0; c < 4; c++) {
             assert_true(abs(bytes[i][c] - byte_of((double)color[i][c])) <= 0);
             assert_int_equal(specular[i][c], c == 3 ? byte_of(f) : 0x5a);
+            assert_int_equal(alpha[i][c], c == 3 ? bytes[i][3] : 0xa5);
         }
         for (int c = 0; c < 3 && desc->color != NULL; c++)
             assert_true(fabs((double)color[i][c] - desc->color[c] * (1 - f)) <= 1e-6);
@@ -244,7 +244,7 @@ static void test_halves_are_rounded_upwards(void **unused)
 
 typedef struct vertex {
     float pad, x, y, z;
-    unsigned char color[4], specular[4];
+    unsigned char color[4], specular[4], alpha[4];
     float coordinate, light[4], factor, tail;
 } vertex;
 
@@ -261,8 +261,9 @@ static void fog_structures(const nebel_snapshot *snapshot, nebel_isa isa, vertex
                                            {NEBEL_VERTEX_COORDINATE, &v[first].coordinate, sizeof *v},
                                            {NEBEL_VERTEX_RGBA_FLOAT, v[first].light, sizeof *v},
                                            {NEBEL_VERTEX_RGBA8, v[first].color, sizeof *v},
-                                           {NEBEL_VERTEX_SPECULAR_ALPHA, v[first].specular, sizeof *v}};
-    assert_int_equal(nebel_fog_vertices(snapshot, &(nebel_vertex_desc){.isa = isa}, n, &vertices, outputs, 5),
+                                           {NEBEL_VERTEX_SPECULAR_ALPHA, v[first].specular, sizeof *v},
+                                           {NEBEL_VERTEX_ALPHA, v[first].alpha, sizeof *v}};
+    assert_int_equal(nebel_fog_vertices(snapshot, &(nebel_vertex_desc){.isa = isa}, n, &vertices, outputs, 6),
                      NEBEL_OK);
 }
 
@@ -285,6 +286,7 @@ static void assert_same_as_packed(const nebel_snapshot *snapshot, const points *
         memcpy(wanted.light, light[i], sizeof wanted.light);
         memcpy(wanted.color, color[i], sizeof wanted.color);
         wanted.specular[3] = byte_of((double)factor[i]);
+        wanted.alpha[3] = color[i][3];
         assert_memory_equal(&v[i], &wanted, sizeof wanted);
     }
 }

@@ -201,6 +201,8 @@ typedef enum nebel_vertex_format {
     NEBEL_VERTEX_RGBA8,      /* the same in four bytes */
     NEBEL_VERTEX_SPECULAR_ALPHA, /* f in the alpha of a D3DCOLOR, which is its byte 3; its other bytes are not touched
                                   */
+    NEBEL_VERTEX_ALPHA,          /* a in byte 3 of four, whose others are the fog's color and not touched. Blend with
+                                    GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA */
     NEBEL_VERTEX_FORMAT_COUNT
 } nebel_vertex_format;
 

@@ -23,12 +23,13 @@ static span span_of_positions(const nebel_vertices *v)
     return (span){(uintptr_t)v->positions, position_size, v->position_stride != 0 ? v->position_stride : position_size};
 }
 
-/* Of a D3DCOLOR the last byte alone. */
+/* Of a colour that keeps its red, green and blue the last byte alone. */
 static span span_of_output(const nebel_vertex_output *output)
 {
     const uintptr_t first = (uintptr_t)output->data;
     const size_t size = size_of(output->format), stride = nb_layout_stride(output);
-    if (output->format == NEBEL_VERTEX_SPECULAR_ALPHA) return (span){first + size - 1, 1, stride};
+    if (output->format == NEBEL_VERTEX_SPECULAR_ALPHA || output->format == NEBEL_VERTEX_ALPHA)
+        return (span){first + size - 1, 1, stride};
     return (span){first, size, stride};
 }
 

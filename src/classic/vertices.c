@@ -14,8 +14,7 @@
 #include <math.h>
 #include <string.h>
 
-_Static_assert((int)NEBEL_CURVE_TABLE == (int)NB_CURVE_TABLE &&
-                   (int)NEBEL_VERTEX_SPECULAR_ALPHA == (int)NB_VERTEX_SPECULAR_ALPHA,
+_Static_assert((int)NEBEL_CURVE_TABLE == (int)NB_CURVE_TABLE && (int)NEBEL_VERTEX_ALPHA == (int)NB_VERTEX_ALPHA,
                "the kernel's lists are those of the public face");
 
 #define TRANSMIT(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,

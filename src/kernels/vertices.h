@@ -18,7 +18,8 @@ typedef enum nb_vertex_kind {
     NB_VERTEX_COORDINATE,
     NB_VERTEX_RGBA_FLOAT,
     NB_VERTEX_RGBA8,
-    NB_VERTEX_SPECULAR_ALPHA
+    NB_VERTEX_SPECULAR_ALPHA,
+    NB_VERTEX_ALPHA
 } nb_vertex_kind;
 
 /* The most vertices of a block, a multiple of every number of lanes. */

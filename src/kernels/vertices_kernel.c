@@ -107,6 +107,7 @@ NB_INLINE nb_bits word_of(const nb_vertices_job *job, nb_vertex_kind kind, size_
     const nb_real factor = nb_load_lanes(job->factor + i);
     if (kind == NB_VERTEX_FACTOR) return nb_to_bits(factor);
     if (kind == NB_VERTEX_SPECULAR_ALPHA) return byte_of(factor);
+    if (kind == NB_VERTEX_ALPHA) return byte_of(NB_F(1.0) - factor);
     return nb_to_bits((NB_F(1.0) - factor) * nb_splat(job->coordinate_end));
 }
 
@@ -134,11 +135,11 @@ NB_INLINE void write_words(const nb_vertices_job *job, nb_vertex_kind kind)
     }
 }
 
-/* A D3DCOLOR is blue, green, red, alpha in memory. */
-NB_INLINE void write_alpha(const nb_vertices_job *job)
+/* The last of four bytes: a D3DCOLOR is blue, green, red, alpha in memory. `kind` is a constant. */
+NB_INLINE void write_alpha(const nb_vertices_job *job, nb_vertex_kind kind)
 {
     for (size_t i = 0; i < job->count; i += NB_WIDTH) {
-        const nb_bits words = word_of(job, NB_VERTEX_SPECULAR_ALPHA, i);
+        const nb_bits words = word_of(job, kind, i);
         uint32_t lanes[NB_WIDTH];
         memcpy(lanes, &words, sizeof lanes);
         for (size_t k = 0; k < least(NB_WIDTH, job->count - i); k++)
@@ -178,7 +179,10 @@ void NB_SUFFIXED(nb_vertices_, NB_SUFFIX)(const nb_vertices_job *job)
         write_words(&j, NB_VERTEX_RGBA8);
         break;
     case NB_VERTEX_SPECULAR_ALPHA:
-        write_alpha(&j);
+        write_alpha(&j, NB_VERTEX_SPECULAR_ALPHA);
+        break;
+    case NB_VERTEX_ALPHA:
+        write_alpha(&j, NB_VERTEX_ALPHA);
         break;
     }
 }
