@@ -1,4 +1,11 @@
-# The tests of classic fog in OpenGL watch their context as the passes do.
+# The tests of classic fog in OpenGL watch their context as the passes do; every test_pass_classic_NAME.c shares a mesh.
 if(TARGET test_classic_gl)
     target_sources(test_classic_gl PRIVATE pass_help.c projections.c)
 endif()
+nebel_glob(classic_tests test_pass_classic_*.c)
+foreach(source IN LISTS classic_tests)
+    get_filename_component(name ${source} NAME_WE)
+    if(TARGET ${name})
+        target_sources(${name} PRIVATE classic_help.c)
+    endif()
+endforeach()

@@ -242,8 +242,8 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
     const nebel_result result = bind_textures(t);
     if (result != NEBEL_OK) return result;
     nb_state_clear(context, t->pass->x, t->pass->y, t->gl->view.width, t->gl->view.height);
-    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND) nb_state_blend(context, GL_SRC1_COLOR);
-    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GREY) nb_state_blend(context, GL_SRC_ALPHA);
+    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND) nb_state_blend(context, GL_ONE, GL_SRC1_COLOR);
+    if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GREY) nb_state_blend(context, GL_ONE, GL_SRC_ALPHA);
     glUseProgram(t->program->name);
     glBindVertexArray(t->gl->vertex_array);
     set_uniforms(t, target_framebuffer);

@@ -111,23 +111,27 @@ static GLuint blending_count(const nb_context *c)
     return c->blending_by_buffer ? NB_STATE_BUFFERS : 1;
 }
 
-static void save_buffers(const nb_context *c, nb_state *s)
+void nb_blending_save(const nb_context *c, nb_blending *b)
+{
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) b->on[i] = indexed_switch(c->switches_by_buffer, GL_BLEND, i);
+    for (GLuint i = 0; i < blending_count(c); i++) {
+        for (int k = 0; k < NB_STATE_BLENDING; k++) {
+            if (c->blending_by_buffer) {
+                glGetIntegeri_v(blending_names[k], i, &b->how[i][k]);
+            } else {
+                glGetIntegerv(blending_names[k], &b->how[i][k]);
+            }
+        }
+    }
+}
+
+static void save_masks(const nb_context *c, nb_state *s)
 {
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
-        s->blend[i] = indexed_switch(c->switches_by_buffer, GL_BLEND, i);
         if (c->switches_by_buffer) {
             glGetBooleani_v(GL_COLOR_WRITEMASK, i, s->mask[i]);
         } else {
             glGetBooleanv(GL_COLOR_WRITEMASK, s->mask[i]);
-        }
-    }
-    for (GLuint i = 0; i < blending_count(c); i++) {
-        for (int k = 0; k < NB_STATE_BLENDING; k++) {
-            if (c->blending_by_buffer) {
-                glGetIntegeri_v(blending_names[k], i, &s->blending[i][k]);
-            } else {
-                glGetIntegerv(blending_names[k], &s->blending[i][k]);
-            }
         }
     }
 }
@@ -152,7 +156,8 @@ void nb_state_save(const nb_context *c, nb_state *s)
     save_units(c, s);
     save_block(s);
     save_switches(c, s);
-    save_buffers(c, s);
+    save_masks(c, s);
+    nb_blending_save(c, &s->blending);
     if (c->viewport_arrays) {
         glGetFloati_v(GL_VIEWPORT, 0, s->viewport);
     } else {
@@ -230,6 +235,12 @@ static void set_viewport(const nb_context *c, const GLfloat v[4])
     }
 }
 
+void nb_blending_restore(const nb_context *c, const nb_blending *b)
+{
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, b->on[i]);
+    for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, b->how[i]);
+}
+
 /* A program that was deleted while it was current is gone for good once another takes its place. Core profiles have one
  * polygon mode for both faces. */
 void nb_state_restore(const nb_context *c, const nb_state *s)
@@ -241,11 +252,8 @@ void nb_state_restore(const nb_context *c, const nb_state *s)
     restore_block(s);
     set_switches(c, s->switches, s->clip_distances);
     set_scissors(c, s->scissors);
-    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
-        set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, s->blend[i]);
-        set_mask(c, i, s->mask[i]);
-    }
-    for (GLuint i = 0; i < blending_count(c); i++) set_blending(c, i, s->blending[i]);
+    for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) set_mask(c, i, s->mask[i]);
+    nb_blending_restore(c, &s->blending);
     set_viewport(c, s->viewport);
     if (!c->es) {
         glPolygonMode(GL_FRONT_AND_BACK, (GLenum)s->polygon_mode[0]);
@@ -268,9 +276,10 @@ void nb_state_clear(const nb_context *c, uint32_t x, uint32_t y, uint32_t width,
     if (!c->es) glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
 }
 
-void nb_state_blend(const nb_context *c, GLenum factor)
+void nb_state_blend(const nb_context *c, GLenum source_factor, GLenum target_factor)
 {
-    const GLint blending[NB_STATE_BLENDING] = {GL_ONE, (GLint)factor, GL_ZERO, GL_ONE, GL_FUNC_ADD, GL_FUNC_ADD};
+    const GLint blending[NB_STATE_BLENDING] = {(GLint)source_factor, (GLint)target_factor, GL_ZERO, GL_ONE,
+                                               GL_FUNC_ADD,          GL_FUNC_ADD};
     set_indexed_switch(c->switches_by_buffer, GL_BLEND, 0, 1);
     set_blending(c, 0, blending);
 }

@@ -12,6 +12,12 @@ typedef struct nb_unit {
     GLint texture, multisample, sampler;
 } nb_unit;
 
+/* How draw buffers blend. */
+typedef struct nb_blending {
+    GLboolean on[NB_STATE_BUFFERS];
+    GLint how[NB_STATE_BUFFERS][NB_STATE_BLENDING]; /* the first alone where buffers cannot differ */
+} nb_blending;
+
 /* For drawing. */
 typedef struct nb_state {
     GLint program, vertex_array, active_unit, framebuffer;
@@ -21,9 +27,9 @@ typedef struct nb_state {
     GLfloat viewport[4];
     uint32_t switches, clip_distances, scissors; /* bits: which were on */
     int feedback;                                /* transform feedback was under way */
-    GLboolean blend[NB_STATE_BUFFERS], mask[NB_STATE_BUFFERS][4];
+    GLboolean mask[NB_STATE_BUFFERS][4];
+    nb_blending blending;
     GLint polygon_mode[2], sample_mask;
-    GLint blending[NB_STATE_BUFFERS][NB_STATE_BLENDING]; /* the first alone where buffers cannot differ */
 } nb_state;
 
 /* For uploads. */
@@ -39,8 +45,12 @@ void nb_state_restore(const nb_context *context, const nb_state *state);
 /* Everything that would keep fragments away or change them is switched off; fragments cover the rectangle alone. */
 void nb_state_clear(const nb_context *context, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
 
-/* Blending of draw buffer 0: source + target * factor, alpha of the target as it is. */
-void nb_state_blend(const nb_context *context, GLenum factor);
+/* Of nb_state alone. */
+void nb_blending_save(const nb_context *context, nb_blending *blending);
+void nb_blending_restore(const nb_context *context, const nb_blending *blending);
+
+/* Blending of draw buffer 0: source * factor + target * factor, alpha of the target as it is. */
+void nb_state_blend(const nb_context *context, GLenum source_factor, GLenum target_factor);
 
 /* Blending of draw buffers 0 and 1: source + target * source's alpha. */
 void nb_state_layer(const nb_context *context);
