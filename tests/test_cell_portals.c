@@ -69,6 +69,26 @@ static void test_fog_is_seen_through_portals_alone(void **state)
     }
 }
 
+/* Of two portals that share an edge one is open to a ray through that edge. */
+static void test_no_wall_between_portals_that_touch(void **state)
+{
+    (void)state;
+    static const double halves[2][3][3] = {{{4, -1.3, -1.1}, {4, 1.7, .9}, {4, -1.3, .9}},
+                                           {{4, -1.3, -1.1}, {4, 1.7, -1.1}, {4, 1.7, .9}}};
+    const nebel_portal portals[] = {{{0, 1}, halves[0], 3}, {{0, 1}, halves[1], 3}};
+    nebel_cells *cells =
+        create(&(nebel_cells_desc){.cells = rooms, .cell_count = 3, .portals = portals, .portal_count = 2});
+    uint64_t d = 23;
+    for (int i = 0; i < 1000; i++) {
+        const double t = dice(&d, 0, 1), eye[3] = {dice(&d, 0, 4), dice(&d, -2, 2), dice(&d, -2, 2)};
+        const double on_edge[3] = {4, -1.3 + 3 * t, -1.1 + 2 * t};
+        double x[3];
+        for (int k = 0; k < 3; k++) x[k] = eye[k] + 1.01 * (on_edge[k] - eye[k]);
+        assert_true(ask(cells, eye, x).alpha > 0);
+    }
+    nebel_destroy_cells(cells);
+}
+
 /* The same walk once more, from portal to portal, as an engine does it. */
 static int lies_in_polygon(const nebel_portal *portal, const double x[3])
 {
@@ -204,6 +224,46 @@ static void test_a_derived_portal_is_what_two_faces_share(void **state)
     nebel_destroy_cells(cells);
 }
 
+/* A prism of half the face's square: the cut goes through two of its corners. */
+static void test_a_cut_through_corners_leaves_each_once(void **state)
+{
+    (void)state;
+    static const nebel_plane prism[] = {
+        {{-1, 0, 0}, -4}, {{1, 0, 0}, 7}, {{0, -1, 0}, 2}, {{0, 0, -1}, 2}, {{0, 1, 1}, 0}};
+    const nebel_cell pair[] = {BOX(0, 4, .1),
+                               {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = prism, .plane_count = 5}}};
+    for (int turned = 0; turned < 2; turned++) {
+        const nebel_cell cells_turned[] = {pair[turned], pair[!turned]};
+        nebel_cells *cells = create(&(nebel_cells_desc){.cells = cells_turned, .cell_count = 2});
+        assert_int_equal(nebel_count_cell_portals(cells), 1);
+        assert_int_equal(nebel_get_cell_portal(cells, 0).vertex_count, 3);
+        nebel_destroy_cells(cells);
+    }
+}
+
+/* Four boxes around an edge: those across it share no face. A strip narrower than nothing is none either. */
+static void test_edges_are_no_portals(void **state)
+{
+    (void)state;
+    nebel_cell boxes[4];
+    for (int i = 0; i < 4; i++)
+        boxes[i] = (nebel_cell){.shape = {.type = NEBEL_SHAPE_BOX,
+                                          .min = {i % 2 ? 0 : -3, i / 2 ? 0 : -3, 0},
+                                          .max = {i % 2 ? 3 : 0, i / 2 ? 3 : 0, 9}}};
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = boxes, .cell_count = 4});
+    assert_int_equal(nebel_count_cell_portals(cells), 4);
+    nebel_destroy_cells(cells);
+    static const double strips[] = {5e-6, 1e-3};
+    for (size_t i = 0; i < 2; i++) {
+        const nebel_cell pair[] = {
+            {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, 0, 0}, .max = {0, 3, 9}}},
+            {.shape = {.type = NEBEL_SHAPE_BOX, .min = {0, 3 - strips[i], 0}, .max = {3, 6, 9}}}};
+        cells = create(&(nebel_cells_desc){.cells = pair, .cell_count = 2});
+        assert_int_equal(nebel_count_cell_portals(cells), i);
+        nebel_destroy_cells(cells);
+    }
+}
+
 /* What is derived and given back as given is as good as open. */
 static void test_derived_portals_leave_no_wall(void **state)
 {
@@ -237,7 +297,14 @@ static void test_a_hair_between_cells_is_nothing(void **state)
     static const double hairs[] = {1e-6, -1e-6};
     for (int i = 0; i < 2; i++) {
         const nebel_cell pair[] = {BOX(0, 4, .1), BOX(4 + hairs[i], 9, .1)};
-        nebel_cells *cells = create(&(nebel_cells_desc){.cells = pair, .cell_count = 2});
+        nebel_cell turned[] = {pair[0], pair[1]};
+        turned[0].shape.transform.rotation[1] = turned[0].shape.transform.rotation[3] = 1;
+        turned[0].shape.transform.rotation[0] = .3;
+        turned[1].shape.transform = turned[0].shape.transform;
+        nebel_cells *cells = create(&(nebel_cells_desc){.cells = turned, .cell_count = 2});
+        assert_int_equal(nebel_count_cell_portals(cells), 1);
+        nebel_destroy_cells(cells);
+        cells = create(&(nebel_cells_desc){.cells = pair, .cell_count = 2});
         assert_int_equal(nebel_count_cell_portals(cells), 1);
         assert_near(ask(cells, (const double[3]){1, 0, 0}, (const double[3]){7, 0, 0}).alpha, .6, 1e-6);
         nebel_destroy_cells(cells);
@@ -391,8 +458,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fog_is_seen_through_portals_alone),
+        cmocka_unit_test(test_no_wall_between_portals_that_touch),
         cmocka_unit_test(test_random_worlds_of_portals),
         cmocka_unit_test(test_a_derived_portal_is_what_two_faces_share),
+        cmocka_unit_test(test_a_cut_through_corners_leaves_each_once),
+        cmocka_unit_test(test_edges_are_no_portals),
         cmocka_unit_test(test_derived_portals_leave_no_wall),
         cmocka_unit_test(test_a_hair_between_cells_is_nothing),
         cmocka_unit_test(test_cells_that_are_none),

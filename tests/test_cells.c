@@ -140,6 +140,28 @@ static void test_an_edge_on_portal_is_met_on_the_ray(void **state)
     }
 }
 
+/* Z = -5 of the portal at x = -13 is behind the eye, and counts as the eye. A plane that leans the other way is left
+ * before a vertex at x = 13, Z 10, where it has Z = 22, and counts as the vertex. */
+static void test_printed_depths_stay_between_eye_and_surface(void **state)
+{
+    (void)state;
+    static const nebel_plane sides[] = {{{2, 0, 1}, 4},   {{0, 0, 1}, 1}, {{0, 0, -1}, 60},
+                                        {{-1, 0, 0}, 40}, {{0, 1, 0}, 3}, {{0, -1, 0}, 3}};
+    const nebel_cell leaving = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = sides, .plane_count = 6},
+                                .density = .01};
+    nebel_cells *in = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
+    nebel_cells *out = create(&(nebel_cells_desc){.cells = &leaving, .cell_count = 1, .span = NEBEL_SPAN_FAITHFUL});
+    nebel_cell_layer layer[4];
+    assert_int_equal(layers_at(in, &into_leaning, -13, 0, -25, layer), 1);
+    assert_near(layer[0].from, 0, 0);
+    assert_near(layer[0].to, 25, 1e-13);
+    assert_int_equal(layers_at(out, &into_leaning, 13, 0, -10, layer), 1);
+    assert_near(layer[0].from, 0, 0);
+    assert_near(layer[0].to, 10, 1e-13);
+    nebel_destroy_cells(in);
+    nebel_destroy_cells(out);
+}
+
 /* ---- hand-computed ----------------------------------------------------------------------------------------------- */
 
 static void test_one_fogged_room(void **state)
@@ -243,6 +265,16 @@ static void test_cells_that_do_not_touch_are_not_grouped(void **state)
     (void)state;
     const nebel_cell rooms[] = {BOX(0, 4, .1, 1, 1, 1), BOX(4, 5, 0, 1, 1, 1), BOX(5, 9, .1, 1, 1, 1)};
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = rooms, .cell_count = 3});
+    assert_near(alpha_at(cells, &along_x, 7, 0, 0), .3 + .2 - .3 * .2, 1e-15);
+    nebel_destroy_cells(cells);
+}
+
+/* The same with nothing at all between them. */
+static void test_a_gap_is_not_grouped_over(void **state)
+{
+    (void)state;
+    const nebel_cell rooms[] = {BOX(0, 4, .1, 1, 1, 1), BOX(5, 9, .1, 1, 1, 1)};
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = rooms, .cell_count = 2});
     assert_near(alpha_at(cells, &along_x, 7, 0, 0), .3 + .2 - .3 * .2, 1e-15);
     nebel_destroy_cells(cells);
 }
@@ -414,6 +446,16 @@ static void test_an_eye_on_a_portal(void **state)
         }
 }
 
+/* A hair before a leaning portal the eye is in it: no depth of the portal far from the ray has a say. */
+static void test_an_eye_a_hair_before_a_portal(void **state)
+{
+    (void)state;
+    const nebel_cell_view view = {{0, 0, -8 + 1e-7}, {0, 0, -1}};
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
+    assert_near(alpha_at(cells, &view, 13, 0, -25), .04 * 17, 1e-7);
+    nebel_destroy_cells(cells);
+}
+
 static void test_an_eye_outside_all_cells(void **state)
 {
     (void)state;
@@ -440,6 +482,10 @@ static void test_what_is_behind_the_eye(void **state)
         /* A vertex behind the eye: the way there is fogged, but it has no depth. */
         assert_near(alpha_at(cells, &view, 4, 0, 0), span == NEBEL_SPAN_RAY ? .5 : 0, 1e-15);
         assert_near(alpha_at(cells, &view, 15, 0, 0), 0, 0);
+        const nebel_cell_point point = {{4, 0, 0}, {{1, 0, 0}, 18}};
+        nebel_cell_fog fog;
+        assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
+        assert_near(fog.alpha, span == NEBEL_SPAN_RAY ? .5 : 0, 1e-15);
         nebel_destroy_cells(cells);
     }
 }
@@ -497,6 +543,7 @@ int main(void)
         cmocka_unit_test(test_the_printed_form_is_right_on_the_axis),
         cmocka_unit_test(test_zmax_comes_from_the_polygon),
         cmocka_unit_test(test_an_edge_on_portal_is_met_on_the_ray),
+        cmocka_unit_test(test_printed_depths_stay_between_eye_and_surface),
         cmocka_unit_test(test_one_fogged_room),
         cmocka_unit_test(test_the_eye_stands_in_fog),
         cmocka_unit_test(test_intensity_is_clamped),
@@ -504,11 +551,13 @@ int main(void)
         cmocka_unit_test(test_the_seam_and_its_cure),
         cmocka_unit_test(test_what_differs_is_not_grouped),
         cmocka_unit_test(test_cells_that_do_not_touch_are_not_grouped),
+        cmocka_unit_test(test_a_gap_is_not_grouped_over),
         cmocka_unit_test(test_grouping_is_one_merged_cell),
         cmocka_unit_test(test_exponential_fog_is_the_exact_one),
         cmocka_unit_test(test_a_ray_in_a_face),
         cmocka_unit_test(test_the_order_of_cells_means_nothing),
         cmocka_unit_test(test_an_eye_on_a_portal),
+        cmocka_unit_test(test_an_eye_a_hair_before_a_portal),
         cmocka_unit_test(test_an_eye_outside_all_cells),
         cmocka_unit_test(test_what_is_behind_the_eye),
         cmocka_unit_test(test_points_that_are_none),

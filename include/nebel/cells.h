@@ -92,7 +92,7 @@ typedef struct nebel_cells nebel_cells;
  * nothing. Cost: every pair of cells once, and every face of those that touch. On an error *cells is NULL. Errors:
  * ARGUMENT (NULL, an unknown model or span), LIMIT (too many), MEMORY, and VALUE: a cell that is neither box nor convex
  * body, that is empty (planes that face inwards), without end, or overlaps another; a density that is negative or not
- * finite; a portal of one and the same or of unknown cells, that is not flat, not convex or of no area, or does not lie
+ * finite; a portal of one and the same or of unknown cells, that is not convex or of no area, or does not lie
  * where its cells touch. */
 nebel_result nebel_create_cells(const nebel_cells_desc *desc, nebel_cells **cells);
 void nebel_destroy_cells(nebel_cells *cells); /* NULL is fine */

@@ -250,7 +250,7 @@ static double find_way_out(const nebel_cells *cells, const nb_cell *cell, const 
     return way;
 }
 
-/* Cells do not overlap: a polygon in both is in the face that they share. */
+/* Cells do not overlap: a polygon in both is in the face that they share, and flat as that is. */
 static nebel_result check_places(const nebel_cells *cells, const nebel_log *log, size_t number,
                                  const nebel_portal *portal)
 {
@@ -287,18 +287,12 @@ static int is_convex(const nebel_portal *portal, const double normal[3], double 
 static nebel_result check_form(const nebel_cells *cells, const nebel_log *log, size_t number,
                                const nebel_portal *portal, double area[3])
 {
-    double normal[3], way[3];
+    double normal[3];
     find_area(portal->vertices, portal->vertex_count, area);
     if (find_width(portal->vertices, portal->vertex_count, area) <= cells->tolerance)
         return nb_fail(log, NEBEL_ERROR_VALUE, "portal %zu: has no area", number);
     const double length = length_of(area);
     for (int i = 0; i < 3; i++) normal[i] = area[i] / length;
-    for (size_t v = 1; v < portal->vertex_count; v++) {
-        subtract(portal->vertices[v], portal->vertices[0], way);
-        if (fabs(dot(way, normal)) > 2 * cells->tolerance)
-            return nb_fail(log, NEBEL_ERROR_VALUE, "portal %zu: is not flat; vertex %zu is %g m off its plane", number,
-                           v, fabs(dot(way, normal)));
-    }
     if (is_convex(portal, normal, 2 * cells->tolerance)) return NEBEL_OK;
     return nb_fail(log, NEBEL_ERROR_VALUE,
                    "portal %zu: is not convex; give its vertices in order, and split it where it has a dent", number);
