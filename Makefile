@@ -5,7 +5,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 V ?= 0
 SOURCES = $(shell git ls-files '*.c' '*.h' '*.cpp')
 MODELS = examples/scenes/models/landscape.png examples/scenes/models/planet.obj examples/scenes/models/gates.gltf \
-	examples/scenes/models/hall.obj
+	examples/scenes/models/hall.obj examples/scenes/models/rooms.obj
 
 MAKEFLAGS += --no-print-directory
 ifeq ($(V),0)

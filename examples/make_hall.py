@@ -20,8 +20,9 @@ MATERIALS = {
 
 
 class Mesh:
-    def __init__(self):
-        self.places, self.lines, self.faces = {}, [], {name: [] for name in MATERIALS}
+    def __init__(self, materials):
+        self.materials = materials
+        self.places, self.lines, self.faces = {}, [], {name: [] for name in materials}
 
     def vertex(self, place):
         key = tuple(round(x, 4) for x in place)
@@ -44,7 +45,7 @@ def quads(length):
 
 
 def build():
-    mesh = Mesh()
+    mesh = Mesh(MATERIALS)
     x, z = LENGTH / 2, WIDTH / 2
     tile = lambda i, j, counts: "floor_light" if (i // 3 + j // 3) % 2 else "floor_dark"
     wall = lambda name: lambda i, j, counts: "cornice" if j in (counts[1] - 1, counts[1] // 3) else name
@@ -64,12 +65,10 @@ def build():
     return mesh
 
 
-def main():
-    path = sys.argv[1]
+def write(mesh, path):
     stem = os.path.splitext(path)[0]
-    mesh = build()
     with open(stem + ".mtl", "w") as out:
-        for name, color in MATERIALS.items():
+        for name, color in mesh.materials.items():
             out.write("newmtl %s\nKd %g %g %g\n" % (name, *color))
     with open(path, "w") as out:
         out.write("mtllib %s\n" % os.path.basename(stem + ".mtl"))
@@ -80,4 +79,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    write(build(), sys.argv[1])

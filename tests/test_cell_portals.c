@@ -35,14 +35,18 @@ static nebel_cells *create(const nebel_cells_desc *desc)
     return cells;
 }
 
-static nebel_cell_fog ask(const nebel_cells *cells, const double eye[3], const double x[3])
+static nebel_cell_fog ask_from(nebel_cell_view view, const nebel_cells *cells, const double eye[3], const double x[3])
 {
-    nebel_cell_view view = {.forward = {1, 0, 0}};
     nebel_cell_point point = {.position = {x[0], x[1], x[2]}};
     nebel_cell_fog fog;
     memcpy(view.eye, eye, sizeof view.eye);
     assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &fog, 0), NEBEL_OK);
     return fog;
+}
+
+static nebel_cell_fog ask(const nebel_cells *cells, const double eye[3], const double x[3])
+{
+    return ask_from((nebel_cell_view){.forward = {1, 0, 0}}, cells, eye, x);
 }
 
 /* ---- walls ------------------------------------------------------------------------------------------------------- */
@@ -61,6 +65,11 @@ static void test_fog_is_seen_through_portals_alone(void **state)
         /* Through the door's rim, and past it, where the wall hides the fog. */
         assert_near(ask(cells, eye, (const double[3]){6, 1.99, 0}).alpha, .1 * hypot(2, .995), 1e-15);
         assert_near(ask(cells, eye, (const double[3]){5, 1.8, 0}).alpha, 0, 0);
+        /* A vertex there is fogged for the rest of its polygon. */
+        const nebel_cell_view of_vertices = {.ignore_walls = 1};
+        assert_near(ask_from(of_vertices, cells, eye, (const double[3]){5, 1.8, 0}).alpha, .1 * hypot(1, .6), 1e-15);
+        assert_near(ask_from(of_vertices, cells, (const double[3]){30, 0, 0}, (const double[3]){7, 0, 0}).alpha, .2,
+                    1e-15);
         /* Back through the hatch, and past it, to a place in fog and to one behind it. */
         static const double far[3] = {11, .5, 0};
         assert_near(ask(cells, far, (const double[3]){7, .5, 0}).alpha, .2, 1e-15);

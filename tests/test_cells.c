@@ -54,7 +54,7 @@ static size_t layers_at(const nebel_cells *cells, const nebel_cell_view *view, d
 
 /* Three rooms in a row along x; the eye is in the first. */
 static const nebel_cell clear_then_fog[] = {BOX(0, 4, 0, 0, 0, 0), BOX(4, 9, .1, 1, .5, .25), BOX(9, 20, 0, 0, 0, 0)};
-static const nebel_cell_view along_x = {{1, 0, 0}, {2, 0, 0}};
+static const nebel_cell_view along_x = {.eye = {1, 0, 0}, .forward = {2, 0, 0}};
 
 /* ---- the printed formula and what is wrong with it ---------------------------------------------------------------
  */
@@ -70,7 +70,7 @@ static const nebel_cell leaning[] = {
      .density = .04,
      .color = {1, 1, 1}},
 };
-static const nebel_cell_view into_leaning = {{0, 0, 0}, {0, 0, -1}};
+static const nebel_cell_view into_leaning = {.eye = {0, 0, 0}, .forward = {0, 0, -1}};
 
 /* The vertex (13, 0, Z 25). Printed: Zmin = 8 + 13 = 21. The ray (13 t, 25 t) is in the portal where 25 t = 8 + 13 t, t
  * = 2/3, Zmin = 50/3. */
@@ -130,7 +130,7 @@ static void test_an_edge_on_portal_is_met_on_the_ray(void **state)
     (void)state;
     static const double hairs[] = {0, 1e-16, -1e-16, 1e-14, -1e-14};
     for (size_t i = 0; i < sizeof hairs / sizeof *hairs; i++) {
-        const nebel_cell_view view = {{1, 0, -1.5}, {hairs[i], 0, 1}};
+        const nebel_cell_view view = {.eye = {1, 0, -1.5}, .forward = {hairs[i], 0, 1}};
         for (int span = NEBEL_SPAN_DEPTH; span < NEBEL_SPAN_COUNT; span++) {
             nebel_cells *cells =
                 create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3, .span = (nebel_cell_span)span});
@@ -186,7 +186,7 @@ static void test_one_fogged_room(void **state)
 static void test_the_eye_stands_in_fog(void **state)
 {
     (void)state;
-    const nebel_cell_view view = {{6, 0, 0}, {1, 0, 0}};
+    const nebel_cell_view view = {.eye = {6, 0, 0}, .forward = {1, 0, 0}};
     for (int span = 0; span < NEBEL_SPAN_COUNT; span++) {
         nebel_cells *cells =
             create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3, .span = (nebel_cell_span)span});
@@ -211,7 +211,7 @@ static void test_intensity_is_clamped(void **state)
 static void test_depth_turns_with_the_camera(void **state)
 {
     (void)state;
-    const nebel_cell_view turned = {{1, 0, 0}, {.8, .6, 0}};
+    const nebel_cell_view turned = {.eye = {1, 0, 0}, .forward = {.8, .6, 0}};
     nebel_cells *depth =
         create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3, .span = NEBEL_SPAN_DEPTH});
     nebel_cells *ray = create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3});
@@ -430,7 +430,8 @@ static void test_the_order_of_cells_means_nothing(void **state)
 static void test_an_eye_on_a_portal(void **state)
 {
     (void)state;
-    const nebel_cell_view there = {{4, 0, 0}, {1, 0, 0}}, back = {{4, 0, 0}, {-1, 0, 0}};
+    const nebel_cell_view there = {.eye = {4, 0, 0}, .forward = {1, 0, 0}},
+                          back = {.eye = {4, 0, 0}, .forward = {-1, 0, 0}};
     static const double corners[4][3] = {{4, -1, -1}, {4, 1, -1}, {4, 1, 1}, {4, -1, 1}};
     const nebel_portal door = {{0, 1}, corners, 4};
     for (int walls = 0; walls < 2; walls++)
@@ -450,7 +451,7 @@ static void test_an_eye_on_a_portal(void **state)
 static void test_an_eye_a_hair_before_a_portal(void **state)
 {
     (void)state;
-    const nebel_cell_view view = {{0, 0, -8 + 1e-7}, {0, 0, -1}};
+    const nebel_cell_view view = {.eye = {0, 0, -8 + 1e-7}, .forward = {0, 0, -1}};
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = leaning, .cell_count = 2, .span = NEBEL_SPAN_FAITHFUL});
     assert_near(alpha_at(cells, &view, 13, 0, -25), .04 * 17, 1e-7);
     nebel_destroy_cells(cells);
@@ -459,7 +460,7 @@ static void test_an_eye_a_hair_before_a_portal(void **state)
 static void test_an_eye_outside_all_cells(void **state)
 {
     (void)state;
-    const nebel_cell_view view = {{20, 0, 0}, {-1, 0, 0}};
+    const nebel_cell_view view = {.eye = {20, 0, 0}, .forward = {-1, 0, 0}};
     static const nebel_portal none = {.vertex_count = 0};
     nebel_cells *open = create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 2});
     nebel_cells *closed = create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 2, .portals = &none});
@@ -474,7 +475,7 @@ static void test_an_eye_outside_all_cells(void **state)
 static void test_what_is_behind_the_eye(void **state)
 {
     (void)state;
-    const nebel_cell_view view = {{15, 0, 0}, {1, 0, 0}};
+    const nebel_cell_view view = {.eye = {15, 0, 0}, .forward = {1, 0, 0}};
     for (int span = 0; span < NEBEL_SPAN_COUNT; span++) {
         nebel_cells *cells =
             create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3, .span = (nebel_cell_span)span});
@@ -499,14 +500,14 @@ static void test_points_that_are_none(void **state)
         const nebel_cell_fog fog = ask_at(cells, &along_x, bad[i], 0, 0);
         assert_near(fog.alpha, 0, 0);
         assert_near(fog.color[0], 0, 0);
-        const nebel_cell_view view = {{0, bad[i], 0}, {1, 0, 0}};
+        const nebel_cell_view view = {.eye = {0, bad[i], 0}, .forward = {1, 0, 0}};
         const nebel_cell_point point = {.position = {7, 0, 0}};
         nebel_cell_fog out;
         assert_int_equal(nebel_fog_cells(cells, &view, 1, &point, 0, &out, 0), NEBEL_ERROR_ARGUMENT);
     }
     nebel_destroy_cells(cells);
     cells = create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3, .span = NEBEL_SPAN_DEPTH});
-    const nebel_cell_view aimless = {{1, 0, 0}, {0, 0, 0}};
+    const nebel_cell_view aimless = {.eye = {1, 0, 0}, .forward = {0, 0, 0}};
     const nebel_cell_point point = {.position = {7, 0, 0}};
     nebel_cell_fog out;
     assert_int_equal(nebel_fog_cells(cells, &aimless, 1, &point, 0, &out, 0), NEBEL_ERROR_ARGUMENT);

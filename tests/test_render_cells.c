@@ -45,6 +45,17 @@ static void render_cells(const nebel_scene_data *scene, const nebel_cells *cells
     nebel_destroy_renderer(renderer);
 }
 
+/* The eye sees the near room alone, through a hatch under it. */
+static nebel_cells *create_walled_rooms(void)
+{
+    static const double hatch[4][3] = {{-4, 2, .5}, {4, 2, .5}, {4, 2, 4}, {-4, 2, 4}};
+    static const nebel_portal portal = {{0, 2}, hatch, 4};
+    nebel_cells *cells = NULL;
+    const nebel_cells_desc desc = {.cells = rooms, .cell_count = 3, .portals = &portal, .portal_count = 1};
+    assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_OK);
+    return cells;
+}
+
 static nebel_cell_fog ask(const nebel_cells *cells, const nebel_camera *camera, const double place[3])
 {
     nebel_cell_view view;
@@ -184,6 +195,27 @@ static void test_between_vertices_alpha_is_linear_in_the_world(void **state)
     test_picture_free(&picture);
 }
 
+/* Walls hide vertices of polygons that are seen: those are fogged as if they were seen, too. */
+static void test_hidden_vertices_have_fog(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_floor();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = camera_down();
+    nebel_cells *open = create_rooms(NEBEL_SPAN_RAY), *walled = create_walled_rooms();
+    test_picture wanted = test_picture_make(40, 30), got = test_picture_make(40, 30);
+    render_cells(&scene, open, NEBEL_CELLS_PER_VERTEX, 1, &camera, &wanted);
+    render_cells(&scene, walled, NEBEL_CELLS_PER_VERTEX, 1, &camera, &got);
+    assert_memory_equal(wanted.planes.color, got.planes.color, 40 * 30 * 3 * sizeof(float));
+    render_cells(&scene, walled, NEBEL_CELLS_PER_PIXEL, 1, &camera, &got);
+    assert_near((double)transmittance(&got, 20, 2)[0], 1, 0);
+    assert_true(transmittance(&got, 20, 15)[0] < .85f);
+    nebel_destroy_cells(open);
+    nebel_destroy_cells(walled);
+    test_picture_free(&wanted);
+    test_picture_free(&got);
+}
+
 /* No polygon, no fog; nothing dims the sun. */
 static void test_what_is_not_fogged(void **state)
 {
@@ -290,6 +322,7 @@ int main(void)
         cmocka_unit_test(test_pixels_are_what_the_cells_say),
         cmocka_unit_test(test_exponential_pixels_are_exact),
         cmocka_unit_test(test_between_vertices_alpha_is_linear_in_the_world),
+        cmocka_unit_test(test_hidden_vertices_have_fog),
         cmocka_unit_test(test_what_is_not_fogged),
         cmocka_unit_test(test_other_projections),
         cmocka_unit_test(test_threads_change_nothing),

@@ -112,6 +112,8 @@ typedef struct nebel_cell_view {
     double eye[3];     /* m */
     double forward[3]; /* the view's axis, any length but 0; Z counts from the eye along it, > 0 in front. Not read with
                           NEBEL_SPAN_RAY */
+    int ignore_walls;  /* nonzero: fog as though there were no walls. For vertices: a wall may hide one whose polygon is
+                          seen beside it, and that part of it is interpolated */
 } nebel_cell_view;
 
 typedef struct nebel_cell_point {

@@ -16,6 +16,7 @@
 typedef struct walk {
     const nebel_cells *cells;
     const double *eye;
+    int has_walls;
     const nebel_cell_point *point;
     double forward[3]; /* unit length */
     double step[3], length;
@@ -119,7 +120,7 @@ static int is_at_eye(const walk *way, const piece *p)
 /* How many of the pieces are seen: those up to the first wall. */
 static size_t count_seen(const walk *way, const piece *pieces, size_t count)
 {
-    if (!way->cells->has_walls || count == 0) return count;
+    if (!way->has_walls || count == 0) return count;
     if (!is_at_eye(way, &pieces[0])) return 0;
     size_t seen = 1;
     while (seen < count && is_open(way, &pieces[seen - 1], &pieces[seen])) seen++;
@@ -216,7 +217,7 @@ static nebel_result set_view(const nebel_cells *cells, const nebel_cell_view *vi
 {
     const double *f = view->forward;
     const double length = hypot(hypot(f[0], f[1]), f[2]);
-    *way = (walk){.cells = cells, .eye = view->eye};
+    *way = (walk){.cells = cells, .eye = view->eye, .has_walls = cells->has_walls && !view->ignore_walls};
     if (!is_place(view->eye)) return NEBEL_ERROR_ARGUMENT;
     if (cells->span == NEBEL_SPAN_RAY) return NEBEL_OK;
     if (!(length > 0 && isfinite(length))) return NEBEL_ERROR_ARGUMENT;

@@ -6,9 +6,9 @@
 
 /* The camera as cells want it. Orthographic rays begin in the camera's plane, beside its position; a panorama has no
  * axis but each ray itself. */
-static nebel_cell_view view_towards(const nb_view *camera, const double place[3])
+static nebel_cell_view view_towards(const nb_view *camera, const double place[3], int ignore_walls)
 {
-    nebel_cell_view view;
+    nebel_cell_view view = {.ignore_walls = ignore_walls};
     double depth = 0;
     for (int i = 0; i < 3; i++) {
         view.eye[i] = camera->position[i];
@@ -25,7 +25,8 @@ static nebel_cell_view view_towards(const nb_view *camera, const double place[3]
 /* A place that is none, or is the eye, has no fog. */
 static nb_vertex_fog fog_at(const nb_frame *frame, const double place[3])
 {
-    const nebel_cell_view view = view_towards(&frame->view, place);
+    const int is_vertex = frame->renderer->cell_stage == NEBEL_CELLS_PER_VERTEX;
+    const nebel_cell_view view = view_towards(&frame->view, place, is_vertex);
     const nebel_cell_point point = {.position = {place[0], place[1], place[2]}};
     nebel_cell_fog fog;
     if (nebel_fog_cells(frame->renderer->cells, &view, 1, &point, 0, &fog, 0) != NEBEL_OK)
