@@ -450,10 +450,11 @@ class RenderTest(PictureCase):
         for samples in ("0", "4097", "2.5", "-1"):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
-        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, five-tap")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, five-tap, vertex, additive")
         self.assert_misused(self.render("a.png", "--method", "cells", "--device", "gl"), "--method", "--device cpu")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
-        self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
+        for method in ("five-tap", "vertex", "additive"):
+            self.assert_misused(self.render("a.png", "--method", method), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)
 
     def test_places_that_cannot_be_written_are_found_before_the_work(self):

@@ -54,6 +54,17 @@ class GlDeviceTest(PictureCase):
         for channel, most in (("transmittance.G", 1e-4), ("in_scattering.G", 2e-3)):
             self.assert_done(nebel("compare", "cpu.exr", "gl.exr", "-c", channel, "--fail-above", most, cwd=self.folder))
 
+    def test_fog_at_vertices(self):
+        self.scene = self.write_scene("mist.json", [FOG], models=[{"file": "triangle.obj"}], background=1,
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        for method in ("exact", "vertex", "additive"):
+            self.assert_done(self.draw(f"{method}.exr", "--aov", "--method", method))
+        # Fog where there is no surface, and what it hides, are what these lack.
+        for one, other, channel in (("exact", "vertex", "in_scattering.G"), ("vertex", "additive", "transmittance.G")):
+            compared = nebel("compare", f"{one}.exr", f"{other}.exr", "-c", channel, "--fail-above", 1e-3, cwd=self.folder)
+            self.assertEqual(compared.returncode, 1)
+        self.assert_done(nebel("compare", "vertex.exr", "additive.exr", "-c", "in_scattering.G", "--fail-above", 0, cwd=self.folder))
+
     def test_what_is_of_the_cpu_alone(self):
         for words in (("--threads", 2), ("--isa", "scalar"), ("--tolerance", 0.1)):
             self.assert_misused(self.draw("a.png", *words), words[0], "--device cpu")

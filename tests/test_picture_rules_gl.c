@@ -205,7 +205,7 @@ typedef struct outcome {
     float color[3 * LARGE_WIDTH * LARGE_HEIGHT], depth[LARGE_WIDTH * LARGE_HEIGHT];
 } outcome;
 
-static void draw_in_odd_state(nb_gl_language language, int odd_state, outcome *out)
+static void draw_in_odd_state(nb_gl_language language, nebel_gl_method method, int odd_state, outcome *out)
 {
     static stage s;
     static odd_snapshot before, after;
@@ -218,7 +218,8 @@ static void draw_in_odd_state(nb_gl_language language, int odd_state, outcome *o
     if (odd_state >= 0 && desktop) glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
     odd_take(&before, desktop);
     nebel_gl_renderer *const renderer = make_renderer(&s);
-    const nebel_gl_frame_desc desc = {.camera = s.camera, .width = LARGE_WIDTH, .height = LARGE_HEIGHT, .samples = 2};
+    const nebel_gl_frame_desc desc = {
+        .camera = s.camera, .width = LARGE_WIDTH, .height = LARGE_HEIGHT, .samples = 2, .method = method};
     const nebel_gl_planes planes = {.color = out->color, .depth = out->depth};
     assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
     assert_int_equal(nebel_gl_read_planes(renderer, &planes), NEBEL_OK);
@@ -234,10 +235,12 @@ static void test_state_neither_changes_nor_matters(void **state)
 {
     (void)state;
     static outcome plain, strange;
-    for (int language = 0; language < 2; language++) {
-        draw_in_odd_state(languages[language], -1, &plain);
+    for (int i = 0; i < 4; i++) {
+        const nb_gl_language language = languages[i % 2];
+        const nebel_gl_method method = i < 2 ? NEBEL_GL_METHOD_EXACT : NEBEL_GL_METHOD_VERTEX;
+        draw_in_odd_state(language, method, -1, &plain);
         for (int on = 0; on < 2; on++) {
-            draw_in_odd_state(languages[language], on, &strange);
+            draw_in_odd_state(language, method, on, &strange);
             assert_memory_equal(&plain, &strange, sizeof plain);
         }
     }

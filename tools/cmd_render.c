@@ -42,10 +42,12 @@ static const nb_option options[] = {
     [TOLERANCE] = {"tolerance", 0, "E",
                    "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
-    [METHOD] = {"method", 0, "NAME",
-                "exact (default); cells: the scene's cells and\ntheir portals alone, fogged the classic way at the\n"
-                "vertices of surfaces; cells-pixel: the same at\neach pixel; five-tap, of --device gl: particles "
-                "meet\nsurfaces by the classic comparison of five depths."},
+    [METHOD] =
+        {"method", 0, "NAME",
+         "exact (default); cells: the scene's cells and\ntheir portals alone, fogged the classic way at the\n"
+         "vertices of surfaces; cells-pixel: the same at\neach pixel; five-tap, of --device gl: particles "
+         "meet\nsurfaces by the classic comparison of five depths;\nvertex, of --device gl: fog at the vertices of\n"
+         "surfaces; additive: the same, but it only adds."},
     [DEVICE] = {"device", 0, "NAME",
                 "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
                 "--threads with gl."},
@@ -77,7 +79,7 @@ static const char examples[] = "Examples:\n"
 /* Pictures of more samples are not written. */
 enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, LAST_FRAME = 1000000 };
 
-typedef enum method { EXACT, CELLS, CELLS_PIXEL, FIVE_TAP } method;
+typedef enum method { EXACT, CELLS, CELLS_PIXEL, FIVE_TAP, VERTEX, ADDITIVE } method;
 
 typedef struct settings {
     const char *scene, *output;
@@ -158,8 +160,13 @@ static void read_output(nb_arguments *arguments, settings *wanted)
 static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
-    static const char *const methods[] = {
-        [EXACT] = "exact", [CELLS] = "cells", [CELLS_PIXEL] = "cells-pixel", [FIVE_TAP] = "five-tap", NULL};
+    static const char *const methods[] = {[EXACT] = "exact",
+                                          [CELLS] = "cells",
+                                          [CELLS_PIXEL] = "cells-pixel",
+                                          [FIVE_TAP] = "five-tap",
+                                          [VERTEX] = "vertex",
+                                          [ADDITIVE] = "additive",
+                                          NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
     wanted->method = (method)nb_options_choice(arguments, METHOD, methods, EXACT);
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
@@ -169,9 +176,12 @@ static void read_device(nb_arguments *arguments, settings *wanted)
         }
     }
     if (wanted->gl && (wanted->method == CELLS || wanted->method == CELLS_PIXEL))
-        nb_options_reject(arguments, METHOD, "is for --device cpu; with gl there are exact and five-tap");
+        nb_options_reject(arguments, METHOD,
+                          "is for --device cpu; with gl there are exact, five-tap, vertex, additive");
     if (!wanted->gl && wanted->method == FIVE_TAP)
         nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
+    if (!wanted->gl && (wanted->method == VERTEX || wanted->method == ADDITIVE))
+        nb_options_reject(arguments, METHOD, "is for --device gl");
     if (wanted->method != EXACT && arguments->values[TOLERANCE] != NULL)
         nb_options_reject(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
@@ -368,6 +378,14 @@ static nebel_result trace_frame(studio *all)
 }
 
 #if defined(NEBEL_HAVE_GL)
+static nebel_gl_method gl_method(method wanted)
+{
+    return wanted == FIVE_TAP   ? NEBEL_GL_METHOD_FIVE_TAP
+           : wanted == VERTEX   ? NEBEL_GL_METHOD_VERTEX
+           : wanted == ADDITIVE ? NEBEL_GL_METHOD_ADDITIVE
+                                : NEBEL_GL_METHOD_EXACT;
+}
+
 static nebel_result draw_frame(studio *all)
 {
     const nebel_gl_frame_desc desc = {
@@ -377,7 +395,7 @@ static nebel_result draw_frame(studio *all)
         .samples = all->wanted->samples,
         .progress = show_progress,
         .progress_user = all,
-        .method = all->wanted->method == FIVE_TAP ? NEBEL_GL_METHOD_FIVE_TAP : NEBEL_GL_METHOD_EXACT,
+        .method = gl_method(all->wanted->method),
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[COLOR],

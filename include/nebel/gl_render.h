@@ -61,11 +61,15 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapsh
 nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
                                              size_t count);
 
-/* How particles meet the surfaces that reach into them. */
+/* The exact picture, or a classic technique in place of a part of it. */
 typedef enum nebel_gl_method {
-    NEBEL_GL_METHOD_EXACT = 0, /* each counts up to the surface, in closed form */
-    NEBEL_GL_METHOD_FIVE_TAP,  /* each is a disc through its middle, across the view: all of it or nothing, by the
-                                  classic comparison of depth at five places */
+    NEBEL_GL_METHOD_EXACT = 0, /* fog of each pixel; particles count up to the surface, in closed form */
+    NEBEL_GL_METHOD_FIVE_TAP,  /* each particle is a disc through its middle, across the view: all of it or nothing, by
+                                  the  classic comparison of depth at five places */
+    NEBEL_GL_METHOD_VERTEX,    /* fog at the vertices of surfaces, by nebel_fog_vertices, interpolated over triangles:
+                                  what fog coordinates, a second pass and alpha polygons draw (nebel/gl_classic.h). It
+                                  has one transmittance, that of red. Where no surface is there is no fog */
+    NEBEL_GL_METHOD_ADDITIVE,  /* the same, but fog only adds its light, and transmittance is 1 */
     NEBEL_GL_METHOD_COUNT
 } nebel_gl_method;
 
@@ -89,15 +93,15 @@ typedef struct nebel_gl_frame_desc {
     uint32_t samples;                                       /* per pixel, 1 to 4096; 0: 4 */
     int (*progress)(size_t done, size_t total, void *user); /* after each sample; nonzero stops the frame. NULL: none */
     void *progress_user;
-    nebel_gl_method method;    /* of particles */
+    nebel_gl_method method;
     const nebel_gl_taps *taps; /* of FIVE_TAP; NULL: nebel_gl_default_taps */
 } nebel_gl_frame_desc;
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or
  * light as for nebel_render_frame; taps that are not finite or negative),
  * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (a panorama; more than one
- * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
- * lost). */
+ * sample where OpenGL ES cannot blend floats; an orthographic camera, which has no eye, with VERTEX or ADDITIVE; a
+ * shader that the driver does not take; the context is another one, or lost). */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 
 /* What the last frame is made of: RGBA32F, linear light, the lowest row first, without filters or mipmaps. */

@@ -3,6 +3,7 @@
  */
 #include "gl.h"
 #include "renderer.h"
+#include "vertex_fog.h"
 
 #include <math.h>
 
@@ -79,6 +80,18 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
                    "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
 }
 
+static int is_by_vertex(const frame *f)
+{
+    return f->desc->method == NEBEL_GL_METHOD_VERTEX || f->desc->method == NEBEL_GL_METHOD_ADDITIVE;
+}
+
+static nebel_result check_eye(const frame *f)
+{
+    if (!is_by_vertex(f) || f->view.clip_from_eye[15] == 0) return NEBEL_OK;
+    return nb_fail(&f->renderer->log, NEBEL_ERROR_UNSUPPORTED,
+                   "frame: fog at vertices is that on the way from an eye, and an orthographic camera has none");
+}
+
 static int is_light(const double rgb[3])
 {
     return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
@@ -115,6 +128,7 @@ static nebel_result set_frame(frame *f)
     if (result == NEBEL_OK) result = check_method(r, desc);
     if (result == NEBEL_OK) result = set_lighting(r->scene, &f->light, &r->log);
     if (result == NEBEL_OK) result = nebel_gl_camera_view(&desc->camera, desc->width, desc->height, &r->log, &f->view);
+    if (result == NEBEL_OK) result = check_eye(f);
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
     return result;
@@ -210,6 +224,21 @@ static void clear_fog(void)
     glClearBufferfv(GL_COLOR, 1, clear);
 }
 
+/* The fog that vertices bring. Particles ask for the fog before them as ever. */
+static nebel_result draw_vertex_fog(const frame *f)
+{
+    const nebel_gl_renderer *const r = f->renderer;
+    const unsigned program = r->shading.vertex_fog;
+    clear_fog();
+    glUseProgram(program);
+    set_rays(f, program);
+    set_clip(f, program);
+    glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method == NEBEL_GL_METHOD_VERTEX);
+    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    draw_meshes(f, program);
+    return r->particles.count > 0 ? nebel_gl_set_fog(r->eye_fog, r->fog, &f->view) : NEBEL_OK;
+}
+
 static nebel_result draw_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -219,6 +248,7 @@ static nebel_result draw_fog(const frame *f)
         clear_fog();
         return NEBEL_OK;
     }
+    if (is_by_vertex(f)) return draw_vertex_fog(f);
     const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
                                 .depth_texture = r->targets.place,
                                 .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
@@ -472,12 +502,21 @@ static nebel_result sort_particles(const frame *f)
     return nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL);
 }
 
+static nebel_result prepare_vertices(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    if (!is_by_vertex(f) || r->fog == NULL) return NEBEL_OK;
+    const nebel_result result = nb_shading_make_vertex_fog(&r->shading, &r->context, &r->log);
+    return result == NEBEL_OK ? nb_vertex_fog_set(&r->meshes, r->fog, f->eye) : result;
+}
+
 static nebel_result draw_samples(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
     if (result == NEBEL_OK && r->particles.count > 0) result = sort_particles(f);
+    if (result == NEBEL_OK) result = prepare_vertices(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {
         result = draw_sample(f, i);
         if (result == NEBEL_OK) result = report(f, i + 1);

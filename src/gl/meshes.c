@@ -9,6 +9,8 @@ typedef struct vertex {
     float position[3], normal[3], uv[2], face[3];
 } vertex;
 
+_Static_assert(sizeof(vertex) == NB_VERTEX_SIZE && offsetof(vertex, position) == 0, "others read positions, too");
+
 /* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_textures(const nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene)
@@ -139,6 +141,7 @@ static void fill(draft *d)
     }
     for (uint32_t i = 0; i < mesh->vertex_count; i++) d->vertices[d->vertex_count++] = vertex_of(mesh, i);
     for (uint32_t t = 0; t < mesh->triangle_count; t++) add_triangle(d, mesh->indices + 3 * (size_t)t);
+    d->made->vertex_count = d->vertex_count;
     d->made->index_count = (int)d->index_count;
 }
 
@@ -258,9 +261,9 @@ static void delete_objects(const nb_meshes *meshes)
 {
     glDeleteTextures((GLsizei)meshes->texture_count, meshes->textures);
     for (size_t i = 0; i < meshes->count; i++) {
-        const GLuint buffers[] = {meshes->list[i].vertices, meshes->list[i].indices};
+        const GLuint buffers[] = {meshes->list[i].vertices, meshes->list[i].indices, meshes->list[i].fog};
         glDeleteVertexArrays(1, &meshes->list[i].vertex_array);
-        glDeleteBuffers(2, buffers);
+        glDeleteBuffers(3, buffers);
     }
 }
 

@@ -7,13 +7,18 @@
 #include <nebel/scene.h>
 
 /* Vertex attributes. */
-enum { NB_ATTRIBUTE_POSITION, NB_ATTRIBUTE_NORMAL, NB_ATTRIBUTE_UV, NB_ATTRIBUTE_FACE };
+enum { NB_ATTRIBUTE_POSITION, NB_ATTRIBUTE_NORMAL, NB_ATTRIBUTE_UV, NB_ATTRIBUTE_FACE, NB_ATTRIBUTE_FOG };
+
+/* Bytes of a vertex, whose position comes first. */
+enum { NB_VERTEX_SIZE = 11 * sizeof(float) };
 
 typedef struct nb_mesh {
     double origin[3];
     float low[3], high[3]; /* of the positions that are used */
     float base_color[3];
     unsigned vertex_array, vertices, indices, texture; /* texture 0: none */
+    unsigned fog; /* per vertex: the light that fog adds, and the amount of fog; 0: not made yet */
+    size_t vertex_count;
     int index_count;
 } nb_mesh;
 

@@ -45,25 +45,27 @@ static const char ray_text[] =
 /* Where a ray grazes its triangle the plane alone would be met anywhere: the interpolated distance, which is off by
  * rounding of far corners only, bounds it. Depth is 1 at the eye and falls to 0: floats are as fine in all distances.
  */
-static const char surface_fragment_text[] =
+static const char distance_text[] =
     "in vec3 surface_place;\n"
-    "in vec3 surface_normal;\n"
-    "in vec2 surface_uv;\n"
     "flat in vec3 surface_corner;\n"
     "flat in vec3 surface_face;\n"
-    "uniform vec3 scene_color;\n"
-    "uniform bool scene_has_texture;\n"
-    "uniform highp sampler2D scene_texture;\n"
-    "layout(location = 0) out vec4 out_place;\n"
-    "layout(location = 1) out vec4 out_normal;\n"
-    "layout(location = 2) out vec4 out_reflectance;\n"
     "float surface_distance(vec3 origin, vec3 direction)\n"
     "{\n"
     "    float met = dot(surface_face, surface_corner - origin) / dot(surface_face, direction);\n"
     "    float near = dot(surface_place - origin, direction);\n"
     "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5);\n"
     "    return met > near - slack && met < near + slack ? met : near;\n"
-    "}\n"
+    "}\n";
+
+static const char surface_fragment_text[] =
+    "in vec3 surface_normal;\n"
+    "in vec2 surface_uv;\n"
+    "uniform vec3 scene_color;\n"
+    "uniform bool scene_has_texture;\n"
+    "uniform highp sampler2D scene_texture;\n"
+    "layout(location = 0) out vec4 out_place;\n"
+    "layout(location = 1) out vec4 out_normal;\n"
+    "layout(location = 2) out vec4 out_reflectance;\n"
     "void main()\n"
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
@@ -78,6 +80,40 @@ static const char surface_fragment_text[] =
     "    out_normal = vec4(dot(normal, side) < 0.0 ? -normal : normal, 0.0);\n"
     "    out_reflectance = vec4(reflectance, 0.0);\n"
     "    gl_FragDepth = 1.0 / (1.0 + t);\n"
+    "}\n";
+
+/* ---- fog at vertices ------------------------------------------------------------------------- */
+
+static const char vertex_fog_vertex_text[] = "layout(location = 0) in vec3 mesh_position;\n"
+                                             "layout(location = 3) in vec3 mesh_face;\n"
+                                             "layout(location = 4) in vec4 mesh_fog;\n"
+                                             "uniform mat4 scene_clip;\n"
+                                             "uniform vec3 scene_offset;\n"
+                                             "out vec3 surface_place;\n"
+                                             "out vec4 surface_fog;\n"
+                                             "flat out vec3 surface_corner;\n"
+                                             "flat out vec3 surface_face;\n"
+                                             "void main()\n"
+                                             "{\n"
+                                             "    surface_place = surface_corner = mesh_position + scene_offset;\n"
+                                             "    surface_face = mesh_face;\n"
+                                             "    surface_fog = mesh_fog;\n"
+                                             "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
+                                             "}\n";
+
+/* Of the surface that is seen alone; two programs need not find the same distance to the last bit. */
+static const char vertex_fog_fragment_text[] =
+    "in vec4 surface_fog;\n"
+    "uniform highp sampler2D scene_place;\n"
+    "uniform float scene_weakening;\n" /* 1: fog hides the surface, 0: it only adds */
+    "layout(location = 0) out vec4 out_in_scattering;\n"
+    "layout(location = 1) out vec4 out_transmittance;\n"
+    "void main()\n"
+    "{\n"
+    "    float t = surface_distance(ray_origin(gl_FragCoord.xy), ray_direction(gl_FragCoord.xy));\n"
+    "    if (!(t > 0.0 && t <= 1.0001 * texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x)) discard;\n"
+    "    out_in_scattering = vec4(surface_fog.rgb, 1.0);\n"
+    "    out_transmittance = vec4(vec3(1.0 - scene_weakening * surface_fog.a), 1.0);\n"
     "}\n";
 
 /* ---- shadow maps ---------------------------------------------------------------------------------------------------
@@ -362,7 +398,7 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
-    const nb_texts surface_fragment = {{version, precision, ray_text, surface_fragment_text}, 4};
+    const nb_texts surface_fragment = {{version, precision, ray_text, distance_text, surface_fragment_text}, 5};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
     const nb_texts survey_vertex = {{version, light_vertex_text}, 2};
@@ -377,6 +413,19 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
     set_unit(shading->surface, "scene_texture", NB_UNIT_REFLECTANCE);
     glUseProgram(shading->survey);
     set_unit(shading->survey, "scene_place", NB_UNIT_PLACE);
+    return NEBEL_OK;
+}
+
+nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log)
+{
+    const char *const version = nb_program_version(context);
+    const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
+    const nb_texts fragment = {{version, precision_of(context), ray_text, distance_text, vertex_fog_fragment_text}, 5};
+    if (shading->vertex_fog != 0) return NEBEL_OK;
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
+    if (result != NEBEL_OK) return result;
+    glUseProgram(shading->vertex_fog);
+    set_unit(shading->vertex_fog, "scene_place", NB_UNIT_PLACE);
     return NEBEL_OK;
 }
 
@@ -448,5 +497,6 @@ void nb_shading_delete(const nb_shading *shading)
     glDeleteProgram(shading->surface);
     glDeleteProgram(shading->survey);
     glDeleteProgram(shading->shadow);
+    glDeleteProgram(shading->vertex_fog);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

@@ -33,6 +33,7 @@ typedef struct nb_light_program {
 
 typedef struct nb_shading {
     unsigned surface, survey, shadow;
+    unsigned vertex_fog; /* 0 until it is needed */
     nb_light_program *lights;
     size_t light_count, light_capacity;
 } nb_shading;
@@ -42,6 +43,9 @@ typedef struct nb_shading {
 nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, const nebel_log *log);
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
                                    const nebel_log *log, const nb_light_kind *kind, unsigned *program);
+
+/* Fog that vertices bring, over the surfaces that are seen. */
+nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log);
 
 /* In OpenGL. */
 void nb_shading_delete(const nb_shading *shading);

@@ -1,0 +1,330 @@
+/* Scenes in OpenGL with fog at the vertices of their surfaces: interpolated as old hardware does, and nearer to the
+ * exact picture the finer the triangles are. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "fog_help.h"
+#include "pass_help.h"
+
+#include <nebel/classic.h>
+#include <nebel/gl_render.h>
+
+enum { WIDTH = 64, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, FINEST = 96 };
+
+/* ---- a scene --------------------------------------------------------------------------------- */
+
+/* Far out, so that positions must count from the mesh's origin. */
+static const double middle[3] = {3e6, -2e5, 7e6};
+
+static nebel_camera camera_at(double x, double y, double z)
+{
+    nebel_camera camera = {.up = {0, 1, 0}, .vertical_fov = 70};
+    const double from[3] = {x, y, z}, to[3] = {0, -1, -12};
+    for (int k = 0; k < 3; k++) {
+        camera.position[k] = middle[k] + from[k];
+        camera.look_at[k] = middle[k] + to[k];
+    }
+    return camera;
+}
+
+/* A floor of `count` quads either way, beyond the lower edge of the picture; nothing above. */
+typedef struct floor_mesh {
+    float positions[(FINEST + 1) * (FINEST + 1)][3];
+    uint32_t indices[6 * FINEST * FINEST];
+    nebel_mesh mesh;
+    nebel_scene_data scene;
+} floor_mesh;
+
+static void make_floor(floor_mesh *f, uint32_t count)
+{
+    uint32_t *index = f->indices;
+    const uint32_t side = count + 1;
+    for (uint32_t i = 0; i < side * side; i++) {
+        f->positions[i][0] = 60 * ((float)(i % side) / (float)count - .5f);
+        f->positions[i][1] = -3;
+        f->positions[i][2] = 6 - 50 * (float)(i / side) / (float)count;
+    }
+    for (uint32_t i = 0; i < count * count; i++) {
+        const uint32_t corner = i / count * side + i % count, above = corner + side;
+        const uint32_t corners[6] = {corner, corner + 1, above, above, corner + 1, above + 1};
+        for (int k = 0; k < 6; k++) *index++ = corners[k];
+    }
+    f->mesh = (nebel_mesh){.origin = {middle[0], middle[1], middle[2]},
+                           .positions = f->positions[0],
+                           .indices = f->indices,
+                           .vertex_count = side * side,
+                           .triangle_count = 2 * count * count,
+                           .base_color = {.8f, .7f, .6f},
+                           .texture = -1};
+    f->scene =
+        (nebel_scene_data){.background = {.1, .2, .3}, .ambient = {1, 1, 1}, .mesh_count = 1, .meshes = &f->mesh};
+}
+
+/* Two colours of light; grey, so that red's transmittance is all. */
+static nebel_snapshot *commit_mist(void)
+{
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_WORLD},
+         .density = {.type = NEBEL_DENSITY_HEIGHT, .base = middle[1] - 3, .scale_height = 2},
+         .extinction = {.05, .05, .05},
+         .source = {.5, .6, .7}},
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {middle[0] + 2, middle[1] - 1, middle[2] - 14}, .radius = 5},
+         .density = {.type = NEBEL_DENSITY_RADIAL, .power = 3},
+         .extinction = {.2, .2, .2},
+         .source = {.9, .4, .2}},
+    };
+    return fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+}
+
+/* ---- pictures -------------------------------------------------------------------------------- */
+
+typedef struct planes {
+    float color[PIXELS][3], transmittance[PIXELS][3], in_scattering[PIXELS][3], depth[PIXELS];
+} planes;
+
+static void draw(nebel_gl_renderer *renderer, const nebel_camera *camera, nebel_gl_method method, planes *p)
+{
+    const nebel_gl_frame_desc desc = {
+        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .method = method};
+    const nebel_gl_planes wanted = {.color = p->color[0],
+                                    .transmittance = p->transmittance[0],
+                                    .in_scattering = p->in_scattering[0],
+                                    .depth = p->depth};
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+    assert_int_equal(nebel_gl_read_planes(renderer, &wanted), NEBEL_OK);
+}
+
+static nebel_gl_renderer *create(const floor_mesh *floor, nebel_snapshot *fog)
+{
+    nebel_gl_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_gl_renderer(&floor->scene, fog, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
+    return renderer;
+}
+
+static void draw_alone(const floor_mesh *floor, nebel_snapshot *fog, const nebel_camera *camera, nebel_gl_method method,
+                       planes *p)
+{
+    nebel_gl_renderer *const renderer = create(floor, fog);
+    draw(renderer, camera, method, p);
+    nebel_destroy_gl_renderer(renderer);
+}
+
+static double largest_difference(const planes *a, const planes *b)
+{
+    double largest = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        if (!isfinite(a->depth[i])) continue;
+        for (int c = 0; c < 3; c++) {
+            largest = fmax(largest, fabs((double)(a->transmittance[i][c] - b->transmittance[i][c])));
+            largest = fmax(largest, fabs((double)(a->in_scattering[i][c] - b->in_scattering[i][c])));
+        }
+    }
+    return largest;
+}
+
+/* ---- one triangle ---------------------------------------------------------------------------- */
+
+static void make_triangle(floor_mesh *f)
+{
+    static const float corners[3][3] = {{-20, -3, 4}, {25, -3, -1}, {-4, -3, -40}};
+    make_floor(f, 1);
+    memcpy(f->positions, corners, sizeof corners);
+    f->indices[0] = 0, f->indices[1] = 1, f->indices[2] = 2;
+    f->mesh.vertex_count = 3;
+    f->mesh.triangle_count = 1;
+}
+
+/* Weights of the corners at a place of the triangle, which is level. */
+static void find_weights(const floor_mesh *f, const double place[3], double weights[3])
+{
+    const float(*const p)[3] = f->positions;
+    for (int i = 0; i < 3; i++) {
+        const float *const a = p[(i + 1) % 3], *const b = p[(i + 2) % 3], *const own = p[i];
+        const double bx = (double)b[0] - (double)a[0], bz = (double)b[2] - (double)a[2];
+        const double area = bx * ((double)own[2] - (double)a[2]) - bz * ((double)own[0] - (double)a[0]);
+        weights[i] = (bx * (place[2] - (double)a[2]) - bz * (place[0] - (double)a[0])) / area;
+    }
+}
+
+/* The light that fog adds, and its amount, interpolated where the pixel's ray meets the floor. */
+static void interpolate(const floor_mesh *f, float corners[3][4], const nebel_view *view, int pixel, double wanted[4])
+{
+    const line ray = line_of(view, pixel % WIDTH + .5, HEIGHT - 1 - pixel / WIDTH + .5);
+    const long double t = ((long double)middle[1] - 3 - ray.origin[1]) / ray.direction[1];
+    double place[3], weights[3];
+    for (int k = 0; k < 3; k++) place[k] = (double)(ray.origin[k] + t * ray.direction[k] - (long double)middle[k]);
+    find_weights(f, place, weights);
+    for (int k = 0; k < 4; k++) {
+        wanted[k] = 0;
+        for (int i = 0; i < 3; i++) wanted[k] += weights[i] * (double)corners[i][k];
+    }
+}
+
+static void check_triangle(nb_gl_language language)
+{
+    static floor_mesh f;
+    static planes p;
+    float corners[3][4];
+    double largest = 0;
+    int seen = 0;
+    nb_gl context;
+    nebel_view view;
+    nebel_snapshot *const fog = commit_mist();
+    const nebel_camera camera = camera_at(1, 1.5, 5);
+    make_triangle(&f);
+    nebel_vertices points = {.positions = f.positions};
+    memcpy(points.origin, middle, sizeof points.origin);
+    memcpy(points.eye, camera.position, sizeof points.eye);
+    const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, corners, 0};
+    assert_int_equal(nebel_fog_vertices(fog, NULL, 3, &points, &output, 1), NEBEL_OK);
+    assert_int_equal(nebel_gl_camera_view(&camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
+    pass_open(&context, language);
+    draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_VERTEX, &p);
+    for (int i = 0; i < PIXELS; i++) {
+        double wanted[4] = {0};
+        if (isfinite(p.depth[i])) interpolate(&f, corners, &view, i, wanted);
+        seen += isfinite(p.depth[i]) != 0;
+        for (int c = 0; c < 3; c++) {
+            largest = fmax(largest, fabs((double)p.transmittance[i][c] - (1 - wanted[3])));
+            largest = fmax(largest, fabs((double)p.in_scattering[i][c] - wanted[c]));
+        }
+    }
+    print_message("one triangle: %d pixels, off by at most %.1e\n", seen, largest);
+    assert_true(seen > PIXELS / 4 && seen < PIXELS);
+    assert_true(largest <= 1e-5);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+}
+
+static void test_fog_is_that_of_the_corners_interpolated(void **state)
+{
+    (void)state;
+    check_triangle(NB_GL_330);
+    check_triangle(NB_GL_300ES);
+}
+
+/* ---- many ------------------------------------------------------------------------------------ */
+
+/* The error of interpolation falls with the square of the size of triangles that are small beside the fog. */
+static void test_fine_triangles_are_nearly_exact(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    static planes exact, p;
+    double last = 1;
+    nb_gl context;
+    nebel_snapshot *const fog = commit_mist();
+    const nebel_camera camera = camera_at(1, 1.5, 5);
+    pass_open(&context, NB_GL_330);
+    for (uint32_t count = 6; count <= FINEST; count *= 4) {
+        make_floor(&f, count);
+        draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_EXACT, &exact);
+        draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_VERTEX, &p);
+        const double largest = largest_difference(&exact, &p);
+        print_message("%u x %u quads: %.1f/255 from the exact fog\n", (unsigned)count, (unsigned)count, 255 * largest);
+        assert_true(largest < last / 3);
+        last = largest;
+    }
+    assert_true(last < 1. / 255);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+}
+
+static void test_additive_fog_hides_nothing(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    static planes vertex, additive;
+    nb_gl context;
+    nebel_snapshot *const fog = commit_mist();
+    const nebel_camera camera = camera_at(1, 1.5, 5);
+    make_floor(&f, 12);
+    pass_open(&context, NB_GL_330);
+    draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_VERTEX, &vertex);
+    draw_alone(&f, fog, &camera, NEBEL_GL_METHOD_ADDITIVE, &additive);
+    assert_memory_equal(vertex.in_scattering, additive.in_scattering, sizeof vertex.in_scattering);
+    for (int i = 0; i < PIXELS; i++) {
+        const int hit = isfinite(vertex.depth[i]) != 0;
+        for (int c = 0; c < 3; c++) {
+            const double surface = hit ? (double)f.mesh.base_color[c] : f.scene.background[c];
+            assert_true(additive.transmittance[i][c] == 1);
+            assert_true(fabs((double)additive.color[i][c] - surface - (double)additive.in_scattering[i][c]) < 1e-3);
+            assert_true(hit || vertex.transmittance[i][c] == 1);
+        }
+    }
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+}
+
+/* ---- the renderer ---------------------------------------------------------------------------- */
+
+/* One renderer, other eyes, other fog, other methods: each frame is that of a new one, and nothing is left behind. */
+static void test_frames_do_not_depend_on_the_last(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    static planes again, fresh;
+    nb_gl context;
+    nebel_snapshot *const mist = commit_mist(), *const nothing =
+                                                    fog_commit(&(nebel_fog_desc){.log = {NULL, NULL}}, NULL, 0);
+    const nebel_camera cameras[2] = {camera_at(1, 1.5, 5), camera_at(-3, .5, 2)};
+    make_floor(&f, 12);
+    pass_open(&context, NB_GL_330);
+    const int objects = pass_count_objects();
+    nebel_gl_renderer *const renderer = create(&f, NULL);
+    for (int turn = 0; turn < 8; turn++) {
+        nebel_snapshot *const fog = turn == 7 ? NULL : turn == 3 ? nothing : mist;
+        const nebel_gl_method method = turn % 3 == 2 ? NEBEL_GL_METHOD_EXACT : NEBEL_GL_METHOD_VERTEX;
+        assert_int_equal(nebel_set_gl_renderer_fog(renderer, fog), NEBEL_OK);
+        draw(renderer, &cameras[turn % 2], method, &again);
+        draw_alone(&f, fog, &cameras[turn % 2], method, &fresh);
+        assert_memory_equal(&again, &fresh, sizeof again);
+    }
+    nebel_destroy_gl_renderer(renderer);
+    assert_int_equal(pass_count_objects(), objects);
+    pass_close(&context);
+    nebel_release_snapshot(mist);
+    nebel_release_snapshot(nothing);
+}
+
+/* Parallel rays have no eye that vertices could be fogged from. */
+static void test_orthographic_cameras_are_refused(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    nb_gl context;
+    nebel_snapshot *const fog = commit_mist();
+    nebel_gl_frame_desc desc = {.camera = camera_at(1, 1.5, 5), .width = WIDTH, .height = HEIGHT};
+    make_floor(&f, 1);
+    desc.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    desc.camera.view_height = 20;
+    pass_open(&context, NB_GL_330);
+    nebel_gl_renderer *const renderer = create(&f, fog);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+    desc.method = NEBEL_GL_METHOD_VERTEX;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_UNSUPPORTED);
+    desc.method = NEBEL_GL_METHOD_COUNT;
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_fog_is_that_of_the_corners_interpolated),
+        cmocka_unit_test(test_fine_triangles_are_nearly_exact),
+        cmocka_unit_test(test_additive_fog_hides_nothing),
+        cmocka_unit_test(test_frames_do_not_depend_on_the_last),
+        cmocka_unit_test(test_orthographic_cameras_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
