@@ -75,7 +75,10 @@ void nebel_destroy_gl(nebel_gl *gl);
  * and eye are those of the last call, to the last bit, and nothing at all is done where the view is, too. Errors:
  * ARGUMENT (also a view that nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
  * volumes than the largest texture holds), UNSUPPORTED (the context is another one, or lost). On an error there is no
- * fog. */
+ * fog.
+ *
+ * Mesa's llvmpipe ends loops early: where a tile lists so many volumes of different light that this may matter, the log
+ * is told once, with NEBEL_OK; see docs/shaders.md. */
 nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view);
 
 typedef enum nebel_gl_output {
@@ -116,6 +119,7 @@ typedef struct nebel_gl_fog {
     unsigned tiles;        /* for nebel_tile_texture; 0: without tiles, use nebel_trace */
     uint32_t tile_size;    /* pixels */
     uint32_t tile_columns; /* tile of a pixel: x / tile_size + y / tile_size * tile_columns */
+    uint32_t tile_most;    /* volumes that the fullest tile lists */
     uint32_t features;     /* NEBEL_FEATURES: a shader compiled with these, or more, will do */
     size_t word_count;
     double eye[3]; /* what positions are relative to [m] */

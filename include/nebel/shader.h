@@ -81,8 +81,9 @@
  * RGBA32F; a host that defines NEBEL_WORD itself gets neither. The Vulkan and HLSL texts declare nothing: define
  * NEBEL_WORD before them. NEBEL_INDEX(i), an int, is only needed by the _list functions, which are there when it is
  * defined; NEBEL_TILES makes GLSL define it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of
- * NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be defined as what nebel_pack_features says. The GLSL ES text
- * makes highp the default precision.
+ * NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be defined as what nebel_pack_features says, and
+ * NEBEL_MOST_TURNS as how many turns of loops a ray may take, for drivers that end loops: see docs/shaders.md. The GLSL
+ * ES text makes highp the default precision.
  *
  * docs/shaders.md shows a complete shader, the same for Vulkan and HLSL, and says how exact and how fast all this is.
  *
@@ -130,6 +131,9 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
  * answers; masks of several snapshots may be joined with |. NULL gives everything. O(volumes and their parts). Any
  * thread. */
 uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
+
+/* The feature of fog whose volumes are of different light: rays may have to be walked, from event to event. */
+#define NEBEL_FEATURE_MIXED 512u
 
 /* ---- views ----------------------------------------------------------------------------------- */
 

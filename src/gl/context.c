@@ -1,12 +1,22 @@
 #include "context.h"
 
 #include <epoxy/gl.h>
+#include <string.h>
 
 enum { OLDEST = 33, OLDEST_ES = 30 };
 
 static int has(const char *extension)
 {
     return epoxy_has_gl_extension(extension) ? 1 : 0;
+}
+
+/* Mesa's llvmpipe ends all loops of a shader together after 65,535 turns, without a word. Neighbouring pixels run along
+ * with each other, so that each turn of an outer loop lasts as long as the longest of theirs: half of it is for that.
+ */
+static int read_most_turns(void)
+{
+    const char *const renderer = (const char *)glGetString(GL_RENDERER);
+    return renderer != NULL && strstr(renderer, "llvmpipe") != NULL ? 32000 : 0;
 }
 
 /* Extensions give OpenGL ES what OpenGL has always had by now. */
@@ -46,6 +56,7 @@ nebel_result nb_context_read(const nebel_log *log, nb_context *context)
             context->es ? "OpenGL ES" : "OpenGL", version / 10, version % 10);
     }
     read_features(context);
+    context->most_turns = read_most_turns();
     context->widest = (uint32_t)read_integer(GL_MAX_TEXTURE_SIZE);
     if (!context->es || has("GL_EXT_clip_cull_distance")) context->clip_distances = read_integer(GL_MAX_CLIP_DISTANCES);
     if (context->clip_distances > 32) context->clip_distances = 32;

@@ -12,6 +12,7 @@ typedef struct nb_context {
     int sample_mask, clip_distances, depth_bounds;
     int dual_source; /* 0: no, 1: yes, 2: through an extension of the shading language */
     uint32_t widest; /* texture */
+    int most_turns;  /* of the walk through a ray's fog in one shader; 0: any number */
 } nb_context;
 
 /* Reads what the current context is. UNSUPPORTED where there is none or it is too old. */

@@ -23,7 +23,6 @@ static const char fragment_text[] =
     "#endif\n"
     "#ifdef PASS_MULTISAMPLED\n"
     "uniform highp sampler2DMS pass_depth;\n"
-    "uniform ivec2 pass_sample_range;\n" /* the first, and the one behind the last */
     "uniform vec2 pass_sample_places[32];\n"
     "#define PASS_COLOR highp sampler2DMS\n"
     "#else\n"
@@ -99,6 +98,15 @@ const char *nb_program_version(const nb_context *context)
     return context->es ? "#version 300 es\n" : "#version 330 core\n";
 }
 
+const char *nb_program_limits(const nb_context *context, const char *shares, char *text, size_t size)
+{
+    text[0] = '\0';
+    if (context->most_turns > 0) {
+        (void)snprintf(text, size, "#define NEBEL_MOST_TURNS (%d / %s)\n", context->most_turns, shares);
+    }
+    return text;
+}
+
 /* What comes before the shader text. */
 static void write_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
 {
@@ -108,13 +116,18 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
         [NEBEL_GL_OUTPUT_BLEND] = "#define PASS_FIRST , index = 0\n#define PASS_SECOND 0, index = 1\n",
         [NEBEL_GL_OUTPUT_BLEND_GREY] = "#define PASS_FIRST\n",
     };
+    /* The first sample, and the one behind the last: which ones a fragment walks through is told before the text. */
+    const char *const samples = "#define PASS_MULTISAMPLED\nuniform ivec2 pass_sample_range;\n";
     const int extended = kind->output == NEBEL_GL_OUTPUT_BLEND && context->dual_source == 2;
+    char limits[128];
+    const char *const shares = kind->multisampled ? "(pass_sample_range.y - pass_sample_range.x)" : "1";
     (void)snprintf(text, size,
-                   "%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
+                   "%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
                    "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n",
                    nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
+                   nb_program_limits(context, shares, limits, sizeof limits),
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-                   kind->multisampled ? "#define PASS_MULTISAMPLED\n" : "", output[kind->output],
+                   kind->multisampled ? samples : "", output[kind->output],
                    kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features);
 }
 

@@ -20,6 +20,10 @@ typedef struct nb_texts {
 /* The first line of a shader. */
 const char *nb_program_version(const nb_context *context);
 
+/* What the fog's text is told of the context's limits, in `text`; "" where there are none. `shares` is what divides
+ * them in GLSL. Returns text. */
+const char *nb_program_limits(const nb_context *context, const char *shares, char *text, size_t size);
+
 /* Compiles and links. UNSUPPORTED, with the driver's words, where it refuses; *name is 0 then. */
 nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, const nb_texts *fragment, unsigned *name);
 

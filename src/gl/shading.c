@@ -431,9 +431,10 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
 
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
-    (void)snprintf(text, size, "%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
-                   nb_program_version(context), kind->has_fog ? "#define SCENE_FOG\n" : "",
-                   kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
+    char limits[128];
+    (void)snprintf(text, size, "%s%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
+                   nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
+                   kind->has_fog ? "#define SCENE_FOG\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }

@@ -63,6 +63,33 @@ static nebel_result list_tiles(nebel_gl *gl, const nebel_snapshot *snapshot, siz
     }
 }
 
+static uint32_t fullest_tile(const nebel_gl *gl)
+{
+    const size_t columns = (gl->view.width + TILE_SIZE - 1) / TILE_SIZE;
+    const size_t rows = (gl->view.height + TILE_SIZE - 1) / TILE_SIZE;
+    uint32_t most = 0;
+    for (size_t i = 0; i < columns * rows; i++) {
+        if (gl->entries[2 * i + 1] > most) most = gl->entries[2 * i + 1];
+    }
+    return most;
+}
+
+/* So many overlapping volumes, of a density that varies, are walked in full. */
+enum { SURELY_WALKED = 40 };
+
+static void warn_of_turns(nebel_gl *gl)
+{
+    const int walks = (gl->fog.features & NEBEL_FEATURE_MIXED) != 0 && gl->fog.tile_most > SURELY_WALKED;
+    if (gl->context.most_turns == 0 || gl->has_warned || !walks) return;
+    gl->has_warned = 1;
+    (void)nb_fail(
+        &gl->log, NEBEL_OK,
+        "nebel_gl_set_fog: a tile of the picture lists %u volumes of different light. This driver (%s) ends "
+        "long loops: where more than %d of them overlap on a ray, what lies behind may count as evenly mixed. "
+        "A graphics processor or the CPU renderer has no such bound",
+        (unsigned)gl->fog.tile_most, (const char *)glGetString(GL_RENDERER), (int)SURELY_WALKED);
+}
+
 /* ---- textures -------------------------------------------------------------------------------- */
 
 typedef struct texel_kind {
@@ -146,6 +173,7 @@ static nebel_result upload_tiles(nebel_gl *gl, size_t count)
     gl->fog.tiles = gl->tiles;
     gl->fog.tile_size = TILE_SIZE;
     gl->fog.tile_columns = (gl->view.width + TILE_SIZE - 1) / TILE_SIZE;
+    gl->fog.tile_most = fullest_tile(gl);
     return result;
 }
 
@@ -192,6 +220,7 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_
     }
     if (result == NEBEL_OK) result = upload(gl, !has_words, entry_count);
     keep(gl, result == NEBEL_OK ? snapshot : NULL);
+    if (result == NEBEL_OK) warn_of_turns(gl);
     return result;
 }
 

@@ -106,11 +106,20 @@ int nb_farthest_slot(int used)
     return farthest;
 }
 
+/* Some drivers end loops after so many turns, all loops of a shader together, without a word. Where the host says how many, the walk
+ * counts its own and stops before; neighbours of a pixel run along with it, which the host's number has to allow for. */
+#ifdef NEBEL_MOST_TURNS
+bool nb_is_tired(int turns) { return turns >= NEBEL_MOST_TURNS; }
+#else
+bool nb_is_tired(int turns) { return false; }
+#endif
+
 /* What the slots hold: `used` of them, of the media before `rest` in the list, right until `end`. */
 struct nb_window {
     int used;
     int rest;
     float end;
+    int turns; /* it took */
 };
 
 /* Stretches behind t. The nearest of all media; or in a crowd, where more begin at t than there are slots, those of the media
@@ -122,9 +131,10 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
     window.used = 0;
     window.rest = count;
     window.end = ray.t_max;
+    window.turns = 0;
     int farthest = 0;
     for (int i = begin; i < count; i++) {
-        if (window.end <= t) break;
+        if (window.end <= t || nb_is_tired(window.turns)) break;
         if (crowd && window.used == NEBEL_SLOTS) {
             window.rest = i;
             break;
@@ -132,6 +142,7 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
         int at = nb_medium_at(first + i, listed);
         int leaves = int(NEBEL_WORD(at + 2).w);
         nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+        window.turns += NB_HAS(NB_HAS_GROUP) && leaves > 1 ? (2 * leaves + 1) * (2 * leaves + 1) : 1; /* events, leaves, folds */
         if (!(s.enter < s.leave)) continue;
         if (NB_HAS(NB_HAS_GROUP) && leaves > 1) window.end = min(window.end, s.leave);
         if (window.used < NEBEL_SLOTS) {
@@ -145,6 +156,7 @@ nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin
         if (s.enter < dropped) {
             nb_set_slot(farthest, at, s);
             farthest = nb_farthest_slot(window.used);
+            window.turns += NEBEL_SLOTS;
         }
     }
     return window;
@@ -340,6 +352,7 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
 /* What has been gathered up to a place on the ray. */
 struct nb_gathered {
     nb_vec3 depth;
+    nb_vec3 light; /* if nothing attenuated it */
     nb_vec3 radiance;
 };
 
@@ -403,6 +416,7 @@ float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, float to
     float rest = piece.end - piece.start - leg.from;
     if (fits) {
         if (lit) g.radiance += even ? nb_light_even(leg.light, depth, g.depth) : nb_light_mixed(leg, g.depth);
+        g.light += leg.light;
         g.depth += depth;
         rest -= leg.h;
     }
@@ -422,12 +436,22 @@ void nb_pass_piece(inout nb_gathered g, nb_piece piece, bool lit)
     float length = piece.end - piece.start;
     nb_vec3 depth = piece.extinction * length;
     if (lit) g.radiance += nb_light_even(piece.light * length, depth, g.depth);
+    g.light += piece.light * length;
     g.depth += depth;
+}
+
+/* The rest of a ray that is too much to walk, where no medium covers another: what is left of all, as if it were mixed evenly. */
+nb_gathered nb_pass_rest(nb_gathered g, nb_media_sum all)
+{
+    nb_vec3 depth = max(all.depth - g.depth, nb_splat3(0.0));
+    g.radiance += nb_light_even(max(all.light - g.light, nb_splat3(0.0)), depth, g.depth);
+    g.depth += depth;
+    return g;
 }
 
 /* Each turn of the outer loop looks once at all media on the ray: to find the end of the next piece, or to sum a leg within one of
  * varying density. So the shapes and profiles stand in the program once, not once for each purpose. */
-nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
+nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit, nb_media_sum all)
 {
     float tolerance = NEBEL_WORD(0).y;
     float t = 0.0;
@@ -435,19 +459,27 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
     bool stepping = false;
     nb_gathered g;
     g.depth = nb_splat3(0.0);
+    g.light = nb_splat3(0.0);
     g.radiance = nb_splat3(0.0);
+    int turns = count; /* of the sums */
     nb_piece piece = nb_open_piece(0.0, 0.0);
     nb_leg leg = nb_open_leg(0.0, 0.0, false, 0);
     nb_window window;
     window.used = 0;
     window.rest = count;
     window.end = 0.0;
-    while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE) {
+    window.turns = 0;
+    while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
         bool on_leg = NB_HAS(NB_HAS_PROFILE) && stepping;
         bool stale = crowd || t >= window.end;
         if (!on_leg) piece = nb_open_piece(t, ray.t_max);
         for (int next = 0; next < count;) {
-            if (stale) window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
+            if (stale) {
+                window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
+                turns += window.turns;
+                if (nb_is_tired(turns)) break;
+            }
+            turns += 1 + window.used * (on_leg ? 1 + NB_NODES : 2);
             bool over_full = !crowd && window.end <= t;
             crowd = crowd || over_full;
             if (over_full) continue;
@@ -462,6 +494,7 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
                     nb_add_slot(leg, piece, slot, ray);
             }
         }
+        if (nb_is_tired(turns)) break;
         bool foggy = piece.present > 0;
         bool begins = NB_HAS(NB_HAS_PROFILE) && foggy && !on_leg && piece.varies;
         bool over = !begins;
@@ -478,6 +511,7 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
             crowd = false;
         }
     }
+    if (lit && nb_is_tired(turns) && !all.covers) g = nb_pass_rest(g, all);
     return g;
 }
 
@@ -512,7 +546,7 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
         light.in_scattering = sum.light * attenuation.mean;
         bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
         if (covers || (NB_HAS(NB_HAS_MIXED) && lit && sum.mixed)) {
-            nb_gathered walked = nb_walk(ray, first, count, listed, lit);
+            nb_gathered walked = nb_walk(ray, first, count, listed, lit, sum);
             light.in_scattering = walked.radiance;
             if (covers) light.transmittance = nb_exp3(-walked.depth);
         }

@@ -42,6 +42,8 @@ static void set_color(nebel_word *word, const double v[3], double last)
     word->v[3] = (float)last;
 }
 
+_Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED, "the public name of a feature");
+
 /* ---- leaves
  * ------------------------------------------------------------------------------------------------------------ */
 
