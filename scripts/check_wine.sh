@@ -1,6 +1,7 @@
 #!/bin/bash
 # check_wine.sh BUILD: the core as a Windows library. Builds it and its tests with MinGW in BUILD/windows and runs them in Wine, whose
-# prefix (700 MB) is BUILD/wine-prefix. Where MinGW or Wine are missing it says so and succeeds, unless CI=true.
+# prefix (700 MB) is BUILD/wine-prefix; compares the bits of light with those of BUILD/libnebel.a, where that is. Where MinGW or Wine are
+# missing it says so and succeeds, unless CI=true.
 set -euo pipefail
 
 build=$(cd "${1:?usage: check_wine.sh BUILD}" && pwd)
@@ -43,6 +44,13 @@ stop_wine() {
     wineserver -w
 }
 
+compare_bits() {
+    cc -std=c11 -O1 -I"$source/include" "$source/tests/cross/bits.c" "$build/libnebel.a" -lm -o "$build/bits"
+    "$build/bits" >"$build/bits.txt"
+    "$wine" "$windows/tests/bits.exe" 2>/dev/null | tr -d '\r' | diff "$build/bits.txt" -
+    echo "check_wine: the same bits as here, $(wc -l <"$build/bits.txt") times"
+}
+
 if ! build_windows >"$build/windows.log" 2>&1; then
     cat "$build/windows.log"
     exit 1
@@ -50,3 +58,4 @@ fi
 trap stop_wine EXIT
 start_wine </dev/null >"$build/wine.log" 2>&1
 xvfb-run -a -s "-screen 0 640x480x24" ctest --test-dir "$windows" --output-on-failure --no-tests=error -j 2 2>&1
+if [ -e "$build/libnebel.a" ]; then compare_bits; fi

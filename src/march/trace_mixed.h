@@ -50,7 +50,7 @@ static const double up_to_node[NODE_COUNT][NODE_COUNT] = {
 static nb_real choose_ellipse(double budget)
 {
     const double wanted = budget < 1e-15 ? 1e-15 : budget > 0.1 ? 0.1 : budget;
-    return REAL(fmin(pow(120 / wanted, 0.5 / NODE_COUNT), WIDEST_ELLIPSE));
+    return nb_min(nb_exp(nb_log(REAL(120 / wanted)) * REAL(0.5 / NODE_COUNT)), REAL(WIDEST_ELLIPSE));
 }
 
 /* 64 / (15 (1 - r^-2) r^12) */

@@ -128,9 +128,11 @@ static nebel_density resolve_density(const nebel_density *from)
     return to;
 }
 
+/* Of places whose distance is_extent: squares stay finite. hypot's last digit hangs on the C library. */
 static double distance_between(const double a[3], const double b[3])
 {
-    return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrt(x * x + y * y + z * z);
 }
 
 static nb_edge resolve_edge(const nebel_shape *shape, double distance)

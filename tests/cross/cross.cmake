@@ -16,6 +16,9 @@ foreach(source IN LISTS sources)
     set_tests_properties(${name} PROPERTIES TIMEOUT 600)
 endforeach()
 
+# For scripts/check_wine.sh.
+nebel_add_program(bits cross/bits.c nebel m)
+
 foreach(part IN ITEMS d3d9 elementary fog formula oracle)
     include(${part}.cmake)
 endforeach()
