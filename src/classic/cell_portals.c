@@ -107,7 +107,9 @@ static void cut(polygon *p, const nb_cell_plane *plane, double slack)
     p->count = count;
 }
 
-/* By all planes of the cell but one. */
+/* By all planes of the cell but one; NO_FACE: by all. */
+#define NO_FACE SIZE_MAX
+
 static void cut_all(const nebel_cells *cells, const nb_cell *cell, size_t but, double slack, polygon *p)
 {
     for (size_t i = 0; i < cell->plane_count && p->count > 0; i++)
@@ -193,6 +195,17 @@ static int join_faces(nebel_cells *cells, const size_t ends[2], size_t a, size_t
     return keep_portal(cells, ends, vertices, work->count, area);
 }
 
+/* Whether the face comes near the second cell anywhere; most do not, and need not be compared with its faces. */
+static int comes_near(const nebel_cells *cells, const nb_cell *first, size_t a, const nb_cell *second, polygon *work)
+{
+    double area[3];
+    set_square(work, &cells->planes[first->first_plane + a], first);
+    cut_all(cells, second, NO_FACE, cells->tolerance, work);
+    cut_all(cells, first, a, KEPT * cells->tolerance, work);
+    find_area((const double(*)[3])work->vertices, work->count, area);
+    return find_width((const double(*)[3])work->vertices, work->count, area) > cells->tolerance;
+}
+
 static int are_near(const nebel_cells *cells, const nb_cell *a, const nb_cell *b)
 {
     for (int i = 0; i < 3; i++)
@@ -204,9 +217,11 @@ static int join_cells(nebel_cells *cells, const size_t ends[2], polygon *work)
 {
     const nb_cell *first = &cells->cells[ends[0]], *second = &cells->cells[ends[1]];
     if (!are_near(cells, first, second)) return 1;
-    for (size_t a = 0; a < first->plane_count; a++)
+    for (size_t a = 0; a < first->plane_count; a++) {
+        if (!comes_near(cells, first, a, second, work)) continue;
         for (size_t b = 0; b < second->plane_count; b++)
             if (!join_faces(cells, ends, a, b, work)) return 0;
+    }
     return 1;
 }
 
