@@ -272,10 +272,9 @@ static nebel_result set_fog_anew(const nb_gl_bench *b, nebel_snapshot *fog, doub
     return nebel_gl_set_fog(b->gl, fog, &view);
 }
 
-/* Fog and floor in turn. */
-static const char *measure(nb_gl_bench *b, nb_fog_case *c)
+/* Makes the fog of a case and hands it over. */
+static const char *hand_over(nb_gl_bench *b, nb_fog_case *c)
 {
-    nb_contest contests[] = {{.run = run_floor}, {.run = run_fog, .user = b}};
     nebel_snapshot *const fog = make_fog(b, c);
     if (fog == NULL) return out_of_memory;
     const double start = nb_clock_wall();
@@ -283,7 +282,16 @@ static const char *measure(nb_gl_bench *b, nb_fog_case *c)
     for (int i = 0; i < 4 && result == NEBEL_OK; i++) result = set_fog_anew(b, fog, 1e-6 * (3 - i));
     c->upload = (nb_clock_wall() - start) / 4;
     nebel_release_snapshot(fog);
-    if (result != NEBEL_OK || nb_measure(contests, 2, b->repetitions) != 0) return failed;
+    return result == NEBEL_OK ? NULL : failed;
+}
+
+/* Fog and floor in turn. */
+static const char *measure(nb_gl_bench *b, nb_fog_case *c)
+{
+    nb_contest contests[] = {{.run = run_floor}, {.run = run_fog, .user = b}};
+    const char *const fault = hand_over(b, c);
+    if (fault != NULL) return fault;
+    if (nb_measure(contests, 2, b->repetitions) != 0) return failed;
     b->floor = contests[0].seconds;
     c->seconds = contests[1].seconds;
     return NULL;
@@ -328,27 +336,66 @@ static void add_slope(const nb_gl_bench *b, const nb_fog_case *few, const nb_fog
     add(b, figure);
 }
 
-/* The same coverage by ever more and smaller balls: what grows is the number alone. */
-static const char *measure_growth(nb_gl_bench *b)
+/* Radius at which so many balls cover a pixel on average; coverage grows nearly as its square. */
+static int fit_coverage(const nb_gl_bench *b, nb_fog_case *c, double wanted)
 {
-    nb_fog_case cases[] = {
-        {.count = 10, .radius = 12}, {.count = 1000, .radius = 1.2}, {.count = 10000, .radius = .3794733}};
-    for (int i = 0; i < 3; i++) {
-        const char *const fault = measure(b, &cases[i]);
-        if (fault != NULL) return fault;
+    c->radius = 12;
+    for (int i = 0; i < 8; i++) {
+        nebel_snapshot *const fog = make_fog(b, c);
+        if (fog == NULL) return -1;
+        nebel_release_snapshot(fog);
+        if (fabs(c->coverage / wanted - 1) < 1e-3) break;
+        c->radius *= sqrt(wanted / c->coverage);
+    }
+    return 0;
+}
+
+enum { GROWTH = 4 };
+
+static void add_growth(const nb_gl_bench *b, const nb_fog_case cases[GROWTH])
+{
+    for (int i = 0; i < GROWTH; i++) {
         nb_figure figure = {.unit = "ms", .value = 1e3 * cases[i].seconds};
         (void)snprintf(figure.name, sizeof figure.name, "%zu balls, %.2f a pixel", cases[i].count, cases[i].coverage);
         if (i > 0) {
             figure.floor_name = "10 balls";
             figure.floor = 1e3 * cases[0].seconds;
-            figure.at_most = i == 1 ? 100 : 1000;
+            figure.at_most = (double)cases[i].count / (double)cases[0].count;
         }
         add(b, figure);
         figure = (nb_figure){.unit = "ms", .value = 1e3 * cases[i].upload};
         (void)snprintf(figure.name, sizeof figure.name, "handing over %zu balls", cases[i].count);
         add(b, figure);
     }
+}
+
+/* Each case has a nebel_gl of its own, so that they can take turns. */
+static const char *run_growth(const nb_gl_bench *b, nb_gl_bench benches[GROWTH], nb_fog_case cases[GROWTH])
+{
+    nb_contest contests[GROWTH] = {{0}};
+    for (int i = 0; i < GROWTH; i++) {
+        benches[i] = *b;
+        benches[i].gl = NULL;
+        if (fit_coverage(b, &cases[i], 3.5) != 0) return out_of_memory;
+        if (nebel_create_gl(&(nebel_gl_desc){0}, &benches[i].gl) != NEBEL_OK) return failed;
+        const char *const fault = hand_over(&benches[i], &cases[i]);
+        if (fault != NULL) return fault;
+        contests[i] = (nb_contest){.run = run_fog, .user = &benches[i]};
+    }
+    if (nb_measure(contests, GROWTH, b->repetitions) != 0) return failed;
+    for (int i = 0; i < GROWTH; i++) cases[i].seconds = contests[i].seconds;
     return NULL;
+}
+
+/* The same coverage by ever more and smaller balls: what grows is the number alone. */
+static const char *measure_growth(nb_gl_bench *b)
+{
+    nb_fog_case cases[GROWTH] = {{.count = 10}, {.count = 100}, {.count = 1000}, {.count = 10000}};
+    nb_gl_bench benches[GROWTH] = {{0}};
+    const char *const fault = run_growth(b, benches, cases);
+    for (int i = 0; i < GROWTH; i++) nebel_destroy_gl(benches[i].gl);
+    if (fault == NULL) add_growth(b, cases);
+    return fault;
 }
 
 static const char *measure_all(nb_gl_bench *b)
