@@ -530,7 +530,7 @@ static void summarize(const settings *wanted, double seconds)
 
 static int render(const settings *wanted)
 {
-    studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet)};
+    studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     int status = set_up(&all);
     all.frame = wanted->first_frame;
     while (status == NB_DONE && all.frame <= wanted->last_frame) {

@@ -90,7 +90,10 @@ static const char *skip_ray(const char *message)
 static void hand_on(nebel_result result, const char *message, void *user)
 {
     nb_report_listener *const listener = user;
-    (void)result;
+    if (result == NEBEL_OK) {
+        if (!listener->quiet && listener->mode != NB_REPORT_DROP) nb_report_message("note: %s", message);
+        return;
+    }
     if (listener->mode == NB_REPORT_KEEP && atomic_fetch_add(&listener->kept_count, 1) == 0) {
         (void)snprintf(listener->kept, sizeof listener->kept, "%s", skip_ray(message));
     }

@@ -38,6 +38,7 @@ typedef enum nb_report_mode {
 typedef struct nb_report_listener {
     size_t printed; /* so that an error never passes in silence */
     nb_report_mode mode;
+    int quiet; /* what is no error is left out */
     atomic_int kept_count;
     char kept[512];
 } nb_report_listener;

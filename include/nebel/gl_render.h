@@ -56,8 +56,8 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapsh
  * nebel_commit_scene_volumes_at. They are copied; count 0: none. Each is drawn as a ball whose transmittance and light
  * up to the surface behind it have closed forms, from the farthest centre to the nearest: particles that overlap take
  * their light from each other as if one were behind the other, and fog counts before a particle's middle. They do not
- * dim the sun. O(count log count) for each frame, and what they cover. Errors: ARGUMENT, MEMORY, UNSUPPORTED (OpenGL ES
- * without GL_EXT_float_blend). */
+ * dim the sun, which the log is told with NEBEL_OK where there are a sun and surfaces. O(count log count) for each
+ * frame, and what they cover. Errors: ARGUMENT, MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
 nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
                                              size_t count);
 

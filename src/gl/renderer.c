@@ -124,7 +124,12 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_p
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
                        "particles: OpenGL ES without GL_EXT_float_blend cannot blend light; use OpenGL");
     }
-    return nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
+    const nebel_result result = nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
+    if (result == NEBEL_OK && count > 0 && r->scene->has_sun && r->meshes.count > 0) {
+        (void)nb_fail(&r->log, NEBEL_OK,
+                      "OpenGL renderer: particles do not dim the sun on surfaces; the CPU renderer dims it exactly");
+    }
+    return result;
 }
 
 /* ---- results --------------------------------------------------------------------------------- */
