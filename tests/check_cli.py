@@ -419,6 +419,19 @@ class RenderTest(PictureCase):
             self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / f"{other}.exr").out)
         self.assertIn("cells: 2, 1 of them with fog, portals wherever they touch", nebel("info", self.scene).out)
 
+    def test_classic_fog(self):
+        self.assert_failed(self.render("a.exr", "--method", "exp2"), "scene.json", 'no section "classic"')
+        classic = {"start": 1, "end": 9, "density": 0.2, "color": [1, 0.5, 0.25]}
+        self.scene = self.write_scene("classic.json", [FOG], models=[{"file": "triangle.obj"}], classic=classic,
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        pictures = {}
+        for method in ("exact", "vertex", "additive", "linear", "exp", "exp2"):
+            self.assert_done(self.render("a.exr", "--method", method, "--aov"))
+            pictures[method] = (self.folder / "a.exr").read_bytes()
+            self.assertEqual(b"error\0" in pictures[method], method == "exact")
+        self.assertEqual(len(set(pictures.values())), len(pictures))
+        self.assert_misused(self.render("a.png", "--method", "exp", "--device", "gl"), "--method", "--device cpu")
+
     def test_quiet(self):
         done = self.render("a.png", "--quiet")
         self.assert_done(done)
@@ -450,11 +463,10 @@ class RenderTest(PictureCase):
         for samples in ("0", "4097", "2.5", "-1"):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
-        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, five-tap, vertex, additive")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap")
         self.assert_misused(self.render("a.png", "--method", "cells", "--device", "gl"), "--method", "--device cpu")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
-        for method in ("five-tap", "vertex", "additive"):
-            self.assert_misused(self.render("a.png", "--method", method), "--method", "--device gl")
+        self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)
 
     def test_places_that_cannot_be_written_are_found_before_the_work(self):

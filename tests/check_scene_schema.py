@@ -8,7 +8,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_cells", "read_density", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
+READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_cells", "read_classic", "read_density", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
 TABLE = re.compile(r"static const char \*const (?:\w+_)?(?:names|types|projections)\[\w*\] = \{(.*?)\}", re.S)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
 REFUSED = {"grid", "noise"}  # known to the reader only to be refused
@@ -27,6 +27,8 @@ BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [],
        '{"nebel": 1, "fog": [], "nebula": [{}]}',
        '{"nebel": 1, "fog": [], "cells": {"cells": []}}',
        '{"nebel": 1, "fog": [], "cells": {"cells": [{"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}}]}}',
+       '{"nebel": 1, "fog": [], "classic": {"density": 0}}',
+       '{"nebel": 1, "fog": [], "classic": {"coordinate": "user"}}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": []}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": [{"extinction": 1}]}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": [{"frame": 1, "name": "a"}]}]}',

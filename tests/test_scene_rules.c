@@ -30,7 +30,7 @@ static void test_what_no_scene_has(void **state)
         {FORMAT, SCENE("`\"ambiant\": 0"),
          "ambiant: unknown key; a scene has: nebel, up, unit, camera, background, sun, ambient, max_opacity, lights, "
          "models, fog, "
-         "nebula, cells; did "
+         "nebula, cells, classic; did "
          "you "
          "mean "
          "\"ambient\"?"},

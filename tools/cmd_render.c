@@ -44,10 +44,10 @@ static const nb_option options[] = {
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
     [METHOD] =
         {"method", 0, "NAME",
-         "exact (default); cells: the scene's cells and\ntheir portals alone, fogged the classic way at the\n"
-         "vertices of surfaces; cells-pixel: the same at\neach pixel; five-tap, of --device gl: particles "
-         "meet\nsurfaces by the classic comparison of five depths;\nvertex, of --device gl: fog at the vertices of\n"
-         "surfaces; additive: the same, but it only adds."},
+         "exact (default); on surfaces alone: vertex: the\nfog at vertices; additive: the same, but it only\nadds; "
+         "linear, exp, exp2: the factors of section\n\"classic\"; cells, cells-pixel: section \"cells\" at\nvertices "
+         "or "
+         "pixels. five-tap, of --device gl:\nparticles meet surfaces by five depths."},
     [DEVICE] = {"device", 0, "NAME",
                 "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
                 "--threads with gl."},
@@ -79,8 +79,6 @@ static const char examples[] = "Examples:\n"
 /* Pictures of more samples are not written. */
 enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, LAST_FRAME = 1000000 };
 
-typedef enum method { EXACT, CELLS, CELLS_PIXEL, FIVE_TAP, VERTEX, ADDITIVE } method;
-
 typedef struct settings {
     const char *scene, *output;
     nebel_image_format format;
@@ -88,7 +86,7 @@ typedef struct settings {
     double exposure, tolerance;
     uint32_t first_frame, last_frame;
     int many_frames, aov, quiet, gl;
-    method method;
+    nebel_method method;
     nebel_renderer_desc renderer;
 } settings;
 
@@ -157,32 +155,31 @@ static void read_output(nb_arguments *arguments, settings *wanted)
     }
 }
 
+static int is_of_gl(nebel_method method)
+{
+    return method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE ||
+           method == NEBEL_METHOD_FIVE_TAP;
+}
+
 static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
-    static const char *const methods[] = {[EXACT] = "exact",
-                                          [CELLS] = "cells",
-                                          [CELLS_PIXEL] = "cells-pixel",
-                                          [FIVE_TAP] = "five-tap",
-                                          [VERTEX] = "vertex",
-                                          [ADDITIVE] = "additive",
-                                          NULL};
     static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
-    wanted->method = (method)nb_options_choice(arguments, METHOD, methods, EXACT);
+    const char *methods[NEBEL_METHOD_COUNT + 1] = {NULL};
+    for (int i = 0; i < NEBEL_METHOD_COUNT; i++) methods[i] = nebel_method_word((nebel_method)i);
+    wanted->method = (nebel_method)nb_options_choice(arguments, METHOD, methods, NEBEL_METHOD_EXACT);
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
     for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
         if (arguments->values[of_cpu[i]] != NULL) {
             nb_options_reject(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
         }
     }
-    if (wanted->gl && (wanted->method == CELLS || wanted->method == CELLS_PIXEL))
+    if (wanted->gl && !is_of_gl(wanted->method))
         nb_options_reject(arguments, METHOD,
-                          "is for --device cpu; with gl there are exact, five-tap, vertex, additive");
-    if (!wanted->gl && wanted->method == FIVE_TAP)
+                          "is for --device cpu; with gl there are exact, vertex, additive, five-tap");
+    if (!wanted->gl && wanted->method == NEBEL_METHOD_FIVE_TAP)
         nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
-    if (!wanted->gl && (wanted->method == VERTEX || wanted->method == ADDITIVE))
-        nb_options_reject(arguments, METHOD, "is for --device gl");
-    if (wanted->method != EXACT && arguments->values[TOLERANCE] != NULL)
+    if (wanted->method != NEBEL_METHOD_EXACT && arguments->values[TOLERANCE] != NULL)
         nb_options_reject(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
 
@@ -274,7 +271,7 @@ static float *allocate_pixels(const settings *wanted, uint32_t channels)
 /* Neither OpenGL nor classic fog knows a bound of its error. */
 static int has_error(const settings *wanted)
 {
-    return !wanted->gl && wanted->method == EXACT;
+    return !wanted->gl && wanted->method == NEBEL_METHOD_EXACT;
 }
 
 static int count_planes(const settings *wanted)
@@ -378,12 +375,12 @@ static nebel_result trace_frame(studio *all)
 }
 
 #if defined(NEBEL_HAVE_GL)
-static nebel_gl_method gl_method(method wanted)
+static nebel_gl_method gl_method(nebel_method method)
 {
-    return wanted == FIVE_TAP   ? NEBEL_GL_METHOD_FIVE_TAP
-           : wanted == VERTEX   ? NEBEL_GL_METHOD_VERTEX
-           : wanted == ADDITIVE ? NEBEL_GL_METHOD_ADDITIVE
-                                : NEBEL_GL_METHOD_EXACT;
+    return method == NEBEL_METHOD_FIVE_TAP   ? NEBEL_GL_METHOD_FIVE_TAP
+           : method == NEBEL_METHOD_VERTEX   ? NEBEL_GL_METHOD_VERTEX
+           : method == NEBEL_METHOD_ADDITIVE ? NEBEL_GL_METHOD_ADDITIVE
+                                             : NEBEL_GL_METHOD_EXACT;
 }
 
 static nebel_result draw_frame(studio *all)
@@ -483,7 +480,6 @@ static int open_cells(studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
-    if (wanted->method == EXACT) return NB_DONE;
     if (scene->cells == NULL)
         return nb_report_failure("render: %s: there is no section \"cells\" for --method cells; add one, or say "
                                  "--method exact",
@@ -494,7 +490,26 @@ static int open_cells(studio *all)
     nebel_result result = nebel_create_cells(&desc, &all->cells);
     if (result == NEBEL_OK)
         result = nebel_set_renderer_cells(all->renderer, all->cells,
-                                          wanted->method == CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL);
+                                          wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX
+                                                                               : NEBEL_CELLS_PER_PIXEL);
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
+}
+
+static int takes_factor(nebel_method method)
+{
+    return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
+}
+
+static int choose_method(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    if (wanted->method == NEBEL_METHOD_CELLS || wanted->method == NEBEL_METHOD_CELLS_PIXEL) return open_cells(all);
+    if (takes_factor(wanted->method) && scene->classic == NULL)
+        return nb_report_failure("render: %s: there is no section \"classic\" for --method %s; add one, or say "
+                                 "--method exact",
+                                 wanted->scene, nebel_method_word(wanted->method));
+    const nebel_result result = nebel_set_renderer_method(all->renderer, wanted->method, scene->classic);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
@@ -504,7 +519,7 @@ static int open_renderer(studio *all)
     desc.log = nb_report_log(&all->listener);
     const nebel_result result =
         nebel_create_renderer(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->renderer);
-    return result == NEBEL_OK ? open_cells(all) : nb_report_result(&all->listener, all->wanted->scene, result);
+    return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
 static int set_up(studio *all)

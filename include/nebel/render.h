@@ -12,6 +12,7 @@
 #define NEBEL_RENDER_H
 
 #include <nebel/cells.h>
+#include <nebel/classic.h>
 #include <nebel/nebel.h>
 #include <nebel/scene.h>
 
@@ -50,6 +51,32 @@ typedef enum nebel_cell_stage {
  * an orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. The cells must
  * outlive the frames; NULL: the snapshot's fog again. Not while a frame is rendered. Errors: ARGUMENT, MEMORY. */
 nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells, nebel_cell_stage stage);
+
+/* How fog gets onto a picture: the one list, of the CPU and of OpenGL. All but EXACT fog surfaces alone; where no
+ * surface is there is no fog. */
+typedef enum nebel_method {
+    NEBEL_METHOD_EXACT = 0,   /* the snapshot's fog, at each sample */
+    NEBEL_METHOD_CELLS,       /* nebel_set_renderer_cells, at vertices */
+    NEBEL_METHOD_CELLS_PIXEL, /* the same at each sample */
+    NEBEL_METHOD_VERTEX,      /* the snapshot's fog at vertices, by nebel_fog_vertices, between them linear over the
+                                 triangle, with perspective. It has one transmittance, that of red */
+    NEBEL_METHOD_ADDITIVE,    /* the same, but fog only adds its light, and transmittance is 1 */
+    NEBEL_METHOD_LINEAR,      /* a fog factor in place of the snapshot's fog, at vertices or at each sample */
+    NEBEL_METHOD_EXP,
+    NEBEL_METHOD_EXP2,
+    NEBEL_METHOD_FIVE_TAP, /* of OpenGL: nebel/gl_render.h */
+    NEBEL_METHOD_COUNT
+} nebel_method;
+
+/* The word of `nebel render --method`; NULL: there is no such method. Any thread. */
+const char *nebel_method_word(nebel_method method);
+
+/* The method of the frames from now on: EXACT, VERTEX, ADDITIVE, LINEAR, EXP or EXP2; of those with a factor `factor`
+ * says its numbers, and its mode is that of the method; for others it is not read. With VERTEX and ADDITIVE the sun
+ * comes through the fog as with EXACT; with factors nothing dims it. Of all but EXACT the frame's `error` is 0. Of an
+ * orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. Not while a frame
+ * is rendered. Errors: ARGUMENT (another method, COORDINATE_USER), VALUE, MEMORY; the method is then as it was. */
+nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_factor_desc *factor);
 
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
 typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);

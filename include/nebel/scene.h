@@ -14,6 +14,7 @@
 #define NEBEL_SCENE_H
 
 #include <nebel/cells.h>
+#include <nebel/classic.h>
 #include <nebel/nebel.h>
 #include <nebel/nebula.h>
 
@@ -88,6 +89,8 @@ typedef struct nebel_scene_data {
 
     const nebel_cells_desc *cells; /* good for nebel_create_cells; allocator and log are not set. NULL: none */
     const char *const *cell_names; /* UTF-8; "" where the file gives none */
+
+    const nebel_factor_desc *classic; /* numbers of the fog factors; the mode is the method's to set. NULL: none */
 
     size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
     const char *const *files; /* as they are opened, once for each time they are named */

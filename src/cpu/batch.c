@@ -1,5 +1,5 @@
 /* One sample of 64 x 4 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
-#include "cell_fog.h"
+#include "classic_fog.h"
 
 #include <math.h>
 
@@ -72,8 +72,8 @@ static nebel_light_planes light_samples(const nb_frame *frame, nb_light_samples 
 static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_light_samples *samples = &scratch->samples;
-    if (frame->renderer->cells != NULL) {
-        nb_cell_fog_trace(frame, scratch);
+    if (frame->renderer->method != NEBEL_METHOD_EXACT) {
+        nb_classic_fog_trace(frame, scratch);
         return NEBEL_OK;
     }
     if (frame->renderer->fog == NULL) {
@@ -136,11 +136,18 @@ NB_CLONES static void dim(const float (*restrict transmittance)[NB_BATCH], float
     }
 }
 
+/* Methods that fog the snapshot's way to the camera leave the light of surfaces as it is. */
+static int dims_sun(const nebel_renderer *renderer)
+{
+    const nebel_method method = renderer->method;
+    return renderer->fog != NULL &&
+           (method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE);
+}
+
 static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
     set_clear_sunlight(frame->lighting.irradiance, scratch);
-    const int has_fog = frame->renderer->fog != NULL && frame->renderer->cells == NULL;
-    if (!has_fog || !frame->lighting.has_sun) return NEBEL_OK;
+    if (!dims_sun(frame->renderer) || !frame->lighting.has_sun) return NEBEL_OK;
     const nebel_result result = trace_sun_fog(frame, scratch, scratch->sun_transmittance);
     if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->sun_transmittance, scratch->samples.color);
     return result;

@@ -1,4 +1,4 @@
-#include "cell_fog.h"
+#include "classic_fog.h"
 
 #include <math.h>
 #include <omp.h>
@@ -80,7 +80,9 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     }
     frame->trace =
         (nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = renderer->fog_isa, .tolerance = desc->tolerance};
-    if (renderer->cells != NULL && renderer->cell_stage == NEBEL_CELLS_PER_VERTEX) nb_cell_fog_set_vertices(frame);
+    result = nb_classic_fog_set_vertices(frame);
+    if (result != NEBEL_OK)
+        return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
     return NEBEL_OK;
 }
 

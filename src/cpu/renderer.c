@@ -95,17 +95,82 @@ nebel_result nebel_set_renderer_fog(nebel_renderer *renderer, nebel_snapshot *fo
     return NEBEL_OK;
 }
 
+/* ---- methods --------------------------------------------------------------------------------- */
+
+const char *nebel_method_word(nebel_method method)
+{
+    static const char *const words[] = {
+        [NEBEL_METHOD_EXACT] = "exact",
+        [NEBEL_METHOD_CELLS] = "cells",
+        [NEBEL_METHOD_CELLS_PIXEL] = "cells-pixel",
+        [NEBEL_METHOD_VERTEX] = "vertex",
+        [NEBEL_METHOD_ADDITIVE] = "additive",
+        [NEBEL_METHOD_LINEAR] = "linear",
+        [NEBEL_METHOD_EXP] = "exp",
+        [NEBEL_METHOD_EXP2] = "exp2",
+        [NEBEL_METHOD_FIVE_TAP] = "five-tap",
+    };
+    _Static_assert(sizeof words / sizeof *words == NEBEL_METHOD_COUNT, "each method has its word");
+    return (unsigned)method < NEBEL_METHOD_COUNT ? words[method] : NULL;
+}
+
+static nebel_result make_room_at_vertices(nebel_renderer *renderer)
+{
+    if (renderer->vertex_fog != NULL) return NEBEL_OK;
+    renderer->vertex_fog =
+        nb_allocate(&renderer->allocator, renderer->geometry.vertex_count, sizeof *renderer->vertex_fog);
+    if (renderer->vertex_fog != NULL) return NEBEL_OK;
+    return nb_fail(&renderer->log, NEBEL_ERROR_MEMORY, "renderer: out of memory for fog at vertices");
+}
+
 nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cells *cells, nebel_cell_stage stage)
 {
     if (renderer == NULL || stage < 0 || stage >= NEBEL_CELL_STAGE_COUNT) return NEBEL_ERROR_ARGUMENT;
-    if (cells != NULL && stage == NEBEL_CELLS_PER_VERTEX && renderer->vertex_fog == NULL) {
-        renderer->vertex_fog =
-            nb_allocate(&renderer->allocator, renderer->geometry.vertex_count, sizeof *renderer->vertex_fog);
-        if (renderer->vertex_fog == NULL)
-            return nb_fail(&renderer->log, NEBEL_ERROR_MEMORY, "renderer: out of memory for fog at vertices");
+    if (cells != NULL && stage == NEBEL_CELLS_PER_VERTEX) {
+        const nebel_result result = make_room_at_vertices(renderer);
+        if (result != NEBEL_OK) return result;
     }
     renderer->cells = cells;
-    renderer->cell_stage = stage;
+    renderer->method = cells == NULL                     ? NEBEL_METHOD_EXACT
+                       : stage == NEBEL_CELLS_PER_VERTEX ? NEBEL_METHOD_CELLS
+                                                         : NEBEL_METHOD_CELLS_PIXEL;
+    return NEBEL_OK;
+}
+
+/* Surfaces have no numbers of the program's own. */
+static nebel_result resolve_factor(nebel_method method, const nebel_factor_desc *factor, nebel_factor_desc *resolved)
+{
+    if (factor == NULL || factor->coordinate == NEBEL_COORDINATE_USER) return NEBEL_ERROR_ARGUMENT;
+    nebel_factor_desc desc = *factor;
+    desc.mode = method == NEBEL_METHOD_LINEAR ? NEBEL_FACTOR_LINEAR
+                : method == NEBEL_METHOD_EXP  ? NEBEL_FACTOR_EXP
+                                              : NEBEL_FACTOR_EXP2;
+    return nebel_resolve_factor(&desc, resolved);
+}
+
+nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_factor_desc *factor)
+{
+    if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_factor_desc resolved = renderer->factor;
+    nebel_result result = NEBEL_OK;
+    switch (method) {
+    case NEBEL_METHOD_LINEAR:
+    case NEBEL_METHOD_EXP:
+    case NEBEL_METHOD_EXP2:
+        result = resolve_factor(method, factor, &resolved);
+        if (result != NEBEL_OK) return nb_fail(&renderer->log, result, "renderer: the fog factor is not valid");
+        break;
+    case NEBEL_METHOD_EXACT:
+    case NEBEL_METHOD_VERTEX:
+    case NEBEL_METHOD_ADDITIVE:
+        break;
+    default:
+        return nb_fail(&renderer->log, NEBEL_ERROR_ARGUMENT, "renderer: there is no such method here");
+    }
+    if (method != NEBEL_METHOD_EXACT) result = make_room_at_vertices(renderer);
+    if (result != NEBEL_OK) return result;
+    renderer->method = method;
+    renderer->factor = resolved;
     return NEBEL_OK;
 }
 

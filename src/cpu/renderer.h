@@ -44,10 +44,11 @@ struct nebel_renderer {
     nebel_allocator allocator;
     nebel_log log;
     const nebel_scene_data *scene;
-    nebel_snapshot *fog;      /* NULL: none */
-    const nebel_cells *cells; /* in place of the fog; NULL: none */
-    nebel_cell_stage cell_stage;
-    nb_vertex_fog *vertex_fog; /* of all surfaces, for the frame that is rendered; NULL until cells ask for it */
+    nebel_snapshot *fog; /* NULL: none */
+    nebel_method method;
+    const nebel_cells *cells;  /* of the methods CELLS and CELLS_PIXEL */
+    nebel_factor_desc factor;  /* of the methods LINEAR, EXP, EXP2; resolved */
+    nb_vertex_fog *vertex_fog; /* of all surfaces, for the frame that is rendered; NULL until a method asks for it */
     nebel_isa fog_isa;
     int threads;
     nb_geometry geometry;

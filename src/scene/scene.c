@@ -21,16 +21,18 @@ enum {
     FOG,
     NEBULA,
     CELLS,
+    CLASSIC,
     SECTION_COUNT = NB_SCENE_SECTIONS
 };
 
 /* Their numbers are in the units of the file. */
 #define PLACED_SECTIONS                                                                                                \
-    (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA) | NB_BIT(CELLS))
+    (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA) | NB_BIT(CELLS) |   \
+     NB_BIT(CLASSIC))
 
 static const char *const section_names[] = {"nebel", "up",      "unit",        "camera", "background",
                                             "sun",   "ambient", "max_opacity", "lights", "models",
-                                            "fog",   "nebula",  "cells"};
+                                            "fog",   "nebula",  "cells",       "classic"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
@@ -90,6 +92,8 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
         return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
     case CELLS:
         return nb_read_cells(in, node) && (in->save == NULL || nb_save_cells(in->save, in, node));
+    case CLASSIC:
+        return nb_read_classic(in, node);
     default:
         return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }

@@ -80,7 +80,7 @@ typedef struct nb_fog_node {
 } nb_fog_node;
 
 /* The keys that a scene may have. */
-enum { NB_SCENE_SECTIONS = 13 };
+enum { NB_SCENE_SECTIONS = 14 };
 
 /* The longest scene file. */
 #define NB_SCENE_TEXT_LIMIT ((size_t)1 << 30)
@@ -114,6 +114,7 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
 /* Points and their number, from a model file. NULL: none. */
 bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula);
 

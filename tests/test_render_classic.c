@@ -1,0 +1,314 @@
+/* Classic fog on the surfaces of the CPU renderer: fog at vertices, added fog, fog factors. */
+#include "test_render_scene.h"
+
+#include <nebel/classic.h>
+
+static const float square_positions[12] = {-5, 0, -5, -5, 0, 5, 5, 0, 5, 5, 0, -5};
+
+static void assert_near(double got, double wanted, double tolerance)
+{
+    if (!(fabs(got - wanted) <= tolerance)) fail_msg("%.9g should be %.9g", got, wanted);
+}
+
+static nebel_mesh the_square(void)
+{
+    nebel_mesh mesh = test_square();
+    mesh.positions = square_positions;
+    return mesh;
+}
+
+/* Over the square, looking straight down but aside of its middle. */
+static nebel_camera camera_down(void)
+{
+    nebel_camera camera = test_camera(1, 7, 2, 1, 0, 2);
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    camera.vertical_fov = 80;
+    return camera;
+}
+
+static const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, 0, -9}, .max = {9, 2, 9}},
+                                       .extinction = {.1, .2, .3},
+                                       .source = {1, .5, .25}};
+
+static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, nebel_method method,
+                           const nebel_factor_desc *factor, int threads, const nebel_camera *camera,
+                           test_picture *picture)
+{
+    nebel_renderer *renderer = NULL;
+    const nebel_renderer_desc desc = {.threads = threads};
+    const nebel_frame_desc frame = {
+        .camera = *camera, .width = picture->width, .height = picture->height, .samples = 1};
+    assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, method, factor), NEBEL_OK);
+    const nebel_result result = nebel_render_frame(renderer, &frame, &picture->planes);
+    nebel_destroy_renderer(renderer);
+    return result;
+}
+
+/* What a pixel's middle sees of the ground. */
+static int find_ground(const nebel_camera *camera, const test_picture *picture, uint32_t x, uint32_t y, double place[3])
+{
+    const double high = 2 * tan(camera->vertical_fov * test_pi / 360) * camera->position[1];
+    place[0] = camera->position[0] + (x + .5 - .5 * picture->width) / picture->height * high;
+    place[1] = 0;
+    place[2] = camera->position[2] + (y + .5 - .5 * picture->height) / picture->height * high;
+    return fabs(place[0]) < 4.9 && fabs(place[2]) < 4.9;
+}
+
+/* Of numbers at the square's vertices, whose diagonal goes from (-5, -5) to (5, 5). */
+static double interpolate(const double corners[4], const double place[3])
+{
+    const double right = (place[0] + 5) / 10, down = (place[2] + 5) / 10;
+    const double other = down > right ? (down - right) * corners[1] : (right - down) * corners[3];
+    return fmin(right, down) * corners[2] + (1 - fmax(right, down)) * corners[0] + other;
+}
+
+static const float *transmittance(const test_picture *picture, uint32_t x, uint32_t y)
+{
+    return picture->planes.transmittance + 3 * ((size_t)y * picture->width + x);
+}
+
+static const float *in_scattering(const test_picture *picture, uint32_t x, uint32_t y)
+{
+    return picture->planes.in_scattering + 3 * ((size_t)y * picture->width + x);
+}
+
+/* The exact fog of the way to a corner. */
+static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *camera, size_t v)
+{
+    nebel_ray ray = {.t_max = 0};
+    nebel_light light;
+    double square = 0;
+    for (size_t i = 0; i < 3; i++) {
+        ray.origin[i] = camera->position[i];
+        ray.direction[i] = (double)square_positions[3 * v + i] - camera->position[i];
+        square += ray.direction[i] * ray.direction[i];
+    }
+    ray.t_max = sqrt(square);
+    assert_int_equal(nebel_trace(fog, &(nebel_trace_desc){0}, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    return light;
+}
+
+/* ---- fog at vertices ----------------------------------------------------------------------------------------------
+ */
+
+static void test_vertices_are_exact_and_linear_between(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_square();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
+    const nebel_camera camera = camera_down();
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture picture = test_picture_make(40, 30);
+    double hidden[4], red[4], farthest = 0;
+    for (size_t v = 0; v < 4; v++) {
+        const nebel_light light = trace_corner(fog, &camera, v);
+        hidden[v] = 1 - light.transmittance[0];
+        red[v] = light.in_scattering[0];
+        farthest = fmax(farthest, hidden[v]);
+    }
+    assert_true(farthest > .1);
+    for (int parts = 1; parts < 4; parts++) {
+        assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, parts, &camera, &picture), NEBEL_OK);
+        for (uint32_t y = 0; y < 30; y++)
+            for (uint32_t x = 0; x < 40; x++) {
+                double place[3];
+                if (!find_ground(&camera, &picture, x, y, place)) continue;
+                const double through = 1 - interpolate(hidden, place), added = interpolate(red, place);
+                for (size_t c = 0; c < 3; c++) assert_near((double)transmittance(&picture, x, y)[c], through, 1e-5);
+                assert_near((double)in_scattering(&picture, x, y)[0], added, 1e-5);
+                assert_near((double)test_color(&picture, x, y)[0], .5 * through + added, 1e-5);
+            }
+    }
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+/* Every mesh and block of vertices has its own: many small triangles come near to the exact picture. */
+static void test_fine_meshes_come_near_to_exact(void **state)
+{
+    (void)state;
+    static test_ball ball;
+    test_ball_make(&ball, (const double[3]){0, 1, 0});
+    const nebel_camera camera = test_camera(0, 3, 5, 0, 0, 0);
+    nebel_snapshot *fog = test_world_fog(.1, 1);
+    test_picture exact = test_picture_make(70, 50), vertex = test_picture_make(70, 50);
+    ball.scene.mesh_count = 1; /* without the floor, of large triangles */
+    assert_int_equal(render(&ball.scene, fog, NEBEL_METHOD_EXACT, NULL, 2, &camera, &exact), NEBEL_OK);
+    assert_int_equal(render(&ball.scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &vertex), NEBEL_OK);
+    int met = 0;
+    for (size_t i = 0; i < 70 * 50; i++) {
+        if (!isfinite(exact.planes.depth[i])) continue;
+        assert_near((double)vertex.planes.color[3 * i], (double)exact.planes.color[3 * i], .001);
+        met++;
+    }
+    assert_true(met > 100);
+    nebel_release_snapshot(fog);
+    test_picture_free(&exact);
+    test_picture_free(&vertex);
+}
+
+static void test_orthographic_rays_begin_beside_the_camera(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_square();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, 0, -9}, .max = {9, 2, 9}},
+                                     .extinction = {.3, .3, .3}};
+    nebel_camera camera = camera_down();
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.view_height = 4;
+    nebel_snapshot *fog = test_fog(1, &layer);
+    test_picture picture = test_picture_make(16, 16);
+    assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 1, &camera, &picture), NEBEL_OK);
+    for (uint32_t y = 0; y < 16; y++)
+        for (uint32_t x = 0; x < 16; x++) assert_near((double)transmittance(&picture, x, y)[1], exp(-.6), 1e-6);
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+/* ---- added fog ------------------------------------------------------------------------------------------------------
+ */
+
+static void test_added_fog_hides_nothing(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_square();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, 7}};
+    const nebel_camera camera = camera_down();
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture blended = test_picture_make(40, 30), added = test_picture_make(40, 30);
+    assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &blended), NEBEL_OK);
+    assert_int_equal(render(&scene, fog, NEBEL_METHOD_ADDITIVE, NULL, 2, &camera, &added), NEBEL_OK);
+    int fogged = 0;
+    for (size_t i = 0; i < 3 * 40 * 30; i++) {
+        const int met = isfinite(added.planes.depth[i / 3]);
+        const double light = (double)added.planes.in_scattering[i];
+        assert_near(light, (double)blended.planes.in_scattering[i], 0);
+        assert_near((double)added.planes.transmittance[i], 1, 0);
+        const double before = met ? (double)mesh.base_color[i % 3] : scene.background[i % 3];
+        assert_near((double)added.planes.color[i], before + light, 1e-6);
+        fogged += met && light > .1;
+    }
+    assert_true(fogged > 50);
+    nebel_release_snapshot(fog);
+    test_picture_free(&blended);
+    test_picture_free(&added);
+}
+
+/* ---- factors --------------------------------------------------------------------------------------------------------
+ */
+
+static double factor_at(nebel_method method, const nebel_factor_desc *factor, const nebel_camera *camera,
+                        const double place[3])
+{
+    const double aside[3] = {place[0] - camera->position[0], camera->position[1], place[2] - camera->position[2]};
+    const double c = factor->coordinate == NEBEL_COORDINATE_RADIAL
+                         ? sqrt(aside[0] * aside[0] + aside[1] * aside[1] + aside[2] * aside[2])
+                         : aside[1];
+    const double x = factor->density * c;
+    if (method == NEBEL_METHOD_EXP) return exp(-x);
+    if (method == NEBEL_METHOD_EXP2) return exp(-x * x);
+    return fmin(fmax((factor->end - c) / (factor->end - factor->start), 0), 1);
+}
+
+static void test_factors(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_square();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
+    const nebel_camera camera = camera_down();
+    nebel_snapshot *fog = test_world_fog(.2, 1); /* is not drawn */
+    test_picture picture = test_picture_make(40, 30);
+    for (int method = NEBEL_METHOD_LINEAR; method <= NEBEL_METHOD_EXP2; method++)
+        for (int way = 0; way < 4; way++) {
+            const nebel_factor_desc factor = {.coordinate = (nebel_factor_coordinate)(way & 1),
+                                              .stage = (nebel_factor_stage)(way >> 1),
+                                              .start = 4,
+                                              .end = 13,
+                                              .density = .08,
+                                              .color = {.9, .6, .3}};
+            double corners[4];
+            for (size_t v = 0; v < 4; v++) {
+                const float *p = square_positions + 3 * v;
+                corners[v] = factor_at((nebel_method)method, &factor, &camera,
+                                       (const double[3]){(double)p[0], (double)p[1], (double)p[2]});
+            }
+            assert_int_equal(render(&scene, fog, (nebel_method)method, &factor, 2, &camera, &picture), NEBEL_OK);
+            for (uint32_t y = 0; y < 30; y++)
+                for (uint32_t x = 0; x < 40; x++) {
+                    double place[3];
+                    if (!find_ground(&camera, &picture, x, y, place)) continue;
+                    const double f = factor.stage == NEBEL_STAGE_VERTEX
+                                         ? interpolate(corners, place)
+                                         : factor_at((nebel_method)method, &factor, &camera, place);
+                    assert_near((double)transmittance(&picture, x, y)[1], f, 1e-5);
+                    assert_near((double)test_color(&picture, x, y)[2], .75 * f + .3 * (1 - f), 1e-5);
+                }
+        }
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+/* ---- methods --------------------------------------------------------------------------------------------------------
+ */
+
+static void test_methods_come_and_go(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = the_square();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = camera_down();
+    nebel_renderer *renderer = NULL;
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);
+    const nebel_frame_desc frame = {.camera = camera, .width = 16, .height = 16, .samples = 1};
+    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &before.planes), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_VERTEX, NULL), NEBEL_OK);
+    const nebel_factor_desc user = {.coordinate = NEBEL_COORDINATE_USER}, bad = {.density = -1};
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, &user), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, &bad), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_CELLS, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_FIVE_TAP, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_COUNT, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(NULL, NEBEL_METHOD_EXACT, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
+    assert_memory_not_equal(before.planes.color, after.planes.color, 16 * 16 * 3 * sizeof(float));
+    assert_int_equal(nebel_set_renderer_fog(renderer, NULL), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
+    assert_near((double)transmittance(&after, 8, 8)[0], 1, 0);
+    assert_int_equal(nebel_set_renderer_fog(renderer, fog), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXACT, NULL), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
+    assert_memory_equal(before.planes.color, after.planes.color, 16 * 16 * 3 * sizeof(float));
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+    test_picture_free(&before);
+    test_picture_free(&after);
+}
+
+static void test_words(void **state)
+{
+    (void)state;
+    assert_string_equal(nebel_method_word(NEBEL_METHOD_EXACT), "exact");
+    assert_string_equal(nebel_method_word(NEBEL_METHOD_ADDITIVE), "additive");
+    assert_null(nebel_method_word(NEBEL_METHOD_COUNT));
+    assert_null(nebel_method_word((nebel_method)-1));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_vertices_are_exact_and_linear_between),
+        cmocka_unit_test(test_fine_meshes_come_near_to_exact),
+        cmocka_unit_test(test_orthographic_rays_begin_beside_the_camera),
+        cmocka_unit_test(test_added_fog_hides_nothing),
+        cmocka_unit_test(test_factors),
+        cmocka_unit_test(test_methods_come_and_go),
+        cmocka_unit_test(test_words),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
