@@ -341,10 +341,13 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
     if (flat_sided) first = nb_planes_density(profile, 0.0);
     for (int j = leg.mixed ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
         float s = leg.h * nb_node(j);
-        float density = nb_density(profile, s);
-        float length = flat_sided ? 0.5 * s * (first + density) : nb_integral(profile, s);
+        float length = 0.0;
+        if (flat_sided)
+            length = 0.5 * s * (first + nb_planes_density(profile, s));
+        else
+            length = nb_integral(profile, s);
         leg.depth[j] += extinction.xyz * length;
-        leg.density[j] += light * density;
+        leg.density[j] += light * nb_density(profile, s);
         if (j == NB_NODES - 1) leg.light += light * length;
     }
 }
