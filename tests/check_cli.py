@@ -464,7 +464,7 @@ class RenderTest(PictureCase):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
         self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap")
-        self.assert_misused(self.render("a.png", "--method", "cells", "--device", "gl"), "--method", "--device cpu")
+        self.assert_misused(self.render("a.png", "--method", "cells-pixel", "--device", "gl"), "--method", "--device cpu")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)

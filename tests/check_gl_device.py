@@ -65,6 +65,18 @@ class GlDeviceTest(PictureCase):
             self.assertEqual(compared.returncode, 1)
         self.assert_done(nebel("compare", "vertex.exr", "additive.exr", "-c", "in_scattering.G", "--fail-above", 0, cwd=self.folder))
 
+    def test_fog_in_cells(self):
+        room = {"shape": {"type": "box", "min": [-9, -9, -9], "max": [9, 9, 3]}, "density": 0.2, "color": [0.1, 0.5, 0.9]}
+        self.scene = self.write_scene("cells.json", [FOG], models=[{"file": "triangle.obj"}], background=1, ambient=1,
+                                      cells={"cells": [room]}, sun={"direction": [0, 0, 1], "irradiance": 1},
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        self.assert_done(self.render("cpu.exr", "--aov", "--samples", 1, "--method", "cells"))
+        self.assert_done(self.draw("gl.exr", "--aov", "--samples", 1, "--method", "cells"))
+        self.assert_done(self.draw("exact.exr", "--aov", "--samples", 1))
+        for channel in ("G", "transmittance.G", "in_scattering.B"):
+            self.assert_done(nebel("compare", "cpu.exr", "gl.exr", "-c", channel, "--fail-above", 1e-5, cwd=self.folder))
+            self.assertEqual(nebel("compare", "exact.exr", "gl.exr", "-c", channel, "--fail-above", 1e-2, cwd=self.folder).returncode, 1)
+
     def test_what_is_of_the_cpu_alone(self):
         for words in (("--threads", 2), ("--isa", "scalar"), ("--tolerance", 0.1)):
             self.assert_misused(self.draw("a.png", *words), words[0], "--device cpu")

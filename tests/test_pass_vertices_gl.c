@@ -294,6 +294,75 @@ static void test_frames_do_not_depend_on_the_last(void **state)
     nebel_release_snapshot(nothing);
 }
 
+/* ---- cells ----------------------------------------------------------------------------------- */
+
+/* Fog on both sides of a wall with a door, far from the world's origin. */
+static const nebel_cell rooms[] = {
+    {.shape = {.type = NEBEL_SHAPE_BOX,
+               .min = {-40, -4, -10},
+               .max = {40, 9, 20},
+               .transform = {.position = {3e6, -2e5, 7e6}}},
+     .density = .02,
+     .color = {.5, .6, .7}},
+    {.shape = {.type = NEBEL_SHAPE_BOX,
+               .min = {-40, -4, -60},
+               .max = {40, 9, -10},
+               .transform = {.position = {3e6, -2e5, 7e6}}},
+     .density = .05,
+     .color = {.9, .4, .2}},
+};
+
+static nebel_cells *create_rooms(void)
+{
+    static const double door[4][3] = {{3e6 - 1, -2e5 - 4, 7e6 - 10},
+                                      {3e6 + 1, -2e5 - 4, 7e6 - 10},
+                                      {3e6 + 1, -2e5, 7e6 - 10},
+                                      {3e6 - 1, -2e5, 7e6 - 10}};
+    static const nebel_portal portal = {{0, 1}, door, 4};
+    const nebel_cells_desc desc = {
+        .cells = rooms, .cell_count = 2, .portals = &portal, .portal_count = 1, .model = NEBEL_CELL_EXPONENTIAL};
+    nebel_cells *cells = NULL;
+    assert_int_equal(nebel_create_cells(&desc, &cells), NEBEL_OK);
+    return cells;
+}
+
+/* Along the ray the exponential model is that of volumes; vertices behind the wall are fogged as if they were seen. */
+static void test_cells_are_drawn_like_volumes(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    static planes by_volumes, by_cells;
+    const nebel_volume_desc volumes[] = {nebel_cell_volume(&rooms[0]), nebel_cell_volume(&rooms[1])};
+    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+    nebel_cells *const cells = create_rooms();
+    nb_gl context;
+    nebel_gl_frame_desc desc = {.camera = camera_at(1, 1.5, 5),
+                                .width = WIDTH,
+                                .height = HEIGHT,
+                                .samples = 1,
+                                .method = NEBEL_GL_METHOD_CELLS};
+    const nebel_gl_planes wanted = {.transmittance = by_cells.transmittance[0],
+                                    .in_scattering = by_cells.in_scattering[0],
+                                    .depth = by_cells.depth};
+    make_floor(&f, 8);
+    for (int language = 0; language < 2; language++) {
+        pass_open(&context, language == 0 ? NB_GL_330 : NB_GL_300ES);
+        draw_alone(&f, fog, &desc.camera, NEBEL_GL_METHOD_VERTEX, &by_volumes);
+        nebel_gl_renderer *const renderer = create(&f, NULL);
+        desc.cells = NULL;
+        assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_ARGUMENT);
+        desc.cells = cells;
+        assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+        assert_int_equal(nebel_gl_read_planes(renderer, &wanted), NEBEL_OK);
+        assert_true(largest_difference(&by_volumes, &by_cells) < 2e-5);
+        assert_true(by_cells.transmittance[PIXELS / 2 + WIDTH / 2][0] < .9f);
+        nebel_destroy_gl_renderer(renderer);
+        pass_close(&context);
+    }
+    nebel_destroy_cells(cells);
+    nebel_release_snapshot(fog);
+}
+
 /* Parallel rays have no eye that vertices could be fogged from. */
 static void test_orthographic_cameras_are_refused(void **state)
 {
@@ -324,6 +393,7 @@ int main(void)
         cmocka_unit_test(test_fine_triangles_are_nearly_exact),
         cmocka_unit_test(test_additive_fog_hides_nothing),
         cmocka_unit_test(test_frames_do_not_depend_on_the_last),
+        cmocka_unit_test(test_cells_are_drawn_like_volumes),
         cmocka_unit_test(test_orthographic_cameras_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

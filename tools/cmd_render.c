@@ -158,7 +158,7 @@ static void read_output(nb_arguments *arguments, settings *wanted)
 static int is_of_gl(nebel_method method)
 {
     return method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE ||
-           method == NEBEL_METHOD_FIVE_TAP;
+           method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_FIVE_TAP;
 }
 
 static void read_device(nb_arguments *arguments, settings *wanted)
@@ -176,7 +176,7 @@ static void read_device(nb_arguments *arguments, settings *wanted)
     }
     if (wanted->gl && !is_of_gl(wanted->method))
         nb_options_reject(arguments, METHOD,
-                          "is for --device cpu; with gl there are exact, vertex, additive, five-tap");
+                          "is for --device cpu; with gl there are exact, vertex, additive, cells, five-tap");
     if (!wanted->gl && wanted->method == NEBEL_METHOD_FIVE_TAP)
         nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
     if (wanted->method != NEBEL_METHOD_EXACT && arguments->values[TOLERANCE] != NULL)
@@ -380,6 +380,7 @@ static nebel_gl_method gl_method(nebel_method method)
     return method == NEBEL_METHOD_FIVE_TAP   ? NEBEL_GL_METHOD_FIVE_TAP
            : method == NEBEL_METHOD_VERTEX   ? NEBEL_GL_METHOD_VERTEX
            : method == NEBEL_METHOD_ADDITIVE ? NEBEL_GL_METHOD_ADDITIVE
+           : method == NEBEL_METHOD_CELLS    ? NEBEL_GL_METHOD_CELLS
                                              : NEBEL_GL_METHOD_EXACT;
 }
 
@@ -393,6 +394,7 @@ static nebel_result draw_frame(studio *all)
         .progress = show_progress,
         .progress_user = all,
         .method = gl_method(all->wanted->method),
+        .cells = all->cells,
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[COLOR],
@@ -476,10 +478,16 @@ static void note_other_fog(const nebel_scene_data *scene, const settings *wanted
                       wanted->scene);
 }
 
-static int open_cells(studio *all)
+static int takes_cells(nebel_method method)
+{
+    return method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL;
+}
+
+static int make_cells(studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    if (!takes_cells(wanted->method)) return NB_DONE;
     if (scene->cells == NULL)
         return nb_report_failure("render: %s: there is no section \"cells\" for --method cells; add one, or say "
                                  "--method exact",
@@ -487,11 +495,7 @@ static int open_cells(studio *all)
     note_other_fog(scene, wanted);
     nebel_cells_desc desc = *scene->cells;
     desc.log = nb_report_log(&all->listener);
-    nebel_result result = nebel_create_cells(&desc, &all->cells);
-    if (result == NEBEL_OK)
-        result = nebel_set_renderer_cells(all->renderer, all->cells,
-                                          wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX
-                                                                               : NEBEL_CELLS_PER_PIXEL);
+    const nebel_result result = nebel_create_cells(&desc, &all->cells);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
@@ -504,12 +508,15 @@ static int choose_method(studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
-    if (wanted->method == NEBEL_METHOD_CELLS || wanted->method == NEBEL_METHOD_CELLS_PIXEL) return open_cells(all);
     if (takes_factor(wanted->method) && scene->classic == NULL)
         return nb_report_failure("render: %s: there is no section \"classic\" for --method %s; add one, or say "
                                  "--method exact",
                                  wanted->scene, nebel_method_word(wanted->method));
-    const nebel_result result = nebel_set_renderer_method(all->renderer, wanted->method, scene->classic);
+    const nebel_cell_stage stage =
+        wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
+    const nebel_result result = takes_cells(wanted->method)
+                                    ? nebel_set_renderer_cells(all->renderer, all->cells, stage)
+                                    : nebel_set_renderer_method(all->renderer, wanted->method, scene->classic);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
@@ -528,7 +535,8 @@ static int set_up(studio *all)
     int status = nb_load_scene(wanted->scene, 1, wanted->first_frame, &all->listener, &all->loaded);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
-    status = allocate_planes(all);
+    status = make_cells(all);
+    if (status == NB_DONE) status = allocate_planes(all);
     if (status != NB_DONE) return status;
     return wanted->gl ? open_gl(all) : open_renderer(all);
 }

@@ -44,10 +44,18 @@ static nebel_result set_fog(const nb_gl_painter *painter, double frame)
     return result;
 }
 
+/* Cells are all fog there is. */
+static nebel_result clear_fog(const nb_gl_painter *painter)
+{
+    const nebel_result result = nebel_set_gl_renderer_fog(painter->renderer, NULL);
+    return result == NEBEL_OK ? nebel_set_gl_renderer_particles(painter->renderer, NULL, 0) : result;
+}
+
 nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebel_gl_frame_desc *desc,
                                 const nebel_gl_planes *planes)
 {
-    nebel_result result = set_fog(painter, frame);
+    const int by_cells = desc->method == NEBEL_GL_METHOD_CELLS;
+    nebel_result result = by_cells ? clear_fog(painter) : set_fog(painter, frame);
     if (result == NEBEL_OK) result = nebel_gl_render_frame(painter->renderer, desc);
     return result == NEBEL_OK ? nebel_gl_read_planes(painter->renderer, planes) : result;
 }

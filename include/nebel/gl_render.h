@@ -70,6 +70,8 @@ typedef enum nebel_gl_method {
                                   what fog coordinates, a second pass and alpha polygons draw (nebel/gl_classic.h). It
                                   has one transmittance, that of red. Where no surface is there is no fog */
     NEBEL_GL_METHOD_ADDITIVE,  /* the same, but fog only adds its light, and transmittance is 1 */
+    NEBEL_GL_METHOD_CELLS,     /* the same by nebel_fog_cells, in place of the renderer's fog, which still dims the sun:
+                                  give it none where cells are all */
     NEBEL_GL_METHOD_COUNT
 } nebel_gl_method;
 
@@ -95,13 +97,14 @@ typedef struct nebel_gl_frame_desc {
     void *progress_user;
     nebel_gl_method method;
     const nebel_gl_taps *taps; /* of FIVE_TAP; NULL: nebel_gl_default_taps */
+    const nebel_cells *cells;  /* of CELLS */
 } nebel_gl_frame_desc;
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or
  * light as for nebel_render_frame; taps that are not finite or negative),
  * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (a panorama; more than one
- * sample where OpenGL ES cannot blend floats; an orthographic camera, which has no eye, with VERTEX or ADDITIVE; a
- * shader that the driver does not take; the context is another one, or lost). */
+ * sample where OpenGL ES cannot blend floats; an orthographic camera, which has no eye, with VERTEX, ADDITIVE or CELLS;
+ * a shader that the driver does not take; the context is another one, or lost). */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 
 /* What the last frame is made of: RGBA32F, linear light, the lowest row first, without filters or mipmaps. */

@@ -215,13 +215,14 @@ static int is_place(const double x[3])
 
 static nebel_result set_view(const nebel_cells *cells, const nebel_cell_view *view, walk *way)
 {
-    const double *f = view->forward;
-    const double length = hypot(hypot(f[0], f[1]), f[2]);
+    const double *f = view->forward, largest = fmax(fabs(f[0]), fmax(fabs(f[1]), fabs(f[2])));
     *way = (walk){.cells = cells, .eye = view->eye, .has_walls = cells->has_walls && !view->ignore_walls};
     if (!is_place(view->eye)) return NEBEL_ERROR_ARGUMENT;
     if (cells->span == NEBEL_SPAN_RAY) return NEBEL_OK;
-    if (!(length > 0 && isfinite(length))) return NEBEL_ERROR_ARGUMENT;
-    for (int i = 0; i < 3; i++) way->forward[i] = f[i] / length;
+    if (!is_place(f) || !(largest > 0)) return NEBEL_ERROR_ARGUMENT;
+    for (int i = 0; i < 3; i++) way->forward[i] = f[i] / largest;
+    const double length = sqrt(dot(way->forward, way->forward));
+    for (int i = 0; i < 3; i++) way->forward[i] /= length;
     return NEBEL_OK;
 }
 
@@ -231,7 +232,7 @@ static int set_point(walk *way, const nebel_cell_point *point)
     way->point = point;
     if (!is_place(point->position)) return 0;
     for (int i = 0; i < 3; i++) way->step[i] = point->position[i] - way->eye[i];
-    way->length = hypot(hypot(way->step[0], way->step[1]), way->step[2]);
+    way->length = sqrt(dot(way->step, way->step));
     const double depth = dot(way->step, way->forward);
     way->depth = depth;
     if (way->cells->span == NEBEL_SPAN_FAITHFUL)

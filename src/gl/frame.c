@@ -71,6 +71,8 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
     if ((unsigned)desc->method >= NEBEL_GL_METHOD_COUNT) {
         return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: there is no method %d", (int)desc->method);
     }
+    if (desc->method == NEBEL_GL_METHOD_CELLS && desc->cells == NULL)
+        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: the method CELLS needs cells; they are NULL");
     const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
     if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
         isfinite(taps.offset + taps.nothing + taps.edge + taps.margin + taps.brightness)) {
@@ -82,7 +84,8 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
 
 static int is_by_vertex(const frame *f)
 {
-    return f->desc->method == NEBEL_GL_METHOD_VERTEX || f->desc->method == NEBEL_GL_METHOD_ADDITIVE;
+    return f->desc->method == NEBEL_GL_METHOD_VERTEX || f->desc->method == NEBEL_GL_METHOD_ADDITIVE ||
+           f->desc->method == NEBEL_GL_METHOD_CELLS;
 }
 
 static nebel_result check_eye(const frame *f)
@@ -233,10 +236,10 @@ static nebel_result draw_vertex_fog(const frame *f)
     glUseProgram(program);
     set_rays(f, program);
     set_clip(f, program);
-    glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method == NEBEL_GL_METHOD_VERTEX);
+    glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method != NEBEL_GL_METHOD_ADDITIVE);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_meshes(f, program);
-    return r->particles.count > 0 ? nebel_gl_set_fog(r->eye_fog, r->fog, &f->view) : NEBEL_OK;
+    return r->particles.count > 0 && r->fog != NULL ? nebel_gl_set_fog(r->eye_fog, r->fog, &f->view) : NEBEL_OK;
 }
 
 static nebel_result draw_fog(const frame *f)
@@ -244,7 +247,7 @@ static nebel_result draw_fog(const frame *f)
     const nebel_gl_renderer *const r = f->renderer;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
-    if (r->fog == NULL) {
+    if (r->fog == NULL && f->desc->method != NEBEL_GL_METHOD_CELLS) {
         clear_fog();
         return NEBEL_OK;
     }
@@ -505,9 +508,15 @@ static nebel_result sort_particles(const frame *f)
 static nebel_result prepare_vertices(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    if (!is_by_vertex(f) || r->fog == NULL) return NEBEL_OK;
+    const int by_cells = f->desc->method == NEBEL_GL_METHOD_CELLS;
+    nb_vertex_source source = {.fog = r->fog, .cells = by_cells ? f->desc->cells : NULL, .view = {.ignore_walls = 1}};
+    if (!is_by_vertex(f) || (r->fog == NULL && !by_cells)) return NEBEL_OK;
+    for (int i = 0; i < 3; i++) {
+        source.view.eye[i] = f->eye[i];
+        source.view.forward[i] = f->desc->camera.look_at[i] - f->desc->camera.position[i];
+    }
     const nebel_result result = nb_shading_make_vertex_fog(&r->shading, &r->context, &r->log);
-    return result == NEBEL_OK ? nb_vertex_fog_set(&r->meshes, r->fog, f->eye) : result;
+    return result == NEBEL_OK ? nb_vertex_fog_set(&r->meshes, &source) : result;
 }
 
 static nebel_result draw_samples(frame *f)

@@ -31,33 +31,58 @@ static int unmap(unsigned buffer, const void *mapped)
     return mapped != NULL && glUnmapBuffer(GL_ARRAY_BUFFER);
 }
 
+static nebel_result fog_by_cells(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
+                                 float (*out)[4])
+{
+    const char *const positions = vertices->positions;
+    nebel_result result = NEBEL_OK;
+    for (size_t v = 0; v < count && result == NEBEL_OK; v++) {
+        const float *const p = (const float *)(const void *)(positions + v * vertices->position_stride);
+        nebel_cell_point point = {.position = {0, 0, 0}};
+        nebel_cell_fog fog;
+        for (int i = 0; i < 3; i++) point.position[i] = vertices->origin[i] + (double)p[i];
+        result = nebel_fog_cells(source->cells, &source->view, 1, &point, 0, &fog, 0);
+        for (int i = 0; i < 3 && result == NEBEL_OK; i++) out[v][i] = (float)fog.color[i];
+        if (result == NEBEL_OK) out[v][3] = (float)fog.alpha;
+    }
+    return result;
+}
+
+static nebel_result fog_vertices(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
+                                 void *out)
+{
+    const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out, 0};
+    return source->cells != NULL ? fog_by_cells(source, count, vertices, out)
+                                 : nebel_fog_vertices(source->fog, NULL, count, vertices, &output, 1);
+}
+
 /* Positions are where OpenGL has them, and nowhere else. */
-static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nebel_snapshot *fog, const double eye[3])
+static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nb_vertex_source *source)
 {
     const size_t count = mesh->vertex_count;
     const GLbitfield writing = GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT;
     nebel_vertices vertices = {.positions = map(mesh->vertices, count * NB_VERTEX_SIZE, GL_MAP_READ_BIT),
                                .position_stride = NB_VERTEX_SIZE};
-    const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, map(mesh->fog, count * FOG_SIZE, writing), 0};
-    const int mapped = vertices.positions != NULL && output.data != NULL;
+    void *const out = map(mesh->fog, count * FOG_SIZE, writing);
+    const int mapped = vertices.positions != NULL && out != NULL;
     for (int i = 0; i < 3; i++) {
         vertices.origin[i] = mesh->origin[i];
-        vertices.eye[i] = eye[i];
+        vertices.eye[i] = source->view.eye[i];
     }
-    const nebel_result result = mapped ? nebel_fog_vertices(fog, NULL, count, &vertices, &output, 1) : NEBEL_OK;
-    const int read = unmap(mesh->vertices, vertices.positions), written = unmap(mesh->fog, output.data);
+    const nebel_result result = mapped ? fog_vertices(source, count, &vertices, out) : NEBEL_OK;
+    const int read = unmap(mesh->vertices, vertices.positions), written = unmap(mesh->fog, out);
     if (read && written) return result;
     return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL: no access to the vertices; try again");
 }
 
-nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nebel_snapshot *fog, const double eye[3])
+nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nb_vertex_source *source)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < meshes->count && result == NEBEL_OK; i++) {
         nb_mesh *const mesh = &meshes->list[i];
         if (mesh->index_count == 0) continue;
         result = make_attribute(meshes, mesh);
-        if (result == NEBEL_OK) result = fill(meshes, mesh, fog, eye);
+        if (result == NEBEL_OK) result = fill(meshes, mesh, source);
     }
     return result;
 }

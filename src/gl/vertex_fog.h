@@ -4,8 +4,15 @@
 
 #include "meshes.h"
 
+/* What fogs the vertices: volumes, or cells in their place. */
+typedef struct nb_vertex_source {
+    const nebel_snapshot *fog;
+    const nebel_cells *cells; /* NULL: none */
+    nebel_cell_view view;
+} nb_vertex_source;
+
 /* Fills the attribute NB_ATTRIBUTE_FOG of all meshes. Changes the bindings of ARRAY_BUFFER and the vertex array.
- * Errors: MEMORY, and those of nebel_fog_vertices. */
-nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nebel_snapshot *fog, const double eye[3]);
+ * Errors: MEMORY, and those of nebel_fog_vertices or nebel_fog_cells. */
+nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nb_vertex_source *source);
 
 #endif
