@@ -72,8 +72,11 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
 {
     nebel_gl_renderer *renderer = NULL;
     const nebel_gl_renderer_desc desc = {.log = {write_message, NULL}};
-    const nebel_gl_frame_desc frame = {
-        .camera = *camera, .width = pair->width, .height = pair->height, .samples = samples};
+    const nebel_gl_frame_desc frame = {.camera = *camera,
+                                       .width = pair->width,
+                                       .height = pair->height,
+                                       .samples = samples,
+                                       .particles_dim_sun = particles != NULL && particles->dim_sun};
     const nebel_gl_planes planes = {pair->gl.color, pair->gl.transmittance, pair->gl.in_scattering, pair->gl.depth,
                                     pair->gl.normal};
     assert_int_equal(nebel_create_gl_renderer(scene, fog, &desc, &renderer), NEBEL_OK);

@@ -118,12 +118,11 @@ static void check_particles(const stage *s, nb_gl_language language, int grey, n
     nb_gl context;
     picture_pair pair = picture_make(WIDTH, HEIGHT);
     nebel_camera camera = s->camera;
-    nebel_scene_data scene = s->ball.scene;
+    const nebel_scene_data scene = s->ball.scene; /* the first fog lets no light of the sun through */
     make_particles(particles, volumes, grey);
-    scene.has_sun = 0; /* which particles do not dim in OpenGL */
     camera.projection = projection;
     nebel_snapshot *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
-    const picture_particles drawn = {particles, 9, others};
+    const picture_particles drawn = {.list = particles, .count = 9, .others = others};
     pass_open(&context, language);
     picture_render_particles(&scene, all, &drawn, &camera, 1, &pair);
     pass_close(&context);
@@ -147,6 +146,42 @@ static void test_particles_are_fog(void **state)
             check_particles(&s, languages[i], grey,
                             i == grey ? NEBEL_PROJECTION_PERSPECTIVE : NEBEL_PROJECTION_ORTHOGRAPHIC);
         }
+    }
+    nebel_release_snapshot(s.fog);
+}
+
+/* How far the colours are apart where the sun shines through particles onto the floor. */
+static double compare_sunlight(const stage *s, nb_gl_language language, int grey, int dim_sun)
+{
+    nebel_particle particles[9];
+    nebel_volume_desc volumes[11] = {
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, -2, -9}, .max = {9, 3, 9}}, .extinction = {.02, .03, .04}},
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, 0, 2.5}, .max = {9, 3, 4}}, .extinction = {.1, .1, .3}}};
+    nb_gl context;
+    picture_pair pair = picture_make(WIDTH, HEIGHT);
+    make_particles(particles, volumes, grey);
+    nebel_snapshot *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
+    const picture_particles drawn = {.list = particles, .count = 9, .others = others, .dim_sun = dim_sun};
+    pass_open(&context, language);
+    picture_render_particles(&s->ball.scene, all, &drawn, &s->camera, 1, &pair);
+    pass_close(&context);
+    const double color = picture_compare(&pair, 1).color;
+    picture_free(&pair);
+    nebel_release_snapshot(all);
+    nebel_release_snapshot(others);
+    return color;
+}
+
+static void test_particles_dim_the_sun(void **state)
+{
+    (void)state;
+    static stage s;
+    set_stage(&s, (double[3]){0, 0, 0});
+    for (int i = 0; i < 2; i++) {
+        const double dimmed = compare_sunlight(&s, languages[i], i, 1),
+                     bright = compare_sunlight(&s, languages[i], i, 0);
+        print_message("dimmed %.2g, not dimmed %.2g\n", dimmed, bright);
+        assert_true(dimmed < .01 && dimmed < .2 * bright);
     }
     nebel_release_snapshot(s.fog);
 }
@@ -319,6 +354,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_light_is_that_of_the_cpu),
         cmocka_unit_test(test_particles_are_fog),
+        cmocka_unit_test(test_particles_dim_the_sun),
         cmocka_unit_test(test_samples_smooth_edges),
         cmocka_unit_test(test_outlines_agree_sample_by_sample),
         cmocka_unit_test(test_state_neither_changes_nor_matters),

@@ -15,10 +15,11 @@
  * the map wide. No panoramas. Link with libnebel_gl and libnebel.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
- * what nebel/gl.h lists it changes, while it runs, texture units 4 to 7 and there TEXTURE_2D_ARRAY; both framebuffers;
- * the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth function, mask
- * and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and the clip
- * control, where they exist. Conditional rendering must not be under way: pictures would be missing within a frame.
+ * what nebel/gl.h lists it changes, while it runs, texture units 4 to 8, and TEXTURE_2D_ARRAY of unit 7; both
+ * framebuffers; the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth
+ * function, mask and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and
+ * the clip control, where they exist. Conditional rendering must not be under way: pictures would be missing within a
+ * frame.
  */
 #ifndef NEBEL_GL_RENDER_H
 #define NEBEL_GL_RENDER_H
@@ -55,9 +56,9 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapsh
 /* The particles of the frames from now on, beside the fog and not among it: commit that with
  * nebel_commit_scene_volumes_at. They are copied; count 0: none. Each is drawn as a ball whose transmittance and light
  * up to the surface behind it have closed forms, from the farthest centre to the nearest: particles that overlap take
- * their light from each other as if one were behind the other, and fog counts before a particle's middle. They do not
- * dim the sun, which the log is told with NEBEL_OK where there are a sun and surfaces. O(count log count) for each
- * frame, and what they cover. Errors: ARGUMENT, MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
+ * their light from each other as if one were behind the other, and fog counts before a particle's middle. They dim
+ * the sun where a frame asks for that. O(count log count) for each frame, and what they cover. Errors: ARGUMENT,
+ * MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
 nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
                                              size_t count);
 
@@ -98,6 +99,9 @@ typedef struct nebel_gl_frame_desc {
     nebel_gl_method method;
     const nebel_gl_taps *taps; /* of FIVE_TAP; NULL: nebel_gl_default_taps */
     const nebel_cells *cells;  /* of CELLS */
+    int particles_dim_sun; /* nonzero: sunlight on surfaces is attenuated by all particles on its way, exactly, by the
+                              lists of particles along it; for a new eye or sun O(particles) more, some microseconds
+                              each. Not where `fog` excludes, replaces or limits what particles do */
 } nebel_gl_frame_desc;
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or

@@ -28,6 +28,7 @@ typedef struct frame {
     nebel_rays rays;        /* of sample_view */
     nebel_view sun_view;    /* of all that is seen, against the sun's light */
     int casts;              /* the sun shines, and there is something to cast shadows */
+    int dims;               /* particles dim the sun */
 } frame;
 
 /* ---- checks
@@ -375,6 +376,19 @@ static nebel_result set_sun_fog(frame *f)
     return nebel_gl_set_fog(r->sun_fog, r->fog, &f->sun_view);
 }
 
+/* The same for particles. */
+static nebel_result set_sun_cloud(frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nebel_result result = NEBEL_OK;
+    f->dims = f->desc->particles_dim_sun && r->particles.count > 0;
+    if (!f->dims) return NEBEL_OK;
+    if (r->cloud == NULL) result = nb_particles_commit(&r->particles, &r->allocator, &r->log, &r->cloud);
+    if (result != NEBEL_OK) return result;
+    set_sun_view(f);
+    return nebel_gl_set_fog(r->sun_cloud, r->cloud, &f->sun_view);
+}
+
 static nebel_result prepare_sun(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
@@ -386,7 +400,8 @@ static nebel_result prepare_sun(frame *f)
     f->casts = r->shadows.seen_low[0] < r->shadows.seen_high[0];
     if (!f->casts) return NEBEL_OK;
     result = nb_shadows_draw(&r->shadows, &r->context, &r->log, r->shading.shadow, &r->meshes, f->eye);
-    return result == NEBEL_OK ? set_sun_fog(f) : result;
+    if (result == NEBEL_OK) result = set_sun_fog(f);
+    return result == NEBEL_OK ? set_sun_cloud(f) : result;
 }
 
 static void set_shadows(const frame *f, unsigned program)
@@ -418,6 +433,42 @@ static void set_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
  * -----------------------------------------------------------------------------------------------------------
  */
 
+static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
+{
+    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
+    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    if (fog->tiles != 0) set_tiles(f, fog, program);
+}
+
+/* What comes through the particles of the sun's light to each surface. */
+static nebel_result draw_dimming(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nebel_gl_fog fog = {0};
+    unsigned program = 0;
+    if (!f->dims) return NEBEL_OK;
+    nebel_result result = nebel_gl_get_fog(r->sun_cloud, &fog);
+    if (result != NEBEL_OK) return result;
+    const nb_light_kind kind = {.of_dimming = 1,
+                                .has_fog = 1,
+                                .in_texture = fog.texture != 0,
+                                .tiled = fog.tiles != 0,
+                                .features = fog.features};
+    result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
+    if (result != NEBEL_OK) return result;
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.dimming_buffer);
+    nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
+    glUseProgram(program);
+    set_rays(f, program);
+    set_vector(program, "scene_sun", f->light.sun);
+    glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, r->shadows.light);
+    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    bind_fog(f, &fog, program);
+    glBindVertexArray(r->vertex_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    return NEBEL_OK;
+}
+
 static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
     const nb_targets *const t = &f->renderer->targets;
@@ -434,9 +485,8 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
     bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
     bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
-    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
-    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
-    if (fog->tiles != 0) set_tiles(f, fog, program);
+    if (f->dims) bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
+    bind_fog(f, fog, program);
 }
 
 /* The first sample replaces what was there. */
@@ -458,8 +508,11 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     const int has_fog = f->casts && r->fog != NULL;
     nebel_result result = has_fog ? nebel_gl_get_fog(r->sun_fog, &fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
-    const nb_light_kind kind = {
-        .has_fog = has_fog, .in_texture = fog.texture != 0, .tiled = fog.tiles != 0, .features = fog.features};
+    const nb_light_kind kind = {.dimmed = f->dims,
+                                .has_fog = has_fog,
+                                .in_texture = fog.texture != 0,
+                                .tiled = fog.tiles != 0,
+                                .features = fog.features};
     result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
@@ -485,6 +538,7 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     if (sample == 0 && f->casts) result = prepare_sun(f);
     if (result == NEBEL_OK) result = draw_fog(f);
     if (result == NEBEL_OK) result = draw_particles(f);
+    if (result == NEBEL_OK) result = draw_dimming(f);
     return result == NEBEL_OK ? draw_light(f, sample) : result;
 }
 

@@ -29,6 +29,21 @@ nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *al
     return NEBEL_OK;
 }
 
+nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
+                                 nebel_snapshot **cloud)
+{
+    nebel_fog *fog = NULL;
+    const nebel_fog_desc desc = {.allocator = *allocator, .log = *log};
+    nebel_result result = nebel_create_fog(&desc, &fog);
+    for (size_t i = 0; i < particles->count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_particle_volume(&particles->list[i]);
+        result = nebel_add_volume(fog, &volume, NULL);
+    }
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, cloud);
+    nebel_destroy_fog(fog);
+    return result;
+}
+
 static nb_ball ball_of(const nebel_particle *p, const double eye[3], const double *forward)
 {
     nb_ball ball = {.radius = (float)p->radius, .profile = (float)p->profile};

@@ -25,6 +25,10 @@ typedef struct nb_particles {
 nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
                               const nebel_particle *list, size_t count);
 
+/* All of them as fog. MEMORY. */
+nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
+                                 nebel_snapshot **cloud);
+
 /* Sorts and hands them over as an eye sees them; `forward` where rays are parallel, else NULL. MEMORY. */
 nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, const double eye[3],
                                const double *forward);

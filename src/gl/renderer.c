@@ -44,6 +44,7 @@ static nebel_result make(nebel_gl_renderer *r)
     nb_scene_state state;
     nebel_result result = nebel_create_gl(&desc, &r->eye_fog);
     if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_fog);
+    if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_cloud);
     if (result != NEBEL_OK) return result;
     nb_scene_state_enter(&r->context, &state);
     result = make_objects(r);
@@ -96,6 +97,8 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     }
     nebel_destroy_gl(r->eye_fog);
     nebel_destroy_gl(r->sun_fog);
+    nebel_destroy_gl(r->sun_cloud);
+    nebel_release_snapshot(r->cloud);
     nebel_release_snapshot(r->fog);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
@@ -125,10 +128,9 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_p
                        "particles: OpenGL ES without GL_EXT_float_blend cannot blend light; use OpenGL");
     }
     const nebel_result result = nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
-    if (result == NEBEL_OK && count > 0 && r->scene->has_sun && r->meshes.count > 0) {
-        (void)nb_fail(&r->log, NEBEL_OK,
-                      "OpenGL renderer: particles do not dim the sun on surfaces; the CPU renderer dims it exactly");
-    }
+    if (result != NEBEL_OK) return result;
+    nebel_release_snapshot(r->cloud);
+    r->cloud = NULL;
     return result;
 }
 

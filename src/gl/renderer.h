@@ -19,6 +19,8 @@ struct nebel_gl_renderer {
     unsigned vertex_array; /* without attributes */
     nebel_gl *eye_fog;     /* as the eye sees it */
     nebel_gl *sun_fog;     /* with tiles as the sun sees them */
+    nebel_gl *sun_cloud;   /* the particles, so, too */
+    nebel_snapshot *cloud; /* of the particles; NULL: not made yet */
     nb_meshes meshes;
     nb_shading shading;
     nb_shadows shadows;

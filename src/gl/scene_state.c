@@ -11,7 +11,7 @@ static const struct {
     {GL_DEPTH_CLAMP, DESKTOP},
     {GL_PRIMITIVE_RESTART_FIXED_INDEX, FIXED_INDEX},
 };
-enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS };
+enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS, ARRAY_UNIT = 7 };
 
 /* The last two are of OpenGL alone. */
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,
@@ -67,6 +67,7 @@ static void save_units(nb_scene_state *s)
         glGetIntegerv(GL_TEXTURE_BINDING_2D, &s->textures[i]);
         glGetIntegerv(GL_SAMPLER_BINDING, &s->samplers[i]);
     }
+    glActiveTexture(GL_TEXTURE0 + ARRAY_UNIT);
     glGetIntegerv(GL_TEXTURE_BINDING_2D_ARRAY, &s->array_texture);
 }
 
@@ -140,6 +141,7 @@ static void restore_units(const nb_scene_state *s)
         glBindTexture(GL_TEXTURE_2D, (GLuint)s->textures[i]);
         glBindSampler((GLuint)(FIRST_UNIT + i), (GLuint)s->samplers[i]);
     }
+    glActiveTexture(GL_TEXTURE0 + ARRAY_UNIT);
     glBindTexture(GL_TEXTURE_2D_ARRAY, (GLuint)s->array_texture);
 }
 

@@ -178,32 +178,13 @@ static const char shadow_text[] =
     "    return 1.0;\n"
     "}\n";
 
-/* One triangle that covers the picture. */
-static const char light_vertex_text[] =
-    "void main()\n"
-    "{\n"
-    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
-    "}\n";
-
-static const char light_text[] =
-    "uniform highp sampler2D scene_place;\n"
-    "uniform highp sampler2D scene_normal;\n"
-    "uniform highp sampler2D scene_reflectance;\n"
-    "uniform highp sampler2D scene_in_scattering;\n"
-    "uniform highp sampler2D scene_transmittance;\n"
-    "uniform vec3 scene_background;\n"
-    "uniform vec3 scene_ambient;\n"
+/* How much of the sun's light comes through the fog to a place, which is `at` in light coordinates. */
+static const char sun_text[] =
     "uniform vec3 scene_sun;\n"
-    "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun */
-    "uniform float scene_share;\n"   /* of this sample */
     "#ifdef NEBEL_TILES\n"
     "uniform vec4 tile_place;\n" /* low corner in light coordinates, pixels per metre */
     "uniform ivec4 tile_grid;\n" /* pixels in all, in a tile, and tiles in a row */
     "#endif\n"
-    "layout(location = 0) out highp vec4 out_color;\n"
-    "layout(location = 1) out highp vec4 out_transmittance;\n"
-    "layout(location = 2) out highp vec4 out_in_scattering;\n"
-    "layout(location = 3) out highp vec4 out_surface;\n"
     "vec3 sun_transmittance(vec3 place, vec2 at)\n"
     "{\n"
     "#if !defined(SCENE_FOG)\n"
@@ -216,7 +197,44 @@ static const char light_text[] =
     "#else\n"
     "    return nebel_transmit_light(place, scene_sun, 1e18);\n"
     "#endif\n"
-    "}\n"
+    "}\n";
+
+/* One triangle that covers the picture. */
+static const char light_vertex_text[] =
+    "void main()\n"
+    "{\n"
+    "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
+    "}\n";
+
+/* The fog is that of particles here. */
+static const char dimming_text[] = "uniform mat3 scene_light;\n"
+                                   "uniform highp sampler2D scene_place;\n"
+                                   "out highp vec4 out_dimming;\n"
+                                   "void main()\n"
+                                   "{\n"
+                                   "    float t = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
+                                   "    vec3 at = ray_origin(gl_FragCoord.xy) + t * ray_direction(gl_FragCoord.xy);\n"
+                                   "    out_dimming = vec4(1.0);\n"
+                                   "    if (t > 0.0) out_dimming.rgb = sun_transmittance(at, (scene_light * at).xy);\n"
+                                   "}\n";
+
+static const char light_text[] =
+    "uniform highp sampler2D scene_place;\n"
+    "uniform highp sampler2D scene_normal;\n"
+    "uniform highp sampler2D scene_reflectance;\n"
+    "uniform highp sampler2D scene_in_scattering;\n"
+    "uniform highp sampler2D scene_transmittance;\n"
+    "#ifdef SCENE_DIMMED\n"
+    "uniform highp sampler2D scene_dimming;\n"
+    "#endif\n"
+    "uniform vec3 scene_background;\n"
+    "uniform vec3 scene_ambient;\n"
+    "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun */
+    "uniform float scene_share;\n"   /* of this sample */
+    "layout(location = 0) out highp vec4 out_color;\n"
+    "layout(location = 1) out highp vec4 out_transmittance;\n"
+    "layout(location = 2) out highp vec4 out_in_scattering;\n"
+    "layout(location = 3) out highp vec4 out_surface;\n"
     "vec3 sunlight(vec3 place, vec3 normal, vec3 side, float t)\n"
     "{\n"
     "    float cosine = dot(normal, scene_sun);\n"
@@ -224,7 +242,11 @@ static const char light_text[] =
     "    vec3 at = scene_light * place;\n"
     "    float visible = shadow(at, side, t);\n"
     "    if (!(visible > 0.0)) return vec3(0.0);\n"
-    "    return visible * cosine * scene_sunlight * sun_transmittance(place, at.xy);\n"
+    "    vec3 light = visible * cosine * scene_sunlight * sun_transmittance(place, at.xy);\n"
+    "#ifdef SCENE_DIMMED\n"
+    "    light *= texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).rgb;\n"
+    "#endif\n"
+    "    return light;\n"
     "}\n"
     "void main()\n"
     "{\n"
@@ -432,9 +454,10 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
     char limits[128];
-    (void)snprintf(text, size, "%s%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
+    (void)snprintf(text, size, "%s%s%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
                    nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
-                   kind->has_fog ? "#define SCENE_FOG\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
+                   kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
+                   kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }
@@ -452,6 +475,7 @@ static void set_units(unsigned program)
     set_unit(program, "scene_in_scattering", NB_UNIT_IN_SCATTERING);
     set_unit(program, "scene_transmittance", NB_UNIT_TRANSMITTANCE);
     set_unit(program, "scene_shadows", NB_UNIT_SHADOWS);
+    set_unit(program, "scene_dimming", NB_UNIT_DIMMING);
 }
 
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
@@ -462,17 +486,23 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const int particles = kind->of_particles;
     const nb_texts vertex = {{nb_program_version(context), particles ? particle_vertex_text : light_vertex_text}, 2};
-    const nb_texts light = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, light_text}, 5};
+    const nb_texts light = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, sun_text, light_text}, 6};
+    const nb_texts dimming = {{head, fog, ray_text, sun_text, dimming_text}, 5};
     const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog, ray_text, particle_text}, 5};
-    const nebel_result result = nb_program_build(log, &vertex, particles ? &particle : &light, name);
+    const nebel_result result = nb_program_build(log, &vertex,
+                                                 particles          ? &particle
+                                                 : kind->of_dimming ? &dimming
+                                                                    : &light,
+                                                 name);
     if (result == NEBEL_OK) set_units(*name);
     return result;
 }
 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
-    return a->of_particles == b->of_particles && a->five_taps == b->five_taps && a->has_fog == b->has_fog &&
-           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
+    return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
+           a->five_taps == b->five_taps && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
+           a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

@@ -12,7 +12,8 @@ enum {
     NB_UNIT_REFLECTANCE,
     NB_UNIT_IN_SCATTERING,
     NB_UNIT_TRANSMITTANCE,
-    NB_UNIT_SHADOWS
+    NB_UNIT_SHADOWS,
+    NB_UNIT_DIMMING
 };
 
 enum { NB_CASCADES = 4 };
@@ -20,6 +21,8 @@ enum { NB_CASCADES = 4 };
 /* What a program that asks fog is made for. */
 typedef struct nb_light_kind {
     int of_particles; /* and the fog before them; else of surfaces, and the fog between them and the sun */
+    int of_dimming;   /* of the sun by particles, for `dimmed` ones */
+    int dimmed;       /* that counts, too */
     int five_taps;    /* particles are discs, which are there or not */
     int has_fog;
     int in_texture, tiled;

@@ -39,7 +39,8 @@ static int make_buffers(nb_targets *t)
 {
     const unsigned surfaces[] = {t->place, t->normal, t->reflectance}, fog[] = {t->in_scattering, t->transmittance};
     return make_buffer(&t->surface_buffer, surfaces, 3, t->depth) && make_buffer(&t->fog_buffer, fog, 2, 0) &&
-           make_buffer(&t->picture_buffer, t->picture, 4, 0) && make_buffer(&t->survey_buffer, &t->survey, 1, 0);
+           make_buffer(&t->picture_buffer, t->picture, 4, 0) && make_buffer(&t->survey_buffer, &t->survey, 1, 0) &&
+           make_buffer(&t->dimming_buffer, &t->dimming, 1, 0);
 }
 
 nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width, uint32_t height)
@@ -54,6 +55,7 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
     t->reflectance = make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
     t->in_scattering = make_floats(t);
     t->transmittance = make_floats(t);
+    t->dimming = make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
     for (int i = 0; i < 4; i++) t->picture[i] = make_floats(t);
     t->survey_width = (width + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
     t->survey_height = (height + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
@@ -70,10 +72,10 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
 void nb_targets_delete(nb_targets *t)
 {
     const GLuint textures[] = {t->depth,         t->place,         t->normal, t->reflectance,
-                               t->in_scattering, t->transmittance, t->survey};
-    const GLuint buffers[] = {t->surface_buffer, t->fog_buffer, t->picture_buffer, t->survey_buffer};
-    glDeleteFramebuffers(4, buffers);
-    glDeleteTextures(7, textures);
+                               t->in_scattering, t->transmittance, t->survey, t->dimming};
+    const GLuint buffers[] = {t->surface_buffer, t->fog_buffer, t->picture_buffer, t->survey_buffer, t->dimming_buffer};
+    glDeleteFramebuffers(5, buffers);
+    glDeleteTextures(8, textures);
     glDeleteTextures(4, t->picture);
     *t = (nb_targets){0};
 }

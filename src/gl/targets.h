@@ -14,10 +14,11 @@ typedef struct nb_targets {
     unsigned place;                        /* distance [m], 0 for none; unit normal of the triangle */
     unsigned normal, reflectance;          /* rgb */
     unsigned in_scattering, transmittance; /* of one sample */
+    unsigned dimming;                      /* of the sun, by particles */
     unsigned picture[4];                   /* color, transmittance, in-scattering, surface: see nebel_gl_textures */
     unsigned survey;                       /* a texel for each block: distances of the nearest and the farthest */
     uint32_t survey_width, survey_height;
-    unsigned surface_buffer, fog_buffer, picture_buffer, survey_buffer;
+    unsigned surface_buffer, fog_buffer, picture_buffer, survey_buffer, dimming_buffer;
 } nb_targets;
 
 /* Makes them for a size; those of another size go. Changes the bindings of TEXTURE_2D on the active unit and of the
