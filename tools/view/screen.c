@@ -32,6 +32,13 @@ static const char show_text[] =
     "    ivec2 have = textureSize(picture, 0);\n"
     "    return have == ivec2(size) ? texelFetch(picture, ivec2(at), 0).rgb : texture(picture, at / size).rgb;\n"
     "}\n"
+    /* The ordered dither with which pictures are written (B. Bayer 1973), rows counted from the top as there. */
+    "float threshold(ivec2 at)\n"
+    "{\n"
+    "    int a = at.x ^ at.y, rank = 0;\n"
+    "    for (int bit = 0; bit < 3; bit++) rank = rank << 2 | (a >> bit & 1) << 1 | (at.y >> bit & 1);\n"
+    "    return (float(rank) + 0.5) / 64.0;\n"
+    "}\n"
     "void main()\n"
     "{\n"
     "    vec2 at = gl_FragCoord.xy;\n"
@@ -41,7 +48,7 @@ static const char show_text[] =
     "    if (compare == 1 && at.x < split * size.x) shown = traced;\n"
     "    if (compare == 1 && abs(at.x - split * size.x) < 1.0) shown = vec3(1.0, 0.75, 0.2);\n"
     "    if (compare == 2) shown = min(abs(drawn - traced) * gain, 1.0);\n"
-    "    color = vec4(shown, 1.0);\n"
+    "    color = vec4(floor(shown * 255.0 + threshold(ivec2(at.x, size.y - at.y))) / 255.0, 1.0);\n"
     "}\n";
 
 nebel_result nb_screen_open(const nebel_log *log, nb_screen *screen)
