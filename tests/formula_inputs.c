@@ -262,7 +262,8 @@ static void aim(nb_formula_dice *dice, nb_formula formula, long double *in)
     for (int i = 3; i < 6; ++i) in[i] *= stretch;
 }
 
-/* As the march computes it: (distance + size) * 8 roundings, times 3 for the product with a normal. */
+/* As the march computes it: (distance + size) * 8 roundings, times 3 for the product with a normal, and what follows
+ * for a half space: the noise of n.d, and of the height of a level ray. */
 static void add_reach(nb_formula formula, nb_formula_digits digits, long double *in)
 {
     const long double unit = nb_formula_unit(digits);
@@ -274,7 +275,9 @@ static void add_reach(nb_formula formula, nb_formula_digits digits, long double 
     in[12] = reach;
     if (formula == NB_FORMULA_half_space) {
         in[11] = 3 * reach + fabsl(in[9]) * 4 * unit;
-        in[12] = 16 * unit;
+        in[12] = 0;
+        for (int i = 0; i < 3; ++i) in[12] += 16 * unit * fabsl(in[3 + i] * in[6 + i]);
+        in[13] = in[11];
     }
 }
 

@@ -42,7 +42,7 @@ static nb_interval interval(nb_wide enter, nb_wide leave, nb_wide enter_slack, n
 static outputs evaluate(nb_formula formula, const nb_wide a[NB_FORMULA_INPUTS])
 {
     const nb_wide a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
-    const nb_wide a9 = a[9], a10 = a[10], a11 = a[11], a12 = a[12];
+    const nb_wide a9 = a[9], a10 = a[10], a11 = a[11], a12 = a[12], a13 = a[13];
     const nb_real r0 = nb_narrow(a0), r1 = nb_narrow(a1), r2 = nb_narrow(a2), r3 = nb_narrow(a3);
     const nb_wvec3 v0 = nb_wvec3(a0, a1, a2), v3 = nb_wvec3(a3, a4, a5), v6 = nb_wvec3(a6, a7, a[8]);
     const nb_wvec3 v9 = nb_wvec3(a9, a10, a11);

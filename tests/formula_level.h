@@ -17,7 +17,7 @@ enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
     X(slab, of_interval(nb_interval_slab(a0, a1, a2, a3, a4)))                                                         \
     X(around, of_interval(nb_interval_around(a0, a1, a2, a3)))                                                         \
     X(box, of_interval(nb_interval_box(v0, v3, v6, v9, a12)))                                                          \
-    X(half_space, of_interval(nb_interval_half_space(v0, v3, v6, a9, a10, a11, a12)))                                  \
+    X(half_space, of_interval(nb_interval_half_space(v0, v3, v6, a9, a10, a11, a12, a13)))                             \
     X(ball, of_interval(nb_interval_ball(v0, v3, a6, a12)))                                                            \
     X(pipe, of_interval(nb_interval_pipe(v0, v3, a12)))                                                                \
     X(tube, of_interval(nb_interval_tube(v0, v3, a12)))                                                                \

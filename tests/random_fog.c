@@ -181,8 +181,10 @@ static void make_level_density(uint64_t *state, nebel_density *d)
     d->type = chance(state, .8) ? NEBEL_DENSITY_HEIGHT : NEBEL_DENSITY_LINEAR;
     d->scale_height = power_of_ten(state, 0, 3);
     places(state, -8, 8, d->from);
-    memcpy(d->to, d->from, sizeof d->to);
-    d->to[1] += power_of_ten(state, -1, 3) * (chance(state, .5) ? 1 : -1);
+    double way[3] = {0, 1, 0};
+    if (chance(state, .3)) random_unit(state, way);
+    const double length = power_of_ten(state, -1, 3) * (chance(state, .5) ? 1 : -1);
+    for (int k = 0; k < 3; k++) d->to[k] = d->from[k] + length * way[k];
 }
 
 /* ---- scenes ---------------------------------------------------------------------------------- */
@@ -320,6 +322,11 @@ static void remove_along(const double axis[3], double v[3])
     for (int k = 0; k < 3; k++) v[k] -= share * axis[k];
 }
 
+static int has_axis(const nebel_shape *s)
+{
+    return s->type == NEBEL_SHAPE_CONE || s->type == NEBEL_SHAPE_CYLINDER || s->type == NEBEL_SHAPE_CAPSULE;
+}
+
 /* Whether numbers of the shape are numbers of the world. */
 static int is_in_place(const target *t)
 {
@@ -392,16 +399,30 @@ static void set_ray(nebel_ray *ray, const double through[3], const double direct
     }
 }
 
-/* How far beside a surface. Where a plane is concerned a ray can be parallel to it only to 1e-16, so that closer than
- * that times some metres the last bits of the input would decide where it crosses; but rays along the axes lie exactly
- * in the faces of a box. Curved surfaces are touched to the last digit. */
+/* How far beside a surface. A ray can be parallel to a plane only to 1e-16, so that closer than that times some metres
+ * the last bits decide where it crosses, and float has no answer: that is rare. Rays along the axes lie exactly in the
+ * faces of a box. Curved surfaces are touched to the last digit. */
 static double choose_offset(uint64_t *state, const target *t, int along_axis)
 {
     const nebel_shape_type type = t->shape->type;
-    const int exact = along_axis && is_in_place(t);
     const int flat = type == NEBEL_SHAPE_CONVEX || type == NEBEL_SHAPE_HALF_SPACE || type == NEBEL_SHAPE_BOX;
-    const double off = power_of_ten(state, flat ? -11 : -14, -2) * (chance(state, .5) ? 1 : -1);
-    return exact || (!flat && chance(state, .2)) ? 0 : off;
+    const int closest = chance(state, .03);
+    const double off = power_of_ten(state, !flat ? -14 : closest ? -18 : -11, -2) * (chance(state, .5) ? 1 : -1);
+    const int exact = along_axis && is_in_place(t);
+    return exact || (flat ? closest && chance(state, .5) : chance(state, .2)) ? 0 : off;
+}
+
+/* Along the mantle of a body with an axis, or in one of its ends. */
+static void run_along(uint64_t *state, const nebel_shape *s, const double n[3], double d[3])
+{
+    double axis[3];
+    for (int k = 0; k < 3; k++) axis[k] = s->to[k] - s->from[k];
+    if (chance(state, .3)) {
+        remove_along(axis, d);
+        return;
+    }
+    memcpy(d, axis, sizeof axis);
+    remove_along(n, d);
 }
 
 /* In a face, or tangent. */
@@ -414,12 +435,15 @@ static void graze(const random_fog *fog, uint64_t *state, nebel_ray *ray)
     const int along_axis = t.shape->type == NEBEL_SHAPE_BOX && chance(state, .5), axis = below(state, 3);
     for (int k = 0; k < 3 && along_axis; k++) d[k] = k == axis ? 1 : 0;
     remove_along(n, d);
+    if (has_axis(t.shape) && chance(state, .05)) run_along(state, t.shape, n, d);
     if (!(length_of(d) > 1e-3)) random_unit(state, d);
     const double off = choose_offset(state, &t, along_axis);
     const double size = length_of(n);
-    for (int k = 0; k < 3; k++) p[k] += off * n[k] / size;
+    for (int k = 0; k < 3; k++) n[k] *= off / size;
     to_world(&t, p, 1);
     to_world(&t, d, 0);
+    to_world(&t, n, 0);
+    add(p, n);
     set_ray(ray, p, d, uniform(state, -5, 30) / length_of(d));
 }
 
@@ -428,8 +452,7 @@ static void aim(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 {
     const target t = choose_target(fog, state);
     const nebel_shape *const s = t.shape;
-    const int spindle =
-        s->type == NEBEL_SHAPE_CONE || s->type == NEBEL_SHAPE_CYLINDER || s->type == NEBEL_SHAPE_CAPSULE;
+    const int spindle = has_axis(s);
     const int box = s->type == NEBEL_SHAPE_BOX, end = below(state, 2), along = chance(state, .3);
     double p[3], d[3];
     random_unit(state, d);
@@ -464,13 +487,19 @@ static void cross_along_axis(const random_fog *fog, uint64_t *state, nebel_ray *
     }
 }
 
-/* Nearly level, so that the height hardly changes over the ray. */
+/* Nearly level, so that the height, or the place in one volume's linear density, hardly changes over the ray. */
 static double run_level(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 {
     cross(fog, state, ray);
+    const nebel_density *const d = &fog->volumes[below(state, (int)fog->count)].density;
+    const int linear = d->type == NEBEL_DENSITY_LINEAR;
+    double up[3] = {0, 1, 0};
+    for (int k = 0; k < 3 && linear; k++) up[k] = d->to[k] - d->from[k];
     const double steepness = chance(state, .1) ? 0 : power_of_ten(state, -18, -1);
-    ray->direction[1] = steepness * length_of(ray->direction) * (chance(state, .5) ? 1 : -1);
-    return steepness;
+    const double rise = steepness * length_of(ray->direction) / length_of(up) * (chance(state, .5) ? 1 : -1);
+    remove_along(up, ray->direction);
+    for (int k = 0; k < 3; k++) ray->direction[k] += rise * up[k];
+    return up[0] == 0 ? steepness : fmax(steepness, 1e-17); /* which is as level as rounding lets it be */
 }
 
 /* No endless rays that reach another height only after more metres than there are. */

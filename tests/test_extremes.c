@@ -364,6 +364,33 @@ static void test_segments_give_transmittances(void **unused)
     }
 }
 
+/* Fog of two colours whose optical depth reaches 1 within 1e-17 m, seen through thin fog. */
+static void test_a_wall_of_fog_is_seen_behind_thin_fog(void **unused)
+{
+    (void)unused;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_WORLD}, .extinction = {1e-6, 1e-6, 1e-6}, .source = {1.4, 1.4, 1.4}},
+        {.shape = {.type = NEBEL_SHAPE_HALF_SPACE, .point = {0, -2e5, 0}, .normal = {0, 1, 0}},
+         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 2.3, .below = NEBEL_BELOW_GROW},
+         .extinction = {.18, .18, .18},
+         .source = {.3, .3, .3}}};
+    const nebel_precision precisions[] = {NEBEL_PRECISION_DOUBLE, NEBEL_PRECISION_FLOAT};
+    const nebel_ray down = {{3, 0, 2}, {0, -1, 0}, HUGE_VAL};
+    const double through = exp(-1e-6 * 2e5), expected = 1.4 * (1 - through) + .3 * through;
+    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
+    for (int p = 0; p < 2; p++) {
+        nebel_light light;
+        const nebel_trace_desc desc = {.precision = precisions[p]};
+        assert_int_equal(nebel_trace(fog, &desc, 1, &down, sizeof down, &light, sizeof light), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            assert_true(light.transmittance[c] <= light.error);
+            assert_true(fabs(light.in_scattering[c] - expected) <= light.error + 1e-15);
+        }
+        assert_true(light.error < 1e-4);
+    }
+    nebel_release_snapshot(fog);
+}
+
 int main(int argc, char **argv)
 {
     if (argc > 1) scene_count = (size_t)strtoull(argv[1], NULL, 10);
@@ -373,6 +400,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_extreme_but_legal_fog_gives_numbers_within_their_ranges),
         cmocka_unit_test(test_distances_to_a_transmittance_lie_on_the_ray),
         cmocka_unit_test(test_segments_give_transmittances),
+        cmocka_unit_test(test_a_wall_of_fog_is_seen_behind_thin_fog),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

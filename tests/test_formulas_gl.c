@@ -40,7 +40,7 @@ static const char functions[] =
 
 static const char arguments[] =
     "float a0 = in0.x, a1 = in0.y, a2 = in0.z, a3 = in0.w, a4 = in1.x, a5 = in1.y, a6 = in1.z, a7 = in1.w;\n"
-    "float a8 = in2.x, a9 = in2.y, a10 = in2.z, a11 = in2.w, a12 = in3.x;\n"
+    "float a8 = in2.x, a9 = in2.y, a10 = in2.z, a11 = in2.w, a12 = in3.x, a13 = in3.y;\n"
     "float r0 = a0, r1 = a1, r2 = a2, r3 = a3;\n"
     "vec3 v0 = vec3(a0, a1, a2), v3 = vec3(a3, a4, a5), v6 = vec3(a6, a7, a8), v9 = vec3(a9, a10, a11);\n";
 

@@ -299,13 +299,35 @@ static void report(const char *what, nb_formula formula, const level *l, const w
     fail_msg("error %.6Lg, slack %.6Lg", w->error, w->slack);
 }
 
-/* A ray that leans by less than the noise of the direction: the plane is crossed beyond what the slack leaves free. */
+/* A ray that leans by less than the noise of the direction: only one of the ends of its half space is known. */
 static int is_level(nb_formula formula, const long double *in)
 {
     if (formula != NB_FORMULA_half_space) return 0;
-    long double along = 0, size = 0;
-    for (int i = 0; i < 3; ++i) along += in[3 + i] * in[6 + i], size += fabsl(in[3 + i] * in[6 + i]);
-    return fabsl(along) <= 1.5L * in[12] * size;
+    long double along = 0;
+    for (int i = 0; i < 3; ++i) along += in[3 + i] * in[6 + i];
+    return fabsl(along) <= 3 * in[12];
+}
+
+static int is_within(nb_quad t, long double end, long double slack)
+{
+    const nb_quad apart = t - (nb_quad)end;
+    return apart <= (nb_quad)slack && apart >= -(nb_quad)slack;
+}
+
+/* Ahead of its start it is on the side that is found, or within the slack of an end. */
+static void expect_sides(const long double *in, const quad_ray *ray, const interval *got)
+{
+    const long double *v = got->v, places[] = {1e-3L, 1, 1e3L, 1e9L, 1e15L};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; ++i) {
+        const nb_quad t = (nb_quad)places[i];
+        const nb_quad x[] = {ray->p[0] + t * ray->d[0], ray->p[1] + t * ray->d[1], ray->p[2] + t * ray->d[2]};
+        const int is_inside = nb_truth_inside(NB_FORMULA_half_space, in, x);
+        const int found_inside = places[i] > v[ENTER] && places[i] < v[LEAVE];
+        if (is_inside == found_inside || is_within(t, v[ENTER], v[ENTER_SLACK])) continue;
+        if (is_within(t, v[LEAVE], v[LEAVE_SLACK])) continue;
+        for (int k = 0; k < 14; ++k) print_message(" %.21Lg", in[k]);
+        fail_msg("%d at %Lg, not %d", found_inside, places[i], is_inside);
+    }
 }
 
 static void check_slack(const char *what, int rounded)
@@ -322,7 +344,10 @@ static void check_slack(const char *what, int rounded)
                     rounded ? ray_before_rounding(&dice, shapes[s], levels[l].digits, in) : exact_ray(in);
                 const nb_quad_interval truth = nb_truth_interval(shapes[s], in, ray.p, ray.d);
                 const interval got = ask(&levels[l], shapes[s], in);
-                if (!is_level(shapes[s], in)) note_interval(&w, in, &got, &truth);
+                if (is_level(shapes[s], in))
+                    expect_sides(in, &ray, &got);
+                else
+                    note_interval(&w, in, &got, &truth);
             }
             report(what, shapes[s], &levels[l], &w);
         }

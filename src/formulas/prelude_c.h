@@ -35,6 +35,7 @@ typedef uint32_t nb_bits;
 typedef nb_scalar nb_wscalar;
 #define NB_W(x) NB_F(x)
 #define NB_WEPSILON NB_EPSILON
+#define NB_WTINY_SQUARE NB_WTINY
 #elif defined(NB_QUAD)
 typedef nb_quad nb_wscalar;
 #define NB_W(x) ((nb_quad)x##L)
@@ -47,6 +48,9 @@ typedef long double nb_wscalar;
 typedef double nb_wscalar;
 #define NB_W(x) x
 #define NB_WEPSILON 1.1102230246251565e-16
+#endif
+#if !defined(NB_FAST)
+#define NB_WTINY_SQUARE NB_W(1e-60)
 #endif
 
 typedef nb_scalar nb_real;

@@ -10,6 +10,7 @@
 #define NB_W(x) (x)
 #define NB_EPSILON 5.9604644775390625e-8
 #define NB_WEPSILON NB_EPSILON
+#define NB_WTINY_SQUARE NB_WTINY
 
 #define nb_real float
 #define nb_wide float

@@ -197,6 +197,7 @@ typedef nb_mask nb_wmask;
 
 #define NB_W(x) NB_F(x)
 #define NB_WEPSILON NB_EPSILON
+#define NB_WTINY_SQUARE NB_WTINY
 
 static inline nb_wide nb_wsplat(double x) { return nb_splat((float)x); }
 static inline int nb_wany(nb_wmask m) { return nb_any(m); }
@@ -233,6 +234,7 @@ typedef uint64_t nb_wbits __attribute__((vector_size(8 * NB_WIDTH)));
 
 #define NB_W(x) nb_wsplat(x)
 #define NB_WEPSILON NB_W(1.1102230246251565e-16)
+#define NB_WTINY_SQUARE NB_W(1e-60)
 
 static inline nb_wide nb_wsplat(double x) { return x - (nb_wide){0}; }
 static inline int nb_wany(nb_wmask m) { return NB_WIDE_SIGNS(m) != 0; }

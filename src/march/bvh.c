@@ -276,14 +276,15 @@ void nb_bvh_free(const nebel_allocator *allocator, nb_bvh *bvh)
  * tree's:
  *
  *  - with reach = max(|o'|, extent), o' is off by u reach, low - o' is rounded by 2 u reach, and a direction that is
- * off by 4 u misleads by 8 u reach where it crosses the tree. All this is within a padding of 16 u reach that pushes
- * every face outwards before the difference is taken. The sign of a padded difference is therefore right.
+ * off by 4 u misleads by 8 u reach where it crosses the tree. All this is within a padding of 64 u reach that pushes
+ * every face outwards before the difference is taken. The sign of a padded difference is therefore right, with room for
+ * those who ask about a box with a margin of 16 u reach (part_in_bounds in trace_meet.h).
  *  - a distance is off by u for the product and 5 u for the direction and its inverse, which keeps its sign; the last
  *    comparison allows 16 u for both sides together.
  *  - a direction of 0 is a huge inverse: between the faces the distances are -huge and +huge, outside them both lie
  * beyond any other. The padding is > 0 unless everything is in one point, which is then met at t = 0. */
 
-static const double padding_per_reach = 8 * DBL_EPSILON;
+static const double padding_per_reach = 32 * DBL_EPSILON;
 static const double slack = 1 + 8 * DBL_EPSILON;
 
 static double smaller(double a, double b)

@@ -1,4 +1,4 @@
-/* Rays that come nowhere near a medium: asked before anything dear is. Included by trace_kernel.c after trace_packet.h.
+/* Rays that come nowhere near a medium: asked before anything dear is. Included by trace_kernel.c after trace_meet.h.
  *
  * Leaving a medium out must change no bit of the light, so its bounds are taken with a margin that covers the rounding
  * of every crossing: distances times roundings, more by its shape's proportions in a frame that scales, and by the

@@ -80,7 +80,7 @@ nebel_result SUFFIXED(nb_find_, NB_SUFFIX)(nb_find_job *job)
         if (!meet_fog(&w, job->snapshot)) {
             result = NEBEL_ERROR_MEMORY;
 #if defined(ASKS_QUAD)
-        } else if (!ends_are_clear(&w.m)) {
+        } else if (!is_clear(&w.m, NB_F(0.0))) {
             nb_find_job one = {job->snapshot, job->depth, job->channel, 1, ray, job->ray_stride, &job->distances[i]};
             result = nb_find_quad(&one);
 #endif

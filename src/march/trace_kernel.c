@@ -29,6 +29,7 @@
 #endif
 
 #include "trace_packet.h"
+#include "trace_meet.h"
 #include "trace_bounds.h"
 #include "trace_window.h"
 #include "trace_walk.h"
@@ -265,6 +266,9 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
     m->span_count = 0;
     m->all_ends = no_ends();
     m->grazing_ends = m->all_ends;
+    for (int c = 0; c < 3; c++) m->revealed[c] = m->doubtful_radiance[c] = NB_F(0.0);
+    m->doubt_from = NB_W(2.0) * NB_WFAR;
+    m->drift = NB_F(0.0);
     m->event_count = NB_F(0.0);
     if (snapshot->bounded_count <= FEW_MEDIA) {
         for (size_t i = 0; i < snapshot->medium_count; i++)
@@ -289,13 +293,21 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 static gathered nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
-    return (gathered){{zero, zero, zero},
-                      {one, one, one},
-                      {zero, zero, zero},
-                      {zero, zero, zero},
-                      {zero, zero, zero},
-                      {zero, zero, zero},
-                      zero};
+    return (gathered){{zero, zero, zero}, {one, one, one},    {zero, zero, zero}, {zero, zero, zero},
+                      {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+}
+
+/* The fog before the first large doubt, as far as it is in the piece. */
+static void note_clear(const march *m, const piece *p, gathered *g)
+{
+    const nb_mask clear = nb_and(p->lanes, nb_narrow_mask(nb_wand(m->doubt_from > p->start, m->doubt_from <= NB_WFAR)));
+    if (!nb_any(clear)) return;
+    const nb_wide length = nb_wmax(nb_wmin(m->doubt_from, p->end) - p->start, NB_W(0.0));
+    const piece_sum sum = sum_step(m, p->start, nb_narrow(length) * (NB_F(1.0) - NB_F(2.0) * NB_EPSILON));
+    for (int c = 0; c < 3; c++) {
+        const nb_real least = (g->depth[c] + sum.depth[c]) - (g->depth_error[c] + sum.depth_error[c]);
+        g->clear_depth[c] = nb_select(clear, nb_max(least, NB_F(0.0)), g->clear_depth[c]);
+    }
 }
 
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
@@ -351,17 +363,21 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
         return g;
     }
     open_window(m, nb_any(watched));
-    if (nb_any(watched)) pass_ends(m, &g, t, watched); /* of fog that the ray may start in */
+    if (nb_any(watched)) pass_ends(m, &g, t, watched);                  /* of fog that the ray may start in */
+    const nb_wmask to_the_end = nb_wand(lanes, nb_widen_mask(watched)); /* also where an end may lie much nearer */
     piece p;
-    while (next_piece(m, t, lanes, &p)) {
+    while (next_piece(m, t, nb_wor(lanes, to_the_end), &p)) {
+        const nb_mask here = p.lanes;
+        p.lanes = nb_and(here, nb_narrow_mask(lanes));
         const int foggy = mark_inside(m, &p);
+        if (foggy) note_clear(m, &p, &g);
         if (foggy) gather_piece(m, &p, may, &g, unbounded);
-        if (nb_any(watched)) pass_ends(m, &g, p.end, nb_and(watched, p.lanes));
+        if (nb_any(watched)) pass_ends(m, &g, p.end, nb_and(watched, here));
         if (foggy) {
             const nb_real thinnest = nb_min(nb_min(g.depth[0], g.depth[1]), g.depth[2]);
             lanes = nb_wand(lanes, nb_widen_mask(thinnest < OPAQUE_DEPTH));
         }
-        t = nb_wselect(nb_wand(lanes, nb_widen_mask(p.lanes)), p.end, t);
+        t = nb_wselect(nb_wand(nb_wor(lanes, to_the_end), nb_widen_mask(here)), p.end, t);
     }
     return g;
 }
@@ -402,6 +418,22 @@ typedef struct bounds {
     nb_real transmittance, radiance;
 } bounds;
 
+/* Where fog may be or not over a length that matters, light is what any fog there gives where it is opaque, at most. */
+static nb_real doubtful_light(const march *m, const gathered *g, int c)
+{
+    const nb_mask in_doubt = nb_narrow_mask(m->doubt_from <= NB_WFAR);
+    if (m->total != NULL || !nb_any(in_doubt)) return NB_F(0.0);
+    nb_real most = m->doubtful_radiance[c];
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        if (!nb_volume_has_fog(&k->medium->body)) continue;
+        const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
+        most = nb_max(most, nb_select(met, opaque_radiance(k, c), NB_F(0.0)));
+    }
+    const nb_real seen = nb_exp(-g->clear_depth[c]) * (NB_F(1.0) + NB_F(8.0) * LARGEST_DOUBT);
+    return nb_select(in_doubt, nb_min(most, NB_HUGE) * seen, NB_F(0.0));
+}
+
 /* exp(-depth) is steepest on the thin side, so the transmittance errs most where the optical depth is less by its
  * error. Ends that are watched have been counted on the way. */
 static bounds bound_errors(const march *m, const gathered *g)
@@ -417,7 +449,7 @@ static bounds bound_errors(const march *m, const gathered *g)
         const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
         const nb_real other = (NB_F(4.0) * NB_EPSILON + m->event_count * LEAST_DOUBT) * g->transmittance[c];
         transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + other);
-        radiance = nb_max(radiance, end_light + m->event_count * LEAST_DOUBT +
+        radiance = nb_max(radiance, end_light + doubtful_light(m, g, c) + m->event_count * LEAST_DOUBT +
                                         g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
     /* fog that the ray may only graze is not among what it met */
@@ -425,13 +457,6 @@ static bounds bound_errors(const march *m, const gathered *g)
     const nb_real met = nb_max(nb_max(most_radiance(m, 0), most_radiance(m, 1)), most_radiance(m, 2));
     const nb_real most = nb_select(grazes, NB_HUGE, met);
     return (bounds){transmittance, nb_min(radiance + g->radiance_error, most * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON))};
-}
-
-/* Light per extinction of a medium: the radiance it has where it is opaque. */
-static nb_real opaque_radiance(const contact *k, int c)
-{
-    const nb_real ratio = k->light[c] / nb_max(k->extinction[c], NB_TINY);
-    return nb_select(k->extinction[c] > NB_F(0.0), ratio, k->light[c] * NB_HUGE);
 }
 
 /* Another bound, which holds whatever the ends and the integration do: all light comes from media that give between the
@@ -612,10 +637,12 @@ static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real
 
 #elif defined(ASKS_QUAD)
 
-/* What the ends may do to the light is far less than double promises, so that it does not show who was asked. */
-static int ends_are_clear(const march *m)
+/* What the ends may do to light of that radiance, or linear densities that hardly change along endless rays, is far
+ * less than double promises, so that it does not show who was asked. */
+static int is_clear(const march *m, nb_real radiance)
 {
-    return largest(m->all_ends.depth) + largest(m->all_ends.light) <= 1e-10;
+    const nb_real behind = largest(m->all_ends.depth) * nb_max(radiance, NB_F(1.0));
+    return behind + largest(m->all_ends.light) + m->drift <= 1e-10;
 }
 
 static nebel_result ask_again(nb_trace_job *job, size_t i)
@@ -661,7 +688,7 @@ static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowanc
     w->m.rays = load_packet(rays, job->ray_stride, count);
     const nebel_result result = answer_packet(job, w, may, first, count, &g);
 #if defined(ASKS_QUAD)
-    if (result != NEBEL_ERROR_MEMORY && !ends_are_clear(&w->m)) return ask_again(job, first);
+    if (result != NEBEL_ERROR_MEMORY && !is_clear(&w->m, largest(g.radiance))) return ask_again(job, first);
 #endif
     if (result != NEBEL_OK) return result;
     nb_real error = reported_error(job, &w->m, &g);

@@ -155,7 +155,9 @@ typedef struct step {
     nb_real crude_bound[2];
 } step;
 
-/* The bound of Gauss's rule: M of the integrand, from the ceilings of the densities. */
+/* The bound of Gauss's rule: M of the integrand, from the ceilings of the densities. Or twice the largest value that
+ * the integrand has on the step, which both the integral and the rule stay below: through fog so dense that M is beyond
+ * all numbers. */
 static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_real ellipse)
 {
     const nb_real radius = NB_F(0.5) * s->length;
@@ -171,13 +173,15 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
             light[c] = light[c] + k->light[c] * ceiling;
         }
     }
+    const nb_real factor = ellipse_factor(ellipse) * radius;
     nb_real bound = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real exponent = depth[c] * along;
-        const nb_real height = nb_min(light[c] * nb_exp(exponent), NB_HUGE) * g->transmittance[c];
-        bound = nb_max(bound, nb_select(exponent < NB_F(60.0), height, NB_HUGE * g->transmittance[c]));
+        const nb_real height = nb_min(light[c] * nb_exp(exponent), NB_HUGE) * factor;
+        const nb_real least = nb_select(exponent < NB_F(60.0), height, NB_HUGE);
+        bound = nb_max(bound, nb_min(least, nb_min(light[c] * s->length, NB_HUGE) * NB_F(2.0)) * g->transmittance[c]);
     }
-    return nb_min(ellipse_factor(ellipse) * radius * bound, NB_HUGE);
+    return bound;
 }
 
 /* The range of light per extinction. Returns where some medium shines without that quotient meaning anything. */

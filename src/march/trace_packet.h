@@ -1,5 +1,5 @@
-/* A packet of rays and the fog on it: intervals of every leaf that any of them meets, and the profile of every medium
- * in coordinates along the ray. Included by trace_kernel.c once the vocabulary of formulas/prelude.h is there. */
+/* A packet of rays and the fog on it: intervals of a leaf, and the profile of a medium in coordinates along the ray.
+ * Included by trace_kernel.c once the vocabulary of formulas/prelude.h is there. */
 
 /* The double reference keeps the digits that resolving had. */
 #if defined(NB_QUAD)
@@ -41,6 +41,7 @@ typedef struct contact {
     nb_wvec3 size;          /* soft edge: half widths of a box; `ends` of a round body */
     nb_real level;          /* gaussian: m; radial: c */
     nb_real noise;          /* of the density, from the rounding of the frame */
+    nb_real drift;          /* linear: what the density may be off by per metre of the ray, besides */
     nb_mask inside;         /* within the current piece of the ray */
     nb_wvec3 side;          /* soft edge of a round body */
     double steepest;        /* soft edge: density per metre at most */
@@ -67,6 +68,10 @@ typedef struct march {
     nb_real event_count; /* two for every leaf that the lane's ray meets, whatever its company meets */
     ends all_ends;       /* what the ends may do if nothing attenuates it, */
     ends grazing_ends;   /* and those of them that are no events */
+    nb_real revealed[3]; /* optical depth that covers may take away which are no events */
+    nb_wide doubt_from;  /* from here on fog may be or not, more than a first order tells; NB_WFAR * 2: nowhere */
+    nb_real doubtful_radiance[3]; /* of the brightest medium whose ends have slack */
+    nb_real drift;                /* what the drift of linear densities may do to optical depth and to radiance */
 
     uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_window.h */
     size_t window_count;
@@ -78,6 +83,12 @@ typedef struct march {
     double *lasts;             /* of all contacts */
     size_t entered;            /* how many of the stretches the window has had */
 } march;
+
+/* What the rounding of a dot product is relative to. */
+static nb_wide products(nb_wvec3 a, nb_wvec3 b)
+{
+    return nb_wabs(a.x * b.x) + nb_wabs(a.y * b.y) + nb_wabs(a.z * b.z);
+}
 
 static nb_wvec3 wide_vector(const double v[3])
 {
@@ -119,9 +130,19 @@ static local_ray localize(const packet *rays, const nb_leaf *leaf)
                            nb_wdot3(row[2], rays->direction));
         distance = distance * WIDE(leaf->scale);
     }
-    const nb_wide size = WIDE(1.0 + leaf->radius + leaf->length);
-    local.reach = (distance + size) * (NB_W(8.0) * NB_WEPSILON) + WIDE(ORIGIN_ERROR(leaf) * leaf->scale);
+    local.reach = (distance + WIDE(leaf->size)) * (NB_W(8.0) * NB_WEPSILON) + WIDE(ORIGIN_ERROR(leaf) * leaf->scale);
     return local;
+}
+
+/* Where sums and products of the numbers of ray and body are exact, so is on which side of a face a level ray runs. In
+ * quad they are, but for turned bodies. */
+static int is_exact(const nb_leaf *leaf)
+{
+#if defined(NB_QUAD)
+    return leaf->aligned;
+#else
+    return leaf->in_place;
+#endif
 }
 
 static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
@@ -129,33 +150,42 @@ static nb_interval box_interval(const nb_leaf *leaf, const local_ray *local)
     double size = 0;
     for (int i = 0; i < 3; i++) size += fabs(leaf->low[i]) + fabs(leaf->high[i]);
     const nb_wide reach =
-        leaf->aligned ? WIDE(ORIGIN_ERROR(leaf)) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
+        is_exact(leaf) ? WIDE(ORIGIN_ERROR(leaf)) : local->reach + WIDE(size) * (NB_W(8.0) * NB_WEPSILON);
     return nb_interval_box(local->p, local->d, wide_vector(leaf->low), wide_vector(leaf->high), reach);
 }
 
-/* A turned direction is off by roundings of its length, not of its components: far crossings of a plane it nearly runs
- * along move by more than the formula, which sees exact components, can tell. */
-static nb_interval turned_half_space(nb_interval half_space, nb_wvec3 n, nb_wvec3 d)
+/* The noise of n.d. That of a turned direction is of roundings of its length, not of its components. */
+static nb_wide lean_noise(const nb_leaf *leaf, nb_wvec3 n, nb_wvec3 d)
 {
-    const nb_wide lengths = (nb_wabs(n.x) + nb_wabs(n.y) + nb_wabs(n.z)) * (nb_wabs(d.x) + nb_wabs(d.y) + nb_wabs(d.z));
-    const nb_wide doubt = lengths * (NB_W(8.0) * NB_WEPSILON) * nb_wabs(nb_wrcp_bounded(nb_wdot3(n, d)));
-    const nb_wide enter = nb_wabs(half_space.enter), leave = nb_wabs(half_space.leave);
-    half_space.enter_slack = half_space.enter_slack + nb_wselect(enter < NB_WFAR, enter * doubt, NB_W(0.0));
-    half_space.leave_slack = half_space.leave_slack + nb_wselect(leave < NB_WFAR, leave * doubt, NB_W(0.0));
-    return half_space;
+    const nb_wide lean = products(n, d) * (NB_W(4.0) * NB_WEPSILON);
+    if (leaf->aligned) return lean;
+    const nb_wide length = WIDE(leaf->scale) * (nb_wabs(n.x) + nb_wabs(n.y) + nb_wabs(n.z));
+    return lean + length * (NB_W(8.0) * NB_WEPSILON);
+}
+
+/* How small a height above a face says nothing about the side of a level ray. In quad a height is 0 where the numbers
+ * of ray and face say so. */
+static nb_wide height_blur(const nb_face *face, nb_wide reach)
+{
+#if defined(NB_QUAD)
+    (void)face, (void)reach;
+    return NB_W(0.0);
+#else
+    return face->is_sharp ? NB_W(0.0) : reach;
+#endif
 }
 
 static nb_interval planes_interval(const nb_volume *body, const nb_leaf *leaf, const local_ray *local)
 {
-    const nb_wide lean = WIDE(leaf->aligned ? 4.0 : 16.0) * NB_WEPSILON;
     nb_interval meet = nb_interval_all();
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
         const nb_wvec3 normal = wide_vector(face->normal);
         const nb_wide reach = local->reach * NB_W(3.0) + WIDE(fabs(face->distance)) * (NB_W(4.0) * NB_WEPSILON);
-        const nb_interval half_space =
-            nb_interval_half_space(local->p, local->d, normal, WIDE(face->distance), WIDE(face->tie), reach, lean);
-        meet = nb_interval_meet(meet, leaf->aligned ? half_space : turned_half_space(half_space, normal, local->d));
+        const nb_wide lean = lean_noise(leaf, normal, local->d);
+        const nb_interval half_space = nb_interval_half_space(local->p, local->d, normal, WIDE(face->distance),
+                                                              WIDE(face->tie), reach, lean, height_blur(face, reach));
+        meet = nb_interval_meet(meet, half_space);
     }
     return meet;
 }
@@ -194,8 +224,12 @@ static void linear_contact(contact *k, const packet *rays, const nebel_density *
     const nb_wvec3 from = wide_vector(density->from);
     const nb_wvec3 axis = nb_wsub3(wide_vector(density->to), from);
     const nb_wide inverse = NB_W(1.0) / nb_wdot3(axis, axis);
-    k->offset.x = nb_wdot3(nb_wsub3(rays->origin, from), axis) * inverse;
-    k->slope.x = nb_wdot3(rays->direction, axis) * inverse;
+    const nb_wvec3 p = nb_wsub3(rays->origin, from), d = rays->direction;
+    k->offset.x = nb_wdot3(p, axis) * inverse;
+    k->slope.x = nb_wdot3(d, axis) * inverse;
+    const nb_wide rounding = inverse * (NB_W(8.0) * NB_WEPSILON);
+    k->noise = nb_narrow(products(p, axis) * rounding);
+    k->drift = nb_narrow(products(d, axis) * rounding);
 }
 
 /* x = (t - closest approach) / (sqrt(2) sigma) */
@@ -514,6 +548,20 @@ static nb_real contact_density_within(const contact *k, nb_wide start, nb_real l
     return nb_radial_density(k->level, u, density->power);
 }
 
+/* How far the density of a ray that is nearly level may be off, over how many metres: as long as it may be between its
+ * limits. A ray that surely leaves them has done so where it meets the farther one, at its least steepness. */
+static nb_estimate blur_linear(nb_estimate estimate, const contact *k, nb_wide start, nb_real h)
+{
+    const nb_real end = nb_narrow(start) + h, offset = nb_narrow(k->offset.x);
+    const nb_real flattest = nb_rcp_bounded(nb_max(nb_abs(nb_narrow(k->slope.x)) - k->drift, NB_F(0.0)));
+    const nb_real farther = nb_max(nb_abs(offset), nb_abs(NB_F(1.0) - offset)) + k->noise;
+    const nb_real noise = k->noise + k->drift * nb_min(end, NB_F(2.0) * farther * flattest);
+    const nb_real first = coordinate(k, start), last = coordinate(k, start + nb_widen(h));
+    const nb_mask varies = nb_and(nb_min(first, last) <= NB_F(1.0) + noise, nb_max(first, last) >= -noise);
+    const nb_real length = nb_min(h, (NB_F(1.0) + NB_F(2.0) * noise) * flattest);
+    return blur(estimate, nb_select(varies, nb_min(noise, NB_F(1.0)), NB_F(0.0)), length);
+}
+
 /* The density integrated from start over h metres. */
 static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
 {
@@ -530,7 +578,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
                                                   : nb_height_capped_integral(from, rise, h);
     }
     case NEBEL_DENSITY_LINEAR:
-        return nb_linear_integral(u, slope, h);
+        return blur_linear(nb_linear_integral(u, slope, h), k, start, h);
     case NEBEL_DENSITY_GAUSSIAN:
         return nb_gaussian_integral(k->level, u, coordinate(k, start + nb_widen(h)), slope);
     case NEBEL_DENSITY_RADIAL:
@@ -560,171 +608,4 @@ static nb_wide contact_kink(const contact *k, nb_wide t)
 static int grows_without_bound(const nebel_density *density)
 {
     return density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_GROW;
-}
-
-/* ---- meeting the fog ------------------------------------------------------------------------- */
-
-/* How dense a medium may be within slack of t, for what an uncertain end there may do. */
-static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
-{
-    const nebel_density *density = &k->medium->body.density;
-    const nb_wide rounding = (nb_wabs(k->offset.x) + nb_wabs(k->slope.x * t)) * (NB_W(4.0) * NB_WEPSILON);
-    const nb_real u = coordinate(k, t);
-    const nb_real reach =
-        nb_abs(nb_narrow(k->slope.x)) * slack + nb_narrow(rounding) + nb_abs(u) * (NB_F(4.0) * NB_EPSILON);
-    const nb_real nearest = nb_max(nb_abs(u) - reach, NB_F(0.0));
-    switch (density->type) {
-    case NEBEL_DENSITY_HEIGHT:
-        return density->below == NEBEL_BELOW_GROW ? nb_height_density(u - reach) : nb_height_capped_density(u - reach);
-    case NEBEL_DENSITY_LINEAR:
-        return nb_linear_density(u + reach);
-    case NEBEL_DENSITY_GAUSSIAN:
-        return nb_gaussian_density(k->level * (NB_F(1.0) - NB_F(4.0) * NB_EPSILON), nearest);
-    case NEBEL_DENSITY_RADIAL:
-        return nb_min(nb_radial_density(k->level, nearest, density->power) + k->noise, NB_F(1.0));
-    case NEBEL_DENSITY_SOFT_EDGE:
-        return nb_min(soft_edge_density(k, t) + soft_edge_rise(k, slack) + soft_edge_noise(k, t), NB_F(1.0));
-    default:
-        return NB_F(1.0);
-    }
-}
-
-static ends no_ends(void)
-{
-    const nb_real zero = NB_F(0.0);
-    return (ends){{zero, zero, zero}, {zero, zero, zero}};
-}
-
-static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
-{
-    const nb_real weight = slack * end_density(k, t, slack);
-    for (int c = 0; c < 3; c++) {
-        sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
-        const nb_real seen =
-            nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
-        sum->light[c] = sum->light[c] + seen * k->light[c];
-    }
-}
-
-/* An end of a leaf may be off by slack. The end of a medium that covers moves the fog of every medium of a lower rank
- * that is there, too; those were met before, as ranks ascend. */
-static void add_end(const march *m, ends *sum, const contact *k, nb_wide t, nb_real slack)
-{
-    if (nb_volume_has_fog(&k->medium->body)) add_end_of(sum, k, t, slack);
-    if (!nb_volume_covers(&k->medium->body)) return;
-    for (size_t i = 0; i < m->contact_count; i++) {
-        const contact *other = &m->contacts[i];
-        if (other->medium->body.rank >= k->medium->body.rank) break;
-        if (!nb_volume_has_fog(&other->medium->body)) continue;
-        const nb_wmask there = nb_wand(t >= other->hull_enter, t <= other->hull_leave);
-        add_end_of(sum, other, t, nb_select(nb_narrow_mask(there), slack, NB_F(0.0)));
-    }
-}
-
-/* The part of the rays on which a medium acts. */
-typedef struct part {
-    nb_wide enter, leave;
-} part;
-
-static part part_of_rays(const march *m, const nb_volume *body)
-{
-    if (m->ignores_distances) return (part){NB_W(0.0), m->rays.t_max};
-    return (part){WIDE(body->start), nb_wmin(m->rays.t_max, WIDE(body->cutoff))};
-}
-
-/* Where lanes can meet a body of several leaves. Its bounds may be much smaller than a leaf's: what a leaf does outside
- * them must not split the ray, or its bits would depend on whether its company brought the body here. */
-static part part_in_bounds(const packet *rays, const nb_volume *body, const part *acts)
-{
-    if (body->leaf_count == 1) return *acts;
-    const nb_interval span =
-        nb_interval_box(rays->origin, rays->direction, wide_vector(body->low), wide_vector(body->high), NB_W(0.0));
-    return (part){nb_wmax(span.enter, acts->enter), nb_wmin(span.leave, acts->leave)};
-}
-
-/* How far an end with slack may be from where it is, both within the bounds. */
-static nb_real slack_within(nb_wide end, nb_wide slack, const part *bounds, nb_wmask counts)
-{
-    const nb_wide here = nb_wclamp(end, bounds->enter, bounds->leave);
-    const nb_wide before = here - nb_wclamp(end - slack, bounds->enter, bounds->leave);
-    const nb_wide behind = nb_wclamp(end + slack, bounds->enter, bounds->leave) - here;
-    return nb_narrow(nb_wselect(counts, nb_wmax(before, behind), NB_W(0.0)));
-}
-
-/* Slack that changes the light by less than this is left out, and counted once for all in bound_error. */
-#define LEAST_DOUBT (NB_F(0.015625) * NB_EPSILON)
-
-/* The slack of an end where it may matter: nearly never in float, whose ends are doubles. */
-static nb_wide slack_that_matters(const contact *k, nb_wide slack)
-{
-    if (grows_without_bound(&k->medium->body.density)) return slack;
-    const nb_wide least = nb_widen(LEAST_DOUBT) * WIDE(nb_volume_covers(&k->medium->body) ? 0 : k->least_slack);
-    return nb_wselect(slack < least, NB_W(0.0), slack);
-}
-
-/* Clips a leaf's interval to where the medium acts. Ends have slack as far as they may move where the ray and the body
- * are. */
-static leaf_span clip_interval(const contact *k, const nb_interval *raw, const part *acts, const part *bounds)
-{
-    const nb_wide first = slack_that_matters(k, raw->enter_slack), last = slack_that_matters(k, raw->leave_slack);
-    const nb_wmask some = raw->enter - first <= raw->leave + last;
-    const nb_wmask counts = nb_wand(some, bounds->enter < bounds->leave);
-    leaf_span span = {nb_wmax(raw->enter, acts->enter), nb_wselect(counts, nb_wmin(raw->leave, acts->leave), NB_W(0.0)),
-                      NB_F(0.0), NB_F(0.0)};
-    if (!nb_wany(first + last > NB_W(0.0))) return span;
-    span.enter_slack = slack_within(raw->enter, first, bounds, counts);
-    span.leave_slack = slack_within(raw->leave, last, bounds, counts);
-    return span;
-}
-
-static void count_ends(march *m, const contact *k, const leaf_span *span)
-{
-    if (!nb_any(span->enter_slack + span->leave_slack > NB_F(0.0))) return;
-    const nb_mask grazes = nb_narrow_mask(span->enter >= span->leave);
-    add_end(m, &m->all_ends, k, span->enter, span->enter_slack);
-    add_end(m, &m->all_ends, k, span->leave, span->leave_slack);
-    const nb_real slack = nb_select(grazes, span->enter_slack + span->leave_slack, NB_F(0.0));
-    if (nb_any(slack > NB_F(0.0))) add_end(m, &m->grazing_ends, k, span->enter, slack);
-}
-
-/* Intervals of all leaves of one medium. Returns whether any lane is inside any of them. */
-static int meet_leaves(march *m, contact *k)
-{
-    const nb_volume *body = &k->medium->body;
-    const part acts = part_of_rays(m, body), bounds = part_in_bounds(&m->rays, body, &acts);
-    int hit = 0;
-    k->hull_enter = NB_WFAR;
-    k->hull_leave = NB_W(0.0);
-    for (size_t i = 0; i < body->leaf_count; i++) {
-        const nb_interval raw = leaf_interval(&m->rays, body, &body->leaves[i]);
-        const leaf_span span = clip_interval(k, &raw, &acts, &bounds);
-        const nb_wmask met = span.enter < span.leave;
-        count_ends(m, k, &span);
-        m->spans[k->first_span + i] = span;
-        m->event_count = m->event_count + nb_select(nb_narrow_mask(met), NB_F(2.0), NB_F(0.0));
-        k->hull_enter = nb_wselect(met, nb_wmin(span.enter, k->hull_enter), k->hull_enter);
-        k->hull_leave = nb_wselect(met, nb_wmax(span.leave, k->hull_leave), k->hull_leave);
-        hit = hit || nb_wany(met);
-    }
-    return hit;
-}
-
-/* Adds a medium to the march when any ray meets it. */
-static void meet_medium(march *m, const nb_medium *medium)
-{
-    contact *k = &m->contacts[m->contact_count];
-    k->medium = medium;
-    k->first_span = m->span_count;
-    k->noise = NB_F(0.0);
-    k->steepest = 0;
-    for (int c = 0; c < 3; c++) {
-        k->extinction[c] = REAL(medium->body.extinction[c]);
-        k->light[c] = REAL(medium->light[c]);
-        k->radiance[c] = REAL(medium->radiance[c]);
-    }
-    k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
-    if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
-    if (!meet_leaves(m, k)) return;
-    m->contact_count++;
-    m->span_count += medium->body.leaf_count;
 }

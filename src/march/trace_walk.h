@@ -7,7 +7,8 @@ typedef struct gathered {
     nb_real radiance[3];
     nb_real depth_error[3];
     nb_real ends_depth[3];  /* that of ends which were weighed against what lies behind them */
-    nb_real least_depth[3]; /* what the optical depth is at least, in spite of ends farther on */
+    nb_real least_depth[3]; /* what the optical depth is at least, in spite of ends farther on, */
+    nb_real clear_depth[3]; /* and up to where no end is in large doubt */
     nb_real radiance_error; /* rounding, ends and the bound of adaptive integration; the worst channel of each piece */
 } gathered;
 
@@ -240,9 +241,10 @@ static presence body_near(const march *m, const contact *k, size_t which, nb_wid
             continue;
         }
         const leaf_span *span = &m->spans[k->first_span + leaf];
+        const nb_wide enter = place_on_ray(m, span->enter), leave = place_on_ray(m, span->leave);
         const nb_wide enter_slack = nb_widen(span->enter_slack), leave_slack = nb_widen(span->leave_slack);
-        const nb_wmask may = nb_wand(span->enter - enter_slack <= to, span->leave + leave_slack >= from);
-        const nb_wmask must = nb_wand(span->enter + enter_slack <= from, span->leave - leave_slack >= to);
+        const nb_wmask may = nb_wand(enter - enter_slack <= to, leave + leave_slack >= from);
+        const nb_wmask must = nb_wand(enter + enter_slack <= from, leave - leave_slack >= to);
         most[top] = leaf == which ? nb_mask_true : nb_narrow_mask(may);
         least[top] = leaf == which ? nb_mask_false : nb_narrow_mask(must);
         top++;
@@ -355,7 +357,8 @@ static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
     }
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        const nb_real least = g->depth[c] - (g->depth_error[c] + g->ends_depth[c] + p.less.depth[c]);
+        const nb_real doubt = g->depth_error[c] + g->ends_depth[c] + p.less.depth[c] + m->revealed[c];
+        const nb_real least = g->depth[c] - doubt;
         nb_real *depth = m->total == NULL ? &g->depth_error[c] : &g->ends_depth[c];
         g->least_depth[c] = nb_select(lanes, nb_max(g->least_depth[c], least), g->least_depth[c]);
         *depth = *depth + p.here.depth[c];

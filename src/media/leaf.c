@@ -63,6 +63,8 @@ static int set_frame(nb_leaf *leaf, const nb_affine *world, const nb_quad center
         leaf->matrix[i] = (double)leaf->exact_matrix[i];
         leaf->aligned = leaf->aligned && leaf->quad_matrix[i] == (i % 4 == 0 ? 1 : 0);
     }
+    leaf->in_place = leaf->aligned;
+    for (int i = 0; i < 3; i++) leaf->in_place = leaf->in_place && leaf->quad_origin[i] == 0;
     leaf->scale = 0;
     for (int i = 0; i < 3; i++) {
         const long double *row = &leaf->exact_matrix[3 * i];
@@ -241,6 +243,19 @@ static void set_face(nb_face *face, const double normal[3], double distance)
                                     face->normal[2] * face->normal[2]);
 }
 
+/* Across an axis the height of a point over a plane is the product of one component and a difference: of exact sign
+ * where either is exact and the other rounded once. */
+static int is_sharp(const nb_leaf *leaf, const nb_face *face)
+{
+    int axes = 0, halves = 0, exact = leaf->aligned && leaf->origin_error == 0;
+    for (int i = 0; i < 3; i++) {
+        axes += face->normal[i] != 0;
+        halves += fabs(face->normal[i]) == 0.5;
+        exact = exact && leaf->origin_rest[i] == 0;
+    }
+    return exact && axes == 1 && (face->distance == 0 || (leaf->in_place && halves == 1));
+}
+
 /* The faces in world coordinates relative to the leaf's origin, for the bounds; side -1: turned around. 0: the body is
  * empty. */
 static int bound_faces(const nb_leaf *leaf, const nb_face *faces, int side, double low[3], double high[3])
@@ -274,6 +289,7 @@ static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_
     const int half_space = shape->type == NEBEL_SHAPE_HALF_SPACE;
     nb_quad center[3] = {0, 0, 0};
     leaf->type = NB_LEAF_PLANES;
+    leaf->size = 1;
     leaf->face_count = half_space ? 1 : shape->plane_count;
     if (half_space) {
         widen_point(shape->point, center);
@@ -282,10 +298,19 @@ static nebel_result set_planes(const nebel_log *log, nb_leaf *leaf, const nebel_
     for (size_t i = 0; i < leaf->face_count && !half_space; i++)
         set_face(&faces[i], shape->planes[i].normal, shape->planes[i].distance);
     if (!set_frame(leaf, world, center, no_shaping)) return nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
+    for (size_t i = 0; i < leaf->face_count; i++) faces[i].is_sharp = is_sharp(leaf, &faces[i]);
     if (bound_faces(leaf, faces, 1, low, high)) return NEBEL_OK;
     return nb_fail(log, NEBEL_ERROR_VALUE, "convex: no point is inside all planes; the body is empty%s",
                    bound_faces(leaf, faces, -1, low, high) ? ": its normals point inwards, they must point out of it"
                                                            : "");
+}
+
+/* Of what has no end as much as its numbers say. */
+static double size_of(const nb_leaf *leaf, const double low[3], const double high[3])
+{
+    double world = 0;
+    for (int i = 0; i < 3; i++) world += high[i] - low[i];
+    return 1 + leaf->radius + leaf->length + (isfinite(world) ? leaf->scale * world : 0);
 }
 
 nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, const nb_affine *world, nb_face *faces,
@@ -319,5 +344,7 @@ nebel_result nb_leaf_resolve(const nebel_log *log, const nebel_shape *shape, con
         regular = set_axis_body(leaf, shape, world, low, high);
         break;
     }
-    return regular ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
+    if (!regular) return nb_fail(log, NEBEL_ERROR_VALUE, "transform: is singular");
+    leaf->size = size_of(leaf, low, high);
+    return NEBEL_OK;
 }

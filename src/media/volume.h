@@ -27,15 +27,18 @@ typedef enum nb_leaf_type {
 } nb_leaf_type;
 
 /* normal.x <= distance, the largest component of the normal within 0.5 and 1. `tie` decides for rays that lie in the
- * face: the body with tie < 0 owns it, so that of two bodies that touch there exactly one does. */
+ * face: the body with tie < 0 owns it, so that of two bodies that touch there exactly one does. The plane is sharp
+ * where arithmetic in double finds the side of every point that is a double. */
 typedef struct nb_face {
     double normal[3], distance, tie;
     double inverse_length; /* of the normal */
+    int is_sharp;
 } nb_face;
 
 typedef struct nb_leaf {
     nb_leaf_type type;
-    int aligned;                                                 /* the matrix is the identity */
+    int aligned;                                                 /* the matrix is the identity, */
+    int in_place;                                                /* and the origin 0 */
     double origin[3];                                            /* local = matrix (world - origin) */
     double origin_rest[3];                                       /* what rounding to double took from the origin */
     double origin_error;                                         /* what resolving and rounding may have lost of it */
@@ -44,6 +47,7 @@ typedef struct nb_leaf {
     nb_quad quad_origin[3], quad_matrix[9];                      /* the same as resolved */
     double resolved_error;                                       /* what resolving may have lost of the origin */
     double scale;                                                /* largest row length of the matrix */
+    double size;                                                 /* of the body in any coordinates of its frame */
     double low[3], high[3];                                      /* box */
     double radius, slope;                                        /* ball, cone */
     double length;                                               /* capsule */

@@ -83,8 +83,9 @@ nb_interval nb_planes_interval(int first, int count, nb_ray ray)
     nb_interval span = nb_interval_all();
     for (int i = 0; i < count; i++) {
         nb_vec4 face = NEBEL_WORD(first + i);
+        float lean = 2.0 * NB_EPSILON * dot(abs(face.xyz), abs(ray.direction));
         span = nb_interval_meet(span, nb_interval_half_space(ray.origin, ray.direction, face.xyz, face.w,
-                                                             nb_face_tie(face.xyz), 0.0, 4.0 * NB_EPSILON));
+                                                             nb_face_tie(face.xyz), 0.0, lean, 0.0));
     }
     return span;
 }
