@@ -158,10 +158,11 @@ function(nebel_add_tool_parts)
     endif()
 endfunction()
 
-# The window of `nebel view`, with the one file in C++.
+# The window of `nebel view`, with its controls in C++.
 function(nebel_add_viewer)
     nebel_glob(sources tools/view/*.c)
-    add_library(nebel_panel OBJECT tools/view/panel.cpp)
+    nebel_glob(panel_sources tools/view/*.cpp)
+    add_library(nebel_panel OBJECT ${panel_sources})
     set_target_properties(nebel_panel PROPERTIES CXX_STANDARD 11 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF)
     set(warnings ${nebel_warnings})
     list(REMOVE_ITEM warnings -Wstrict-prototypes -Wmissing-prototypes)

@@ -344,8 +344,9 @@ static void test_bad_input(void **state)
     assert_int_equal(nebel_tile_volumes(snapshot, &view, 2, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_tile_volumes(snapshot, &view, 24, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_tile_volumes(snapshot, &view, 512, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    memset(&messages, 0, sizeof messages);
     assert_int_equal(nebel_tile_volumes(snapshot, &view, 16, entries, 1, &count), NEBEL_ERROR_LIMIT);
-    assert_non_null(strstr(messages.text, "room for 1"));
+    assert_string_equal(messages.text, ""); /* those who ask again with more room have made no mistake */
     const size_t live = memory.live;
     for (size_t fail = 1; fail <= 3; fail++) {
         memory.fail_first = fail;

@@ -12,12 +12,13 @@
 
 #include <string.h>
 
-enum { SIZE, EXPOSURE, FRAME, SCREENSHOT, CONTROLS };
+enum { SIZE, EXPOSURE, FRAME, UI_SCALE, SCREENSHOT, CONTROLS };
 
 static const nb_option options[] = {
     [SIZE] = {"size", 's', "WxH", "Of the picture in the window, each side 64 to 8192.\nDefault: 1280x720."},
     [EXPOSURE] = {"exposure", 'e', "EV", "Stops, -20 to 20: 1 doubles the light. Default: 0."},
     [FRAME] = {"frame", 0, "N", "The frame of a moving camera or fog, 0 to 1000000.\nDefault: 0."},
+    [UI_SCALE] = {"ui-scale", 0, "N", "How large the controls are, 0.5 to 4. Default: what\nthe screen says."},
     [SCREENSHOT] = {"screenshot", 0, "FILE",
                     "Writes the window (.png or .exr) when its picture is\ncomplete, and ends."},
     [CONTROLS] =
@@ -60,6 +61,7 @@ static int view(nb_arguments *arguments)
     read_size(arguments, &wanted);
     wanted.exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
     wanted.frame = nb_options_number(arguments, FRAME, 0, 1000000, 0);
+    wanted.scale = nb_options_number(arguments, UI_SCALE, 0.5, 4, 0);
     wanted.screenshot = arguments->values[SCREENSHOT];
     wanted.controls = arguments->values[CONTROLS];
     if (wanted.screenshot != NULL && nebel_find_image_format(wanted.screenshot) == NEBEL_IMAGE_NONE)

@@ -204,8 +204,9 @@ nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *dep
  * pixels wide and high (a power of two, 4 to 256), counted from the lower left corner, row by row; tile k owns
  * entries[2 k] = first and entries[2 k + 1] = count, and the volumes of the tile are entries[first] ... entries[first +
  * count - 1], ascending, as nebel_trace_list takes them. *count receives the number of entries needed; they are written
- * when capacity is at least that. `view` must be the one of the eye that the fog was packed for. O(volumes + entries).
- * Any thread. Errors: ARGUMENT (a matrix that cannot be inverted or is not finite), MEMORY, LIMIT as nebel_pack_fog. */
+ * when capacity is at least that; with less the result is LIMIT, without a message. `view` must be the one of the eye
+ * that the fog was packed for. O(volumes + entries). Any thread. Errors: ARGUMENT (a matrix that cannot be inverted or
+ * is not finite), MEMORY, LIMIT as nebel_pack_fog. */
 nebel_result nebel_tile_volumes(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t tile_size,
                                 uint32_t *entries, size_t capacity, size_t *count);
 

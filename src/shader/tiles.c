@@ -345,9 +345,7 @@ static nebel_result list_tiles(tiler *t, uint32_t *entries, size_t capacity, siz
         return nb_fail(log, NEBEL_ERROR_LIMIT, "tiles: %zu entries; shaders can address %zu: make tiles larger", *count,
                        MOST_ENTRIES);
     if (entries == NULL) return NEBEL_OK;
-    if (capacity < *count)
-        return nb_fail(log, NEBEL_ERROR_LIMIT, "tiles: %zu entries are needed, there is room for %zu", *count,
-                       capacity);
+    if (capacity < *count) return NEBEL_ERROR_LIMIT; /* no message: who asks again with more room is in the right */
     write_entries(t, entries);
     return NEBEL_OK;
 }

@@ -6,159 +6,341 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void *copy_array(const void *from, size_t count, size_t size)
+static nebel_result fail_memory(const nb_draft *draft)
 {
-    void *const copy = malloc(count > 0 ? count * size : 1);
-    if (copy != NULL && count > 0) memcpy(copy, from, count * size);
-    return copy;
-}
-
-static nebel_result allocate(nb_draft *draft)
-{
-    const size_t count = draft->data.volume_count;
-    draft->volumes = copy_array(draft->data.volumes, count, sizeof *draft->volumes);
-    draft->good = copy_array(draft->data.volumes, count, sizeof *draft->good);
-    draft->written = copy_array(draft->data.volumes, count, sizeof *draft->written);
-    draft->ids = calloc(count + 1, sizeof *draft->ids);
-    draft->file = draft->data;
-    draft->data.volumes = draft->volumes;
-    if (draft->volumes != NULL && draft->good != NULL && draft->written != NULL && draft->ids != NULL) return NEBEL_OK;
     draft->log.write(NEBEL_ERROR_MEMORY, "memory is out for the scene", draft->log.user);
     return NEBEL_ERROR_MEMORY;
 }
 
-static nebel_result add_particles(nb_draft *draft)
+/* ---- fog
+ * -------------------------------------------------------------------------------------------------------------
+ */
+
+static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
-    nebel_particle *particles = NULL;
-    if (draft->data.particle_count == 0) return NEBEL_OK;
-    nebel_result result = nebel_make_scene_particles(draft->scene, &particles);
-    for (size_t i = 0; i < draft->data.particle_count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_particle_volume(&particles[i]);
-        result = nebel_add_volume(draft->fog, &volume, NULL);
+    nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
+    memcpy(desc.ambient, edition->ambient, sizeof desc.ambient);
+    return nebel_create_fog(&desc, fog);
+}
+
+static nebel_result commit_fog(nb_draft *draft)
+{
+    nebel_snapshot *fresh = NULL;
+    const nebel_result result = nebel_commit_fog(draft->fog, &fresh);
+    if (result != NEBEL_OK) return result;
+    nebel_release_snapshot(draft->volumes);
+    nebel_release_snapshot(draft->whole);
+    draft->volumes = fresh;
+    draft->whole = NULL;
+    return NEBEL_OK;
+}
+
+/* As exact fog, each for itself. */
+static nebel_result add_cells(nebel_fog *fog, const nb_edition *edition)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < edition->cells_desc.cell_count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_cell_volume(&edition->cells[i]);
+        if (edition->cells[i].density > 0) result = nebel_add_volume(fog, &volume, NULL);
     }
-    nebel_free_scene_particles(draft->scene, particles);
     return result;
 }
 
-static nebel_result fill_fog(nb_draft *draft)
+/* Cells that overlap are no scene. */
+static nebel_result check_cells(const nb_draft *draft, const nb_edition *edition)
 {
-    nebel_fog_desc desc = {.log = draft->log};
-    memcpy(desc.ambient, draft->data.ambient, sizeof desc.ambient);
-    nebel_result result = nebel_create_fog(&desc, &draft->fog);
-    for (size_t i = 0; i < draft->data.volume_count && result == NEBEL_OK; i++) {
-        result = nebel_add_volume(draft->fog, &draft->volumes[i], &draft->ids[i]);
-    }
-    if (result == NEBEL_OK) result = add_particles(draft);
-    return result == NEBEL_OK ? nebel_commit_fog(draft->fog, &draft->snapshot) : result;
+    nebel_cells_desc desc = edition->cells_desc;
+    nebel_cells *cells = NULL;
+    if (edition->cells == NULL) return NEBEL_OK;
+    desc.log = draft->log;
+    const nebel_result result = nebel_create_cells(&desc, &cells);
+    nebel_destroy_cells(cells);
+    return result;
 }
 
-static void place_frame(nb_draft *draft, double frame)
+/* In place of the fog that is there. On an error that one stays. */
+static nebel_result fill_fog(nb_draft *draft, const nb_edition *edition)
 {
-    draft->frame = frame;
-    for (size_t i = 0; i < draft->data.volume_count; i++) {
-        if (nb_draft_is_moving(draft, i)) draft->volumes[i] = nebel_scene_volume(draft->scene, i, frame);
+    nebel_fog *fog = NULL;
+    nebel_volume_id *const ids = calloc(edition->count + 1, sizeof *ids);
+    if (ids == NULL) return fail_memory(draft);
+    nebel_result result = create_fog(draft, edition, &fog);
+    for (size_t i = 0; i < edition->count && result == NEBEL_OK; i++)
+        result = nebel_add_volume(fog, &edition->volumes[i], &ids[i]);
+    if (result == NEBEL_OK) result = add_cells(fog, edition);
+    if (result != NEBEL_OK) {
+        nebel_destroy_fog(fog);
+        free(ids);
+        return result;
     }
-    if (draft->data.camera_key_count > 0 || draft->data.turntable_frames > 0) {
-        draft->data.camera = nebel_scene_camera(draft->scene, frame);
+    nebel_destroy_fog(draft->fog);
+    free(draft->ids);
+    draft->fog = fog;
+    draft->ids = ids;
+    return commit_fog(draft);
+}
+
+/* Only numbers of the edition are not as they were. */
+static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_edition *now)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < now->count && result == NEBEL_OK; i++)
+        if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]))
+            result = nebel_change_volume(draft->fog, draft->ids[i], &now->volumes[i]);
+    if (result == NEBEL_OK) result = nebel_set_ambient(draft->fog, now->ambient);
+    if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
+    return result == NEBEL_OK ? commit_fog(draft) : result;
+}
+
+/* ---- particles
+ * -------------------------------------------------------------------------------------------------------
+ */
+
+static nebel_result scatter(const nb_draft *draft, const nb_edition *edition, nebel_particle *particles)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < edition->nebula_count && result == NEBEL_OK; i++) {
+        nebel_nebula_desc desc = edition->nebulae[i];
+        desc.log = draft->log;
+        result = nebel_scatter_nebula(&desc, particles);
+        particles += desc.count;
     }
+    return result;
+}
+
+/* In place of those that are there. On an error they stay. */
+static nebel_result strew(nb_draft *draft, const nb_edition *edition)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < edition->nebula_count; i++) count += edition->nebulae[i].count;
+    nebel_particle *const particles = calloc(count + 1, sizeof *particles);
+    if (particles == NULL) return fail_memory(draft);
+    const nebel_result result = scatter(draft, edition, particles);
+    if (result != NEBEL_OK) {
+        free(particles);
+        return result;
+    }
+    free(draft->particles);
+    draft->particles = particles;
+    draft->particle_count = count;
+    nebel_release_snapshot(draft->whole);
+    draft->whole = NULL;
+    return NEBEL_OK;
+}
+
+static nebel_result add_all(const nb_draft *draft, nebel_fog *fog)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < draft->good.count && result == NEBEL_OK; i++)
+        result = nebel_add_volume(fog, &draft->good.volumes[i], NULL);
+    if (result == NEBEL_OK) result = add_cells(fog, &draft->good);
+    for (size_t i = 0; i < draft->particle_count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_particle_volume(&draft->particles[i]);
+        result = nebel_add_volume(fog, &volume, NULL);
+    }
+    return result;
+}
+
+nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole)
+{
+    nebel_fog *fog = NULL;
+    nebel_result result = NEBEL_OK;
+    if (draft->whole == NULL && draft->particle_count == 0) {
+        draft->whole = nebel_retain_snapshot(draft->volumes);
+    } else if (draft->whole == NULL) {
+        result = create_fog(draft, &draft->good, &fog);
+        if (result == NEBEL_OK) result = add_all(draft, fog);
+        if (result == NEBEL_OK) result = nebel_commit_fog(fog, &draft->whole);
+        nebel_destroy_fog(fog);
+    }
+    *whole = draft->whole;
+    return result;
+}
+
+/* ---- what moves
+ * ------------------------------------------------------------------------------------------------------
+ */
+
+nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume)
+{
+    const size_t source = draft->now.sources[volume];
+    return source == NEBEL_NEW_VOLUME ? NEBEL_VOLUME_WRITTEN : nebel_scene_volume_origin(draft->file, source);
+}
+
+/* Parts and planes do not move, and are the edition's own. */
+static void place_volume(const nb_draft *draft, nb_edition *edition, size_t index)
+{
+    nebel_shape *const shape = &edition->volumes[index].shape;
+    const nebel_shape own = *shape;
+    edition->volumes[index] = nebel_scene_volume(draft->file, edition->sources[index], draft->frame);
+    shape->parts = own.parts;
+    shape->planes = own.planes;
+}
+
+static void place_volumes(nb_draft *draft)
+{
+    for (size_t i = 0; i < draft->now.count; i++)
+        if (nb_draft_origin(draft, i) == NEBEL_VOLUME_MOVING) place_volume(draft, &draft->now, i);
+}
+
+static void place_camera(nb_draft *draft)
+{
+    if (draft->data.camera_key_count == 0 && draft->data.turntable_frames == 0) return;
+    draft->data.camera = nebel_scene_camera(draft->file, draft->frame);
+}
+
+/* ---- open and close
+ * --------------------------------------------------------------------------------------------------
+ */
+
+static nebel_result make_editions(nb_draft *draft)
+{
+    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    if (nb_edition_make(scene, &draft->written) != 0 || nb_edition_make(scene, &draft->now) != 0)
+        return fail_memory(draft);
+    place_volumes(draft);
+    place_camera(draft);
+    nb_edition_show(&draft->now, &draft->data);
+    return nb_edition_copy(&draft->now, &draft->good) == 0 ? NEBEL_OK : fail_memory(draft);
 }
 
 nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
 {
     const nebel_scene_desc desc = {.log = *log};
-    *draft = (nb_draft){.log = *log};
+    *draft = (nb_draft){.log = *log, .frame = frame};
     nebel_result result = nebel_load_scene(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
     if (result == NEBEL_OK) {
+        draft->file = draft->scene;
         draft->data = *nebel_scene_contents(draft->scene);
-        result = allocate(draft);
+        result = make_editions(draft);
     }
-    if (result == NEBEL_OK) {
-        place_frame(draft, frame);
-        result = fill_fog(draft);
-    }
+    if (result == NEBEL_OK) result = fill_fog(draft, &draft->good);
+    if (result == NEBEL_OK) result = strew(draft, &draft->good);
     if (result != NEBEL_OK) nb_draft_close(draft);
     return result;
 }
 
 void nb_draft_close(nb_draft *draft)
 {
-    nebel_release_snapshot(draft->snapshot);
+    nebel_release_snapshot(draft->volumes);
+    nebel_release_snapshot(draft->whole);
     nebel_destroy_fog(draft->fog);
-    free(draft->volumes);
-    free(draft->good);
-    free(draft->written);
     free(draft->ids);
+    free(draft->particles);
+    nb_history_forget(&draft->history);
+    nb_edition_free(&draft->now);
+    nb_edition_free(&draft->good);
+    nb_edition_free(&draft->written);
+    if (draft->file != draft->scene) nebel_destroy_scene(draft->file);
     nebel_destroy_scene(draft->scene);
     *draft = (nb_draft){.scene = NULL};
 }
 
-/* A change that the fog does not take is undone. Volumes are compared as bytes, so that their padding is copied, too.
+/* ---- changes
+ * ---------------------------------------------------------------------------------------------------------
  */
-static nebel_result change_volumes(nb_draft *draft)
+
+static nebel_result apply(nb_draft *draft)
 {
-    nebel_result first = NEBEL_OK;
-    for (size_t i = 0; i < draft->data.volume_count; i++) {
-        if (memcmp(&draft->volumes[i], &draft->good[i], sizeof *draft->good) == 0) continue;
-        const nebel_result result = nebel_change_volume(draft->fog, draft->ids[i], &draft->volumes[i]);
-        if (result == NEBEL_OK) {
-            memcpy(&draft->good[i], &draft->volumes[i], sizeof *draft->good);
-        } else {
-            memcpy(&draft->volumes[i], &draft->good[i], sizeof *draft->good);
-            if (first == NEBEL_OK) first = result;
-        }
+    const nb_edition *const now = &draft->now, *const was = &draft->good;
+    nebel_result result = NEBEL_OK;
+    if (!nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
+    const int has_other_cells = !nb_edition_has_same_cells(now, was);
+    if (result == NEBEL_OK && has_other_cells) result = check_cells(draft, now);
+    if (result != NEBEL_OK) return result;
+    return nb_edition_has_same_sources(now, was) && !has_other_cells ? change_fog(draft, was, now)
+                                                                     : fill_fog(draft, now);
+}
+
+/* The same the other way, from whatever has been reached. */
+static void revert(nb_draft *draft)
+{
+    nb_edition back;
+    if (nb_edition_copy(&draft->good, &back) != 0) return;
+    if (!nb_edition_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
+    nb_edition_free(&draft->now);
+    draft->now = back;
+    (void)fill_fog(draft, &draft->good);
+}
+
+/* `good` becomes what `now` is. */
+static nebel_result settle(nb_draft *draft, int is_step)
+{
+    nb_edition fresh;
+    nebel_result result = apply(draft);
+    if (result == NEBEL_OK && nb_edition_copy(&draft->now, &fresh) != 0) result = fail_memory(draft);
+    if (result != NEBEL_OK) {
+        revert(draft);
+    } else {
+        if (is_step) nb_history_note(&draft->history, &draft->good);
+        nb_edition_free(&draft->good);
+        draft->good = fresh;
     }
-    return first;
+    nb_edition_show(&draft->now, &draft->data);
+    return result;
 }
 
 nebel_result nb_draft_commit(nb_draft *draft)
 {
-    nebel_snapshot *fresh = NULL;
-    const nebel_result changed = change_volumes(draft);
-    nebel_result result = nebel_set_ambient(draft->fog, draft->data.ambient);
-    if (result == NEBEL_OK) result = nebel_commit_fog(draft->fog, &fresh);
-    if (result != NEBEL_OK) return result;
-    nebel_release_snapshot(draft->snapshot);
-    draft->snapshot = fresh;
-    return changed;
+    return nb_edition_is_same(&draft->now, &draft->good) ? NEBEL_OK : settle(draft, 1);
 }
 
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
 {
-    place_frame(draft, frame);
-    return nb_draft_commit(draft);
+    draft->frame = frame;
+    place_volumes(draft);
+    place_camera(draft);
+    return settle(draft, 0);
 }
 
-int nb_draft_is_moving(const nb_draft *draft, size_t volume)
+int nb_draft_undo(nb_draft *draft, nebel_result *result)
 {
-    return nebel_scene_volume_origin(draft->scene, volume) == NEBEL_VOLUME_MOVING;
+    if (!nb_history_undo(&draft->history, &draft->now)) return 0;
+    place_volumes(draft);
+    *result = settle(draft, 0);
+    return 1;
+}
+
+int nb_draft_redo(nb_draft *draft, nebel_result *result)
+{
+    if (!nb_history_redo(&draft->history, &draft->now)) return 0;
+    place_volumes(draft);
+    *result = settle(draft, 0);
+    return 1;
 }
 
 /* ---- the file
  * --------------------------------------------------------------------------------------------------------
  */
 
-static int is_same(const double a[3], const double b[3])
+static int has_same_light(const nb_edition *a, const nb_edition *b)
 {
-    return memcmp(a, b, sizeof(double[3])) == 0;
+    const size_t size = sizeof a->background;
+    return memcmp(a->background, b->background, size) == 0 && memcmp(a->ambient, b->ambient, size) == 0 &&
+           memcmp(a->sun_direction, b->sun_direction, size) == 0 &&
+           memcmp(a->sun_irradiance, b->sun_irradiance, size) == 0 && a->max_opacity == b->max_opacity;
 }
 
 int nb_draft_is_changed(const nb_draft *draft)
 {
-    const nebel_scene_data *const now = &draft->data, *const was = &draft->file;
-    for (size_t i = 0; i < now->volume_count; i++) {
-        if (nebel_scene_volume_origin(draft->scene, i) == NEBEL_VOLUME_WRITTEN &&
-            memcmp(&draft->volumes[i], &draft->written[i], sizeof *draft->written) != 0)
+    const nb_edition *const now = &draft->now, *const was = &draft->written;
+    if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
+        !nb_edition_has_same_cells(now, was) || !has_same_light(now, was))
+        return 1;
+    for (size_t i = 0; i < now->count; i++) {
+        if (nb_draft_origin(draft, i) != NEBEL_VOLUME_WRITTEN) continue;
+        if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]) || strcmp(now->names[i], was->names[i]) != 0)
             return 1;
     }
-    return !is_same(now->background, was->background) || !is_same(now->ambient, was->ambient) ||
-           !is_same(now->sun_direction, was->sun_direction) || !is_same(now->sun_irradiance, was->sun_irradiance);
+    return 0;
 }
 
 int nb_draft_can_save_camera(const nb_draft *draft)
 {
-    return draft->file.camera_key_count == 0 && draft->file.turntable_frames == 0 &&
-           draft->file.camera.projection != NEBEL_PROJECTION_PANORAMA;
+    const nebel_scene_data *const file = nebel_scene_contents(draft->file);
+    return file->camera_key_count == 0 && file->turntable_frames == 0 &&
+           file->camera.projection != NEBEL_PROJECTION_PANORAMA;
 }
 
 /* To a hundred-thousandth of the distance: nobody sees the difference, and the file stays readable. */
@@ -173,15 +355,69 @@ static nebel_camera round_camera(nebel_camera camera)
     return camera;
 }
 
+/* Points, colours and portals are those of the scene that stays. */
+static void adopt_arrays(const nb_draft *draft, nb_edition *edition)
+{
+    const nebel_nebula_desc *const own = nebel_scene_contents(draft->scene)->nebulae;
+    for (size_t i = 0; i < edition->nebula_count; i++) {
+        edition->nebulae[i].points = own[i].points;
+        edition->nebulae[i].colors = own[i].colors;
+        edition->nebulae[i].color_count = own[i].color_count;
+        if (own[i].points != NULL) edition->nebulae[i].count = own[i].count;
+    }
+    if (edition->cells != NULL) edition->cells_desc.portals = draft->now.cells_desc.portals;
+}
+
+static void exchange(nebel_volume_desc *a, nebel_volume_desc *b)
+{
+    const nebel_volume_desc kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+/* What the file holds is as it says now, to the last digit. Changes that it does not hold stay as long as the volumes
+ * are the same ones; with others, what is known by their old places is forgotten. */
+static nebel_result use_written(nb_draft *draft, int has_moved)
+{
+    nb_edition now;
+    if (nb_edition_copy(&draft->written, &now) != 0) return fail_memory(draft);
+    for (size_t i = 0; i < now.count && !has_moved; i++)
+        if (nb_draft_origin(draft, i) != NEBEL_VOLUME_WRITTEN) exchange(&now.volumes[i], &draft->now.volumes[i]);
+    nb_edition_free(&draft->now);
+    draft->now = now;
+    if (has_moved) nb_history_forget(&draft->history);
+    place_volumes(draft);
+    return settle(draft, 0);
+}
+
+/* The file is read again, without its models, so that `written` is what it says. */
+static nebel_result read_back(nb_draft *draft, const char *path)
+{
+    const nebel_scene_desc desc = {.log = draft->log};
+    const int has_moved = !nb_edition_has_same_sources(&draft->now, &draft->written);
+    nebel_scene *fresh = NULL;
+    nb_edition written;
+    nebel_result result = nebel_load_scene(path, &desc, &fresh);
+    if (result != NEBEL_OK) return result;
+    if (nb_edition_make(nebel_scene_contents(fresh), &written) != 0) {
+        nebel_destroy_scene(fresh);
+        return fail_memory(draft);
+    }
+    adopt_arrays(draft, &written);
+    if (draft->file != draft->scene) nebel_destroy_scene(draft->file);
+    nb_edition_free(&draft->written);
+    draft->file = fresh;
+    draft->written = written;
+    return use_written(draft, has_moved);
+}
+
 nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log};
-    nebel_scene_data changed = draft->data;
-    changed.camera = draft->file.camera;
+    const nebel_scene_data *const before = nebel_scene_contents(draft->file);
+    nebel_scene_data changed = *before;
+    nb_edition_show(&draft->now, &changed);
     if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = round_camera(draft->data.camera);
-    const nebel_result result = nebel_save_scene(path, &desc, nebel_scene_contents(draft->scene), &changed, NULL);
-    if (result != NEBEL_OK) return result;
-    draft->file = changed;
-    memcpy(draft->written, draft->volumes, changed.volume_count * sizeof *draft->written);
-    return NEBEL_OK;
+    const nebel_result result = nebel_save_scene(path, &desc, before, &changed, draft->now.sources);
+    return result == NEBEL_OK ? read_back(draft, path) : result;
 }

@@ -2,22 +2,24 @@
 #ifndef NB_DRAFT_H
 #define NB_DRAFT_H
 
-#include <nebel/nebel.h>
-#include <nebel/scene.h>
-
-#include <stddef.h>
+#include "edition.h"
+#include "history.h"
 
 typedef struct nb_draft {
-    nebel_scene *scene;
-    nebel_scene_data data;      /* for the renderers; camera and light are ours, and so are the volumes */
-    nebel_volume_desc *volumes; /* data.volumes; their planes and parts are the scene's */
-    nebel_volume_desc *good;    /* the last ones that the fog has taken */
-    nebel_volume_desc *written; /* what the file says */
-    nebel_scene_data file;      /* ... of camera and light */
+    nebel_scene *scene;    /* with the models */
+    nebel_scene *file;     /* as it was read or written last; `scene` until it is written */
+    nebel_scene_data data; /* for the renderers: the camera is ours, fog and light are those of `now` */
+    nb_edition now;        /* to be changed */
+    nb_edition good;       /* the last one that the fog has taken */
+    nb_edition written;    /* what the file says */
+    nb_history history;
+    nebel_fog *fog; /* the volumes of `good` */
     nebel_volume_id *ids;
-    nebel_fog *fog;
-    nebel_snapshot *snapshot; /* of the fog */
-    double frame;             /* of what moves */
+    nebel_snapshot *volumes;   /* of the fog */
+    nebel_snapshot *whole;     /* with the particles; NULL: not asked for yet */
+    nebel_particle *particles; /* of all nebulae */
+    size_t particle_count;
+    double frame; /* of what moves */
     nebel_log log;
 } nb_draft;
 
@@ -28,23 +30,29 @@ nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log,
 /* Fine with zeros. */
 void nb_draft_close(nb_draft *draft);
 
-/* Puts volumes and ambient light as they are in `data` into a new snapshot. A volume that is not valid gets its last
- * good numbers back, and the log says why. */
+/* Puts `now` into new snapshots. If it is not valid, all of it is what it was before, and the log says why. */
 nebel_result nb_draft_commit(nb_draft *draft);
+
+/* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */
+nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole);
 
 /* Goes to another frame: everything that moves. Volumes that stand still keep their changes. */
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame);
 
+/* A step back or forth; 0: there is none. */
+int nb_draft_undo(nb_draft *draft, nebel_result *result);
+int nb_draft_redo(nb_draft *draft, nebel_result *result);
+
 /* Whether anything that the file could hold is not as the file says; the camera does not count. */
 int nb_draft_is_changed(const nb_draft *draft);
+
+/* What the volume of `now` comes from; those that are new will stand in the file. */
+nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume);
 
 /* Whether the camera is one that the file could hold. */
 int nb_draft_can_save_camera(const nb_draft *draft);
 
 /* Writes what has changed into the file. On an error the file is as it was, and the log has said why. */
 nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera);
-
-/* Whether the volume is another one from frame to frame. */
-int nb_draft_is_moving(const nb_draft *draft, size_t volume);
 
 #endif

@@ -27,6 +27,8 @@ static void press(nb_hands *hands, nb_look *look, int key, int modifiers)
     if (with_control) {
         hands->wants_save |= key == GLFW_KEY_S;
         hands->wants_end |= key == GLFW_KEY_Q;
+        hands->wants_undo |= key == GLFW_KEY_Z && !with_shift;
+        hands->wants_redo |= key == GLFW_KEY_Y || (key == GLFW_KEY_Z && with_shift);
         return;
     }
     hands->wants_home |= key == GLFW_KEY_HOME || key == GLFW_KEY_H;
@@ -139,6 +141,7 @@ static void take_event(nb_hands *hands, const nb_window *window, const nb_window
 {
     switch (event->kind) {
     case NB_WINDOW_KEY_DOWN:
+        nb_panel_press_key(event->code, event->modifiers);
         if (!nb_panel_has_keys()) press(hands, look, event->code, event->modifiers);
         if (!nb_panel_has_keys() && event->modifiers == (event->modifiers & GLFW_MOD_SHIFT))
             hands->keys_down |= find_fly_key(event->code);
@@ -147,6 +150,7 @@ static void take_event(nb_hands *hands, const nb_window *window, const nb_window
         hands->keys_down &= ~find_fly_key(event->code);
         break;
     case NB_WINDOW_BUTTON_DOWN:
+        nb_panel_press_button(event->modifiers);
         move_cursor(hands, window, event, camera, look);
         press_button(hands, window, event, look);
         break;

@@ -17,9 +17,18 @@ typedef enum nb_look_compare {
     NB_LOOK_COMPARES
 } nb_look_compare;
 
+/* How OpenGL draws the particles of nebulae. */
+typedef enum nb_look_particles {
+    NB_LOOK_AS_BALLS = 0, /* one by one, from the farthest: a closed form each, overlaps as if they were layers */
+    NB_LOOK_AS_DISCS,     /* the same, cut by surfaces after the comparison of depth at five places */
+    NB_LOOK_AS_FOG,       /* among the fog, exactly as the CPU does: slow */
+    NB_LOOK_PARTICLES
+} nb_look_particles;
+
 typedef struct nb_look {
     nb_look_plane plane;
     nb_look_compare compare;
+    nb_look_particles particles;
     double exposure; /* stops */
     double split;    /* 0 to 1, from the left */
     double gain;     /* of the difference */

@@ -1,22 +1,30 @@
 #include "panel.h"
 
-#include <imgui.h>
+#include "controls.h"
+#include "fog_panel.h"
+
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 namespace
 {
+
+using namespace controls;
 
 /* Where windows of the panel are. */
 struct area {
     ImVec2 low, high;
 };
 
-enum { WINDOW, HELP, AREAS };
+enum { WINDOW, HELP, NOTICE, AREAS };
 
 area areas[AREAS];
 
@@ -26,358 +34,216 @@ void note_area(int which)
     areas[which] = area{low, ImVec2(low.x + size.x, low.y + size.y)};
 }
 
-/* Where the controls are, for programs that press them. */
-FILE *places;
-char owner[64]; /* whose controls follow: their names begin with it */
-
-void note_place(const char *name)
-{
-    if (places == nullptr) return;
-    const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
-    fprintf(places, "%d %d %d %d %s%s\n", int(low.x), int(low.y), int(high.x - low.x), int(high.y - low.y), owner,
-            name);
-}
-
-/* ---- controls
- * --------------------------------------------------------------------------------------------------------
- */
-
-bool slide(const char *name, double *value, double low, double high, const char *format, bool logarithmic)
-{
-    const ImGuiSliderFlags flags = logarithmic ? ImGuiSliderFlags_Logarithmic : 0;
-    const bool changed = ImGui::SliderScalar(name, ImGuiDataType_Double, value, &low, &high, format, flags);
-    note_place(name);
-    return changed;
-}
-
-/* Numbers to be dragged: a hundredth of the largest for each pixel, or of `least` where they are smaller. */
-bool drag(const char *name, double *values, int count, double least, double low, const char *format)
-{
-    const double high = DBL_MAX;
-    double largest = least;
-    for (int i = 0; i < count; i++) largest = fmax(largest, fabs(values[i]));
-    const bool changed = ImGui::DragScalarN(name, ImGuiDataType_Double, values, count, float(largest / 100),
-                                            low > -DBL_MAX ? &low : nullptr, low > -DBL_MAX ? &high : nullptr, format,
-                                            low > -DBL_MAX ? ImGuiSliderFlags_AlwaysClamp : 0);
-    note_place(name);
-    return changed;
-}
-
-bool drag_place(const char *name, double place[3], double reach)
-{
-    return drag(name, place, 3, reach / 10, -DBL_MAX, "%.4g");
-}
-
-bool drag_length(const char *name, double *length)
-{
-    return drag(name, length, 1, 0.01, 1e-6, "%.4g m");
-}
-
-/* Linear light, shown as the screen would show it. Only what is changed is rounded. */
-bool pick(const char *name, double color[3], bool is_share)
-{
-    float shown[3] = {float(color[0]), float(color[1]), float(color[2])};
-    const ImGuiColorEditFlags flags = ImGuiColorEditFlags_Float | (is_share ? 0 : ImGuiColorEditFlags_HDR);
-    const bool changed = ImGui::ColorEdit3(name, shown, flags);
-    note_place(name);
-    for (int c = 0; c < 3; c++) {
-        if (shown[c] != float(color[c])) color[c] = fmax(0, floor(double(shown[c]) * 1e4 + 0.5) / 1e4);
-    }
-    return changed;
-}
-
-bool press(const char *name)
-{
-    const bool pressed = ImGui::Button(name);
-    note_place(name);
-    return pressed;
-}
-
-bool choose(const char *name, int *value, const char *const *names, int count)
-{
-    const bool changed = ImGui::Combo(name, value, names, count);
-    note_place(name);
-    return changed;
-}
-
-bool open_section(const char *name, bool open)
-{
-    const bool is_open = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-    note_place(name);
-    return is_open;
-}
-
-/* ---- shapes and densities
- * --------------------------------------------------------------------------------------------
- */
-
-bool is_plain(const nebel_transform &t)
-{
-    return t.position[0] == 0 && t.position[1] == 0 && t.position[2] == 0 && t.rotation[0] == 0 && t.rotation[1] == 0 &&
-           t.rotation[2] == 0 && t.scale[0] == t.scale[1] && t.scale[1] == t.scale[2] && fabs(t.scale[0]) <= 1;
-}
-
-bool draw_transform(nebel_transform *transform, double reach)
-{
-    if (!ImGui::TreeNodeEx("transform", is_plain(*transform) ? 0 : ImGuiTreeNodeFlags_DefaultOpen)) return false;
-    bool changed = drag_place("position", transform->position, reach);
-    changed |= drag("rotation", transform->rotation, 4, 1, -DBL_MAX, "%.4g");
-    changed |= drag("scale", transform->scale, 3, 0.1, -DBL_MAX, "%.4g");
-    ImGui::TreePop();
-    return changed;
-}
-
-bool draw_shape(nebel_shape *shape, double reach)
-{
-    bool changed = false;
-    switch (shape->type) {
-    case NEBEL_SHAPE_HALF_SPACE:
-        changed |= drag_place("point", shape->point, reach);
-        changed |= drag("normal", shape->normal, 3, 1, -DBL_MAX, "%.4g");
-        break;
-    case NEBEL_SHAPE_BOX:
-        changed |= drag_place("min", shape->min, reach);
-        changed |= drag_place("max", shape->max, reach);
-        break;
-    case NEBEL_SHAPE_SPHERE:
-        changed |= drag_place("center", shape->center, reach);
-        changed |= drag_length("radius", &shape->radius);
-        break;
-    case NEBEL_SHAPE_ELLIPSOID:
-        changed |= drag_place("center", shape->center, reach);
-        changed |= drag("radii", shape->radii, 3, 0.01, 1e-6, "%.4g");
-        break;
-    case NEBEL_SHAPE_CYLINDER:
-    case NEBEL_SHAPE_CAPSULE:
-        changed |= drag_place("from", shape->from, reach);
-        changed |= drag_place("to", shape->to, reach);
-        changed |= drag_length("radius", &shape->radius);
-        break;
-    case NEBEL_SHAPE_CONE:
-        changed |= drag_place("from", shape->from, reach);
-        changed |= drag_place("to", shape->to, reach);
-        changed |= drag("radius from", &shape->radius_from, 1, 0.01, 0, "%.4g m");
-        changed |= drag("radius to", &shape->radius_to, 1, 0.01, 0, "%.4g m");
-        break;
-    default: // what is made of parts or planes moves as a whole
-        break;
-    }
-    return draw_transform(&shape->transform, reach) || changed;
-}
-
-bool draw_height(nebel_density *density, double reach)
-{
-    static const char *const names[] = {"grows", "constant"};
-    int below = density->below;
-    bool changed = drag("base", &density->base, 1, reach / 10, -DBL_MAX, "%.4g m");
-    changed |= slide("scale height", &density->scale_height, 0.01, 1e4, "%.4g m", true);
-    changed |= choose("below", &below, names, 2);
-    density->below = static_cast<nebel_below>(below);
-    return changed;
-}
-
-bool draw_density(nebel_density *density, double reach)
-{
-    bool changed = false;
-    switch (density->type) {
-    case NEBEL_DENSITY_HEIGHT:
-        return draw_height(density, reach);
-    case NEBEL_DENSITY_LINEAR:
-        changed = drag_place("0 at", density->from, reach);
-        return drag_place("1 at", density->to, reach) || changed;
-    case NEBEL_DENSITY_RADIAL:
-        changed = ImGui::SliderInt("power", &density->power, 1, 3, "%d", ImGuiSliderFlags_AlwaysClamp);
-        note_place("power");
-        return changed;
-    case NEBEL_DENSITY_GAUSSIAN:
-        changed = drag_place("middle", density->center, reach);
-        return drag_length("sigma", &density->sigma) || changed;
-    case NEBEL_DENSITY_SOFT_EDGE:
-        return drag_length("edge", &density->distance);
-    default:
-        return false;
-    }
-}
-
-/* ---- volumes
- * ---------------------------------------------------------------------------------------------------------
- */
-
-double mean(const double rgb[3])
-{
-    return (rgb[0] + rgb[1] + rgb[2]) / 3;
-}
-
-bool is_zero(const double rgb[3])
-{
-    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
-}
-
-/* Visibility is that of the mean extinction; its slider keeps the colour. */
-bool draw_amount(double extinction[3])
-{
-    const double farthest = 1e5, amount = mean(extinction);
-    double visibility = amount > 0 ? nebel_extinction_from_visibility(1, 0) / amount : farthest;
-    bool changed = false;
-    if (slide("visibility", &visibility, 0.1, farthest, "%.4g m", true)) {
-        const double wanted = nebel_extinction_from_visibility(visibility, 0);
-        const double factor = amount > 0 ? wanted / amount : 0;
-        for (int c = 0; c < 3; c++) extinction[c] = amount > 0 ? extinction[c] * factor : wanted;
-        changed = true;
-    }
-    return drag("extinction", extinction, 3, 1e-4, 0, "%.4g") || changed;
-}
-
-bool draw_light(nebel_volume_desc *volume, bool has_sun)
-{
-    bool changed = false;
-    if (is_zero(volume->albedo)) changed |= pick("source", volume->source, false);
-    if (is_zero(volume->source) && (!has_sun || !is_zero(volume->albedo)))
-        changed |= pick("albedo", volume->albedo, true);
-    return pick("emission", volume->emission, false) || changed;
-}
-
-bool draw_distances(nebel_volume_desc *volume)
-{
-    bool changed = ImGui::DragInt("priority", &volume->priority, 0.05f);
-    note_place("priority");
-    changed |= drag("start", &volume->start, 1, 1, 0, "%.4g m");
-    return drag("cutoff", &volume->cutoff, 1, 1, 0, volume->cutoff > 0 ? "%.4g m" : "none") || changed;
-}
-
-bool draw_volume_numbers(nebel_volume_desc *volume, double reach, bool has_sun)
-{
-    bool changed = false;
-    if (volume->operation != NEBEL_OPERATION_EXCLUDE) {
-        changed |= draw_amount(volume->extinction);
-        changed |= draw_light(volume, has_sun);
-        changed |= draw_density(&volume->density, reach);
-    }
-    changed |= draw_shape(&volume->shape, reach);
-    return draw_distances(volume) || changed;
-}
-
-void draw_volume(nb_panel *panel, size_t index, double reach)
-{
-    static const char *const origins[] = {"", "moves by its keys: changes here are not saved",
-                                          "settings of another program: changes here are not saved",
-                                          "a node of a model: changes here are not saved"};
-    const nebel_volume_origin origin = nebel_scene_volume_origin(panel->source, index);
-    char title[160];
-    const char *const name = panel->data->volume_names[index];
-    snprintf(title, sizeof title, "%.100s%s###volume", name[0] != '\0' ? name : "(no name)",
-             origin != NEBEL_VOLUME_WRITTEN ? " *" : "");
-    ImGui::PushID(int(index));
-    snprintf(owner, sizeof owner, "fog[%u].", unsigned(index));
-    const bool is_open =
-        ImGui::CollapsingHeader(title, panel->data->volume_count <= 2 ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-    note_place("open");
-    if (is_open) {
-        if (origin != NEBEL_VOLUME_WRITTEN) ImGui::TextDisabled("%s", origins[origin]);
-        const bool has_sun = panel->data->has_sun && !is_zero(panel->data->sun_irradiance);
-        panel->fog_changed |= draw_volume_numbers(&panel->volumes[index], reach, has_sun);
-    }
-    owner[0] = '\0';
-    ImGui::PopID();
-}
-
-void draw_fog(nb_panel *panel, double reach)
-{
-    const nebel_scene_data *const data = panel->data;
-    for (size_t i = 0; i < data->volume_count; i++) draw_volume(panel, i, reach);
-    for (size_t i = 0; i < data->nebula_count; i++) {
-        ImGui::TextDisabled("nebula %s: %u particles, as the file says", data->nebula_names[i],
-                            unsigned(data->nebulae[i].count));
-    }
-}
-
 /* ---- light and camera
  * -----------------------------------------------------------------------------------------------
  */
 
 const double degree = 3.14159265358979323846 / 180;
 
-bool draw_sun(nebel_scene_data *data)
+bool draw_sun(nb_edition *now)
 {
-    double *const d = data->sun_direction;
+    double *const d = now->sun_direction;
     double height = asin(fmax(-1, fmin(1, d[1]))) / degree, turn = atan2(d[0], d[2]) / degree;
-    bool changed = slide("sun turn", &turn, -180, 180, "%.1f deg", false);
-    changed |= slide("sun height", &height, -89, 89, "%.1f deg", false);
+    bool changed =
+        slide("sun turn", &turn, -180, 180, "%.1f deg", false, "Where it stands, seen from above: 0 is along z.");
+    changed |= slide("sun height", &height, -89, 89, "%.1f deg", false, "How high it stands above the horizon.");
     if (changed) {
         d[0] = cos(height * degree) * sin(turn * degree);
         d[1] = sin(height * degree);
         d[2] = cos(height * degree) * cos(turn * degree);
     }
-    return pick("sun", data->sun_irradiance, false) || changed;
+    return pick("sun", now->sun_irradiance, false,
+                "Irradiance on a surface that faces the sun, before any fog. It lights surfaces, not yet fog.") ||
+           changed;
+}
+
+/* 0 and 1 are no limit. */
+bool draw_opacity(nb_edition *now)
+{
+    double opacity = now->max_opacity > 0 ? now->max_opacity : 1;
+    if (!slide("most opacity", &opacity, 0.01, 1, opacity < 1 ? "%.2f" : "no limit", false,
+               "All fog together hides no more than this. A look, not physics."))
+        return false;
+    now->max_opacity = opacity;
+    return true;
 }
 
 void draw_lights(nb_panel *panel)
 {
-    nebel_scene_data *const data = panel->data;
+    nb_edition *const now = panel->now;
     if (!open_section("Light", false)) return;
-    panel->light_changed |= pick("ambient", data->ambient, false);
-    panel->light_changed |= pick("background", data->background, false);
-    if (data->has_sun) panel->light_changed |= draw_sun(data);
+    bool changed =
+        pick("ambient", now->ambient, false, "Radiance from everywhere. Lights surfaces, and fog with an albedo.");
+    changed |= pick("background", now->background, false, "Radiance where no surface is: the sky.");
+    if (panel->data->has_sun) changed |= draw_sun(now);
+    panel->fog_changed |= draw_opacity(now) || changed;
 }
 
 void draw_camera(nb_panel *panel, double reach)
 {
     nebel_camera *const camera = &panel->data->camera;
     if (!open_section("Camera", false)) return;
-    bool changed = drag_place("eye", camera->position, reach);
-    changed |= drag_place("look at", camera->look_at, reach);
-    if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) {
-        changed |= drag_length("view height", &camera->view_height);
-    } else {
-        changed |= slide("field of view", &camera->vertical_fov, 1, 150, "%.1f deg", false);
-    }
+    bool changed = drag_place("eye", camera->position, reach, "Where the camera is [m].");
+    changed |=
+        drag_place("look at", camera->look_at, reach, "What is in the middle, and what a drag orbits about [m].");
+    changed |= drag("up", camera->up, 3, 1, -DBL_MAX, "%.3g", "Which way is up in the picture.");
+    if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
+        changed |= drag_length("view height", &camera->view_height, "What the height of the picture shows.");
+    else
+        changed |= slide("field of view", &camera->vertical_fov, 1, 150, "%.1f deg", false, "From bottom to top.");
     panel->camera_changed |= changed;
-    if (!panel->camera_is_keyed) {
-        bool saved = panel->saves_camera;
-        ImGui::Checkbox("save the camera, too", &saved);
-        note_place("save the camera, too");
-        panel->saves_camera = saved;
-    } else {
+    if (panel->camera_is_keyed)
         ImGui::TextDisabled("moves: changes here are not saved");
-    }
+    else
+        tick("save the camera, too", &panel->saves_camera, "Save writes where the camera is now into the file.");
 }
 
 /* ---- what is shown
  * ---------------------------------------------------------------------------------------------------
  */
 
+void draw_comparison(nb_panel *panel)
+{
+    static const char *const compares[] = {"OpenGL", "CPU | OpenGL", "difference"};
+    nb_look *const look = panel->look;
+    int compare = look->compare;
+    panel->look_changed |=
+        choose("drawn by", &compare, compares, NB_LOOK_COMPARES,
+               "The CPU's picture on the left of a line that can be dragged, or the difference of both.");
+    look->compare = nb_look_compare(compare);
+    if (compare == NB_LOOK_SPLIT) slide("split", &look->split, 0, 1, "%.2f", false, "Where the line is.");
+    if (compare == NB_LOOK_DIFFERENCE)
+        slide("times", &look->gain, 1, 255, "%.4g", true,
+              "How much brighter the difference is shown: 255 makes one byte white.");
+}
+
+void draw_technique(nb_panel *panel)
+{
+    static const char *const names[] = {"balls: fast", "five-tap discs", "fog: exact"};
+    int particles = panel->look->particles;
+    if (panel->now->nebula_count == 0) return;
+    panel->look_changed |=
+        choose("particles", &particles, names, NB_LOOK_PARTICLES,
+               "Balls: each particle in closed form, from the farthest to the nearest. Five-tap: a disc that "
+               "is drawn or not, by the classic comparison of depth at five places. Fog: among all "
+               "other fog, as the CPU does; slow where there are many.");
+    panel->look->particles = nb_look_particles(particles);
+}
+
 void draw_look(nb_panel *panel)
 {
     static const char *const planes[] = {"colour", "transmittance", "in-scattering", "depth"};
     nb_look *const look = panel->look;
     int plane = look->plane;
-    panel->look_changed |= choose("picture", &plane, planes, NB_LOOK_PLANES);
-    look->plane = static_cast<nb_look_plane>(plane);
-    slide("exposure", &look->exposure, -10, 10, "%.2f stops", false);
-    panel->look_changed |= ImGui::SliderInt("samples", &look->samples, 1, 64, "%d", ImGuiSliderFlags_AlwaysClamp);
-    note_place("samples");
-    static const char *const compares[] = {"OpenGL", "CPU | OpenGL", "difference"};
-    int compare = look->compare;
-    panel->look_changed |= choose("drawn by", &compare, compares, NB_LOOK_COMPARES);
-    look->compare = static_cast<nb_look_compare>(compare);
-    if (compare == NB_LOOK_SPLIT) slide("split", &look->split, 0, 1, "%.2f", false);
-    if (compare == NB_LOOK_DIFFERENCE) slide("times", &look->gain, 1, 255, "%.4g", true);
-    if (look->plane == NB_LOOK_DEPTH) slide("grey at", &look->range, 0.1, 10000, "%.4g m", true);
-    if (panel->moves) {
+    panel->look_changed |= choose("picture", &plane, planes, NB_LOOK_PLANES,
+                                  "What is shown: picture = transmittance x surface + in-scattering.");
+    look->plane = nb_look_plane(plane);
+    slide("exposure", &look->exposure, -10, 10, "%.2f stops", false,
+          "One more doubles the light. Of the window alone.");
+    panel->look_changed |=
+        slide_whole("samples", &look->samples, 1, 64, false, "Of each pixel, once everything rests.");
+    draw_comparison(panel);
+    draw_technique(panel);
+    if (look->plane == NB_LOOK_DEPTH)
+        slide("grey at", &look->range, 0.1, 10000, "%.4g m", true, "The distance that is shown in middle grey.");
+    if (panel->moves)
         panel->frame_changed =
-            ImGui::DragScalar("frame", ImGuiDataType_Double, panel->frame, 0.5f, nullptr, nullptr, "%.1f");
-        note_place("frame");
-    }
+            drag("frame", panel->frame, 1, 50, -DBL_MAX, "%.1f", "Of the camera and the fog that move.");
 }
 
-void draw_state(const nb_panel *panel)
+/* ---- state and commands
+ * --------------------------------------------------------------------------------------------
+ */
+
+void draw_time(const char *who, double seconds, unsigned samples)
 {
-    ImGui::Text("%s%s", panel->scene, panel->is_changed ? " (changed)" : "");
-    if (panel->file_is_newer)
-        ImGui::TextWrapped("The file has changed, too. Save: it gets your numbers. Read again: they are lost.");
-    ImGui::Text("%.1f ms, %s", panel->seconds * 1e3, panel->picture);
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", panel->driver);
-    if (panel->message[0] != '\0') ImGui::TextWrapped("%s", panel->message);
+    const bool is_long = seconds >= 1;
+    ImGui::Text("%s: %.3g %s, %u sample%s", who, is_long ? seconds : seconds * 1e3, is_long ? "s" : "ms", samples,
+                samples == 1 ? "" : "s");
+}
+
+void draw_state(nb_panel *panel)
+{
+    /* In one line, whatever its length: the controls below stay where they are. */
+    const char *const folder_end = strrchr(panel->scene, '/');
+    ImGui::Text("%s%s", panel->is_changed ? "* " : "", folder_end != nullptr ? folder_end + 1 : panel->scene);
+    explain(panel->scene);
+    draw_time("OpenGL", panel->seconds, panel->samples);
+    explain(panel->driver);
+    if (panel->cpu_seconds > 0) draw_time("CPU", panel->cpu_seconds, 1);
+    ImGui::TextDisabled("%s", panel->picture);
+}
+
+bool press_if(bool possible, const char *name, const char *help)
+{
+    if (possible) return press(name, help);
+    ImGui::BeginDisabled();
+    ImGui::Button(name);
+    ImGui::EndDisabled();
+    return false;
+}
+
+void draw_commands(nb_panel *panel)
+{
+    panel->wants_save |=
+        press("Save", "Ctrl + S: into the scene file. All that has not changed stays as it stands there.");
+    ImGui::SameLine();
+    panel->wants_reload |= press("Read again", "F5: the scene file. What was changed here is lost.");
+    ImGui::SameLine();
+    panel->wants_undo = press_if(panel->has_past, "Undo", "Ctrl + Z");
+    ImGui::SameLine();
+    panel->wants_redo = press_if(panel->has_future, "Redo", "Ctrl + Y");
+    panel->wants_home = press("Home", "The camera of the file.");
+    ImGui::SameLine();
+    panel->wants_picture = press("Picture", "F12: the picture without controls, into the current folder.");
+    ImGui::SameLine();
+    panel->help_shown |= press("Keys and mouse", "F1");
+    ImGui::TextDisabled("drag orbits, right drag looks, wheel nears");
+}
+
+/* ---- messages, which stand beside the controls: nothing moves when they come and go
+ * ---------------------------------
+ */
+
+const ImVec4 warning(1.0f, 0.65f, 0.4f, 1.0f);
+
+void draw_message(nb_panel *panel)
+{
+    if (panel->message[0] == '\0') return;
+    if (panel->is_fault) ImGui::PushStyleColor(ImGuiCol_Text, warning);
+    ImGui::TextWrapped("%s", panel->message);
+    if (panel->is_fault) ImGui::PopStyleColor();
+    if (panel->is_fault) panel->has_read_message = press("OK", "Takes the message away.");
+}
+
+/* Nobody's changes are lost without being asked. */
+void draw_question(nb_panel *panel)
+{
+    if (!panel->file_is_newer) return;
+    ImGui::PushStyleColor(ImGuiCol_Text, warning);
+    ImGui::TextWrapped("The file has changed on the disk, and so have numbers here.");
+    ImGui::PopStyleColor();
+    panel->wants_save |=
+        press("Save mine into it", "What you have changed goes into the new file; all else there stays.");
+    ImGui::SameLine();
+    panel->wants_reload |= press("Read it, drop mine", "What you have changed is lost.");
+}
+
+void draw_notice(nb_panel *panel)
+{
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const float margin = 8 * scale, width = fminf(420 * scale, size.x - 2 * margin);
+    if (panel->message[0] == '\0' && !panel->file_is_newer) return;
+    ImGui::SetNextWindowPos(ImVec2(size.x - margin, size.y - margin), ImGuiCond_Always, ImVec2(1, 1));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, size.y));
+    ImGui::SetNextWindowBgAlpha(0.9f);
+    ImGui::Begin("notice", nullptr,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoTitleBar |
+                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
+    draw_message(panel);
+    draw_question(panel);
+    note_area(NOTICE);
+    ImGui::End();
 }
 
 void draw_help(nb_panel *panel)
@@ -394,6 +260,8 @@ void draw_help(nb_panel *panel)
         {"C", "OpenGL, split, difference"},
         {"F12, Shift + F12", "save the picture, the window"},
         {"Ctrl + S, F5", "save the scene, read it again"},
+        {"Ctrl + Z, Ctrl + Y", "undo, redo"},
+        {"Ctrl + click", "type a number into a control"},
         {"Tab, F1", "controls, this list"},
         {"Ctrl + Q", "end"},
     };
@@ -401,7 +269,7 @@ void draw_help(nb_panel *panel)
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing, ImVec2(0.5f, 0.5f));
     if (ImGui::Begin("Keys", &shown, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings) &&
-        ImGui::BeginTable("keys", 2)) {
+        ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
         for (const auto &key : keys) {
             ImGui::TableNextColumn();
             ImGui::TextUnformatted(key[0]);
@@ -427,24 +295,23 @@ double find_reach(const nebel_camera &camera)
 void draw_window(nb_panel *panel)
 {
     const ImGuiIO &io = ImGui::GetIO();
+    const float width = fminf(330 * scale, io.DisplaySize.x);
     ImGui::SetNextWindowPos(ImVec2(0, 0));
-    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(FLT_MAX, io.DisplaySize.y));
-    ImGui::SetNextWindowBgAlpha(0.8f);
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, io.DisplaySize.y));
+    ImGui::SetNextWindowBgAlpha(0.85f);
     ImGui::Begin("nebel", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoTitleBar |
                      ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoNav);
-    ImGui::PushItemWidth(180);
+    ImGui::PushItemWidth(180 * scale);
     draw_state(panel);
-    panel->wants_save = press("Save");
-    ImGui::SameLine();
-    panel->wants_reload = press("Read again");
-    ImGui::SameLine();
-    panel->wants_home = press("Home");
-    ImGui::SameLine();
-    panel->help_shown |= press("Keys");
+    draw_commands(panel);
+    ImGui::Separator();
     draw_look(panel);
+    ImGui::Separator();
     const double reach = find_reach(panel->data->camera);
     draw_fog(panel, reach);
+    draw_nebulae(panel, reach);
+    draw_cells(panel, reach);
     draw_lights(panel);
     draw_camera(panel, reach);
     ImGui::PopItemWidth();
@@ -452,23 +319,54 @@ void draw_window(nb_panel *panel)
     ImGui::End();
 }
 
+/* ---- keys that were down between two frames
+ * ------------------------------------------------------------------------
+ */
+
+GLFWwindow *own_window;
+int pressed[16], key_count, key_modifiers;
+
+void hold_keys()
+{
+    ImGuiIO &io = ImGui::GetIO();
+    for (int i = 0; i < key_count; i++) io.KeysDown[pressed[i]] = true;
+    /* Letters of the same frame would be taken for commands. */
+    if ((key_modifiers & GLFW_MOD_CONTROL) != 0 && io.InputQueueCharacters.empty()) io.KeyCtrl = true;
+}
+
+void release_keys()
+{
+    ImGuiIO &io = ImGui::GetIO();
+    for (int i = 0; i < key_count; i++) io.KeysDown[pressed[i]] = glfwGetKey(own_window, pressed[i]) == GLFW_PRESS;
+    if (key_modifiers != 0)
+        io.KeyCtrl = glfwGetKey(own_window, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
+                     glfwGetKey(own_window, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;
+    key_count = key_modifiers = 0;
+}
+
 void clear_answers(nb_panel *panel)
 {
-    panel->fog_changed = panel->light_changed = panel->camera_changed = 0;
-    panel->frame_changed = panel->look_changed = 0;
-    panel->wants_save = panel->wants_reload = panel->wants_home = 0;
+    panel->fog_changed = panel->camera_changed = panel->frame_changed = panel->look_changed = 0;
+    panel->wants_save = panel->wants_reload = panel->wants_home = panel->wants_picture = 0;
+    panel->wants_undo = panel->wants_redo = panel->has_read_message = 0;
 }
 
 } // namespace
 
-extern "C" int nb_panel_open(void *window)
+extern "C" int nb_panel_open(void *window, double size)
 {
     if (ImGui::CreateContext() == nullptr) return -1;
     ImGuiIO &io = ImGui::GetIO();
     io.IniFilename = nullptr;
     io.LogFilename = nullptr;
+    scale = float(size);
+    ImFontConfig font;
+    font.SizePixels = floorf(13 * scale);
+    io.Fonts->AddFontDefault(&font);
     ImGui::StyleColorsDark();
-    ImGui_ImplGlfw_InitForOpenGL(static_cast<GLFWwindow *>(window), true);
+    ImGui::GetStyle().ScaleAllSizes(scale);
+    own_window = static_cast<GLFWwindow *>(window);
+    ImGui_ImplGlfw_InitForOpenGL(own_window, true);
     ImGui_ImplOpenGL3_Init("#version 330 core");
     return 0;
 }
@@ -486,10 +384,15 @@ extern "C" void nb_panel_draw(nb_panel *panel, const char *controls)
     places = controls != nullptr ? fopen(controls, "w") : nullptr;
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
+    hold_keys();
     ImGui::NewFrame();
+    if (places != nullptr && ImGui::GetIO().WantTextInput) fprintf(places, "0 0 0 0 (typing)\n");
     for (area &taken : areas) taken = area{ImVec2(0, 0), ImVec2(0, 0)};
     if (panel->shown) draw_window(panel);
+    draw_notice(panel);
     if (panel->help_shown) draw_help(panel);
+    release_keys();
+    panel->is_held = ImGui::IsAnyItemActive();
     ImGui::Render();
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (places != nullptr) fclose(places);
@@ -506,6 +409,18 @@ extern "C" int nb_panel_has_place(double x, double y)
         }
     }
     return 0;
+}
+
+extern "C" void nb_panel_press_key(int key, int modifiers)
+{
+    key_modifiers |= modifiers;
+    if (key < 0 || key >= IM_ARRAYSIZE(ImGui::GetIO().KeysDown) || key_count == IM_ARRAYSIZE(pressed)) return;
+    pressed[key_count++] = key;
+}
+
+extern "C" void nb_panel_press_button(int modifiers)
+{
+    key_modifiers |= modifiers;
 }
 
 extern "C" int nb_panel_has_keys(void)

@@ -1,7 +1,8 @@
-/* The controls of the window, by Dear ImGui. The one C++ file of the project is behind this. */
+/* The controls of the window, by Dear ImGui. The C++ of the project is behind this. */
 #ifndef NB_PANEL_H
 #define NB_PANEL_H
 
+#include "edition.h"
 #include "look.h"
 
 #include <nebel/scene.h>
@@ -12,36 +13,49 @@ extern "C" {
 
 /* What the panel shows, and what was done with it. */
 typedef struct nb_panel {
-    const char *scene;          /* the file's name */
-    const char *driver;         /* of OpenGL */
-    const nebel_scene *source;  /* as it was read */
-    nebel_scene_data *data;     /* camera and light are changed in place */
-    nebel_volume_desc *volumes; /* changed in place: those of `data` */
+    const char *scene;                  /* the file's name */
+    const char *driver;                 /* of OpenGL */
+    nebel_scene_data *data;             /* the camera is changed in place */
+    nb_edition *now;                    /* fog and light, changed in place */
+    const nebel_volume_origin *origins; /* of the volumes */
+    const char *const *cell_names;
     nb_look *look;
     double *frame;       /* of what moves */
     int moves;           /* whether anything does */
     int camera_is_keyed; /* ... the camera */
     int saves_camera;
-    const char *message;   /* "": none */
-    const char *picture;   /* what of the picture is done */
-    double seconds;        /* that OpenGL took for the last one */
+    const char *message; /* "": none */
+    int is_fault;        /* the message says what went wrong */
+    const char *picture; /* what of the picture is done */
+    double seconds;      /* that OpenGL took for the last one */
+    unsigned samples;    /* ... with so many for each pixel */
+    double cpu_seconds;  /* ... the CPU; 0: there is none */
+    int has_past, has_future;
     int is_changed;        /* something is not as the file says */
     int file_is_newer;     /* ... and the file has changed, too */
     int shown, help_shown; /* the controls, the list of keys */
 
     /* Answers of the last nb_panel_draw. */
-    int fog_changed, light_changed, camera_changed, frame_changed, look_changed;
-    int wants_save, wants_reload, wants_home;
+    int fog_changed, camera_changed, frame_changed, look_changed;
+    int wants_save, wants_reload, wants_home, wants_undo, wants_redo, wants_picture;
+    int is_held;          /* a control is being changed: more will follow */
+    int is_out_of_memory; /* something could not be added */
+    int has_read_message; /* it may go */
 } nb_panel;
 
-/* `window` is a GLFWwindow whose context of OpenGL is current; its callbacks are chained to. 0, or -1 where memory is
- * out. */
-int nb_panel_open(void *window);
+/* `window` is a GLFWwindow whose context of OpenGL is current; its callbacks are chained to. `scale` is the size of the
+ * controls, 1 on a screen of 96 pixels per inch. 0, or -1 where memory is out. */
+int nb_panel_open(void *window, double scale);
 void nb_panel_close(void);
 
 /* Draws over the picture and fills in the answers. `controls` is NULL, or takes a line "x y width height name", in
- * pixels, for each control. */
+ * pixels, for each control; the name of the first is "(typing)" while keys go into one. */
 void nb_panel_draw(nb_panel *panel, const char *controls);
+
+/* Tells of a key, or a button of the mouse, that went down, by GLFW's numbers: it, or Ctrl, may have come up before the
+ * panel is drawn again, which Dear ImGui would not notice. */
+void nb_panel_press_key(int key, int modifiers);
+void nb_panel_press_button(int modifiers);
 
 /* Whether a press of the mouse, or of a key, is the panel's; x and y in the window's coordinates. */
 int nb_panel_has_place(double x, double y);

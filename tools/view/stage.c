@@ -24,10 +24,10 @@ static const char copy_text[] = "uniform sampler2D plane_texture, color_texture;
                                 "    picture = vec4(is_depth ? vec3(depth) : plane.rgb, 1.0);\n"
                                 "}\n";
 
-nebel_result nb_stage_open(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_log *log, nb_stage *stage)
+nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_stage *stage)
 {
     const nebel_gl_renderer_desc desc = {.log = *log};
-    nebel_result result = nebel_create_gl_renderer(scene, fog, &desc, &stage->renderer);
+    nebel_result result = nebel_create_gl_renderer(scene, NULL, &desc, &stage->renderer);
     if (result == NEBEL_OK) result = nb_program_make(copy_text, log, &stage->program);
     if (result != NEBEL_OK) {
         nb_stage_close(stage);
@@ -110,6 +110,7 @@ static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t w
                          const nb_look *look, uint32_t samples)
 {
     nebel_gl_frame_desc desc = {.camera = *camera, .width = width, .height = height, .samples = samples};
+    if (look->particles == NB_LOOK_AS_DISCS) desc.method = NEBEL_GL_METHOD_FIVE_TAP;
     if (samples > 1) {
         desc.progress = stop;
         desc.progress_user = stage;

@@ -27,8 +27,8 @@ typedef struct nb_stage {
     void *user;
 } nb_stage;
 
-/* In a current context of OpenGL 3.3 core. `scene` must outlive the stage. */
-nebel_result nb_stage_open(const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_log *log, nb_stage *stage);
+/* In a current context of OpenGL 3.3 core, without fog. `scene` must outlive the stage. */
+nebel_result nb_stage_open(const nebel_scene_data *scene, const nebel_log *log, nb_stage *stage);
 
 /* Fine with zeros. */
 void nb_stage_close(nb_stage *stage);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <threads.h>
+#include <time.h>
 
 /* The first picture has one pixel of so many either way; each that follows has half. */
 enum { COARSEST = 8 };
@@ -67,6 +68,13 @@ static nebel_result render(work *w, const nb_twin_picture *picture)
     return NEBEL_OK;
 }
 
+static double now(void)
+{
+    struct timespec time;
+    timespec_get(&time, TIME_UTC);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
 static void publish(nb_twin *twin, nb_twin_picture picture)
 {
     mtx_lock(&twin->lock);
@@ -79,7 +87,8 @@ static void publish(nb_twin *twin, nb_twin_picture picture)
 /* Nonzero: go on with the next one. */
 static int make_picture(work *w, uint32_t by)
 {
-    nb_twin_picture picture = {(w->wish.width + by - 1) / by, (w->wish.height + by - 1) / by, NULL};
+    nb_twin_picture picture = {(w->wish.width + by - 1) / by, (w->wish.height + by - 1) / by, NULL, 0};
+    const double start = now();
     picture.rgb = malloc(sizeof(float[3]) * picture.width * picture.height);
     if (picture.rgb == NULL) return 0;
     w->may_stop = by < COARSEST;
@@ -87,6 +96,7 @@ static int make_picture(work *w, uint32_t by)
         free(picture.rgb);
         return 0;
     }
+    picture.seconds = now() - start;
     publish(w->twin, picture);
     return !is_out_of_date(w->twin);
 }

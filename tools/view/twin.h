@@ -20,7 +20,8 @@ typedef struct nb_twin_wish {
 
 typedef struct nb_twin_picture {
     uint32_t width, height;
-    float *rgb; /* top row first; depth is in all three */
+    float *rgb;     /* top row first; depth is in all three */
+    double seconds; /* that it took */
 } nb_twin_picture;
 
 /* The meshes and textures of `scene` must outlive the twin. NULL where memory or threads are out. */

@@ -16,10 +16,14 @@
 #include "window.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* How long after the last movement the picture waits before it becomes whole [s]. */
 static const double rest = 0.15;
+
+/* How long a message that is no fault is shown [s]. */
+static const double message_seconds = 6;
 
 typedef struct viewer {
     const nb_view_settings *settings;
@@ -36,7 +40,13 @@ typedef struct viewer {
     nebel_camera home;
     nebel_log log;
     char message[512]; /* the last one, for the window */
-    double moved;      /* when something changed last [s] */
+    int is_fault;      /* it says what went wrong */
+    double said;       /* when it was said [s] */
+    nebel_volume_origin *origins;
+    size_t origin_count;
+    double lost;        /* when the context was lost last [s] */
+    double cpu_seconds; /* that its last picture took */
+    double moved;       /* when something changed last [s] */
     double frame;
     int wants_picture, wants_window_picture;
 } viewer;
@@ -51,7 +61,21 @@ static void listen(nebel_result result, const char *message, void *user)
     viewer *const all = user;
     if (result == NEBEL_ERROR_LIMIT && all->stage.was_stopped) return;
     (void)snprintf(all->message, sizeof all->message, "%s", message);
+    all->is_fault = 1;
     nb_report_message("%s", message);
+}
+
+static void say(viewer *all, const char *words)
+{
+    (void)snprintf(all->message, sizeof all->message, "%s", words);
+    all->is_fault = 0;
+    all->said = all->window.time;
+}
+
+/* What went well need not stand there for long. */
+static void let_message_fade(viewer *all)
+{
+    if (!all->is_fault && all->window.time - all->said > message_seconds) all->message[0] = '\0';
 }
 
 static int fail(viewer *all, nebel_result result)
@@ -77,41 +101,76 @@ static void set_home(viewer *all)
     if (camera->projection == NEBEL_PROJECTION_PANORAMA) {
         camera->projection = NEBEL_PROJECTION_PERSPECTIVE;
         camera->vertical_fov = 75;
-        (void)snprintf(all->message, sizeof all->message, "The scene's camera is a panorama; this is a part of it.");
+        say(all, "The scene's camera is a panorama; this is a part of it.");
     }
     all->home = *camera;
+}
+
+/* The draft's fog to the renderer, particles in the way that is wished for. */
+static nebel_result set_fog(viewer *all)
+{
+    nb_draft *const draft = &all->draft;
+    nebel_snapshot *fog = draft->volumes;
+    const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
+    nebel_result result = is_whole ? nb_draft_whole(draft, &fog) : NEBEL_OK;
+    if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(all->stage.renderer, fog);
+    if (result != NEBEL_OK) return result;
+    return nebel_set_gl_renderer_particles(all->stage.renderer, draft->particles, is_whole ? 0 : draft->particle_count);
 }
 
 static nebel_result open_stage(viewer *all)
 {
     all->stage = (nb_stage){.is_needed = is_needed, .user = all};
-    return nb_stage_open(&all->draft.data, all->draft.snapshot, &all->log, &all->stage);
+    const nebel_result result = nb_stage_open(&all->draft.data, &all->log, &all->stage);
+    return result == NEBEL_OK ? set_fog(all) : result;
+}
+
+static void watch_files(viewer *all)
+{
+    nb_watch_open(&all->watch, all->settings->scene, all->draft.data.files, all->draft.data.file_count);
+}
+
+/* All that a context of OpenGL has. */
+static int open_window(viewer *all, uint32_t width, uint32_t height)
+{
+    const nb_view_settings *const settings = all->settings;
+    nb_window *const window = &all->window;
+    if (nb_window_open(window, settings->scene, width, height) != NB_DONE) return NB_FAILED;
+    nebel_result result = nb_screen_open(&all->log, &all->screen);
+    if (result == NEBEL_OK) result = open_stage(all);
+    if (result != NEBEL_OK) return fail(all, result);
+    if (nb_panel_open(window->handle, settings->scale > 0 ? settings->scale : window->scale) != 0)
+        return nb_report_failure("view: memory is out");
+    window->has_panel = 1;
+    return NB_DONE;
+}
+
+static void close_window(viewer *all)
+{
+    if (all->window.has_panel) nb_panel_close();
+    nb_stage_close(&all->stage);
+    nb_screen_close(&all->screen);
+    nb_window_close(&all->window);
+    all->window.has_panel = 0;
 }
 
 static int open_viewer(viewer *all)
 {
     const nb_view_settings *const settings = all->settings;
-    nb_watch_take(&all->watch, settings->scene);
-    nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
+    const nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
     if (result != NEBEL_OK) return fail(all, result);
+    watch_files(all);
     set_home(all);
-    if (nb_window_open(&all->window, settings->scene, settings->width, settings->height) != NB_DONE) return NB_FAILED;
-    result = nb_screen_open(&all->log, &all->screen);
-    if (result == NEBEL_OK) result = open_stage(all);
-    if (result != NEBEL_OK) return fail(all, result);
-    if (nb_panel_open(all->window.handle) != 0) return nb_report_failure("view: memory is out");
-    all->window.has_panel = 1;
-    return NB_DONE;
+    return open_window(all, settings->width, settings->height);
 }
 
 static void close_viewer(viewer *all)
 {
     nb_twin_close(all->twin);
-    if (all->window.has_panel) nb_panel_close();
-    nb_stage_close(&all->stage);
-    nb_screen_close(&all->screen);
-    nb_window_close(&all->window);
+    close_window(all);
+    nb_watch_close(&all->watch);
     nb_draft_close(&all->draft);
+    free(all->origins);
 }
 
 /* ---- changes
@@ -130,23 +189,33 @@ static int is_moving(const viewer *all)
     return all->settings->screenshot == NULL && all->window.time - all->moved < rest;
 }
 
-static void say(viewer *all, const char *words)
+/* What ends the program: memory that is out, and a context that draws nothing any longer. All else is said, and
+ * something can be done about it. */
+static nebel_result forgive(nebel_result result)
 {
-    (void)snprintf(all->message, sizeof all->message, "%s", words);
+    return result == NEBEL_ERROR_MEMORY || result == NEBEL_ERROR_UNSUPPORTED ? result : NEBEL_OK;
 }
 
-/* What the fog does not take is undone and said; memory that is out ends the program. */
+/* What the fog does not take is undone and said. */
 static nebel_result use_fog(viewer *all, nebel_result committed)
 {
-    if (committed == NEBEL_ERROR_MEMORY) return committed;
+    if (forgive(committed) != NEBEL_OK) return committed;
     note_change(all);
-    return nebel_set_gl_renderer_fog(all->stage.renderer, all->draft.snapshot);
+    return forgive(set_fog(all));
 }
 
 static nebel_result commit(viewer *all)
 {
     say(all, "");
     return use_fog(all, nb_draft_commit(&all->draft));
+}
+
+static nebel_result step(viewer *all, int back)
+{
+    nebel_result result = NEBEL_OK;
+    if (!(back ? nb_draft_undo(&all->draft, &result) : nb_draft_redo(&all->draft, &result))) return NEBEL_OK;
+    say(all, "");
+    return use_fog(all, result);
 }
 
 static int is_same_camera(const nebel_camera *a, const nebel_camera *b)
@@ -157,45 +226,107 @@ static int is_same_camera(const nebel_camera *a, const nebel_camera *b)
            a->projection == b->projection;
 }
 
-/* The view stays where somebody has moved it, unless the file has another camera now. */
+/* The fresh draft in the place of ours, unless it cannot be drawn. */
+static nebel_result replace_draft(viewer *all, const nb_draft *fresh)
+{
+    nb_draft old_draft = all->draft;
+    nb_stage old_stage = all->stage;
+    nb_twin_close(all->twin);
+    all->twin = NULL;
+    all->draft = *fresh;
+    nb_edition_show(&all->draft.now, &all->draft.data);
+    const nebel_result result = open_stage(all);
+    if (result != NEBEL_OK) {
+        nb_stage_close(&all->stage);
+        nb_draft_close(&all->draft);
+        all->stage = old_stage;
+        all->draft = old_draft;
+        nb_edition_show(&all->draft.now, &all->draft.data);
+        return result;
+    }
+    nb_stage_close(&old_stage);
+    nb_draft_close(&old_draft);
+    return NEBEL_OK;
+}
+
+/* Where that fails all stays as it is. The view stays where somebody has moved it, unless the file has another camera
+ * now. */
 static nebel_result read_again(viewer *all)
 {
     nb_draft fresh;
-    const nebel_camera view = all->draft.data.camera, before = nebel_scene_contents(all->draft.scene)->camera;
+    const nebel_camera view = all->draft.data.camera, before = nebel_scene_contents(all->draft.file)->camera;
     say(all, "");
-    nb_watch_take(&all->watch, all->settings->scene);
+    nb_watch_take(&all->watch);
     all->panel.file_is_newer = 0;
     if (nb_draft_open(all->settings->scene, all->draft.frame, &all->log, &fresh) != NEBEL_OK) return NEBEL_OK;
-    nb_twin_close(all->twin);
-    all->twin = NULL;
-    nb_stage_close(&all->stage);
-    nb_draft_close(&all->draft);
-    all->draft = fresh;
-    set_home(all);
-    if (is_same_camera(&before, &nebel_scene_contents(fresh.scene)->camera)) all->draft.data.camera = view;
     note_change(all);
+    const nebel_result result = replace_draft(all, &fresh);
+    if (result != NEBEL_OK) return forgive(result);
+    watch_files(all);
+    set_home(all);
+    if (is_same_camera(&before, &nebel_scene_contents(fresh.file)->camera)) all->draft.data.camera = view;
     nb_report_message("view: read %s again", all->settings->scene);
-    return open_stage(all);
+    return NEBEL_OK;
 }
 
 static nebel_result watch_file(viewer *all)
 {
-    if (!nb_watch_is_changed(&all->watch, all->settings->scene)) return NEBEL_OK;
+    if (nb_watch_find_changed(&all->watch) == NULL) return NEBEL_OK;
     if (!nb_draft_is_changed(&all->draft)) return read_again(all);
     all->panel.file_is_newer = 1;
     return NEBEL_OK;
 }
 
-static void save(viewer *all)
+/* A file that somebody else has changed is not written before the question about that was seen; then what is new in it
+ * stays there, and is read. */
+static nebel_result save(viewer *all)
 {
     const char *const path = all->settings->scene;
     const int was_newer = all->panel.file_is_newer;
     say(all, "");
-    if (nb_draft_save(&all->draft, path, all->panel.saves_camera) != NEBEL_OK) return;
-    if (!was_newer) nb_watch_take(&all->watch, path); /* otherwise what else has changed there is read, too */
-    all->panel.file_is_newer = 0;
-    say(all, "Saved.");
+    if (!was_newer && nb_watch_find_changed(&all->watch) != NULL) {
+        all->panel.file_is_newer = 1;
+        return NEBEL_OK;
+    }
+    const nebel_result result = nb_draft_save(&all->draft, path, all->panel.saves_camera);
+    if (result != NEBEL_OK) return forgive(result);
     nb_report_message("view: saved %s", path);
+    all->panel.file_is_newer = 0;
+    nb_watch_take(&all->watch);
+    const nebel_result used = was_newer ? read_again(all) : use_fog(all, NEBEL_OK);
+    if (all->message[0] == '\0') say(all, "Saved.");
+    return used;
+}
+
+/* ---- a lost context
+ * --------------------------------------------------------------------------------------------------
+ */
+
+/* Within so many seconds a second loss is the fault of what is drawn [s]. */
+static const double relapse = 10;
+
+static int recover(viewer *all)
+{
+    static const char words[] = "The graphics driver was reset; the window has been opened again. Nothing is lost.";
+    const double now = all->window.time;
+    const int is_relapse = all->lost > 0 && now - all->lost < relapse;
+    const uint32_t width = all->window.width, height = all->window.height;
+    if (is_relapse)
+        return nb_report_failure(
+            "view: the graphics driver was reset twice, perhaps by this scene; try a smaller window, "
+            "or 'nebel render --device cpu'");
+    close_window(all);
+    all->window = (nb_window){.handle = NULL};
+    if (open_window(all, width > 0 ? width : all->settings->width, height > 0 ? height : all->settings->height) !=
+        NB_DONE)
+        return nb_report_failure("view: the graphics driver was reset, and no new window opens");
+    all->lost = now;
+    all->has_cpu = 0;
+    all->hands = (nb_hands){.x = 0};
+    note_change(all);
+    nb_report_message("view: %s", words);
+    say(all, words);
+    return NB_DONE;
 }
 
 /* ---- one turn
@@ -206,49 +337,81 @@ static void obey_keys(viewer *all)
 {
     const nb_hands *const hands = &all->hands;
     if (hands->moved_camera) note_change(all);
-    if (hands->wants_home) {
-        all->draft.data.camera = all->home;
-        note_change(all);
-    }
     if (hands->wants_help) all->panel.help_shown = !all->panel.help_shown;
     if (hands->wants_panel) all->panel.shown = !all->panel.shown;
     if (hands->changed_look) note_change(all);
-    if (hands->wants_save) save(all);
-    all->wants_picture |= hands->wants_picture;
+    all->wants_picture |= hands->wants_picture || all->panel.wants_picture;
     all->wants_window_picture |= hands->wants_window_picture;
+    if (hands->wants_home || all->panel.wants_home) {
+        all->draft.data.camera = all->home;
+        note_change(all);
+    }
     if (hands->wants_end) nb_window_end(&all->window);
 }
 
 static nebel_result obey_panel(viewer *all)
 {
     const nb_panel *const panel = &all->panel;
-    if (panel->wants_home) all->draft.data.camera = all->home;
-    if (panel->camera_changed || panel->light_changed || panel->wants_home || panel->look_changed) note_change(all);
-    if (panel->wants_save) save(all);
-    if (panel->wants_reload || all->hands.wants_reload) return read_again(all);
-    if (panel->frame_changed) return use_fog(all, nb_draft_set_frame(&all->draft, all->frame));
-    return panel->fog_changed || panel->light_changed ? commit(all) : NEBEL_OK;
+    nebel_result result = NEBEL_OK;
+    if (panel->is_out_of_memory) return NEBEL_ERROR_MEMORY;
+    if (panel->has_read_message) say(all, "");
+    if (panel->camera_changed || panel->look_changed) note_change(all);
+    if (panel->look_changed) result = forgive(set_fog(all));
+    if (panel->fog_changed && result == NEBEL_OK) result = commit(all);
+    if (panel->frame_changed && result == NEBEL_OK) result = use_fog(all, nb_draft_set_frame(&all->draft, all->frame));
+    if (!panel->is_held) nb_history_close(&all->draft.history);
+    return result;
 }
 
-static void fill_panel(viewer *all)
+/* Those of the keys and of the panel's buttons, one at a time. */
+static nebel_result obey_commands(viewer *all)
 {
-    static const char *const states[] = {"", "moving: fewer pixels", "refining", "complete"};
+    const nb_panel *const panel = &all->panel;
+    const nb_hands *const hands = &all->hands;
+    if (panel->wants_undo || hands->wants_undo) return step(all, 1);
+    if (panel->wants_redo || hands->wants_redo) return step(all, 0);
+    if (panel->wants_reload || hands->wants_reload) return read_again(all);
+    return panel->wants_save || hands->wants_save ? save(all) : NEBEL_OK;
+}
+
+static int list_origins(viewer *all)
+{
+    const size_t count = all->draft.now.count;
+    void *const origins = realloc(all->origins, (count + 1) * sizeof *all->origins);
+    if (origins == NULL) return -1;
+    all->origins = origins;
+    for (size_t i = 0; i < count; i++) all->origins[i] = nb_draft_origin(&all->draft, i);
+    return 0;
+}
+
+static int fill_panel(viewer *all)
+{
+    static const char *const states[] = {"", "moving: fewer pixels", "refining...", "complete"};
     nb_panel *const panel = &all->panel;
     const nebel_scene_data *const data = &all->draft.data;
+    let_message_fade(all);
+    if (list_origins(all) != 0) return nb_report_failure("view: memory is out");
     panel->scene = all->settings->scene;
     panel->driver = all->window.driver;
-    panel->source = all->draft.scene;
     panel->data = &all->draft.data;
-    panel->volumes = all->draft.volumes;
+    panel->now = &all->draft.now;
+    panel->origins = all->origins;
+    panel->cell_names = data->cell_names;
     panel->look = &all->look;
     all->frame = all->draft.frame;
     panel->frame = &all->frame;
     panel->camera_is_keyed = !nb_draft_can_save_camera(&all->draft);
     panel->moves = data->moving_volume_count > 0 || data->camera_key_count > 0 || data->turntable_frames > 0;
     panel->is_changed = nb_draft_is_changed(&all->draft);
+    panel->has_past = all->draft.history.at > 0;
+    panel->has_future = all->draft.history.at < all->draft.history.count;
     panel->message = all->message;
+    panel->is_fault = all->is_fault;
     panel->picture = states[all->stage.state];
     panel->seconds = all->stage.seconds;
+    panel->samples = all->stage.samples;
+    panel->cpu_seconds = all->look.compare != NB_LOOK_GL_ALONE && all->has_cpu ? all->cpu_seconds : 0;
+    return NB_DONE;
 }
 
 /* ---- the CPU's picture
@@ -257,12 +420,14 @@ static void fill_panel(viewer *all)
 
 static void ask_twin(viewer *all)
 {
+    nebel_snapshot *fog = NULL;
+    if (nb_draft_whole(&all->draft, &fog) != NEBEL_OK) return;
     const nb_twin_wish wish = {.camera = all->draft.data.camera,
                                .width = all->window.width,
                                .height = all->window.height,
                                .plane = all->look.plane,
                                .light = all->draft.data,
-                               .fog = all->draft.snapshot};
+                               .fog = fog};
     if (all->twin == NULL) all->twin = nb_twin_open(&all->draft.data);
     if (all->twin == NULL) {
         say(all, "Memory or threads are out for the picture of the CPU.");
@@ -280,6 +445,7 @@ static void compare(viewer *all)
     if (all->twin == NULL || !nb_twin_take(all->twin, &picture)) return;
     nb_screen_set_cpu(&all->screen, picture.width, picture.height, picture.rgb);
     all->has_cpu = 1;
+    all->cpu_seconds = picture.seconds;
 }
 
 static int is_complete(const viewer *all)
@@ -299,7 +465,9 @@ static void keep_picture(viewer *all)
     if (nb_picture_name(name, sizeof name) != 0 ||
         nb_picture_write(name, all->window.width, all->window.height, &all->log) != NB_DONE)
         return;
-    (void)snprintf(all->message, sizeof all->message, "Saved %s", name);
+    char words[64];
+    (void)snprintf(words, sizeof words, "Saved %s", name);
+    say(all, words);
     nb_report_message("view: saved %s", name);
 }
 
@@ -324,32 +492,40 @@ static int show(viewer *all)
     compare(all);
     nb_screen_draw(&all->screen, all->stage.texture, all->has_cpu, &all->look, window->width, window->height);
     int status = take_pictures(all, 0);
-    fill_panel(all);
+    if (status == NB_DONE) status = fill_panel(all);
+    if (status != NB_DONE) return status;
     nb_panel_draw(&all->panel, all->settings->controls);
     if (status == NB_DONE) status = take_pictures(all, 1);
     nb_window_show(&all->window);
     return status;
 }
 
+/* A frame that cannot be drawn is not tried again before something has changed. */
+static nebel_result draw(viewer *all)
+{
+    nb_window *const window = &all->window;
+    const nebel_result result =
+        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &all->look, is_moving(all));
+    if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
+    return nb_window_is_lost(window) ? NEBEL_OK : forgive(result);
+}
+
 static int turn(viewer *all)
 {
     nb_window *const window = &all->window;
     nb_window_wait(window, is_moving(all) || !is_complete(all) || nb_hands_are_busy(&all->hands));
-    if (nb_window_is_lost(window)) {
-        return nb_report_failure("view: the graphics driver was reset and its context is lost; start the viewer again");
-    }
+    if (nb_window_is_lost(window)) return recover(all);
     if (window->width == 0 || window->height == 0) return NB_DONE;
     if (window->was_resized) note_change(all);
     nb_hands_move(&all->hands, window, &all->draft.data.camera, &all->look);
     obey_keys(all);
     nebel_result result = watch_file(all);
-    if (result != NEBEL_OK) return fail(all, result);
-    result =
-        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &all->look, is_moving(all));
+    if (result == NEBEL_OK) result = draw(all);
     if (result != NEBEL_OK) return fail(all, result);
     const int status = show(all);
-    const nebel_result obeyed = obey_panel(all);
-    return obeyed == NEBEL_OK ? status : fail(all, obeyed);
+    result = obey_panel(all);
+    if (result == NEBEL_OK) result = obey_commands(all);
+    return result == NEBEL_OK ? status : fail(all, result);
 }
 
 int nb_view_run(const nb_view_settings *settings)

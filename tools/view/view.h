@@ -9,6 +9,7 @@ typedef struct nb_view_settings {
     uint32_t width, height;
     double exposure; /* stops */
     double frame;
+    double scale;           /* of the controls; 0: what the screen says */
     const char *screenshot; /* NULL: none; else the finished picture goes there, and the window closes */
     const char *controls;   /* NULL: none; else a file that says where the controls are */
 } nb_view_settings;

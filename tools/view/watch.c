@@ -2,24 +2,59 @@
 
 #include "watch.h"
 
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
-/* Zero where there is none. */
-static nb_watch look(const char *path)
+static void look(nb_watch_file *file)
 {
     struct stat status;
-    if (stat(path, &status) != 0) return (nb_watch){0};
-    return (nb_watch){status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size, (long long)status.st_ino};
+    if (stat(file->path, &status) != 0) {
+        *file = (nb_watch_file){.path = file->path};
+        return;
+    }
+    *file = (nb_watch_file){file->path, status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size,
+                            (long long)status.st_ino};
 }
 
-void nb_watch_take(nb_watch *watch, const char *path)
+static void add(nb_watch *watch, const char *path)
 {
-    *watch = look(path);
+    nb_watch_file *const file = &watch->files[watch->count];
+    file->path = strdup(path);
+    watch->count += file->path != NULL;
 }
 
-int nb_watch_is_changed(const nb_watch *watch, const char *path)
+void nb_watch_open(nb_watch *watch, const char *scene, const char *const *files, size_t count)
 {
-    const nb_watch now = look(path);
-    return now.number != 0 && memcmp(&now, watch, sizeof now) != 0;
+    nb_watch_close(watch);
+    watch->files = calloc(count + 1, sizeof *watch->files);
+    if (watch->files == NULL) return;
+    add(watch, scene);
+    for (size_t i = 0; i < count; i++) add(watch, files[i]);
+    nb_watch_take(watch);
+}
+
+void nb_watch_close(nb_watch *watch)
+{
+    for (size_t i = 0; i < watch->count; i++) free(watch->files[i].path);
+    free(watch->files);
+    *watch = (nb_watch){.files = NULL};
+}
+
+void nb_watch_take(nb_watch *watch)
+{
+    for (size_t i = 0; i < watch->count; i++) look(&watch->files[i]);
+}
+
+const char *nb_watch_find_changed(const nb_watch *watch)
+{
+    for (size_t i = 0; i < watch->count; i++) {
+        const nb_watch_file *const was = &watch->files[i];
+        nb_watch_file now = *was;
+        look(&now);
+        if (now.number != 0 && (now.seconds != was->seconds || now.nanoseconds != was->nanoseconds ||
+                                now.size != was->size || now.number != was->number))
+            return was->path;
+    }
+    return NULL;
 }

@@ -92,6 +92,17 @@ static void read_size(nb_window *window)
     window->height = (uint32_t)height;
 }
 
+/* Where the system enlarges the whole window nothing is left to be done. */
+static void read_scale(nb_window *window)
+{
+    float x = 1, y = 1;
+    int pixels = 1, height = 1;
+    glfwGetWindowContentScale(window->handle, &x, &y);
+    glfwGetFramebufferSize(window->handle, NULL, &pixels);
+    glfwGetWindowSize(window->handle, NULL, &height);
+    window->scale = pixels > 0 && height > 0 ? (double)y * height / pixels : (double)y;
+}
+
 static GLFWwindow *make_window(const char *title, uint32_t width, uint32_t height)
 {
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
@@ -127,6 +138,7 @@ int nb_window_open(nb_window *window, const char *title, uint32_t width, uint32_
                    (const char *)glGetString(GL_VERSION));
     window->can_be_lost = epoxy_has_gl_extension("GL_ARB_robustness");
     listen(window);
+    read_scale(window);
     read_size(window);
     window->awake = SETTLING;
     return NB_DONE;
@@ -187,7 +199,8 @@ void nb_window_end(nb_window *window)
     glfwSetWindowShouldClose(window->handle, GLFW_TRUE);
 }
 
-int nb_window_is_lost(const nb_window *window)
+int nb_window_is_lost(nb_window *window)
 {
-    return window->can_be_lost && glGetGraphicsResetStatusARB() != GL_NO_ERROR;
+    if (window->can_be_lost && glGetGraphicsResetStatusARB() != GL_NO_ERROR) window->is_lost = 1;
+    return window->is_lost;
 }

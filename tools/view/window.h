@@ -35,6 +35,8 @@ typedef struct nb_window {
     int awake;        /* turns that do not wait */
     char driver[256]; /* GL_RENDERER and GL_VERSION */
     int can_be_lost;  /* the driver would say so */
+    int is_lost;      /* it has */
+    double scale;     /* of what people read: 1 on a screen of 96 pixels per inch */
 } nb_window;
 
 /* A window with a context of OpenGL 3.3 core, which is current. Returns an exit status; what went wrong was said. */
@@ -54,7 +56,7 @@ void nb_window_show(nb_window *window);
 int nb_window_is_ended(const nb_window *window);
 void nb_window_end(nb_window *window);
 
-/* Whether the driver has lost the context. */
-int nb_window_is_lost(const nb_window *window);
+/* Whether the driver has lost the context: for good. */
+int nb_window_is_lost(nb_window *window);
 
 #endif

@@ -1,0 +1,271 @@
+// Shapes and densities.
+#include "controls.h"
+#include "fog_panel.h"
+#include "shape.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+namespace
+{
+
+using namespace controls;
+
+const double degree = 3.14159265358979323846 / 180;
+
+/* ---- transforms
+ * ------------------------------------------------------------------------------------------------------
+ */
+
+bool is_plain(const nebel_transform &t)
+{
+    return t.position[0] == 0 && t.position[1] == 0 && t.position[2] == 0 && t.rotation[0] == 0 && t.rotation[1] == 0 &&
+           t.rotation[2] == 0 && t.scale[0] == t.scale[1] && t.scale[1] == t.scale[2] && fabs(t.scale[0]) <= 1;
+}
+
+// A quaternion as turns about y, then the turned x, then the turned z, in degrees: the rotation is Ry Rx Rz.
+void find_turns(const double q[4], double turns[3])
+{
+    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const double by = length > 0 ? 1 / length : 0;
+    const double x = q[0] * by, y = q[1] * by, z = q[2] * by, w = length > 0 ? q[3] * by : 1;
+    turns[0] = atan2(2 * (x * z + w * y), 1 - 2 * (x * x + y * y)) / degree;
+    turns[1] = asin(fmax(-1, fmin(1, 2 * (w * x - y * z)))) / degree;
+    turns[2] = atan2(2 * (x * y + w * z), 1 - 2 * (x * x + z * z)) / degree;
+}
+
+void make_rotation(const double turns[3], double q[4])
+{
+    const double sy = sin(turns[0] * degree / 2), cy = cos(turns[0] * degree / 2);
+    const double sx = sin(turns[1] * degree / 2), cx = cos(turns[1] * degree / 2);
+    const double sz = sin(turns[2] * degree / 2), cz = cos(turns[2] * degree / 2);
+    q[0] = cy * sx * cz + sy * cx * sz;
+    q[1] = sy * cx * cz - cy * sx * sz;
+    q[2] = cy * cx * sz - sy * sx * cz;
+    q[3] = cy * cx * cz + sy * sx * sz;
+}
+
+bool draw_rotation(double rotation[4])
+{
+    double turns[3];
+    find_turns(rotation, turns);
+    if (!drag("rotation", turns, 3, 50, -DBL_MAX, "%.4g",
+              "Degrees about the vertical, then about the axis to the right, then about the one towards you."))
+        return false;
+    turns[1] = fmax(-90, fmin(90, turns[1]));
+    make_rotation(turns, rotation);
+    return true;
+}
+
+bool draw_transform(nebel_transform *transform, double reach)
+{
+    if (!ImGui::TreeNodeEx("transform", is_plain(*transform) ? 0 : ImGuiTreeNodeFlags_DefaultOpen)) {
+        note_place("transform");
+        return false;
+    }
+    note_place("transform");
+    bool changed = drag_place("position", transform->position, reach, "Moves the shape [m].");
+    changed |= draw_rotation(transform->rotation);
+    changed |= drag("scale", transform->scale, 3, 0.1, -DBL_MAX, "%.4g",
+                    "Stretches the shape along its axes, before it is turned. Less than 0 mirrors; 0 is not possible.");
+    ImGui::TreePop();
+    return changed;
+}
+
+/* ---- what is made of pieces
+ * -------------------------------------------------------------------------------------------
+ */
+
+bool draw_planes(nb_panel *panel, nebel_shape *shape, double reach)
+{
+    bool changed = false;
+    size_t gone = shape->plane_count;
+    for (size_t i = 0; i < shape->plane_count; i++) {
+        const Owner owner("planes", i);
+        nebel_plane *const plane = const_cast<nebel_plane *>(&shape->planes[i]);
+        changed |= drag("normal", plane->normal, 3, 1, -DBL_MAX, "%.3g",
+                        "Which way the plane faces: out of the fog. Its length means nothing.");
+        changed |= drag("distance", &plane->distance, 1, reach / 10, -DBL_MAX, "%.4g m",
+                        "Where the plane is along its normal: inside where n . x <= distance.");
+        ImGui::SameLine();
+        if (shape->plane_count > 1 && press("x", "Takes this plane away.")) gone = i;
+        ImGui::Separator();
+    }
+    if (gone < shape->plane_count) {
+        nb_shape_remove_plane(shape, gone);
+        changed = true;
+    }
+    if (shape->plane_count < NEBEL_MAX_PLANES && press("Add a plane", "A copy of the last plane, turned round.")) {
+        panel->is_out_of_memory |= nb_shape_add_plane(shape) != 0;
+        changed = true;
+    }
+    return changed;
+}
+
+bool draw_part(nb_panel *panel, nebel_shape *shape, size_t index, double reach, bool *goes)
+{
+    const Owner owner("parts", index);
+    char title[48];
+    snprintf(title, sizeof title, "part %u: %s###part", unsigned(index + 1), nb_shape_title(shape->parts[index].type));
+    const bool is_open = ImGui::TreeNodeEx(title, shape->part_count <= 3 ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+    note_place("open");
+    if (!is_open) return false;
+    const bool changed = draw_shape(panel, const_cast<nebel_shape *>(&shape->parts[index]), reach, true);
+    *goes = shape->part_count > 1 && press("Remove this part", "Takes the part away. Ctrl + Z brings it back.");
+    ImGui::TreePop();
+    return changed;
+}
+
+bool draw_parts(nb_panel *panel, nebel_shape *shape, double reach)
+{
+    bool changed = false;
+    size_t gone = shape->part_count;
+    for (size_t i = 0; i < shape->part_count; i++) {
+        bool goes = false;
+        changed |= draw_part(panel, shape, i, reach, &goes);
+        if (goes) gone = i;
+    }
+    if (gone < shape->part_count) {
+        nb_shape_remove_part(shape, gone);
+        changed = true;
+    }
+    if (shape->part_count < NEBEL_MAX_LEAVES && press("Add a part", "A copy of the last part.")) {
+        panel->is_out_of_memory |= nb_shape_add_part(shape) != 0;
+        changed = true;
+    }
+    return changed;
+}
+
+/* ---- shapes
+ * ----------------------------------------------------------------------------------------------------------
+ */
+
+bool draw_axis(nebel_shape *shape, double reach)
+{
+    bool changed = drag_place("from", shape->from, reach, "One end of the axis [m].");
+    return drag_place("to", shape->to, reach, "The other end of the axis [m].") || changed;
+}
+
+bool draw_numbers(nb_panel *panel, nebel_shape *shape, double reach)
+{
+    bool changed = false;
+    switch (shape->type) {
+    case NEBEL_SHAPE_HALF_SPACE:
+        changed = drag_place("point", shape->point, reach, "A place in the plane that bounds the fog [m].");
+        return drag("normal", shape->normal, 3, 1, -DBL_MAX, "%.3g", "Which way the plane faces: out of the fog.") ||
+               changed;
+    case NEBEL_SHAPE_BOX:
+        changed = drag_place("min", shape->min, reach, "The lowest corner [m]: less than max in x, y and z.");
+        return drag_place("max", shape->max, reach, "The highest corner [m].") || changed;
+    case NEBEL_SHAPE_SPHERE:
+        changed = drag_place("center", shape->center, reach, "Where the sphere is [m].");
+        return drag_length("radius", &shape->radius, "From the centre to the surface.") || changed;
+    case NEBEL_SHAPE_ELLIPSOID:
+        changed = drag_place("center", shape->center, reach, "Where the ellipsoid is [m].");
+        return drag("radii", shape->radii, 3, 0.01, 1e-6, "%.4g", "From the centre along x, y and z [m].") || changed;
+    case NEBEL_SHAPE_CYLINDER:
+    case NEBEL_SHAPE_CAPSULE:
+        changed = draw_axis(shape, reach);
+        return drag_length("radius", &shape->radius, "From the axis to the surface.") || changed;
+    case NEBEL_SHAPE_CONE:
+        changed = draw_axis(shape, reach);
+        changed |= drag("radius from", &shape->radius_from, 1, 0.01, 0, "%.4g m", "At the first end; 0 is a tip.");
+        return drag("radius to", &shape->radius_to, 1, 0.01, 0, "%.4g m", "At the other end; 0 is a tip.") || changed;
+    case NEBEL_SHAPE_CONVEX:
+        return draw_planes(panel, shape, reach);
+    case NEBEL_SHAPE_UNION:
+    case NEBEL_SHAPE_INTERSECTION:
+        return draw_parts(panel, shape, reach);
+    default:
+        return false;
+    }
+}
+
+bool choose_shape(nb_panel *panel, nebel_shape *shape, double reach)
+{
+    const char *titles[NEBEL_SHAPE_COUNT];
+    int type = shape->type;
+    for (int i = 0; i < NEBEL_SHAPE_COUNT; i++) titles[i] = nb_shape_title(nebel_shape_type(i));
+    if (!choose("shape", &type, titles, NEBEL_SHAPE_COUNT, "Where the fog is. Another shape starts where you look at."))
+        return false;
+    panel->is_out_of_memory |=
+        nb_shape_change(shape, nebel_shape_type(type), panel->data->camera.look_at, reach / 4) != 0;
+    return true;
+}
+
+/* ---- densities
+ * -------------------------------------------------------------------------------------------------------
+ */
+
+bool draw_height(nebel_density *density, double reach)
+{
+    static const char *const names[] = {"grows", "constant"};
+    int below = density->below;
+    bool changed = drag("base", &density->base, 1, reach / 10, -DBL_MAX, "%.4g m",
+                        "The height y at which the fog is as thick as its extinction says.");
+    changed |= slide("scale height", &density->scale_height, 0.01, 1e4, "%.4g m", true,
+                     "How much higher the fog has thinned to 37 %. Ctrl + click types a number in.");
+    changed |= choose("below", &below, names, 2, "Whether the fog gets thicker under its base.");
+    density->below = nebel_below(below);
+    return changed;
+}
+
+bool draw_density_numbers(nebel_density *density, double reach)
+{
+    bool changed = false;
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+        return draw_height(density, reach);
+    case NEBEL_DENSITY_LINEAR:
+        changed = drag_place("none at", density->from, reach, "Where the density is 0 [m].");
+        return drag_place("full at", density->to, reach, "Where the density is 1 [m].") || changed;
+    case NEBEL_DENSITY_RADIAL:
+        return slide_whole("power", &density->power, 1, 3, false,
+                           "(1 - r^2)^power from the centre to the surface: more is softer.");
+    case NEBEL_DENSITY_GAUSSIAN:
+        changed = drag_place("middle", density->center, reach, "Where the fog is thickest [m].");
+        return drag_length("sigma", &density->sigma, "How far from there it has thinned to 61 %.") || changed;
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return drag_length("edge", &density->distance, "How far inside of the surface the fog is full.");
+    default:
+        return false;
+    }
+}
+
+// Numbers that another kind of density needs, where they are not yet.
+void complete_density(nebel_density *density, const double place[3], double size)
+{
+    if (!(density->scale_height > 0)) density->scale_height = size;
+    if (!(density->sigma > 0)) density->sigma = size;
+    if (!(density->distance > 0)) density->distance = size / 4;
+    if (density->power < 1) density->power = 1;
+    if (memcmp(density->from, density->to, sizeof density->from) != 0) return;
+    memcpy(density->center, place, sizeof density->center);
+    memcpy(density->from, place, sizeof density->from);
+    memcpy(density->to, place, sizeof density->to);
+    density->to[1] += size;
+}
+
+} // namespace
+
+bool draw_shape(nb_panel *panel, nebel_shape *shape, double reach, bool may_change)
+{
+    bool changed = may_change && choose_shape(panel, shape, reach);
+    changed |= draw_numbers(panel, shape, reach);
+    return draw_transform(&shape->transform, reach) || changed;
+}
+
+bool draw_density(nebel_density *density, const double place[3], double reach)
+{
+    static const char *const names[] = {"constant", "height", "linear", "radial", "gaussian", "soft edge"};
+    int type = density->type;
+    bool changed = choose("density", &type, names, NEBEL_DENSITY_COUNT,
+                          "How thick the fog is from place to place. Radial is for spheres and ellipsoids; a soft edge "
+                          "is not for the world, unions and intersections.");
+    if (changed) {
+        density->type = nebel_density_type(type);
+        complete_density(density, place, reach / 4);
+    }
+    return draw_density_numbers(density, reach) || changed;
+}
