@@ -157,5 +157,5 @@ const char *nb_bench_vertices(const nb_bench_desc *desc, nb_figures *figures)
     const char *fault = measure_setting(&terrain, NB_FOG_BANK, desc, figures);
     if (fault == NULL) fault = measure_setting(&terrain, NB_FOG_OVER_ALL, desc, figures);
     nb_terrain_free(&terrain);
-    return fault;
+    return fault == NULL ? nb_bench_tessellation(desc, figures) : fault;
 }

@@ -243,6 +243,68 @@ nebel_result nebel_fog_vertices(const nebel_snapshot *snapshot, const nebel_vert
                                 const nebel_vertices *vertices, const nebel_vertex_output *outputs,
                                 size_t output_count);
 
+/* ---- tessellation ---------------------------------------------------------------------------- */
+
+/* Between vertices hardware interpolates: where triangles are large against a volume its fog breaks. nebel_tessellate
+ * splits triangles until fog at their vertices is near enough to the exact fog everywhere, and not at vertices alone.
+ *
+ * {0}: the eye at the origin, red, 1/255. */
+typedef struct nebel_tessellation_desc {
+    nebel_allocator allocator;
+    double eye[3];         /* m, in the coordinates of the fog; at most 1e15 */
+    int channel;           /* whose factor: 0 red, 1 green, 2 blue */
+    double bound;          /* of the error of the factor, > 0; 0: 1/255 */
+    unsigned deepest;      /* how often a triangle may be halved, at most 48; 0: 20 */
+    size_t most_triangles; /* no triangle is halved for its error where there are so many; 0: 2^18 */
+} nebel_tessellation_desc;
+
+typedef struct nebel_triangles {
+    const void *positions;  /* three floats each, x y z [m] */
+    size_t position_stride; /* bytes, 12 or more; 0: 12 */
+    double origin[3];       /* m, where positions count from, in the coordinates of the fog */
+    size_t vertex_count;
+    const uint32_t *indices; /* three for each triangle */
+    size_t triangle_count;
+} nebel_triangles;
+
+/* The same surface in more triangles. Vertices of the input come first, in their order; vertex vertex_count_before + i
+ * lies half-way between the two of parents[i], which come before it: what else vertices have, normals and texture
+ * coordinates, is the mean of both, in the same order. */
+typedef struct nebel_tessellation {
+    size_t vertex_count, triangle_count;
+    const float (*positions)[3]; /* m from the same origin */
+    const uint32_t *indices;     /* three for each triangle, turned as those of the input */
+    size_t vertex_count_before;  /* of the input */
+    const uint32_t (*parents)[2];
+    size_t added_triangles;
+    double error;      /* proven bound of what is left, of all triangles; at most 1 */
+    size_t over_count; /* triangles whose bound is above the one asked for: 0 where it was met */
+} nebel_tessellation;
+
+/* Splits triangles until |f - L| <= bound everywhere on each, where f is the exact transmittance between the eye and
+ * the place, and L is linear between the exact f of the three corners. The bound is proven by interval arithmetic, not
+ * sampled: it holds for every place of every triangle but for the rounding of double, for which 1e-6 is counted; a
+ * bound below that cannot be met. What the factors of the vertices are off by themselves (nebel_fog_vertices) comes on
+ * top.
+ *
+ * Where a sharp edge of the fog crosses a triangle the error falls with the size of the triangle alone, and at the
+ * silhouette of a round volume with its square root: `deepest` and `most_triangles` end that. Then the result is OK,
+ * over_count says how many triangles are left, and error how much.
+ *
+ * Edges are halved at their middle, for all triangles that share them: there are no T-junctions, also where vertices at
+ * one place differ in their index, but none is looked for between meshes of different calls. What neighbours need may
+ * exceed both limits. The longest edge of a triangle is halved first, so that angles stay at least half as wide as they
+ * were. Triangles without area are triangles like others.
+ *
+ * The fog: volumes of constant density that only add, each world, box, convex, sphere, ellipsoid or cylinder. Any
+ * thread. *tessellation is NULL on an error: ARGUMENT (NULL, a stride below 12, an index that is too large, a channel
+ * or allocator that is none, a depth above 48), VALUE (a bound that is negative or not finite, an eye or origin that is
+ * not finite or more than 1e15 m away, a vertex of a triangle that is not finite, or farther than 5e5 m from the eye
+ * along an axis), UNSUPPORTED (other fog), LIMIT (2^32 - 1 vertices or edges), MEMORY. */
+nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessellation_desc *desc,
+                              const nebel_triangles *triangles, nebel_tessellation **tessellation);
+void nebel_destroy_tessellation(nebel_tessellation *tessellation); /* NULL is fine */
+
 #ifdef __cplusplus
 }
 #endif
