@@ -386,7 +386,7 @@ class EditTest(ViewTest):
                   "size": [0.8, 1.2], "absorption": 3, "emission": 0.5}
         self.scene = self.write_scene("scene.json", [FOG], models=[{"file": "triangle.obj"}], nebula=[nebula],
                                       camera={"position": [0, 0, 6], "look_at": [0, 0, 0]}, max_opacity=0.4, ambient=1,
-                                      cells={"cells": [cell]})
+                                      sun={"direction": [0, 0, 1], "irradiance": 3}, cells={"cells": [cell]})
         viewer = Viewer(self, "--size", "400x740")
         balls = viewer.take_picture()
         self.assertTrue(self.same(balls, self.draw_small("balls.png"), ROUNDING), "the limit of all fog counts, too")

@@ -106,10 +106,12 @@ static int stop(size_t done, size_t total, void *user)
     return stage->was_stopped;
 }
 
+/* Many particles take long to dim the sun for an eye that moves. */
 static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
-                         const nb_look *look, uint32_t samples)
+                         const nb_look *look, uint32_t samples, int quick)
 {
-    nebel_gl_frame_desc desc = {.camera = *camera, .width = width, .height = height, .samples = samples};
+    nebel_gl_frame_desc desc = {
+        .camera = *camera, .width = width, .height = height, .samples = samples, .particles_dim_sun = !quick};
     if (look->particles == NB_LOOK_AS_DISCS) desc.method = NEBEL_GL_METHOD_FIVE_TAP;
     if (samples > 1) {
         desc.progress = stop;
@@ -122,7 +124,9 @@ static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t w
     glFinish();
     stage->seconds = now() - start;
     stage->samples = samples;
-    if (samples == 1) stage->pixel_seconds = stage->seconds / ((double)width * height);
+    stage->was_quick = quick;
+    if (samples == 1 && (quick || stage->pixel_seconds == 0))
+        stage->pixel_seconds = stage->seconds / ((double)width * height);
     return NEBEL_OK;
 }
 
@@ -143,7 +147,7 @@ static nebel_result draw_moving(nb_stage *stage, const nebel_camera *camera, uin
                                 const nb_look *look)
 {
     const uint32_t by = find_coarseness(stage, width, height);
-    const nebel_result result = draw(stage, camera, divide_up(width, by), divide_up(height, by), look, 1);
+    const nebel_result result = draw(stage, camera, divide_up(width, by), divide_up(height, by), look, 1, 1);
     if (result == NEBEL_OK) stage->state = by > 1 ? NB_STAGE_COARSE : NB_STAGE_WHOLE;
     return result;
 }
@@ -153,14 +157,14 @@ nebel_result nb_stage_draw(nb_stage *stage, const nebel_camera *camera, uint32_t
 {
     if (moving) return draw_moving(stage, camera, width, height, look);
     if (stage->state == NB_STAGE_FINE) return NEBEL_OK;
-    const int fine = stage->state == NB_STAGE_WHOLE;
+    const int fine = stage->state == NB_STAGE_WHOLE && !stage->was_quick;
     /* Beside the picture of the CPU one sample is enough: both look through the centres of the pixels then. */
     const uint32_t samples = fine && look->compare == NB_LOOK_GL_ALONE ? (uint32_t)look->samples : 1;
     if (fine && samples == 1) {
         stage->state = NB_STAGE_FINE;
         return NEBEL_OK;
     }
-    const nebel_result result = draw(stage, camera, width, height, look, samples);
+    const nebel_result result = draw(stage, camera, width, height, look, samples, 0);
     if (result == NEBEL_OK) stage->state = fine ? NB_STAGE_FINE : NB_STAGE_WHOLE;
     const int was_stopped = stage->was_stopped;
     stage->was_stopped = 0;
