@@ -637,7 +637,7 @@ static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real
 
 #elif defined(ASKS_QUAD)
 
-/* What the ends may do to light of that radiance, or linear densities that hardly change along endless rays, is far
+/* What the ends may do to light of that radiance, or densities that hardly change along endless rays, is far
  * less than double promises, so that it does not show who was asked. */
 static int is_clear(const march *m, nb_real radiance)
 {

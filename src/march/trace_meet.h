@@ -222,10 +222,20 @@ static int meet_leaves(march *m, contact *k)
 }
 
 #if defined(ASKS_QUAD)
+/* What the noise of a ray's lean does to the integral of a density that follows planes, over h metres from start. */
+static nb_real drift_within(const contact *k, nb_wide start, nb_real h)
+{
+    const nb_volume *body = &k->medium->body;
+    if (body->density.type == NEBEL_DENSITY_LINEAR) return blur_linear(nb_estimate_of(h, NB_F(0.0)), k, start, h).error;
+    if (body->density.type != NEBEL_DENSITY_SOFT_EDGE || body->leaves[0].type != NB_LEAF_PLANES) return NB_F(0.0);
+    const nb_estimate edge = planes_edge_integral(k, start, h);
+    return nb_max(edge.error - edge.value * (NB_F(17.0) * NB_EPSILON), NB_F(0.0));
+}
+
 static void count_drift(march *m, const contact *k)
 {
     const nb_real length = nb_narrow(nb_wmax(k->hull_leave - k->hull_enter, NB_W(0.0)));
-    const nb_real blurred = blur_linear(nb_estimate_of(length, NB_F(0.0)), k, k->hull_enter, length).error;
+    const nb_real blurred = drift_within(k, k->hull_enter, length);
     for (int c = 0; c < 3; c++) m->drift = m->drift + blurred * (k->extinction[c] + k->light[c]);
 }
 #endif
@@ -247,7 +257,7 @@ static void meet_medium(march *m, const nb_medium *medium)
     if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;
 #if defined(ASKS_QUAD)
-    if (medium->body.density.type == NEBEL_DENSITY_LINEAR) count_drift(m, k);
+    if (nb_volume_has_fog(&medium->body)) count_drift(m, k);
 #endif
     m->contact_count++;
     m->span_count += medium->body.leaf_count;

@@ -71,7 +71,7 @@ typedef struct march {
     nb_real revealed[3]; /* optical depth that covers may take away which are no events */
     nb_wide doubt_from;  /* from here on fog may be or not, more than a first order tells; NB_WFAR * 2: nowhere */
     nb_real doubtful_radiance[3]; /* of the brightest medium whose ends have slack */
-    nb_real drift;                /* what the drift of linear densities may do to optical depth and to radiance */
+    nb_real drift;                /* what drift of densities along planes may do to optical depth and to radiance */
 
     uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_window.h */
     size_t window_count;
