@@ -20,6 +20,8 @@ for scene in "${scenes[@]}"; do
     echo "demo: $name"
     case $name in
         cells-*) method=cells ;;
+        linear-*) method=linear ;;
+        vertex-*) method=vertex ;;
         *) method=exact ;;
     esac
     "$build/nebel" render "$scene" -o "$pictures/$name.png" --method "$method"

@@ -432,6 +432,20 @@ class RenderTest(PictureCase):
         self.assertEqual(len(set(pictures.values())), len(pictures))
         self.assert_misused(self.render("a.png", "--method", "exp", "--device", "gl"), "--method", "--device cpu")
 
+    def test_tessellation(self):
+        box = {"shape": {"type": "box", "min": [-9, -0.5, -9], "max": [9, 0.5, 9]}, "extinction": 0.3, "source": 1}
+        self.scene = self.write_scene("box.json", [box], models=[{"file": "triangle.obj"}],
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        self.assert_done(self.render("a.exr", "--method", "vertex"))
+        done = self.render("b.exr", "--method", "vertex", "--tessellate", "0.004")
+        self.assert_done(done)
+        self.assertRegex(done.err, r"note: 1 triangles became \d\d+; .* within 0.0\d+ of the exact one, 0 triangles above")
+        self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
+        vertex = ("--method", "vertex", "--tessellate")
+        self.assert_misused(self.render("c.png", *vertex, "0"), "--tessellate", "more than 0")
+        self.assert_misused(self.render("c.png", "--tessellate", "0.1"), "--tessellate", "--method vertex")
+        self.assert_misused(self.render("c%d.png", *vertex, "0.1", "--frames", "0-1"), "--tessellate", "one frame")
+
     def test_quiet(self):
         done = self.render("a.png", "--quiet")
         self.assert_done(done)

@@ -3,6 +3,7 @@
 
 #include "commands.h"
 #include "decimal.h"
+#include "finer.h"
 #include "interrupt.h"
 #include "isa.h"
 #include "load.h"
@@ -24,7 +25,22 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { OUTPUT, SIZE, SAMPLES, EXPOSURE, FRAME, FRAMES, AOV, TOLERANCE, METHOD, DEVICE, ISA, THREADS, QUIET };
+enum {
+    OUTPUT,
+    SIZE,
+    SAMPLES,
+    EXPOSURE,
+    FRAME,
+    FRAMES,
+    AOV,
+    TOLERANCE,
+    METHOD,
+    TESSELLATE,
+    DEVICE,
+    ISA,
+    THREADS,
+    QUIET
+};
 
 static const nb_option options[] = {
     [OUTPUT] = {"output", 'o', "FILE",
@@ -48,6 +64,9 @@ static const nb_option options[] = {
          "linear, exp, exp2: the factors of section\n\"classic\"; cells, cells-pixel: section \"cells\" at\nvertices "
          "or "
          "pixels. five-tap, of --device gl:\nparticles meet surfaces by five depths."},
+    [TESSELLATE] = {"tessellate", 0, "E",
+                    "With --method vertex or additive of the CPU: smaller\ntriangles, until the fog's factor is "
+                    "within E of the\nexact one for the camera, 0 < E <= 1."},
     [DEVICE] = {"device", 0, "NAME",
                 "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
                 "--threads with gl."},
@@ -83,7 +102,7 @@ typedef struct settings {
     const char *scene, *output;
     nebel_image_format format;
     uint32_t width, height, samples;
-    double exposure, tolerance;
+    double exposure, tolerance, tessellate; /* 0: the triangles of the models */
     uint32_t first_frame, last_frame;
     int many_frames, aov, quiet, gl;
     nebel_method method;
@@ -161,6 +180,17 @@ static int is_of_gl(nebel_method method)
            method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_FIVE_TAP;
 }
 
+static void read_tessellate(nb_arguments *arguments, settings *wanted)
+{
+    if (arguments->values[TESSELLATE] == NULL) return;
+    wanted->tessellate = nb_options_number(arguments, TESSELLATE, 0, 1, 0);
+    if (wanted->tessellate == 0) nb_options_reject(arguments, TESSELLATE, "is not more than 0");
+    if (wanted->gl || (wanted->method != NEBEL_METHOD_VERTEX && wanted->method != NEBEL_METHOD_ADDITIVE))
+        nb_options_reject(arguments, TESSELLATE, "is for --method vertex or additive of --device cpu");
+    if (wanted->many_frames)
+        nb_options_reject(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
+}
+
 static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
@@ -199,6 +229,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     read_frames(arguments, wanted);
     read_output(arguments, wanted);
     read_device(arguments, wanted);
+    read_tessellate(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
     return -1;
 }
@@ -251,7 +282,8 @@ typedef struct studio {
     nb_report_listener listener;
     nb_load_result loaded;
     nebel_renderer *renderer; /* of the CPU */
-    nebel_cells *cells;       /* of the methods of that name */
+    nb_finer finer;
+    nebel_cells *cells; /* of the methods of that name */
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter painter; /* of OpenGL */
 #endif
@@ -302,6 +334,7 @@ static void free_studio(studio *all)
     for (int i = 0; i < PLANES; i++) free(all->samples[i]);
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
+    nb_finer_free(&all->finer);
     nebel_destroy_cells(all->cells);
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter_close(&all->painter);
@@ -521,12 +554,29 @@ static int choose_method(studio *all)
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
+static nebel_result tessellate(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const nebel_camera camera = nebel_scene_camera(all->loaded.scene, wanted->first_frame);
+    nb_finer *const finer = &all->finer;
+    const nebel_result result = nb_finer_make(nebel_scene_contents(all->loaded.scene), all->loaded.fog, camera.position,
+                                              wanted->tessellate, finer);
+    if (result == NEBEL_OK && !wanted->quiet)
+        nb_report_message("note: %zu triangles became %zu; the fog's factor is within %.3g of the exact one, %zu "
+                          "triangles above --tessellate",
+                          finer->triangles_before, finer->triangles, finer->error, finer->over_count);
+    return result;
+}
+
 static int open_renderer(studio *all)
 {
     nebel_renderer_desc desc = all->wanted->renderer;
     desc.log = nb_report_log(&all->listener);
-    const nebel_result result =
-        nebel_create_renderer(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->renderer);
+    const int is_finer = all->wanted->tessellate > 0;
+    nebel_result result = is_finer ? tessellate(all) : NEBEL_OK;
+    if (result != NEBEL_OK) return nb_report_result(&all->listener, all->wanted->scene, result);
+    const nebel_scene_data *const scene = is_finer ? &all->finer.data : nebel_scene_contents(all->loaded.scene);
+    result = nebel_create_renderer(scene, all->loaded.fog, &desc, &all->renderer);
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 

@@ -1,0 +1,79 @@
+#include "finer.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Those of the mesh, and for each new vertex the mean of its parents; normals are made unit ones where they are used.
+ */
+static const float *refine(const nebel_tessellation *made, const float *given, size_t channels, float *out)
+{
+    const size_t before = made->vertex_count_before;
+    if (given == NULL) return NULL;
+    memcpy(out, given, before * channels * sizeof *out);
+    for (size_t v = before; v < made->vertex_count; v++) {
+        const uint32_t *const parents = made->parents[v - before];
+        for (size_t c = 0; c < channels; c++)
+            out[v * channels + c] = .5f * (out[parents[0] * channels + c] + out[parents[1] * channels + c]);
+    }
+    return out;
+}
+
+static nebel_result refine_mesh(const nebel_mesh *mesh, const nebel_tessellation *made, nebel_mesh *finer, float **room)
+{
+    *room = malloc((made->vertex_count + 1) * 5 * sizeof **room);
+    if (*room == NULL) return NEBEL_ERROR_MEMORY;
+    *finer = *mesh;
+    finer->positions = made->positions[0];
+    finer->normals = refine(made, mesh->normals, 3, *room);
+    finer->uvs = refine(made, mesh->uvs, 2, *room + 3 * made->vertex_count);
+    finer->indices = made->indices;
+    finer->vertex_count = (uint32_t)made->vertex_count;
+    finer->triangle_count = (uint32_t)made->triangle_count;
+    return NEBEL_OK;
+}
+
+static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation_desc *desc, size_t i, nb_finer *finer)
+{
+    const nebel_mesh *const mesh = &finer->data.meshes[i];
+    nebel_triangles triangles = {.positions = mesh->positions,
+                                 .vertex_count = mesh->vertex_count,
+                                 .indices = mesh->indices,
+                                 .triangle_count = mesh->triangle_count};
+    for (int k = 0; k < 3; k++) triangles.origin[k] = mesh->origin[k];
+    const nebel_result result = nebel_tessellate(fog, desc, &triangles, &finer->made[i]);
+    if (result != NEBEL_OK) return result;
+    const nebel_tessellation *const made = finer->made[i];
+    finer->triangles_before += mesh->triangle_count;
+    finer->triangles += made->triangle_count;
+    finer->over_count += made->over_count;
+    finer->error = made->error > finer->error ? made->error : finer->error;
+    return refine_mesh(mesh, made, &finer->meshes[i], &finer->attributes[i]);
+}
+
+nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3], double bound,
+                           nb_finer *finer)
+{
+    const size_t count = scene->mesh_count;
+    const nebel_tessellation_desc desc = {.eye = {eye[0], eye[1], eye[2]}, .bound = bound};
+    *finer = (nb_finer){.data = *scene};
+    finer->meshes = calloc(count + 1, sizeof *finer->meshes);
+    finer->made = calloc(count + 1, sizeof *finer->made);
+    finer->attributes = calloc(count + 1, sizeof *finer->attributes);
+    if (finer->meshes == NULL || finer->made == NULL || finer->attributes == NULL) return NEBEL_ERROR_MEMORY;
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < count && result == NEBEL_OK; i++) result = add_mesh(fog, &desc, i, finer);
+    finer->data.meshes = finer->meshes;
+    return result;
+}
+
+void nb_finer_free(nb_finer *finer)
+{
+    for (size_t i = 0; i < finer->data.mesh_count; i++) {
+        if (finer->made != NULL) nebel_destroy_tessellation(finer->made[i]);
+        if (finer->attributes != NULL) free(finer->attributes[i]);
+    }
+    free(finer->meshes);
+    free(finer->made);
+    free(finer->attributes);
+    *finer = (nb_finer){.triangles = 0};
+}
