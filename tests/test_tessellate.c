@@ -179,11 +179,13 @@ static void test_the_bound_holds_everywhere(void **state)
         for (size_t i = 0; i < count; i++) volumes[i] = volume_of((round / 3 + (int)i * (1 + round % 5)) % 7);
         make_ground(&g, round % 4 == 0 ? 0 : uniform());
         nebel_snapshot *fog = commit(count, volumes);
-        /* In the volumes, above, far away, and level with the ground's faces. */
+        /* In the volumes, above, far away, and in the planes of a box's faces, where fog is not continuous. */
         nebel_tessellation_desc desc = {.eye = {8 * uniform() - 4, .1 + 3 * uniform(), 12 * uniform() - 4},
                                         .bound = 1. / 255,
                                         .deepest = 1 + (unsigned)(round % 9)};
         if (round % 7 == 0) desc.eye[1] = 300, desc.eye[0] = -200;
+        for (int k = 0; k < 3 && round % 5 == 0; k++)
+            if (volumes[0].shape.max[k] != 0 && uniform() < .5) desc.eye[k] = volumes[0].shape.max[k];
         const nebel_triangles triangles = triangles_of(&g);
         nebel_tessellation *t = tessellate(fog, &desc, &triangles);
         const size_t step = t->triangle_count / 60 + 1;
