@@ -279,11 +279,43 @@ static void test_float_owns_up_to_linear_fog_it_cannot_place(void **unused)
     assert_int_equal(wrong, 0);
 }
 
+/* From up to 1000 km away into fog that the ray ends in: float has lost the digits of where that is. */
+static void test_float_knows_where_rays_end_that_come_from_far_away(void **unused)
+{
+    (void)unused;
+    static nebel_ray rays[RAYS];
+    size_t wrong = 0;
+    for (uint64_t seed = 0; seed < 12; seed++) {
+        uint64_t state = seed;
+        const double size = dice(&state, .5, 4);
+        nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_WORLD},
+                                    .density = {.type = seed % 3 == 0 ? NEBEL_DENSITY_GAUSSIAN : NEBEL_DENSITY_HEIGHT,
+                                                .scale_height = size,
+                                                .sigma = size,
+                                                .below = seed % 3 == 1 ? NEBEL_BELOW_GROW : NEBEL_BELOW_CONSTANT},
+                                    .extinction = {.05, .1, .2},
+                                    .source = {1, 1, 1}};
+        for (int i = 0; i < RAYS; i++) {
+            const double away = pow(10, dice(&state, 2, 6));
+            double target[3];
+            roll(&state, -2, 2, target);
+            roll(&state, -1, 1, rays[i].direction);
+            rays[i].direction[1] = dice(&state, -1, -.3);
+            const double length = sqrt(along(rays[i].direction, rays[i].direction));
+            for (int k = 0; k < 3; k++) rays[i].origin[k] = target[k] - rays[i].direction[k] * away;
+            rays[i].t_max = away * length;
+        }
+        wrong += count_dishonest(&volume, rays);
+    }
+    assert_int_equal(wrong, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_float_owns_up_to_rays_it_cannot_place),
         cmocka_unit_test(test_float_owns_up_to_linear_fog_it_cannot_place),
+        cmocka_unit_test(test_float_knows_where_rays_end_that_come_from_far_away),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,7 +10,7 @@ static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real 
     *extinction = NB_F(0.0);
     for (size_t i = m->present_first; i < m->window_count; i++) {
         const contact *k = present(m, i);
-        depth = depth + k->extinction[channel] * contact_integral(k, start, h).value;
+        depth = depth + k->extinction[channel] * contact_integral(k, start, start + nb_widen(h), h).value;
         *extinction = *extinction + k->extinction[channel] * contact_density(k, start + nb_widen(h));
     }
     return depth;

@@ -302,8 +302,9 @@ static void note_clear(const march *m, const piece *p, gathered *g)
 {
     const nb_mask clear = nb_and(p->lanes, nb_narrow_mask(nb_wand(m->doubt_from > p->start, m->doubt_from <= NB_WFAR)));
     if (!nb_any(clear)) return;
-    const nb_wide length = nb_wmax(nb_wmin(m->doubt_from, p->end) - p->start, NB_W(0.0));
-    const piece_sum sum = sum_step(m, p->start, nb_narrow(length) * (NB_F(1.0) - NB_F(2.0) * NB_EPSILON));
+    const nb_wide end = nb_wmax(nb_wmin(m->doubt_from, p->end), p->start);
+    const nb_real length = nb_narrow(end - p->start) * (NB_F(1.0) - NB_F(2.0) * NB_EPSILON);
+    const piece_sum sum = sum_step(m, p->start, p->start + nb_widen(length), length);
     for (int c = 0; c < 3; c++) {
         const nb_real least = (g->depth[c] + sum.depth[c]) - (g->depth_error[c] + sum.depth_error[c]);
         g->clear_depth[c] = nb_select(clear, nb_max(least, NB_F(0.0)), g->clear_depth[c]);

@@ -217,10 +217,10 @@ static void bound_crude(const march *m, step *s, const gathered *g)
     s->crude_bound[1] = nb_select(emits, NB_HUGE, spread);
 }
 
-static piece_sum sum_step(const march *m, nb_wide start, nb_real length)
+static piece_sum sum_step(const march *m, nb_wide start, nb_wide end, nb_real length)
 {
     piece_sum sum = no_sum();
-    for (size_t i = m->present_first; i < m->window_count; i++) add_contact(&sum, present(m, i), start, length);
+    for (size_t i = m->present_first; i < m->window_count; i++) add_contact(&sum, present(m, i), start, end, length);
     return sum;
 }
 
@@ -269,7 +269,8 @@ static void add_to_node(node *n, const contact *k, const step *s)
         for (int c = 0; c < 3; c++) n->extinction[c] = n->extinction[c] + k->extinction[c] * density;
         return;
     }
-    const nb_real before = nb_select(k->inside, contact_integral(k, s->start, n->h).value, NB_F(0.0));
+    const nb_real before =
+        nb_select(k->inside, contact_integral(k, s->start, s->start + nb_widen(n->h), n->h).value, NB_F(0.0));
     for (int c = 0; c < 3; c++) n->depth[c] = n->depth[c] + k->extinction[c] * before;
 }
 
@@ -354,13 +355,19 @@ static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
     return nearest;
 }
 
+/* Where a step of `length` from t ends that may go as far as `stop`. */
+static nb_wide end_of_step(nb_wide t, nb_real length, nb_wide stop)
+{
+    return nb_wselect(nb_widen_mask(length >= nb_narrow(stop - t)), stop, t + nb_widen(length));
+}
+
 /* Halves the step in every lane until its bound fits. `whole` is the sum of the piece. */
 static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, nb_wide start,
-                     nb_real length, nb_mask pending, nb_real *ellipse, const piece_sum *whole)
+                     nb_wide stop, nb_real length, nb_mask pending, nb_real *ellipse, const piece_sum *whole)
 {
     for (;;) {
         const int is_whole = nb_wall(start == p->start) && nb_all(length == p->length);
-        const piece_sum sum = is_whole ? *whole : sum_step(m, start, length);
+        const piece_sum sum = is_whole ? *whole : sum_step(m, start, end_of_step(start, length, stop), length);
         const step s = consider(m, g, *ellipse, start, length, &sum);
         const nb_mask last = length >= nb_narrow(p->end - start);
         const nb_real allowed = may->drop_share * s.drop + may->length_share * (length / p->length) +
@@ -385,9 +392,9 @@ static void gather_mixed(const march *m, const piece *p, const piece_sum *whole,
         const nb_wide stop = nearest_kink(m, t, p->end);
         const nb_real rest = nb_narrow(stop - t);
         const nb_real wish = nb_min(guess, rest);
-        const step s = fit_step(m, g, may, p, t, wish, lanes, &ellipse, whole);
+        const step s = fit_step(m, g, may, p, t, stop, wish, lanes, &ellipse, whole);
         take_step(m, &s, g, lanes);
-        t = nb_wselect(nb_widen_mask(s.length >= rest), stop, t + nb_widen(s.length));
+        t = end_of_step(t, s.length, stop);
         guess = s.length + s.length;
         /* Only where the wish was granted: else the next step would be halved again, and none would ever grow. */
         ellipse = nb_select(s.length >= wish, nb_max(NB_F(0.8) * ellipse, may->ellipse), ellipse);
@@ -395,7 +402,7 @@ static void gather_mixed(const march *m, const piece *p, const piece_sum *whole,
     }
     if (!nb_any(lanes)) return;
     const nb_real rest = nb_narrow(p->end - t);
-    const piece_sum sum = sum_step(m, t, rest);
+    const piece_sum sum = sum_step(m, t, p->end, rest);
     step s = consider(m, g, ellipse, t, rest, &sum);
     s.gauss_bound = NB_HUGE;
     take_step(m, &s, g, lanes);

@@ -562,8 +562,9 @@ static nb_estimate blur_linear(nb_estimate estimate, const contact *k, nb_wide s
     return blur(estimate, nb_select(varies, nb_min(noise, NB_F(1.0)), NB_F(0.0)), length);
 }
 
-/* The density integrated from start over h metres. */
-static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
+/* The density integrated from start to end, h metres. The end counts by its place: h has lost digits of it where fog is
+ * far from where the piece starts. */
+static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end, nb_real h)
 {
     const nebel_density *density = &k->medium->body.density;
     const nb_real u = coordinate(k, start);
@@ -571,7 +572,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
     switch (density->type) {
     case NEBEL_DENSITY_HEIGHT: {
         /* from the dense end, where a ray comes down from so far that its start has lost the digits of the height */
-        const nb_real u_end = coordinate(k, start + nb_widen(h));
+        const nb_real u_end = coordinate(k, end);
         const nb_mask down = nb_and(slope < NB_F(0.0), nb_abs(u_end) < nb_abs(u));
         const nb_real from = nb_select(down, u_end, u), rise = nb_select(down, -slope, slope);
         return density->below == NEBEL_BELOW_GROW ? nb_height_integral(from, rise, h)
@@ -580,7 +581,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_real h)
     case NEBEL_DENSITY_LINEAR:
         return blur_linear(nb_linear_integral(u, slope, h), k, start, h);
     case NEBEL_DENSITY_GAUSSIAN:
-        return nb_gaussian_integral(k->level, u, coordinate(k, start + nb_widen(h)), slope);
+        return nb_gaussian_integral(k->level, u, coordinate(k, end), slope);
     case NEBEL_DENSITY_RADIAL:
         return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
     case NEBEL_DENSITY_SOFT_EDGE:

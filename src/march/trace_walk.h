@@ -114,10 +114,10 @@ static nb_real largest(const nb_real v[3])
     return nb_max(nb_max(v[0], v[1]), v[2]);
 }
 
-/* Adds one medium's optical depth and light over h metres from `start` to the sum. */
-static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_real h)
+/* Adds one medium's optical depth and light from `start` to `end`, h metres, to the sum. */
+static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_wide end, nb_real h)
 {
-    const nb_estimate along = contact_integral(k, start, h);
+    const nb_estimate along = contact_integral(k, start, end, h);
     const nb_real length = nb_select(k->inside, along.value, NB_F(0.0));
     const nb_real error = nb_select(k->inside, along.error, NB_F(0.0));
     for (int c = 0; c < 3; c++) {
@@ -144,7 +144,7 @@ static piece_sum sum_piece(const march *m, const piece *p)
     nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = m->present_first; i < m->window_count; i++) {
         const contact *k = present(m, i);
-        add_contact(&sum, k, p->start, p->length);
+        add_contact(&sum, k, p->start, p->end, p->length);
         const nb_mask again = nb_and(k->inside, seen);
         nb_mask differs = k->medium->emits ? nb_mask_true : emits;
         for (int c = 0; c < 3; c++) {
@@ -375,8 +375,8 @@ static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum
     for (size_t i = m->present_first; i < m->window_count && nb_any(open); i++) {
         const contact *k = present(m, i);
         if (!k->medium->emits) continue;
-        const nb_mask here =
-            nb_and(open, nb_and(k->inside, contact_integral(k, p->start, p->length).value >= NB_F(0.5) * NB_FAR));
+        const nb_mask here = nb_and(
+            open, nb_and(k->inside, contact_integral(k, p->start, p->end, p->length).value >= NB_F(0.5) * NB_FAR));
         for (int c = 0; c < 3; c++)
             if (k->medium->body.emission[c] > 0) endless = nb_or(endless, nb_and(here, sum->depth[c] < NB_F(1.0)));
     }
