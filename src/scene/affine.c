@@ -1,6 +1,9 @@
 #include "scene/affine.h"
 
+#include "scene/value.h"
+
 #include <math.h>
+#include <string.h>
 
 nb_affine nb_affine_compose(const nb_affine *outer, const nb_affine *inner)
 {
@@ -16,8 +19,10 @@ nb_affine nb_affine_compose(const nb_affine *outer, const nb_affine *inner)
 
 nb_affine nb_affine_from_transform(const nebel_transform *transform)
 {
-    const double x = transform->rotation[0], y = transform->rotation[1], z = transform->rotation[2];
-    const double w = transform->rotation[3];
+    double q[4];
+    memcpy(q, transform->rotation, sizeof q);
+    nb_vector_normalize(q, 4);
+    const double x = q[0], y = q[1], z = q[2], w = q[3];
     const double rotation[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
                                    {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
                                    {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
@@ -37,8 +42,7 @@ void nb_affine_apply(const nb_affine *map, const double place[3], double result[
     }
 }
 
-/* ---- taken apart
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- taken apart ----------------------------------------------------------------------------- */
 
 /* Right angles are off by no more than this where float quaternions were multiplied a few times. */
 static const double most_shear = 1e-4;

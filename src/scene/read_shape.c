@@ -57,7 +57,7 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     return nb_value_members(json, node, &keys, found) && nb_value_vector(json, found[POSITION], transform->position) &&
-           nb_value_rotation(json, found[ROTATION], transform->rotation) &&
+           nb_value_quaternion(json, found[ROTATION], transform->rotation) &&
            nb_value_scale(json, found[SCALE], transform->scale);
 }
 

@@ -10,8 +10,7 @@ const nb_range nb_range_not_negative = {0, HUGE_VAL, false, "a number >= 0"};
 const nb_range nb_range_light = {0, 1e9, false, "a number from 0 to 1e9"};
 const nb_range nb_range_fraction = {0, 1, false, "a number from 0 to 1"};
 
-/* ---- names
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- names ----------------------------------------------------------------------------------- */
 
 /* Lists in messages are cut at this size. */
 enum { LIST_SIZE = 480 };
@@ -156,8 +155,7 @@ int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *
     return -1;
 }
 
-/* ---- numbers
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- numbers --------------------------------------------------------------------------------- */
 
 static const char *const type_names[] = {"null", "true or false", "a number", "a string", "an array", "an object"};
 
@@ -228,7 +226,7 @@ bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has no direction; one number must not be 0");
 }
 
-bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4])
+bool nb_value_quaternion(nb_json *json, const nb_json_node *node, double rotation[4])
 {
     if (node == NULL) return true;
     if (!nb_value_numbers(json, node, &nb_range_any, 4, rotation)) return false;
@@ -236,7 +234,18 @@ bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[
         return nb_json_fail(
             json, NEBEL_ERROR_FORMAT, node,
             "a quaternion [x, y, z, w] of zeros is no rotation; [0, 0, 0, 1] leaves things as they are");
-    nb_vector_normalize(rotation, 4);
+    double most = 0;
+    for (int i = 0; i < 4; i++) most = fmax(most, fabs(rotation[i]));
+    int exponent;
+    frexp(most, &exponent);
+    for (int i = 0; i < 4; i++) rotation[i] = ldexp(rotation[i], -exponent);
+    return true;
+}
+
+bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4])
+{
+    if (!nb_value_quaternion(json, node, rotation)) return false;
+    if (node != NULL) nb_vector_normalize(rotation, 4);
     return true;
 }
 
@@ -306,8 +315,7 @@ void nb_vector_normalize(double *vector, size_t count)
     for (size_t i = 0; i < count; i++) vector[i] /= sqrt(square);
 }
 
-/* ---- text
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- text ------------------------------------------------------------------------------------ */
 
 bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text)
 {

@@ -56,7 +56,10 @@ bool nb_value_numbers(nb_json *json, const nb_json_node *node, const nb_range *r
 bool nb_value_vector(nb_json *json, const nb_json_node *node, double vector[3]);
 bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3]);  /* not zero; length kept */
 bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4]); /* not zero; normalised */
-bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3]);       /* one number or three, none 0 */
+/* Not zero, with all its digits, though not of length 1: dividing by the length rounds, and a silhouette shows it. The
+ * longest number is from .5 to 1. */
+bool nb_value_quaternion(nb_json *json, const nb_json_node *node, double rotation[4]);
+bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3]); /* one number or three, none 0 */
 bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *range, double rgb[3]); /* one or three */
 
 /* The same, or "#rrggbb" or "#rgb": an sRGB color, made linear. 0 and 1 must be in the range. */

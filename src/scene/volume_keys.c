@@ -100,8 +100,7 @@ static bool move_numbers(const nb_keyframes *around, const nebel_volume_desc at[
     return near;
 }
 
-/* ---- where a cubic passes through nothing
- * ---------------------------------------------------------------------------- */
+/* ---- where a cubic passes through nothing ---------------------------------------------------- */
 
 static double distance(const double a[3], const double b[3])
 {
@@ -147,8 +146,7 @@ static void mend(const nebel_volume_desc *nearer, nebel_volume_desc *volume)
     mend_ends(density->from, density->to, volume->density.from, volume->density.to);
 }
 
-/* ---- a volume at a frame
- * --------------------------------------------------------------------------------------------- */
+/* ---- a volume at a frame --------------------------------------------------------------------- */
 
 static nebel_volume_desc volume_between(const nb_volume_track *track, const nb_keyframes *around)
 {
@@ -157,6 +155,7 @@ static nebel_volume_desc volume_between(const nb_volume_track *track, const nb_k
     for (int k = 0; k < 4; k++) {
         at[k] = track->keys[around->keys[k]].volume;
         pack_shape(&at[k].shape);
+        nb_vector_normalize(at[k].shape.transform.rotation, 4);
     }
     align(at[1].shape.transform.rotation, at[0].shape.transform.rotation);
     align(at[1].shape.transform.rotation, at[2].shape.transform.rotation);
