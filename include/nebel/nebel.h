@@ -228,10 +228,10 @@ typedef struct nebel_volume_desc {
     int priority; /* any */
     nebel_shape shape;
     nebel_density density;
-    double extinction[3]; /* 1/m, >= 0, where the density is 1 */
+    double extinction[3]; /* 1/m, 0 to 1e9, where the density is 1 */
     double source[3];     /* radiance of opaque fog, >= 0: alone it gives source * (1 - transmittance) */
     double albedo[3];     /* 0..1: lit by the fog's ambient light, scattered evenly; not together with source */
-    double emission[3];   /* radiance per metre, >= 0, where the density is 1 */
+    double emission[3];   /* radiance per metre, 0 to 1e9, where the density is 1 */
     double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
                              operation; cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
 } nebel_volume_desc;
