@@ -25,8 +25,7 @@ static void write_gltf(const char *members)
 #define NODE(members) "\"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"name\": \"Mist\", " members "}]"
 #define MODEL(members) "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"" GLTF "\"" members "}]}"
 
-/* ---- the same fog, written by hand
- * ----------------------------------------------------------------------------------- */
+/* ---- the same fog, written by hand ----------------------------------------------------------- */
 
 enum { RAYS = 3000 };
 
@@ -228,8 +227,7 @@ static void test_binary_files(void **state)
     }
 }
 
-/* ---- rules
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- rules ----------------------------------------------------------------------------------- */
 
 /* The mark ` stands in the model where the message must point: after "node", if any, where it says GLTF. */
 static void assert_broken(const char *members, nebel_result wanted, const char *node, const char *message)

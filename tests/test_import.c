@@ -39,8 +39,7 @@ static const nebel_volume_desc *import(const char *text, size_t count, nebel_sce
     return nebel_scene_contents(*scene)->volumes;
 }
 
-/* ---- Unreal
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- Unreal ---------------------------------------------------------------------------------- */
 
 static void test_unreal_height_fog(void **state)
 {
@@ -131,8 +130,7 @@ static void test_unreal_local_fog_volume(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- Godot
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- Godot ----------------------------------------------------------------------------------- */
 
 static void test_godot_fog(void **state)
 {
@@ -240,8 +238,7 @@ static void test_godot_edge_fade(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- Unity
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- Unity ----------------------------------------------------------------------------------- */
 
 static void test_hdrp_fog(void **state)
 {
@@ -335,8 +332,7 @@ static void test_hdrp_overwrites_what_ranks_below(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- Bevy
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- Bevy ------------------------------------------------------------------------------------ */
 
 static void test_bevy(void **state)
 {
@@ -365,8 +361,7 @@ static void test_bevy(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- all
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- all ------------------------------------------------------------------------------------- */
 
 static void test_a_source_stands_for_the_lights_of_the_engine(void **state)
 {

@@ -192,8 +192,7 @@ static void test_textures_are_linear_bilinear_and_repeat(void **state)
     test_picture_free(&picture);
 }
 
-/* ---- cameras
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- cameras --------------------------------------------------------------------------------- */
 
 static uint32_t next_random(uint32_t *seed)
 {
@@ -286,8 +285,7 @@ static void test_camera_inside_a_closed_mesh(void **state)
     test_picture_free(&picture);
 }
 
-/* ---- bits
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- bits ------------------------------------------------------------------------------------ */
 
 static void assert_same_bytes(const test_picture *a, const test_picture *b)
 {
@@ -394,8 +392,7 @@ static void test_fog_of_a_frame_takes_the_place_of_that_before(void **state)
     test_picture_free(&later);
 }
 
-/* ---- places far away
- * ------------------------------------------------------------------------------------------------- */
+/* ---- places far away ------------------------------------------------------------------------- */
 
 /* How many pixels differ by more than a rounding error would let them. */
 static size_t count_different(const test_picture *a, const test_picture *b, float tolerance)
@@ -448,8 +445,7 @@ static void test_telescope_sees_what_a_parallel_camera_sees(void **state)
     test_picture_free(&far_picture);
 }
 
-/* ---- what may be missing
- * ---------------------------------------------------------------------------------------------- */
+/* ---- what may be missing --------------------------------------------------------------------- */
 
 static void assert_background_only(const nebel_scene_data *scene)
 {
@@ -506,8 +502,7 @@ static void test_background_behind_endless_fog(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* ---- samples
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- samples --------------------------------------------------------------------------------- */
 
 static void test_samples_are_stratified(void **state)
 {

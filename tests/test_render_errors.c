@@ -15,8 +15,7 @@ static void write_log(nebel_result result, const char *message, void *user)
     strncpy(log->text, message, sizeof log->text - 1);
 }
 
-/* ---- descriptions
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- descriptions ---------------------------------------------------------------------------- */
 
 static void assert_not_created(const nebel_scene_data *scene, const nebel_renderer_desc *desc, nebel_result expected)
 {
@@ -182,8 +181,7 @@ static void test_light_without_end_is_an_error(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* ---- progress
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- progress -------------------------------------------------------------------------------- */
 
 typedef struct test_progress {
     size_t calls, last, total, stop_at;
@@ -219,8 +217,7 @@ static void test_progress_rises_and_ends(void **state)
     nebel_destroy_renderer(renderer);
 }
 
-/* ---- memory
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- memory ---------------------------------------------------------------------------------- */
 
 typedef struct test_memory {
     int live, countdown;

@@ -17,8 +17,7 @@ static void assert_vector(const double *got, double x, double y, double z)
     for (int i = 0; i < 3; i++) assert_number(got[i], wanted[i]);
 }
 
-/* ---- between keys
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- between keys ---------------------------------------------------------------------------- */
 
 static void test_what_a_key_leaves_out_it_takes_from_the_volume(void **state)
 {
@@ -147,8 +146,7 @@ static void test_what_would_vanish_keeps_the_nearer_key(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- snapshots
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- snapshots ------------------------------------------------------------------------------- */
 
 static nebel_light trace(const nebel_scene *scene, double frame)
 {
@@ -252,8 +250,7 @@ static void test_everything_that_moves_can_be_had(void **state)
         }
 }
 
-/* ---- rules
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- rules ----------------------------------------------------------------------------------- */
 
 #define KEY(members) FOG(BALL ", \"extinction\": 1, \"keys\": [{\"frame\": 0}, " members "]")
 #define LIT(members) FOG(BALL ", \"extinction\": 1, \"albedo\": 0.5, \"keys\": [" members "]")

@@ -83,8 +83,7 @@ static void check_saved(draft *d, const char *wanted)
 #define SCENE(sections) "{ \"nebel\": 1,\n  " sections "\n}\n"
 #define BOX "\"shape\": {\"type\": \"box\", \"min\": [-1, -2, -3], \"max\": [1, 2.50, 3]}"
 
-/* ---- in place
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- in place -------------------------------------------------------------------------------- */
 
 static void test_only_what_changes_is_written(void **state)
 {
@@ -142,8 +141,7 @@ static void test_shapes_and_densities(void **state)
                           " \"priority\": 5, \"extinction\": 1}]"));
 }
 
-/* ---- in addition
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- in addition ----------------------------------------------------------------------------- */
 
 static void test_keys_are_added_as_their_neighbours_stand(void **state)
 {
@@ -168,8 +166,7 @@ static void test_a_transform_is_added(void **state)
                           "\"transform\": { \"position\": [0, 0, 1.5] }}, \"extinction\": 1}]"));
 }
 
-/* ---- camera and light
- * ------------------------------------------------------------------------------------------------ */
+/* ---- camera and light ------------------------------------------------------------------------ */
 
 static void test_camera_and_light(void **state)
 {
@@ -187,8 +184,7 @@ static void test_camera_and_light(void **state)
                           "  \"sun\": {\"direction\": [0.6, 0.8, 0], \"irradiance\": [1, 2, 4]}, \"fog\": []"));
 }
 
-/* ---- other units
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- other units ----------------------------------------------------------------------------- */
 
 static void test_the_units_of_the_file(void **state)
 {
@@ -210,8 +206,7 @@ static void test_the_units_of_the_file(void **state)
                   "\"visibility\": 1000, \"emission\": [0.2, 0.1, 0.1]}]"));
 }
 
-/* ---- volumes that come and go
- * --------------------------------------------------------------------------------------- */
+/* ---- volumes that come and go ---------------------------------------------------------------- */
 
 #define THIN "{" BOX ", \"extinction\": 0.1}"
 #define THICK "{" BOX ", \"extinction\": 7}"
@@ -393,8 +388,7 @@ static void test_other_changes_of_the_file_stay(void **state)
     check_saved(&d, SCENE("\"ambient\": 2, \"fog\": [{" BOX ", \"extinction\": 0.3, \"source\": [1, 0, 0]}]"));
 }
 
-/* ---- what is not written
- * ------------------------------------------------------------------------------------------ */
+/* ---- what is not written --------------------------------------------------------------------- */
 
 static void test_volumes_that_are_made_of_something_else_stay(void **state)
 {

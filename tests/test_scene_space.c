@@ -9,8 +9,7 @@ typedef struct convention {
     double unit;
 } convention;
 
-/* ---- the same text in a convention
- * ----------------------------------------------------------------------------------- */
+/* ---- the same text in a convention ----------------------------------------------------------- */
 
 /* A template has marks, each a letter before numbers in parentheses, in metres with y up:
  * P place, D direction, Q quaternion, S scale, E extents along the axes, L length, K inverse length, B box: two
@@ -84,8 +83,7 @@ static nebel_scene *parse_in(const char *template, const convention *in)
     return scene;
 }
 
-/* ---- comparing
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- comparing ------------------------------------------------------------------------------- */
 
 static void assert_same(const double *got, const double *wanted, size_t count, double scale)
 {
@@ -194,8 +192,7 @@ static void test_a_nebula(void **state)
         "\"absorption\": K(4)}]}");
 }
 
-/* ---- camera, sun, models
- * -------------------------------------------------------------------------------------------- */
+/* ---- camera, sun, models --------------------------------------------------------------------- */
 
 static void assert_same_camera(const nebel_camera *got, const nebel_camera *wanted)
 {

@@ -32,8 +32,7 @@ static answer answers[RAYS];
 static nebel_ray rays[RAYS];
 static nebel_light lights[RAYS];
 
-/* ---- words to the shader
- * ------------------------------------------------------------------------------------------------- */
+/* ---- words to the shader --------------------------------------------------------------------- */
 
 typedef enum word_store { BLOCK, TEXTURE } word_store;
 
@@ -92,8 +91,7 @@ static void pack_and_upload(tracer *t, const nebel_snapshot *snapshot, const dou
     free(words);
 }
 
-/* ---- rays
- * ------------------------------------------------------------------------------------------------------------------ */
+/* ---- rays ------------------------------------------------------------------------------------ */
 
 /* What the shader is asked, in the world: the very same numbers. */
 static nebel_ray ray_of_item(const item *asked, const double eye[3])
@@ -138,8 +136,7 @@ static void camera_rays(const double eye[3], const double middle[3], uint64_t se
     }
 }
 
-/* ---- comparison
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- comparison ------------------------------------------------------------------------------ */
 
 static double worst_of(const answer *a, const nebel_light *light, double scale)
 {
@@ -228,8 +225,7 @@ static void compare(const nebel_snapshot *snapshot, const nebel_trace_desc *desc
     assert_true(most <= 1. / 255);
 }
 
-/* ---- random scenes
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- random scenes --------------------------------------------------------------------------- */
 
 static double largest_source(const random_fog *fog)
 {
@@ -403,8 +399,7 @@ static void test_300_es_block(void **state)
     try_language(NB_GL_300ES, BLOCK, 1);
 }
 
-/* ---- very many, very far
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- very many, very far --------------------------------------------------------------------- */
 
 static nebel_volume_desc ball_of(double x, double y, double z, double radius)
 {
@@ -532,8 +527,7 @@ static void test_silhouettes_from_afar(void **state)
     nb_gl_close(&t.gl);
 }
 
-/* ---- the same segment, asked differently
- * ------------------------------------------------------------------------------------------ */
+/* ---- the same segment, asked differently ----------------------------------------------------- */
 
 /* The answers do not depend on the eye that the fog was packed for, nor on the volumes' order. */
 static void test_eyes_and_orders(void **state)
@@ -643,8 +637,7 @@ static void test_features(void **state)
     }
 }
 
-/* ---- the edges of the contract
- * --------------------------------------------------------------------------------------------------- */
+/* ---- the edges of the contract --------------------------------------------------------------- */
 
 static const char transmit_body[] = "out0 = vec4(nebel_transmit(in0.xyz, in1.xyz, in0.w), 0.0);\n"
                                     "out1 = vec4(nebel_trace(in0.xyz, in1.xyz, in0.w).transmittance, 0.0);\n";

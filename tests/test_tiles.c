@@ -16,8 +16,7 @@
 
 enum { WIDTH = 323, HEIGHT = 171, RAYS = 1500 };
 
-/* ---- views, column-major
- * ------------------------------------------------------------------------------------------------ */
+/* ---- views, column-major --------------------------------------------------------------------- */
 
 static void multiply(const double a[16], const double b[16], double out[16])
 {
@@ -114,8 +113,7 @@ static nebel_ray ray_of_pixel(const nebel_rays *rays, const double pixel[2])
     return ray;
 }
 
-/* ---- brute force
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- brute force ----------------------------------------------------------------------------- */
 
 static uint32_t *tile(const nebel_snapshot *snapshot, const nebel_view *view, uint32_t size, size_t *count)
 {
@@ -230,8 +228,7 @@ static void test_never_misses(void **state)
     }
 }
 
-/* ---- how tight
- * --------------------------------------------------------------------------------------------------------------- */
+/* ---- how tight ------------------------------------------------------------------------------- */
 
 static nebel_volume_desc box_of(double x, double y, double z, double half)
 {
@@ -323,8 +320,7 @@ static void test_ten_thousand(void **state)
     nebel_release_snapshot(snapshot);
 }
 
-/* ---- bad input
- * ---------------------------------------------------------------------------------------------------------------- */
+/* ---- bad input ------------------------------------------------------------------------------- */
 
 static void test_bad_input(void **state)
 {

@@ -173,8 +173,7 @@ static void print_visibility(double visibility)
     }
 }
 
-/* ---- what looks like a mistake
- * --------------------------------------------------------------------------------------- */
+/* ---- what looks like a mistake --------------------------------------------------------------- */
 
 static int is_black(const double *color)
 {

@@ -13,8 +13,7 @@ NB_CLONES static void set_inside(const nb_frame *frame, const nb_place *place, i
     }
 }
 
-/* ---- fog on the way to the camera
- * ------------------------------------------------------------------------------------ */
+/* ---- fog on the way to the camera ------------------------------------------------------------ */
 
 static void set_clear(nb_light_samples *samples)
 {
@@ -86,8 +85,7 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     return nebel_trace_planes(frame->renderer->fog, &frame->trace, NB_BATCH, &rays, &lights);
 }
 
-/* ---- surfaces
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- surfaces -------------------------------------------------------------------------------- */
 
 /* Irradiance of the sun over pi, before fog, in samples->color. */
 NB_CLONES static void set_clear_sunlight(const float *irradiance, nb_scratch *scratch)

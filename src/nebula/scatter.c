@@ -46,8 +46,7 @@ nebel_volume_desc nebel_particle_volume(const nebel_particle *particle)
     return volume;
 }
 
-/* ---- checks
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_amounts(const nebel_nebula_desc *desc)
 {
@@ -131,8 +130,7 @@ static nebel_result open_cloud(const nebel_nebula_desc *desc, cloud *made)
     return NEBEL_OK;
 }
 
-/* ---- one particle
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- one particle ---------------------------------------------------------------------------- */
 
 static double chance(const cloud *from, int stream, size_t particle, uint64_t i)
 {

@@ -12,8 +12,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* ---- the file before it is read
- * -------------------------------------------------------------------------------------- */
+/* ---- the file before it is read -------------------------------------------------------------- */
 
 /* A PLY header longer than this is not believed. */
 enum { HEAD_SIZE = 1 << 16 };
@@ -117,8 +116,7 @@ nebel_result nb_assimp_check_file(const nb_model_load *load)
     return result;
 }
 
-/* ---- what went wrong when it was read
- * ------------------------------------------------------------------------------ */
+/* ---- what went wrong when it was read -------------------------------------------------------- */
 
 nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason)
 {
@@ -143,8 +141,7 @@ nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason)
         file);
 }
 
-/* ---- the meshes before they are worked on
- * -------------------------------------------------------------------------- */
+/* ---- the meshes before they are worked on ---------------------------------------------------- */
 
 static bool is_finite(const struct aiVector3D *v)
 {

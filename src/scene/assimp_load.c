@@ -18,8 +18,7 @@ static void prepare_lock(void)
     mtx_init(&import_lock, mtx_plain);
 }
 
-/* ---- import
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- import ---------------------------------------------------------------------------------- */
 
 static bool has_polygons(const struct aiScene *scene)
 {
@@ -62,8 +61,7 @@ static nebel_result import(nb_assimp *in)
     return result;
 }
 
-/* ---- transforms
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- transforms ------------------------------------------------------------------------------ */
 
 static nb_affine from_assimp(const struct aiMatrix4x4 *matrix)
 {
@@ -72,8 +70,7 @@ static nb_affine from_assimp(const struct aiMatrix4x4 *matrix)
                         {(double)matrix->c1, (double)matrix->c2, (double)matrix->c3, (double)matrix->c4}}};
 }
 
-/* ---- the scene graph
- * ------------------------------------------------------------------------------------------------- */
+/* ---- the scene graph ------------------------------------------------------------------------- */
 
 typedef struct waiting {
     const struct aiNode *node;
@@ -126,8 +123,7 @@ static nebel_result walk(nb_assimp *in)
     return result;
 }
 
-/* ---- loading
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- loading --------------------------------------------------------------------------------- */
 
 static nebel_result convert_meshes(nb_assimp *in)
 {

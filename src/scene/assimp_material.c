@@ -10,8 +10,7 @@
 /* The largest file of a texture. */
 #define FILE_LIMIT ((size_t)1 << 30)
 
-/* ---- pictures
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- pictures -------------------------------------------------------------------------------- */
 
 static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture)
 {
@@ -58,8 +57,7 @@ static nebel_result read_file(const nb_codec *codec, const char *path, nebel_tex
     return result;
 }
 
-/* ---- which picture
- * --------------------------------------------------------------------------------------------------- */
+/* ---- which picture --------------------------------------------------------------------------- */
 
 /* "*3" names the third embedded picture; some formats name it by its file. */
 static const struct aiTexture *find_embedded(const struct aiScene *scene, const char *path)
@@ -129,8 +127,7 @@ static nebel_result find_texture(nb_assimp *in, char *path, int32_t *index)
     return result == NEBEL_OK ? remember(in, path, *index) : result;
 }
 
-/* ---- the surface
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- the surface ----------------------------------------------------------------------------- */
 
 static void read_color(const struct aiMaterial *material, float color[3])
 {

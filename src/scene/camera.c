@@ -13,8 +13,7 @@ nebel_camera nb_camera_default(void)
         .position = {0, 1.7, 0}, .look_at = {0, 1.7, -1}, .up = {0, 1, 0}, .vertical_fov = 50, .view_height = 10};
 }
 
-/* ---- directions
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- directions ------------------------------------------------------------------------------ */
 
 static void cross(const double a[3], const double b[3], double result[3])
 {
@@ -53,8 +52,7 @@ bool nb_camera_is_upright(const nebel_camera *camera)
     return dot(side, side) > 1e-12;
 }
 
-/* ---- keys
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- keys ------------------------------------------------------------------------------------ */
 
 /* A camera as numbers: position, look_at, up, and from FIRST_LIMITED on those that have a range to keep. */
 enum { FIRST_LIMITED = 9, NUMBER_COUNT = 11 };
@@ -111,8 +109,7 @@ static nebel_camera camera_between_keys(const nebel_camera_key *keys, size_t cou
     return is_usable(numbers, &camera) ? camera : mend(&camera, &keys[nb_keyframes_nearer(&around)].camera);
 }
 
-/* ---- turntable
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- turntable ------------------------------------------------------------------------------- */
 
 /* Rotation by Rodrigues' formula, right-handed about up: the camera walks to its right. */
 static nebel_camera turn(const nebel_camera *start, double frame, uint32_t frames)

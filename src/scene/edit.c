@@ -7,8 +7,7 @@
 /* A volume has no more members than this. */
 enum { NB_EDIT_MEMBERS = 32 };
 
-/* ---- pieces
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- pieces ---------------------------------------------------------------------------------- */
 
 void nb_edit_put(nb_edit *edit, size_t offset, size_t size, const char *words)
 {
@@ -63,8 +62,7 @@ void nb_edit_release(nb_edit *edit)
     nb_arena_release(&edit->arena);
 }
 
-/* ---- values
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- values ---------------------------------------------------------------------------------- */
 
 /* 15 digits: all that a decimal number keeps on its way through a double, so that 0.1 stays 0.1 and conversions of
  * units leave no dust. */
@@ -117,8 +115,7 @@ nb_edit_object nb_edit_find(const nb_json *json, const nb_json_node *object)
     return found;
 }
 
-/* ---- new members
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- new members ----------------------------------------------------------------------------- */
 
 static bool is_blank(char c)
 {
@@ -178,8 +175,7 @@ void nb_edit_add(nb_edit *edit, const nb_edit_object *object, const char *key, c
     put_words(edit, behind, 0, "%s%s\"%s\": %s", is_second ? "," : "", gap, key, value);
 }
 
-/* ---- what goes
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- what goes ------------------------------------------------------------------------------- */
 
 /* The first comma from `at` on that is in no remark. Between two elements there is one. */
 static size_t find_comma(const nb_edit *edit, size_t at)
@@ -254,8 +250,7 @@ void nb_edit_remove_members(nb_edit *edit, const nb_json *json, const nb_json_no
     nb_edit_remove(edit, spans, count);
 }
 
-/* ---- numbers
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- numbers --------------------------------------------------------------------------------- */
 
 void nb_edit_elements(nb_edit *edit, const nb_json *json, const nb_json_node *array, const double *was,
                       const double *now)

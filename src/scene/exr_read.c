@@ -26,8 +26,7 @@ bool nb_exr_is(const nb_bytes *bytes)
     return bytes->size >= 4 && memcmp(bytes->data, "\x76\x2f\x31\x01", 4) == 0;
 }
 
-/* ---- OpenEXR's callbacks
- * --------------------------------------------------------------------------------------------- */
+/* ---- OpenEXR's callbacks --------------------------------------------------------------------- */
 
 static void on_error(exr_const_context_t exr, exr_result_t code, const char *message)
 {
@@ -57,8 +56,7 @@ static int64_t on_read(exr_const_context_t exr, void *user, void *buffer, uint64
     return (int64_t)count;
 }
 
-/* ---- the header
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- the header ------------------------------------------------------------------------------ */
 
 static nebel_result fail_format(decoder *in)
 {
@@ -136,8 +134,7 @@ static nebel_result allocate_image(decoder *in)
     return result;
 }
 
-/* ---- the pixels
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- the pixels ------------------------------------------------------------------------------ */
 
 /* Copies a decoded block, one plane after the other, to where it lies in the display window. */
 static void place_block(const decoder *in, int64_t x0, int64_t y0, const exr_chunk_info_t *chunk)

@@ -19,8 +19,7 @@ typedef struct encoder {
     char message[200];
 } encoder;
 
-/* ---- OpenEXR's callbacks
- * --------------------------------------------------------------------------------------------- */
+/* ---- OpenEXR's callbacks --------------------------------------------------------------------- */
 
 static void on_error(exr_const_context_t exr, exr_result_t code, const char *message)
 {
@@ -42,8 +41,7 @@ static int64_t on_write(exr_const_context_t exr, void *user, const void *data, u
     return (int64_t)size;
 }
 
-/* ---- encoding
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- encoding -------------------------------------------------------------------------------- */
 
 static bool write_header(encoder *out)
 {

@@ -28,8 +28,7 @@ int nb_bytes_write(const nebel_allocator *allocator, nb_bytes *bytes, size_t off
     return 1;
 }
 
-/* ---- where to write
- * -------------------------------------------------------------------------------------------------- */
+/* ---- where to write -------------------------------------------------------------------------- */
 
 /* Follows symbolic links to the path they end at, which need not exist. NULL, with errno, where that fails. */
 static const char *follow_links(nb_arena *arena, const char *path)
@@ -70,8 +69,7 @@ static int create_beside(nb_arena *arena, const char *path, const char **tempora
     return -1;
 }
 
-/* ---- writing
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- writing --------------------------------------------------------------------------------- */
 
 /* 0 or an error number. */
 static int write_all(int file, const nb_bytes *bytes)
@@ -203,8 +201,7 @@ static int try_file(nb_arena *arena, const char *path)
     return unlink(temporary) == 0 ? 0 : errno;
 }
 
-/* ---- what went wrong
- * ------------------------------------------------------------------------------------------------- */
+/* ---- what went wrong ------------------------------------------------------------------------- */
 
 static nebel_result fail(nb_arena *arena, const nebel_log *log, const char *path, int error)
 {

@@ -40,8 +40,7 @@ static const nb_json_node *find_member(const nb_json *json, const nb_json_node *
     return node;
 }
 
-/* ---- nodes
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- nodes ----------------------------------------------------------------------------------- */
 
 /* By columns, as glTF has it. */
 static bool read_matrix(nb_json *json, const nb_json_node *node, nb_affine *place)
@@ -97,8 +96,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     return !nb_json_has_key(value, "scenes") || take_scenes(json, value, tree);
 }
 
-/* ---- the tree
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- the tree -------------------------------------------------------------------------------- */
 
 static void hang_up(nb_gltf_tree *tree)
 {

@@ -10,8 +10,7 @@
 /* Channel names of EXR end at 255 bytes. */
 enum { MAX_NAME = 255, MAX_CHANNELS = 1024 };
 
-/* ---- memory
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- memory ---------------------------------------------------------------------------------- */
 
 nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t height, uint64_t channel_count)
 {
@@ -71,8 +70,7 @@ int nb_image_channel(const nebel_image *image, const char *name)
     return -1;
 }
 
-/* ---- reading
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- reading --------------------------------------------------------------------------------- */
 
 static nebel_result check_desc(const nebel_scene_desc *desc)
 {
@@ -109,8 +107,7 @@ void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image)
     nb_image_release(&allocator, image);
 }
 
-/* ---- writing
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- writing --------------------------------------------------------------------------------- */
 
 static bool ends_in(const char *path, const char *ending)
 {

@@ -25,8 +25,7 @@ bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb
 /* Reads an import of any type. */
 bool nb_read_import(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
 
-/* ---- what importers share
- * -------------------------------------------------------------------------------------------- */
+/* ---- what importers share -------------------------------------------------------------------- */
 
 /* An endless volume of constant density that takes all colours alike. */
 nebel_volume_desc nb_import_world(double extinction);

@@ -22,8 +22,7 @@ static bool read_albedo(nb_json *json, const nb_json_node *node, double albedo[3
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is brighter than white; an albedo is at most 1");
 }
 
-/* ---- fog of the environment
- * ------------------------------------------------------------------------------------------ */
+/* ---- fog of the environment ------------------------------------------------------------------ */
 
 bool nb_import_godot_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
@@ -73,8 +72,7 @@ bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *nod
     return true;
 }
 
-/* ---- fog volumes
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- fog volumes ----------------------------------------------------------------------------- */
 
 enum { ELLIPSOID, CONE, CYLINDER, BOX, WORLD, SHAPE_COUNT };
 

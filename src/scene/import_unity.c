@@ -28,8 +28,7 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
     return true;
 }
 
-/* ---- local fog
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- local fog ------------------------------------------------------------------------------- */
 
 /* Fades are fractions of the size. The product of both faces of an axis is the soft edge of the nearer one as long as
  * the two do not meet. */

@@ -14,8 +14,7 @@ static void convert_location(double location[3])
     for (int i = 0; i < 3; i++) location[i] *= 0.01;
 }
 
-/* ---- height fog
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- height fog ------------------------------------------------------------------------------ */
 
 /* The shader's line integral over 2^(-f (z - h)) leaves out 1 / ln 2, and transmittance is 2 to the power of its
  * negative: the extinction is (ln 2)^2 times the density. Both settings are scaled by 1/1000 per cm, which is 1/10 per
@@ -78,8 +77,7 @@ bool nb_import_unreal_height_fog(nb_scene_reader *in, const nb_json_node *node, 
     return true;
 }
 
-/* ---- local fog volumes
- * ----------------------------------------------------------------------------------------------- */
+/* ---- local fog volumes ----------------------------------------------------------------------- */
 
 /* The radius of a volume of scale 1. */
 static const double base_radius = 5;

@@ -18,8 +18,7 @@ typedef struct reader {
     bool at_end; /* the whole text has been seen: a number at its very end comes now */
 } reader;
 
-/* ---- where tokens are
- * ------------------------------------------------------------------------------------------------ */
+/* ---- where tokens are ------------------------------------------------------------------------ */
 
 /* The first byte of the token after `at`: yajl tells only where tokens end. */
 static size_t find_token(const nb_json *json, size_t at)
@@ -37,8 +36,7 @@ static uint32_t take_token(reader *in)
     return (uint32_t)start;
 }
 
-/* ---- building trees
- * -------------------------------------------------------------------------------------------------- */
+/* ---- building trees -------------------------------------------------------------------------- */
 
 static bool fail_at(nb_json *json, nebel_result result, size_t offset, const char *message)
 {
@@ -171,8 +169,7 @@ static bool close_container(reader *in)
     return close_value(json, json->open[json->depth]);
 }
 
-/* ---- yajl's events
- * --------------------------------------------------------------------------------------------------- */
+/* ---- yajl's events --------------------------------------------------------------------------- */
 
 static int on_null(void *user)
 {
@@ -249,8 +246,7 @@ static const yajl_callbacks callbacks = {
     .yajl_end_array = on_end,
 };
 
-/* ---- reading
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- reading --------------------------------------------------------------------------------- */
 
 /* Between setjmp and here nothing is held but yajl's memory, which is given back as a whole. */
 static void run_parser(reader *in)

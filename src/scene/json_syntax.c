@@ -27,8 +27,7 @@ typedef struct spot {
     const nb_json_node *about; /* what messages name; NULL: the innermost of what is open */
 } spot;
 
-/* ---- the text
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- the text -------------------------------------------------------------------------------- */
 
 size_t nb_json_skip_blanks(const nb_json *json, size_t at, size_t *comment)
 {
@@ -95,8 +94,7 @@ static bool word_is(word given, const char *const *names, size_t count)
     word_is(given, (const char *const[]){__VA_ARGS__},                                                                 \
             sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 
-/* ---- messages
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- messages -------------------------------------------------------------------------------- */
 
 static const nb_json_node *innermost(const nb_json *json)
 {
@@ -148,8 +146,7 @@ static void explain_bracket(const spot *wrong)
          closing(wrong));
 }
 
-/* ---- strings
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- strings --------------------------------------------------------------------------------- */
 
 static void explain_escape(const spot *wrong, size_t at)
 {
@@ -195,8 +192,7 @@ static bool is_curly_quote(const spot *wrong)
     return false;
 }
 
-/* ---- numbers and words
- * ----------------------------------------------------------------------------------------------- */
+/* ---- numbers and words ----------------------------------------------------------------------- */
 
 static const char *number_advice(word number)
 {
@@ -249,8 +245,7 @@ static void explain_character(const spot *wrong, const char *wanted)
         FAIL(wrong, wrong->at, "found '%.*s'; %s", (int)length, wrong->text + wrong->at, wanted);
 }
 
-/* ---- what is wrong, by what was expected
- * ------------------------------------------------------------------------------ */
+/* ---- what is wrong, by what was expected ----------------------------------------------------- */
 
 static void explain_scene(const spot *wrong)
 {
@@ -445,8 +440,7 @@ void nb_json_explain(nb_json *json, size_t end)
         explain(&wrong);
 }
 
-/* ---- what is no text
- * ------------------------------------------------------------------------------------------------- */
+/* ---- what is no text ------------------------------------------------------------------------- */
 
 /* Nearly all characters of a scene are ASCII, so that every second byte of UTF-16 is 0. */
 static bool is_utf16(const unsigned char *byte, size_t size)

@@ -42,8 +42,7 @@ nb_affine nb_model_place(const nb_model_source *model)
     return nb_affine_compose(&placed, &own);
 }
 
-/* ---- meshes
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- meshes ---------------------------------------------------------------------------------- */
 
 bool nb_mesh_allocate_vertices(const nebel_allocator *allocator, uint32_t count, bool has_uvs, nebel_mesh *mesh)
 {
@@ -120,8 +119,7 @@ void nb_models_release(nebel_scene *scene)
     release_set(&scene->allocator, &scene->loaded);
 }
 
-/* ---- loading
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- loading --------------------------------------------------------------------------------- */
 
 static nebel_result load_all(const nebel_scene *scene, nb_model_set *set)
 {

@@ -24,8 +24,7 @@ bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_sha
     return true;
 }
 
-/* ---- into the world
- * -------------------------------------------------------------------------------------------------- */
+/* ---- into the world -------------------------------------------------------------------------- */
 
 /* A ramp is level across: what counts is the gradient, which turns by the inverse of the transpose. g is that of the
  * density, 1 from `from` to `to`; afterwards `to` lies g / |g|^2 away. */

@@ -28,8 +28,7 @@ bool nb_png_is(const nb_bytes *bytes)
     return bytes->size >= 8 && memcmp(bytes->data, "\x89PNG\r\n\x1a\n", 8) == 0;
 }
 
-/* ---- libpng's callbacks
- * ---------------------------------------------------------------------------------------------- */
+/* ---- libpng's callbacks ---------------------------------------------------------------------- */
 
 static void on_error(png_structp png, png_const_charp message)
 {
@@ -67,8 +66,7 @@ static void on_read(png_structp png, png_bytep target_bytes, size_t size)
     in->at += size;
 }
 
-/* ---- decoding
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- decoding -------------------------------------------------------------------------------- */
 
 static void stop(decoder *in, nebel_result result, const char *message)
 {
@@ -139,8 +137,7 @@ static nebel_result decode(decoder *in)
     return nb_fail(&in->codec->log, in->result, "%s: not a good PNG picture: %s", in->codec->name, message);
 }
 
-/* ---- what becomes of the pixels
- * -------------------------------------------------------------------------------------- */
+/* ---- what becomes of the pixels -------------------------------------------------------------- */
 
 /* PNG stores the high byte first. */
 static uint16_t read_16(const unsigned char *at)

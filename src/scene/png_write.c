@@ -15,8 +15,7 @@ typedef struct encoder {
     char message[200];
 } encoder;
 
-/* ---- libpng's callbacks
- * ---------------------------------------------------------------------------------------------- */
+/* ---- libpng's callbacks ---------------------------------------------------------------------- */
 
 static void on_error(png_structp png, png_const_charp message)
 {
@@ -55,8 +54,7 @@ static void on_flush(png_structp png)
     (void)png;
 }
 
-/* ---- encoding
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- encoding -------------------------------------------------------------------------------- */
 
 /* B. Bayer's matrix of 8 x 8 (1973): the bits of x ^ y and y, interleaved and reversed. Within (0, 1), so that a value
  * that is a multiple of 1/255 keeps its number. */

@@ -1,8 +1,7 @@
 /* Density profiles and phase functions. */
 #include "scene/scene_internal.h"
 
-/* ---- density
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- density --------------------------------------------------------------------------------- */
 
 enum { TYPE, BASE, SCALE_HEIGHT, BELOW, FROM, TO, POWER, CENTER, SIGMA, DISTANCE, DENSITY_KEY_COUNT };
 
@@ -122,8 +121,7 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
     return read_members(json, found, density);
 }
 
-/* ---- phase
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- phase ----------------------------------------------------------------------------------- */
 
 /* Under ambient light, the same from everywhere, each of these scatters as much as the isotropic one: they integrate
  * to 1. That is why the core is not told. */

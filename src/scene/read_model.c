@@ -140,8 +140,7 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
            keep_model(in, node, &model);
 }
 
-/* ---- points
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- points ---------------------------------------------------------------------------------- */
 
 static const nb_keys points_keys = {model_names, MODEL_KEY_COUNT,
                                     NB_BIT(MODEL_KEY_COUNT) - 1 - NB_BIT(HEIGHTFIELD) - NB_BIT(COLOR), NB_BIT(FILE_KEY),

@@ -17,8 +17,7 @@ typedef struct nodes_reader {
     char name[NAME_SHOWN + 1]; /* of the node in work, "" outside of all */
 } nodes_reader;
 
-/* ---- messages
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- messages -------------------------------------------------------------------------------- */
 
 static void pass_on(nebel_result result, const char *message, void *user)
 {
@@ -53,8 +52,7 @@ static void set_name(nodes_reader *nodes, const nb_json *json, const nb_json_nod
         if ((unsigned char)*at < 0x20 || *at == 0x7F) *at = '?';
 }
 
-/* ---- one node
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- one node -------------------------------------------------------------------------------- */
 
 static bool begins_with(const nb_json_node *node, const char *prefix)
 {
@@ -144,8 +142,7 @@ static bool take(nb_json *json, const nb_json_node *value, void *user)
     return take_node(nodes, json, value);
 }
 
-/* ---- the file
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- the file -------------------------------------------------------------------------------- */
 
 /* Most files know nothing of fog. */
 static bool speaks_of_fog(const nb_bytes *text)

@@ -58,8 +58,7 @@ static bool read_operation(nb_json *json, const nb_json_node *volume, const char
     return true;
 }
 
-/* ---- amount
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- amount ---------------------------------------------------------------------------------- */
 
 static double extinction_from_path(double path, double contrast)
 {
@@ -118,8 +117,7 @@ static bool read_amount(nb_json *json, const nb_json_node *const *found, double 
     return read_length(json, found[MEAN_FREE_PATH], 0, extinction_from_path, extinction);
 }
 
-/* ---- light
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- light ----------------------------------------------------------------------------------- */
 
 static void remember_lit(nb_scene_reader *in, const nb_json_node *albedo, const double color[3])
 {
@@ -144,8 +142,7 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
     return true;
 }
 
-/* ---- keeping
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- keeping --------------------------------------------------------------------------------- */
 
 bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subject, const nebel_volume_desc *volume)
 {
@@ -184,8 +181,7 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
     return true;
 }
 
-/* ---- keys
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- keys ------------------------------------------------------------------------------------ */
 
 /* A volume is lit in one way at all frames, so that it is in between, too. */
 static bool check_light_key(nb_json *json, const nb_json_node *const *entry, const nb_json_node *const *found)
@@ -287,8 +283,7 @@ static bool keep_track(nb_scene_reader *in, const nb_json_node *node, const nb_v
     return true;
 }
 
-/* ---- volume
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- volume ---------------------------------------------------------------------------------- */
 
 static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
                           nebel_volume_desc *volume, const char *name)
@@ -329,8 +324,7 @@ static bool read_name(nb_scene_reader *in, const nb_json_node *node, const char 
     return *name != NULL;
 }
 
-/* ---- fog of other programs
- * ------------------------------------------------------------------------------------------- */
+/* ---- fog of other programs ------------------------------------------------------------------- */
 
 /* A source of the entry's own stands for the lights of the engine. */
 static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3], nebel_volume_desc *volume,

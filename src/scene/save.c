@@ -6,8 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- numbers
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- numbers --------------------------------------------------------------------------------- */
 
 static void save_places(nb_save *save, const nb_json *json, const nb_edit_object *object, const nb_place *places,
                         unsigned mask, const void *was, const void *now)
@@ -43,8 +42,7 @@ static void save_object(nb_save *save, const nb_json *json, const nb_edit_object
         nb_edit_add(&save->edit, owner, key, words);
 }
 
-/* ---- fog
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- fog ------------------------------------------------------------------------------------- */
 
 static bool is_zero(const double rgb[3])
 {
@@ -268,8 +266,7 @@ static bool check_removed(const nb_save *save, const nb_scene_reader *in, const 
     return true;
 }
 
-/* ---- new fog
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- new fog --------------------------------------------------------------------------------- */
 
 /* Behind the last entry that stays, on a line of its own where that one is; in an empty array behind its bracket. */
 static void add_entry(nb_save *save, const nb_json_node *array, const char *words)
@@ -305,8 +302,7 @@ static void save_entries(nb_save *save, const nb_scene_reader *in, const nb_json
     nb_edit_remove(&save->edit, save->spans, save->span_count);
 }
 
-/* ---- nebulae
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- nebulae --------------------------------------------------------------------------------- */
 
 static bool is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *b)
 {
@@ -342,8 +338,7 @@ bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node
     return true;
 }
 
-/* ---- cells
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- cells ----------------------------------------------------------------------------------- */
 
 static bool are_same_cells(const nebel_cells_desc *a, const nebel_cells_desc *b)
 {
@@ -390,8 +385,7 @@ bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node)
     return true;
 }
 
-/* ---- camera and light
- * ------------------------------------------------------------------------------------------------ */
+/* ---- camera and light ------------------------------------------------------------------------ */
 
 #define CAMERA_PLACE(member, count)                                                                                    \
     {                                                                                                                  \
@@ -477,8 +471,7 @@ bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *
     return check_removed(save, in, root);
 }
 
-/* ---- the file
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- the file -------------------------------------------------------------------------------- */
 
 /* What would be written is read as well: whatever is wrong with it is found before the file is. */
 static nebel_result write_text(const char *path, const nebel_scene_desc *desc, const nb_bytes *bytes)

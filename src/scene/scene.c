@@ -37,8 +37,7 @@ static const char *const streamed_names[] = {"lights", "models", "fog", "nebula"
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
 
-/* ---- reading
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- reading --------------------------------------------------------------------------------- */
 
 static bool read_version(nb_json *json, const nb_json_node *node)
 {
@@ -239,8 +238,7 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
     return result;
 }
 
-/* ---- the scene
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- the scene ------------------------------------------------------------------------------- */
 
 const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene)
 {

@@ -1,7 +1,6 @@
 #include "scene/space.h"
 
-/* ---- numbers
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- numbers --------------------------------------------------------------------------------- */
 
 static void scale_all(double factor, double *numbers, size_t count)
 {
@@ -48,8 +47,7 @@ void nb_space_convert_placement(const nb_space *space, double position[3], doubl
     convert_extents(space, 1, scale);
 }
 
-/* ---- fog
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- fog ------------------------------------------------------------------------------------- */
 
 /* What was the least y is the largest z. */
 static void convert_box(const nb_space *space, double min[3], double max[3])
@@ -122,8 +120,7 @@ void nb_space_convert_cell(const nb_space *space, nebel_cell *cell)
     cell->density /= space->unit;
 }
 
-/* ---- camera
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- camera ---------------------------------------------------------------------------------- */
 
 void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
 {
@@ -133,8 +130,7 @@ void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
     camera->view_height *= space->unit;
 }
 
-/* ---- the other way
- * --------------------------------------------------------------------------------------------------- */
+/* ---- the other way --------------------------------------------------------------------------- */
 
 void nb_space_restore_direction(const nb_space *space, double direction[3])
 {

@@ -44,8 +44,7 @@ static void set_color(nebel_word *word, const double v[3], double last)
 
 _Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED, "the public name of a feature");
 
-/* ---- leaves
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- leaves ---------------------------------------------------------------------------------- */
 
 static int type_of(const nb_leaf *leaf)
 {
@@ -161,8 +160,7 @@ static void pack_group(packer *p, const nb_volume *body, nebel_word *word)
         pack_leaf(p, body, &body->leaves[i], folds_behind(body, &step), &leaves[i * NB_LEAF_WORDS]);
 }
 
-/* ---- profiles
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- profiles -------------------------------------------------------------------------------- */
 
 static int kind_of(const nb_volume *body)
 {
@@ -226,8 +224,7 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
     }
 }
 
-/* ---- fog
- * --------------------------------------------------------------------------------------------------------------- */
+/* ---- fog ------------------------------------------------------------------------------------- */
 
 static double light_flags(const nb_medium *medium, size_t rank)
 {
@@ -294,8 +291,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     return NEBEL_OK;
 }
 
-/* ---- features
- * ---------------------------------------------------------------------------------------------------------- */
+/* ---- features -------------------------------------------------------------------------------- */
 
 static uint32_t features_of_leaf(const nb_leaf *leaf)
 {

@@ -50,8 +50,7 @@ typedef struct screen {
     uint32_t width, height, columns, rows;
 } screen;
 
-/* ---- hulls
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- hulls ----------------------------------------------------------------------------------- */
 
 static double transform(const double row[4], const double p[3])
 {
@@ -132,8 +131,7 @@ static void make_hull(const screen *s, const double low[3], const double high[3]
         for (int j = h->first_cut; j < i; j++) add_edge(h, i, j);
 }
 
-/* ---- ranges
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- ranges ---------------------------------------------------------------------------------- */
 
 static range nothing(void)
 {
@@ -191,8 +189,7 @@ static int tiles_in(const screen *s, const range *r, uint32_t pixels, uint32_t t
     return 1;
 }
 
-/* ---- footprints
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- footprints ------------------------------------------------------------------------------ */
 
 typedef struct tiler {
     screen screen;
@@ -273,8 +270,7 @@ static span span_at(const tiler *t, const footprint *f, uint32_t row)
     return f->spans == SIZE_MAX ? whole_row(&t->screen) : t->spans[f->spans + row];
 }
 
-/* ---- lists
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- lists ----------------------------------------------------------------------------------- */
 
 static size_t count_entries(tiler *t)
 {

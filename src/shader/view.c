@@ -230,8 +230,7 @@ static fraction plane_fraction(const bundle *rays, int rising, double end, doubl
                       .below_growth = sign * growth * rays->w1};
 }
 
-/* ---- depth
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- depth ----------------------------------------------------------------------------------- */
 
 /* Normalized and stored depth at the ends of the range. */
 typedef struct ends {
