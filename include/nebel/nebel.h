@@ -168,7 +168,8 @@ typedef struct nebel_shape {
  * soft edge follow the shape and its transform. */
 typedef enum nebel_density_type {
     NEBEL_DENSITY_CONSTANT = 0,
-    NEBEL_DENSITY_HEIGHT,    /* exp(-(y - base) / scale_height); `below` says what holds under the base */
+    NEBEL_DENSITY_HEIGHT,    /* exp(-(y - base) / scale_height); `below` says what holds under the base. At most 1e18,
+                                as is its integral along a piece of a ray [m] */
     NEBEL_DENSITY_LINEAR,    /* 0 at `from`, 1 at `to`, clamped, level across */
     NEBEL_DENSITY_RADIAL,    /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
     NEBEL_DENSITY_GAUSSIAN,  /* exp(-r^2 / (2 sigma^2)) around center */
