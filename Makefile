@@ -30,7 +30,7 @@ demo: $(MODELS)
 	@cmake --build $(BUILD) -j $(JOBS) --target nebel_tool
 	@scripts/demo.sh $(BUILD)
 
-test:
+test: $(MODELS)
 	@scripts/install_packages.sh build demo test
 	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=ON
@@ -49,7 +49,7 @@ report: $(MODELS)
 bench: all
 	@$(BUILD)/nebel bench
 
-asan:
+asan: $(MODELS)
 	@scripts/install_packages.sh build demo test
 	@echo "nebel: building with sanitizers"
 	@$(CONFIGURE) -B $(BUILD)-asan -DCMAKE_BUILD_TYPE=Debug -DNEBEL_SANITIZE=ON

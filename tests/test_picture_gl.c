@@ -72,7 +72,9 @@ static void check_demo(const nebel_scene *scene, const char *name)
     render_demo(scene, &pair);
     const picture_difference d = check(name, &pair);
     expect_sameness(&d);
-    assert_true(d.fogged > DEMO_WIDTH * DEMO_HEIGHT / 8);
+    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    if (data->volume_count + data->particle_count > 0) /* else the scene shows factors alone */
+        assert_true(d.fogged > DEMO_WIDTH * DEMO_HEIGHT / 16);
     assert_true(d.color < .02);
     picture_free(&pair);
 }
