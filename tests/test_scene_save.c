@@ -259,8 +259,9 @@ static void test_volumes_come(void **state)
         "{ \"type\": \"cylinder\", \"radius\": 1, \"from\": [0, 0, 0], \"to\": [0, 1, 0] }",
         "{ \"type\": \"cone\", \"from\": [0, 0, 0], \"to\": [0, 1, 0], \"radius_from\": 0, \"radius_to\": 2 }",
         "{ \"type\": \"convex\", \"planes\": [[1, 0, 0, 2], [0, 1, 0, 0.5]] }",
-        "{ \"type\": \"union\", \"shapes\": [{ \"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1, "
-        "\"transform\": { \"scale\": [1, 2, 1] } }, { \"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1] }] }"};
+        ("{ \"type\": \"union\", \"shapes\": [{ \"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1, "
+         "\"transform\": { \"scale\": [1, 2, 1] } }, { \"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1] }] "
+         "}")};
     static const char *const others[] = {
         ", \"density\": { \"type\": \"height\", \"base\": 2, \"scale_height\": 5, \"below\": \"constant\" }, "
         "\"extinction\": 0.5, \"albedo\": [0.5, 0.25, 1], \"start\": 1, \"cutoff\": 8 }",
