@@ -7,6 +7,7 @@
 #include <cmocka.h>
 
 #include "fog_help.h"
+#include "near.h"
 
 #include "cell_world.h"
 
@@ -19,11 +20,6 @@ static const nebel_cell rooms[] = {BOX(0, 4, 0), BOX(4, 9, .1), BOX(9, 20, 0)};
 static const double door[4][3] = {{4, -1, -1}, {4, 1, -1}, {4, 1, 1}, {4, -1, 1}};
 static const double turned_door[4][3] = {{4, -1, 1}, {4, 1, 1}, {4, 1, -1}, {4, -1, -1}};
 static const double hatch[3][3] = {{9, 0, -2}, {9, 0, 2}, {9, 2, 0}};
-
-static void assert_near(double got, double wanted, double tolerance)
-{
-    if (!(fabs(got - wanted) <= tolerance)) fail_msg("%.17g should be %.17g", got, wanted);
-}
 
 static nebel_cells *create(const nebel_cells_desc *desc)
 {

@@ -7,13 +7,9 @@
 #include <cmocka.h>
 
 #include "fog_help.h"
+#include "near.h"
 
 #include "cell_world.h"
-
-static void assert_near(double got, double wanted, double tolerance)
-{
-    if (!(fabs(got - wanted) <= tolerance)) fail_msg("%.17g should be %.17g", got, wanted);
-}
 
 static nebel_cells *create(const nebel_cells_desc *desc)
 {

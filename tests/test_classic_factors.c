@@ -10,12 +10,9 @@
 
 #include <cmocka.h>
 
-static const double not_a_number = (double)NAN;
+#include "near.h"
 
-static void assert_near(double found, double wanted, double most)
-{
-    if (!(fabs(found - wanted) <= most)) fail_msg("%.17g is not %.17g within %g", found, wanted, most);
-}
+static const double not_a_number = (double)NAN;
 
 static nebel_factor_desc resolved(nebel_factor_desc desc)
 {

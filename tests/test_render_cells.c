@@ -1,6 +1,8 @@
 /* Fog in cells on the surfaces of the CPU renderer. */
 #include "test_render_scene.h"
 
+#include "near.h"
+
 #include <stdio.h>
 
 /* Two rooms of fog in a row along z under clear air; a square of 10 m lies on their floor, its vertices far apart. */
@@ -11,11 +13,6 @@ static const nebel_cell rooms[] = {
 };
 
 static const float floor_positions[12] = {-5, 0, -5, -5, 0, 5, 5, 0, 5, 5, 0, -5};
-
-static void assert_near(double got, double wanted, double tolerance)
-{
-    if (!(fabs(got - wanted) <= tolerance)) fail_msg("%.9g should be %.9g", got, wanted);
-}
 
 static nebel_mesh the_floor(void)
 {

@@ -1,14 +1,11 @@
 /* Classic fog on the surfaces of the CPU renderer: fog at vertices, added fog, fog factors. */
 #include "test_render_scene.h"
 
+#include "near.h"
+
 #include <nebel/classic.h>
 
 static const float square_positions[12] = {-5, 0, -5, -5, 0, 5, 5, 0, 5, 5, 0, -5};
-
-static void assert_near(double got, double wanted, double tolerance)
-{
-    if (!(fabs(got - wanted) <= tolerance)) fail_msg("%.9g should be %.9g", got, wanted);
-}
 
 static nebel_mesh the_square(void)
 {
