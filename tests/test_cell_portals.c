@@ -45,7 +45,7 @@ static nebel_cell_fog ask(const nebel_cells *cells, const double eye[3], const d
     return ask_from((nebel_cell_view){.forward = {1, 0, 0}}, cells, eye, x);
 }
 
-/* ---- walls ------------------------------------------------------------------------------------------------------- */
+/* ---- walls ----------------------------------------------------------------------------------- */
 
 static void test_fog_is_seen_through_portals_alone(void **state)
 {
@@ -197,7 +197,7 @@ static void test_random_worlds_of_portals(void **state)
     assert_true(fogged > 5000);
 }
 
-/* ---- derived ----------------------------------------------------------------------------------------------------- */
+/* ---- derived --------------------------------------------------------------------------------- */
 
 static void test_a_derived_portal_is_what_two_faces_share(void **state)
 {
@@ -320,7 +320,7 @@ static void test_a_hair_between_cells_is_nothing(void **state)
     nebel_destroy_cells(cells);
 }
 
-/* ---- what is no description -------------------------------------------------------------------------------------- */
+/* ---- what is no description ------------------------------------------------------------------ */
 
 static void refuse(const nebel_cells_desc *desc, nebel_result result, size_t cell, size_t portal, const char *text)
 {

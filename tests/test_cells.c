@@ -52,8 +52,7 @@ static size_t layers_at(const nebel_cells *cells, const nebel_cell_view *view, d
 static const nebel_cell clear_then_fog[] = {BOX(0, 4, 0, 0, 0, 0), BOX(4, 9, .1, 1, .5, .25), BOX(9, 20, 0, 0, 0, 0)};
 static const nebel_cell_view along_x = {.eye = {1, 0, 0}, .forward = {2, 0, 0}};
 
-/* ---- the printed formula and what is wrong with it ---------------------------------------------------------------
- */
+/* ---- the printed formula and what is wrong with it ------------------------------------------- */
 
 /* View space is the world's with Z = -z. A leaning portal lies in Z = 8 + x; the eye is before it, fog behind. */
 static const nebel_plane before_portal[] = {{{-1, 0, -1}, 8}, {{0, 0, 1}, 5}, {{1, 0, 0}, 40},
@@ -158,7 +157,7 @@ static void test_printed_depths_stay_between_eye_and_surface(void **state)
     nebel_destroy_cells(out);
 }
 
-/* ---- hand-computed ----------------------------------------------------------------------------------------------- */
+/* ---- hand-computed --------------------------------------------------------------------------- */
 
 static void test_one_fogged_room(void **state)
 {
@@ -217,7 +216,7 @@ static void test_depth_turns_with_the_camera(void **state)
     nebel_destroy_cells(ray);
 }
 
-/* ---- the seam ---------------------------------------------------------------------------------------------------- */
+/* ---- the seam -------------------------------------------------------------------------------- */
 
 static void test_the_seam_and_its_cure(void **state)
 {
@@ -314,7 +313,7 @@ static void test_grouping_is_one_merged_cell(void **state)
     }
 }
 
-/* ---- the exponential model --------------------------------------------------------------------------------------- */
+/* ---- the exponential model ------------------------------------------------------------------- */
 
 static void compare_with_trace(const nebel_cells *cells, const nebel_snapshot *snapshot, uint64_t *d)
 {
@@ -383,7 +382,7 @@ static void test_a_ray_in_a_face(void **state)
     nebel_release_snapshot(snapshot);
 }
 
-/* ---- order ------------------------------------------------------------------------------------------------------- */
+/* ---- order ----------------------------------------------------------------------------------- */
 
 static void shuffle(cell_world *world, uint64_t *d)
 {
@@ -421,7 +420,7 @@ static void test_the_order_of_cells_means_nothing(void **state)
     }
 }
 
-/* ---- where the eye and the point may be -------------------------------------------------------------------------- */
+/* ---- where the eye and the point may be ------------------------------------------------------ */
 
 static void test_an_eye_on_a_portal(void **state)
 {

@@ -100,7 +100,7 @@ static int is_floor(const double place[3])
     return fabs(place[0]) < 4.9 && fabs(place[2]) < 4.9;
 }
 
-/* ---- what is drawn ----------------------------------------------------------------------------------------------- */
+/* ---- what is drawn --------------------------------------------------------------------------- */
 
 static void test_pixels_are_what_the_cells_say(void **state)
 {

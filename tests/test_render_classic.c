@@ -87,8 +87,7 @@ static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *c
     return light;
 }
 
-/* ---- fog at vertices ----------------------------------------------------------------------------------------------
- */
+/* ---- fog at vertices ------------------------------------------------------------------------- */
 
 static void test_vertices_are_exact_and_linear_between(void **state)
 {
@@ -165,8 +164,7 @@ static void test_orthographic_rays_begin_beside_the_camera(void **state)
     test_picture_free(&picture);
 }
 
-/* ---- added fog ------------------------------------------------------------------------------------------------------
- */
+/* ---- added fog ------------------------------------------------------------------------------- */
 
 static void test_added_fog_hides_nothing(void **state)
 {
@@ -194,8 +192,7 @@ static void test_added_fog_hides_nothing(void **state)
     test_picture_free(&added);
 }
 
-/* ---- factors --------------------------------------------------------------------------------------------------------
- */
+/* ---- factors --------------------------------------------------------------------------------- */
 
 static double factor_at(nebel_method method, const nebel_factor_desc *factor, const nebel_camera *camera,
                         const double place[3])
@@ -248,8 +245,7 @@ static void test_factors(void **state)
     test_picture_free(&picture);
 }
 
-/* ---- methods --------------------------------------------------------------------------------------------------------
- */
+/* ---- methods --------------------------------------------------------------------------------- */
 
 static void test_methods_come_and_go(void **state)
 {

@@ -22,8 +22,7 @@ static void assert_number(double got, double wanted)
     if (!(fabs(got - wanted) <= 1e-14 * fmax(1, fabs(wanted)))) fail_msg("%.17g should be %.17g", got, wanted);
 }
 
-/* ---- what it becomes ---------------------------------------------------------------------------------------------
- */
+/* ---- what it becomes ------------------------------------------------------------------------- */
 
 static void test_everything_it_may_say(void **state)
 {
@@ -117,7 +116,7 @@ static void test_cells_are_exact_fog_too(void **state)
     nebel_destroy_scene(scene);
 }
 
-/* ---- what is wrong with it --------------------------------------------------------------------------------------- */
+/* ---- what is wrong with it ------------------------------------------------------------------- */
 
 static void test_what_no_cell_has(void **state)
 {
@@ -216,7 +215,7 @@ static void test_memory_runs_out(void **state)
     assert_int_equal(result, NEBEL_OK);
 }
 
-/* ---- saving ------------------------------------------------------------------------------------------------------ */
+/* ---- saving ---------------------------------------------------------------------------------- */
 
 static char path[] = "/tmp/nebel_cells_XXXXXX";
 

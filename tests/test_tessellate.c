@@ -128,7 +128,7 @@ static nebel_tessellation *tessellate(const nebel_snapshot *fog, const nebel_tes
     return t;
 }
 
-/* ---- the bound --------------------------------------------------------------------------------------------------- */
+/* ---- the bound ------------------------------------------------------------------------------- */
 
 static const nebel_plane wedge[] = {
     {{0, -1, 0}, .2}, {{1, 1, .3}, 2}, {{-1, .5, 0}, 3}, {{0, .2, 1}, 4}, {{0, 1, -1}, 4}};
@@ -247,8 +247,7 @@ static void test_the_bound_is_met_in_smooth_fog(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* ---- the mesh -----------------------------------------------------------------------------------------------------
- */
+/* ---- the mesh -------------------------------------------------------------------------------- */
 
 static int compare_edges(const void *a, const void *b)
 {
@@ -368,8 +367,7 @@ static void test_strides_and_origins(void **state)
     nebel_release_snapshot(far_fog);
 }
 
-/* ---- limits -------------------------------------------------------------------------------------------------------
- */
+/* ---- limits ---------------------------------------------------------------------------------- */
 
 static void test_limits_are_told(void **state)
 {
@@ -447,8 +445,7 @@ static void test_degenerate_triangles(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* ---- bad input ----------------------------------------------------------------------------------------------------
- */
+/* ---- bad input ------------------------------------------------------------------------------- */
 
 static void *no_memory_after(size_t size, void *user)
 {
