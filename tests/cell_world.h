@@ -1,11 +1,27 @@
-/* Random worlds of convex cells: a cube cut again and again by planes between two of its places, so that the cells fill
- * it without a gap. Include after <cmocka.h> and fog_help.h. */
+/* Rooms in a row, and random worlds of convex cells: a cube cut again and again by planes between two of its places, so
+ * that the cells fill it without a gap. Include after <cmocka.h> and fog_help.h. */
 #ifndef CELL_WORLD_H
 #define CELL_WORLD_H
 
 #include <nebel/cells.h>
 
 #include <math.h>
+
+/* A room from x0 to x1. */
+#define BOX(x0, x1, d, r, g, b)                                                                                        \
+    {                                                                                                                  \
+        .shape = {.type = NEBEL_SHAPE_BOX, .min = {x0, -2, -2}, .max = {x1, 2, 2}}, .density = d, .color = { r, g, b } \
+    }
+
+static inline nebel_cells *create(const nebel_cells_desc *desc)
+{
+    fog_messages messages = {0};
+    nebel_cells_desc logged = *desc;
+    nebel_cells *cells = NULL;
+    logged.log = fog_messages_log(&messages);
+    if (nebel_create_cells(&logged, &cells) != NEBEL_OK) fail_msg("%s", messages.text);
+    return cells;
+}
 
 enum { WORLD_CELLS = 12, WORLD_PLANES = 6 + WORLD_CELLS };
 

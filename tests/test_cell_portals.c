@@ -11,25 +11,10 @@
 
 #include "cell_world.h"
 
-#define BOX(x0, x1, d)                                                                                                 \
-    {                                                                                                                  \
-        .shape = {.type = NEBEL_SHAPE_BOX, .min = {x0, -2, -2}, .max = {x1, 2, 2}}, .density = d, .color = { 1, 1, 1 } \
-    }
-
-static const nebel_cell rooms[] = {BOX(0, 4, 0), BOX(4, 9, .1), BOX(9, 20, 0)};
+static const nebel_cell rooms[] = {BOX(0, 4, 0, 1, 1, 1), BOX(4, 9, .1, 1, 1, 1), BOX(9, 20, 0, 1, 1, 1)};
 static const double door[4][3] = {{4, -1, -1}, {4, 1, -1}, {4, 1, 1}, {4, -1, 1}};
 static const double turned_door[4][3] = {{4, -1, 1}, {4, 1, 1}, {4, 1, -1}, {4, -1, -1}};
 static const double hatch[3][3] = {{9, 0, -2}, {9, 0, 2}, {9, 2, 0}};
-
-static nebel_cells *create(const nebel_cells_desc *desc)
-{
-    fog_messages messages = {0};
-    nebel_cells_desc logged = *desc;
-    nebel_cells *cells = NULL;
-    logged.log = fog_messages_log(&messages);
-    if (nebel_create_cells(&logged, &cells) != NEBEL_OK) fail_msg("%s", messages.text);
-    return cells;
-}
 
 static nebel_cell_fog ask_from(nebel_cell_view view, const nebel_cells *cells, const double eye[3], const double x[3])
 {
@@ -235,7 +220,7 @@ static void test_a_cut_through_corners_leaves_each_once(void **state)
     (void)state;
     static const nebel_plane prism[] = {
         {{-1, 0, 0}, -4}, {{1, 0, 0}, 7}, {{0, -1, 0}, 2}, {{0, 0, -1}, 2}, {{0, 1, 1}, 0}};
-    const nebel_cell pair[] = {BOX(0, 4, .1),
+    const nebel_cell pair[] = {BOX(0, 4, .1, 1, 1, 1),
                                {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = prism, .plane_count = 5}}};
     for (int turned = 0; turned < 2; turned++) {
         const nebel_cell cells_turned[] = {pair[turned], pair[!turned]};
@@ -301,7 +286,7 @@ static void test_a_hair_between_cells_is_nothing(void **state)
     (void)state;
     static const double hairs[] = {1e-6, -1e-6};
     for (int i = 0; i < 2; i++) {
-        const nebel_cell pair[] = {BOX(0, 4, .1), BOX(4 + hairs[i], 9, .1)};
+        const nebel_cell pair[] = {BOX(0, 4, .1, 1, 1, 1), BOX(4 + hairs[i], 9, .1, 1, 1, 1)};
         nebel_cell turned[] = {pair[0], pair[1]};
         turned[0].shape.transform.rotation[1] = turned[0].shape.transform.rotation[3] = 1;
         turned[0].shape.transform.rotation[0] = .3;
@@ -314,7 +299,7 @@ static void test_a_hair_between_cells_is_nothing(void **state)
         assert_near(ask(cells, (const double[3]){1, 0, 0}, (const double[3]){7, 0, 0}).alpha, .6, 1e-6);
         nebel_destroy_cells(cells);
     }
-    const nebel_cell parted[] = {BOX(0, 4, .1), BOX(4.001, 9, .1)};
+    const nebel_cell parted[] = {BOX(0, 4, .1, 1, 1, 1), BOX(4.001, 9, .1, 1, 1, 1)};
     nebel_cells *cells = create(&(nebel_cells_desc){.cells = parted, .cell_count = 2});
     assert_int_equal(nebel_count_cell_portals(cells), 0);
     nebel_destroy_cells(cells);
@@ -344,7 +329,7 @@ static void refuse(const nebel_cells_desc *desc, nebel_result result, size_t cel
 
 static void refuse_cell(nebel_cell cell, const char *text)
 {
-    const nebel_cell pair[] = {BOX(-9, -5, .1), cell};
+    const nebel_cell pair[] = {BOX(-9, -5, .1, 1, 1, 1), cell};
     refuse(&(nebel_cells_desc){.cells = pair, .cell_count = 2}, NEBEL_ERROR_VALUE, 1, SIZE_MAX, text);
 }
 
@@ -370,9 +355,9 @@ static void test_cells_that_are_none(void **state)
     refuse_cell((nebel_cell){.shape = {.type = NEBEL_SHAPE_UNION, .parts = parts, .part_count = 2}},
                 "cell 1: its shape is neither a box nor a convex body of planes; split what is not convex");
     refuse_cell((nebel_cell){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1}}, "cell 1: its shape is neither");
-    refuse_cell((nebel_cell)BOX(-7, 3, .1), "cell 1: overlaps cell 0; cells may touch");
+    refuse_cell((nebel_cell)BOX(-7, 3, .1, 1, 1, 1), "cell 1: overlaps cell 0; cells may touch");
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        nebel_cell cell = BOX(0, 1, bad[i]);
+        nebel_cell cell = BOX(0, 1, bad[i], 1, 1, 1);
         refuse_cell(cell, "cell 1: density is ");
         cell.density = 0;
         cell.color[1] = bad[i];

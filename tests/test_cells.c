@@ -11,16 +11,6 @@
 
 #include "cell_world.h"
 
-static nebel_cells *create(const nebel_cells_desc *desc)
-{
-    fog_messages messages = {0};
-    nebel_cells_desc logged = *desc;
-    nebel_cells *cells = NULL;
-    logged.log = fog_messages_log(&messages);
-    if (nebel_create_cells(&logged, &cells) != NEBEL_OK) fail_msg("%s", messages.text);
-    return cells;
-}
-
 static nebel_cell_fog ask_at(const nebel_cells *cells, const nebel_cell_view *view, double x, double y, double z)
 {
     const nebel_cell_point point = {.position = {x, y, z}};
@@ -42,11 +32,6 @@ static size_t layers_at(const nebel_cells *cells, const nebel_cell_view *view, d
     assert_int_equal(nebel_find_cell_layers(cells, view, &point, 4, layers, &count), NEBEL_OK);
     return count;
 }
-
-#define BOX(x0, x1, d, r, g, b)                                                                                        \
-    {                                                                                                                  \
-        .shape = {.type = NEBEL_SHAPE_BOX, .min = {x0, -2, -2}, .max = {x1, 2, 2}}, .density = d, .color = { r, g, b } \
-    }
 
 /* Three rooms in a row along x; the eye is in the first. */
 static const nebel_cell clear_then_fog[] = {BOX(0, 4, 0, 0, 0, 0), BOX(4, 9, .1, 1, .5, .25), BOX(9, 20, 0, 0, 0, 0)};
