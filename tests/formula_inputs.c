@@ -412,6 +412,24 @@ static void draw_integral(nb_formula_dice *dice, nb_formula formula, nb_formula_
     }
 }
 
+/* ---- phase functions ------------------------------------------------------------------------- */
+
+/* Peaks of all widths, on both sides, and turns from next to none to any. */
+static void draw_phase(nb_formula_dice *dice, long double *in)
+{
+    const long double rest = decade(dice, -4, 0), g = either_sign(dice, 1 - rest);
+    in[0] = rest * (2 - rest) * between(dice, 0, 1);
+    in[1] = nb_formula_pick(dice, 3) ? between(dice, 0, 250) : 0;
+    in[2] = rest * rest;
+    in[3] = 2 * g;
+    random_unit(dice, in + 6);
+    random_unit(dice, in + 9);
+    const long double aside = nb_formula_pick(dice, 2) ? decade(dice, -4, 0) : 1;
+    for (int i = 0; i < 3; ++i) in[9 + i] = in[6 + i] + aside * (in[9 + i] - in[6 + i]);
+    const long double length = sqrtl(dot(in + 9, in + 9));
+    for (int i = 0; i < 3; ++i) in[9 + i] /= length;
+}
+
 /* ---- values ---------------------------------------------------------------------------------- */
 
 static void draw_value(nb_formula_dice *dice, nb_formula formula, long double *in)
@@ -443,6 +461,8 @@ void nb_formula_draw(nb_formula_dice *dice, nb_formula formula, nb_formula_digit
     } else if (formula <= NB_FORMULA_soft_edge_integral ||
                (formula >= NB_FORMULA_soft_edge_density && formula <= NB_FORMULA_soft_edge_kink)) {
         draw_integral(dice, formula, digits, in);
+    } else if (formula >= NB_FORMULA_phase_lobe && formula <= NB_FORMULA_turn_ahead) {
+        draw_phase(dice, in);
     } else {
         draw_value(dice, formula, in);
     }

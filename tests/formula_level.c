@@ -6,6 +6,7 @@
 #include "formulas/shapes.inc"
 #include "formulas/profiles.inc"
 #include "formulas/medium.inc"
+#include "formulas/phase.inc"
 
 #define JOIN_EXPANDED(a, b) a##b
 #define JOIN(a, b) JOIN_EXPANDED(a, b)

@@ -120,6 +120,8 @@ static double size_of(nb_formula formula, int i)
     case NB_FORMULA_soft_axis:
     case NB_FORMULA_soft_edge_density:
         return fmax(value, (double)fmaxf(in[6], fmaxf(in[7], in[8])));
+    case NB_FORMULA_turn_cosine:
+        return 1;
     default:
         return value;
     }

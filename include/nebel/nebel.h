@@ -212,6 +212,28 @@ typedef struct nebel_density {
     double distance;       /* soft edge: m in the shape's own coordinates, > 0 */
 } nebel_density;
 
+/* What part of the light that fog scatters goes into which direction. The cosine of the angle by which light is turned
+ * is +1 straight on: an eye that looks at the sun through fog sees light at +1. */
+typedef enum nebel_phase_type {
+    NEBEL_PHASE_ISOTROPIC = 0,     /* into all directions alike */
+    NEBEL_PHASE_RAYLEIGH,          /* particles far smaller than the light's waves: air */
+    NEBEL_PHASE_HENYEY_GREENSTEIN, /* g: the mean cosine */
+    NEBEL_PHASE_CORNETTE_SHANKS,   /* g: not quite the mean cosine; Rayleigh where it is 0 */
+    NEBEL_PHASE_DRAINE,            /* g and alpha: HENYEY_GREENSTEIN at alpha 0, CORNETTE_SHANKS at 1 */
+    NEBEL_PHASE_DROPLETS,          /* diameter: water droplets of fog and clouds */
+    NEBEL_PHASE_COUNT
+} nebel_phase_type;
+
+#define NEBEL_LARGEST_G 0.9999
+#define NEBEL_LARGEST_DROPLET 50
+
+typedef struct nebel_phase {
+    nebel_phase_type type;
+    double g;        /* -NEBEL_LARGEST_G to NEBEL_LARGEST_G; < 0: backwards */
+    double alpha;    /* 0 to 1e9 */
+    double diameter; /* micrometres, > 0, at most NEBEL_LARGEST_DROPLET */
+} nebel_phase;
+
 typedef enum nebel_operation {
     NEBEL_OPERATION_ADD = 0,
     NEBEL_OPERATION_EXCLUDE, /* inside the shape there is no fog of this or a lower priority; no density, colours or
@@ -241,6 +263,19 @@ typedef struct nebel_volume_desc {
  * visibility. contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when
  * visibility is not > 0 or contrast not within (0, 1). Any thread. */
 double nebel_extinction_from_visibility(double visibility, double contrast);
+
+/* What part of the light goes into a direction, per steradian; over the sphere it is 1. `cosine` as above, -1 to 1.
+ * NaN when the phase function or the cosine is out of range. Any thread. Sources: Henyey and Greenstein 1941; Cornette
+ * and Shanks 1992; Draine 2003; droplets: Jendersie and d'Eon 2023, a fit of Mie's theory for 5 to 50 micrometres with
+ * others below. */
+double nebel_phase_value(const nebel_phase *phase, double cosine);
+
+/* The mean cosine over all scattered light, -1 to 1. NaN when the phase function is out of range. Any thread. */
+double nebel_phase_mean_cosine(const nebel_phase *phase);
+
+/* Sampling: the cosine below which `part`, 0 to 1, of the light is scattered; random parts give random cosines as the
+ * phase function has them. NaN when something is out of range. Any thread. */
+double nebel_phase_sample(const nebel_phase *phase, double part);
 
 /* ---- fog that can be edited ------------------------------------------------------------------ */
 

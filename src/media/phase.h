@@ -1,0 +1,27 @@
+/* Phase functions as the core keeps them: a weighted sum of lobes, see formulas/phase.inc. */
+#ifndef NB_MEDIA_PHASE_H
+#define NB_MEDIA_PHASE_H
+
+#include "base/base.h"
+
+#include <nebel/nebel.h>
+
+typedef struct nb_lobe {
+    double g, alpha, weight;
+    double factor, peak, slope; /* what nb_phase_lobe takes; the factor holds the weight */
+} nb_lobe;
+
+enum { NB_MOST_LOBES = 2 };
+
+typedef struct nb_phase {
+    nb_lobe lobes[NB_MOST_LOBES];
+    int lobe_count;
+} nb_phase;
+
+/* NULL when the phase function is in order, else the member that is not and its rule, as one text. */
+const char *nb_phase_fault(const nebel_phase *phase);
+
+/* Of a phase function that is in order. */
+nb_phase nb_phase_resolve(const nebel_phase *phase);
+
+#endif
