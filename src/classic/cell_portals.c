@@ -4,6 +4,8 @@
  * Hodgman, Reentrant polygon clipping (1974). */
 #include "cells.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -19,24 +21,9 @@ typedef struct polygon {
     size_t count;
 } polygon;
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
-
 static void subtract(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = a[i] - b[i];
-}
-
-static double length_of(const double v[3])
-{
-    return sqrt(dot(v, v));
 }
 
 /* ---- polygons -------------------------------------------------------------------------------- */
@@ -50,7 +37,7 @@ static void find_area(const double (*vertices)[3], size_t count, double area[3])
         double a[3], b[3], part[3];
         subtract(vertices[i], vertices[0], a);
         subtract(vertices[i + 1], vertices[0], b);
-        cross(a, b, part);
+        nb_vector_cross(a, b, part);
         for (int k = 0; k < 3; k++) area[k] += part[k];
     }
 }
@@ -62,9 +49,9 @@ static double find_width(const double (*vertices)[3], size_t count, const double
     for (size_t i = 0; i < count; i++) {
         double edge[3];
         subtract(vertices[(i + 1) % count], vertices[i], edge);
-        around += length_of(edge);
+        around += nb_vector_length(edge);
     }
-    return around > 0 ? length_of(area) / around : 0;
+    return around > 0 ? nb_vector_length(area) / around : 0;
 }
 
 static void set_square(polygon *square, const nb_cell_plane *plane, const nb_cell *cell)
@@ -74,13 +61,13 @@ static void set_square(polygon *square, const nb_cell_plane *plane, const nb_cel
     for (int i = 1; i < 3; i++)
         if (fabs(plane->normal[i]) < fabs(plane->normal[smallest])) smallest = i;
     axis[smallest] = 1;
-    cross(axis, plane->normal, u);
-    const double length = length_of(u);
+    nb_vector_cross(axis, plane->normal, u);
+    const double length = nb_vector_length(u);
     for (int i = 0; i < 3; i++) u[i] /= length;
-    cross(plane->normal, u, v);
+    nb_vector_cross(plane->normal, u, v);
     subtract(cell->high, cell->low, diagonal);
     for (int i = 0; i < 3; i++) center[i] = (cell->low[i] + cell->high[i]) / 2;
-    const double half = 2 * length_of(diagonal), off = nb_cell_plane_distance(plane, center);
+    const double half = 2 * nb_vector_length(diagonal), off = nb_cell_plane_distance(plane, center);
     static const double corners[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     for (int c = 0; c < 4; c++)
         for (int i = 0; i < 3; i++)
@@ -122,7 +109,7 @@ static void drop_repeated(polygon *p, double slack)
     for (size_t i = 0; i < p->count; i++) {
         double step[3];
         subtract(p->vertices[i], p->vertices[(i + p->count - 1) % p->count], step);
-        if (length_of(step) > slack) memcpy(p->spare[count++], p->vertices[i], sizeof *p->spare);
+        if (nb_vector_length(step) > slack) memcpy(p->spare[count++], p->vertices[i], sizeof *p->spare);
     }
     double(*swap)[3] = p->vertices;
     p->vertices = p->spare;
@@ -148,7 +135,7 @@ static int keep_portal(nebel_cells *cells, const size_t ends[2], const double (*
     *portal = (nb_portal){{ends[0], ends[1]}, vertex_count, count, {0, 0, 0}};
     memcpy(cells->vertices[vertex_count], vertices, count * sizeof *vertices);
     cells->vertex_count += count;
-    const double length = length_of(area);
+    const double length = nb_vector_length(area);
     for (int i = 0; i < 3; i++) portal->normal[i] = area[i] / length;
     return 1;
 }
@@ -183,7 +170,7 @@ static int join_faces(nebel_cells *cells, const size_t ends[2], size_t a, size_t
     const nb_cell_plane *other = &cells->planes[second->first_plane + b];
     const double slack = KEPT * cells->tolerance;
     double area[3];
-    if (dot(face->normal, other->normal) > -0.5) return 1;
+    if (nb_vector_dot(face->normal, other->normal) > -0.5) return 1;
     set_square(work, face, first);
     cut_all(cells, first, a, slack, work);
     cut_all(cells, second, b, slack, work);
@@ -290,10 +277,10 @@ static int is_convex(const nebel_portal *portal, const double normal[3], double 
     for (size_t i = 0; i < portal->vertex_count; i++) {
         double edge[3], inwards[3], way[3];
         subtract(portal->vertices[(i + 1) % portal->vertex_count], portal->vertices[i], edge);
-        cross(normal, edge, inwards);
+        nb_vector_cross(normal, edge, inwards);
         for (size_t v = 0; v < portal->vertex_count; v++) {
             subtract(portal->vertices[v], portal->vertices[i], way);
-            if (dot(inwards, way) < -tolerance * length_of(edge)) return 0;
+            if (nb_vector_dot(inwards, way) < -tolerance * nb_vector_length(edge)) return 0;
         }
     }
     return 1;
@@ -306,7 +293,7 @@ static nebel_result check_form(const nebel_cells *cells, const nebel_log *log, s
     find_area(portal->vertices, portal->vertex_count, area);
     if (find_width(portal->vertices, portal->vertex_count, area) <= cells->tolerance)
         return nb_fail(log, NEBEL_ERROR_VALUE, "portal %zu: has no area", number);
-    const double length = length_of(area);
+    const double length = nb_vector_length(area);
     for (int i = 0; i < 3; i++) normal[i] = area[i] / length;
     if (is_convex(portal, normal, 2 * cells->tolerance)) return NEBEL_OK;
     return nb_fail(log, NEBEL_ERROR_VALUE,

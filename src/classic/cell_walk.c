@@ -1,6 +1,8 @@
 /* The way from the eye to a point, as pieces in cells, as layers of fog. */
 #include "cells.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -30,11 +32,6 @@ typedef struct piece {
     const nb_cell_plane *entry, *exit;
 } piece;
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* ---- pieces ---------------------------------------------------------------------------------- */
 
 /* Source: Cyrus and Beck, Generalized two- and three-dimensional clipping (1978). */
@@ -44,7 +41,7 @@ static int clip(const walk *way, size_t number, piece *out)
     *out = (piece){number, 0, 1, NULL, NULL};
     for (size_t i = 0; i < cell->plane_count; i++) {
         const nb_cell_plane *plane = &way->cells->planes[cell->first_plane + i];
-        const double along = dot(plane->normal, way->step), outside = nb_cell_plane_distance(plane, way->eye);
+        const double along = nb_vector_dot(plane->normal, way->step), outside = nb_cell_plane_distance(plane, way->eye);
         if (along == 0 && (outside > 0 || (outside == 0 && plane->tie > 0))) return 0;
         if (along == 0) continue;
         const double t = -outside / along;
@@ -94,7 +91,7 @@ static int is_in_portal(const nebel_cells *cells, const nb_portal *portal, const
         const double edge[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, to[3] = {x[0] - a[0], x[1] - a[1], x[2] - a[2]};
         const double inwards[3] = {n[1] * edge[2] - n[2] * edge[1], n[2] * edge[0] - n[0] * edge[2],
                                    n[0] * edge[1] - n[1] * edge[0]};
-        if (dot(inwards, to) < -cells->tolerance * sqrt(dot(edge, edge))) return 0;
+        if (nb_vector_dot(inwards, to) < -cells->tolerance * nb_vector_length(edge)) return 0;
     }
     return 1;
 }
@@ -134,15 +131,15 @@ static size_t count_seen(const walk *way, const piece *pieces, size_t count)
 static double find_printed_depth(const walk *way, const double normal[3], double distance, double otherwise)
 {
     const double *x = way->point->position;
-    const double c = dot(normal, way->forward);
-    if (!(fabs(c) > EDGE_ON * sqrt(dot(normal, normal)))) return otherwise;
-    return dot(way->step, way->forward) + (distance - dot(normal, x)) / c;
+    const double c = nb_vector_dot(normal, way->forward);
+    if (!(fabs(c) > EDGE_ON * nb_vector_length(normal))) return otherwise;
+    return nb_vector_dot(way->step, way->forward) + (distance - nb_vector_dot(normal, x)) / c;
 }
 
 static double find_place(const walk *way, double t, const nb_cell_plane *plane)
 {
     if (way->cells->span == NEBEL_SPAN_RAY) return t * way->length;
-    const double depth = t * dot(way->step, way->forward);
+    const double depth = t * nb_vector_dot(way->step, way->forward);
     if (way->cells->span == NEBEL_SPAN_DEPTH || plane == NULL) return depth;
     return fmin(fmax(find_printed_depth(way, plane->normal, plane->distance, depth), 0), way->depth);
 }
@@ -221,7 +218,7 @@ static nebel_result set_view(const nebel_cells *cells, const nebel_cell_view *vi
     if (cells->span == NEBEL_SPAN_RAY) return NEBEL_OK;
     if (!is_place(f) || !(largest > 0)) return NEBEL_ERROR_ARGUMENT;
     for (int i = 0; i < 3; i++) way->forward[i] = f[i] / largest;
-    const double length = sqrt(dot(way->forward, way->forward));
+    const double length = nb_vector_length(way->forward);
     for (int i = 0; i < 3; i++) way->forward[i] /= length;
     return NEBEL_OK;
 }
@@ -232,8 +229,8 @@ static int set_point(walk *way, const nebel_cell_point *point)
     way->point = point;
     if (!is_place(point->position)) return 0;
     for (int i = 0; i < 3; i++) way->step[i] = point->position[i] - way->eye[i];
-    way->length = sqrt(dot(way->step, way->step));
-    const double depth = dot(way->step, way->forward);
+    way->length = nb_vector_length(way->step);
+    const double depth = nb_vector_dot(way->step, way->forward);
     way->depth = depth;
     if (way->cells->span == NEBEL_SPAN_FAITHFUL)
         way->depth = find_printed_depth(way, point->surface.normal, point->surface.distance, depth);

@@ -2,6 +2,8 @@
  * between as Gouraud's interpolation is, with perspective. Where nothing is drawn there is no fog. */
 #include "classic_fog.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 
 /* The camera as cells want it. Orthographic rays begin in the camera's plane, beside its position; a panorama has no
@@ -36,20 +38,15 @@ static nb_vertex_fog fog_of_cells(const nb_frame *frame, const double place[3])
     return (nb_vertex_fog){{(float)fog.color[0], (float)fog.color[1], (float)fog.color[2]}, (float)fog.alpha};
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* Each ray of a panorama is its own axis, and of an orthographic camera each begins beside its position. */
 static void set_eye_coordinates(const nb_view *camera, const double place[3], double out[3])
 {
     const nebel_cell_view view = view_towards(camera, place);
     const double way[3] = {place[0] - view.eye[0], place[1] - view.eye[1], place[2] - view.eye[2]};
     const int panorama = camera->projection == NEBEL_PROJECTION_PANORAMA;
-    out[0] = panorama ? 0 : dot(way, camera->right);
-    out[1] = panorama ? 0 : dot(way, camera->up);
-    out[2] = panorama ? sqrt(dot(way, way)) : dot(way, camera->forward);
+    out[0] = panorama ? 0 : nb_vector_dot(way, camera->right);
+    out[1] = panorama ? 0 : nb_vector_dot(way, camera->up);
+    out[2] = panorama ? nb_vector_length(way) : nb_vector_dot(way, camera->forward);
 }
 
 static nb_vertex_fog fog_of_factor(const nb_frame *frame, const double place[3])

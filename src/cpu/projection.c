@@ -1,5 +1,7 @@
 #include "projection.h"
 
+#include "base/vector.h"
+
 #include <string.h>
 
 /* Rectangles grow by this many pixels on every side: more than triangles do when they are rasterized. */
@@ -7,25 +9,13 @@ static const double slack = 0x1p-12;
 
 /* ---- the view -------------------------------------------------------------------------------- */
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* The inverse of the matrix with the columns a, b, c: what gives the weights of a, b and c in a point. */
 static void invert(const double a[3], const double b[3], const double c[3], double rows[3][3])
 {
-    cross(b, c, rows[0]);
-    cross(c, a, rows[1]);
-    cross(a, b, rows[2]);
-    const double determinant = dot(a, rows[0]);
+    nb_vector_cross(b, c, rows[0]);
+    nb_vector_cross(c, a, rows[1]);
+    nb_vector_cross(a, b, rows[2]);
+    const double determinant = nb_vector_dot(a, rows[0]);
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) rows[i][k] /= determinant;
     }

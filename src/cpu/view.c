@@ -1,33 +1,11 @@
 #include "view.h"
 
 #include "base/base.h"
+#include "base/vector.h"
 
 #include <math.h>
 
 static const double pi = 3.14159265358979323846;
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-/* Scales to unit length, first by the largest component so that no square overflows. 0 where there is no direction. */
-static int normalize(double v[3])
-{
-    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-    if (!(largest > 0) || isinf(largest)) return 0;
-    for (int i = 0; i < 3; i++) v[i] /= largest;
-    const double length = sqrt(dot(v, v));
-    for (int i = 0; i < 3; i++) v[i] /= length;
-    return 1;
-}
 
 static int is_finite(const double v[3])
 {
@@ -43,8 +21,8 @@ static void choose_right(nb_view *view)
     }
     double axis[3] = {0, 0, 0};
     axis[least] = 1;
-    cross(view->forward, axis, view->right);
-    normalize(view->right);
+    nb_vector_cross(view->forward, axis, view->right);
+    nb_vector_make_unit(view->right);
 }
 
 static nebel_result set_axes(nb_view *view, const nebel_camera *camera, const nebel_log *log)
@@ -58,13 +36,13 @@ static nebel_result set_axes(nb_view *view, const nebel_camera *camera, const ne
         view->forward[i] = camera->look_at[i] - camera->position[i];
         up[i] = camera->up[i];
     }
-    if (!normalize(view->forward)) {
+    if (!nb_vector_make_unit(view->forward)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "camera: look_at is where the camera stands; move one of the two");
     }
-    if (!normalize(up)) return nb_fail(log, NEBEL_ERROR_VALUE, "camera: up has no direction");
-    cross(view->forward, up, view->right);
-    if (!(dot(view->right, view->right) > 1e-20) || !normalize(view->right)) choose_right(view);
-    cross(view->right, view->forward, view->up);
+    if (!nb_vector_make_unit(up)) return nb_fail(log, NEBEL_ERROR_VALUE, "camera: up has no direction");
+    nb_vector_cross(view->forward, up, view->right);
+    if (!(nb_vector_dot(view->right, view->right) > 1e-20) || !nb_vector_make_unit(view->right)) choose_right(view);
+    nb_vector_cross(view->right, view->forward, view->up);
     return NEBEL_OK;
 }
 

@@ -1,5 +1,7 @@
 #include "camera.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 
 static const double pi = 3.14159265358979323846;
@@ -9,29 +11,6 @@ static const double pi = 3.14159265358979323846;
 static const double near_distance = 1e-6, far_distance = 1e9;
 
 /* ---- vectors --------------------------------------------------------------------------------- */
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-void nb_camera_cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-/* By the largest component first, so that no square overflows. */
-int nb_camera_normalize(double v[3])
-{
-    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-    if (!(largest > 0) || isinf(largest)) return 0;
-    for (int i = 0; i < 3; i++) v[i] /= largest;
-    const double length = sqrt(dot(v, v));
-    for (int i = 0; i < 3; i++) v[i] /= length;
-    return 1;
-}
 
 void nb_camera_subtract(const double a[3], const double b[3], float difference[3])
 {
@@ -54,8 +33,8 @@ static void choose_right(const double forward[3], double right[3])
     }
     double axis[3] = {0, 0, 0};
     axis[least] = 1;
-    nb_camera_cross(forward, axis, right);
-    (void)nb_camera_normalize(right);
+    nb_vector_cross(forward, axis, right);
+    (void)nb_vector_make_unit(right);
 }
 
 static nebel_result set_axes(const nebel_camera *camera, const nebel_log *log, double eye_from_world[16])
@@ -68,22 +47,22 @@ static nebel_result set_axes(const nebel_camera *camera, const nebel_log *log, d
         forward[i] = camera->look_at[i] - camera->position[i];
         up[i] = camera->up[i];
     }
-    if (!nb_camera_normalize(forward)) {
+    if (!nb_vector_make_unit(forward)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "camera: look_at is where the camera stands; move one of the two");
     }
-    if (!nb_camera_normalize(up)) return nb_fail(log, NEBEL_ERROR_VALUE, "camera: up has no direction");
-    nb_camera_cross(forward, up, right);
-    if (!(dot(right, right) > 1e-20) || !nb_camera_normalize(right)) choose_right(forward, right);
-    nb_camera_cross(right, forward, up);
+    if (!nb_vector_make_unit(up)) return nb_fail(log, NEBEL_ERROR_VALUE, "camera: up has no direction");
+    nb_vector_cross(forward, up, right);
+    if (!(nb_vector_dot(right, right) > 1e-20) || !nb_vector_make_unit(right)) choose_right(forward, right);
+    nb_vector_cross(right, forward, up);
     for (int i = 0; i < 3; i++) {
         eye_from_world[4 * i] = right[i];
         eye_from_world[4 * i + 1] = up[i];
         eye_from_world[4 * i + 2] = -forward[i];
         eye_from_world[4 * i + 3] = 0;
     }
-    eye_from_world[12] = -dot(right, camera->position);
-    eye_from_world[13] = -dot(up, camera->position);
-    eye_from_world[14] = dot(forward, camera->position);
+    eye_from_world[12] = -nb_vector_dot(right, camera->position);
+    eye_from_world[13] = -nb_vector_dot(up, camera->position);
+    eye_from_world[14] = nb_vector_dot(forward, camera->position);
     eye_from_world[15] = 1;
     return NEBEL_OK;
 }

@@ -13,10 +13,4 @@ nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point);
 /* a - b in float, without losing digits of what both have in common. */
 void nb_camera_subtract(const double a[3], const double b[3], float difference[3]);
 
-/* a x b */
-void nb_camera_cross(const double a[3], const double b[3], double out[3]);
-
-/* Unit length; 0 where there is no direction. */
-int nb_camera_normalize(double v[3]);
-
 #endif

@@ -5,6 +5,8 @@
 #include "renderer.h"
 #include "vertex_fog.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 
 enum { MOST_SIDE = 32768, MOST_SAMPLES = 4096 };
@@ -109,7 +111,7 @@ static nebel_result set_lighting(const nebel_scene_data *scene, lighting *light,
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
     }
     light->has_sun = scene->has_sun != 0;
-    if (light->has_sun && !nb_camera_normalize(direction)) {
+    if (light->has_sun && !nb_vector_make_unit(direction)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
     }
     for (int c = 0; c < 3; c++) {

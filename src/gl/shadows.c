@@ -3,6 +3,8 @@
 #include "camera.h"
 #include "state.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 
 /* ---- what is seen
@@ -44,9 +46,9 @@ void nb_shadows_turn(nb_shadows *shadows, const double sun[3])
         if (fabs(sun[i]) < fabs(sun[least])) least = i;
     }
     axis[least] = 1;
-    nb_camera_cross(axis, sun, shadows->across[0]);
-    (void)nb_camera_normalize(shadows->across[0]);
-    nb_camera_cross(shadows->across[0], sun, shadows->across[1]);
+    nb_vector_cross(axis, sun, shadows->across[0]);
+    (void)nb_vector_make_unit(shadows->across[0]);
+    nb_vector_cross(shadows->across[0], sun, shadows->across[1]);
     for (int i = 0; i < 3; i++) {
         shadows->light[3 * i] = (float)shadows->across[0][i];
         shadows->light[3 * i + 1] = (float)shadows->across[1][i];
@@ -82,11 +84,6 @@ static void combine(const nebel_word words[3], double x, double y, double v[3])
     for (int i = 0; i < 3; i++) v[i] = (double)words[0].v[i] + x * (double)words[1].v[i] + y * (double)words[2].v[i];
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* The rays through the corners of a block. Distances along a ray are `size` times the steps along its way. */
 typedef struct beam {
     double origin[4][3], way[4][3];
@@ -101,13 +98,13 @@ static beam make_beam(const survey *s, uint32_t column, uint32_t row)
     const double right = fmin(left + NB_SURVEY_BLOCK, s->width), high = fmin(low + NB_SURVEY_BLOCK, s->height);
     double middle[3];
     combine(s->rays->words + 3, .5 * (left + right), .5 * (low + high), middle);
-    const double size = sqrt(dot(middle, middle));
+    const double size = nb_vector_length(middle);
     for (int i = 0; i < 4; i++) {
         const double x = i & 1 ? right : left, y = i & 2 ? high : low;
         combine(s->rays->words, x, y, b.origin[i]);
         combine(s->rays->words + 3, x, y, b.way[i]);
-        b.least_size = fmin(b.least_size, dot(middle, b.way[i]) / size);
-        b.most_size = fmax(b.most_size, sqrt(dot(b.way[i], b.way[i])));
+        b.least_size = fmin(b.least_size, nb_vector_dot(middle, b.way[i]) / size);
+        b.most_size = fmax(b.most_size, nb_vector_length(b.way[i]));
     }
     return b;
 }
@@ -119,7 +116,8 @@ static void include_beam(const nb_shadows *shadows, const beam *b, double near, 
     for (int i = 0; i < 8; i++) {
         double at[2];
         for (int k = 0; k < 2; k++) {
-            at[k] = dot(shadows->across[k], b->origin[i / 2]) + steps[i & 1] * dot(shadows->across[k], b->way[i / 2]);
+            at[k] = nb_vector_dot(shadows->across[k], b->origin[i / 2]) +
+                    steps[i & 1] * nb_vector_dot(shadows->across[k], b->way[i / 2]);
         }
         include(seen, at);
     }

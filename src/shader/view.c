@@ -18,6 +18,8 @@
  * depth of the far end, which floats subtract without an error there, so that nothing cancels below the line. */
 #include "view.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -41,23 +43,6 @@ typedef struct bundle {
 
 /* ---- vectors --------------------------------------------------------------------------------- */
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double length(const double a[3])
-{
-    return sqrt(dot(a, a));
-}
-
 /* a x + b y + c z */
 static void combine(double a, const double x[3], double b, const double y[3], double c, const double z[3],
                     double out[3])
@@ -72,7 +57,7 @@ static void scale_vector(linear_vector *v, double by)
 
 static linear along(const double row[3], const linear_vector *v)
 {
-    return (linear){dot(row, v->middle), dot(row, v->x), dot(row, v->y)};
+    return (linear){nb_vector_dot(row, v->middle), nb_vector_dot(row, v->x), nb_vector_dot(row, v->y)};
 }
 
 static linear scaled(linear a, double by)
@@ -110,8 +95,8 @@ static void go_parallel(double r[4][4], double across, bundle *rays)
     double right[3], up[3];
     rays->parallel = 1;
     rays->w0 = r[3][3];
-    cross(r[1], d, right);
-    cross(d, r[0], up);
+    nb_vector_cross(r[1], d, right);
+    nb_vector_cross(d, r[0], up);
     for (int i = 0; i < 3; i++) {
         rays->o.x[i] = rays->w0 * right[i] / across;
         rays->o.y[i] = rays->w0 * up[i] / across;
@@ -126,14 +111,15 @@ static int set_bundle(const double clip_from_eye[16], bundle *rays)
     double r[4][4];
     *rays = (bundle){0};
     for (int i = 0; i < 16; i++) r[i % 4][i / 4] = clip_from_eye[i];
-    cross(r[0], r[1], rays->d.middle);
-    cross(r[1], r[3], rays->d.x);
-    cross(r[3], r[0], rays->d.y);
-    const double size = length(r[0]) * length(r[1]), across = dot(rays->d.middle, rays->d.middle);
-    const double determinant = dot(r[3], rays->d.middle);
-    if (fabs(determinant) > 1e-12 * size * length(r[3])) {
+    nb_vector_cross(r[0], r[1], rays->d.middle);
+    nb_vector_cross(r[1], r[3], rays->d.x);
+    nb_vector_cross(r[3], r[0], rays->d.y);
+    const double size = nb_vector_length(r[0]) * nb_vector_length(r[1]),
+                 across = nb_vector_dot(rays->d.middle, rays->d.middle);
+    const double determinant = nb_vector_dot(r[3], rays->d.middle);
+    if (fabs(determinant) > 1e-12 * size * nb_vector_length(r[3])) {
         meet_in_a_point(r, determinant, rays);
-    } else if (length(r[3]) == 0 && r[3][3] > 0 && sqrt(across) > 1e-12 * size) {
+    } else if (nb_vector_length(r[3]) == 0 && r[3][3] > 0 && sqrt(across) > 1e-12 * size) {
         go_parallel(r, across, rays);
     } else {
         return 0;
@@ -158,11 +144,11 @@ static int invert(const double eye_from_world[16], double columns[3][3])
 {
     const double *const a = eye_from_world, *const b = eye_from_world + 4, *const c = eye_from_world + 8;
     double rows[3][3];
-    cross(b, c, rows[0]);
-    cross(c, a, rows[1]);
-    cross(a, b, rows[2]);
-    const double determinant = dot(a, rows[0]);
-    if (!(fabs(determinant) > 1e-12 * length(a) * length(b) * length(c))) return 0;
+    nb_vector_cross(b, c, rows[0]);
+    nb_vector_cross(c, a, rows[1]);
+    nb_vector_cross(a, b, rows[2]);
+    const double determinant = nb_vector_dot(a, rows[0]);
+    if (!(fabs(determinant) > 1e-12 * nb_vector_length(a) * nb_vector_length(b) * nb_vector_length(c))) return 0;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) columns[k][i] = rows[i][k] / determinant;
     }
@@ -323,7 +309,7 @@ nebel_result nebel_view_rays(const nebel_view *view, const nebel_depth_desc *dep
         return NEBEL_ERROR_ARGUMENT;
     }
     if (!is_convention(depth, &b)) return NEBEL_ERROR_ARGUMENT;
-    scale_bundle(&b, 1 / length(b.d.middle));
+    scale_bundle(&b, 1 / nb_vector_length(b.d.middle));
     const ends e = find_ends(&b, depth);
     const fraction surface = surface_fraction(&b, depth, &e), start = start_fraction(&b, depth, &e);
     put_fraction(view, &surface, &rays->words[6], &rays->words[7]);

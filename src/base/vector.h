@@ -1,0 +1,36 @@
+/* Vectors of three doubles. */
+#ifndef NB_VECTOR_H
+#define NB_VECTOR_H
+
+#include <math.h>
+
+static inline double nb_vector_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* `out` must be another than a and b. */
+static inline void nb_vector_cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline double nb_vector_length(const double v[3])
+{
+    return sqrt(nb_vector_dot(v, v));
+}
+
+/* Scales to unit length, first by the largest component so that no square overflows. 0 where there is no direction. */
+static inline int nb_vector_make_unit(double v[3])
+{
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(largest > 0) || isinf(largest)) return 0;
+    for (int i = 0; i < 3; i++) v[i] /= largest;
+    const double length = nb_vector_length(v);
+    for (int i = 0; i < 3; i++) v[i] /= length;
+    return 1;
+}
+
+#endif
