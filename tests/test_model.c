@@ -527,6 +527,37 @@ static void test_what_is_no_height_map(void **state)
     assert_broken(HEIGHTS("none.png"), NEBEL_ERROR_FILE, "No such file or directory");
 }
 
+/* ---- other places ---------------------------------------------------------------------------- */
+
+static void test_models_are_placed_anew(void **state)
+{
+    (void)state;
+    write_text("t.obj", triangle_obj);
+    nebel_scene *scene = load_good("\"file\": \"t.obj\", \"position\": [5, 0, 0]}, {\"file\": \"t.obj\"");
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(data->model_count, 2);
+    nebel_model moved = data->models[0], wrong = moved;
+    moved.position[1] = 3;
+    moved.has_color = 1;
+    moved.color[2] = .5;
+    assert_int_equal(nebel_load_models_anew(scene, &moved, 1), NEBEL_OK);
+    assert_int_equal(data->mesh_count, 1);
+    assert_near((const float[]){(float)data->meshes[0].origin[0] + data->meshes[0].positions[0],
+                                (float)data->meshes[0].origin[1] + data->meshes[0].positions[1],
+                                (float)data->meshes[0].origin[2] + data->meshes[0].positions[2]},
+                5, 3, 0);
+    assert_near(data->meshes[0].base_color, 0, 0, .5);
+    wrong.source = 2;
+    assert_int_equal(nebel_load_models_anew(scene, &wrong, 1), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(data->mesh_count, 1);
+    remove(in_folder("t.obj"));
+    assert_int_equal(nebel_load_models_anew(scene, data->models, 2), NEBEL_ERROR_FILE);
+    assert_int_equal(data->mesh_count, 1);
+    assert_int_equal(nebel_load_models_anew(scene, NULL, 0), NEBEL_OK);
+    assert_int_equal(data->mesh_count, 0);
+    nebel_destroy_scene(scene);
+}
+
 /* ---- memory ---------------------------------------------------------------------------------- */
 
 static void test_every_failing_allocation_is_survived(void **state)
@@ -638,6 +669,7 @@ int main(void)
         cmocka_unit_test(test_a_height_map_becomes_terrain),
         cmocka_unit_test(test_a_slope_has_the_normal_of_its_plane),
         cmocka_unit_test(test_what_is_no_height_map),
+        cmocka_unit_test(test_models_are_placed_anew),
         cmocka_unit_test(test_every_failing_allocation_is_survived),
         cmocka_unit_test(test_models_of_many_formats),
     };

@@ -39,8 +39,9 @@ typedef struct draft {
     nebel_scene_data data;
     nebel_volume_desc volumes[8];
     const char *names[8];
-    nebel_nebula_desc nebulae[2];
+    nebel_nebula_desc nebulae[4];
     const size_t *sources;
+    nebel_volume_entry *entries; /* NULL: as they were */
 } draft;
 
 static draft open_draft(const char *text)
@@ -66,6 +67,7 @@ static nebel_result save(draft *d, journal *kept)
     d->data.volumes = d->volumes;
     d->data.volume_names = d->names;
     d->data.nebulae = d->nebulae;
+    d->data.volume_entries = d->entries;
     const nebel_result result =
         nebel_save_scene(file_path(), &desc, nebel_scene_contents(d->scene), &d->data, d->sources);
     assert_int_equal(m.live, 0);
@@ -82,6 +84,9 @@ static void check_saved(draft *d, const char *wanted)
 
 #define SCENE(sections) "{ \"nebel\": 1,\n  " sections "\n}\n"
 #define BOX "\"shape\": {\"type\": \"box\", \"min\": [-1, -2, -3], \"max\": [1, 2.50, 3]}"
+
+#define THIN "{" BOX ", \"extinction\": 0.1}"
+#define THICK "{" BOX ", \"extinction\": 7}"
 
 /* ---- in place -------------------------------------------------------------------------------- */
 
@@ -184,6 +189,195 @@ static void test_camera_and_light(void **state)
                           "  \"sun\": {\"direction\": [0.6, 0.8, 0], \"irradiance\": [1, 2, 4]}, \"fog\": []"));
 }
 
+static void test_the_sun_comes_and_goes(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"up\": \"z\", \"fog\": []"));
+    d.data.has_sun = 1;
+    d.data.sun_direction[1] = 1;
+    d.data.sun_irradiance[0] = 3;
+    check_saved(&d,
+                SCENE("\"up\": \"z\", \"fog\": [], \"sun\": { \"direction\": [0, 0, 1], \"irradiance\": [3, 0, 0] }"));
+    static const char sun[] = "\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 1}", comma[] = ", \"fog\": []";
+    char before[256];
+    (void)snprintf(before, sizeof before, SCENE("%s%s"), sun, comma);
+    d = open_draft(before);
+    d.data.has_sun = 0;
+    d.data.max_opacity = .5;
+    check_saved(&d, "{ \"nebel\": 1, \"fog\": [], \"max_opacity\": 0.5\n}\n");
+    (void)snprintf(before, sizeof before, SCENE("\"fog\": [] /* none */, %s"), sun);
+    d = open_draft(before);
+    d.data.has_sun = 0;
+    d.data.ambient[0] = d.data.ambient[1] = d.data.ambient[2] = 2;
+    check_saved(&d, SCENE("\"fog\": [],\n  \"ambient\": 2 /* none */"));
+}
+
+static void test_the_projection(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": []"));
+    d.data.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    d.data.camera.view_height = 4;
+    check_saved(&d, SCENE("\"fog\": [],\n  \"camera\": { \"projection\": \"orthographic\", \"look_at\": [0, 1.7, -1], "
+                          "\"view_height\": 4 }"));
+    d = open_draft(SCENE("\"camera\": {\"look_at\": [0, 0, -9], \"projection\": \"panorama\"}, \"fog\": []"));
+    d.data.camera.projection = NEBEL_PROJECTION_PERSPECTIVE;
+    check_saved(&d, SCENE("\"camera\": {\"look_at\": [0, 0, -9], \"projection\": \"perspective\"}, \"fog\": []"));
+}
+
+static void test_classic_fog(void **state)
+{
+    (void)state;
+    static const nebel_factor_desc factor = {
+        .start = 2, .end = 8, .density = .5, .color = {.25, .25, .25}, .coordinate = NEBEL_COORDINATE_RADIAL};
+    static const char section[] = SCENE("\"unit\": 0.5, \"fog\": [], \"classic\": { \"start\": 4, \"end\": 16, "
+                                        "\"density\": 0.25, \"color\": 0.25, \"coordinate\": \"radial\", \"stage\": "
+                                        "\"vertex\" }");
+    draft d = open_draft(SCENE("\"unit\": 0.5, \"fog\": []"));
+    d.data.classic = &factor;
+    check_saved(&d, section);
+    d = open_draft(section);
+    nebel_factor_desc other = *d.data.classic;
+    other.end = 6;
+    other.stage = NEBEL_STAGE_PIXEL;
+    d.data.classic = &other;
+    check_saved(&d, SCENE("\"unit\": 0.5, \"fog\": [], \"classic\": { \"start\": 4, \"end\": 12, \"density\": 0.25, "
+                          "\"color\": 0.25, \"coordinate\": \"radial\", \"stage\": \"pixel\" }"));
+    d = open_draft(section);
+    d.data.classic = NULL;
+    check_saved(&d, SCENE("\"unit\": 0.5, \"fog\": []"));
+}
+
+static void test_models(void **state)
+{
+    (void)state;
+    draft d =
+        open_draft(SCENE("\"unit\": 2, \"models\": [ {\"file\": \"a.obj\"}, {\"file\": \"b.obj\", \"color\": 1, "
+                         "\"scale\": [1, 2, 3]}, {\"position\": [1, 2, 3], \"heightfield\": {\"file\": \"c.png\", "
+                         "\"size\": [4, 5], \"height\": 6}} ], \"fog\": []"));
+    nebel_model models[2] = {d.data.models[1], d.data.models[2]};
+    assert_int_equal(d.data.model_count, 3);
+    assert_string_equal(strrchr(models[0].file, '/'), "/b.obj");
+    models[0].has_color = 0;
+    models[0].position[1] = 3;
+    models[0].scale[2] = 4;
+    models[0].rotation[0] = 1, models[0].rotation[3] = 0;
+    models[1].has_color = 1;
+    models[1].height = 10;
+    models[1].size[0] = 6;
+    models[1].position[0] = 8;
+    d.data.models = models;
+    d.data.model_count = 2;
+    check_saved(
+        &d, SCENE("\"unit\": 2, \"models\": [ {\"file\": \"b.obj\", \"scale\": [1, 2, 4], \"position\": [0, 1.5, 0], "
+                  "\"rotation\": [1, 0, 0, 0]}, {\"position\": [4, 2, 3], \"heightfield\": {\"file\": \"c.png\", "
+                  "\"size\": [3, 5], \"height\": 5}, \"color\": 0} ], \"fog\": []"));
+}
+
+/* ---- what volumes have beside their numbers -------------------------------------------------- */
+
+static void test_contrast_and_phase(void **state)
+{
+    (void)state;
+    draft d =
+        open_draft(SCENE("\"fog\": [{" BOX ", \"visibility\": 5}, {" BOX ", \"extinction\": 1, \"albedo\": 0.5}, {" BOX
+                         ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"rayleigh\"}}]"));
+    nebel_volume_entry entries[3];
+    for (int i = 0; i < 3; i++) entries[i] = d.data.volume_entries[i];
+    assert_int_equal(entries[2].phase.type, NEBEL_PHASE_RAYLEIGH);
+    for (int c = 0; c < 3; c++) {
+        d.volumes[0].extinction[c] = nebel_extinction_from_visibility(5, .02);
+        d.volumes[1].extinction[c] = nebel_extinction_from_visibility(8, .1);
+    }
+    entries[0].contrast = .02;
+    entries[1].contrast = .1;
+    entries[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .75};
+    entries[2].phase = (nebel_phase){.type = NEBEL_PHASE_DROPLETS, .diameter = 12.5};
+    d.entries = entries;
+    check_saved(
+        &d, SCENE("\"fog\": [{" BOX ", \"visibility\": 5, \"contrast\": 0.02}, {" BOX
+                  ", \"visibility\": 8, \"albedo\": 0.5, \"phase\": { \"type\": \"henyey_greenstein\", \"g\": 0.75 }, "
+                  "\"contrast\": 0.1}, {" BOX ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": { \"type\": "
+                  "\"droplets\", \"diameter\": 12.5 }}]"));
+}
+
+static void test_keys_come_change_and_go(void **state)
+{
+    (void)state;
+    static const char still[] = SCENE("\"up\": \"z\", \"unit\": 0.5, \"fog\": [{" BOX ", \"extinction\": 1}]");
+    static const char moving[] =
+        SCENE("\"up\": \"z\", \"unit\": 0.5, \"fog\": [{" BOX ", \"extinction\": 1, \"keys\": [{ \"frame\": 0 }, { "
+              "\"frame\": 24, \"shape\": { \"max\": [1, 2.5, 8], \"transform\": { \"position\": [2, 0, 0] } }, "
+              "\"extinction\": 4, \"source\": 0.5 }]}]");
+    nebel_volume_key keys[3];
+    nebel_volume_entry entry = {.contrast = .05, .keys = keys, .key_count = 2};
+    draft d = open_draft(still);
+    nebel_volume_desc own = d.volumes[0];
+    keys[0] = (nebel_volume_key){0, own};
+    keys[1] = (nebel_volume_key){24, own};
+    keys[1].volume.shape.max[1] = 4;
+    keys[1].volume.shape.transform.position[0] = 1;
+    for (int c = 0; c < 3; c++) keys[1].volume.extinction[c] = 8, keys[1].volume.source[c] = .5;
+    entry.own = &own;
+    d.entries = &entry;
+    check_saved(&d, moving);
+    d = open_draft(moving);
+    entry = d.data.volume_entries[0];
+    assert_int_equal(entry.key_count, 2);
+    keys[0] = entry.keys[0];
+    keys[1] = entry.keys[1];
+    keys[2] = (nebel_volume_key){30.5, keys[0].volume};
+    keys[2].volume.emission[0] = 2;
+    keys[0].volume.extinction[1] = 3;
+    entry.keys = keys;
+    entry.key_count = 3;
+    d.entries = &entry;
+    check_saved(&d,
+                SCENE("\"up\": \"z\", \"unit\": 0.5, \"fog\": [{" BOX ", \"extinction\": 1, \"keys\": [{ \"frame\": 0, "
+                      "\"extinction\": [1, 1.5, 1] }, { \"frame\": 24, \"shape\": { \"max\": [1, 2.5, 8], "
+                      "\"transform\": { \"position\": [2, 0, 0] } }, \"extinction\": 4, \"source\": 0.5 }, { "
+                      "\"frame\": 30.5, \"emission\": [1, 0, 0] }]}]"));
+    d = open_draft(moving);
+    entry = (nebel_volume_entry){.contrast = .05};
+    d.volumes[0] = *d.data.volume_entries[0].own;
+    d.entries = &entry;
+    check_saved(&d, still);
+}
+
+static void test_keys_keep_their_words_and_lines(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [{" BOX
+                               ", \"visibility\": 30, \"keys\": [ {\"frame\": 1, \"visibility\": 20 /* thick */},\n"
+                               "    {\"frame\": 2}, {\"frame\": 3, \"source\": \"#fff\"}]}]"));
+    nebel_volume_key keys[3];
+    nebel_volume_entry entry = d.data.volume_entries[0];
+    keys[0] = entry.keys[0];
+    keys[1] = entry.keys[1];
+    keys[2] = entry.keys[2];
+    keys[1].frame = 2.5;
+    entry.keys = keys;
+    d.entries = &entry;
+    check_saved(&d, SCENE("\"fog\": [{" BOX
+                          ", \"visibility\": 30, \"keys\": [{\"frame\": 1, \"visibility\": 20 /* thick */},\n"
+                          "    { \"frame\": 2.5 },\n    {\"frame\": 3, \"source\": \"#fff\"}]}]"));
+}
+
+/* An albedo in a key needs one in the volume. */
+static void test_keys_with_an_albedo(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"fog\": [" THIN "]"));
+    nebel_volume_desc own = d.volumes[0];
+    nebel_volume_key key = {5, own};
+    const nebel_volume_entry entry = {.contrast = .05, .keys = &key, .key_count = 1, .own = &own};
+    key.volume.albedo[0] = key.volume.albedo[1] = key.volume.albedo[2] = .5;
+    nebel_volume_entry entries[1] = {entry};
+    d.entries = entries;
+    check_saved(&d, SCENE("\"fog\": [{" BOX ", \"extinction\": 0.1, \"keys\": [{ \"frame\": 5, \"albedo\": 0.5 }], "
+                          "\"albedo\": 0}]"));
+}
+
 /* ---- other units ----------------------------------------------------------------------------- */
 
 static void test_the_units_of_the_file(void **state)
@@ -207,9 +401,6 @@ static void test_the_units_of_the_file(void **state)
 }
 
 /* ---- volumes that come and go ---------------------------------------------------------------- */
-
-#define THIN "{" BOX ", \"extinction\": 0.1}"
-#define THICK "{" BOX ", \"extinction\": 7}"
 
 static void take_out(draft *d, size_t index)
 {
@@ -360,6 +551,8 @@ static void test_parts_and_planes(void **state)
                   "\"extinction\": 1}]"));
 }
 
+#define DUST "{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}"
+
 static void test_nebulae(void **state)
 {
     (void)state;
@@ -377,6 +570,24 @@ static void test_nebulae(void **state)
     check_saved(&d, SCENE("\"max_opacity\": 0.75, \"unit\": 0.1, \"fog\": [], \"nebula\": [ {\"shape\": {\"type\": "
                           "\"sphere\", \"center\": [0, 0, 0], \"radius\": 30}, \"count\": 20, \"turbulence\": 3, "
                           "\"size\": [1, 5], \"emission\": 1, \"seed\": 7, \"profile\": \"ball\"} ]"));
+}
+
+static void test_colors_of_a_nebula(void **state)
+{
+    (void)state;
+    static const double three[3][3] = {{1, 0, 0}, {.5, .5, .5}, {0, 0, 2}}, two[2][3] = {{1, 1, 1}, {0, 1, 0}};
+    draft d = open_draft(SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [1, /* green */ \"#0f0\"]}, " DUST
+                               "}, " DUST ", \"colors\": [2]}]"));
+    d.nebulae[0].colors = two;
+    d.nebulae[1].colors = three;
+    d.nebulae[1].color_count = 3;
+    d.nebulae[2].colors = NULL;
+    d.nebulae[2].color_count = 0;
+    check_saved(&d, SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [1, /* green */ \"#0f0\"]}, " DUST
+                          ", \"colors\": [[1, 0, 0], 0.5, [0, 0, 2]]}, " DUST "}]"));
+    d = open_draft(SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [\"#fff\", [0, 1, 0]]}]"));
+    d.nebulae[0].colors = three;
+    check_saved(&d, SCENE("\"fog\": [], \"nebula\": [" DUST ", \"colors\": [[1, 0, 0], 0.5]}]"));
 }
 
 /* What somebody else has changed meanwhile stays. */
@@ -449,6 +660,14 @@ static void test_memory_runs_out(void **state)
         d.volumes[0].source[0] = 5;
         d.volumes[1] = d.volumes[0];
         d.names[1] = "a \"new\" one";
+        const nebel_volume_desc own = d.volumes[0];
+        const nebel_volume_key key = {1, own};
+        const nebel_volume_entry entries[2] = {d.data.volume_entries[0],
+                                               {.contrast = .02, .own = &own, .keys = &key, .key_count = 1}};
+        d.data.volume_entries = entries;
+        d.data.classic = &(nebel_factor_desc){.density = 1};
+        d.data.has_sun = 1;
+        d.data.sun_direction[1] = 1;
         d.data.volumes = d.volumes;
         d.data.volume_names = d.names;
         d.data.volume_count = 2;
@@ -484,6 +703,14 @@ int main(void)
         cmocka_unit_test(test_keys_are_added_as_their_neighbours_stand),
         cmocka_unit_test(test_a_transform_is_added),
         cmocka_unit_test(test_camera_and_light),
+        cmocka_unit_test(test_the_sun_comes_and_goes),
+        cmocka_unit_test(test_the_projection),
+        cmocka_unit_test(test_classic_fog),
+        cmocka_unit_test(test_models),
+        cmocka_unit_test(test_contrast_and_phase),
+        cmocka_unit_test(test_keys_come_change_and_go),
+        cmocka_unit_test(test_keys_keep_their_words_and_lines),
+        cmocka_unit_test(test_keys_with_an_albedo),
         cmocka_unit_test(test_the_units_of_the_file),
         cmocka_unit_test(test_volumes_leave),
         cmocka_unit_test(test_volumes_come),
@@ -492,6 +719,7 @@ int main(void)
         cmocka_unit_test(test_keys_that_have_become_wrong_go),
         cmocka_unit_test(test_parts_and_planes),
         cmocka_unit_test(test_nebulae),
+        cmocka_unit_test(test_colors_of_a_nebula),
         cmocka_unit_test(test_other_changes_of_the_file_stay),
         cmocka_unit_test(test_volumes_that_are_made_of_something_else_stay),
         cmocka_unit_test(test_what_is_refused),

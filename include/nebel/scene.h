@@ -62,6 +62,35 @@ typedef struct nebel_texture {
     const uint8_t *rgba; /* sRGB, 4 bytes per texel, top row first */
 } nebel_texture;
 
+/* What a volume is at a frame. Planes and parts are the same in all keys of a volume. */
+typedef struct nebel_volume_key {
+    double frame;
+    nebel_volume_desc volume; /* whole: what the file's key leaves out is the volume's own */
+} nebel_volume_key;
+
+/* What the file says of a volume, beside what it is at one frame. */
+typedef struct nebel_volume_entry {
+    double contrast;              /* that is left at its visibility, 0 < contrast < 1 */
+    nebel_phase phase;            /* of fog with an albedo; in this version nothing but the file knows of it */
+    size_t key_count;             /* 0: it stands still */
+    const nebel_volume_key *keys; /* ascending frames */
+    const nebel_volume_desc *own; /* without its keys; NULL where there are none */
+} nebel_volume_entry;
+
+/* A model as the file places it, in metres with y up. */
+typedef struct nebel_model {
+    size_t source;    /* which model of the file it is */
+    const char *file; /* as it is opened */
+    int is_heightfield;
+    int has_fog; /* its nodes bring some */
+    double position[3];
+    double rotation[4]; /* quaternion, any length but 0; not of height fields, as scale */
+    double scale[3];
+    double size[2], height; /* m, > 0: of height fields */
+    int has_color;
+    double color[3]; /* 0 to 1: in place of its own */
+} nebel_model;
+
 /* Everything the file says, resolved: defaults filled in, directions normalised. Owned by the scene. */
 typedef struct nebel_scene_data {
     nebel_camera camera;
@@ -80,12 +109,15 @@ typedef struct nebel_scene_data {
     const nebel_volume_desc *volumes;
     const char *const *volume_names; /* UTF-8; "" where the file gives none */
 
+    const nebel_volume_entry *volume_entries; /* of the same volumes */
+
     size_t moving_volume_count; /* how many volumes have keys: 0 means that the fog is the same at every frame */
 
     size_t nebula_count; /* strewn by nebel_make_scene_particles; allocator and log are not set */
     const nebel_nebula_desc *nebulae;
     const char *const *nebula_names;
-    size_t particle_count; /* of all nebulae */
+    const nebel_transform *nebula_places; /* where the file puts their points; of no meaning without points */
+    size_t particle_count;                /* of all nebulae */
 
     const nebel_cells_desc *cells; /* good for nebel_create_cells; allocator and log are not set. NULL: none */
     const char *const *cell_names; /* UTF-8; "" where the file gives none */
@@ -94,6 +126,9 @@ typedef struct nebel_scene_data {
 
     size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
     const char *const *files; /* as they are opened, once for each time they are named */
+
+    size_t model_count;
+    const nebel_model *models;
 
     size_t mesh_count; /* 0 until nebel_load_scene_models */
     const nebel_mesh *meshes;
@@ -121,6 +156,12 @@ nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, 
  * scene. Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
 nebel_result nebel_load_scene_models(nebel_scene *scene);
 
+/* Loads models again, placed and coloured as `models` says; those of the file that are not among them are left out.
+ * Contents have meshes and textures of these then, and what they pointed to before is gone, as nodes with fog are where
+ * they were. Where that fails all stays as it was. O(what their files hold). Thread safety and errors: as above;
+ * ARGUMENT (a source that the file has not). */
+nebel_result nebel_load_models_anew(nebel_scene *scene, const nebel_model *models, size_t count);
+
 /* The contents; lives as long as the scene (mesh pointers change with nebel_load_scene_models). Never NULL. */
 const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene);
 
@@ -136,6 +177,9 @@ void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *partic
 /* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no
  * number leaves its range. Its arrays are the scene's. index < contents->volume_count. */
 nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame);
+
+/* The same of any 1 or more keys of one volume. */
+nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t count, double frame);
 
 /* What a volume comes from. */
 typedef enum nebel_volume_origin {
@@ -163,12 +207,14 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
- * of it with other numbers in the camera, the background, the sun (where there is one), the ambient light, max_opacity,
- * the nebulae (but for points and colours), the cells (but for names and portals; model, span and grouping, too), and
- * with other names, numbers or kinds of volumes of origin WRITTEN. Its
+ * of it with other numbers in the camera, the background, the sun, the ambient light, max_opacity, the classic fog, the
+ * nebulae (points by their place alone), the cells (but for names and portals; model, span and grouping, too), the
+ * models (fewer may be left, in their order), and with other names, numbers or kinds of volumes of origin WRITTEN or
+ * MOVING. The sun and the section "classic" may come and go. Its
  * volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
- * MOVING. sources NULL: the same volumes.
+ * MOVING. sources NULL: the same volumes. changed->volume_entries is as long as changed->volumes; of a volume with keys
+ * `own` counts and not what stands in `volumes`. NULL: keys, contrast and phase are as they were.
  *
  * What differs between the two is written in its place, in the file's own unit, axes and words (a visibility stays a
  * visibility, where the fog is not of extinction 0), with 15 digits; a key that is missing is added, one that has

@@ -121,13 +121,27 @@ void nb_models_release(nebel_scene *scene)
 
 /* ---- loading --------------------------------------------------------------------------------- */
 
-static nebel_result load_all(const nebel_scene *scene, nb_model_set *set)
+/* The model of the file, as it is wanted. */
+static nb_model_source place_source(const nb_model_source *source, const nebel_model *model)
+{
+    nb_model_source placed = *source;
+    memcpy(placed.position, model->position, sizeof placed.position);
+    memcpy(placed.rotation, model->rotation, sizeof placed.rotation);
+    memcpy(placed.scale, model->scale, sizeof placed.scale);
+    memcpy(placed.size, model->size, sizeof placed.size);
+    memcpy(placed.color, model->color, sizeof placed.color);
+    placed.height = model->height;
+    placed.has_color = model->has_color != 0;
+    return placed;
+}
+
+static nebel_result load_all(const nebel_scene *scene, const nebel_model *models, size_t count, nb_model_set *set)
 {
     nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < scene->model_count && result == NEBEL_OK; i++) {
-        const nb_model_source *source = &scene->models[i];
-        const nb_model_load load = {scene->allocator, scene->log, source, set, NULL};
-        result = source->is_heightfield ? nb_heightfield_load(&load) : nb_assimp_load(&load);
+    for (size_t i = 0; i < count && result == NEBEL_OK; i++) {
+        const nb_model_source source = place_source(&scene->models[models[i].source], &models[i]);
+        const nb_model_load load = {scene->allocator, scene->log, &source, set, NULL};
+        result = source.is_heightfield ? nb_heightfield_load(&load) : nb_assimp_load(&load);
     }
     return result;
 }
@@ -135,13 +149,22 @@ static nebel_result load_all(const nebel_scene *scene, nb_model_set *set)
 nebel_result nebel_load_scene_models(nebel_scene *scene)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (scene->models_loaded) return NEBEL_OK;
+    return scene->models_loaded ? NEBEL_OK : nebel_load_models_anew(scene, scene->placements, scene->model_count);
+}
+
+nebel_result nebel_load_models_anew(nebel_scene *scene, const nebel_model *models, size_t count)
+{
     nb_model_set set = {0};
-    const nebel_result result = load_all(scene, &set);
+    if (scene == NULL || (models == NULL && count > 0)) return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < count; i++)
+        if (models[i].source >= scene->model_count)
+            return nb_fail(&scene->log, NEBEL_ERROR_ARGUMENT, "models: number %zu comes from none of the file", i);
+    const nebel_result result = load_all(scene, models, count, &set);
     if (result != NEBEL_OK) {
         release_set(&scene->allocator, &set);
         return result;
     }
+    nb_models_release(scene);
     scene->loaded = set;
     scene->models_loaded = true;
     scene->data.meshes = set.meshes;

@@ -47,11 +47,12 @@ static bool read_view(nb_json *json, const nb_json_node *node, const nb_json_nod
            check_view(json, node, found, camera);
 }
 
+const char *const nb_projection_names[3] = {"perspective", "orthographic", "panorama"};
+
 static bool read_projection(nb_json *json, const nb_json_node *node, nebel_projection *projection)
 {
-    static const char *const projections[] = {"perspective", "orthographic", "panorama"};
     if (node == NULL) return true;
-    const int choice = nb_value_choice(json, node, projections, 3);
+    const int choice = nb_value_choice(json, node, nb_projection_names, 3);
     if (choice >= 0) *projection = (nebel_projection)choice;
     return choice >= 0;
 }

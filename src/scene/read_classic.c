@@ -1,9 +1,8 @@
 /* The section "classic": the numbers of the fog factors. */
 #include "scene/scene_internal.h"
 
-/* In the order of nebel_factor_coordinate and nebel_factor_stage. */
-static const char *const coordinate_names[] = {"plane", "radial"};
-static const char *const stage_names[] = {"vertex", "pixel"};
+const char *const nb_coordinate_names[2] = {"plane", "radial"};
+const char *const nb_stage_names[2] = {"vertex", "pixel"};
 
 static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int *choice)
 {
@@ -37,8 +36,8 @@ bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
         !nb_value_number(json, found[END], &nb_range_any, &factor->end) ||
         !nb_value_number(json, found[DENSITY], &nb_range_positive, &factor->density) ||
         !nb_value_color(json, found[COLOR], &nb_range_not_negative, factor->color) ||
-        !read_choice(json, found[COORDINATE], coordinate_names, &coordinate) ||
-        !read_choice(json, found[STAGE], stage_names, &stage))
+        !read_choice(json, found[COORDINATE], nb_coordinate_names, &coordinate) ||
+        !read_choice(json, found[STAGE], nb_stage_names, &stage))
         return false;
     convert(&in->space, found[END], found[DENSITY], factor);
     factor->coordinate = (nebel_factor_coordinate)coordinate;

@@ -125,11 +125,14 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
 
 /* Under ambient light, the same from everywhere, each of these scatters as much as the isotropic one: they integrate
  * to 1. That is why the core is not told. */
-bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node)
+bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase)
 {
     enum { PHASE_TYPE, G, DIAMETER, COUNT };
     static const char *const names[] = {"type", "g", "diameter"};
-    static const char *const types[] = {"isotropic", "henyey_greenstein", "rayleigh", "cornette_shanks", "droplets"};
+    static const char *const phase_names[] = {"isotropic", "henyey_greenstein", "rayleigh", "cornette_shanks",
+                                              "droplets"};
+    static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN, NEBEL_PHASE_RAYLEIGH,
+                                             NEBEL_PHASE_CORNETTE_SHANKS, NEBEL_PHASE_DROPLETS};
     static const nb_keys keys[] = {
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "an isotropic phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a henyey_greenstein phase function"},
@@ -138,10 +141,11 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node)
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
     static const nb_range g_range = {-1, 1, true, "a number > -1 and < 1"};
     const nb_json_node *found[COUNT];
-    double value;
     if (node == NULL) return true;
-    const int type = nb_value_type(in->json, node, types, 5);
-    return type >= 0 && nb_value_members(in->json, node, &keys[type], found) &&
-           nb_value_number(in->json, found[G], &g_range, &value) &&
-           nb_value_number(in->json, found[DIAMETER], &nb_range_positive, &value);
+    const int type = nb_value_type(in->json, node, phase_names, 5);
+    if (type < 0) return false;
+    phase->type = types[type];
+    return nb_value_members(in->json, node, &keys[type], found) &&
+           nb_value_number(in->json, found[G], &g_range, &phase->g) &&
+           nb_value_number(in->json, found[DIAMETER], &nb_range_positive, &phase->diameter);
 }

@@ -114,15 +114,38 @@ static bool read_placement(nb_json *json, const nb_json_node *const *found, nb_m
            nb_value_scale(json, found[SCALE], model->scale);
 }
 
+/* What the public face says of a model. */
+static nebel_model describe_model(const nb_model_source *source, size_t index)
+{
+    nebel_model model = {.source = index,
+                         .file = source->file,
+                         .is_heightfield = source->is_heightfield,
+                         .has_fog = source->has_fog,
+                         .height = source->height,
+                         .has_color = source->has_color};
+    memcpy(model.position, source->position, sizeof model.position);
+    memcpy(model.rotation, source->rotation, sizeof model.rotation);
+    memcpy(model.scale, source->scale, sizeof model.scale);
+    memcpy(model.size, source->size, sizeof model.size);
+    memcpy(model.color, source->color, sizeof model.color);
+    return model;
+}
+
 static bool keep_model(nb_scene_reader *in, const nb_json_node *node, const nb_model_source *model)
 {
     nebel_scene *scene = in->scene;
     void *models = scene->models;
     const size_t count = scene->model_count;
-    if (!nb_grow(&scene->allocator, &models, sizeof *model, count, &scene->model_capacity, count + 1))
-        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    const bool room = nb_grow(&scene->allocator, &models, sizeof *model, count, &scene->model_capacity, count + 1);
     scene->models = models;
-    scene->models[scene->model_count++] = *model;
+    void *placements = scene->placements;
+    const bool place_room = nb_grow(&scene->allocator, &placements, sizeof *scene->placements, count,
+                                    &scene->placement_capacity, count + 1);
+    scene->placements = placements;
+    if (!room || !place_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    scene->models[count] = *model;
+    scene->placements[count] = describe_model(model, count);
+    scene->model_count++;
     return true;
 }
 
@@ -158,7 +181,8 @@ static bool keep_points(nb_scene_reader *in, const nb_json_node *node, const nb_
     return true;
 }
 
-bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula)
+bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
+                    nebel_transform *place)
 {
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_model_source model = unplaced;
@@ -168,6 +192,9 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
     if (!nb_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
         !read_placement(in->json, found, &model) || !convert_model(in, node, &model))
         return false;
+    memcpy(place->position, model.position, sizeof place->position);
+    memcpy(place->rotation, model.rotation, sizeof place->rotation);
+    memcpy(place->scale, model.scale, sizeof place->scale);
     const nebel_result result = nb_assimp_load_points(&load);
     const bool good = result == NEBEL_OK ? keep_points(in, node, &points, nebula) : nb_json_stop(in->json, result);
     nb_release(&load.allocator, points.places);

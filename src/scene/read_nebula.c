@@ -1,4 +1,5 @@
 /* One entry of the section "nebula". Particles are strewn later, by nebel_make_scene_particles. */
+#include "scene/save_places.h"
 #include "scene/scene_internal.h"
 
 #include <string.h>
@@ -77,7 +78,7 @@ static bool read_colors(nb_scene_reader *in, const nb_json_node *node, nebel_neb
 }
 
 static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const nebel_nebula_desc *nebula,
-                        const char *name)
+                        const nebel_transform *place, const char *name)
 {
     nebel_scene *scene = in->scene;
     const size_t count = scene->data.nebula_count;
@@ -88,9 +89,14 @@ static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const neb
     const bool name_room =
         nb_grow(&scene->allocator, &names, sizeof name, count, &scene->nebula_name_capacity, count + 1);
     scene->nebula_names = names;
-    if (!room || !name_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    void *places = scene->nebula_places;
+    const bool place_room =
+        nb_grow(&scene->allocator, &places, sizeof *place, count, &scene->nebula_place_capacity, count + 1);
+    scene->nebula_places = places;
+    if (!room || !name_room || !place_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     scene->nebulae[count] = *nebula;
     scene->nebula_names[count] = name;
+    scene->nebula_places[count] = *place;
     scene->data.nebula_count = count + 1;
     scene->data.particle_count += nebula->count;
     return true;
@@ -140,10 +146,11 @@ static bool check_total(nb_scene_reader *in, const nb_json_node *node, const neb
                         "brings the particles of this scene above %d, the most it may have", MOST_PARTICLES);
 }
 
-static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, nebel_nebula_desc *nebula, const char *name)
+static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, nebel_nebula_desc *nebula,
+                          const nebel_transform *place, const char *name)
 {
     nb_space_convert_nebula(&in->space, nebula);
-    return try_nebula(in, node, nebula) && check_total(in, node, nebula) && keep_nebula(in, node, nebula, name);
+    return try_nebula(in, node, nebula) && check_total(in, node, nebula) && keep_nebula(in, node, nebula, place, name);
 }
 
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
@@ -152,6 +159,7 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
     nb_json *json = in->json;
     /* The defaults of the core, in the numbers of the file. */
     nebel_nebula_desc nebula = {.size = {0.05 / in->space.unit, 0.2 / in->space.unit}};
+    nebel_transform place = nb_plain_transform;
     const char *name = "";
     return nb_value_is(json, node, NB_JSON_OBJECT, "a nebula {\"shape\": ...}") &&
            nb_value_members(json, node, &nebula_keys, found) &&
@@ -159,9 +167,9 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
            (found[SHAPE] == NULL || nb_read_shape(in, found[SHAPE], &nebula.shape)) &&
            check_bounds(json, found[SHAPE], nebula.shape.type) &&
            nb_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
-           read_counts(json, found, &nebula) && nb_read_points(in, found[POINTS], MOST_PARTICLES, &nebula) &&
+           read_counts(json, found, &nebula) && nb_read_points(in, found[POINTS], MOST_PARTICLES, &nebula, &place) &&
            read_profile(json, found[PROFILE], &nebula.profile) && read_sizes(json, found, &nebula) &&
            nb_value_amount(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
            nb_value_color(json, found[EMISSION], &nb_range_not_negative, nebula.emission) &&
-           read_colors(in, found[COLORS], &nebula) && finish_nebula(in, node, &nebula, name);
+           read_colors(in, found[COLORS], &nebula) && finish_nebula(in, node, &nebula, &place, name);
 }

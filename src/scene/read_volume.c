@@ -101,19 +101,18 @@ static bool check_amount_given(nb_json *json, const nb_json_node *volume, const 
                         "the amount is missing; give one of extinction, mean_free_path, visibility");
 }
 
-/* An amount that is not given leaves `extinction` as it is. */
-static bool read_amount(nb_json *json, const nb_json_node *const *found, double extinction[3])
+/* An amount that is not given leaves `extinction` as it is, as a contrast does. */
+static bool read_amount(nb_json *json, const nb_json_node *const *found, double extinction[3], double *contrast)
 {
     static const nb_range contrast_range = {0, 1, true, "a number > 0 and < 1"};
-    double contrast = 0.05;
     if (!check_amount_count(json, found)) return false;
     if (found[CONTRAST] != NULL && found[VISIBILITY] == NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[CONTRAST],
                                 "belongs to \"visibility\", which is absent");
-    if (!nb_value_number(json, found[CONTRAST], &contrast_range, &contrast)) return false;
+    if (!nb_value_number(json, found[CONTRAST], &contrast_range, contrast)) return false;
     if (found[EXTINCTION] != NULL) return nb_value_amount(json, found[EXTINCTION], &nb_range_not_negative, extinction);
     if (found[VISIBILITY] != NULL)
-        return read_length(json, found[VISIBILITY], contrast, nebel_extinction_from_visibility, extinction);
+        return read_length(json, found[VISIBILITY], *contrast, nebel_extinction_from_visibility, extinction);
     return read_length(json, found[MEAN_FREE_PATH], 0, extinction_from_path, extinction);
 }
 
@@ -126,7 +125,8 @@ static void remember_lit(nb_scene_reader *in, const nb_json_node *albedo, const 
     nb_json_path(in->json, albedo, in->lit_path);
 }
 
-static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume)
+static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume,
+                       nebel_phase *phase)
 {
     nb_json *json = in->json;
     if (found[SOURCE] != NULL && found[ALBEDO] != NULL)
@@ -135,7 +135,8 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
     if (found[PHASE] != NULL && found[ALBEDO] == NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[PHASE], "belongs to \"albedo\", which is absent");
     if (!nb_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
-        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) || !nb_read_phase(in, found[PHASE]) ||
+        !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
+        !nb_read_phase(in, found[PHASE], phase) ||
         !nb_value_color(json, found[EMISSION], &nb_range_not_negative, volume->emission))
         return false;
     if (found[ALBEDO] != NULL) remember_lit(in, found[ALBEDO], volume->albedo);
@@ -158,8 +159,13 @@ bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subj
     return nb_json_fail(in->json, kept ? result : NEBEL_ERROR_FORMAT, node, "%s", text);
 }
 
+nebel_volume_entry nb_volume_entry_default(void)
+{
+    return (nebel_volume_entry){.contrast = 0.05};
+}
+
 static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const nebel_volume_desc *volume,
-                        const char *name, nebel_volume_origin origin)
+                        const nebel_volume_entry *entry, const char *name, nebel_volume_origin origin)
 {
     nebel_scene *scene = in->scene;
     const size_t count = scene->data.volume_count;
@@ -173,11 +179,18 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
     const bool origin_room =
         nb_grow(&scene->allocator, &origins, sizeof origin, count, &scene->origin_capacity, count + 1);
     scene->volume_origins = origins;
-    if (!room || !name_room || !origin_room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    void *entries = scene->volume_entries;
+    const bool entry_room =
+        nb_grow(&scene->allocator, &entries, sizeof *entry, count, &scene->entry_capacity, count + 1);
+    scene->volume_entries = entries;
+    if (!room || !name_room || !origin_room || !entry_room)
+        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
     scene->volumes[count] = *volume;
     scene->volume_names[count] = name;
     scene->volume_origins[count] = origin;
+    scene->volume_entries[count] = *entry;
     scene->data.volume_count = count + 1;
+    scene->data.moving_volume_count += entry->key_count > 0;
     return true;
 }
 
@@ -206,16 +219,18 @@ static bool check_scale_signs(nb_json *json, const nb_json_node *node, const neb
 }
 
 static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *entry,
-                     nb_volume_key *key)
+                     nebel_volume_key *key)
 {
     const nb_json_node *found[VOLUME_KEY_COUNT];
     nb_json *json = in->json;
     nebel_volume_desc *volume = &key->volume;
+    double contrast = nb_volume_entry_default().contrast;
     return nb_value_members(json, node, &moving_keys[volume->operation], found) &&
            nb_value_number(json, found[FRAME], &nb_range_any, &key->frame) &&
            nb_read_shape_key(in, found[SHAPE], &volume->shape) &&
-           nb_read_density_key(in, found[DENSITY], &volume->density) && read_amount(json, found, volume->extinction) &&
-           check_light_key(json, entry, found) && read_light(in, found, volume);
+           nb_read_density_key(in, found[DENSITY], &volume->density) &&
+           read_amount(json, found, volume->extinction, &contrast) && check_light_key(json, entry, found) &&
+           read_light(in, found, volume, NULL);
 }
 
 /* The parts are those of the volume, which are converted with it, once. */
@@ -229,7 +244,7 @@ static void convert_key(const nb_space *space, nebel_volume_desc *volume)
 }
 
 static bool read_key_list(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *entry,
-                          const nebel_volume_desc *volume, nb_volume_key *keys)
+                          const nebel_volume_desc *volume, nebel_volume_key *keys)
 {
     nb_json *json = in->json;
     size_t i = 0;
@@ -246,57 +261,56 @@ static bool read_key_list(nb_scene_reader *in, const nb_json_node *list, const n
 }
 
 /* `volume` is still in the file's numbers. */
-static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *entry,
-                      const nebel_volume_desc *volume, nb_volume_track *track)
+static bool read_keys(nb_scene_reader *in, const nb_json_node *list, const nb_json_node *const *found,
+                      const nebel_volume_desc *volume, nebel_volume_entry *entry)
 {
     if (list == NULL) return true;
     if (!nb_value_is(in->json, list, NB_JSON_ARRAY, "an array of keys {\"frame\": ...}")) return false;
     if (list->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, list, "holds no key; give one or more");
-    nb_volume_key *keys = nb_arena_allocate(&in->scene->arena, list->count, sizeof *keys);
+    nebel_volume_key *keys = nb_arena_allocate(&in->scene->arena, list->count, sizeof *keys);
     if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, list, "out of memory");
-    if (!read_key_list(in, list, entry, volume, keys)) return false;
+    if (!read_key_list(in, list, found, volume, keys)) return false;
     for (size_t i = 0; i < list->count; i++) convert_key(&in->space, &keys[i].volume);
-    track->keys = keys;
-    track->key_count = list->count;
+    entry->keys = keys;
+    entry->key_count = list->count;
     return true;
 }
 
-static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nb_volume_track *track)
+static bool try_keys(nb_scene_reader *in, const nb_json_node *list, const nebel_volume_entry *entry)
 {
     const nb_json_node *node = list != NULL ? nb_json_first(in->json, list) : NULL;
-    for (size_t i = 0; i < track->key_count; i++, node = nb_json_next(in->json, node))
-        if (!nb_read_try(in, node, "", &track->keys[i].volume)) return false;
+    for (size_t i = 0; i < entry->key_count; i++, node = nb_json_next(in->json, node))
+        if (!nb_read_try(in, node, "", &entry->keys[i].volume)) return false;
     return true;
 }
 
-static bool keep_track(nb_scene_reader *in, const nb_json_node *node, const nb_volume_track *track)
+/* The volume itself goes into the entry; in its place comes what it is at frame 0. */
+static bool start_moving(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume,
+                         nebel_volume_entry *entry)
 {
-    nebel_scene *scene = in->scene;
-    void *tracks = scene->tracks;
-    if (track->key_count == 0) return true;
-    if (!nb_grow(&scene->allocator, &tracks, sizeof *track, scene->track_count, &scene->track_capacity,
-                 scene->track_count + 1))
-        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    scene->tracks = tracks;
-    scene->tracks[scene->track_count++] = *track;
-    scene->data.moving_volume_count++;
+    if (entry->key_count == 0) return true;
+    nebel_volume_desc *own = nb_arena_allocate(&in->scene->arena, 1, sizeof *own);
+    if (own == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    *own = *volume;
+    entry->own = own;
+    *volume = nebel_volume_between_keys(entry->keys, entry->key_count, 0);
     return true;
 }
 
 /* ---- volume ---------------------------------------------------------------------------------- */
 
 static bool finish_volume(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
-                          nebel_volume_desc *volume, const char *name)
+                          nebel_volume_desc *volume, nebel_volume_entry *entry, const char *name)
 {
-    nb_volume_track track = {.volume = in->scene->data.volume_count};
-    if (!read_keys(in, found[KEYS], found, volume, &track)) return false;
+    if (!read_keys(in, found[KEYS], found, volume, entry)) return false;
     nb_space_convert_volume(&in->space, volume);
     if (in->node != NULL && !nb_read_place_volume(in, node, volume)) return false;
-    if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], &track)) return false;
-    if (track.key_count > 0) *volume = nb_volume_at(&track, 0);
+    if (!nb_read_try(in, node, "", volume) || !try_keys(in, found[KEYS], entry) ||
+        !start_moving(in, node, volume, entry))
+        return false;
     nebel_volume_origin origin = in->node != NULL ? NEBEL_VOLUME_OF_NODE : NEBEL_VOLUME_WRITTEN;
-    if (track.key_count > 0) origin = NEBEL_VOLUME_MOVING;
-    return keep_volume(in, node, volume, name, origin) && keep_track(in, node, &track);
+    if (entry->key_count > 0) origin = NEBEL_VOLUME_MOVING;
+    return keep_volume(in, node, volume, entry, name, origin);
 }
 
 /* A node of a model has its shape from the modelling program, where it names none, and does not move. */
@@ -331,10 +345,12 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
                           const char *name)
 {
     static const double black[3] = {0};
+    const nebel_volume_entry entry = nb_volume_entry_default();
     if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
     if (!nb_value_color(in->json, found[2], &nb_range_light, volume->source)) return false;
     remember_lit(in, found[1], volume->albedo);
-    return nb_read_try(in, found[1], "", volume) && keep_volume(in, found[1], volume, name, NEBEL_VOLUME_IMPORTED);
+    return nb_read_try(in, found[1], "", volume) &&
+           keep_volume(in, found[1], volume, &entry, name, NEBEL_VOLUME_IMPORTED);
 }
 
 static bool keep_opacity(nb_scene_reader *in, const nb_json_node *node, double max_opacity)
@@ -389,13 +405,14 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[VOLUME_KEY_COUNT];
     nb_json *json = in->json;
     nebel_volume_desc volume = {.operation = NEBEL_OPERATION_ADD};
+    nebel_volume_entry entry = nb_volume_entry_default();
     const char *name = "";
     if (!read_members(in, node, &volume, found) || !read_place(json, found, &volume)) return false;
     if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
-         !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction) ||
-         !read_light(in, found, &volume)))
+         !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction, &entry.contrast) ||
+         !read_light(in, found, &volume, &entry.phase)))
         return false;
-    return finish_volume(in, node, found, &volume, name);
+    return finish_volume(in, node, found, &volume, &entry, name);
 }

@@ -4,33 +4,84 @@
 #define NB_SCENE_SAVE_H
 
 #include "scene/edit.h"
+#include "scene/save_places.h"
 #include "scene/scene_internal.h"
+
+typedef struct nb_span_list {
+    nb_edit_span *spans;
+    size_t count, capacity;
+} nb_span_list;
 
 struct nb_save {
     const nebel_scene_data *before, *changed;
     const size_t *sources; /* of the volumes of `changed`; NULL: the same volumes */
     size_t *targets;       /* where each volume of `before` is in `changed`; NEBEL_NEW_VOLUME: nowhere */
     nb_edit edit;
-    nb_edit_object root; /* with the last section that was read */
-    bool done[4];        /* sections that the file may lack */
-    nb_edit_span *spans; /* entries of the section "fog" */
-    size_t span_count, span_capacity;
-    bool has_added; /* an entry to an array without any */
+    nb_edit_object root;                      /* with the last section that was read */
+    nb_edit_span sections[NB_SCENE_SECTIONS]; /* of the root */
+    size_t section_count;
+    uint32_t done;                /* sections that the file may lack */
+    nb_span_list volumes, models; /* entries of the sections "fog" and "models" */
+    bool has_added;               /* an entry to an array without any */
 };
 
-/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula or the cells have
- * been read, while the tree is there. */
+/* A place in the tables of save_places.h: numbers that differ are put down for a change. */
+void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *object, const nb_place *places,
+                    unsigned mask, const void *was, const void *now);
+
+/* The same for an object that the file may lack: then it is added, with what has changed, behind the member `word`; "":
+ * none. */
+void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key, const char *word,
+                    const nb_place *places, const void *was, const void *now);
+
+/* Keeps where an entry is, and whether it goes. */
+bool nb_save_keep_span(nb_save *save, const nb_scene_reader *in, nb_span_list *list, const nb_json_node *node,
+                       bool goes);
+
+/* What goes from an object, by its name. */
+typedef struct nb_lost_keys {
+    const char *names[8]; /* NULL ends them */
+} nb_lost_keys;
+
+void nb_save_lose(nb_lost_keys *lost, const char *key);
+
+/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model or the
+ * cells have been read, while the tree is there. */
 void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
 bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t first);
 bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
+bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
 
 /* After everything. */
 bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *root);
 
+/* After the section "fog": volumes that are new or gone. */
+void nb_save_entries(nb_save *save, const nb_scene_reader *in, const nb_json_node *array);
+
+/* Of volumes that go, all do; those that models and other programs bring cannot. */
+bool nb_save_check_removed(const nb_save *save, const nb_scene_reader *in, const nb_json_node *root);
+
+/* A volume to be written: in metres, with its entry, whose `own` is not read. */
+typedef struct nb_written_volume {
+    nebel_volume_desc volume;
+    nebel_volume_entry entry;
+    const char *name;
+} nb_written_volume;
+
 /* Writes a whole volume as JSON, with a zero byte behind it. False when memory is out. Free text->data with nb_release.
  */
-bool nb_save_write_volume(const nebel_allocator *allocator, const nb_space *space, const nebel_volume_desc *volume,
-                          const char *name, nb_bytes *text);
+bool nb_save_write_volume(const nebel_allocator *allocator, const nb_space *space, const nb_written_volume *volume,
+                          nb_bytes *text);
+
+/* The same for the array of its keys, with `gap` before each but the first. Where kept[i] has bytes they are key i. */
+bool nb_save_write_keys(const nebel_allocator *allocator, const nb_space *space, const nb_written_volume *volume,
+                        const nb_bytes *kept, const char *gap, nb_bytes *text);
+
+/* A phase function as JSON. */
+void nb_save_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBERS]);
+
+/* Whether some key gives the volume an albedo. */
+bool nb_save_has_lit_key(const nebel_volume_entry *entry);
 
 #endif

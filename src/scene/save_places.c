@@ -77,6 +77,20 @@ const nb_place nb_cell_places[] = {
     END,
 };
 
+/* Of models from files; height fields have the first one. */
+const nb_place nb_model_places[] = {
+    PLACE(nebel_model, position, 3, NB_EDIT_EACH),
+    PLACE(nebel_model, rotation, 4, NB_EDIT_WHOLE),
+    PLACE(nebel_model, scale, 3, NB_EDIT_AMOUNT),
+    END,
+};
+
+const nb_place nb_height_field_places[] = {
+    PLACE(nebel_model, size, 2, NB_EDIT_EACH),
+    PLACE(nebel_model, height, 1, NB_EDIT_EACH),
+    END,
+};
+
 const char *const nb_shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_space", "box",         "sphere",
                                                        "ellipsoid", "cylinder",   "capsule",     "cone",
                                                        "convex",    "union",      "intersection"};
@@ -85,6 +99,9 @@ const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
 const char *const nb_profile_names[NEBEL_PARTICLE_COUNT] = {"soft", "gaussian", "ball"};
+/* By nebel_phase_type. */
+const char *const nb_phase_names[NEBEL_PHASE_COUNT] = {"isotropic",       "rayleigh", "henyey_greenstein",
+                                                       "cornette_shanks", "draine",   "droplets"};
 const char *const nb_cell_model_names[NEBEL_CELL_MODEL_COUNT] = {"linear", "exponential"};
 const char *const nb_cell_span_names[NEBEL_SPAN_COUNT] = {"ray", "depth", "faithful"};
 

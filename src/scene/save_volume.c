@@ -1,7 +1,7 @@
 /* Whole volumes as JSON, for those that the file has not, or has as something else. */
 #include "scene/save.h"
-#include "scene/save_places.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -139,8 +139,148 @@ static void put_density(writer *out, const nebel_density *density)
     close_object(out);
 }
 
+void nb_save_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBERS])
+{
+    const bool has_g = phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS;
+    char number[NB_EDIT_NUMBERS], member[NB_EDIT_NUMBERS] = "";
+    nb_edit_write_numbers(1, has_g ? &phase->g : &phase->diameter, NB_EDIT_EACH, number);
+    if (has_g) snprintf(member, sizeof member, ", \"g\": %.40s", number);
+    if (phase->type == NEBEL_PHASE_DROPLETS) snprintf(member, sizeof member, ", \"diameter\": %.40s", number);
+    snprintf(text, NB_EDIT_NUMBERS, "{ \"type\": \"%s\"%.60s }", nb_phase_names[phase->type], member);
+}
+
+static bool is_zero(const double rgb[3])
+{
+    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
+}
+
+bool nb_save_has_lit_key(const nebel_volume_entry *entry)
+{
+    for (size_t i = 0; i < entry->key_count; i++)
+        if (!is_zero(entry->keys[i].volume.albedo)) return true;
+    return false;
+}
+
+/* As an extinction, unless the entry has a contrast that only a visibility can say. */
+static void put_amount(writer *out, const nebel_volume_desc *own, double contrast)
+{
+    const double *rgb = own->extinction;
+    double visibility[3];
+    const bool is_plain_amount =
+        contrast == nb_volume_entry_default().contrast || !(rgb[0] > 0 && rgb[1] > 0 && rgb[2] > 0);
+    for (int i = 0; i < 3; i++) visibility[i] = -log(contrast) / rgb[i];
+    put_key(out, is_plain_amount ? "extinction" : "visibility");
+    put_numbers(out, 3, is_plain_amount ? rgb : visibility, NB_EDIT_AMOUNT);
+    if (is_plain_amount) return;
+    put_key(out, "contrast");
+    put_numbers(out, 1, &contrast, NB_EDIT_EACH);
+}
+
+static void put_phase(writer *out, const nebel_phase *phase)
+{
+    char text[NB_EDIT_NUMBERS];
+    if (phase->type == NEBEL_PHASE_ISOTROPIC) return;
+    nb_save_write_phase(phase, text);
+    put_key(out, "phase");
+    put(out, text);
+}
+
+/* ---- keys ------------------------------------------------------------------------------------ */
+
+static bool has_difference(const nb_place *places, unsigned mask, const void *was, const void *now)
+{
+    for (size_t i = 0; places[i].key != NULL; i++)
+        if ((mask >> i & 1) != 0 && nb_place_differs(was, now, &places[i])) return true;
+    return false;
+}
+
+/* Both in the file's numbers. */
+static void put_shape_key(writer *out, const nebel_shape *own, const nebel_shape *key)
+{
+    const unsigned mask = nb_shape_masks[own->type];
+    const bool moves = has_difference(nb_transform_places, NB_ALL_PLACES, &own->transform, &key->transform);
+    if (!moves && !has_difference(nb_shape_places, mask, own, key)) return;
+    open_object(out, "shape");
+    put_places(out, nb_shape_places, mask, key, own);
+    if (moves) {
+        open_object(out, "transform");
+        put_places(out, nb_transform_places, NB_ALL_PLACES, &key->transform, &own->transform);
+        close_object(out);
+    }
+    close_object(out);
+}
+
+static void put_density_key(writer *out, const nebel_density *own, const nebel_density *key)
+{
+    const unsigned mask = nb_density_masks[own->type];
+    if (!has_difference(nb_density_places, mask, own, key)) return;
+    open_object(out, "density");
+    put_places(out, nb_density_places, mask, key, own);
+    close_object(out);
+}
+
+/* What differs from the volume itself. Start and cutoff do not move. */
+static void put_key_object(writer *out, const nebel_volume_desc *own, const nebel_volume_key *key)
+{
+    const unsigned light = 1 | 2 | 4;
+    nebel_volume_desc volume = key->volume;
+    nb_space_restore_volume(out->space, &volume);
+    complete_transform(&volume.shape.transform);
+    put(out, "{");
+    out->is_first = true;
+    put_key(out, "frame");
+    put_numbers(out, 1, &key->frame, NB_EDIT_EACH);
+    put_shape_key(out, &own->shape, &volume.shape);
+    if (own->operation != NEBEL_OPERATION_EXCLUDE) {
+        put_density_key(out, &own->density, &volume.density);
+        if (memcmp(own->extinction, volume.extinction, sizeof own->extinction) != 0) {
+            put_key(out, "extinction");
+            put_numbers(out, 3, volume.extinction, NB_EDIT_AMOUNT);
+        }
+        put_places(out, nb_volume_places, light, &volume, own);
+    }
+    close_object(out);
+}
+
+static void put_keys(writer *out, const nb_written_volume *volume, const nb_bytes *kept, const char *gap)
+{
+    nebel_volume_desc own = volume->volume;
+    nb_space_restore_volume(out->space, &own);
+    complete_transform(&own.shape.transform);
+    put(out, "[");
+    for (size_t i = 0; i < volume->entry.key_count; i++) {
+        put(out, i > 0 ? "," : "");
+        put(out, i > 0 ? gap : "");
+        if (kept != NULL && kept[i].size > 0)
+            out->good =
+                out->good && nb_bytes_write(out->allocator, &out->text, out->text.size, kept[i].data, kept[i].size);
+        else
+            put_key_object(out, &own, &volume->entry.keys[i]);
+    }
+    put(out, "]");
+    out->is_first = false;
+}
+
+/* ---- volumes --------------------------------------------------------------------------------- */
+
+static bool finish(writer *out, nb_bytes *text)
+{
+    out->good = out->good && nb_bytes_write(out->allocator, &out->text, out->text.size, "", 1);
+    *text = out->text;
+    if (!out->good) nb_release(out->allocator, text->data);
+    return out->good;
+}
+
+bool nb_save_write_keys(const nebel_allocator *allocator, const nb_space *space, const nb_written_volume *volume,
+                        const nb_bytes *kept, const char *gap, nb_bytes *text)
+{
+    writer out = {.allocator = allocator, .space = space, .good = true};
+    put_keys(&out, volume, kept, gap);
+    return finish(&out, text);
+}
+
 /* `own` is in the file's numbers, but for its parts and planes. */
-static void put_members(writer *out, const nebel_volume_desc *own, const nebel_shape *shape)
+static void put_members(writer *out, const nebel_volume_desc *own, const nb_written_volume *written)
 {
     static const nebel_volume_desc nothing = {.priority = 0};
     const bool has_fog = own->operation != NEBEL_OPERATION_EXCLUDE;
@@ -151,27 +291,31 @@ static void put_members(writer *out, const nebel_volume_desc *own, const nebel_s
         put_numbers(out, 1, &(double){own->priority}, NB_EDIT_EACH);
     }
     put_key(out, "shape");
-    put_shape(out, shape);
+    put_shape(out, &written->volume.shape);
     if (has_fog) {
         put_density(out, &own->density);
-        put_key(out, "extinction");
-        put_numbers(out, 3, own->extinction, NB_EDIT_AMOUNT);
+        put_amount(out, own, written->entry.contrast);
     }
     put_places(out, nb_volume_places, has_fog ? NB_ALL_PLACES : distances, own, &nothing);
+    if (has_fog && !is_zero(own->albedo)) put_phase(out, &written->entry.phase);
+    if (has_fog && is_zero(own->albedo) && nb_save_has_lit_key(&written->entry)) {
+        put_key(out, "albedo");
+        put(out, "0");
+    }
+    if (written->entry.key_count == 0) return;
+    put_key(out, "keys");
+    put_keys(out, written, NULL, " ");
 }
 
-bool nb_save_write_volume(const nebel_allocator *allocator, const nb_space *space, const nebel_volume_desc *volume,
-                          const char *name, nb_bytes *text)
+bool nb_save_write_volume(const nebel_allocator *allocator, const nb_space *space, const nb_written_volume *volume,
+                          nb_bytes *text)
 {
-    nebel_volume_desc own = *volume;
+    nebel_volume_desc own = volume->volume;
     writer out = {.allocator = allocator, .space = space, .good = true, .is_first = true};
     nb_space_restore_volume(space, &own);
     put(&out, "{");
-    if (name[0] != '\0') put_text(&out, "name", name);
-    put_members(&out, &own, &volume->shape);
+    if (volume->name[0] != '\0') put_text(&out, "name", volume->name);
+    put_members(&out, &own, volume);
     close_object(&out);
-    out.good = out.good && nb_bytes_write(allocator, &out.text, out.text.size, "", 1);
-    *text = out.text;
-    if (!out.good) nb_release(allocator, text->data);
-    return out.good;
+    return finish(&out, text);
 }

@@ -110,11 +110,17 @@ static bool read_nebula(nb_scene_reader *in, const nb_json_node *node)
     return nb_read_nebula(in, node) && (in->save == NULL || nb_save_nebula(in->save, in, node, index));
 }
 
+static bool read_model(nb_scene_reader *in, const nb_json_node *node)
+{
+    const size_t index = in->scene->model_count;
+    return nb_read_model(in, node) && (in->save == NULL || nb_save_model(in->save, in, node, index));
+}
+
 static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
 {
     if (nb_json_has_key(array, "fog")) return read_fog(in, node);
     if (nb_json_has_key(array, "nebula")) return read_nebula(in, node);
-    if (nb_json_has_key(array, "models")) return nb_read_model(in, node);
+    if (nb_json_has_key(array, "models")) return read_model(in, node);
     return nb_read_light(in, node);
 }
 
@@ -172,8 +178,12 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     nebel_destroy_fog(in.trial);
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
+    scene->data.volume_entries = scene->volume_entries;
     scene->data.nebulae = scene->nebulae;
     scene->data.nebula_names = scene->nebula_names;
+    scene->data.nebula_places = scene->nebula_places;
+    scene->data.models = scene->placements;
+    scene->data.model_count = scene->model_count;
     scene->data.files = scene->files;
     return result;
 }
@@ -358,10 +368,12 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, scene->volumes);
     nb_release(&allocator, (void *)scene->volume_names);
     nb_release(&allocator, scene->volume_origins);
-    nb_release(&allocator, scene->tracks);
+    nb_release(&allocator, scene->volume_entries);
     nb_release(&allocator, scene->nebulae);
     nb_release(&allocator, (void *)scene->nebula_names);
+    nb_release(&allocator, scene->nebula_places);
     nb_release(&allocator, scene->models);
+    nb_release(&allocator, scene->placements);
     nb_release(&allocator, (void *)scene->files);
     nb_release(&allocator, scene);
 }

@@ -21,18 +21,6 @@ typedef struct nb_model_source {
     double color[3];
 } nb_model_source;
 
-typedef struct nb_volume_key {
-    double frame;
-    nebel_volume_desc volume;
-} nb_volume_key;
-
-/* A volume that moves: one or more keys, frames ascending. Parts and planes are the same in all. */
-typedef struct nb_volume_track {
-    size_t volume; /* which one of the scene's */
-    const nb_volume_key *keys;
-    size_t key_count;
-} nb_volume_track;
-
 /* Meshes and textures of loaded models. */
 typedef struct nb_model_set {
     nebel_mesh *meshes;
@@ -52,20 +40,20 @@ struct nebel_scene {
     nebel_volume_desc *volumes;
     const char **volume_names;
     nebel_volume_origin *volume_origins;
-    size_t volume_capacity, name_capacity, origin_capacity;
-
-    nb_volume_track *tracks; /* in the order of their volumes */
-    size_t track_count, track_capacity;
+    nebel_volume_entry *volume_entries;
+    size_t volume_capacity, name_capacity, origin_capacity, entry_capacity;
 
     nebel_nebula_desc *nebulae;
     const char **nebula_names;
-    size_t nebula_capacity, nebula_name_capacity;
+    nebel_transform *nebula_places;
+    size_t nebula_capacity, nebula_name_capacity, nebula_place_capacity;
 
     const char **files;
     size_t file_capacity;
 
     nb_model_source *models;
-    size_t model_count, model_capacity;
+    nebel_model *placements; /* of the models, in the words of the public face */
+    size_t model_count, model_capacity, placement_capacity;
     nb_model_set loaded;
     bool models_loaded;
 };
@@ -115,8 +103,9 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
-/* Points and their number, from a model file. NULL: none. */
-bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula);
+/* Points, their number and their place, from a model file. NULL: none. */
+bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
+                    nebel_transform *place);
 
 /* The fog in the nodes of a glTF model. Sets model->has_fog. */
 bool nb_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model);
@@ -132,7 +121,7 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
 /* The numbers that a key of fog gives anew. Numbers it leaves out stay, as do type, planes and parts. */
 bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
-bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase);
 
 /* Shows a volume to the core, which knows more than the file's rules: whether a convex body is empty, for one. Where
  * its message begins with `subject`, which the node's path says already, that is left out. */
@@ -141,8 +130,11 @@ bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subj
 /* For logs of the core: keeps the message in the reader, which is `user`. */
 void nb_read_keep_message(nebel_result result, const char *message, void *user);
 
-/* The volume at a frame: that of the first or last key, or between two. */
-nebel_volume_desc nb_volume_at(const nb_volume_track *track, double frame);
+/* Words of the file, in the order of their enumerations. */
+extern const char *const nb_projection_names[3], *const nb_coordinate_names[2], *const nb_stage_names[2];
+
+/* What an entry says that says nothing. */
+nebel_volume_entry nb_volume_entry_default(void);
 
 nebel_camera nb_camera_default(void);
 

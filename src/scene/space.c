@@ -145,6 +145,13 @@ static void restore_place(const nb_space *space, double place[3])
     for (int i = 0; i < 3; i++) place[i] /= space->unit;
 }
 
+void nb_space_restore_placement(const nb_space *space, double position[3], double rotation[4], double scale[3])
+{
+    restore_place(space, position);
+    nb_space_restore_direction(space, rotation);
+    convert_extents(space, 1, scale);
+}
+
 void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
 {
     restore_place(space, camera->position);
@@ -161,12 +168,10 @@ void nb_space_restore_shape(const nb_space *space, nebel_shape *shape)
         shape->min[2] = shape->max[2];
         shape->max[2] = near;
     }
-    double *const places[] = {transform->position, shape->min, shape->max,  shape->center,
-                              shape->from,         shape->to,  shape->point};
+    double *const places[] = {shape->min, shape->max, shape->center, shape->from, shape->to, shape->point};
+    nb_space_restore_placement(space, transform->position, transform->rotation, transform->scale);
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) restore_place(space, places[i]);
-    nb_space_restore_direction(space, transform->rotation);
     nb_space_restore_direction(space, shape->normal);
-    convert_extents(space, 1, transform->scale);
     convert_extents(space, back, shape->radii);
     shape->radius *= back;
     shape->radius_from *= back;

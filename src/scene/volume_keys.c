@@ -148,12 +148,12 @@ static void mend(const nebel_volume_desc *nearer, nebel_volume_desc *volume)
 
 /* ---- a volume at a frame --------------------------------------------------------------------- */
 
-static nebel_volume_desc volume_between(const nb_volume_track *track, const nb_keyframes *around)
+static nebel_volume_desc volume_between(const nebel_volume_key *keys, const nb_keyframes *around)
 {
-    const nebel_volume_desc *nearer = &track->keys[nb_keyframes_nearer(around)].volume;
+    const nebel_volume_desc *nearer = &keys[nb_keyframes_nearer(around)].volume;
     nebel_volume_desc at[4], volume;
     for (int k = 0; k < 4; k++) {
-        at[k] = track->keys[around->keys[k]].volume;
+        at[k] = keys[around->keys[k]].volume;
         pack_shape(&at[k].shape);
         nb_vector_normalize(at[k].shape.transform.rotation, 4);
     }
@@ -167,30 +167,16 @@ static nebel_volume_desc volume_between(const nb_volume_track *track, const nb_k
     return is_sound(&volume) ? volume : *nearer;
 }
 
-nebel_volume_desc nb_volume_at(const nb_volume_track *track, double frame)
+nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t count, double frame)
 {
     nb_keyframes around;
-    if (!nb_keyframes_find(&track->keys->frame, sizeof *track->keys, track->key_count, frame, &around))
-        return track->keys[around.keys[1]].volume;
-    return volume_between(track, &around);
-}
-
-/* Tracks are in the order of their volumes. */
-static const nb_volume_track *find_track(const nebel_scene *scene, size_t volume)
-{
-    size_t low = 0, high = scene->track_count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (scene->tracks[middle].volume < volume)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < scene->track_count && scene->tracks[low].volume == volume ? &scene->tracks[low] : NULL;
+    if (!nb_keyframes_find(&keys->frame, sizeof *keys, count, frame, &around)) return keys[around.keys[1]].volume;
+    return volume_between(keys, &around);
 }
 
 nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame)
 {
-    const nb_volume_track *track = find_track(scene, index);
-    return track != NULL ? nb_volume_at(track, frame) : scene->volumes[index];
+    const nebel_volume_entry *entry = &scene->volume_entries[index];
+    return entry->key_count > 0 ? nebel_volume_between_keys(entry->keys, entry->key_count, frame)
+                                : scene->volumes[index];
 }

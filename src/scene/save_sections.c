@@ -1,0 +1,285 @@
+/* Changed camera, light, classic fog and models, back into the file that the scene came from. */
+#include "scene/save.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---- camera ---------------------------------------------------------------------------------- */
+
+#define CAMERA_PLACE(member, count)                                                                                    \
+    {                                                                                                                  \
+#member, offsetof(nebel_camera, member), count, NB_EDIT_EACH                                                   \
+    }
+
+static const nb_place camera_places[] = {
+    CAMERA_PLACE(position, 3),     CAMERA_PLACE(look_at, 3),     CAMERA_PLACE(up, 3),
+    CAMERA_PLACE(vertical_fov, 1), CAMERA_PLACE(view_height, 1), {NULL, 0, 0, NB_EDIT_EACH},
+};
+
+static bool is_same_camera(const nebel_camera *a, const nebel_camera *b)
+{
+    for (size_t i = 0; camera_places[i].key != NULL; i++)
+        if (nb_place_differs(a, b, &camera_places[i])) return false;
+    return a->projection == b->projection;
+}
+
+/* Without a look_at of its own a camera looks ahead from wherever it is, so that one that moves needs one. */
+static void save_camera(nb_save *save, const nb_scene_reader *in)
+{
+    const nb_json_node *camera = nb_edit_member(in->json, save->root.node, "camera");
+    const nb_edit_object object = nb_edit_find(in->json, camera);
+    nebel_camera was = save->before->camera, now = save->changed->camera;
+    char projection[NB_EDIT_NUMBERS] = "";
+    if (is_same_camera(&was, &now)) return;
+    if (was.projection != now.projection)
+        snprintf(projection, sizeof projection, "\"projection\": \"%s\"", nb_projection_names[now.projection]);
+    nb_space_restore_camera(&in->space, &was);
+    nb_space_restore_camera(&in->space, &now);
+    if (nb_edit_member(in->json, camera, "look_at") == NULL) was.look_at[0] = HUGE_VAL;
+    nb_save_object(save, in->json, &save->root, "camera", projection, camera_places, &was, &now);
+    if (object.last_end != 0 && projection[0] != '\0')
+        nb_edit_word(&save->edit, in->json, &object, "projection", nb_projection_names[now.projection]);
+}
+
+/* ---- light ----------------------------------------------------------------------------------- */
+
+static void restore_sun(const nb_space *space, const nebel_scene_data *scene, double direction[3])
+{
+    memcpy(direction, scene->sun_direction, sizeof scene->sun_direction);
+    nb_space_restore_direction(space, direction);
+}
+
+static void save_sun(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+{
+    const nebel_scene_data *before = save->before, *changed = save->changed;
+    const nb_edit_object sun = nb_edit_find(in->json, node);
+    double was[3], now[3];
+    restore_sun(&in->space, before, was);
+    restore_sun(&in->space, changed, now);
+    nb_edit_numbers(&save->edit, in->json, &sun, "direction", 3, was, now, NB_EDIT_WHOLE);
+    nb_edit_numbers(&save->edit, in->json, &sun, "irradiance", 3, before->sun_irradiance, changed->sun_irradiance,
+                    NB_EDIT_AMOUNT);
+}
+
+static void add_sun(nb_save *save, const nb_space *space)
+{
+    char direction[NB_EDIT_NUMBERS], irradiance[NB_EDIT_NUMBERS], words[3 * NB_EDIT_NUMBERS];
+    double now[3];
+    restore_sun(space, save->changed, now);
+    nb_edit_write_numbers(3, now, NB_EDIT_EACH, direction);
+    nb_edit_write_numbers(3, save->changed->sun_irradiance, NB_EDIT_AMOUNT, irradiance);
+    snprintf(words, sizeof words, "{ \"direction\": %s, \"irradiance\": %s }", direction, irradiance);
+    nb_edit_add(&save->edit, &save->root, "sun", words);
+}
+
+/* ---- classic fog ----------------------------------------------------------------------------- */
+
+#define FACTOR_PLACE(member, count, style)                                                                             \
+    {                                                                                                                  \
+#member, offsetof(nebel_factor_desc, member), count, style                                                     \
+    }
+
+static const nb_place factor_places[] = {
+    FACTOR_PLACE(start, 1, NB_EDIT_EACH),   FACTOR_PLACE(end, 1, NB_EDIT_EACH), FACTOR_PLACE(density, 1, NB_EDIT_EACH),
+    FACTOR_PLACE(color, 3, NB_EDIT_AMOUNT), {NULL, 0, 0, NB_EDIT_EACH},
+};
+
+static nebel_factor_desc restore_factor(const nb_space *space, const nebel_factor_desc *factor)
+{
+    nebel_factor_desc own = *factor;
+    own.start /= space->unit;
+    own.end /= space->unit;
+    own.density *= space->unit;
+    return own;
+}
+
+static void write_factor(const nebel_factor_desc *own, char *words, size_t size)
+{
+    size_t used = (size_t)snprintf(words, size, "{ ");
+    for (size_t i = 0; factor_places[i].key != NULL; i++) {
+        char numbers[NB_EDIT_NUMBERS];
+        nb_edit_write_numbers(factor_places[i].count, nb_place_numbers(own, &factor_places[i]), factor_places[i].style,
+                              numbers);
+        used += (size_t)snprintf(words + used, size - used, "\"%s\": %s, ", factor_places[i].key, numbers);
+    }
+    snprintf(words + used, size - used, "\"coordinate\": \"%s\", \"stage\": \"%s\" }",
+             nb_coordinate_names[own->coordinate], nb_stage_names[own->stage]);
+}
+
+static void save_factor(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+{
+    const nebel_factor_desc was = restore_factor(&in->space, save->before->classic);
+    const nebel_factor_desc now = restore_factor(&in->space, save->changed->classic);
+    const nb_edit_object factor = nb_edit_find(in->json, node);
+    char words[8 * NB_EDIT_NUMBERS];
+    if (factor.last_end == 0) {
+        write_factor(&now, words, sizeof words);
+        nb_edit_replace(&save->edit, node, words);
+        return;
+    }
+    nb_save_places(save, in->json, &factor, factor_places, NB_ALL_PLACES, &was, &now);
+    if (was.coordinate != now.coordinate)
+        nb_edit_word(&save->edit, in->json, &factor, "coordinate", nb_coordinate_names[now.coordinate]);
+    if (was.stage != now.stage) nb_edit_word(&save->edit, in->json, &factor, "stage", nb_stage_names[now.stage]);
+}
+
+static void add_factor(nb_save *save, const nb_space *space)
+{
+    const nebel_factor_desc own = restore_factor(space, save->changed->classic);
+    char words[8 * NB_EDIT_NUMBERS];
+    write_factor(&own, words, sizeof words);
+    nb_edit_add(&save->edit, &save->root, "classic", words);
+}
+
+/* ---- models ---------------------------------------------------------------------------------- */
+
+static const nebel_model *find_model(const nebel_scene_data *scene, size_t source)
+{
+    for (size_t i = 0; i < scene->model_count; i++)
+        if (scene->models[i].source == source) return &scene->models[i];
+    return NULL;
+}
+
+static void restore_model(const nb_space *space, nebel_model *model)
+{
+    nb_space_restore_placement(space, model->position, model->rotation, model->scale);
+    for (int i = 0; i < 2; i++) model->size[i] /= space->unit;
+    model->height /= space->unit;
+}
+
+static void save_model_color(nb_save *save, const nb_json *json, const nb_edit_object *object, const nebel_model *was,
+                             const nebel_model *now)
+{
+    double from[3];
+    memcpy(from, was->color, sizeof from);
+    if (!was->has_color) from[0] = HUGE_VAL;
+    if (now->has_color) nb_edit_numbers(&save->edit, json, object, "color", 3, from, now->color, NB_EDIT_AMOUNT);
+    if (was->has_color && !now->has_color)
+        nb_edit_remove_members(&save->edit, json, object->node, (const char *const[]){"color", NULL});
+}
+
+static void change_model(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_model was,
+                         nebel_model now)
+{
+    const nb_edit_object object = nb_edit_find(in->json, node);
+    const nb_edit_object field = nb_edit_find(in->json, nb_edit_member(in->json, node, "heightfield"));
+    restore_model(&in->space, &was);
+    restore_model(&in->space, &now);
+    nb_save_places(save, in->json, &object, nb_model_places, field.node != NULL ? 1 : NB_ALL_PLACES, &was, &now);
+    if (field.node != NULL) nb_save_places(save, in->json, &field, nb_height_field_places, NB_ALL_PLACES, &was, &now);
+    save_model_color(save, in->json, &object, &was, &now);
+}
+
+bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+{
+    const nebel_scene_data *before = save->before;
+    if (index >= before->model_count || strcmp(in->scene->models[index].file, before->models[index].file) != 0)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
+                            "is another model than the one to be written; the file has changed, load it again");
+    const nebel_model *now = find_model(save->changed, index);
+    if (now != NULL) change_model(save, in, node, before->models[index], *now);
+    return nb_save_keep_span(save, in, &save->models, node, now == NULL);
+}
+
+/* ---- sections -------------------------------------------------------------------------------- */
+
+enum { CAMERA, AMBIENT, BACKGROUND, MAX_OPACITY, SUN, CLASSIC, FOG, MODELS, SECTIONS };
+
+static const char *const section_names[SECTIONS] = {"camera", "ambient", "background", "max_opacity",
+                                                    "sun",    "classic", "fog",        "models"};
+
+/* Of a section that comes or goes as a whole. */
+static bool is_there(const nebel_scene_data *scene, int section)
+{
+    if (section == SUN) return scene->has_sun;
+    return section == CLASSIC ? scene->classic != NULL : true;
+}
+
+static void save_light(nb_save *save, const nb_scene_reader *in, int section)
+{
+    const nebel_scene_data *was = save->before, *now = save->changed;
+    const double *const from[SECTIONS] = {NULL, was->ambient, was->background, &was->max_opacity};
+    const double *const to[SECTIONS] = {NULL, now->ambient, now->background, &now->max_opacity};
+    nb_edit_numbers(&save->edit, in->json, &save->root, section_names[section], section == MAX_OPACITY ? 1 : 3,
+                    from[section], to[section], NB_EDIT_AMOUNT);
+}
+
+/* One that is in the file, and stays there. */
+static void save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, int section)
+{
+    switch (section) {
+    case CAMERA:
+        save_camera(save, in);
+        break;
+    case SUN:
+        save_sun(save, in, node);
+        break;
+    case CLASSIC:
+        save_factor(save, in, node);
+        break;
+    case FOG:
+        nb_save_entries(save, in, node);
+        break;
+    case MODELS:
+        nb_edit_remove(&save->edit, save->models.spans, save->models.count);
+        break;
+    default:
+        save_light(save, in, section);
+    }
+}
+
+void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
+{
+    int section = 0;
+    while (section < SECTIONS && !nb_json_has_key(node, section_names[section])) section++;
+    /* A file that has got such a section since is refused at its end. */
+    const bool is_new = section < SECTIONS && !is_there(save->before, section);
+    const bool goes = section < SECTIONS && !is_there(save->changed, section);
+    save->sections[save->section_count++] = (nb_edit_span){node->key_offset, node->end, goes};
+    if (!goes) save->root = (nb_edit_object){nb_json_parent(in->json, node), node->key_offset, node->end};
+    if (section == SECTIONS) return;
+    save->done |= 1u << section;
+    if (!goes && !is_new) save_section(save, in, node, section);
+}
+
+/* One that is not in the file. */
+static void add_section(nb_save *save, const nb_scene_reader *in, int section)
+{
+    if (section == CAMERA)
+        save_camera(save, in);
+    else if (section <= MAX_OPACITY)
+        save_light(save, in, section);
+    else if (section == SUN && save->changed->has_sun)
+        add_sun(save, &in->space);
+    else if (section == CLASSIC && save->changed->classic != NULL)
+        add_factor(save, &in->space);
+}
+
+static bool check_counts(const nb_scene_reader *in, const nebel_scene_data *before, const nb_json_node *root)
+{
+    const nebel_scene_data *now = &in->scene->data;
+    if (now->volume_count != before->volume_count)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
+                            "has %zu volumes of fog where %zu were; the file has changed, load it again",
+                            now->volume_count, before->volume_count);
+    if (in->scene->model_count != before->model_count)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
+                            "has %zu models where %zu were; the file has changed, load it again",
+                            in->scene->model_count, before->model_count);
+    if ((now->cells == NULL) == (before->cells == NULL) && (now->classic == NULL) == (before->classic == NULL) &&
+        now->has_sun == before->has_sun)
+        return true;
+    return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
+                        "has not the sections that it had; the file has changed, load it again");
+}
+
+bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *root)
+{
+    if (!check_counts(in, save->before, root) || !nb_save_check_removed(save, in, root)) return false;
+    save->root.node = root;
+    for (int i = 0; i < SECTIONS; i++)
+        if ((save->done >> i & 1) == 0) add_section(save, in, i);
+    nb_edit_remove(&save->edit, save->sections, save->section_count);
+    return true;
+}
