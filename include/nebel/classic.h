@@ -296,11 +296,12 @@ typedef struct nebel_tessellation {
  * exceed both limits. The longest edge of a triangle is halved first, so that angles stay at least half as wide as they
  * were. Triangles without area are triangles like others.
  *
- * The fog: volumes of constant density that only add, each world, box, convex, sphere, ellipsoid or cylinder. Any
+ * The fog: any but soft edges of cylinders, cones, capsules and convex bodies of more than 32 planes, and volumes that
+ * have, together with those that exclude or replace their fog where both may be, more than 8 leaves. Any
  * thread. *tessellation is NULL on an error: ARGUMENT (NULL, a stride below 12, an index that is too large, a channel
  * or allocator that is none, a depth above 48), VALUE (a bound that is negative or not finite, an eye or origin that is
  * not finite or more than 1e15 m away, a vertex of a triangle that is not finite, or farther than 5e5 m from the eye
- * along an axis), UNSUPPORTED (other fog), LIMIT (2^32 - 1 vertices or edges), MEMORY. */
+ * along an axis), UNSUPPORTED (fog without a proof), LIMIT (2^32 - 1 vertices or edges), MEMORY. */
 nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessellation_desc *desc,
                               const nebel_triangles *triangles, nebel_tessellation **tessellation);
 void nebel_destroy_tessellation(nebel_tessellation *tessellation); /* NULL is fine */

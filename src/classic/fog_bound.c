@@ -1,7 +1,4 @@
-/* Interval arithmetic of first order over a triangle. A jet encloses a number that varies over the triangle, and its
- * derivatives along the three edges; every step of the formula that gives transmittance takes jets to jets.
- *
- * The bound. Let g = f - L, which is 0 at the corners c, and let the derivative of f along the edge from i to j lie in
+/* The bound. Let g = f - L, which is 0 at the corners c, and let the derivative of f along the edge from i to j lie in
  * an interval of width W_ij; that of g lies in one of the same width. From corner c to a place of weights w the way is
  * the sum over j of w_j times the edge from c to j, so that g <= sum_j w_j high_cj for every c, and by weighing these
  * with w_c, because high_cj + high_jc = W_cj,
@@ -13,8 +10,14 @@
  * hull of both. As widths shrink with the square of the triangle, so does the bound where fog is smooth. Besides, f and
  * L both lie between the least and the largest f: where a sphere's silhouette or a discontinuity crosses the triangle,
  * and derivatives have no bound, that is what is left.
+ *
+ * Bodies of several leaves, and what takes fog away, become a sum over intersections of leaves, which are convex: a
+ * function of what is inside which leaves, x_i in {0, 1}, is a sum of products of some x_i (Moebius inversion). What
+ * density a body has is integrated along the stretch of the way in such an intersection in closed form.
  */
 #include "classic/fog_bound.h"
+
+#include "classic/stretch.h"
 
 #include <math.h>
 
@@ -22,365 +25,466 @@
  * the digits are lost. */
 #define ROUNDING 1e-6
 
-/* Stands for infinity, but without making NaNs of zeros. */
-#define ENDLESS 1e60
+enum { MOST_LEAVES = 8, MOST_SOFT_PLANES = 32, MOST_FACTORS = 3 };
 
-typedef struct interval {
-    double low, high;
-} interval;
+/* A leaf of a body, and the eye in its frame. */
+typedef struct known_leaf {
+    const nb_volume *body;
+    const nb_leaf *leaf;
+    double eye[3];
+} known_leaf;
 
-typedef struct jet {
-    interval value, along[3]; /* along the edges from corner 0 to 1, 1 to 2, 2 to 0 */
-} jet;
+/* The fog of a body in an intersection of leaves, so many times. */
+typedef struct part {
+    const nb_volume *body; /* whose fog it is */
+    double extinction;     /* times the coefficient of the intersection */
+    size_t leaf_count;
+    known_leaf leaves[MOST_LEAVES];
+} part;
 
-/* A triangle as seen from the eye, in the frame of a leaf or of the world. */
-typedef struct sight {
-    double way[3][3];  /* to the corners */
-    double edge[3][3]; /* from corner i to the next */
-} sight;
+struct nb_fog_bound {
+    nebel_allocator allocator;
+    double eye[3], least_factor;
+    part *parts;
+    size_t part_count, part_room;
+};
 
-static double dot(const double a[3], const double b[3])
+/* ---- integrals along a stretch ----------------------------------------------------------------- */
+
+/* A triangle, and the length of the way to it. */
+typedef struct view {
+    const sight *world;
+    jet length;
+} view;
+
+/* offset + share times slope. */
+typedef struct line {
+    double offset;
+    jet slope;
+} line;
+
+static jet extent(const stretch *inside)
 {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    return greatest(difference(inside->to, inside->from), constant(0));
 }
 
-/* Of numbers, so that no call of fmin has to think of NaNs. */
-static inline double smaller(double a, double b)
+static int is_empty(const stretch *inside)
 {
-    return a < b ? a : b;
+    return inside->to.value.high <= inside->from.value.low;
 }
 
-static inline double larger(double a, double b)
+/* Where a stretch begins, but within the way where it is empty. */
+static jet beginning(const stretch *inside)
 {
-    return a > b ? a : b;
+    return least(inside->from, constant(1));
 }
 
-/* ---- intervals ------------------------------------------------------------------------------- */
-
-static inline interval hull(interval a, interval b)
+static jet at_share(const line *l, jet share)
 {
-    return (interval){smaller(a.low, b.low), larger(a.high, b.high)};
+    return sum(constant(l->offset), product(share, l->slope));
 }
 
-static inline interval hull_of(double a, double b, double c)
+/* Of the product of at most three lines: two points of Gauss are exact. */
+static jet integrate_lines(const line *lines, size_t count, const stretch *inside)
 {
-    return hull((interval){a < b ? a : b, a < b ? b : a}, (interval){c, c});
-}
-
-static inline interval scale(double s, interval a)
-{
-    return s >= 0 ? (interval){s * a.low, s * a.high} : (interval){s * a.high, s * a.low};
-}
-
-static inline interval multiply(interval a, interval b)
-{
-    return hull(scale(a.low, b), scale(a.high, b));
-}
-
-static inline interval add(interval a, interval b)
-{
-    return (interval){a.low + b.low, a.high + b.high};
-}
-
-static inline interval subtract(interval a, interval b)
-{
-    return (interval){a.low - b.high, a.high - b.low};
-}
-
-/* ---- jets ------------------------------------------------------------------------------------ */
-
-static const interval endless = {-ENDLESS, ENDLESS};
-
-static inline jet constant(double value)
-{
-    return (jet){{value, value}, {{0, 0}, {0, 0}, {0, 0}}};
-}
-
-static inline jet unknown(double low, double high)
-{
-    return (jet){{low, high}, {endless, endless, endless}};
-}
-
-/* A linear function of the place, from its values at the corners. */
-static inline jet linear(const double at[3])
-{
-    jet a = {.value = hull_of(at[0], at[1], at[2])};
-    for (int i = 0; i < 3; i++) a.along[i].low = a.along[i].high = at[(i + 1) % 3] - at[i];
-    return a;
-}
-
-static inline jet sum(jet a, jet b)
-{
-    a.value = add(a.value, b.value);
-    for (int i = 0; i < 3; i++) a.along[i] = add(a.along[i], b.along[i]);
-    return a;
-}
-
-static inline jet difference(jet a, jet b)
-{
-    a.value = subtract(a.value, b.value);
-    for (int i = 0; i < 3; i++) a.along[i] = subtract(a.along[i], b.along[i]);
-    return a;
-}
-
-static inline jet times(double s, jet a)
-{
-    a.value = scale(s, a.value);
-    for (int i = 0; i < 3; i++) a.along[i] = scale(s, a.along[i]);
-    return a;
-}
-
-static inline jet product(jet a, jet b)
-{
-    jet p = {.value = multiply(a.value, b.value)};
-    for (int i = 0; i < 3; i++) p.along[i] = add(multiply(a.along[i], b.value), multiply(a.value, b.along[i]));
-    return p;
-}
-
-/* A function of a jet by its range and the range of its derivative. */
-static inline jet chain(interval value, interval slope, jet a)
-{
-    jet f = {.value = value};
-    for (int i = 0; i < 3; i++) f.along[i] = multiply(slope, a.along[i]);
-    return f;
-}
-
-static inline jet least(jet a, jet b)
-{
-    if (a.value.high <= b.value.low) return a;
-    if (b.value.high <= a.value.low) return b;
-    jet m = {.value = {smaller(a.value.low, b.value.low), smaller(a.value.high, b.value.high)}};
-    for (int i = 0; i < 3; i++) m.along[i] = hull(a.along[i], b.along[i]);
-    return m;
-}
-
-static inline jet greatest(jet a, jet b)
-{
-    if (a.value.low >= b.value.high) return a;
-    if (b.value.low >= a.value.high) return b;
-    jet m = {.value = {larger(a.value.low, b.value.low), larger(a.value.high, b.value.high)}};
-    for (int i = 0; i < 3; i++) m.along[i] = hull(a.along[i], b.along[i]);
-    return m;
-}
-
-/* a.value.low > 0 */
-static inline jet reciprocal(jet a)
-{
-    const double steep = 1 / a.value.low, flat = 1 / a.value.high;
-    return chain((interval){flat, steep}, (interval){-steep * steep, -flat * flat}, a);
-}
-
-/* Where it may come near 0 its derivative has no bound. */
-static inline jet root(jet a)
-{
-    const double low = sqrt(larger(a.value.low, 0)), high = sqrt(larger(a.value.high, 0));
-    if (low <= 1e-8 * high) return unknown(low, high);
-    return chain((interval){low, high}, (interval){.5 / high, .5 / low}, a);
-}
-
-static inline jet exponential_of_minus(jet a)
-{
-    const interval value = {exp(-a.value.high), exp(-a.value.low)};
-    return chain(value, (interval){-value.high, -value.low}, a);
-}
-
-/* ---- the triangle ---------------------------------------------------------------------------- */
-
-static inline void set_edges(sight *s)
-{
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) s->edge[i][k] = s->way[(i + 1) % 3][k] - s->way[i][k];
-}
-
-/* Least distance of the origin from a triangle in so many dimensions, or less: that of the middle, without the radius
- * about it. */
-static inline double least_distance(const sight *s, int dimensions)
-{
-    double middle[3], square = 0, radius = 0;
-    for (int k = 0; k < dimensions; k++) {
-        middle[k] = (s->way[0][k] + s->way[1][k] + s->way[2][k]) / 3;
-        square += middle[k] * middle[k];
+    const double places[2] = {0.21132486540518711775, 0.78867513459481288225};
+    const jet from = beginning(inside), size = extent(inside);
+    jet mean = constant(0);
+    for (int i = 0; i < 2; i++) {
+        const jet share = sum(from, times(places[i], size));
+        jet density = constant(.5);
+        for (size_t k = 0; k < count; k++) density = product(density, at_share(&lines[k], share));
+        mean = sum(mean, density);
     }
+    return product(size, mean);
+}
+
+/* n . (eye + share way - origin) */
+static line line_along(const double normal[3], const double eye[3], const double origin[3], const sight *s)
+{
+    double at[3], from[3];
     for (int i = 0; i < 3; i++) {
-        double off = 0;
-        for (int k = 0; k < dimensions; k++) off += (s->way[i][k] - middle[k]) * (s->way[i][k] - middle[k]);
-        radius = larger(radius, off);
+        at[i] = nb_vector_dot(normal, s->way[i]);
+        from[i] = eye[i] - origin[i];
     }
-    return larger(sqrt(square) - sqrt(radius), 0);
+    return (line){nb_vector_dot(normal, from), linear(at)};
 }
 
-/* |way|^2 in so many dimensions; its derivative along an edge is linear. */
-static inline jet square_of_way(const sight *s, int dimensions)
+static line plus(double offset, double factor, const line *l)
 {
-    const double near = least_distance(s, dimensions);
-    double products[3][3] = {{0}};
-    for (int i = 0; i < 3; i++)
-        for (int j = i; j < 3; j++) {
-            for (int k = 0; k < dimensions; k++) products[i][j] += s->way[i][k] * s->way[j][k];
-            products[j][i] = products[i][j];
+    return (line){offset + factor * l->offset, times(factor, l->slope)};
+}
+
+/* The part where the line is not negative. */
+static void part_at_zero(stretch *inside, const line *l)
+{
+    part_at(inside, l->offset, times(-1, l->slope));
+}
+
+/* ---- height -------------------------------------------------------------------------------------- */
+
+/* (1 - e^-x) / x, which falls, and its derivative, which rises. */
+static double ratio_of(double x)
+{
+    return fabs(x) < 1e-5 ? 1 - x * (.5 - x / 6) : -expm1(-x) / x;
+}
+
+static double slope_of_ratio(double x)
+{
+    if (fabs(x) < 1e-2) return -.5 + x * (1. / 3 - x * (.125 - x / 30));
+    return (exp(-x) * (1 + x) - 1) / (x * x);
+}
+
+static jet ratio(jet x)
+{
+    return chain((interval){ratio_of(x.value.high), ratio_of(x.value.low)},
+                 (interval){slope_of_ratio(x.value.low), slope_of_ratio(x.value.high)}, x);
+}
+
+/* Of e^-u, from the end where the fog is dense. Where the density comes near its limit, and where a triangle is so
+ * large that the fog is dense at either end, nothing more is known than the largest density. */
+static jet integrate_exponential(const line *u, const stretch *inside)
+{
+    const double lowest = u->offset + smaller(u->slope.value.low, 0);
+    const int sinks = u->slope.value.low + u->slope.value.high < 0;
+    const jet from = beginning(inside), size = extent(inside), to = sum(from, size);
+    const jet change = product(sinks ? times(-1, u->slope) : u->slope, size);
+    if (lowest < -25 || change.value.low < -100) return unknown(0, exp(-larger(lowest, -50)));
+    return product(product(size, exponential_of_minus(at_share(u, sinks ? to : from))), ratio(change));
+}
+
+static jet integrate_height(const nebel_density *density, const line *u, const stretch *inside)
+{
+    if (density->below == NEBEL_BELOW_GROW) return integrate_exponential(u, inside);
+    stretch above = *inside, below = *inside;
+    const line depth = plus(0, -1, u);
+    part_at_zero(&above, u);
+    part_at_zero(&below, &depth);
+    return sum(is_empty(&above) ? constant(0) : integrate_exponential(u, &above), extent(&below));
+}
+
+/* ---- linear and gaussian ------------------------------------------------------------------------- */
+
+/* Of u clamped to 0..1. */
+static jet integrate_ramp(const line *u, const stretch *inside)
+{
+    stretch ramp = *inside, full = *inside;
+    const line rest = plus(1, -1, u), over = plus(-1, 1, u);
+    part_at_zero(&ramp, u);
+    part_at_zero(&ramp, &rest);
+    part_at_zero(&full, &over);
+    return sum(is_empty(&ramp) ? constant(0) : integrate_lines(u, 1, &ramp), extent(&full));
+}
+
+static jet error_function(jet x)
+{
+    const double steepest = 1.12837916709551257390, least_far = x.value.low > 0    ? x.value.low
+                                                                : x.value.high < 0 ? x.value.high
+                                                                                   : 0;
+    const double farthest = larger(fabs(x.value.low), fabs(x.value.high));
+    const interval slope = {steepest * exp(-farthest * farthest), steepest * exp(-least_far * least_far)};
+    return chain((interval){erf(x.value.low), erf(x.value.high)}, slope, x);
+}
+
+/* In metres: e^-m (erf x_to - erf x_from) sigma sqrt(pi / 2), where x = (share |way| + e . way / |way|) / (sqrt(2)
+ * sigma), e from the centre to the eye, and m = |e x way|^2 / (2 sigma^2 |way|^2). */
+static jet integrate_gaussian(const nebel_density *density, const double eye[3], const stretch *inside, const view *v)
+{
+    double from[3], at[3];
+    for (int i = 0; i < 3; i++) from[i] = eye[i] - density->center[i];
+    for (int i = 0; i < 3; i++) at[i] = nb_vector_dot(from, v->world->way[i]);
+    if (v->length.value.low <= 1e-12 * v->length.value.high) return unknown(0, v->length.value.high);
+    const double sigma = density->sigma, width = sigma * sqrt(2);
+    const sight moment = moments(v->world, 3, from);
+    const jet over = reciprocal(v->length), start = product(linear(at), over);
+    const jet m = product(times(.5 / (sigma * sigma), square_of_way(&moment, 3)), product(over, over));
+    const jet to = sum(product(inside->to, v->length), start), first = sum(product(inside->from, v->length), start);
+    const jet parts = difference(error_function(times(1 / width, to)), error_function(times(1 / width, first)));
+    const jet height = exponential_of_minus(m);
+    return times(sigma * sqrt(acos(-1) / 2), product(height, greatest(parts, constant(0))));
+}
+
+/* ---- balls ---------------------------------------------------------------------------------------- */
+
+/* From 0 to x of max(c - y^2, 0)^power. It rises with x, and away from 0 with c. */
+static double chord_integral(int power, double c, double x)
+{
+    if (c <= 0) return 0;
+    const double end = sqrt(c), y = smaller(larger(x, -end), end), s = y * y;
+    switch (power) {
+    case 0:
+        return y;
+    case 1:
+        return y * (c - s / 3);
+    case 2:
+        return y * (c * c - s * (2 * c / 3 - s / 5));
+    default:
+        return y * (c * c * c - s * (c * c - s * (3 * c / 5 - s / 7)));
+    }
+}
+
+static interval chord_integrals(int power, interval c, interval x)
+{
+    return (interval){chord_integral(power, x.low < 0 ? c.high : c.low, x.low),
+                      chord_integral(power, x.high > 0 ? c.high : c.low, x.high)};
+}
+
+static double chord_density(int power, double c, double x)
+{
+    return pow(larger(c - x * x, 0), power);
+}
+
+static jet chord(int power, jet c, jet x)
+{
+    const interval by_c = scale(power, chord_integrals(power - 1, c.value, x.value));
+    const double least_far = x.value.low > 0 ? x.value.low : x.value.high < 0 ? x.value.high : 0;
+    const double farthest = larger(fabs(x.value.low), fabs(x.value.high));
+    const interval by_x = {chord_density(power, c.value.low, farthest), chord_density(power, c.value.high, least_far)};
+    jet made = {.value = chord_integrals(power, c.value, x.value)};
+    for (int i = 0; i < 3; i++) made.along[i] = add(multiply(by_c, c.along[i]), multiply(by_x, x.along[i]));
+    return made;
+}
+
+/* max(c - x^2, 0)^power between two x. */
+static jet chord_between(int power, jet c, jet from, jet to)
+{
+    return greatest(difference(chord(power, c, to), chord(power, c, from)), constant(0));
+}
+
+/* Of the density of a ball: (1 - r^2)^power, or min(1, gain (1 - r^2)), which is a difference of two balls. In metres.
+ * x = (share |w|^2 + e . w) / (radius |w|) in the ball's frame, c = 1 - |e x w|^2 / (radius |w|)^2; all that is there
+ * vanishes at the silhouette. */
+static jet integrate_ball(const part *p, const stretch *inside, const view *v, const sight *s)
+{
+    const known_leaf *const own = &p->leaves[0];
+    const double radius = own->leaf->radius, inverse = 1 / radius;
+    const jet speed = length_of_way(s);
+    if (speed.value.low <= 1e-12 * speed.value.high) return unknown(0, v->length.value.high);
+    double at[3];
+    for (int i = 0; i < 3; i++) at[i] = nb_vector_dot(own->eye, s->way[i]);
+    const sight moment = moments(s, 3, own->eye);
+    const jet over = reciprocal(speed), start = product(linear(at), over);
+    const jet m = product(times(inverse * inverse, square_of_way(&moment, 3)), product(over, over));
+    const jet c = difference(constant(1), m);
+    const jet from = times(inverse, sum(product(inside->from, speed), start));
+    const jet to = times(inverse, sum(product(inside->to, speed), start));
+    const nebel_density *const density = &p->body->density;
+    const jet metres = times(radius, product(v->length, over));
+    if (density->type == NEBEL_DENSITY_RADIAL) return product(metres, chord_between(density->power, c, from, to));
+    const double gain = p->body->edge.gain;
+    const jet inner = chord_between(1, difference(c, constant(1 / gain)), from, to);
+    const jet edge = difference(chord_between(1, c, from, to), inner);
+    return product(metres, times(gain, greatest(edge, constant(0))));
+}
+
+/* ---- soft edges of planes ------------------------------------------------------------------------- */
+
+/* The least of min(1, depth behind a face / width): in the part of the body where one face is the nearest, or all are
+ * far, it is one line. */
+static jet integrate_soft_planes(const part *p, const stretch *inside, const sight *s)
+{
+    static const double origin[3] = {0, 0, 0};
+    const known_leaf *const own = &p->leaves[0];
+    const size_t count = own->leaf->face_count;
+    line depths[MOST_SOFT_PLANES];
+    jet integral;
+    stretch plateau = *inside;
+    for (size_t i = 0; i < count; i++) {
+        const nb_face *const face = &own->body->faces[own->leaf->first_face + i];
+        const double scale = face->inverse_length / own->body->density.distance;
+        const line along = line_along(face->normal, own->eye, origin, s);
+        depths[i] = plus(face->distance * scale, -scale, &along);
+        const line over = plus(-1, 1, &depths[i]);
+        part_at_zero(&plateau, &over);
+    }
+    integral = extent(&plateau);
+    for (size_t i = 0; i < count; i++) {
+        stretch near = *inside;
+        const line rest = plus(1, -1, &depths[i]);
+        part_at_zero(&near, &depths[i]);
+        part_at_zero(&near, &rest);
+        for (size_t k = 0; k < count && !is_empty(&near); k++) {
+            const line farther = {depths[k].offset - depths[i].offset, difference(depths[k].slope, depths[i].slope)};
+            if (k != i) part_at_zero(&near, &farther);
         }
-    jet a = {.value = {near * near, larger(products[0][0], larger(products[1][1], products[2][2]))}};
-    for (int i = 0; i < 3; i++) {
-        const double *const here = products[i], *const next = products[(i + 1) % 3];
-        a.along[i] = scale(2, hull_of(next[0] - here[0], next[1] - here[1], next[2] - here[2]));
+        if (!is_empty(&near)) integral = sum(integral, integrate_lines(&depths[i], 1, &near));
     }
-    return a;
+    return integral;
 }
 
-/* |way|, which changes no faster than the place does. */
-static inline jet length_of_way(const sight *s)
+static void part_at_axis(stretch *inside, jet rise, double low, double high, double eye)
 {
-    const jet square = square_of_way(s, 3);
-    jet a = root(square);
-    for (int i = 0; i < 3; i++) {
-        const double edge = sqrt(dot(s->edge[i], s->edge[i]));
-        a.along[i].low = larger(a.along[i].low, -edge);
-        a.along[i].high = smaller(a.along[i].high, edge);
-    }
-    return a;
+    part_at(inside, high - eye, rise);
+    part_at(inside, eye - low, times(-1, rise));
 }
 
-/* ---- shares of the way in a leaf -------------------------------------------------------------- */
-
-/* The stretch [from, to] of the way, as shares of it, that is in a body. */
-typedef struct stretch {
-    jet from, to;
-} stretch;
-
-/* E / n where n > E, else 1; E > 0. */
-static inline jet crossing(double e, jet n)
+/* The product over the axes of min(1, depth behind the nearer face / width): each axis has an edge on both sides and a
+ * plateau, and so the box at most 27 parts. */
+static jet integrate_soft_box(const part *p, const stretch *inside, const sight *s, int axis, line *lines, size_t count)
 {
-    const interval range = n.value;
-    if (range.high <= e) return constant(1);
-    const double last = range.low > e ? e / range.low : 1, first = e / range.high;
-    const double steep = range.low > e ? -e / (range.low * range.low) : -1 / e;
-    const double flat = range.low > e ? -e / (range.high * range.high) : 0;
-    return chain((interval){first, last}, (interval){steep, flat}, n);
-}
-
-/* A half-space: share times rise <= depth, where depth is that of the eye in it. */
-static inline void cut(stretch *inside, double depth, jet rise)
-{
-    if (depth >= 0 && rise.value.high <= depth) return;
-    if (depth > 0)
-        inside->to = least(inside->to, crossing(depth, rise));
-    else if (depth < 0)
-        inside->from = greatest(inside->from, crossing(-depth, times(-1, rise)));
-    else if (rise.value.low > 0)
-        inside->to = constant(0);
-    else
-        inside->to = least(inside->to, unknown(0, 1));
-}
-
-static inline void cut_axis(stretch *inside, const sight *s, int axis, double low, double high, double eye)
-{
+    if (is_empty(inside)) return constant(0);
+    if (axis == 3) return integrate_lines(lines, count, inside);
+    const known_leaf *const own = &p->leaves[0];
+    const double low = own->leaf->low[axis], high = own->leaf->high[axis];
+    const double width = own->body->density.distance, edge = smaller(width, .5 * (high - low));
+    stretch near = *inside, far = *inside, plateau = *inside;
     const double at[3] = {s->way[0][axis], s->way[1][axis], s->way[2][axis]};
     const jet rise = linear(at);
-    cut(inside, high - eye, rise);
-    cut(inside, eye - low, times(-1, rise));
+    part_at_axis(&near, rise, low, low + edge, own->eye[axis]);
+    part_at_axis(&far, rise, high - edge, high, own->eye[axis]);
+    lines[count] = (line){(own->eye[axis] - low) / width, times(1 / width, rise)};
+    jet integral = integrate_soft_box(p, &near, s, axis + 1, lines, count + 1);
+    lines[count] = (line){(high - own->eye[axis]) / width, times(-1 / width, rise)};
+    integral = sum(integral, integrate_soft_box(p, &far, s, axis + 1, lines, count + 1));
+    if (high - low <= 2 * edge) return integral;
+    part_at_axis(&plateau, rise, low + edge, high - edge, own->eye[axis]);
+    return sum(integral, integrate_soft_box(p, &plateau, s, axis + 1, lines, count));
 }
 
-static inline void cut_faces(stretch *inside, const sight *s, const nb_face *faces, size_t count, const double eye[3])
-{
-    for (size_t f = 0; f < count; f++) {
-        double at[3];
-        for (int i = 0; i < 3; i++) at[i] = dot(faces[f].normal, s->way[i]);
-        cut(inside, faces[f].distance - dot(faces[f].normal, eye), linear(at));
-    }
-}
+/* ---- the fog of a part ----------------------------------------------------------------------------- */
 
-/* e x way, linear like the way. In two dimensions it has one component, and e and the ways no third. */
-static inline sight moments(const sight *s, int dimensions, const double e[3])
+static sight in_leaf(const nb_leaf *leaf, const sight *world)
 {
-    sight m;
-    for (int i = 0; i < 3; i++) {
-        const double *const w = s->way[i];
-        m.way[i][0] = dimensions == 3 ? e[1] * w[2] - e[2] * w[1] : 0;
-        m.way[i][1] = dimensions == 3 ? e[2] * w[0] - e[0] * w[2] : 0;
-        m.way[i][2] = e[0] * w[1] - e[1] * w[0];
-    }
-    set_edges(&m);
-    return m;
-}
-
-/* A ball, or an endless tube in two dimensions: A share^2 + 2 B share + C <= 0, whose discriminant B^2 - A C is
- * A radius^2 - |e x way|^2 by Lagrange's identity, of terms that know less of each other. Where a part of the triangle
- * is beyond the silhouette both ends meet, and their difference, 0 there, is in what is found. */
-static inline void cut_round(stretch *inside, const sight *s, int dimensions, double radius, const double eye[3])
-{
-    double at[3] = {0, 0, 0};
-    for (int k = 0; k < dimensions; k++)
-        for (int i = 0; i < 3; i++) at[i] += eye[k] * s->way[i][k];
-    const sight moment = moments(s, dimensions, eye);
-    const jet a = square_of_way(s, dimensions), b = linear(at);
-    const jet discriminant = difference(times(radius * radius, a), square_of_way(&moment, 3));
-    if (discriminant.value.high <= 0) {
-        inside->to = constant(0);
-        return;
-    }
-    if (a.value.low <= 1e-12 * a.value.high) {
-        inside->from = greatest(inside->from, unknown(0, 1));
-        inside->to = least(inside->to, unknown(0, 1));
-        return;
-    }
-    const jet half = root(discriminant), over = reciprocal(a);
-    inside->from = greatest(inside->from, product(times(-1, sum(b, half)), over));
-    inside->to = least(inside->to, product(difference(half, b), over));
-}
-
-/* The share of the way that is in the volume's one leaf. */
-static inline jet share_in_leaf(const nb_volume *body, const double eye[3], const sight *world)
-{
-    const nb_leaf *leaf = &body->leaves[0];
-    stretch inside = {constant(0), constant(1)};
-    double from[3], at[3];
     sight s;
-    for (int i = 0; i < 3; i++) from[i] = (eye[i] - leaf->origin[i]) - leaf->origin_rest[i];
-    for (int k = 0; k < 3; k++) {
-        at[k] = dot(leaf->matrix + 3 * k, from);
-        for (int i = 0; i < 3; i++) s.way[i][k] = dot(leaf->matrix + 3 * k, world->way[i]);
-    }
+    if (leaf->aligned) return *world;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) s.way[i][k] = nb_vector_dot(leaf->matrix + 3 * k, world->way[i]);
     set_edges(&s);
-    if (leaf->type == NB_LEAF_BOX)
-        for (int k = 0; k < 3; k++) cut_axis(&inside, &s, k, leaf->low[k], leaf->high[k], at[k]);
-    if (leaf->type == NB_LEAF_PLANES) cut_faces(&inside, &s, body->faces + leaf->first_face, leaf->face_count, at);
-    if (leaf->type == NB_LEAF_BALL) cut_round(&inside, &s, 3, leaf->radius, at);
-    if (leaf->type == NB_LEAF_TUBE) {
-        cut_axis(&inside, &s, 2, 0, 1, at[2]);
-        cut_round(&inside, &s, 2, 1, at);
+    return s;
+}
+
+static int has_edge_of_its_own(const nb_volume *body)
+{
+    return body->density.type == NEBEL_DENSITY_RADIAL || body->density.type == NEBEL_DENSITY_SOFT_EDGE;
+}
+
+static jet integrate_own_edge(const part *p, const stretch *inside, const view *v)
+{
+    const nb_leaf *const leaf = p->leaves[0].leaf;
+    const sight s = in_leaf(leaf, v->world);
+    line lines[MOST_FACTORS];
+    if (leaf->type == NB_LEAF_BALL) return integrate_ball(p, inside, v, &s);
+    const jet shares = leaf->type == NB_LEAF_BOX ? integrate_soft_box(p, inside, &s, 0, lines, 0)
+                                                 : integrate_soft_planes(p, inside, &s);
+    return product(v->length, shares);
+}
+
+static jet integrate_linear(const nebel_density *density, const double eye[3], const stretch *inside, const view *v)
+{
+    double axis[3], square = 0;
+    for (int i = 0; i < 3; i++) {
+        axis[i] = density->to[i] - density->from[i];
+        square += axis[i] * axis[i];
     }
-    return greatest(difference(inside.to, inside.from), constant(0));
+    for (int i = 0; i < 3; i++) axis[i] /= square;
+    const line u = line_along(axis, eye, density->from, v->world);
+    return product(v->length, integrate_ramp(&u, inside));
 }
 
-/* ---- the fog --------------------------------------------------------------------------------- */
-
-static int is_known_leaf(nb_leaf_type type)
+/* The integral of the density along a stretch of the way [m]. */
+static jet integrate(const part *p, const double eye[3], const stretch *inside, const view *v)
 {
-    return type == NB_LEAF_WORLD || type == NB_LEAF_BOX || type == NB_LEAF_PLANES || type == NB_LEAF_BALL ||
-           type == NB_LEAF_TUBE;
-}
-
-int nb_fog_can_be_bounded(const nebel_snapshot *snapshot)
-{
-    if (snapshot->max_opacity < 1) return 0;
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *body = &snapshot->media[i].body;
-        if (nb_volume_covers(body) || nb_volume_has_distances(body) || body->step_count != 1 ||
-            body->density.type != NEBEL_DENSITY_CONSTANT || !is_known_leaf(body->leaves[0].type))
-            return 0;
+    const nebel_density *const density = &p->body->density;
+    if (is_empty(inside)) return constant(0);
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT: {
+        const double up[3] = {0, 1 / density->scale_height, 0}, base[3] = {0, density->base, 0};
+        const line u = line_along(up, eye, base, v->world);
+        return product(v->length, integrate_height(density, &u, inside));
     }
-    return 1;
+    case NEBEL_DENSITY_LINEAR:
+        return integrate_linear(density, eye, inside, v);
+    case NEBEL_DENSITY_GAUSSIAN:
+        return integrate_gaussian(density, eye, inside, v);
+    case NEBEL_DENSITY_RADIAL:
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return integrate_own_edge(p, inside, v);
+    default:
+        return product(v->length, extent(inside));
+    }
 }
 
-static jet optical_depth(const nebel_snapshot *snapshot, const double eye[3], int channel, const sight *s)
+/* A capsule is its tube and, beyond the tube's ends, two balls; other leaves are one piece. */
+static size_t piece_count(const nb_leaf *leaf)
 {
+    return leaf->type == NB_LEAF_CAPSULE ? 3 : 1;
+}
+
+static void cut_capsule(stretch *inside, const known_leaf *known, const sight *s, size_t piece)
+{
+    const double length = known->leaf->length, *const eye = known->eye;
+    const double center[3] = {eye[0], eye[1], eye[2] - (piece == 2 ? length : 0)};
+    const double along[3] = {s->way[0][2], s->way[1][2], s->way[2][2]};
+    const jet rise = linear(along), fall = times(-1, rise);
+    if (piece != 1) part_at(inside, piece == 0 ? eye[2] : eye[2] - length, fall);
+    if (piece != 2) part_at(inside, piece == 0 ? length - eye[2] : -eye[2], rise);
+    cut_round(inside, s, piece == 0 ? 2 : 3, 1, piece == 0 ? eye : center);
+}
+
+static void cut_leaf(stretch *inside, const known_leaf *known, size_t piece, const view *v)
+{
+    const nb_leaf *const leaf = known->leaf;
+    const sight s = in_leaf(leaf, v->world);
+    if (nb_volume_has_distances(known->body)) cut_distances(inside, known->body, v->length);
+    switch (leaf->type) {
+    case NB_LEAF_BOX:
+        for (int k = 0; k < 3; k++) cut_axis(inside, &s, k, leaf->low[k], leaf->high[k], known->eye[k]);
+        break;
+    case NB_LEAF_PLANES:
+        cut_faces(inside, &s, known->body->faces + leaf->first_face, leaf->face_count, known->eye);
+        break;
+    case NB_LEAF_BALL:
+        cut_round(inside, &s, 3, leaf->radius, known->eye);
+        break;
+    case NB_LEAF_TUBE:
+        cut_axis(inside, &s, 2, 0, 1, known->eye[2]);
+        cut_round(inside, &s, 2, 1, known->eye);
+        break;
+    case NB_LEAF_CONE:
+        cut_axis(inside, &s, 2, 0, 1, known->eye[2]);
+        cut_cone(inside, &s, leaf->radius, leaf->slope, known->eye);
+        break;
+    case NB_LEAF_CAPSULE:
+        cut_capsule(inside, known, &s, piece);
+        break;
+    case NB_LEAF_WORLD:
+        break;
+    }
+}
+
+/* Over all choices of one piece of each leaf that is not cut yet. */
+static jet integrate_pieces(const part *p, const double eye[3], size_t next, stretch inside, const view *v)
+{
+    for (; next < p->leaf_count && piece_count(p->leaves[next].leaf) == 1; next++)
+        cut_leaf(&inside, &p->leaves[next], 0, v);
+    if (next == p->leaf_count) return integrate(p, eye, &inside, v);
+    jet integral = constant(0);
+    for (size_t i = 0; i < piece_count(p->leaves[next].leaf); i++) {
+        stretch piece = inside;
+        cut_leaf(&piece, &p->leaves[next], i, v);
+        if (!is_empty(&piece)) integral = sum(integral, integrate_pieces(p, eye, next + 1, piece, v));
+    }
+    return integral;
+}
+
+static jet depth_of_part(const part *p, const double eye[3], const view *v)
+{
+    stretch inside = {constant(0), constant(1)};
+    size_t next = 0;
+    if (has_edge_of_its_own(p->body)) {
+        if (nb_volume_has_distances(p->body)) cut_distances(&inside, p->body, v->length);
+        next = 1;
+    }
+    return times(p->extinction, integrate_pieces(p, eye, next, inside, v));
+}
+
+static jet optical_depth(const nb_fog_bound *bound, const sight *s)
+{
+    const view v = {s, length_of_way(s)};
     jet depth = constant(0);
-    const jet length = length_of_way(s);
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *body = &snapshot->media[i].body;
-        const jet share = share_in_leaf(body, eye, s);
-        if (share.value.high > 0) depth = sum(depth, times(body->extinction[channel], product(length, share)));
-    }
+    for (size_t i = 0; i < bound->part_count; i++) depth = sum(depth, depth_of_part(&bound->parts[i], bound->eye, &v));
+    depth.value.low = larger(depth.value.low, 0);
+    depth.value.high = larger(depth.value.high, 0);
     return depth;
 }
 
@@ -391,15 +495,174 @@ static double bound_of_widths(double a, double b, double c)
     return smaller(widest / 3, least_wide / 3 + (a + b + c - 3 * least_wide) / 4);
 }
 
-double nb_bound_fog(const nebel_snapshot *snapshot, const double eye[3], int channel, const double ways[3][3])
+static jet factor(const nb_fog_bound *bound, const double ways[3][3])
 {
     sight s;
-    double width[3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) s.way[i][k] = ways[i][k];
     set_edges(&s);
-    const jet f = exponential_of_minus(optical_depth(snapshot, eye, channel, &s));
+    return greatest(exponential_of_minus(optical_depth(bound, &s)), constant(bound->least_factor));
+}
+
+void nb_enclose_fog(const nb_fog_bound *bound, const double ways[3][3], double range[2], double slopes[3][2])
+{
+    const jet f = factor(bound, ways);
+    range[0] = f.value.low;
+    range[1] = f.value.high;
+    for (int i = 0; i < 3; i++) {
+        slopes[i][0] = f.along[i].low;
+        slopes[i][1] = f.along[i].high;
+    }
+}
+
+double nb_bound_fog(const nb_fog_bound *bound, const double ways[3][3])
+{
+    double width[3];
+    const jet f = factor(bound, ways);
     for (int i = 0; i < 3; i++) width[i] = f.along[i].high - f.along[i].low;
-    const double bound = smaller(f.value.high - f.value.low, bound_of_widths(width[0], width[1], width[2])) + ROUNDING;
-    return bound < 1 ? bound : 1;
+    const double error = smaller(f.value.high - f.value.low, bound_of_widths(width[0], width[1], width[2])) + ROUNDING;
+    return error < 1 ? error : 1;
+}
+
+/* ---- intersections of leaves ------------------------------------------------------------------------ */
+
+/* A body's leaves, and those of all that take its fog away, which follow one another as `bodies` do. */
+typedef struct mixture {
+    const nb_volume *bodies[MOST_LEAVES + 1];
+    size_t body_count, leaf_count;
+    known_leaf leaves[MOST_LEAVES];
+} mixture;
+
+static int is_inside(const nb_volume *body, size_t leaves)
+{
+    unsigned stack[NB_STEP_STACK];
+    size_t top = 0;
+    for (size_t i = 0; i < body->step_count; i++) {
+        if (body->steps[i] == NB_STEP_LEAF) {
+            stack[top++] = leaves & 1;
+            leaves >>= 1;
+            continue;
+        }
+        top--;
+        stack[top - 1] = body->steps[i] == NB_STEP_ANY ? stack[top - 1] | stack[top] : stack[top - 1] & stack[top];
+    }
+    return stack[0] != 0;
+}
+
+/* Whether the first body's fog is where these leaves are. */
+static int has_fog(const mixture *m, size_t leaves)
+{
+    for (size_t i = 0; i < m->body_count; i++) {
+        if (is_inside(m->bodies[i], leaves) != (i == 0)) return 0;
+        leaves >>= m->bodies[i]->leaf_count;
+    }
+    return 1;
+}
+
+static int parity(size_t bits)
+{
+    int odd = 0;
+    for (; bits != 0; bits &= bits - 1) odd = !odd;
+    return odd;
+}
+
+/* The sum over the subsets of (-1)^(leaves left out) times the fog there. */
+static int coefficient(const mixture *m, size_t leaves)
+{
+    int sum = 0;
+    for (size_t subset = leaves;; subset = (subset - 1) & leaves) {
+        if (has_fog(m, subset)) sum += parity(leaves ^ subset) ? -1 : 1;
+        if (subset == 0) return sum;
+    }
+}
+
+static int overlap(const nb_volume *a, const nb_volume *b)
+{
+    for (int i = 0; i < 3; i++)
+        if (a->high[i] < b->low[i] || b->high[i] < a->low[i]) return 0;
+    return 1;
+}
+
+static void bring_into_frame(known_leaf *known, const double eye[3])
+{
+    double from[3];
+    for (int i = 0; i < 3; i++) from[i] = (eye[i] - known->leaf->origin[i]) - known->leaf->origin_rest[i];
+    for (int k = 0; k < 3; k++) known->eye[k] = nb_vector_dot(known->leaf->matrix + 3 * k, from);
+}
+
+/* 0: too many leaves. */
+static int mix(mixture *m, const nb_volume *body, const double eye[3])
+{
+    if (m->leaf_count + body->leaf_count > MOST_LEAVES) return 0;
+    m->bodies[m->body_count++] = body;
+    for (size_t i = 0; i < body->leaf_count; i++) {
+        known_leaf *const known = &m->leaves[m->leaf_count++];
+        *known = (known_leaf){.body = body, .leaf = &body->leaves[i]};
+        bring_into_frame(known, eye);
+    }
+    return 1;
+}
+
+static nebel_result add_part(nb_fog_bound *bound, const mixture *m, size_t leaves, double extinction)
+{
+    if (!nb_grow(&bound->allocator, (void **)&bound->parts, sizeof *bound->parts, bound->part_count, &bound->part_room,
+                 bound->part_count + 1))
+        return NEBEL_ERROR_MEMORY;
+    part *const p = &bound->parts[bound->part_count++];
+    *p = (part){.body = m->bodies[0], .extinction = extinction};
+    for (size_t i = 0; i < m->leaf_count; i++)
+        if (leaves >> i & 1) p->leaves[p->leaf_count++] = m->leaves[i];
+    return NEBEL_OK;
+}
+
+static int is_known_density(const nb_volume *body)
+{
+    const nb_leaf *const leaf = &body->leaves[0];
+    if (body->density.type != NEBEL_DENSITY_SOFT_EDGE) return 1;
+    return leaf->type == NB_LEAF_BALL || leaf->type == NB_LEAF_BOX ||
+           (leaf->type == NB_LEAF_PLANES && leaf->face_count <= MOST_SOFT_PLANES);
+}
+
+/* A body of one leaf of which nothing is taken away, as most are, is one part. */
+static nebel_result add_body(nb_fog_bound *bound, const nebel_snapshot *snapshot, const nb_volume *body, int channel)
+{
+    mixture m = {.body_count = 0};
+    nebel_result result = NEBEL_OK;
+    if (!is_known_density(body) || !mix(&m, body, bound->eye)) return NEBEL_ERROR_UNSUPPORTED;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *const other = &snapshot->media[i].body;
+        if (!nb_volume_covers(other) || other->rank <= body->rank || !overlap(other, body)) continue;
+        if (!mix(&m, other, bound->eye)) return NEBEL_ERROR_UNSUPPORTED;
+    }
+    for (size_t leaves = 1; leaves >> m.leaf_count == 0 && result == NEBEL_OK; leaves++) {
+        const int times = coefficient(&m, leaves);
+        if (times != 0) result = add_part(bound, &m, leaves, times * body->extinction[channel]);
+    }
+    return result;
+}
+
+nebel_result nb_make_fog_bound(const nebel_allocator *allocator, const nebel_snapshot *snapshot, const double eye[3],
+                               int channel, nb_fog_bound **bound)
+{
+    nb_fog_bound *const made = nb_allocate_zero(allocator, 1, sizeof *made);
+    *bound = made;
+    if (made == NULL) return NEBEL_ERROR_MEMORY;
+    made->allocator = *allocator;
+    made->least_factor = 1 - snapshot->max_opacity;
+    for (int i = 0; i < 3; i++) made->eye[i] = eye[i];
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *const body = &snapshot->media[i].body;
+        if (!nb_volume_has_fog(body) || !(body->extinction[channel] > 0)) continue;
+        const nebel_result result = add_body(made, snapshot, body, channel);
+        if (result != NEBEL_OK) return result;
+    }
+    return NEBEL_OK;
+}
+
+void nb_free_fog_bound(nb_fog_bound *bound)
+{
+    if (bound == NULL) return;
+    const nebel_allocator allocator = bound->allocator;
+    nb_release(&allocator, bound->parts);
+    nb_release(&allocator, bound);
 }

@@ -46,6 +46,7 @@ typedef struct mesh {
     middle *middles;
     triangle *triangles;
     uint32_t *indices;
+    nb_fog_bound *bound;
     uint32_t *queue; /* triangles that may have to be halved, the oldest first */
     size_t vertex_count, edge_count, middle_count, triangle_count, queue_count;
     size_t vertex_room, point_room, parent_room, edge_room, middle_of_room, middle_room, triangle_room, queue_room;
@@ -165,7 +166,7 @@ static void set_error(const mesh *m, triangle *t)
     double ways[3][3];
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < 3; i++) ways[c][i] = m->from_eye[i] + (double)m->positions[t->corners[c]][i];
-    const double error = nb_bound_fog(m->snapshot, m->desc.eye, m->desc.channel, (const double(*)[3])ways);
+    const double error = nb_bound_fog(m->bound, (const double(*)[3])ways);
     t->error = nextafterf((float)error, 2);
 }
 
@@ -429,6 +430,8 @@ static nebel_result finish(mesh *m, size_t triangle_count)
     nb_release(&m->allocator, m->triangles);
     nb_release(&m->allocator, m->points);
     nb_release(&m->allocator, m->queue);
+    nb_free_fog_bound(m->bound);
+    m->bound = NULL;
     m->queue = NULL;
     m->edges = NULL;
     m->middle_of = NULL;
@@ -440,7 +443,14 @@ static nebel_result finish(mesh *m, size_t triangle_count)
 
 static nebel_result tessellate(mesh *m, const nebel_triangles *given)
 {
-    nebel_result result = take(m, given);
+    nebel_result result = nb_make_fog_bound(&m->allocator, m->snapshot, m->desc.eye, m->desc.channel, &m->bound);
+    if (result == NEBEL_ERROR_UNSUPPORTED)
+        return nb_fail(
+            &m->snapshot->log, result,
+            "tessellation: nothing is proven of soft edges of cylinders, cones, capsules and bodies of more "
+            "than 32 planes, nor of a volume that has, with those that exclude or replace its fog, more than "
+            "8 parts");
+    if (result == NEBEL_OK) result = take(m, given);
     if (result == NEBEL_OK) result = refine(m);
     if (result == NEBEL_OK) result = finish(m, given->triangle_count);
     if (result == NEBEL_ERROR_MEMORY || result == NEBEL_ERROR_LIMIT)
@@ -460,10 +470,6 @@ nebel_result nebel_tessellate(const nebel_snapshot *snapshot, const nebel_tessel
     if (fault != NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "tessellation: %s", fault);
     if (!are_values(desc, triangles))
         return nb_fail(log, NEBEL_ERROR_VALUE, "tessellation: bound, eye and origin must be finite, the bound >= 0");
-    if (!nb_fog_can_be_bounded(snapshot))
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
-                       "tessellation: only volumes of constant density that add, without distances, parts and opacity "
-                       "limit, each world, box, convex, sphere, ellipsoid or cylinder, have a proven bound");
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     mesh *const m = nb_allocate_zero(&allocator, 1, sizeof *m);
     if (m == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "tessellation: out of memory");
@@ -497,5 +503,6 @@ void nebel_destroy_tessellation(nebel_tessellation *tessellation)
     nb_release(&allocator, m->triangles);
     nb_release(&allocator, m->indices);
     nb_release(&allocator, m->queue);
+    nb_free_fog_bound(m->bound);
     nb_release(&allocator, m);
 }
