@@ -277,9 +277,9 @@ static void test_messages_about_a_text_in_a_property(void **state)
 {
     (void)state;
     assert_broken(PROPERTIES("\"nebel\": \"{\\\"extinction\\\": -1}\""), FORMAT, MIST,
-                  "extras:1:16: nebel.extinction: is -1; must be a number >= 0");
+                  "extras:1:16: nebel.extinction: is -1; must be an amount from 0 to 1e9 per metre");
     assert_broken(PROPERTIES("\"nebel\": \"{\\n\\\"extinction\\\": -1}\""), FORMAT, MIST,
-                  "extras:2:15: nebel.extinction: is -1; must be a number >= 0");
+                  "extras:2:15: nebel.extinction: is -1; must be an amount from 0 to 1e9 per metre");
     assert_broken(PROPERTIES("\"nebel\": \"{\\\"extinction\\\": 1\""), FORMAT, MIST, "extras:1:18: ");
     assert_broken(PROPERTIES("\"nebel\": \"fog\""), FORMAT, MIST, "extras:1:1: ");
 }

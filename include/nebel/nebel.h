@@ -115,6 +115,16 @@ const char *nebel_isa_name(nebel_isa isa);
 
 /* ---- describing fog -------------------------------------------------------------------------- */
 
+/* The numbers that descriptions may hold: squares of lengths stay finite and normal, and so does the arithmetic in
+ * float. */
+#define NEBEL_MIN_LENGTH 1e-15     /* m: of what must be > 0 */
+#define NEBEL_MAX_LENGTH 1e15      /* m: of lengths, and on each axis of the distance of places from the origin */
+#define NEBEL_MIN_SCALE 1e-9       /* of a transform's factors, whatever their sign */
+#define NEBEL_MAX_SCALE 1e9        /* the same */
+#define NEBEL_MIN_DIRECTION 1e-150 /* the least length of a normal or quaternion, which need not have length 1 */
+#define NEBEL_MAX_DIRECTION 1e150  /* the largest */
+#define NEBEL_MAX_AMOUNT 1e9       /* of extinction [1/m], radiance and emission [radiance per metre] */
+
 typedef enum nebel_shape_type {
     NEBEL_SHAPE_WORLD = 0,    /* everywhere */
     NEBEL_SHAPE_HALF_SPACE,   /* point, normal (pointing out of the fog; any length but 0) */
@@ -134,7 +144,7 @@ typedef enum nebel_shape_type {
 typedef struct nebel_transform {
     double position[3]; /* m */
     double rotation[4]; /* quaternion x y z w, normalised here; all zero: none */
-    double scale[3];    /* all zero: 1; otherwise none may be 0; negative mirrors */
+    double scale[3];    /* all zero: 1; otherwise 1e-9 to 1e9 in size; negative mirrors */
 } nebel_transform;
 
 typedef struct nebel_plane {
@@ -252,7 +262,7 @@ typedef struct nebel_volume_desc {
     nebel_shape shape;
     nebel_density density;
     double extinction[3]; /* 1/m, 0 to 1e9, where the density is 1 */
-    double source[3];     /* radiance of opaque fog, >= 0: alone it gives source * (1 - transmittance) */
+    double source[3];     /* radiance of opaque fog, 0 to 1e9: alone it gives source * (1 - transmittance) */
     double albedo[3];     /* 0..1: lit by the fog's ambient light, scattered evenly; not together with source */
     double emission[3];   /* radiance per metre, 0 to 1e9, where the density is 1 */
     double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
@@ -286,7 +296,7 @@ typedef uint64_t nebel_volume_id; /* 0 is never one */
 typedef struct nebel_fog_desc {
     nebel_allocator allocator;
     nebel_log log;
-    double ambient[3];  /* radiance, the same from everywhere, >= 0; lights volumes with an albedo */
+    double ambient[3];  /* radiance, the same from everywhere, 0 to 1e9; lights volumes with an albedo */
     double max_opacity; /* 0 to 1; 0: 1. See nebel_set_max_opacity */
 } nebel_fog_desc;
 
@@ -309,7 +319,7 @@ nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
 nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
-/* Sets the ambient radiance, >= 0. Cost O(1). Errors: ARGUMENT, VALUE. */
+/* Sets the ambient radiance, 0 to 1e9. Cost O(1). Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than

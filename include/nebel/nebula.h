@@ -49,15 +49,16 @@ typedef struct nebel_nebula_desc {
                                   not read; NULL: those */
     uint64_t seed;             /* the same particles for the same description, on every machine */
     nebel_particle_profile profile;
-    double size[2]; /* m, smallest and largest radius, > 0; as many of one octave as of the next. Both 0: 0.05, 0.2 */
-    double absorption[3]; /* 1/m at a particle's centre, >= 0 */
-    double emission[3];   /* radiance per metre at a particle's centre, >= 0 */
+    double size[2]; /* m, smallest and largest radius, 1e-15 to 1e15 (GAUSSIAN: 3e-15); as many of one octave as of the
+                       next. Both 0: 0.05, 0.2 */
+    double absorption[3]; /* 1/m at a particle's centre, 0 to 1e9 */
+    double emission[3];   /* radiance per metre at a particle's centre, 0 to 1e9, with its color */
     const double (
         *colors)[3]; /* factors of emission, >= 0, which drift through the cloud from the first to the last; NULL: 1 */
     size_t color_count;
-    double turbulence;      /* m, >= 0: how far eddies carry particles; 0: not at all */
-    double turbulence_size; /* m, > 0: the largest eddies, and how fast colours change. 0: a quarter of the extent of
-                               the shape or the points */
+    double turbulence;      /* m, 0 to 1e15: how far eddies carry particles; 0: not at all */
+    double turbulence_size; /* m, 1e-15 to 1e15: the largest eddies, and how fast colours change. 0: a quarter of the
+                               extent of the shape or the points */
 } nebel_nebula_desc;
 
 /* Strews desc->count particles. O(count / share of the shape's bounding box that is taken). Any thread.

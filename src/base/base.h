@@ -34,6 +34,10 @@ void nb_release(const nebel_allocator *allocator, void *memory);
  * changed. */
 int nb_grow(const nebel_allocator *allocator, void **array, size_t size, size_t used, size_t *capacity, size_t wanted);
 
+/* A constant as it is written, for messages: NB_TEXT(NEBEL_MAX_LENGTH) is "1e15". */
+#define NB_TEXT_OF(words) #words
+#define NB_TEXT(constant) NB_TEXT_OF(constant)
+
 /* Hands a message to the caller's log and returns `result`, so that an error path is one line. */
 nebel_result nb_fail(const nebel_log *log, nebel_result result, const char *format, ...) NB_PRINTF(3, 4);
 

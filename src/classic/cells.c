@@ -44,10 +44,10 @@ static nebel_result check_cell(const nebel_log *log, const nebel_cell *cell)
         return nb_fail(log, NEBEL_ERROR_VALUE,
                        "its shape is neither a box nor a convex body of planes; split what is not convex into cells "
                        "that touch");
-    if (!(cell->density >= 0 && cell->density <= NB_LARGEST_AMOUNT))
+    if (!(cell->density >= 0 && cell->density <= NEBEL_MAX_AMOUNT))
         return nb_fail(log, NEBEL_ERROR_VALUE, "density is %g; must be from 0 (no fog) to %g per metre", cell->density,
-                       NB_LARGEST_AMOUNT);
-    return nb_check_color(log, "color", cell->color, NB_LARGEST_AMOUNT);
+                       NEBEL_MAX_AMOUNT);
+    return nb_check_color(log, "color", cell->color, NEBEL_MAX_AMOUNT);
 }
 
 static int add_plane(nebel_cells *cells, nb_cell *cell, const nb_leaf *leaf, const double local[3], double distance,

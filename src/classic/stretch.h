@@ -214,7 +214,7 @@ static inline void cut_cone(stretch *inside, const sight *s, double radius, doub
 static inline void cut_distances(stretch *inside, const nb_volume *body, jet length)
 {
     if (body->start > 0) inside->from = greatest(inside->from, crossing(body->start, length));
-    if (body->cutoff <= NB_LARGEST_LENGTH) inside->to = least(inside->to, crossing(body->cutoff, length));
+    if (body->cutoff <= NEBEL_MAX_LENGTH) inside->to = least(inside->to, crossing(body->cutoff, length));
 }
 
 #endif

@@ -398,7 +398,7 @@ static const char *fault_of(const nebel_tessellation_desc *desc, const nebel_tri
 static int are_values(const nebel_tessellation_desc *desc, const nebel_triangles *given)
 {
     for (int i = 0; i < 3; i++)
-        if (!(fabs(desc->eye[i]) <= 1e15) || !(fabs(given->origin[i]) <= 1e15)) return 0;
+        if (!(fabs(desc->eye[i]) <= NEBEL_MAX_LENGTH) || !(fabs(given->origin[i]) <= NEBEL_MAX_LENGTH)) return 0;
     return desc->bound >= 0 && isfinite(desc->bound);
 }
 

@@ -196,7 +196,7 @@ static int wants_color(const nebel_vertex_output *outputs, size_t output_count)
 static const char *fault_of_places(const nebel_vertices *v)
 {
     for (int c = 0; c < 3; c++)
-        if (!(fabs(v->eye[c]) <= 1e15) || !(fabs(v->origin[c]) <= 1e15))
+        if (!(fabs(v->eye[c]) <= NEBEL_MAX_LENGTH) || !(fabs(v->origin[c]) <= NEBEL_MAX_LENGTH))
             return "eye and origin must be finite and at most 1e15 m away";
     return NULL;
 }

@@ -32,7 +32,7 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     if (desc == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
-    nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NB_LARGEST_AMOUNT);
+    nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK) result = check_opacity(&desc->log, desc->max_opacity);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
@@ -138,7 +138,7 @@ nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3])
 {
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (ambient == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "ambient: must not be NULL");
-    const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NB_LARGEST_AMOUNT);
+    const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK) memcpy(fog->ambient, ambient, sizeof fog->ambient);
     return result;
 }

@@ -16,7 +16,7 @@ static nb_pixels_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
 static const char *fault_of_rays(const nebel_pixels *p)
 {
     for (int c = 0; c < 3; c++) {
-        if (!(fabs(p->eye[c]) <= 1e15)) return "eye must be finite and at most 1e15 m away";
+        if (!(fabs(p->eye[c]) <= NEBEL_MAX_LENGTH)) return "eye must be finite and at most 1e15 m away";
         if (!(fabsf(p->corner[c]) <= 1e15f) || !(fabsf(p->step_x[c]) <= 1e15f) || !(fabsf(p->step_y[c]) <= 1e15f))
             return "corner, step_x and step_y must be finite and at most 1e15";
     }

@@ -36,7 +36,8 @@ static nebel_ray ray_of_segment(const nebel_segments *segments, const float *fro
 
 static int starts_too_far(const nebel_ray *ray)
 {
-    return !(fabs(ray->origin[0]) <= 1e15 && fabs(ray->origin[1]) <= 1e15 && fabs(ray->origin[2]) <= 1e15);
+    return !(fabs(ray->origin[0]) <= NEBEL_MAX_LENGTH && fabs(ray->origin[1]) <= NEBEL_MAX_LENGTH &&
+             fabs(ray->origin[2]) <= NEBEL_MAX_LENGTH);
 }
 
 /* Through the march, a few rays at a time. */
@@ -75,7 +76,7 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segments: from, to and out must not be NULL");
     if (channel < 0 || channel > 2) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1 or 2");
     for (int c = 0; c < 3; c++)
-        if (!(fabs(segments->origin[c]) <= 1e15))
+        if (!(fabs(segments->origin[c]) <= NEBEL_MAX_LENGTH))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "segments origin: must be finite and at most 1e15 m away");
     nb_transmit_fn *kernel = kernels[nb_cpu_choose(isa)];

@@ -37,7 +37,7 @@ static const char *fault_of_ray(const nebel_ray *ray)
 {
     int zero = 1;
     for (int i = 0; i < 3; i++) {
-        if (!(fabs(ray->origin[i]) <= NB_LARGEST_COORDINATE)) return "origin must be finite and at most 1e15 m away";
+        if (!(fabs(ray->origin[i]) <= NEBEL_MAX_LENGTH)) return "origin must be finite and at most 1e15 m away";
         if (!isfinite(ray->direction[i])) return "direction must be finite";
         zero = zero && ray->direction[i] == 0;
     }
@@ -47,7 +47,7 @@ static const char *fault_of_ray(const nebel_ray *ray)
 
 static int is_near(double x)
 {
-    return fabs(x) <= NB_LARGEST_COORDINATE;
+    return fabs(x) <= NEBEL_MAX_LENGTH;
 }
 
 /* The same in one expression without a branch, for the many rays that are right. */

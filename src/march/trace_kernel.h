@@ -4,9 +4,6 @@
 
 #include "snapshot.h"
 
-/* Squares of distances stay finite in every target. */
-#define NB_LARGEST_COORDINATE 1e15
-
 /* Rays and lights are structures or, in float, planes. */
 typedef struct nb_trace_job {
     const nebel_snapshot *snapshot;

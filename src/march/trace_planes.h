@@ -129,7 +129,7 @@ typedef struct loaded {
 
 FORCE_INLINE nb_wmask are_near(nb_wvec3 p)
 {
-    const nb_wide most = NB_W(NB_LARGEST_COORDINATE);
+    const nb_wide most = NB_W(NEBEL_MAX_LENGTH);
     return nb_wand(nb_wand(nb_wabs(p.x) <= most, nb_wabs(p.y) <= most), nb_wabs(p.z) <= most);
 }
 

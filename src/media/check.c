@@ -14,14 +14,13 @@ static int is_zero(const double *v, int n)
 static int is_place(const double v[3])
 {
     for (int i = 0; i < 3; i++)
-        if (!(fabs(v[i]) <= NB_LARGEST_LENGTH)) return 0;
+        if (!(fabs(v[i]) <= NEBEL_MAX_LENGTH)) return 0;
     return 1;
 }
 
-/* > 0, finite, and so large or small that squares stay finite and normal */
 static int is_extent(double x)
 {
-    return x >= 1e-15 && x <= NB_LARGEST_LENGTH;
+    return x >= NEBEL_MIN_LENGTH && x <= NEBEL_MAX_LENGTH;
 }
 
 static double distance(const double a[3], const double b[3])
@@ -34,14 +33,22 @@ static nebel_result bad(const nebel_log *log, const char *what, const char *rule
     return nb_fail(log, NEBEL_ERROR_VALUE, "%s: %s", what, rule);
 }
 
-#define PLACE_RULE "must be three finite numbers, at most 1e15 m from the origin"
-#define EXTENT_RULE "must be a length from 1e-15 to 1e15 m"
-#define DIRECTION_RULE "must be three finite numbers, not all zero"
+#define LEAST NB_TEXT(NEBEL_MIN_LENGTH)
+#define MOST NB_TEXT(NEBEL_MAX_LENGTH)
+#define PLACE_RULE "must be three finite numbers, at most " MOST " m from the origin"
+#define EXTENT_RULE "must be a length from " LEAST " to " MOST " m"
+#define APART_RULE "must be apart, " LEAST " to " MOST " m"
+#define DIRECTION_LENGTHS NB_TEXT(NEBEL_MIN_DIRECTION) " to " NB_TEXT(NEBEL_MAX_DIRECTION)
+#define DIRECTION_RULE "must be three finite numbers, not all zero, of a length from " DIRECTION_LENGTHS
 
-static int is_direction(const double v[3])
+static int is_direction(double length)
 {
-    const double length = hypot(hypot(v[0], v[1]), v[2]);
-    return length >= 1e-150 && length <= 1e150;
+    return length >= NEBEL_MIN_DIRECTION && length <= NEBEL_MAX_DIRECTION;
+}
+
+static double length_of(const double v[3])
+{
+    return hypot(hypot(v[0], v[1]), v[2]);
 }
 
 nebel_result nb_check_color(const nebel_log *log, const char *what, const double color[3], double largest)
@@ -59,13 +66,16 @@ static nebel_result check_transform(const nebel_log *log, const nebel_transform 
     if (!is_zero(transform->rotation, 4)) {
         const double length = hypot(hypot(transform->rotation[0], transform->rotation[1]),
                                     hypot(transform->rotation[2], transform->rotation[3]));
-        if (!(length >= 1e-150 && length <= 1e150))
-            return bad(log, "transform rotation", "must be a finite quaternion x y z w, not zero");
+        if (!is_direction(length))
+            return bad(log, "transform rotation",
+                       "must be a finite quaternion x y z w, not zero, of a length from " DIRECTION_LENGTHS);
     }
     if (!is_zero(transform->scale, 3))
         for (int i = 0; i < 3; i++)
-            if (!(fabs(transform->scale[i]) >= 1e-9 && fabs(transform->scale[i]) <= 1e9))
-                return bad(log, "transform scale", "is singular; each factor must be within 1e-9 and 1e9 in size");
+            if (!(fabs(transform->scale[i]) >= NEBEL_MIN_SCALE && fabs(transform->scale[i]) <= NEBEL_MAX_SCALE))
+                return bad(log, "transform scale",
+                           "is singular; each factor must be within " NB_TEXT(NEBEL_MIN_SCALE) " and " NB_TEXT(
+                               NEBEL_MAX_SCALE) " in size");
     return NEBEL_OK;
 }
 
@@ -95,7 +105,7 @@ static nebel_result check_axis(const nebel_log *log, const nebel_shape *shape)
         if (!is_extent(shape->radius)) return bad(log, "capsule radius", EXTENT_RULE);
         return length == 0 || is_extent(length) ? NEBEL_OK : bad(log, "capsule axis", EXTENT_RULE);
     }
-    if (!is_extent(length)) return bad(log, "from and to", "must be apart, 1e-15 to 1e15 m");
+    if (!is_extent(length)) return bad(log, "from and to", APART_RULE);
     if (shape->type == NEBEL_SHAPE_CYLINDER)
         return is_extent(shape->radius) ? NEBEL_OK : bad(log, "cylinder radius", EXTENT_RULE);
     const double radii[2] = {shape->radius_from, shape->radius_to};
@@ -112,10 +122,10 @@ static nebel_result check_convex(const nebel_log *log, const nebel_shape *shape)
         return nb_fail(log, NEBEL_ERROR_LIMIT, "convex: %zu planes; at most %d", shape->plane_count, NEBEL_MAX_PLANES);
     for (size_t i = 0; i < shape->plane_count; i++) {
         const nebel_plane *plane = &shape->planes[i];
-        if (!is_direction(plane->normal)) return bad(log, "convex plane normal", DIRECTION_RULE);
-        const double length = hypot(hypot(plane->normal[0], plane->normal[1]), plane->normal[2]);
-        if (!(fabs(plane->distance) <= NB_LARGEST_LENGTH * length))
-            return bad(log, "convex plane distance", "must be finite and at most 1e15 m");
+        const double length = length_of(plane->normal);
+        if (!is_direction(length)) return bad(log, "convex plane normal", DIRECTION_RULE);
+        if (!(fabs(plane->distance) <= NEBEL_MAX_LENGTH * length))
+            return bad(log, "convex plane distance", "must be finite and at most " MOST " m");
     }
     return NEBEL_OK;
 }
@@ -148,7 +158,7 @@ static nebel_result check_shape(const nebel_log *log, const nebel_shape *shape, 
         return NEBEL_OK;
     case NEBEL_SHAPE_HALF_SPACE:
         if (!is_place(shape->point)) return bad(log, "half space point", PLACE_RULE);
-        return is_direction(shape->normal) ? NEBEL_OK : bad(log, "half space normal", DIRECTION_RULE);
+        return is_direction(length_of(shape->normal)) ? NEBEL_OK : bad(log, "half space normal", DIRECTION_RULE);
     case NEBEL_SHAPE_BOX:
         return check_box(log, shape);
     case NEBEL_SHAPE_SPHERE:
@@ -171,15 +181,14 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
     case NEBEL_DENSITY_CONSTANT:
         return NEBEL_OK;
     case NEBEL_DENSITY_HEIGHT:
-        if (!(fabs(density->base) <= NB_LARGEST_LENGTH))
-            return bad(log, "height base", "must be finite, at most 1e15 m");
+        if (!(fabs(density->base) <= NEBEL_MAX_LENGTH))
+            return bad(log, "height base", "must be finite, at most " MOST " m");
         if (density->below != NEBEL_BELOW_GROW && density->below != NEBEL_BELOW_CONSTANT)
             return nb_fail(log, NEBEL_ERROR_ARGUMENT, "height below: %d is unknown", (int)density->below);
         return is_extent(density->scale_height) ? NEBEL_OK : bad(log, "scale height", EXTENT_RULE);
     case NEBEL_DENSITY_LINEAR:
         if (!is_place(density->from) || !is_place(density->to)) return bad(log, "linear from and to", PLACE_RULE);
-        return is_extent(distance(density->from, density->to)) ? NEBEL_OK
-                                                               : bad(log, "linear from and to", "must be apart");
+        return is_extent(distance(density->from, density->to)) ? NEBEL_OK : bad(log, "linear from and to", APART_RULE);
     case NEBEL_DENSITY_RADIAL:
         if (shape->type != NEBEL_SHAPE_SPHERE && shape->type != NEBEL_SHAPE_ELLIPSOID)
             return bad(log, "radial density", "needs a sphere or an ellipsoid");
@@ -199,10 +208,10 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
 
 static nebel_result check_light(const nebel_log *log, const nebel_volume_desc *desc)
 {
-    nebel_result result = nb_check_color(log, "extinction", desc->extinction, NB_LARGEST_AMOUNT);
-    if (result == NEBEL_OK) result = nb_check_color(log, "source", desc->source, NB_LARGEST_AMOUNT);
+    nebel_result result = nb_check_color(log, "extinction", desc->extinction, NEBEL_MAX_AMOUNT);
+    if (result == NEBEL_OK) result = nb_check_color(log, "source", desc->source, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK) result = nb_check_color(log, "albedo", desc->albedo, 1);
-    if (result == NEBEL_OK) result = nb_check_color(log, "emission", desc->emission, NB_LARGEST_AMOUNT);
+    if (result == NEBEL_OK) result = nb_check_color(log, "emission", desc->emission, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK && !is_zero(desc->source, 3) && !is_zero(desc->albedo, 3))
         return bad(log, "source and albedo", "a volume has one or the other");
     return result;
@@ -210,10 +219,10 @@ static nebel_result check_light(const nebel_log *log, const nebel_volume_desc *d
 
 static nebel_result check_distances(const nebel_log *log, const nebel_volume_desc *desc)
 {
-    if (!(desc->start >= 0 && desc->start <= NB_LARGEST_LENGTH))
-        return bad(log, "start", "must be a distance from 0 to 1e15 m");
-    if (!(desc->cutoff == 0 || (desc->cutoff > desc->start && desc->cutoff <= NB_LARGEST_LENGTH)))
-        return bad(log, "cutoff", "must be 0, for none, or more than start and at most 1e15 m");
+    if (!(desc->start >= 0 && desc->start <= NEBEL_MAX_LENGTH))
+        return bad(log, "start", "must be a distance from 0 to " MOST " m");
+    if (!(desc->cutoff == 0 || (desc->cutoff > desc->start && desc->cutoff <= NEBEL_MAX_LENGTH)))
+        return bad(log, "cutoff", "must be 0, for none, or more than start and at most " MOST " m");
     return NEBEL_OK;
 }
 

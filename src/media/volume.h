@@ -12,10 +12,6 @@
 
 #include <nebel/nebel.h>
 
-/* Beyond these the single-precision arithmetic would overflow; no fog comes near. */
-#define NB_LARGEST_AMOUNT 1e9
-#define NB_LARGEST_LENGTH 1e15
-
 typedef enum nb_leaf_type {
     NB_LEAF_WORLD,
     NB_LEAF_PLANES, /* n.x <= d for each plane */
@@ -100,7 +96,7 @@ static inline int nb_volume_covers(const nb_volume *volume)
 
 static inline int nb_volume_has_distances(const nb_volume *volume)
 {
-    return volume->start > 0 || volume->cutoff <= NB_LARGEST_LENGTH;
+    return volume->start > 0 || volume->cutoff <= NEBEL_MAX_LENGTH;
 }
 
 /* How the soft edge of a round body is made: the forms of formulas/profiles.inc. */

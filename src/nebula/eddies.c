@@ -1,5 +1,7 @@
 #include "eddies.h"
 
+#include <nebel/nebel.h>
+
 #include <math.h>
 
 static uint64_t mix(uint64_t z)
@@ -46,14 +48,17 @@ static double octave(uint64_t seed, const double place[3])
     return sum;
 }
 
-/* Beyond this, places are not told apart by less than the lattice; its corners must fit their integers. */
-#define FARTHEST 1e15
+/* Places farther than any of the core are not told apart; corners of the lattice must fit their integers. */
+static double within_reach(double x)
+{
+    return fmin(fmax(x, -NEBEL_MAX_LENGTH), NEBEL_MAX_LENGTH);
+}
 
 double nb_eddies(uint64_t seed, const double place[3])
 {
     enum { OCTAVES = 5 };
     double p[3], sum = 0, strength = 16.0 / 31; /* of 1 + 1/2 + ... + 1/16 */
-    for (int i = 0; i < 3; i++) p[i] = fmin(fmax(place[i], -FARTHEST), FARTHEST);
+    for (int i = 0; i < 3; i++) p[i] = within_reach(place[i]);
     for (uint64_t k = 0; k < OCTAVES; k++) {
         sum += strength * octave(seed + k, p);
         strength /= 2;

@@ -3,6 +3,7 @@
 #include "base/base.h"
 #include "base/precision.h"
 #include "eddies.h"
+#include "media/check.h"
 #include "media/density.h"
 
 #include <math.h>
@@ -48,18 +49,44 @@ nebel_volume_desc nebel_particle_volume(const nebel_particle *particle)
 
 /* ---- checks ---------------------------------------------------------------------------------- */
 
+/* What each particle has of it must be what a volume may have. */
 static nebel_result check_amounts(const nebel_nebula_desc *desc)
 {
-    for (int c = 0; c < 3; c++) {
-        if (!(desc->absorption[c] >= 0 && isfinite(desc->absorption[c])))
-            return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: absorption must be finite and not negative");
-        if (!(desc->emission[c] >= 0 && isfinite(desc->emission[c])))
-            return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: emission must be finite and not negative");
-    }
+    const nebel_result result = nb_check_color(&desc->log, "nebula: absorption", desc->absorption, NEBEL_MAX_AMOUNT);
+    if (result != NEBEL_OK) return result;
     for (size_t i = 0; i < desc->color_count; i++)
         for (int c = 0; c < 3; c++)
-            if (!(desc->colors[i][c] >= 0 && isfinite(desc->colors[i][c])))
-                return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: color %zu must be finite and not negative", i);
+            if (!(desc->colors[i][c] >= 0 && desc->colors[i][c] * desc->emission[c] <= NEBEL_MAX_AMOUNT))
+                return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                               "nebula: color %zu must not be negative, and emission times it at most %g", i,
+                               NEBEL_MAX_AMOUNT);
+    return nb_check_color(&desc->log, "nebula: emission", desc->emission, NEBEL_MAX_AMOUNT);
+}
+
+/* That of a gaussian is a third of the radius. */
+static int is_radius(const nebel_nebula_desc *desc, double radius)
+{
+    const double least = desc->profile == NEBEL_PARTICLE_GAUSSIAN ? 3 * NEBEL_MIN_LENGTH : NEBEL_MIN_LENGTH;
+    return radius >= least && radius <= NEBEL_MAX_LENGTH;
+}
+
+static nebel_result check_lengths(const nebel_nebula_desc *desc)
+{
+    const int default_size = desc->size[0] == 0 && desc->size[1] == 0;
+    if (!default_size && !(is_radius(desc, desc->size[0]) && is_radius(desc, desc->size[1])))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                       "nebula: sizes are %g to %g m; they must be from %g (a gaussian: 3 times that) to %g m",
+                       desc->size[0], desc->size[1], NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
+    if (!(desc->size[0] <= desc->size[1]))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: sizes are %g to %g m; the smaller must come first",
+                       desc->size[0], desc->size[1]);
+    if (!(desc->turbulence >= 0 && desc->turbulence <= NEBEL_MAX_LENGTH))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence is %g m; it must be from 0 to %g",
+                       desc->turbulence, NEBEL_MAX_LENGTH);
+    const double eddy = desc->turbulence_size;
+    if (!(eddy == 0 || (eddy >= NEBEL_MIN_LENGTH && eddy <= NEBEL_MAX_LENGTH)))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence_size is %g m; it must be 0, or from %g to %g",
+                       eddy, NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH);
     return NEBEL_OK;
 }
 
@@ -68,18 +95,10 @@ static nebel_result check_desc(const nebel_nebula_desc *desc)
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
                        "nebula: the allocator needs allocate and release, or neither");
-    const int default_size = desc->size[0] == 0 && desc->size[1] == 0;
-    if (!default_size && !(desc->size[0] > 0 && desc->size[0] <= desc->size[1] && isfinite(desc->size[1])))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
-                       "nebula: sizes are %g to %g m; the smaller must come first and be above 0", desc->size[0],
-                       desc->size[1]);
-    if (!(desc->turbulence >= 0 && isfinite(desc->turbulence)) ||
-        !(desc->turbulence_size >= 0 && isfinite(desc->turbulence_size)))
-        return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
-                       "nebula: turbulence and its size must be finite and not negative");
     if (desc->profile < 0 || desc->profile >= NEBEL_PARTICLE_COUNT)
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: %d is no profile of a particle", (int)desc->profile);
-    return check_amounts(desc);
+    const nebel_result result = check_lengths(desc);
+    return result == NEBEL_OK ? check_amounts(desc) : result;
 }
 
 static double find_extent(const double low[3], const double high[3])

@@ -15,7 +15,7 @@ static bool add_link(nb_json *json, nb_gltf_links *links, const nb_json_node *no
 {
     void *items = links->items;
     double child = 0;
-    static const nb_range range = {0, UINT32_MAX - 2, false, "the number of a node"};
+    static const nb_range range = {.low = 0, .high = UINT32_MAX - 2, .text = "the number of a node"};
     if (!nb_value_number(json, node, &range, &child)) return false;
     if (!nb_grow(&json->desc.allocator, &items, sizeof *links->items, links->count, &links->capacity, links->count + 1))
         return fail_memory(json, node);
@@ -57,11 +57,11 @@ static bool read_place(nb_json *json, const nb_json_node *node, nb_affine *place
     nebel_transform transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
     const nb_json_node *matrix = find_member(json, node, "matrix");
     if (matrix != NULL) return read_matrix(json, matrix, place);
-    if (!nb_value_vector(json, find_member(json, node, "translation"), transform.position) ||
+    if (!nb_value_numbers(json, find_member(json, node, "translation"), &nb_range_any, 3, transform.position) ||
         !nb_value_rotation(json, find_member(json, node, "rotation"), transform.rotation))
         return false;
     const nb_json_node *scale = find_member(json, node, "scale");
-    if (scale != NULL && !nb_value_vector(json, scale, transform.scale)) return false;
+    if (scale != NULL && !nb_value_numbers(json, scale, &nb_range_any, 3, transform.scale)) return false;
     *place = nb_affine_from_transform(&transform);
     return true;
 }

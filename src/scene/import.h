@@ -5,10 +5,16 @@
 
 #include "scene/scene_internal.h"
 
+/* The settings that numbers of the volumes were made of, for messages about these; NULL: none in the file. */
+typedef struct nb_import_causes {
+    const nb_json_node *extinction, *source, *emission, *base, *scale_height, *lengths, *edge, *placement;
+} nb_import_causes;
+
 typedef struct nb_import {
     nebel_volume_desc volumes[2]; /* those not 0: `count` of them */
     size_t count;
     double max_opacity; /* of all fog; 0: no limit */
+    nb_import_causes causes[2];
 } nb_import;
 
 /* One for each type of import; `node` is its object. */
@@ -22,10 +28,13 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
 bool nb_import_bevy_distance_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
 bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
 
-/* Reads an import of any type. */
+/* Reads an import of any type. What settings make together is within the limits of the core. */
 bool nb_read_import(nb_scene_reader *in, const nb_json_node *node, nb_import *fog);
 
 /* ---- what importers share -------------------------------------------------------------------- */
+
+/* The first of two settings that the file has; NULL: neither. */
+const nb_json_node *nb_import_either(const nb_json_node *first, const nb_json_node *second);
 
 /* An endless volume of constant density that takes all colours alike. */
 nebel_volume_desc nb_import_world(double extinction);

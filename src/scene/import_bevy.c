@@ -5,7 +5,7 @@ static bool check_inscattering(nb_json *json, const nb_json_node *node, const do
 {
     double other[3];
     for (int c = 0; c < 3; c++) other[c] = extinction[c];
-    if (!nb_value_amount(json, node, &nb_range_not_negative, other)) return false;
+    if (!nb_value_amount(json, node, &nb_range_amount, other)) return false;
     for (int c = 0; c < 3; c++)
         if (other[c] != extinction[c])
             return nb_json_fail(
@@ -32,8 +32,8 @@ bool nb_import_bevy_distance_fog(nb_scene_reader *in, const nb_json_node *node, 
                             "falloffs are not integrals of a density");
     const nb_json_node *amount = found[DENSITY] != NULL ? found[DENSITY] : found[EXTINCTION];
     fog->count = 1;
-    return nb_value_color(json, found[COLOR], &nb_range_not_negative, volume->source) &&
-           nb_value_amount(json, amount, &nb_range_not_negative, volume->extinction) &&
+    return nb_value_color(json, found[COLOR], &nb_range_light, volume->source) &&
+           nb_value_amount(json, amount, &nb_range_amount, volume->extinction) &&
            check_inscattering(json, found[INSCATTERING], volume->extinction);
 }
 
@@ -51,11 +51,11 @@ bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb
     *volume = nb_import_world(0);
     nebel_transform *transform = &volume->shape.transform;
     if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
-        !nb_value_number(json, found[ABSORPTION], &nb_range_not_negative, &absorption) ||
-        !nb_value_number(json, found[SCATTERING], &nb_range_not_negative, &scattering) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_light, &density) ||
+        !nb_value_number(json, found[ABSORPTION], &nb_range_amount, &absorption) ||
+        !nb_value_number(json, found[SCATTERING], &nb_range_amount, &scattering) ||
         !nb_value_color(json, found[COLOR], &nb_range_fraction, color) ||
-        !nb_value_vector(json, found[TRANSLATION], transform->position) ||
+        !nb_value_place(json, found[TRANSLATION], transform->position) ||
         !nb_value_rotation(json, found[ROTATION], transform->rotation) ||
         !nb_value_scale(json, found[SCALE], transform->scale))
         return false;
@@ -66,6 +66,8 @@ bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb
         volume->extinction[i] = density * (absorption + scattering);
         volume->albedo[i] = scattering > 0 ? color[i] * scattering / (absorption + scattering) : 0;
     }
+    fog->causes[0].extinction =
+        nb_import_either(found[DENSITY], nb_import_either(found[ABSORPTION], found[SCATTERING]));
     fog->count = 1;
     return true;
 }

@@ -6,20 +6,13 @@
 static const double ln2 = 0.69314718055994530942;
 
 /* Color(r, g, b, a) holds sRGB values, also beyond 1. */
-static bool read_color(nb_json *json, const nb_json_node *node, double color[3])
+static bool read_color(nb_json *json, const nb_json_node *node, const nb_range *range, double color[3])
 {
     double rgba[4];
-    if (node == NULL || node->type != NB_JSON_ARRAY) return nb_value_color(json, node, &nb_range_not_negative, color);
-    if (!nb_value_numbers(json, node, &nb_range_not_negative, node->count == 4 ? 4 : 3, rgba)) return false;
+    if (node == NULL || node->type != NB_JSON_ARRAY) return nb_value_color(json, node, range, color);
+    if (!nb_value_numbers(json, node, range, node->count == 4 ? 4 : 3, rgba)) return false;
     for (int c = 0; c < 3; c++) color[c] = nb_value_linear_from_srgb(rgba[c]);
     return true;
-}
-
-static bool read_albedo(nb_json *json, const nb_json_node *node, double albedo[3])
-{
-    if (!read_color(json, node, albedo)) return false;
-    if (albedo[0] <= 1 && albedo[1] <= 1 && albedo[2] <= 1) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is brighter than white; an albedo is at most 1");
 }
 
 /* ---- fog of the environment ------------------------------------------------------------------ */
@@ -37,14 +30,15 @@ bool nb_import_godot_fog(nb_scene_reader *in, const nb_json_node *node, nb_impor
                        nb_value_linear_from_srgb(0.608)};
     if (!nb_value_members(json, node, &keys, found) ||
         !nb_import_refuse_other(json, found[MODE], 0, "depth fog is not the integral of a density") ||
-        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
-        !read_color(json, found[COLOR], color) ||
-        !nb_value_number(json, found[ENERGY], &nb_range_not_negative, &energy) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
+        !read_color(json, found[COLOR], &nb_range_light, color) ||
+        !nb_value_number(json, found[ENERGY], &nb_range_light, &energy) ||
         !nb_import_refuse_other(json, found[HEIGHT_DENSITY], 0,
                                 "Godot's height fog depends on the height of the surface alone"))
         return false;
     fog->volumes[0] = nb_import_world(density);
     for (int c = 0; c < 3; c++) fog->volumes[0].source[c] = color[c] * energy;
+    fog->causes[0].source = nb_import_either(found[COLOR], found[ENERGY]);
     fog->count = 1;
     return true;
 }
@@ -59,15 +53,17 @@ bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *nod
     nb_json *json = in->json;
     double density = 0.05, albedo[3] = {1, 1, 1}, emission[3] = {0}, energy = 1;
     if (!nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
-        !read_albedo(json, found[ALBEDO], albedo) || !read_color(json, found[EMISSION], emission) ||
-        !nb_value_number(json, found[ENERGY], &nb_range_not_negative, &energy))
+        !nb_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
+        !read_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
+        !read_color(json, found[EMISSION], &nb_range_light, emission) ||
+        !nb_value_number(json, found[ENERGY], &nb_range_light, &energy))
         return false;
     fog->volumes[0] = nb_import_world(density);
     for (int c = 0; c < 3; c++) {
         fog->volumes[0].albedo[c] = albedo[c];
         fog->volumes[0].emission[c] = emission[c] * energy * density;
     }
+    fog->causes[0].emission = nb_import_either(found[EMISSION], found[ENERGY]);
     fog->count = 1;
     return true;
 }
@@ -152,18 +148,25 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
     *volume = nb_import_world(0);
     for (int c = 0; c < 3; c++) volume->albedo[c] = 1;
     if (!nb_value_members(json, node, &keys, found) || !nb_value_integer(json, found[SHAPE], 0, WORLD, &shape) ||
-        !nb_value_numbers(json, found[SIZE], &nb_range_positive, 3, size) ||
+        !nb_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
         !read_transform(json, found[TRANSFORM], &volume->shape.transform) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &density) ||
-        !read_albedo(json, found[ALBEDO], volume->albedo) || !read_color(json, found[EMISSION], emission) ||
-        !nb_value_number(json, found[FALLOFF], &nb_range_not_negative, &falloff) ||
-        !nb_value_number(json, found[FADE], &nb_range_not_negative, &fade))
+        !nb_value_number(json, found[DENSITY], &nb_range_amount, &density) ||
+        !read_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
+        !read_color(json, found[EMISSION], &nb_range_light, emission) ||
+        !nb_value_number(json, found[FALLOFF], &nb_range_light, &falloff) ||
+        !nb_value_number(json, found[FADE], &nb_range_light, &fade))
         return false;
     set_shape(&volume->shape, shape, size);
     for (int c = 0; c < 3; c++) {
         volume->extinction[c] = density;
         volume->emission[c] = emission[c] * density;
     }
+    fog->causes[0] = (nb_import_causes){.emission = found[EMISSION],
+                                        .scale_height = found[FALLOFF],
+                                        .base = found[TRANSFORM],
+                                        .edge = nb_import_either(found[FADE], found[SIZE]),
+                                        .lengths = found[SIZE],
+                                        .placement = found[TRANSFORM]};
     fog->count = 1;
     if (falloff == 0) return soften(in, node, volume, edge_of(size, fade));
     nb_import_set_height(volume, volume->shape.transform.position[1], 1 / (falloff * ln2), NEBEL_BELOW_CONSTANT);

@@ -15,8 +15,8 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
     nb_json *json = in->json;
     double path = 400, base = 0, top = 50, albedo[3] = {1, 1, 1};
     if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[PATH], &nb_range_positive, &path) ||
-        !nb_value_number(json, found[BASE], &nb_range_any, &base) ||
-        !nb_value_number(json, found[TOP], &nb_range_any, &top) ||
+        !nb_value_number(json, found[BASE], &nb_range_place, &base) ||
+        !nb_value_number(json, found[TOP], &nb_range_place, &top) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, albedo))
         return false;
     nebel_volume_desc *volume = &fog->volumes[0];
@@ -24,6 +24,8 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
     volume->priority = INT_MIN; /* what any local volume may overwrite */
     nb_import_set_height(volume, base, per_depth * fmax(least_depth, top - base), NEBEL_BELOW_CONSTANT);
     for (int c = 0; c < 3; c++) volume->albedo[c] = albedo[c];
+    fog->causes[0] =
+        (nb_import_causes){.extinction = found[PATH], .scale_height = nb_import_either(found[TOP], found[BASE])};
     fog->count = 1;
     return true;
 }
@@ -34,7 +36,7 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
  * the two do not meet. */
 static bool read_fades(nb_json *json, const nb_json_node *const fades[2], const double size[3], double edges[3])
 {
-    static const nb_range half = {0, .5, false, "a fraction of the size, from 0 to 0.5"};
+    static const nb_range half = {.low = 0, .high = .5, .text = "a fraction of the size, from 0 to 0.5"};
     double positive[3] = {0}, negative[3] = {0};
     if (!nb_value_numbers(json, fades[0], &half, 3, positive) || !nb_value_numbers(json, fades[1], &half, 3, negative))
         return false;
@@ -69,8 +71,8 @@ static bool read_distances(nb_json *json, const nb_json_node *const distances[2]
 {
     double start = 10000, end = 10000; /* the engine's */
     if (distances[0] == NULL && distances[1] == NULL) return true;
-    if (!nb_value_number(json, distances[0], &nb_range_positive, &start) ||
-        !nb_value_number(json, distances[1], &nb_range_positive, &end))
+    if (!nb_value_number(json, distances[0], &nb_range_extent, &start) ||
+        !nb_value_number(json, distances[1], &nb_range_extent, &end))
         return false;
     *cutoff = end;
     return start == end || nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, distances[distances[0] == NULL],
@@ -146,18 +148,20 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
     for (int c = 0; c < 3; c++) albedo[c] = 1;
     if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[PATH], &nb_range_positive, &path) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
-        !nb_value_numbers(json, found[SIZE], &nb_range_positive, 3, size) ||
+        !nb_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
         !read_fades(json, &found[POSITIVE_FADE], size, edges) ||
         !nb_import_refuse_other(json, found[INVERT], 0, "fog here is inside its shape") ||
         !nb_import_refuse_other(json, found[FALLOFF], 0, "only the linear falloff has a closed form") ||
         !read_distances(json, &found[FADE_START], &volume->cutoff) ||
         !read_blending(json, found[BLENDING], found[PRIORITY], volume) ||
-        !nb_value_vector(json, found[POSITION], transform->position) ||
+        !nb_value_place(json, found[POSITION], transform->position) ||
         !nb_value_rotation(json, found[ROTATION], transform->rotation))
         return false;
     mirror(transform->position, transform->rotation);
     set_faded_box(volume, size, edges);
     for (int c = 0; c < 3; c++) volume->extinction[c] = 1 / path;
+    fog->causes[0] = (nb_import_causes){
+        .extinction = found[PATH], .edge = found[POSITIVE_FADE], .lengths = found[SIZE], .placement = found[SIZE]};
     fog->count = 1;
     return true;
 }

@@ -61,6 +61,7 @@ struct nb_json {
     nb_json_desc desc;
     nebel_result result; /* of the first error */
     nb_text_place place;
+    double unit; /* m: that of the text's lengths, on which their limits depend. 1 unless the reader says otherwise */
 
     nb_json_node *nodes;
     size_t node_count, node_capacity;

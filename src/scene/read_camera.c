@@ -1,8 +1,6 @@
 /* The sections "camera", its turntable and its keys. */
 #include "scene/scene_internal.h"
 
-#include <math.h>
-
 enum { POSITION, LOOK_AT, UP, VERTICAL_FOV, VIEW_HEIGHT, PROJECTION, TURNTABLE, KEYS, FRAME, CAMERA_KEY_COUNT };
 
 static const char *const names[] = {"position",   "look_at",   "up",   "vertical_fov", "view_height",
@@ -14,7 +12,7 @@ static const nb_keys camera_keys = {names, CAMERA_KEY_COUNT,
                                     VIEW_KEYS | NB_BIT(PROJECTION) | NB_BIT(TURNTABLE) | NB_BIT(KEYS), 0, "a camera"};
 static const nb_keys key_keys = {names, CAMERA_KEY_COUNT, VIEW_KEYS | NB_BIT(FRAME), NB_BIT(FRAME), "a camera key"};
 
-static const nb_range fov_range = {0, 180, true, "a number of degrees, > 0 and < 180"};
+static const nb_range fov_range = {.low = 0, .high = 180, .open = true, .text = "a number of degrees, > 0 and < 180"};
 
 /* Without a look_at of its own a camera looks where the default one does, from wherever it is. */
 static void look_ahead(nebel_camera *camera, const double ahead[3])
@@ -22,29 +20,33 @@ static void look_ahead(nebel_camera *camera, const double ahead[3])
     for (int i = 0; i < 3; i++) camera->look_at[i] = camera->position[i] + ahead[i];
 }
 
-static bool check_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found,
-                       const nebel_camera *camera)
+/* In metres, as it is used. */
+static bool check_view(const nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
+                       nebel_camera camera)
 {
+    nb_json *json = in->json;
     const nb_json_node *at = found[LOOK_AT] != NULL ? found[LOOK_AT] : node;
-    if (!nb_camera_is_apart(camera))
+    nb_space_convert_camera(&in->space, &camera);
+    if (!nb_camera_is_apart(&camera))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "the camera looks at its own position; move one of them");
     if (found[UP] != NULL) at = found[UP];
-    if (!nb_camera_is_upright(camera))
+    if (!nb_camera_is_upright(&camera))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, at,
                             "the view is along \"up\"; give an \"up\" in another direction, such as [0, 0, -1]");
     return true;
 }
 
 /* Reads what a camera and its keys have in common. Without a look_at they look `ahead`; NULL: one was given before. */
-static bool read_view(nb_json *json, const nb_json_node *node, const nb_json_node *const *found, const double *ahead,
-                      nebel_camera *camera)
+static bool read_view(const nb_scene_reader *in, const nb_json_node *node, const nb_json_node *const *found,
+                      const double *ahead, nebel_camera *camera)
 {
-    if (!nb_value_vector(json, found[POSITION], camera->position)) return false;
+    nb_json *json = in->json;
+    if (!nb_value_place(json, found[POSITION], camera->position)) return false;
     if (found[LOOK_AT] == NULL && ahead != NULL) look_ahead(camera, ahead);
-    return nb_value_vector(json, found[LOOK_AT], camera->look_at) && nb_value_direction(json, found[UP], camera->up) &&
+    return nb_value_place(json, found[LOOK_AT], camera->look_at) && nb_value_direction(json, found[UP], camera->up) &&
            nb_value_number(json, found[VERTICAL_FOV], &fov_range, &camera->vertical_fov) &&
-           nb_value_number(json, found[VIEW_HEIGHT], &nb_range_positive, &camera->view_height) &&
-           check_view(json, node, found, camera);
+           nb_value_number(json, found[VIEW_HEIGHT], &nb_range_extent, &camera->view_height) &&
+           check_view(in, node, found, *camera);
 }
 
 const char *const nb_projection_names[3] = {"perspective", "orthographic", "panorama"};
@@ -70,32 +72,12 @@ static bool read_turntable(nb_json *json, const nb_json_node *node, uint32_t *fr
     return true;
 }
 
-static bool read_key(nb_json *json, const nb_json_node *node, const double *ahead, nebel_camera_key *key)
+static bool read_key(const nb_scene_reader *in, const nb_json_node *node, const double *ahead, nebel_camera_key *key)
 {
     const nb_json_node *found[CAMERA_KEY_COUNT];
-    return nb_value_members(json, node, &key_keys, found) &&
-           nb_value_number(json, found[FRAME], &nb_range_any, &key->frame) &&
-           read_view(json, node, found, ahead, &key->camera);
-}
-
-/* Rays of the core begin no further away [m]. */
-static bool is_near(const nebel_camera *camera)
-{
-    const double farthest = 1e15;
-    bool near = true;
-    for (int i = 0; i < 3; i++) near = near && fabs(camera->position[i]) <= farthest;
-    return near;
-}
-
-/* Checks of the file's numbers come before, so that they speak of these. */
-static bool convert_camera(nb_scene_reader *in, const nb_json_node *node, nebel_camera *camera)
-{
-    nb_space_convert_camera(&in->space, camera);
-    if (!is_near(camera))
-        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
-                            "is too far away; its position must lie within 1e15 m of the origin on every axis");
-    if (nb_camera_is_apart(camera) && nb_camera_is_upright(camera)) return true;
-    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has numbers that \"unit\" makes too large");
+    return nb_value_members(in->json, node, &key_keys, found) &&
+           nb_value_number(in->json, found[FRAME], &nb_range_frame, &key->frame) &&
+           read_view(in, node, found, ahead, &key->camera);
 }
 
 static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const double *ahead)
@@ -109,14 +91,13 @@ static bool read_keys(nb_scene_reader *in, const nb_json_node *node, const doubl
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(in->json, node); at != NULL; at = nb_json_next(in->json, at), i++) {
         keys[i].camera = data->camera;
-        if (!read_key(in->json, at, ahead, &keys[i])) return false;
+        if (!read_key(in, at, ahead, &keys[i])) return false;
         if (i > 0 && keys[i].frame <= keys[i - 1].frame)
             return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, at,
                                 "its frame %.15g is not after the key before it, %.15g; frames must ascend",
                                 keys[i].frame, keys[i - 1].frame);
     }
-    for (i = 0; i < node->count; i++)
-        if (!convert_camera(in, node, &keys[i].camera)) return false;
+    for (i = 0; i < node->count; i++) nb_space_convert_camera(&in->space, &keys[i].camera);
     data->camera_keys = keys;
     data->camera_key_count = node->count;
     return true;
@@ -133,8 +114,11 @@ bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node)
     double ahead[3];
     nb_space_restore_camera(&in->space, &data->camera);
     for (int i = 0; i < 3; i++) ahead[i] = data->camera.look_at[i] - data->camera.position[i];
-    return read_projection(in->json, found[PROJECTION], &data->camera.projection) &&
-           read_view(in->json, node, found, ahead, &data->camera) &&
-           read_turntable(in->json, found[TURNTABLE], &data->turntable_frames) &&
-           read_keys(in, found[KEYS], found[LOOK_AT] == NULL ? ahead : NULL) && convert_camera(in, node, &data->camera);
+    if (!read_projection(in->json, found[PROJECTION], &data->camera.projection) ||
+        !read_view(in, node, found, ahead, &data->camera) ||
+        !read_turntable(in->json, found[TURNTABLE], &data->turntable_frames) ||
+        !read_keys(in, found[KEYS], found[LOOK_AT] == NULL ? ahead : NULL))
+        return false;
+    nb_space_convert_camera(&in->space, &data->camera);
+    return true;
 }

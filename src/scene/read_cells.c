@@ -38,6 +38,13 @@ static bool check_name(nb_json *json, const nb_json_node *node, const cells_draf
                         "is the name of cells[%zu], too; portals need to tell them apart", first);
 }
 
+static bool check_shape(nb_json *json, const nb_json_node *node, nebel_shape_type type)
+{
+    if (type == NEBEL_SHAPE_BOX || type == NEBEL_SHAPE_CONVEX) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                        "is neither a box nor a convex body of planes; split what is not convex into cells that touch");
+}
+
 static bool read_cell(nb_scene_reader *in, const nb_json_node *node, const cells_draft *draft, size_t index)
 {
     const nb_json_node *found[CELL_KEY_COUNT];
@@ -49,8 +56,9 @@ static bool read_cell(nb_scene_reader *in, const nb_json_node *node, const cells
         !nb_value_members(json, node, &cell_keys, found) ||
         !nb_value_text(json, found[NAME], &in->scene->arena, &draft->names[index]) ||
         !check_name(json, found[NAME], draft, index) || !nb_read_shape(in, found[SHAPE], &cell->shape) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_not_negative, &cell->density) ||
-        !nb_value_color(json, found[COLOR], &nb_range_not_negative, cell->color))
+        !check_shape(json, found[SHAPE], cell->shape.type) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_amount, &cell->density) ||
+        !nb_value_color(json, found[COLOR], &nb_range_light, cell->color))
         return false;
     nb_space_convert_cell(&in->space, cell);
     return true;
@@ -106,7 +114,7 @@ static bool read_polygon(nb_scene_reader *in, const nb_json_node *node, nebel_po
     if (vertices == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++) {
-        if (!nb_value_vector(json, at, vertices[i])) return false;
+        if (!nb_value_place(json, at, vertices[i])) return false;
         nb_space_convert_place(&in->space, vertices[i]);
     }
     portal->vertices = (const double(*)[3])vertices;

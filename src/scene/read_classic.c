@@ -32,10 +32,10 @@ bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
     *factor = (nebel_factor_desc){.end = 1, .density = 1};
     if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {\"density\": ...}") ||
         !nb_value_members(json, node, &keys, found) ||
-        !nb_value_number(json, found[START], &nb_range_any, &factor->start) ||
-        !nb_value_number(json, found[END], &nb_range_any, &factor->end) ||
-        !nb_value_number(json, found[DENSITY], &nb_range_positive, &factor->density) ||
-        !nb_value_color(json, found[COLOR], &nb_range_not_negative, factor->color) ||
+        !nb_value_number(json, found[START], &nb_range_place, &factor->start) ||
+        !nb_value_number(json, found[END], &nb_range_place, &factor->end) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_density, &factor->density) ||
+        !nb_value_color(json, found[COLOR], &nb_range_light, factor->color) ||
         !read_choice(json, found[COORDINATE], nb_coordinate_names, &coordinate) ||
         !read_choice(json, found[STAGE], nb_stage_names, &stage))
         return false;

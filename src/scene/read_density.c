@@ -58,10 +58,7 @@ static bool read_below(nb_json *json, const nb_json_node *node, nebel_below *bel
 static bool check_ends(nb_json *json, const nb_json_node *const *found, const nebel_density *density)
 {
     const nb_json_node *end = found[TO] != NULL ? found[TO] : found[FROM];
-    const double *a = density->from, *b = density->to;
-    if (end == NULL || a[0] != b[0] || a[1] != b[1] || a[2] != b[2]) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, end, "is the same place as \"%s\"; the two must lie apart",
-                        found[TO] != NULL ? "from" : "to");
+    return end == NULL || nb_read_check_apart(json, end, found[TO] != NULL ? "from" : "to", density->from, density->to);
 }
 
 static const nb_json_node *find_type(const nb_json *json, const nb_json_node *object)
@@ -73,14 +70,14 @@ static const nb_json_node *find_type(const nb_json *json, const nb_json_node *ob
 
 static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_density *density)
 {
-    return nb_value_number(json, found[BASE], &nb_range_any, &density->base) &&
-           nb_value_number(json, found[SCALE_HEIGHT], &nb_range_positive, &density->scale_height) &&
-           read_below(json, found[BELOW], &density->below) && nb_value_vector(json, found[FROM], density->from) &&
-           nb_value_vector(json, found[TO], density->to) && check_ends(json, found, density) &&
+    return nb_value_number(json, found[BASE], &nb_range_place, &density->base) &&
+           nb_value_number(json, found[SCALE_HEIGHT], &nb_range_extent, &density->scale_height) &&
+           read_below(json, found[BELOW], &density->below) && nb_value_place(json, found[FROM], density->from) &&
+           nb_value_place(json, found[TO], density->to) && check_ends(json, found, density) &&
            nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
-           nb_value_vector(json, found[CENTER], density->center) &&
-           nb_value_number(json, found[SIGMA], &nb_range_positive, &density->sigma) &&
-           nb_value_number(json, found[DISTANCE], &nb_range_positive, &density->distance);
+           nb_value_place(json, found[CENTER], density->center) &&
+           nb_value_number(json, found[SIGMA], &nb_range_extent, &density->sigma) &&
+           nb_value_number(json, found[DISTANCE], &nb_range_extent, &density->distance);
 }
 
 bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
@@ -139,7 +136,7 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "a rayleigh phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a cornette_shanks phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
-    static const nb_range g_range = {-1, 1, true, "a number > -1 and < 1"};
+    static const nb_range g_range = {.low = -1, .high = 1, .open = true, .text = "a number > -1 and < 1"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     const int type = nb_value_type(in->json, node, phase_names, 5);

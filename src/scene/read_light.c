@@ -10,7 +10,7 @@ bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node)
     nebel_scene_data *data = &in->scene->data;
     if (!nb_value_members(in->json, node, &keys, found) ||
         !nb_value_direction(in->json, found[DIRECTION], data->sun_direction) ||
-        !nb_value_color(in->json, found[IRRADIANCE], &nb_range_not_negative, data->sun_irradiance))
+        !nb_value_color(in->json, found[IRRADIANCE], &nb_range_light, data->sun_irradiance))
         return false;
     nb_space_convert_direction(&in->space, data->sun_direction);
     nb_vector_normalize(data->sun_direction, 3);
@@ -32,8 +32,10 @@ static const nb_keys light_keys[] = {
 
 static bool check_cone(nb_json *json, const nb_json_node *const *found)
 {
-    static const nb_range outer_range = {0, 180, true, "a number of degrees from the axis, > 0 and < 180"};
-    static const nb_range inner_range = {0, 180, false, "a number of degrees from the axis, from 0 to outer_angle"};
+    static const nb_range outer_range = {
+        .low = 0, .high = 180, .open = true, .text = "a number of degrees from the axis, > 0 and < 180"};
+    static const nb_range inner_range = {
+        .low = 0, .high = 180, .text = "a number of degrees from the axis, from 0 to outer_angle"};
     double inner = 0, outer = 0;
     if (!nb_value_number(json, found[OUTER_ANGLE], &outer_range, &outer) ||
         !nb_value_number(json, found[INNER_ANGLE], &inner_range, &inner))
@@ -52,8 +54,8 @@ bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
     const int type = nb_value_type(in->json, node, types, 2);
     if (type < 0 || !nb_value_members(in->json, node, &light_keys[type], found) ||
         !nb_value_text(in->json, found[NAME], &in->scene->arena, &name) ||
-        !nb_value_vector(in->json, found[POSITION], vector) ||
-        !nb_value_color(in->json, found[INTENSITY], &nb_range_not_negative, vector) ||
+        !nb_value_place(in->json, found[POSITION], vector) ||
+        !nb_value_color(in->json, found[INTENSITY], &nb_range_light, vector) ||
         !nb_value_direction(in->json, found[DIRECTION], vector) || !check_cone(in->json, found))
         return false;
     return nb_json_fail(in->json, NEBEL_ERROR_UNSUPPORTED, node,

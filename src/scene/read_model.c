@@ -3,7 +3,6 @@
 #include "scene/model.h"
 #include "scene/path.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -58,8 +57,8 @@ static bool read_heightfield(nb_scene_reader *in, const nb_json_node *node, nb_m
     const nb_json_node *found[COUNT];
     model->is_heightfield = true;
     return nb_value_members(in->json, node, &keys, found) && read_file(in, found[HEIGHTFIELD_FILE], model) &&
-           nb_value_numbers(in->json, found[SIZE], &nb_range_positive, 2, model->size) &&
-           nb_value_number(in->json, found[HEIGHT], &nb_range_positive, &model->height);
+           nb_value_numbers(in->json, found[SIZE], &nb_range_extent, 2, model->size) &&
+           nb_value_number(in->json, found[HEIGHT], &nb_range_extent, &model->height);
 }
 
 static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
@@ -86,30 +85,21 @@ bool nb_read_up(nb_json *json, const nb_json_node *node, nb_space *space)
 
 bool nb_read_unit(nb_json *json, const nb_json_node *node, nb_space *space)
 {
-    static const nb_range range = {1e-9, 1e18, false, "a number of metres from 1e-9 to 1e18"};
+    static const nb_range range = {.low = 1e-9, .high = 1e18, .text = "a number of metres from 1e-9 to 1e18"};
     return nb_value_number(json, node, &range, &space->unit);
 }
 
-static bool is_finite(const double *numbers, size_t count)
+static void convert_model(const nb_space *space, nb_model_source *model)
 {
-    for (size_t i = 0; i < count; i++)
-        if (!isfinite(numbers[i])) return false;
-    return true;
-}
-
-static bool convert_model(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
-{
-    nb_space_convert_placement(&in->space, model->position, model->rotation, model->scale);
-    for (int i = 0; i < 2; i++) model->size[i] *= in->space.unit;
-    model->height *= in->space.unit;
-    if (is_finite(model->position, 3) && is_finite(model->size, 2) && isfinite(model->height)) return true;
-    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has numbers that \"unit\" makes too large");
+    nb_space_convert_placement(space, model->position, model->rotation, model->scale);
+    for (int i = 0; i < 2; i++) model->size[i] *= space->unit;
+    model->height *= space->unit;
 }
 
 static bool read_placement(nb_json *json, const nb_json_node *const *found, nb_model_source *model)
 {
     return nb_read_up(json, found[UP], &model->space) && nb_read_unit(json, found[UNIT], &model->space) &&
-           nb_value_vector(json, found[POSITION], model->position) &&
+           nb_value_place(json, found[POSITION], model->position) &&
            nb_value_rotation(json, found[ROTATION], model->rotation) &&
            nb_value_scale(json, found[SCALE], model->scale);
 }
@@ -156,11 +146,12 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
     nb_model_source model = unplaced;
     if (!nb_value_members(json, node, &model_keys, found) || !check_kind(json, node, found)) return false;
     model.has_color = found[COLOR] != NULL;
-    return (found[FILE_KEY] != NULL ? read_file(in, found[FILE_KEY], &model)
-                                    : read_heightfield(in, found[HEIGHTFIELD], &model)) &&
-           read_placement(json, found, &model) && nb_value_color(json, found[COLOR], &nb_range_fraction, model.color) &&
-           convert_model(in, node, &model) && (found[FILE_KEY] == NULL || nb_read_nodes(in, found[FILE_KEY], &model)) &&
-           keep_model(in, node, &model);
+    const bool is_file = found[FILE_KEY] != NULL;
+    if (!(is_file ? read_file(in, found[FILE_KEY], &model) : read_heightfield(in, found[HEIGHTFIELD], &model)) ||
+        !read_placement(json, found, &model) || !nb_value_color(json, found[COLOR], &nb_range_fraction, model.color))
+        return false;
+    convert_model(&in->space, &model);
+    return (!is_file || nb_read_nodes(in, found[FILE_KEY], &model)) && keep_model(in, node, &model);
 }
 
 /* ---- points ---------------------------------------------------------------------------------- */
@@ -190,8 +181,9 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
     const nb_model_load load = {in->scene->allocator, in->scene->log, &model, NULL, &points};
     if (node == NULL) return true;
     if (!nb_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
-        !read_placement(in->json, found, &model) || !convert_model(in, node, &model))
+        !read_placement(in->json, found, &model))
         return false;
+    convert_model(&in->space, &model);
     memcpy(place->position, model.position, sizeof place->position);
     memcpy(place->rotation, model.rotation, sizeof place->rotation);
     memcpy(place->scale, model.scale, sizeof place->scale);

@@ -53,12 +53,28 @@ static bool read_profile(nb_json *json, const nb_json_node *node, nebel_particle
 
 static bool read_sizes(nb_json *json, const nb_json_node *const *found, nebel_nebula_desc *nebula)
 {
-    if (!nb_value_numbers(json, found[SIZE], &nb_range_positive, 2, nebula->size) ||
-        !nb_value_number(json, found[TURBULENCE], &nb_range_not_negative, &nebula->turbulence) ||
-        !nb_value_number(json, found[TURBULENCE_SIZE], &nb_range_positive, &nebula->turbulence_size))
+    nb_range radius = nb_range_extent;
+    if (nebula->profile == NEBEL_PARTICLE_GAUSSIAN) radius.low *= 3; /* its sigma is a third of the radius */
+    if (!nb_value_numbers(json, found[SIZE], &radius, 2, nebula->size) ||
+        !nb_value_number(json, found[TURBULENCE], &nb_range_distance, &nebula->turbulence) ||
+        !nb_value_number(json, found[TURBULENCE_SIZE], &nb_range_extent, &nebula->turbulence_size))
         return false;
     if (nebula->size[0] <= nebula->size[1]) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[SIZE], "is larger first; must be [smallest, largest] radius");
+}
+
+/* Of a particle of this color. */
+static bool check_emission(nb_json *json, const nb_json_node *color, const nebel_nebula_desc *nebula,
+                           const double factors[3])
+{
+    char wanted[NB_RANGE_TEXT];
+    for (int c = 0; c < 3; c++) {
+        const double product = nebula->emission[c] * factors[c];
+        if (!nb_range_holds(&nb_range_amount, json->unit, product))
+            return nb_json_fail(json, NEBEL_ERROR_FORMAT, color, "times the emission is %.15g; that must be %s",
+                                product, nb_range_describe(&nb_range_amount, json->unit, wanted));
+    }
+    return true;
 }
 
 static bool read_colors(nb_scene_reader *in, const nb_json_node *node, nebel_nebula_desc *nebula)
@@ -72,8 +88,11 @@ static bool read_colors(nb_scene_reader *in, const nb_json_node *node, nebel_neb
     double(*colors)[3] = nb_arena_allocate(&in->scene->arena, node->count, sizeof *colors);
     if (colors == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     nebula->colors = (const double(*)[3])colors;
-    for (const nb_json_node *color = nb_json_first(json, node); color != NULL; color = nb_json_next(json, color))
-        if (!nb_value_color(json, color, &nb_range_not_negative, colors[nebula->color_count++])) return false;
+    for (const nb_json_node *color = nb_json_first(json, node); color != NULL; color = nb_json_next(json, color)) {
+        double *factors = colors[nebula->color_count++];
+        if (!nb_value_color(json, color, &nb_range_light, factors) || !check_emission(json, color, nebula, factors))
+            return false;
+    }
     return true;
 }
 
@@ -146,11 +165,13 @@ static bool check_total(nb_scene_reader *in, const nb_json_node *node, const neb
                         "brings the particles of this scene above %d, the most it may have", MOST_PARTICLES);
 }
 
-static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, nebel_nebula_desc *nebula,
-                          const nebel_transform *place, const char *name)
+/* What only the core knows is about the shape: its bounds. */
+static bool finish_nebula(nb_scene_reader *in, const nb_json_node *node, const nb_json_node *shape,
+                          nebel_nebula_desc *nebula, const nebel_transform *place, const char *name)
 {
     nb_space_convert_nebula(&in->space, nebula);
-    return try_nebula(in, node, nebula) && check_total(in, node, nebula) && keep_nebula(in, node, nebula, place, name);
+    return try_nebula(in, shape != NULL ? shape : node, nebula) && check_total(in, node, nebula) &&
+           keep_nebula(in, node, nebula, place, name);
 }
 
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
@@ -167,9 +188,11 @@ bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node)
            (found[SHAPE] == NULL || nb_read_shape(in, found[SHAPE], &nebula.shape)) &&
            check_bounds(json, found[SHAPE], nebula.shape.type) &&
            nb_read_density(in, found[DENSITY], nebula.shape.type, &nebula.density) &&
-           read_counts(json, found, &nebula) && nb_read_points(in, found[POINTS], MOST_PARTICLES, &nebula, &place) &&
-           read_profile(json, found[PROFILE], &nebula.profile) && read_sizes(json, found, &nebula) &&
-           nb_value_amount(json, found[ABSORPTION], &nb_range_not_negative, nebula.absorption) &&
-           nb_value_color(json, found[EMISSION], &nb_range_not_negative, nebula.emission) &&
-           read_colors(in, found[COLORS], &nebula) && finish_nebula(in, node, &nebula, &place, name);
+           read_counts(json, found, &nebula) && read_profile(json, found[PROFILE], &nebula.profile) &&
+           read_sizes(json, found, &nebula) &&
+           nb_value_amount(json, found[ABSORPTION], &nb_range_amount, nebula.absorption) &&
+           nb_value_color(json, found[EMISSION], &nb_range_amount, nebula.emission) &&
+           read_colors(in, found[COLORS], &nebula) &&
+           nb_read_points(in, found[POINTS], MOST_PARTICLES, &nebula, &place) &&
+           finish_nebula(in, node, found[SHAPE], &nebula, &place, name);
 }

@@ -1,6 +1,9 @@
 /* Shapes of fog, and their transforms. */
 #include "scene/scene_internal.h"
 
+#include <math.h>
+#include <string.h>
+
 enum {
     TYPE,
     TRANSFORM,
@@ -56,9 +59,25 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a transform"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
-    return nb_value_members(json, node, &keys, found) && nb_value_vector(json, found[POSITION], transform->position) &&
+    return nb_value_members(json, node, &keys, found) && nb_value_place(json, found[POSITION], transform->position) &&
            nb_value_quaternion(json, found[ROTATION], transform->rotation) &&
            nb_value_scale(json, found[SCALE], transform->scale);
+}
+
+/* The two ends of something, in the file's numbers, as far apart as the core wants them. `end` is one of them. */
+bool nb_read_check_apart(nb_json *json, const nb_json_node *end, const char *other, const double from[3],
+                         const double to[3])
+{
+    double away[3];
+    char wanted[NB_RANGE_TEXT];
+    for (int i = 0; i < 3; i++) away[i] = to[i] * json->unit - from[i] * json->unit;
+    const double distance = hypot(hypot(away[0], away[1]), away[2]);
+    if (nb_range_holds(&nb_range_extent, 1, distance)) return true;
+    if (distance == 0)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, end, "is the same place as \"%s\"; the two must lie apart",
+                            other);
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, end, "lies %.15g m from \"%s\"; between them must be %s", distance,
+                        other, nb_range_describe(&nb_range_extent, 1, wanted));
 }
 
 /* `min` or `max`, of which a key may have one alone. */
@@ -67,7 +86,7 @@ static bool check_box(nb_json *json, const nb_json_node *min, const nb_json_node
     const bool at_max = max != NULL;
     const nb_json_node *element = nb_json_first(json, at_max ? max : min);
     for (int i = 0; i < 3; i++, element = nb_json_next(json, element))
-        if (shape->min[i] >= shape->max[i])
+        if (shape->min[i] * json->unit >= shape->max[i] * json->unit)
             return nb_json_fail(json, NEBEL_ERROR_FORMAT, element, "is %.15g; must be %s[%d], which is %.15g",
                                 at_max ? shape->max[i] : shape->min[i], at_max ? "greater than min" : "less than max",
                                 i, at_max ? shape->min[i] : shape->max[i]);
@@ -76,17 +95,44 @@ static bool check_box(nb_json *json, const nb_json_node *min, const nb_json_node
 
 static bool check_axis(nb_json *json, const nb_json_node *end, const nebel_shape *shape)
 {
-    const bool apart =
-        shape->from[0] != shape->to[0] || shape->from[1] != shape->to[1] || shape->from[2] != shape->to[2];
-    if (apart || shape->type == NEBEL_SHAPE_CAPSULE) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, end, "is the same place as \"%s\"; the ends must lie apart",
-                        nb_json_has_key(end, "to") ? "from" : "to");
+    const bool is_ball = memcmp(shape->from, shape->to, sizeof shape->to) == 0 && shape->type == NEBEL_SHAPE_CAPSULE;
+    return is_ball ||
+           nb_read_check_apart(json, end, nb_json_has_key(end, "to") ? "from" : "to", shape->from, shape->to);
 }
 
 static bool check_cone(nb_json *json, const nb_json_node *radius, const nebel_shape *shape)
 {
     if (shape->radius_from > 0 || shape->radius_to > 0) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, radius, "both radii are 0; one must be > 0");
+}
+
+static bool read_plane(nb_json *json, const nb_json_node *node, nebel_plane *plane)
+{
+    double n[4];
+    if (!nb_value_numbers(json, node, &nb_range_any, 4, n)) return false;
+    if (n[0] == 0 && n[1] == 0 && n[2] == 0)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has the normal 0; one of nx, ny, nz must not be 0");
+    if (!nb_value_check_direction(json, node, n)) return false;
+    *plane = (nebel_plane){{n[0], n[1], n[2]}, n[3]};
+    const double away = fabs(n[3] * json->unit), length = hypot(hypot(n[0], n[1]), n[2]);
+    if (away <= NEBEL_MAX_LENGTH * length) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                        "lies %.15g m from the origin, the length of its normal counted; must be at most %s m",
+                        away / length, NB_TEXT(NEBEL_MAX_LENGTH));
+}
+
+/* In metres, as the core will have them. */
+static bool try_planes(nb_scene_reader *in, const nb_json_node *node, const nebel_shape *shape)
+{
+    nebel_plane planes[NEBEL_MAX_PLANES];
+    nebel_volume_desc body = {.operation = NEBEL_OPERATION_EXCLUDE, .shape = *shape};
+    for (size_t i = 0; i < shape->plane_count; i++) {
+        planes[i] = shape->planes[i];
+        planes[i].distance *= in->space.unit;
+    }
+    body.shape.planes = planes;
+    body.shape.transform = no_transform;
+    return nb_read_try(in, node, "convex: ", &body);
 }
 
 static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
@@ -100,23 +146,22 @@ static bool read_planes(nb_scene_reader *in, const nb_json_node *node, nebel_sha
     if (planes == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
     for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++) {
-        double numbers[4];
-        if (!nb_value_numbers(json, at, &nb_range_any, 4, numbers)) return false;
-        if (numbers[0] == 0 && numbers[1] == 0 && numbers[2] == 0)
-            return nb_json_fail(json, NEBEL_ERROR_FORMAT, at, "has the normal 0; one of nx, ny, nz must not be 0");
-        planes[i] = (nebel_plane){{numbers[0], numbers[1], numbers[2]}, numbers[3]};
+        if (!read_plane(json, at, &planes[i])) return false;
     }
     shape->planes = planes;
     shape->plane_count = node->count;
-    nebel_volume_desc body = {.operation = NEBEL_OPERATION_EXCLUDE, .shape = *shape};
-    body.shape.transform = no_transform;
-    return nb_read_try(in, node, "convex: ", &body);
+    return try_planes(in, node, shape);
 }
 
-/* leaf_count is that of the volume so far. */
-static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count);
+/* Where a shape is in its volume: so many groups around it, so many leaves before it. */
+typedef struct nesting {
+    int depth;
+    size_t leaf_count;
+} nesting;
 
-static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count)
+static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, nesting *where);
+
+static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, nesting *where)
 {
     nb_json *json = in->json;
     if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of shapes")) return false;
@@ -126,30 +171,35 @@ static bool read_parts(nb_scene_reader *in, const nb_json_node *node, nebel_shap
     nebel_shape *parts = nb_arena_allocate(&in->scene->arena, node->count, sizeof *parts);
     if (parts == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     size_t i = 0;
+    where->depth++;
     for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++)
-        if (!read_shape(in, at, &parts[i], leaf_count)) return false;
+        if (!read_shape(in, at, &parts[i], where)) return false;
+    where->depth--;
     shape->parts = parts;
     shape->part_count = node->count;
     return true;
 }
 
-static bool count_leaf(nb_json *json, const nb_json_node *node, size_t *leaf_count)
+static bool check_nesting(nb_json *json, const nb_json_node *node, const nesting *where)
 {
-    if (++*leaf_count <= NEBEL_MAX_LEAVES) return true;
+    if (where->depth > NEBEL_MAX_DEPTH)
+        return nb_json_fail(json, NEBEL_ERROR_LIMIT, node, "is nested too deeply; at most %d shapes may be around it",
+                            NEBEL_MAX_DEPTH);
+    if (where->leaf_count <= NEBEL_MAX_LEAVES) return true;
     return nb_json_fail(json, NEBEL_ERROR_LIMIT, node, "one volume is made of too many shapes; at most %d",
                         NEBEL_MAX_LEAVES);
 }
 
 static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_shape *shape)
 {
-    return read_transform(json, found[TRANSFORM], &shape->transform) && nb_value_vector(json, found[MIN], shape->min) &&
-           nb_value_vector(json, found[MAX], shape->max) && nb_value_vector(json, found[CENTER], shape->center) &&
-           nb_value_number(json, found[RADIUS], &nb_range_positive, &shape->radius) &&
-           nb_value_numbers(json, found[RADII], &nb_range_positive, 3, shape->radii) &&
-           nb_value_vector(json, found[FROM], shape->from) && nb_value_vector(json, found[TO], shape->to) &&
-           nb_value_number(json, found[RADIUS_FROM], &nb_range_not_negative, &shape->radius_from) &&
-           nb_value_number(json, found[RADIUS_TO], &nb_range_not_negative, &shape->radius_to) &&
-           nb_value_vector(json, found[POINT], shape->point) && nb_value_direction(json, found[NORMAL], shape->normal);
+    return read_transform(json, found[TRANSFORM], &shape->transform) && nb_value_place(json, found[MIN], shape->min) &&
+           nb_value_place(json, found[MAX], shape->max) && nb_value_place(json, found[CENTER], shape->center) &&
+           nb_value_number(json, found[RADIUS], &nb_range_extent, &shape->radius) &&
+           nb_value_numbers(json, found[RADII], &nb_range_extent, 3, shape->radii) &&
+           nb_value_place(json, found[FROM], shape->from) && nb_value_place(json, found[TO], shape->to) &&
+           nb_value_number(json, found[RADIUS_FROM], &nb_range_end, &shape->radius_from) &&
+           nb_value_number(json, found[RADIUS_TO], &nb_range_end, &shape->radius_to) &&
+           nb_value_place(json, found[POINT], shape->point) && nb_value_direction(json, found[NORMAL], shape->normal);
 }
 
 /* What one number has to do with another. */
@@ -162,7 +212,7 @@ static bool check_members(nb_json *json, const nb_json_node *const *found, const
            (axis == NULL || check_axis(json, axis, shape)) && (cone == NULL || check_cone(json, cone, shape));
 }
 
-static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, size_t *leaf_count)
+static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape, nesting *where)
 {
     const nb_json_node *found[SHAPE_KEY_COUNT];
     nb_json *json = in->json;
@@ -170,15 +220,16 @@ static bool read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shap
     if (type < 0 || !nb_value_members(json, node, &shape_keys[type], found)) return false;
     *shape = (nebel_shape){.type = (nebel_shape_type)type, .transform = no_transform};
     if (!read_members(json, found, shape)) return false;
-    if (found[SHAPES] != NULL) return read_parts(in, found[SHAPES], shape, leaf_count);
-    return count_leaf(json, node, leaf_count) && check_members(json, found, shape) &&
-           (found[PLANES] == NULL || read_planes(in, found[PLANES], shape));
+    where->leaf_count += found[SHAPES] == NULL;
+    if (!check_nesting(json, node, where)) return false;
+    if (found[SHAPES] != NULL) return read_parts(in, found[SHAPES], shape, where);
+    return check_members(json, found, shape) && (found[PLANES] == NULL || read_planes(in, found[PLANES], shape));
 }
 
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)
 {
-    size_t leaf_count = 0;
-    return read_shape(in, node, shape, &leaf_count);
+    nesting where = {0, 0};
+    return read_shape(in, node, shape, &where);
 }
 
 bool nb_read_shape_key(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape)

@@ -60,24 +60,14 @@ static bool read_operation(nb_json *json, const nb_json_node *volume, const char
 
 /* ---- amount ---------------------------------------------------------------------------------- */
 
-static double extinction_from_path(double path, double contrast)
+/* Through `length` fog is of optical depth `depth`. The shortest one is where the extinction is the largest. */
+static bool read_length(nb_json *json, const nb_json_node *node, double depth, double extinction[3])
 {
-    (void)contrast;
-    return 1 / path;
-}
-
-static bool read_length(nb_json *json, const nb_json_node *node, double contrast,
-                        double (*convert)(double length, double contrast), double extinction[3])
-{
+    const nb_range range = {
+        .low = depth / NEBEL_MAX_AMOUNT, .high = HUGE_VAL, .dimension = NB_LENGTH, .text = "a length"};
     double length[3];
-    if (node == NULL) return true;
-    if (!nb_value_amount(json, node, &nb_range_positive, length)) return false;
-    for (int i = 0; i < 3; i++) {
-        extinction[i] = convert(length[i], contrast);
-        if (!isfinite(extinction[i]))
-            return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
-                                "%.15g m is too short; its extinction is too large a number", length[i]);
-    }
+    if (!nb_value_amount(json, node, &range, length)) return false;
+    for (int i = 0; i < 3; i++) extinction[i] = fmin(depth / length[i], NEBEL_MAX_AMOUNT * json->unit);
     return true;
 }
 
@@ -104,16 +94,16 @@ static bool check_amount_given(nb_json *json, const nb_json_node *volume, const 
 /* An amount that is not given leaves `extinction` as it is, as a contrast does. */
 static bool read_amount(nb_json *json, const nb_json_node *const *found, double extinction[3], double *contrast)
 {
-    static const nb_range contrast_range = {0, 1, true, "a number > 0 and < 1"};
+    static const nb_range contrast_range = {.low = 0, .high = 1, .open = true, .text = "a number > 0 and < 1"};
     if (!check_amount_count(json, found)) return false;
     if (found[CONTRAST] != NULL && found[VISIBILITY] == NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[CONTRAST],
                                 "belongs to \"visibility\", which is absent");
     if (!nb_value_number(json, found[CONTRAST], &contrast_range, contrast)) return false;
-    if (found[EXTINCTION] != NULL) return nb_value_amount(json, found[EXTINCTION], &nb_range_not_negative, extinction);
+    if (found[EXTINCTION] != NULL) return nb_value_amount(json, found[EXTINCTION], &nb_range_amount, extinction);
     if (found[VISIBILITY] != NULL)
-        return read_length(json, found[VISIBILITY], *contrast, nebel_extinction_from_visibility, extinction);
-    return read_length(json, found[MEAN_FREE_PATH], 0, extinction_from_path, extinction);
+        return read_length(json, found[VISIBILITY], nebel_extinction_from_visibility(1, *contrast), extinction);
+    return found[MEAN_FREE_PATH] == NULL || read_length(json, found[MEAN_FREE_PATH], 1, extinction);
 }
 
 /* ---- light ----------------------------------------------------------------------------------- */
@@ -137,7 +127,7 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
     if (!nb_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
         !nb_read_phase(in, found[PHASE], phase) ||
-        !nb_value_color(json, found[EMISSION], &nb_range_not_negative, volume->emission))
+        !nb_value_color(json, found[EMISSION], &nb_range_amount, volume->emission))
         return false;
     if (found[ALBEDO] != NULL) remember_lit(in, found[ALBEDO], volume->albedo);
     return true;
@@ -226,7 +216,7 @@ static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_jso
     nebel_volume_desc *volume = &key->volume;
     double contrast = nb_volume_entry_default().contrast;
     return nb_value_members(json, node, &moving_keys[volume->operation], found) &&
-           nb_value_number(json, found[FRAME], &nb_range_any, &key->frame) &&
+           nb_value_number(json, found[FRAME], &nb_range_frame, &key->frame) &&
            nb_read_shape_key(in, found[SHAPE], &volume->shape) &&
            nb_read_density_key(in, found[DENSITY], &volume->density) &&
            read_amount(json, found, volume->extinction, &contrast) && check_light_key(json, entry, found) &&
@@ -391,8 +381,8 @@ static bool is_imported(const nb_json *json, const nb_json_node *volume)
 static bool read_place(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
     if (!nb_value_integer(json, found[PRIORITY], INT_MIN, INT_MAX, &volume->priority) ||
-        !nb_value_number(json, found[START], &nb_range_not_negative, &volume->start) ||
-        !nb_value_number(json, found[CUTOFF], &nb_range_positive, &volume->cutoff))
+        !nb_value_number(json, found[START], &nb_range_distance, &volume->start) ||
+        !nb_value_number(json, found[CUTOFF], &nb_range_distance, &volume->cutoff))
         return false;
     if (found[CUTOFF] == NULL || volume->cutoff > volume->start) return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, found[CUTOFF], "is %.15g; must be more than \"start\", %.15g",

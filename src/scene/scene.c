@@ -62,7 +62,10 @@ static bool read_space(nb_scene_reader *in, const nb_json_node *node, int sectio
         return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node,
                                 "comes after \"%s\", whose numbers it explains; move it to the top of the file",
                                 section_names[find_section(before)]);
-    return section == UP ? nb_read_up(in->json, node, &in->space) : nb_read_unit(in->json, node, &in->space);
+    if (section == UP) return nb_read_up(in->json, node, &in->space);
+    if (!nb_read_unit(in->json, node, &in->space)) return false;
+    in->json->unit = in->space.unit;
+    return true;
 }
 
 static bool read_section(nb_scene_reader *in, const nb_json_node *node)
@@ -82,7 +85,7 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     case CAMERA:
         return nb_read_camera(in, node);
     case BACKGROUND:
-        return nb_value_color(in->json, node, &nb_range_not_negative, data->background);
+        return nb_value_color(in->json, node, &nb_range_light, data->background);
     case SUN:
         return nb_read_sun(in, node);
     case AMBIENT:

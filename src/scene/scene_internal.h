@@ -111,6 +111,11 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
 bool nb_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model);
 bool nb_read_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 
+/* Whether two places, in the file's numbers, lie as far apart as the core wants. `end` is the node of one, `other` the
+ * key of the other. */
+bool nb_read_check_apart(nb_json *json, const nb_json_node *end, const char *other, const double from[3],
+                         const double to[3]);
+
 /* The shape of a node: an object like any other, a name, or NULL, a box. 1 is the size of an empty. */
 bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_shape *shape);
 

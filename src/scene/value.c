@@ -4,12 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-const nb_range nb_range_any = {-HUGE_VAL, HUGE_VAL, false, "a number"};
-const nb_range nb_range_positive = {0, HUGE_VAL, true, "a number > 0"};
-const nb_range nb_range_not_negative = {0, HUGE_VAL, false, "a number >= 0"};
-const nb_range nb_range_light = {0, 1e9, false, "a number from 0 to 1e9"};
-const nb_range nb_range_fraction = {0, 1, false, "a number from 0 to 1"};
-
 /* ---- names ----------------------------------------------------------------------------------- */
 
 /* Lists in messages are cut at this size. */
@@ -167,13 +161,14 @@ bool nb_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, con
 
 bool nb_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value)
 {
+    char wanted[NB_RANGE_TEXT];
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_NUMBER, range->text)) return false;
-    const double number = node->number;
-    const bool inside =
-        range->open ? number > range->low && number < range->high : number >= range->low && number <= range->high;
-    if (!inside) return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %.15g; must be %s", number, range->text);
-    *value = number;
+    if (node->type != NB_JSON_NUMBER)
+        return nb_value_is(json, node, NB_JSON_NUMBER, nb_range_describe(range, json->unit, wanted));
+    if (!nb_range_holds(range, json->unit, node->number))
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %.15g; must be %s", node->number,
+                            nb_range_describe(range, json->unit, wanted));
+    *value = node->number;
     return true;
 }
 
@@ -183,7 +178,7 @@ bool nb_value_integer(nb_json *json, const nb_json_node *node, int low, int high
     double number = 0;
     if (node == NULL) return true;
     snprintf(text, sizeof text, "a whole number from %d to %d", low, high);
-    const nb_range range = {low, high, false, text};
+    const nb_range range = {.low = low, .high = high, .text = text};
     if (!nb_value_number(json, node, &range, &number)) return false;
     if (number != floor(number))
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %.15g; must be %s", number, text);
@@ -206,9 +201,9 @@ bool nb_value_numbers(nb_json *json, const nb_json_node *node, const nb_range *r
     return true;
 }
 
-bool nb_value_vector(nb_json *json, const nb_json_node *node, double vector[3])
+bool nb_value_place(nb_json *json, const nb_json_node *node, double place[3])
 {
-    return nb_value_numbers(json, node, &nb_range_any, 3, vector);
+    return nb_value_numbers(json, node, &nb_range_place, 3, place);
 }
 
 static bool is_zero(const double *vector, size_t count)
@@ -218,12 +213,21 @@ static bool is_zero(const double *vector, size_t count)
     return true;
 }
 
+bool nb_value_check_direction(nb_json *json, const nb_json_node *node, const double vector[3])
+{
+    const double length = hypot(hypot(vector[0], vector[1]), vector[2]);
+    if (length == 0) return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has no direction; one number must not be 0");
+    if (length >= NEBEL_MIN_DIRECTION && length <= NEBEL_MAX_DIRECTION) return true;
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                        "is %.15g long; the length of a direction must be from " NB_TEXT(
+                            NEBEL_MIN_DIRECTION) " to " NB_TEXT(NEBEL_MAX_DIRECTION) ", 1 for example",
+                        length);
+}
+
 bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3])
 {
     if (node == NULL) return true;
-    if (!nb_value_vector(json, node, vector)) return false;
-    if (!is_zero(vector, 3)) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has no direction; one number must not be 0");
+    return nb_value_numbers(json, node, &nb_range_any, 3, vector) && nb_value_check_direction(json, node, vector);
 }
 
 bool nb_value_quaternion(nb_json *json, const nb_json_node *node, double rotation[4])
@@ -261,11 +265,7 @@ static bool read_one_or_three(nb_json *json, const nb_json_node *node, const nb_
 
 bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3])
 {
-    if (node == NULL) return true;
-    if (!read_one_or_three(json, node, &nb_range_any, "a number or an array of 3 numbers", scale)) return false;
-    if (scale[0] != 0 && scale[1] != 0 && scale[2] != 0) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
-                        "a scale of 0 makes the transform singular; every scale must differ from 0");
+    return node == NULL || read_one_or_three(json, node, &nb_range_factor, "a number or an array of 3 numbers", scale);
 }
 
 bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *range, double rgb[3])

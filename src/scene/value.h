@@ -4,6 +4,7 @@
 #define NB_SCENE_VALUE_H
 
 #include "scene/json.h"
+#include "scene/range.h"
 
 /* The keys an object may have, at most 32; bit i of a mask stands for names[i]. */
 typedef struct nb_keys {
@@ -40,26 +41,20 @@ int nb_value_choice(nb_json *json, const nb_json_node *node, const char *const *
 
 bool nb_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, const char *wanted);
 
-/* A closed or open interval of numbers, and its name in messages. */
-typedef struct nb_range {
-    double low, high;
-    bool open; /* without its ends */
-    const char *text;
-} nb_range;
-
-extern const nb_range nb_range_any, nb_range_positive, nb_range_not_negative, nb_range_fraction;
-extern const nb_range nb_range_light; /* what the core takes as radiance */
-
 bool nb_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value);
 bool nb_value_integer(nb_json *json, const nb_json_node *node, int low, int high, int *value);
 bool nb_value_numbers(nb_json *json, const nb_json_node *node, const nb_range *range, size_t count, double *values);
-bool nb_value_vector(nb_json *json, const nb_json_node *node, double vector[3]);
+bool nb_value_place(nb_json *json, const nb_json_node *node, double place[3]);
 bool nb_value_direction(nb_json *json, const nb_json_node *node, double vector[3]);  /* not zero; length kept */
 bool nb_value_rotation(nb_json *json, const nb_json_node *node, double rotation[4]); /* not zero; normalised */
 /* Not zero, with all its digits, though not of length 1: dividing by the length rounds, and a silhouette shows it. The
  * longest number is from .5 to 1. */
 bool nb_value_quaternion(nb_json *json, const nb_json_node *node, double rotation[4]);
-bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3]); /* one number or three, none 0 */
+bool nb_value_scale(nb_json *json, const nb_json_node *node, double scale[3]); /* one number or three */
+
+/* Whether a vector that is a direction has a length that the core takes; `node` is its array. */
+bool nb_value_check_direction(nb_json *json, const nb_json_node *node, const double vector[3]);
+
 bool nb_value_amount(nb_json *json, const nb_json_node *node, const nb_range *range, double rgb[3]); /* one or three */
 
 /* The same, or "#rrggbb" or "#rgb": an sRGB color, made linear. 0 and 1 must be in the range. */

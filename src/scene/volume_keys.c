@@ -45,9 +45,6 @@ static const moving numbers[] = {
     MOVING(emission, 3, true),
 };
 
-/* The core takes no place further away and no length shorter [m]. */
-static const double farthest = 1e15, shortest = 1e-15;
-
 static void pack_shape(nebel_shape *shape)
 {
     nb_vector_normalize(shape->normal, 3);
@@ -65,8 +62,8 @@ static void unpack_shape(nebel_shape *shape)
         shape->min[i] = middle - half;
         shape->max[i] = middle + half;
     }
-    if (shape->radius_from < shortest) shape->radius_from = 0;
-    if (shape->radius_to < shortest) shape->radius_to = 0;
+    if (shape->radius_from < NEBEL_MIN_LENGTH) shape->radius_from = 0;
+    if (shape->radius_to < NEBEL_MIN_LENGTH) shape->radius_to = 0;
 }
 
 static double dot(const double *a, const double *b, size_t count)
@@ -95,7 +92,7 @@ static bool move_numbers(const nb_keyframes *around, const nebel_volume_desc at[
             for (int k = 0; k < 4; k++) memcpy(&values[k], (const char *)&at[k] + offset, sizeof *values);
             value = nb_keyframes_between(around, numbers[n].limited, values);
             memcpy((char *)volume + offset, &value, sizeof value);
-            near = near && (numbers[n].limited || fabs(value) <= farthest);
+            near = near && (numbers[n].limited || fabs(value) <= NEBEL_MAX_LENGTH);
         }
     return near;
 }
@@ -132,8 +129,8 @@ static bool is_sound(const nebel_volume_desc *volume)
     const double axis = distance(shape->from, shape->to);
     for (int i = 0; i < 3; i++)
         if (is_box && !(shape->min[i] < shape->max[i])) return false;
-    if (has_axis && axis < shortest && !(is_capsule && axis == 0)) return false;
-    return density->type != NEBEL_DENSITY_LINEAR || distance(density->from, density->to) >= shortest;
+    if (has_axis && axis < NEBEL_MIN_LENGTH && !(is_capsule && axis == 0)) return false;
+    return density->type != NEBEL_DENSITY_LINEAR || distance(density->from, density->to) >= NEBEL_MIN_LENGTH;
 }
 
 static void mend(const nebel_volume_desc *nearer, nebel_volume_desc *volume)

@@ -1,0 +1,3 @@
+if(TARGET nebel_scene)
+    nebel_add_program(scene_judge scene_judge.c ${internal_libraries} m)
+endif()
