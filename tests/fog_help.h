@@ -1,10 +1,13 @@
 /* What the tests of the core's public face share: memory that keeps accounts, messages that can be read, fog in one
- * call. Include after <cmocka.h>. */
+ * call, numbers. Include after <cmocka.h>. */
 #ifndef FOG_HELP_H
 #define FOG_HELP_H
 
+#include "dice.h"
+
 #include <nebel/nebel.h>
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -97,24 +100,16 @@ static inline nebel_snapshot *fog_commit(const nebel_fog_desc *desc, const nebel
     return snapshot;
 }
 
-/* ---- numbers: splitmix64 --------------------------------------------------------------------- */
-
-static inline uint64_t dice_next(uint64_t *state)
+/* The largest difference of two numbers; infinite where one is a NaN. */
+static inline double fog_difference(const nebel_light *a, const nebel_light *b)
 {
-    uint64_t z = *state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-}
-
-static inline double dice(uint64_t *state, double from, double to)
-{
-    return from + (to - from) * (double)(dice_next(state) >> 11) * 0x1p-53;
-}
-
-static inline int dice_below(uint64_t *state, int n)
-{
-    return (int)(dice_next(state) % (uint64_t)n);
+    double most = 0;
+    for (int c = 0; c < 3; c++) {
+        const double off[2] = {fabs(a->transmittance[c] - b->transmittance[c]),
+                               fabs(a->in_scattering[c] - b->in_scattering[c])};
+        for (int i = 0; i < 2; i++) most = fmax(most, isnan(off[i]) ? HUGE_VAL : off[i]);
+    }
+    return most;
 }
 
 #endif

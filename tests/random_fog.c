@@ -1,42 +1,28 @@
 #include "random_fog.h"
 
+#include "dice.h"
+
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
-/* ---- numbers: splitmix64 --------------------------------------------------------------------- */
-
-static uint64_t next(uint64_t *state)
-{
-    uint64_t z = *state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-}
-
-static double uniform(uint64_t *state, double from, double to)
-{
-    return from + (to - from) * (double)(next(state) >> 11) * 0x1p-53;
-}
-
-static int below(uint64_t *state, int n)
-{
-    return (int)(next(state) % (uint64_t)n);
-}
+/* ---- numbers and vectors --------------------------------------------------------------------- */
 
 static int chance(uint64_t *state, double probability)
 {
-    return uniform(state, 0, 1) < probability;
+    return dice(state, 0, 1) < probability;
 }
 
 static double power_of_ten(uint64_t *state, double from, double to)
 {
-    return pow(10, uniform(state, from, to));
+    return pow(10, dice(state, from, to));
 }
 
 /* Every fifth number is round, so that faces coincide and rays run in them. */
 static double place(uint64_t *state, double from, double to)
 {
-    const double x = uniform(state, from, to);
+    const double x = dice(state, from, to);
     return chance(state, .2) ? floor(x) : x;
 }
 
@@ -45,22 +31,12 @@ static void places(uint64_t *state, double from, double to, double v[3])
     for (int k = 0; k < 3; k++) v[k] = place(state, from, to);
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static double length_of(const double v[3])
-{
-    return sqrt(dot(v, v));
-}
-
 static void random_unit(uint64_t *state, double v[3])
 {
     double length;
     do {
-        for (int k = 0; k < 3; k++) v[k] = uniform(state, -1, 1);
-        length = length_of(v);
+        for (int k = 0; k < 3; k++) v[k] = dice(state, -1, 1);
+        length = nb_vector_length(v);
     } while (length > 1 || length < .01);
     for (int k = 0; k < 3; k++) v[k] /= length;
 }
@@ -76,24 +52,24 @@ static void add_transform(uint64_t *state, nebel_transform *t)
 {
     places(state, -3, 3, t->position);
     if (chance(state, .8))
-        for (int k = 0; k < 4; k++) t->rotation[k] = uniform(state, -1, 1);
-    const int style = below(state, 3);
-    const double same = uniform(state, .6, 1.6);
-    for (int k = 0; k < 3; k++) t->scale[k] = style == 0 ? 0 : style == 1 ? same : uniform(state, .6, 1.6);
-    if (style == 2 && chance(state, .3)) t->scale[below(state, 3)] *= -1;
+        for (int k = 0; k < 4; k++) t->rotation[k] = dice(state, -1, 1);
+    const int style = dice_below(state, 3);
+    const double same = dice(state, .6, 1.6);
+    for (int k = 0; k < 3; k++) t->scale[k] = style == 0 ? 0 : style == 1 ? same : dice(state, .6, 1.6);
+    if (style == 2 && chance(state, .3)) t->scale[dice_below(state, 3)] *= -1;
 }
 
 static void make_planes(random_fog *fog, uint64_t *state, const double center[3], nebel_shape *shape)
 {
     nebel_plane *const planes = &fog->planes[fog->plane_count];
     shape->planes = planes;
-    shape->plane_count = (size_t)(6 + below(state, RANDOM_FOG_PLANES - 5));
+    shape->plane_count = (size_t)(6 + dice_below(state, RANDOM_FOG_PLANES - 5));
     fog->plane_count += shape->plane_count;
     for (size_t i = 0; i < shape->plane_count; i++) {
         random_unit(state, planes[i].normal);
         const double stretch = chance(state, .2) ? power_of_ten(state, -2, 2) : 1;
         for (int k = 0; k < 3; k++) planes[i].normal[k] *= stretch;
-        planes[i].distance = dot(planes[i].normal, center) + stretch * uniform(state, 2, 7);
+        planes[i].distance = nb_vector_dot(planes[i].normal, center) + stretch * dice(state, 2, 7);
     }
 }
 
@@ -102,12 +78,12 @@ static void make_leaf(random_fog *fog, uint64_t *state, nebel_shape_type type, n
     *s = (nebel_shape){.type = type};
     double center[3], half[3];
     places(state, -12, 12, center);
-    for (int k = 0; k < 3; k++) half[k] = floor(uniform(state, 2, 16)) / 2;
+    for (int k = 0; k < 3; k++) half[k] = floor(dice(state, 2, 16)) / 2;
     for (int k = 0; k < 3; k++) {
         s->center[k] = s->from[k] = center[k];
         s->min[k] = center[k] - half[k];
         s->max[k] = center[k] + half[k];
-        s->radii[k] = uniform(state, 1.5, 9);
+        s->radii[k] = dice(state, 1.5, 9);
     }
     places(state, -12, 12, s->to);
     s->radius = type == NEBEL_SHAPE_SPHERE ? place(state, 2, 9) : place(state, 1, 6);
@@ -116,7 +92,7 @@ static void make_leaf(random_fog *fog, uint64_t *state, nebel_shape_type type, n
     places(state, -3, 3, s->point);
     random_unit(state, s->normal);
     if (type == NEBEL_SHAPE_CONVEX) make_planes(fog, state, center, s);
-    if (length_of((const double[3]){s->to[0] - s->from[0], s->to[1] - s->from[1], s->to[2] - s->from[2]}) < .1)
+    if (nb_vector_length((const double[3]){s->to[0] - s->from[0], s->to[1] - s->from[1], s->to[2] - s->from[2]}) < .1)
         s->to[1] += 5;
     if (type != NEBEL_SHAPE_WORLD && chance(state, .3)) add_transform(state, &s->transform);
 }
@@ -124,7 +100,7 @@ static void make_leaf(random_fog *fog, uint64_t *state, nebel_shape_type type, n
 static void make_parts(random_fog *fog, uint64_t *state, int level, nebel_shape *s)
 {
     *s = (nebel_shape){.type = chance(state, .5) ? NEBEL_SHAPE_UNION : NEBEL_SHAPE_INTERSECTION};
-    s->part_count = (size_t)(2 + below(state, RANDOM_FOG_PARTS_EACH - 1));
+    s->part_count = (size_t)(2 + dice_below(state, RANDOM_FOG_PARTS_EACH - 1));
     nebel_shape *const parts = &fog->parts[fog->part_count];
     fog->part_count += s->part_count;
     s->parts = parts;
@@ -132,7 +108,7 @@ static void make_parts(random_fog *fog, uint64_t *state, int level, nebel_shape 
         if (level == 0 && chance(state, .3))
             make_parts(fog, state, 1, &parts[i]);
         else
-            make_leaf(fog, state, leaves[below(state, LEAVES)], &parts[i]);
+            make_leaf(fog, state, leaves[dice_below(state, LEAVES)], &parts[i]);
     }
     if (chance(state, .3)) add_transform(state, &s->transform);
 }
@@ -143,7 +119,7 @@ static void make_density(uint64_t *state, const nebel_shape *shape, nebel_densit
 {
     const int round = shape->type == NEBEL_SHAPE_SPHERE || shape->type == NEBEL_SHAPE_ELLIPSOID;
     const nebel_density_type any[] = {NEBEL_DENSITY_HEIGHT, NEBEL_DENSITY_LINEAR, NEBEL_DENSITY_GAUSSIAN};
-    d->type = any[below(state, 3)];
+    d->type = any[dice_below(state, 3)];
     if (round && chance(state, .6)) d->type = NEBEL_DENSITY_RADIAL;
     if (shape->type == NEBEL_SHAPE_BOX && chance(state, .6)) d->type = NEBEL_DENSITY_SOFT_EDGE;
     d->below = chance(state, .5) ? NEBEL_BELOW_CONSTANT : NEBEL_BELOW_GROW;
@@ -153,9 +129,9 @@ static void make_density(uint64_t *state, const nebel_shape *shape, nebel_densit
     places(state, -8, 8, d->to);
     if (d->from[1] == d->to[1]) d->to[1] += 1;
     places(state, -8, 8, d->center);
-    d->power = 1 + below(state, 3);
-    d->sigma = uniform(state, 1.5, 6);
-    d->distance = uniform(state, .3, 4);
+    d->power = 1 + dice_below(state, 3);
+    d->sigma = dice(state, 1.5, 6);
+    d->distance = dice(state, .3, 4);
     /* by digits that are there already, so that other numbers stay what they were */
     const int has_surface = shape->type != NEBEL_SHAPE_WORLD && shape->type < NEBEL_SHAPE_UNION;
     if (has_surface && d->type != NEBEL_DENSITY_RADIAL && fmod(d->sigma * 1e3, 1) < .4)
@@ -164,16 +140,16 @@ static void make_density(uint64_t *state, const nebel_shape *shape, nebel_densit
 
 static void make_light(uint64_t *state, random_fog_kind kind, nebel_volume_desc *v)
 {
-    const double grey = uniform(state, .005, .2), factor = kind == RANDOM_FOG_OPAQUE ? power_of_ten(state, -5, 5) : 1;
+    const double grey = dice(state, .005, .2), factor = kind == RANDOM_FOG_OPAQUE ? power_of_ten(state, -5, 5) : 1;
     const int colored = chance(state, .5), lit = chance(state, .25), shines = chance(state, .2);
     for (int c = 0; c < 3; c++) {
-        v->extinction[c] = factor * (colored ? uniform(state, .005, .15) : grey);
-        v->source[c] = lit ? 0 : uniform(state, 0, 2);
-        v->albedo[c] = lit ? uniform(state, .2, 1) : 0;
-        v->emission[c] = shines ? uniform(state, 0, .05) : 0;
+        v->extinction[c] = factor * (colored ? dice(state, .005, .15) : grey);
+        v->source[c] = lit ? 0 : dice(state, 0, 2);
+        v->albedo[c] = lit ? dice(state, .2, 1) : 0;
+        v->emission[c] = shines ? dice(state, 0, .05) : 0;
     }
     /* A channel without extinction must not shine, or an endless ray has no answer. */
-    if (!shines && chance(state, .1)) v->extinction[below(state, 3)] = 0;
+    if (!shines && chance(state, .1)) v->extinction[dice_below(state, 3)] = 0;
 }
 
 static void make_level_density(uint64_t *state, nebel_density *d)
@@ -191,10 +167,10 @@ static void make_level_density(uint64_t *state, nebel_density *d)
 
 static void make_priority(uint64_t *state, nebel_volume_desc *v)
 {
-    v->priority = below(state, 3) - 1;
+    v->priority = dice_below(state, 3) - 1;
     if (v->operation == NEBEL_OPERATION_ADD && chance(state, .4)) v->operation = NEBEL_OPERATION_REPLACE;
     if (chance(state, .2)) v->start = place(state, 0, 30);
-    if (chance(state, .2)) v->cutoff = v->start + uniform(state, 1, 30);
+    if (chance(state, .2)) v->cutoff = v->start + dice(state, 1, 30);
 }
 
 static void make_volume(random_fog *fog, uint64_t *state, random_fog_kind kind, size_t i)
@@ -202,7 +178,7 @@ static void make_volume(random_fog *fog, uint64_t *state, random_fog_kind kind, 
     nebel_volume_desc *const v = &fog->volumes[i];
     *v = (nebel_volume_desc){.operation = NEBEL_OPERATION_ADD};
     const int endless = kind == RANDOM_FOG_SINGLE || kind == RANDOM_FOG_LEVEL || chance(state, .1);
-    nebel_shape_type type = leaves[below(state, endless ? LEAVES : BOUNDED)];
+    nebel_shape_type type = leaves[dice_below(state, endless ? LEAVES : BOUNDED)];
     if (i == 0 && (kind == RANDOM_FOG_OVERLAP || (kind == RANDOM_FOG_LEVEL && chance(state, .7))))
         type = NEBEL_SHAPE_WORLD;
     if (kind == RANDOM_FOG_PARTS && chance(state, .8))
@@ -246,13 +222,13 @@ static void shift_shape(random_fog *fog, uint64_t *state, const double by[3], ne
     add(s->to, by);
     add(s->point, by);
     nebel_plane *const planes = s->plane_count > 0 ? &fog->planes[s->planes - fog->planes] : NULL;
-    for (size_t i = 0; i < s->plane_count; i++) planes[i].distance += dot(planes[i].normal, by);
+    for (size_t i = 0; i < s->plane_count; i++) planes[i].distance += nb_vector_dot(planes[i].normal, by);
 }
 
 static void shift_fog(random_fog *fog, uint64_t *state)
 {
-    for (int k = 0; k < 3; k++) fog->shift[k] = 1e7 * (below(state, 3) - 1);
-    if (length_of(fog->shift) < 1) fog->shift[0] = 1e7;
+    for (int k = 0; k < 3; k++) fog->shift[k] = 1e7 * (dice_below(state, 3) - 1);
+    if (nb_vector_length(fog->shift) < 1) fog->shift[0] = 1e7;
     for (size_t i = 0; i < fog->count; i++) {
         nebel_volume_desc *const v = &fog->volumes[i];
         shift_shape(fog, state, fog->shift, &v->shape);
@@ -268,11 +244,27 @@ void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed)
     static const size_t counts[] = {1, 6, 5, 6, RANDOM_FOG_VOLUMES, 3, 5, 4, 3};
     uint64_t state = seed * RANDOM_FOG_KIND_COUNT + (uint64_t)kind;
     *fog = (random_fog){.kind = kind, .seed = seed, .count = counts[kind]};
-    for (int c = 0; c < 3; c++) fog->ambient[c] = uniform(&state, 0, 1);
-    const random_fog_kind near = kind == RANDOM_FOG_FAR ? (random_fog_kind)below(&state, RANDOM_FOG_FAR) : kind;
+    for (int c = 0; c < 3; c++) fog->ambient[c] = dice(&state, 0, 1);
+    const random_fog_kind near = kind == RANDOM_FOG_FAR ? (random_fog_kind)dice_below(&state, RANDOM_FOG_FAR) : kind;
     for (size_t i = 0; i < fog->count; i++) make_volume(fog, &state, near, i);
     if (kind == RANDOM_FOG_FAR) shift_fog(fog, &state);
-    if (seed % 4 == 3) fog->max_opacity = uniform(&state, .05, 1);
+    if (seed % 4 == 3) fog->max_opacity = dice(&state, .05, 1);
+}
+
+nebel_fog_desc random_fog_desc(const random_fog *fog)
+{
+    return (nebel_fog_desc){.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},
+                            .max_opacity = fog->max_opacity};
+}
+
+void random_fog_rotate(const double q[4], double p[3])
+{
+    const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    if (!(n > 0)) return;
+    const double a[3] = {q[1] * p[2] - q[2] * p[1] + q[3] * p[0], q[2] * p[0] - q[0] * p[2] + q[3] * p[1],
+                         q[0] * p[1] - q[1] * p[0] + q[3] * p[2]};
+    const double b[3] = {q[1] * a[2] - q[2] * a[1], q[2] * a[0] - q[0] * a[2], q[0] * a[1] - q[1] * a[0]};
+    for (int k = 0; k < 3; k++) p[k] += 2 * b[k] / n;
 }
 
 /* ---- rays ------------------------------------------------------------------------------------ */
@@ -286,23 +278,13 @@ typedef struct target {
 
 static target choose_target(const random_fog *fog, uint64_t *state)
 {
-    target t = {.shape = &fog->volumes[below(state, (int)fog->count)].shape};
+    target t = {.shape = &fog->volumes[dice_below(state, (int)fog->count)].shape};
     t.chain[t.depth++] = &t.shape->transform;
     while (t.shape->type == NEBEL_SHAPE_UNION || t.shape->type == NEBEL_SHAPE_INTERSECTION) {
-        t.shape = &t.shape->parts[below(state, (int)t.shape->part_count)];
+        t.shape = &t.shape->parts[dice_below(state, (int)t.shape->part_count)];
         t.chain[t.depth++] = &t.shape->transform;
     }
     return t;
-}
-
-static void rotate(const double q[4], double p[3])
-{
-    const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(n > 0)) return;
-    const double a[3] = {q[1] * p[2] - q[2] * p[1] + q[3] * p[0], q[2] * p[0] - q[0] * p[2] + q[3] * p[1],
-                         q[0] * p[1] - q[1] * p[0] + q[3] * p[2]};
-    const double b[3] = {q[1] * a[2] - q[2] * a[1], q[2] * a[0] - q[0] * a[2], q[0] * a[1] - q[1] * a[0]};
-    for (int k = 0; k < 3; k++) p[k] += 2 * b[k] / n;
 }
 
 static void to_world(const target *t, double p[3], int is_point)
@@ -311,14 +293,14 @@ static void to_world(const target *t, double p[3], int is_point)
         const nebel_transform *const f = t->chain[i];
         for (int k = 0; k < 3; k++)
             if (f->scale[k] != 0) p[k] *= f->scale[k];
-        rotate(f->rotation, p);
+        random_fog_rotate(f->rotation, p);
         if (is_point) add(p, f->position);
     }
 }
 
 static void remove_along(const double axis[3], double v[3])
 {
-    const double share = dot(v, axis) / dot(axis, axis);
+    const double share = nb_vector_dot(v, axis) / nb_vector_dot(axis, axis);
     for (int k = 0; k < 3; k++) v[k] -= share * axis[k];
 }
 
@@ -340,8 +322,8 @@ static void surface_point(uint64_t *state, const nebel_shape *s, int edges, doub
     random_unit(state, n);
     double axis[3];
     for (int k = 0; k < 3; k++) axis[k] = s->to[k] - s->from[k];
-    const double where = chance(state, .2) ? below(state, 2) : uniform(state, 0, 1), length = length_of(axis);
-    const int side = below(state, 3);
+    const double where = chance(state, .2) ? dice_below(state, 2) : dice(state, 0, 1), length = nb_vector_length(axis);
+    const int side = dice_below(state, 3);
     switch (s->type) {
     case NEBEL_SHAPE_SPHERE:
         for (int k = 0; k < 3; k++) p[k] = s->center[k] + s->radius * n[k];
@@ -359,7 +341,7 @@ static void surface_point(uint64_t *state, const nebel_shape *s, int edges, doub
         const double slope = cone ? (s->radius_to - s->radius_from) / length : 0;
         const double radius = cone ? s->radius_from + where * length * slope : s->radius;
         remove_along(axis, n);
-        const double size = length_of(n);
+        const double size = nb_vector_length(n);
         for (int k = 0; k < 3; k++) {
             n[k] /= size;
             p[k] = s->from[k] + where * axis[k] + radius * n[k];
@@ -368,10 +350,10 @@ static void surface_point(uint64_t *state, const nebel_shape *s, int edges, doub
         break;
     }
     case NEBEL_SHAPE_CONVEX: {
-        const nebel_plane *const plane = &s->planes[below(state, (int)s->plane_count)];
+        const nebel_plane *const plane = &s->planes[dice_below(state, (int)s->plane_count)];
         memcpy(n, plane->normal, sizeof plane->normal);
-        for (int k = 0; k < 3; k++) p[k] = uniform(state, -5, 5);
-        const double move = (plane->distance - dot(n, p)) / dot(n, n);
+        for (int k = 0; k < 3; k++) p[k] = dice(state, -5, 5);
+        const double move = (plane->distance - nb_vector_dot(n, p)) / nb_vector_dot(n, n);
         for (int k = 0; k < 3; k++) p[k] += move * n[k];
         break;
     }
@@ -381,7 +363,7 @@ static void surface_point(uint64_t *state, const nebel_shape *s, int edges, doub
         break;
     default: {
         for (int k = 0; k < 3; k++) {
-            const double share = edges && chance(state, .2) ? below(state, 2) : uniform(state, 0, 1);
+            const double share = edges && chance(state, .2) ? dice_below(state, 2) : dice(state, 0, 1);
             p[k] = s->min[k] + share * (s->max[k] - s->min[k]);
             n[k] = k == side;
         }
@@ -432,19 +414,19 @@ static void graze(const random_fog *fog, uint64_t *state, nebel_ray *ray)
     double p[3], n[3], d[3];
     surface_point(state, t.shape, is_in_place(&t), p, n);
     random_unit(state, d);
-    const int along_axis = t.shape->type == NEBEL_SHAPE_BOX && chance(state, .5), axis = below(state, 3);
+    const int along_axis = t.shape->type == NEBEL_SHAPE_BOX && chance(state, .5), axis = dice_below(state, 3);
     for (int k = 0; k < 3 && along_axis; k++) d[k] = k == axis ? 1 : 0;
     remove_along(n, d);
     if (has_axis(t.shape) && chance(state, .05)) run_along(state, t.shape, n, d);
-    if (!(length_of(d) > 1e-3)) random_unit(state, d);
+    if (!(nb_vector_length(d) > 1e-3)) random_unit(state, d);
     const double off = choose_offset(state, &t, along_axis);
-    const double size = length_of(n);
+    const double size = nb_vector_length(n);
     for (int k = 0; k < 3; k++) n[k] *= off / size;
     to_world(&t, p, 1);
     to_world(&t, d, 0);
     to_world(&t, n, 0);
     add(p, n);
-    set_ray(ray, p, d, uniform(state, -5, 30) / length_of(d));
+    set_ray(ray, p, d, dice(state, -5, 30) / nb_vector_length(d));
 }
 
 /* Through a corner, an apex, the middle; or along the axis. */
@@ -453,17 +435,17 @@ static void aim(const random_fog *fog, uint64_t *state, nebel_ray *ray)
     const target t = choose_target(fog, state);
     const nebel_shape *const s = t.shape;
     const int spindle = has_axis(s);
-    const int box = s->type == NEBEL_SHAPE_BOX, end = below(state, 2), along = chance(state, .3);
+    const int box = s->type == NEBEL_SHAPE_BOX, end = dice_below(state, 2), along = chance(state, .3);
     double p[3], d[3];
     random_unit(state, d);
     for (int k = 0; k < 3; k++) {
-        p[k] = box ? (below(state, 2) ? s->min[k] : s->max[k]) : spindle && end ? s->to[k] : s->center[k];
+        p[k] = box ? (dice_below(state, 2) ? s->min[k] : s->max[k]) : spindle && end ? s->to[k] : s->center[k];
         if (along && spindle) d[k] = s->to[k] - s->from[k];
         if (along && box) d[k] = s->max[k] - s->min[k];
     }
     to_world(&t, p, 1);
     to_world(&t, d, 0);
-    set_ray(ray, p, d, uniform(state, -5, 30) / length_of(d));
+    set_ray(ray, p, d, dice(state, -5, 30) / nb_vector_length(d));
 }
 
 static void cross(const random_fog *fog, uint64_t *state, nebel_ray *ray)
@@ -471,17 +453,17 @@ static void cross(const random_fog *fog, uint64_t *state, nebel_ray *ray)
     double to[3];
     const int inside = chance(state, .2);
     for (int k = 0; k < 3; k++) {
-        ray->origin[k] = fog->shift[k] + (inside ? uniform(state, -6, 6) : uniform(state, -25, 25));
-        to[k] = fog->shift[k] + uniform(state, -12, 12);
+        ray->origin[k] = fog->shift[k] + (inside ? dice(state, -6, 6) : dice(state, -25, 25));
+        to[k] = fog->shift[k] + dice(state, -12, 12);
         ray->direction[k] = to[k] - ray->origin[k];
     }
 }
 
 static void cross_along_axis(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 {
-    const int axis = below(state, 3), forward = below(state, 2);
+    const int axis = dice_below(state, 3), forward = dice_below(state, 2);
     for (int k = 0; k < 3; k++) {
-        const double x = uniform(state, -12, 12);
+        const double x = dice(state, -12, 12);
         ray->direction[k] = k != axis ? 0 : forward ? 1 : -1;
         ray->origin[k] = fog->shift[k] + (chance(state, .5) ? floor(2 * x) / 2 : x);
     }
@@ -491,12 +473,13 @@ static void cross_along_axis(const random_fog *fog, uint64_t *state, nebel_ray *
 static double run_level(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 {
     cross(fog, state, ray);
-    const nebel_density *const d = &fog->volumes[below(state, (int)fog->count)].density;
+    const nebel_density *const d = &fog->volumes[dice_below(state, (int)fog->count)].density;
     const int linear = d->type == NEBEL_DENSITY_LINEAR;
     double up[3] = {0, 1, 0};
     for (int k = 0; k < 3 && linear; k++) up[k] = d->to[k] - d->from[k];
     const double steepness = chance(state, .1) ? 0 : power_of_ten(state, -18, -1);
-    const double rise = steepness * length_of(ray->direction) / length_of(up) * (chance(state, .5) ? 1 : -1);
+    const double rise =
+        steepness * nb_vector_length(ray->direction) / nb_vector_length(up) * (chance(state, .5) ? 1 : -1);
     remove_along(up, ray->direction);
     for (int k = 0; k < 3; k++) ray->direction[k] += rise * up[k];
     return up[0] == 0 ? steepness : fmax(steepness, 1e-17); /* which is as level as rounding lets it be */
@@ -505,8 +488,8 @@ static double run_level(const random_fog *fog, uint64_t *state, nebel_ray *ray)
 /* No endless rays that reach another height only after more metres than there are. */
 static void choose_end(uint64_t *state, int far, double steepness, nebel_ray *ray)
 {
-    const int style = below(state, 20);
-    ray->t_max = far ? power_of_ten(state, 1, 6) : uniform(state, 5, 80);
+    const int style = dice_below(state, 20);
+    ray->t_max = far ? power_of_ten(state, 1, 6) : dice(state, 5, 80);
     if (style == 0) ray->t_max = 0;
     if (style == 1) ray->t_max = power_of_ten(state, -12, 0);
     if (style >= 2 && style < 6 && (steepness == 0 || steepness > 1e-9)) ray->t_max = HUGE_VAL;
@@ -517,8 +500,8 @@ nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed)
 {
     uint64_t state = fog->seed * 1000003 + seed;
     nebel_ray ray = {{0}, {0}, 0};
-    next(&state);
-    const int style = below(&state, 10), level = fog->kind == RANDOM_FOG_LEVEL && style < 8;
+    dice_next(&state);
+    const int style = dice_below(&state, 10), level = fog->kind == RANDOM_FOG_LEVEL && style < 8;
     double steepness = 1;
     if (level)
         steepness = run_level(fog, &state, &ray);
@@ -530,7 +513,7 @@ nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed)
         graze(fog, &state, &ray);
     else
         aim(fog, &state, &ray);
-    if (!(length_of(ray.direction) > 0)) ray.direction[0] = 1;
+    if (!(nb_vector_length(ray.direction) > 0)) ray.direction[0] = 1;
     choose_end(&state, level, steepness, &ray);
     if (chance(&state, .3)) {
         const double stretch = power_of_ten(&state, -3, 3);

@@ -37,10 +37,16 @@ typedef struct random_fog {
 
 void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed);
 
+/* Its ambient light and its limit. */
+nebel_fog_desc random_fog_desc(const random_fog *fog);
+
 /* Past, through and from inside the volumes; along axes; in faces; tangent to spheres, cylinders and cones to 1e-3 ..
  * 1e-15 of their size; through corners and along axes of shapes; t_max zero, tiny, ending on a surface, long, infinite;
  * directions of any length. */
 nebel_ray random_fog_ray(const random_fog *fog, uint64_t seed);
+
+/* By a quaternion of any length; one of zeros turns nothing. */
+void random_fog_rotate(const double q[4], double p[3]);
 
 /* The fog as a scene file and the ray as a line of `nebel trace`, every number exact. */
 void random_fog_print(FILE *to, const random_fog *fog, const nebel_ray *ray);

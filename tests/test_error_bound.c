@@ -14,6 +14,8 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "fog_help.h"
+
 enum { RAYS_PER_FOG = 20 };
 
 static size_t case_count = 20000, first_case;
@@ -56,15 +58,8 @@ static uint64_t seed_of(size_t i)
 
 static nebel_snapshot *commit(const random_fog *fog)
 {
-    nebel_fog *now = NULL;
-    nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},
-                           .max_opacity = fog->max_opacity};
-    assert_int_equal(nebel_create_fog(&desc, &now), NEBEL_OK);
-    for (size_t i = 0; i < fog->count; i++) assert_int_equal(nebel_add_volume(now, &fog->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(now, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(now);
-    return snapshot;
+    const nebel_fog_desc desc = random_fog_desc(fog);
+    return fog_commit(&desc, fog->volumes, fog->count);
 }
 
 static double largest_radiance(const random_fog *fog)

@@ -278,16 +278,6 @@ static int try_ray(const scene *s, uint64_t seed, const nebel_snapshot *snapshot
     return 0;
 }
 
-static double apart(const nebel_light *a, const nebel_light *b)
-{
-    double most = 0;
-    for (int c = 0; c < 3; c++) {
-        most = fmax(most, fabs(a->transmittance[c] - b->transmittance[c]));
-        most = fmax(most, fabs(a->in_scattering[c] - b->in_scattering[c]));
-    }
-    return most;
-}
-
 static void try_scene(uint64_t seed, tally *sum)
 {
     static scene s;
@@ -299,7 +289,8 @@ static void try_scene(uint64_t seed, tally *sum)
         const int good = try_ray(&s, seed, snapshot, NEBEL_PRECISION_DOUBLE, &ray, &exact, sum);
         if (!try_ray(&s, seed, snapshot, NEBEL_PRECISION_FLOAT, &ray, &light, sum) || !good) continue;
         if (!compares_precisions) continue;
-        if (apart(&exact, &light) <= exact.error + light.error + (double)FLT_MIN) continue; /* floats end there */
+        if (fog_difference(&exact, &light) <= exact.error + light.error + (double)FLT_MIN)
+            continue; /* floats end there */
         sum->wrong++;
         say(seed, "double and float disagree", &ray, &exact);
         say(seed, "beyond their errors", &ray, &light);

@@ -8,15 +8,11 @@
 #include <cmocka.h>
 
 #include "fog_help.h"
+#include "random_fog.h"
 
-#include <math.h>
+#include "base/vector.h"
 
 enum { RAYS = 4200, KINDS = 8 };
-
-static double along(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static void roll(uint64_t *state, double from, double to, double v[3])
 {
@@ -28,10 +24,10 @@ static void roll_across(uint64_t *state, const double axis[3], double v[3])
 {
     do {
         roll(state, -1, 1, v);
-        const double share = along(v, axis) / along(axis, axis);
+        const double share = nb_vector_dot(v, axis) / nb_vector_dot(axis, axis);
         for (int k = 0; k < 3; k++) v[k] -= share * axis[k];
-    } while (!(along(v, v) > .01));
-    const double length = sqrt(along(v, v));
+    } while (!(nb_vector_dot(v, v) > .01));
+    const double length = nb_vector_length(v);
     for (int k = 0; k < 3; k++) v[k] /= length;
 }
 
@@ -123,7 +119,7 @@ typedef struct surface_line {
 static void set_plane_line(uint64_t *state, const double normal[3], double distance, surface_line *l)
 {
     roll(state, -4, 4, l->point);
-    const double move = (distance - along(normal, l->point)) / along(normal, normal);
+    const double move = (distance - nb_vector_dot(normal, l->point)) / nb_vector_dot(normal, normal);
     for (int k = 0; k < 3; k++) {
         l->normal[k] = normal[k];
         l->point[k] += move * normal[k];
@@ -137,7 +133,7 @@ static void set_spindle_line(uint64_t *state, const nebel_shape *s, surface_line
     double axis[3], out[3];
     for (int k = 0; k < 3; k++) axis[k] = s->to[k] - s->from[k];
     if (s->type != NEBEL_SHAPE_CAPSULE && dice_below(state, 3) == 0) {
-        set_plane_line(state, axis, along(axis, dice_below(state, 2) ? s->from : s->to), l);
+        set_plane_line(state, axis, nb_vector_dot(axis, dice_below(state, 2) ? s->from : s->to), l);
         return;
     }
     const int cone = s->type == NEBEL_SHAPE_CONE;
@@ -146,7 +142,7 @@ static void set_spindle_line(uint64_t *state, const nebel_shape *s, surface_line
     for (int k = 0; k < 3; k++) {
         l->point[k] = s->from[k] + radius * out[k];
         l->way[k] = axis[k] + rise * out[k];
-        l->normal[k] = out[k] - rise * axis[k] / along(axis, axis);
+        l->normal[k] = out[k] - rise * axis[k] / nb_vector_dot(axis, axis);
     }
 }
 
@@ -158,7 +154,7 @@ static surface_line choose_line(uint64_t *state, const nebel_shape *s)
     const nebel_plane *plane;
     switch (s->type) {
     case NEBEL_SHAPE_HALF_SPACE:
-        set_plane_line(state, s->normal, along(s->normal, s->point), &l);
+        set_plane_line(state, s->normal, nb_vector_dot(s->normal, s->point), &l);
         break;
     case NEBEL_SHAPE_BOX:
         set_plane_line(state, normal, high ? s->max[axis] : s->min[axis], &l);
@@ -173,44 +169,24 @@ static surface_line choose_line(uint64_t *state, const nebel_shape *s)
     return l;
 }
 
-static void turn(const double q[4], double p[3])
-{
-    const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(n > 0)) return;
-    const double a[3] = {q[1] * p[2] - q[2] * p[1] + q[3] * p[0], q[2] * p[0] - q[0] * p[2] + q[3] * p[1],
-                         q[0] * p[1] - q[1] * p[0] + q[3] * p[2]};
-    const double b[3] = {q[1] * a[2] - q[2] * a[1], q[2] * a[0] - q[0] * a[2], q[0] * a[1] - q[1] * a[0]};
-    for (int k = 0; k < 3; k++) p[k] += 2 * b[k] / n;
-}
-
 static nebel_ray level_ray(uint64_t *state, const nebel_shape *s)
 {
     const surface_line l = choose_line(state, s);
     const double beside =
         dice_below(state, 3) == 0 ? 0 : pow(10, dice(state, -18, -11)) * (dice_below(state, 2) * 2 - 1);
-    const double back = dice(state, -5, 30) / sqrt(along(l.way, l.way)), size = sqrt(along(l.normal, l.normal));
+    const double back = dice(state, -5, 30) / nb_vector_length(l.way), size = nb_vector_length(l.normal);
     nebel_ray ray = {.t_max = dice_below(state, 3) == 0 ? HUGE_VAL : dice(state, 5, 80)};
     for (int k = 0; k < 3; k++) {
         ray.direction[k] = l.way[k];
         ray.origin[k] = l.point[k] - back * l.way[k] + beside * l.normal[k] / size;
     }
-    turn(s->transform.rotation, ray.direction);
-    turn(s->transform.rotation, ray.origin);
+    random_fog_rotate(s->transform.rotation, ray.direction);
+    random_fog_rotate(s->transform.rotation, ray.origin);
     for (int k = 0; k < 3; k++) ray.origin[k] += s->transform.position[k];
     return ray;
 }
 
 /* ---- float against double -------------------------------------------------------------------- */
-
-static double apart(const nebel_light *a, const nebel_light *b)
-{
-    double most = 0;
-    for (int c = 0; c < 3; c++) {
-        most = fmax(most, fabs(a->transmittance[c] - b->transmittance[c]));
-        most = fmax(most, fabs(a->in_scattering[c] - b->in_scattering[c]));
-    }
-    return most;
-}
 
 /* Of the rays how many have an answer in float that is farther from that in double than both say. */
 static size_t count_dishonest(const nebel_volume_desc *volume, const nebel_ray rays[RAYS])
@@ -223,7 +199,8 @@ static size_t count_dishonest(const nebel_volume_desc *volume, const nebel_ray r
     assert_int_equal(nebel_trace(fog, &desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
     nebel_release_snapshot(fog);
     size_t wrong = 0;
-    for (int i = 0; i < RAYS; i++) wrong += !(apart(&lights[i], &truth[i]) <= lights[i].error + truth[i].error);
+    for (int i = 0; i < RAYS; i++)
+        wrong += !(fog_difference(&lights[i], &truth[i]) <= lights[i].error + truth[i].error);
     return wrong;
 }
 
@@ -301,7 +278,7 @@ static void test_float_knows_where_rays_end_that_come_from_far_away(void **unuse
             roll(&state, -2, 2, target);
             roll(&state, -1, 1, rays[i].direction);
             rays[i].direction[1] = dice(&state, -1, -.3);
-            const double length = sqrt(along(rays[i].direction, rays[i].direction));
+            const double length = nb_vector_length(rays[i].direction);
             for (int k = 0; k < 3; k++) rays[i].origin[k] = target[k] - rays[i].direction[k] * away;
             rays[i].t_max = away * length;
         }

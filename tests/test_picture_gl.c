@@ -11,6 +11,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "fog_help.h"
 #include "pass_help.h"
 #include "picture_help.h"
 #include "random_fog.h"
@@ -135,16 +136,9 @@ static nebel_scene_data scene_around(const double middle[3], nebel_mesh meshes[4
 
 static nebel_snapshot *commit(const random_fog *random)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.log = {NULL, NULL}};
-    memcpy(desc.ambient, random->ambient, sizeof desc.ambient);
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < random->count; i++)
-        assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    nebel_fog_desc desc = random_fog_desc(random);
+    desc.max_opacity = 0;
+    return fog_commit(&desc, random->volumes, random->count);
 }
 
 /* Every third camera is orthographic. */

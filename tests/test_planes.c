@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "fog_help.h"
+
 enum { RAYS = 43 };  /* no multiple of any number of lanes */
 enum { STRIDE = 5 }; /* of planes with gaps, in numbers */
 
@@ -33,15 +35,8 @@ static const float untouched = -7;
 
 static nebel_snapshot *commit(const random_fog *fog)
 {
-    nebel_fog *made = NULL;
-    nebel_snapshot *snapshot = NULL;
-    const nebel_fog_desc desc = {.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},
-                                 .max_opacity = fog->max_opacity};
-    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
-    for (size_t i = 0; i < fog->count; i++) assert_int_equal(nebel_add_volume(made, &fog->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(made);
-    return snapshot;
+    const nebel_fog_desc desc = random_fog_desc(fog);
+    return fog_commit(&desc, fog->volumes, fog->count);
 }
 
 /* A direction that stays one as floats. */
@@ -192,15 +187,9 @@ static void test_planes_give_the_bits_of_structures(void **state)
 
 static nebel_snapshot *one_box(void)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
     const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, -9}, .max = {1, 1, -1}},
                                    .extinction = {1, 1, 1}};
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    assert_int_equal(nebel_add_volume(fog, &box, NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit(&(nebel_fog_desc){0}, &box, 1);
 }
 
 static void test_faults_are_named(void **state)

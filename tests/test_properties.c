@@ -11,20 +11,16 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "fog_help.h"
+
 enum { RAYS = 37 }; /* no multiple of any number of lanes */
 
 static const nebel_precision precisions[] = {NEBEL_PRECISION_DOUBLE, NEBEL_PRECISION_FLOAT};
 
 static nebel_snapshot *commit(const double ambient[3], const nebel_volume_desc *volumes, size_t n)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
     const nebel_fog_desc desc = {.ambient = {ambient[0], ambient[1], ambient[2]}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < n; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit(&desc, volumes, n);
 }
 
 static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
@@ -42,18 +38,6 @@ static void trace_volumes(const random_fog *fog, const nebel_volume_desc *volume
     nebel_release_snapshot(snapshot);
 }
 
-static double difference(const nebel_light *a, const nebel_light *b)
-{
-    double most = 0;
-    for (int c = 0; c < 3; c++) {
-        const double t = fabs(a->transmittance[c] - b->transmittance[c]);
-        const double s = fabs(a->in_scattering[c] - b->in_scattering[c]);
-        most = t <= most ? most : t; /* a NaN is a difference */
-        most = s <= most ? most : s;
-    }
-    return most;
-}
-
 static void make(random_fog *fog, random_fog_kind kind, uint64_t seed, nebel_ray rays[RAYS])
 {
     random_fog_make(fog, kind, seed);
@@ -64,7 +48,7 @@ static void make(random_fog *fog, random_fog_kind kind, uint64_t seed, nebel_ray
 static void report(const char *what, const random_fog *fog, const nebel_ray *ray, const nebel_light *a,
                    const nebel_light *b)
 {
-    printf("\n%s: kind %d, seed %zu: differs by %g\n", what, (int)fog->kind, (size_t)fog->seed, difference(a, b));
+    printf("\n%s: kind %d, seed %zu: differs by %g\n", what, (int)fog->kind, (size_t)fog->seed, fog_difference(a, b));
     random_fog_print(stdout, fog, ray);
     for (int i = 0; i < 2; i++) {
         const nebel_light *const l = i == 0 ? a : b;
@@ -194,7 +178,7 @@ static void assert_cut_is_invisible(const char *what, size_t index, const nebel_
         trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, lights);
         trace_volumes(&fog, cut, fog.count + 1, precisions[p], rays, again);
         for (int i = 0; i < RAYS; i++) {
-            const double apart = difference(&lights[i], &again[i]);
+            const double apart = fog_difference(&lights[i], &again[i]);
             if (!(apart <= allowed[p])) {
                 printf("%s, %s: volume %zu\n", what, p == 0 ? "double" : "float", index);
                 report("cut", &fog, &rays[i], &lights[i], &again[i]);
@@ -291,8 +275,8 @@ static void test_cutting_a_ray_in_two_changes_no_more_than_the_stated_errors(voi
             }
             /* The second origin is rounded: where the ray grazes a surface, 1e-15 beside it is 1e-7 along it. */
             const double allowed = whole[i].error + joined.error + 1e-6;
-            if (!(difference(&whole[i], &joined) <= allowed)) report("ray cut", &fog, &rays[i], &whole[i], &joined);
-            assert_true(difference(&whole[i], &joined) <= allowed);
+            if (!(fog_difference(&whole[i], &joined) <= allowed)) report("ray cut", &fog, &rays[i], &whole[i], &joined);
+            assert_true(fog_difference(&whole[i], &joined) <= allowed);
         }
     }
 }
@@ -377,7 +361,7 @@ static void test_moving_everything_by_1e7_m_changes_only_rounding(void **unused)
         for (int p = 0; p < 2; p++) {
             trace_volumes(&fog, fog.volumes, fog.count, precisions[p], rays, there);
             for (int i = 0; i < RAYS; i++) {
-                const double apart = difference(&here[p][i], &there[i]);
+                const double apart = fog_difference(&here[p][i], &there[i]);
                 /* Adaptive steps may fall differently: then both are within the tolerance. */
                 const double may = allowed[p] + (fog.count > 1 && fog.kind != RANDOM_FOG_OVERLAP ? 4e-5 : 0);
                 if (!(apart <= may)) {

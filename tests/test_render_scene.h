@@ -12,8 +12,8 @@
 #include <cmocka.h>
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
+
+#include "fog_help.h"
 
 static const double test_pi = 3.14159265358979323846;
 
@@ -65,13 +65,7 @@ static inline nebel_camera test_camera(double x, double y, double z, double to_x
 /* A snapshot of some volumes. */
 static inline nebel_snapshot *test_fog(size_t count, const nebel_volume_desc *volumes)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit(&(nebel_fog_desc){0}, volumes, count);
 }
 
 /* Fog everywhere. */

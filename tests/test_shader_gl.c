@@ -237,13 +237,16 @@ static double largest_source(const random_fog *fog)
 
 static random_fog fog;
 
+static nebel_snapshot *commit_fog(void)
+{
+    const nebel_fog_desc desc = random_fog_desc(&fog);
+    return fog_commit(&desc, fog.volumes, fog.count);
+}
+
 static nebel_snapshot *commit_random_fog(random_fog_kind kind, uint64_t seed)
 {
     random_fog_make(&fog, kind, seed);
-    nebel_fog_desc desc = {0};
-    memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-    desc.max_opacity = fog.max_opacity;
-    return fog_commit(&desc, fog.volumes, fog.count);
+    return commit_fog();
 }
 
 static void evaluate(tracer *t)
@@ -257,10 +260,7 @@ static const char *const kinds[] = {"single", "overlap", "profiles", "exclude", 
 /* `fog`, from an eye that hangs on the seed, every third time within it. */
 static void trace_fog(tracer *t, uint64_t seed, const nebel_trace_desc *truth, const char *kind)
 {
-    nebel_fog_desc desc = {0};
-    memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-    desc.max_opacity = fog.max_opacity;
-    nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
+    nebel_snapshot *snapshot = commit_fog();
     uint64_t state = seed;
     double eye[3];
     char name[64];
@@ -544,9 +544,7 @@ static void test_eyes_and_orders(void **state)
     evaluate(&t);
     memcpy(first, answers, sizeof first);
 
-    nebel_fog_desc desc = {0};
-    memcpy(desc.ambient, fog.ambient, sizeof desc.ambient);
-    desc.max_opacity = fog.max_opacity;
+    const nebel_fog_desc desc = random_fog_desc(&fog);
     for (size_t i = 0; i < fog.count; i++) reversed[i] = fog.volumes[fog.count - 1 - i];
     nebel_snapshot *other = fog_commit(&desc, reversed, fog.count);
     pack_and_upload(&t, other, eye);
