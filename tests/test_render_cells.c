@@ -5,21 +5,12 @@
 
 #include <stdio.h>
 
-/* Two rooms of fog in a row along z under clear air; a square of 10 m lies on their floor, its vertices far apart. */
+/* Two rooms of fog in a row along z under clear air, around the ground. */
 static const nebel_cell rooms[] = {
     {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-8, 0, 0}, .max = {8, 2, 8}}, .density = .1, .color = {1, .5, .25}},
     {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-8, 0, -8}, .max = {8, 2, 0}}, .density = .1, .color = {1, .5, .25}},
     {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-8, 2, -8}, .max = {8, 9, 8}}},
 };
-
-static const float floor_positions[12] = {-5, 0, -5, -5, 0, 5, 5, 0, 5, 5, 0, -5};
-
-static nebel_mesh the_floor(void)
-{
-    nebel_mesh mesh = test_square();
-    mesh.positions = floor_positions;
-    return mesh;
-}
 
 static nebel_cells *create_rooms(nebel_cell_span span)
 {
@@ -66,48 +57,14 @@ static nebel_cell_fog ask(const nebel_cells *cells, const nebel_camera *camera, 
     return fog;
 }
 
-/* Where the middle of a pixel of a perspective picture that looks straight down sees the floor: x to the right, z
- * downwards. */
-static void find_floor(const nebel_camera *camera, const test_picture *picture, uint32_t x, uint32_t y, double place[3])
-{
-    const double high = 2 * tan(camera->vertical_fov * test_pi / 360) * camera->position[1];
-    place[0] = camera->position[0] + (x + .5 - .5 * picture->width) / picture->height * high;
-    place[1] = 0;
-    place[2] = camera->position[2] + (y + .5 - .5 * picture->height) / picture->height * high;
-}
-
-static nebel_camera camera_down(void)
-{
-    nebel_camera camera = test_camera(1, 7, 2, 1, 0, 2);
-    camera.up[1] = 0;
-    camera.up[2] = -1;
-    camera.vertical_fov = 80;
-    return camera;
-}
-
-static const float *transmittance(const test_picture *picture, uint32_t x, uint32_t y)
-{
-    return picture->planes.transmittance + 3 * ((size_t)y * picture->width + x);
-}
-
-static const float *in_scattering(const test_picture *picture, uint32_t x, uint32_t y)
-{
-    return picture->planes.in_scattering + 3 * ((size_t)y * picture->width + x);
-}
-
-static int is_floor(const double place[3])
-{
-    return fabs(place[0]) < 4.9 && fabs(place[2]) < 4.9;
-}
-
 /* ---- what is drawn --------------------------------------------------------------------------- */
 
 static void test_pixels_are_what_the_cells_say(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     test_picture picture = test_picture_make(40, 30);
     for (int span = 0; span < NEBEL_SPAN_COUNT; span++) {
         nebel_cells *cells = create_rooms((nebel_cell_span)span);
@@ -116,12 +73,11 @@ static void test_pixels_are_what_the_cells_say(void **state)
         for (uint32_t y = 0; y < 30; y++)
             for (uint32_t x = 0; x < 40; x++) {
                 double place[3];
-                find_floor(&camera, &picture, x, y, place);
-                if (!is_floor(place)) continue;
+                if (!test_find_ground(&camera, &picture, x, y, place)) continue;
                 const nebel_cell_fog fog = ask(cells, &camera, place);
                 const double red = .5 * (1 - fog.alpha) + fog.color[0];
-                assert_near((double)transmittance(&picture, x, y)[1], 1 - fog.alpha, 1e-5);
-                assert_near((double)in_scattering(&picture, x, y)[2], fog.color[2], 1e-5);
+                assert_near((double)test_transmittance(&picture, x, y)[1], 1 - fog.alpha, 1e-5);
+                assert_near((double)test_in_scattering(&picture, x, y)[2], fog.color[2], 1e-5);
                 assert_near((double)test_color(&picture, x, y)[0], red, 1e-5);
                 met++;
             }
@@ -135,7 +91,7 @@ static void test_pixels_are_what_the_cells_say(void **state)
 static void test_exponential_pixels_are_exact(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_camera camera = test_camera(-3, 5, 6, 1, 0, -1);
     const nebel_volume_desc volumes[] = {nebel_cell_volume(&rooms[0]), nebel_cell_volume(&rooms[1])};
@@ -165,26 +121,23 @@ static void test_exponential_pixels_are_exact(void **state)
 static void test_between_vertices_alpha_is_linear_in_the_world(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_cells *cells = create_rooms(NEBEL_SPAN_RAY);
     test_picture picture = test_picture_make(40, 30);
     double corners[4], farthest = 0;
     for (size_t v = 0; v < 4; v++) {
-        const float *p = floor_positions + 3 * v;
+        const float *p = test_ground_positions + 3 * v;
         corners[v] = ask(cells, &camera, (const double[3]){(double)p[0], (double)p[1], (double)p[2]}).alpha;
     }
     render_cells(&scene, cells, NEBEL_CELLS_PER_VERTEX, 2, &camera, &picture);
     for (uint32_t y = 0; y < 30; y++)
         for (uint32_t x = 0; x < 40; x++) {
             double place[3];
-            find_floor(&camera, &picture, x, y, place);
-            if (!is_floor(place)) continue;
-            const double right = (place[0] + 5) / 10, down = (place[2] + 5) / 10;
-            const double other = down > right ? (down - right) * corners[1] : (right - down) * corners[3];
-            const double linear = fmin(right, down) * corners[2] + (1 - fmax(right, down)) * corners[0] + other;
-            assert_near((double)transmittance(&picture, x, y)[0], 1 - linear, 1e-5);
+            if (!test_find_ground(&camera, &picture, x, y, place)) continue;
+            const double linear = test_interpolate_ground(corners, place);
+            assert_near((double)test_transmittance(&picture, x, y)[0], 1 - linear, 1e-5);
             farthest = fmax(farthest, fabs(linear - ask(cells, &camera, place).alpha));
         }
     assert_true(farthest > .05); /* so large a triangle is wrong inside, as it was then */
@@ -196,17 +149,17 @@ static void test_between_vertices_alpha_is_linear_in_the_world(void **state)
 static void test_hidden_vertices_have_fog(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_cells *open = create_rooms(NEBEL_SPAN_RAY), *walled = create_walled_rooms();
     test_picture wanted = test_picture_make(40, 30), got = test_picture_make(40, 30);
     render_cells(&scene, open, NEBEL_CELLS_PER_VERTEX, 1, &camera, &wanted);
     render_cells(&scene, walled, NEBEL_CELLS_PER_VERTEX, 1, &camera, &got);
     assert_memory_equal(wanted.planes.color, got.planes.color, 40 * 30 * 3 * sizeof(float));
     render_cells(&scene, walled, NEBEL_CELLS_PER_PIXEL, 1, &camera, &got);
-    assert_near((double)transmittance(&got, 20, 2)[0], 1, 0);
-    assert_true(transmittance(&got, 20, 15)[0] < .85f);
+    assert_near((double)test_transmittance(&got, 20, 2)[0], 1, 0);
+    assert_true(test_transmittance(&got, 20, 15)[0] < .85f);
     nebel_destroy_cells(open);
     nebel_destroy_cells(walled);
     test_picture_free(&wanted);
@@ -217,7 +170,7 @@ static void test_hidden_vertices_have_fog(void **state)
 static void test_what_is_not_fogged(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh,
                                     .mesh_count = 1,
                                     .background = {.1, .2, .3},
@@ -230,9 +183,9 @@ static void test_what_is_not_fogged(void **state)
     for (int stage = 0; stage < NEBEL_CELL_STAGE_COUNT; stage++) {
         render_cells(&scene, cells, (nebel_cell_stage)stage, 1, &camera, &picture);
         assert_near((double)test_color(&picture, 8, 0)[1], .2, 1e-6);
-        assert_near((double)transmittance(&picture, 8, 0)[1], 1, 0);
+        assert_near((double)test_transmittance(&picture, 8, 0)[1], 1, 0);
         assert_near((double)picture.planes.error[0], 0, 0);
-        const float *t = transmittance(&picture, 8, 13), *s = in_scattering(&picture, 8, 13);
+        const float *t = test_transmittance(&picture, 8, 13), *s = test_in_scattering(&picture, 8, 13);
         assert_true(t[0] < .9f);
         assert_near((double)test_color(&picture, 8, 13)[0], (double)t[0] * .5 * 3 / test_pi + (double)s[0], 1e-5);
     }
@@ -244,9 +197,9 @@ static void test_what_is_not_fogged(void **state)
 static void test_other_projections(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
-    nebel_camera camera = camera_down();
+    nebel_camera camera = test_camera_down();
     test_picture picture = test_picture_make(16, 16);
     for (int span = 0; span < NEBEL_SPAN_COUNT; span++) {
         nebel_cells *cells = create_rooms((nebel_cell_span)span);
@@ -255,13 +208,13 @@ static void test_other_projections(void **state)
             camera.view_height = 4;
             render_cells(&scene, cells, (nebel_cell_stage)stage, 1, &camera, &picture);
             for (uint32_t y = 0; y < 16; y++)
-                for (uint32_t x = 0; x < 16; x++) assert_near((double)transmittance(&picture, x, y)[0], .8, 1e-5);
+                for (uint32_t x = 0; x < 16; x++) assert_near((double)test_transmittance(&picture, x, y)[0], .8, 1e-5);
         }
         /* The pixel right of and below the middle is 1 / 32 of the circle off the axis both ways. */
         const double off = test_pi / 16;
         camera.projection = NEBEL_PROJECTION_PANORAMA;
         render_cells(&scene, cells, NEBEL_CELLS_PER_PIXEL, 1, &camera, &picture);
-        assert_near((double)transmittance(&picture, 8, 8)[0], 1 - .2 / (cos(off) * cos(off / 2)), 1e-5);
+        assert_near((double)test_transmittance(&picture, 8, 8)[0], 1 - .2 / (cos(off) * cos(off / 2)), 1e-5);
         nebel_destroy_cells(cells);
     }
     test_picture_free(&picture);
@@ -288,9 +241,9 @@ static void test_threads_change_nothing(void **state)
 static void test_cells_come_and_go(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_floor();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_snapshot *fog = test_world_fog(.2, 1);
     nebel_cells *cells = create_rooms(NEBEL_SPAN_RAY);
     test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);

@@ -5,25 +5,6 @@
 
 #include <nebel/classic.h>
 
-static const float square_positions[12] = {-5, 0, -5, -5, 0, 5, 5, 0, 5, 5, 0, -5};
-
-static nebel_mesh the_square(void)
-{
-    nebel_mesh mesh = test_square();
-    mesh.positions = square_positions;
-    return mesh;
-}
-
-/* Over the square, looking straight down but aside of its middle. */
-static nebel_camera camera_down(void)
-{
-    nebel_camera camera = test_camera(1, 7, 2, 1, 0, 2);
-    camera.up[1] = 0;
-    camera.up[2] = -1;
-    camera.vertical_fov = 80;
-    return camera;
-}
-
 static const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-3, 0, -9}, .max = {9, 2, 9}},
                                        .extinction = {.1, .2, .3},
                                        .source = {1, .5, .25}};
@@ -43,34 +24,6 @@ static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, n
     return result;
 }
 
-/* What a pixel's middle sees of the ground. */
-static int find_ground(const nebel_camera *camera, const test_picture *picture, uint32_t x, uint32_t y, double place[3])
-{
-    const double high = 2 * tan(camera->vertical_fov * test_pi / 360) * camera->position[1];
-    place[0] = camera->position[0] + (x + .5 - .5 * picture->width) / picture->height * high;
-    place[1] = 0;
-    place[2] = camera->position[2] + (y + .5 - .5 * picture->height) / picture->height * high;
-    return fabs(place[0]) < 4.9 && fabs(place[2]) < 4.9;
-}
-
-/* Of numbers at the square's vertices, whose diagonal goes from (-5, -5) to (5, 5). */
-static double interpolate(const double corners[4], const double place[3])
-{
-    const double right = (place[0] + 5) / 10, down = (place[2] + 5) / 10;
-    const double other = down > right ? (down - right) * corners[1] : (right - down) * corners[3];
-    return fmin(right, down) * corners[2] + (1 - fmax(right, down)) * corners[0] + other;
-}
-
-static const float *transmittance(const test_picture *picture, uint32_t x, uint32_t y)
-{
-    return picture->planes.transmittance + 3 * ((size_t)y * picture->width + x);
-}
-
-static const float *in_scattering(const test_picture *picture, uint32_t x, uint32_t y)
-{
-    return picture->planes.in_scattering + 3 * ((size_t)y * picture->width + x);
-}
-
 /* The exact fog of the way to a corner. */
 static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *camera, size_t v)
 {
@@ -79,7 +32,7 @@ static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *c
     double square = 0;
     for (size_t i = 0; i < 3; i++) {
         ray.origin[i] = camera->position[i];
-        ray.direction[i] = (double)square_positions[3 * v + i] - camera->position[i];
+        ray.direction[i] = (double)test_ground_positions[3 * v + i] - camera->position[i];
         square += ray.direction[i] * ray.direction[i];
     }
     ray.t_max = sqrt(square);
@@ -92,9 +45,9 @@ static nebel_light trace_corner(const nebel_snapshot *fog, const nebel_camera *c
 static void test_vertices_are_exact_and_linear_between(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_square();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_snapshot *fog = test_fog(1, &bank);
     test_picture picture = test_picture_make(40, 30);
     double hidden[4], red[4], farthest = 0;
@@ -110,10 +63,12 @@ static void test_vertices_are_exact_and_linear_between(void **state)
         for (uint32_t y = 0; y < 30; y++)
             for (uint32_t x = 0; x < 40; x++) {
                 double place[3];
-                if (!find_ground(&camera, &picture, x, y, place)) continue;
-                const double through = 1 - interpolate(hidden, place), added = interpolate(red, place);
-                for (size_t c = 0; c < 3; c++) assert_near((double)transmittance(&picture, x, y)[c], through, 1e-5);
-                assert_near((double)in_scattering(&picture, x, y)[0], added, 1e-5);
+                if (!test_find_ground(&camera, &picture, x, y, place)) continue;
+                const double through = 1 - test_interpolate_ground(hidden, place),
+                             added = test_interpolate_ground(red, place);
+                for (size_t c = 0; c < 3; c++)
+                    assert_near((double)test_transmittance(&picture, x, y)[c], through, 1e-5);
+                assert_near((double)test_in_scattering(&picture, x, y)[0], added, 1e-5);
                 assert_near((double)test_color(&picture, x, y)[0], .5 * through + added, 1e-5);
             }
     }
@@ -148,18 +103,18 @@ static void test_fine_meshes_come_near_to_exact(void **state)
 static void test_orthographic_rays_begin_beside_the_camera(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_square();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
     const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, 0, -9}, .max = {9, 2, 9}},
                                      .extinction = {.3, .3, .3}};
-    nebel_camera camera = camera_down();
+    nebel_camera camera = test_camera_down();
     camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     camera.view_height = 4;
     nebel_snapshot *fog = test_fog(1, &layer);
     test_picture picture = test_picture_make(16, 16);
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 1, &camera, &picture), NEBEL_OK);
     for (uint32_t y = 0; y < 16; y++)
-        for (uint32_t x = 0; x < 16; x++) assert_near((double)transmittance(&picture, x, y)[1], exp(-.6), 1e-6);
+        for (uint32_t x = 0; x < 16; x++) assert_near((double)test_transmittance(&picture, x, y)[1], exp(-.6), 1e-6);
     nebel_release_snapshot(fog);
     test_picture_free(&picture);
 }
@@ -169,9 +124,9 @@ static void test_orthographic_rays_begin_beside_the_camera(void **state)
 static void test_added_fog_hides_nothing(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_square();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, 7}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_snapshot *fog = test_fog(1, &bank);
     test_picture blended = test_picture_make(40, 30), added = test_picture_make(40, 30);
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &blended), NEBEL_OK);
@@ -210,9 +165,9 @@ static double factor_at(nebel_method method, const nebel_factor_desc *factor, co
 static void test_factors(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_square();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_snapshot *fog = test_world_fog(.2, 1); /* is not drawn */
     test_picture picture = test_picture_make(40, 30);
     for (int method = NEBEL_METHOD_LINEAR; method <= NEBEL_METHOD_EXP2; method++)
@@ -225,7 +180,7 @@ static void test_factors(void **state)
                                               .color = {.9, .6, .3}};
             double corners[4];
             for (size_t v = 0; v < 4; v++) {
-                const float *p = square_positions + 3 * v;
+                const float *p = test_ground_positions + 3 * v;
                 corners[v] = factor_at((nebel_method)method, &factor, &camera,
                                        (const double[3]){(double)p[0], (double)p[1], (double)p[2]});
             }
@@ -233,11 +188,11 @@ static void test_factors(void **state)
             for (uint32_t y = 0; y < 30; y++)
                 for (uint32_t x = 0; x < 40; x++) {
                     double place[3];
-                    if (!find_ground(&camera, &picture, x, y, place)) continue;
+                    if (!test_find_ground(&camera, &picture, x, y, place)) continue;
                     const double f = factor.stage == NEBEL_STAGE_VERTEX
-                                         ? interpolate(corners, place)
+                                         ? test_interpolate_ground(corners, place)
                                          : factor_at((nebel_method)method, &factor, &camera, place);
-                    assert_near((double)transmittance(&picture, x, y)[1], f, 1e-5);
+                    assert_near((double)test_transmittance(&picture, x, y)[1], f, 1e-5);
                     assert_near((double)test_color(&picture, x, y)[2], .75 * f + .3 * (1 - f), 1e-5);
                 }
         }
@@ -250,9 +205,9 @@ static void test_factors(void **state)
 static void test_methods_come_and_go(void **state)
 {
     (void)state;
-    const nebel_mesh mesh = the_square();
+    const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
-    const nebel_camera camera = camera_down();
+    const nebel_camera camera = test_camera_down();
     nebel_renderer *renderer = NULL;
     nebel_snapshot *fog = test_fog(1, &bank);
     test_picture before = test_picture_make(16, 16), after = test_picture_make(16, 16);
@@ -272,7 +227,7 @@ static void test_methods_come_and_go(void **state)
     assert_memory_not_equal(before.planes.color, after.planes.color, 16 * 16 * 3 * sizeof(float));
     assert_int_equal(nebel_set_renderer_fog(renderer, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);
-    assert_near((double)transmittance(&after, 8, 8)[0], 1, 0);
+    assert_near((double)test_transmittance(&after, 8, 8)[0], 1, 0);
     assert_int_equal(nebel_set_renderer_fog(renderer, fog), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXACT, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &after.planes), NEBEL_OK);

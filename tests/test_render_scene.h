@@ -51,6 +51,16 @@ static inline const float *test_color(const test_picture *picture, uint32_t x, u
     return picture->planes.color + 3 * ((size_t)y * picture->width + x);
 }
 
+static inline const float *test_transmittance(const test_picture *picture, uint32_t x, uint32_t y)
+{
+    return picture->planes.transmittance + 3 * ((size_t)y * picture->width + x);
+}
+
+static inline const float *test_in_scattering(const test_picture *picture, uint32_t x, uint32_t y)
+{
+    return picture->planes.in_scattering + 3 * ((size_t)y * picture->width + x);
+}
+
 static inline float test_depth(const test_picture *picture, uint32_t x, uint32_t y)
 {
     return picture->planes.depth[(size_t)y * picture->width + x];
@@ -104,6 +114,49 @@ static inline nebel_mesh test_square(void)
                         .base_color = {.5f, .25f, .75f},
                         .texture = -1};
 }
+
+/* ---- ground ---------------------------------------------------------------------------------- */
+
+/* A square of 10 m in y = 0, its vertices far apart. Its diagonal goes from (-5, -5) to (5, 5). */
+static const float test_ground_positions[12] = {-5, 0, -5, -5, 0, 5, 5, 0, 5, 5, 0, -5};
+
+static inline nebel_mesh test_ground(void)
+{
+    nebel_mesh mesh = test_square();
+    mesh.positions = test_ground_positions;
+    return mesh;
+}
+
+/* Over the ground, looking straight down but aside of its middle. */
+static inline nebel_camera test_camera_down(void)
+{
+    nebel_camera camera = test_camera(1, 7, 2, 1, 0, 2);
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    camera.vertical_fov = 80;
+    return camera;
+}
+
+/* What the middle of a pixel of that camera sees of the ground; 0 where it sees none of it, or its edge. */
+static inline int test_find_ground(const nebel_camera *camera, const test_picture *picture, uint32_t x, uint32_t y,
+                                   double place[3])
+{
+    const double high = 2 * tan(camera->vertical_fov * test_pi / 360) * camera->position[1];
+    place[0] = camera->position[0] + (x + .5 - .5 * picture->width) / picture->height * high;
+    place[1] = 0;
+    place[2] = camera->position[2] + (y + .5 - .5 * picture->height) / picture->height * high;
+    return fabs(place[0]) < 4.9 && fabs(place[2]) < 4.9;
+}
+
+/* Of numbers at the ground's vertices, linear over each triangle. */
+static inline double test_interpolate_ground(const double corners[4], const double place[3])
+{
+    const double right = (place[0] + 5) / 10, down = (place[2] + 5) / 10;
+    const double other = down > right ? (down - right) * corners[1] : (right - down) * corners[3];
+    return fmin(right, down) * corners[2] + (1 - fmax(right, down)) * corners[0] + other;
+}
+
+/* ---- a ball ---------------------------------------------------------------------------------- */
 
 enum { TEST_RINGS = 24, TEST_SECTORS = 48 };
 
