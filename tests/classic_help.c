@@ -159,6 +159,19 @@ void classic_make_mesh(classic_mesh *mesh)
     fog_mesh(mesh);
 }
 
+void classic_start(classic_stage *stage, nb_gl_language language, unsigned internal_format, classic_mesh *mesh)
+{
+    classic_open(&stage->context, language);
+    stage->target = classic_make_target(internal_format);
+    classic_make_mesh(mesh);
+}
+
+void classic_end(classic_stage *stage)
+{
+    classic_delete_target(&stage->target);
+    pass_close(&stage->context);
+}
+
 /* ---- the fixed pipeline ---------------------------------------------------------------------- */
 
 void classic_set_mesh(const classic_mesh *mesh)
@@ -232,13 +245,19 @@ nebel_vertex_output classic_stream(classic_mesh *mesh, nebel_vertex_format forma
     return (nebel_vertex_output){format, data, sizeof *v};
 }
 
+nebel_gl_classic *classic_create(nebel_gl_classic_kind kind)
+{
+    nebel_gl_classic *classic = NULL;
+    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){.kind = kind}, &classic), NEBEL_OK);
+    return classic;
+}
+
 void classic_draw(nebel_gl_classic_kind kind, classic_mesh *mesh, nebel_vertex_format format, int rich)
 {
     const nebel_vertex_output stream = classic_stream(mesh, format);
     const int one_pass = kind == NEBEL_GL_CLASSIC_FOG_COORD;
     void (*const draw)(const classic_mesh *) = rich ? classic_draw_rich : classic_draw_plain;
-    nebel_gl_classic *classic = NULL;
-    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){.kind = kind}, &classic), NEBEL_OK);
+    nebel_gl_classic *const classic = classic_create(kind);
     assert_int_equal(nebel_gl_classic_method(classic), kind);
     classic_clear();
     classic_set_mesh(mesh);

@@ -59,6 +59,15 @@ extern const float classic_color_float[3];
 
 void classic_make_mesh(classic_mesh *mesh);
 
+/* A context with a target and the mesh. */
+typedef struct classic_stage {
+    nb_gl context;
+    classic_target target;
+} classic_stage;
+
+void classic_start(classic_stage *stage, nb_gl_language language, unsigned internal_format, classic_mesh *mesh);
+void classic_end(classic_stage *stage);
+
 /* ---- the fixed pipeline ---------------------------------------------------------------------- */
 
 /* Matrices, and the positions as the vertex array. */
@@ -73,6 +82,8 @@ void classic_draw_positions(const classic_mesh *mesh);
 
 /* A stream of the mesh in memory. */
 nebel_vertex_output classic_stream(classic_mesh *mesh, nebel_vertex_format format);
+
+nebel_gl_classic *classic_create(nebel_gl_classic_kind kind);
 
 /* The mesh by a method, after a clear. `rich`: as above. */
 void classic_draw(nebel_gl_classic_kind kind, classic_mesh *mesh, nebel_vertex_format format, int rich);

@@ -45,10 +45,8 @@ static int count_fogged(const classic_image *fogged, const classic_image *surfac
 static void compare_passes(unsigned internal_format, nebel_vertex_format format, double tolerance, const char *what)
 {
     static classic_image surface, one, two;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(internal_format);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, internal_format, &mesh);
     draw_surface(1);
     classic_read(&surface);
     classic_draw(NEBEL_GL_CLASSIC_FOG_COORD, &mesh, NEBEL_VERTEX_COORDINATE, 1);
@@ -60,8 +58,7 @@ static void compare_passes(unsigned internal_format, nebel_vertex_format format,
     assert_true(count_fogged(&one, &surface) > CLASSIC_PIXELS / 3);
     assert_true(classic_compare(&one, &two) <= tolerance);
     assert_true(classic_compare_alpha(&one, &surface) == 0 && classic_compare_alpha(&two, &surface) == 0);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* Lit, textured, with holes. Bytes of a vertex are off by half a step, in the light and in the amount. */
@@ -81,8 +78,7 @@ static void draw_in_black_fog(int rich)
 {
     const float black[3] = {0, 0, 0};
     const nebel_vertex_output stream = classic_stream(&mesh, NEBEL_VERTEX_COORDINATE);
-    nebel_gl_classic *classic = NULL;
-    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){0}, &classic), NEBEL_OK);
+    nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_FOG_COORD);
     assert_int_equal(nebel_gl_begin_classic(classic, black), NEBEL_OK);
     assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
     draw_surface(rich);
@@ -94,9 +90,7 @@ static void draw_in_black_fog(int rich)
 static void add_fog(nebel_vertex_format format)
 {
     const nebel_vertex_output stream = classic_stream(&mesh, format);
-    nebel_gl_classic *classic = NULL;
-    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){.kind = NEBEL_GL_CLASSIC_ADDITIVE}, &classic),
-                     NEBEL_OK);
+    nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_ADDITIVE);
     assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_OK);
     assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
     classic_draw_positions(&mesh);
@@ -107,18 +101,15 @@ static void add_fog(nebel_vertex_format format)
 static double compare_with_black_fog(unsigned internal_format)
 {
     static classic_image one, two;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(internal_format);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, internal_format, &mesh);
     classic_draw(NEBEL_GL_CLASSIC_FOG_COORD, &mesh, NEBEL_VERTEX_COORDINATE, 1);
     classic_read(&one);
     draw_in_black_fog(1);
     add_fog(NEBEL_VERTEX_RGBA_FLOAT);
     classic_read(&two);
     const double largest = classic_compare(&one, &two);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
     return largest;
 }
 
@@ -137,16 +128,13 @@ static void test_black_object_in_fog_adds_the_same_bits(void **state)
 {
     (void)state;
     static classic_image one, two;
-    nb_gl context;
-    nebel_gl_classic *classic = NULL;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     const nebel_vertex_output stream = classic_stream(&mesh, NEBEL_VERTEX_COORDINATE);
     classic_draw(NEBEL_GL_CLASSIC_FOG_COORD, &mesh, NEBEL_VERTEX_COORDINATE, 0);
     classic_read(&one);
     draw_in_black_fog(0);
-    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){0}, &classic), NEBEL_OK);
+    nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_FOG_COORD);
     assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
     assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
     glEnable(GL_BLEND);
@@ -158,8 +146,7 @@ static void test_black_object_in_fog_adds_the_same_bits(void **state)
     nebel_destroy_gl_classic(classic);
     classic_read(&two);
     assert_true(classic_compare(&one, &two) == 0);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* As the magazine draws it, the surface is not weakened: each pixel is too bright by the amount of fog times the
@@ -169,10 +156,8 @@ static void test_pure_adding_is_too_bright_by_what_fog_hides(void **state)
     (void)state;
     static classic_image surface, one, added;
     double largest = 0, off = 0;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     draw_surface(0);
     classic_read(&surface);
     classic_draw(NEBEL_GL_CLASSIC_FOG_COORD, &mesh, NEBEL_VERTEX_COORDINATE, 0);
@@ -191,8 +176,7 @@ static void test_pure_adding_is_too_bright_by_what_fog_hides(void **state)
     print_message("pure adding is up to %.0f steps too bright\n", 255 * largest);
     assert_true(off <= float_tolerance && largest > .3);
     assert_true(classic_compare_alpha(&added, &surface) == 0);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* ---- alpha ----------------------------------------------------------------------------------- */
@@ -203,10 +187,8 @@ static void test_alpha_polygons_blend_by_the_formula(void **state)
     (void)state;
     static classic_image one, two;
     const GLfloat color[4] = {128 / 255.f, 159 / 255.f, 191 / 255.f, 1};
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     classic_draw(NEBEL_GL_CLASSIC_ALPHA, &mesh, NEBEL_VERTEX_ALPHA, 1);
     classic_read(&two);
     glEnable(GL_FOG);
@@ -222,8 +204,7 @@ static void test_alpha_polygons_blend_by_the_formula(void **state)
     print_message("alpha polygons against the formula: %.1e\n", classic_compare(&one, &two));
     assert_true(classic_compare(&one, &two) <= float_tolerance);
     assert_true(classic_compare_alpha(&one, &two) == 0);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* ---- a coordinate is no factor --------------------------------------------------------------- */
@@ -234,10 +215,8 @@ static void test_printed_coordinates_show_almost_no_fog(void **state)
 {
     (void)state;
     static classic_image surface, right, printed;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     draw_surface(0);
     classic_read(&surface);
     classic_draw(NEBEL_GL_CLASSIC_FOG_COORD, &mesh, NEBEL_VERTEX_COORDINATE, 0);
@@ -248,8 +227,7 @@ static void test_printed_coordinates_show_almost_no_fog(void **state)
     classic_read(&printed);
     assert_true(classic_compare(&right, &surface) > .3);
     assert_true(classic_compare(&printed, &surface) < .01);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* ---- Gouraud shading with perspective -------------------------------------------------------- */
@@ -303,15 +281,13 @@ static void test_amounts_are_interpolated_with_perspective(void **state)
                 {NEBEL_GL_CLASSIC_ALPHA, NEBEL_VERTEX_ALPHA},
                 {NEBEL_GL_CLASSIC_FOG_COORD, NEBEL_VERTEX_COORDINATE}};
     static classic_image image;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     make_slope();
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
-        nebel_gl_classic *classic = NULL;
         const nebel_vertex_output stream = classic_stream(&mesh, ways[i].format);
         const float white[3] = {1, 1, 1};
-        assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){.kind = ways[i].kind}, &classic), NEBEL_OK);
+        nebel_gl_classic *const classic = classic_create(ways[i].kind);
         classic_clear();
         classic_set_mesh(&mesh);
         glColor4f(0, 0, 0, 1);
@@ -324,8 +300,7 @@ static void test_amounts_are_interpolated_with_perspective(void **state)
         classic_read(&image);
         assert_true(compare_with_slope(&image) <= float_tolerance);
     }
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* ---- shaders --------------------------------------------------------------------------------- */
@@ -428,8 +403,7 @@ static void draw_with_shaders(nebel_gl_classic_kind kind, int es)
         [NEBEL_GL_CLASSIC_ADDITIVE] = "pass_stream",
         [NEBEL_GL_CLASSIC_ALPHA] = "nebel_classic_alpha(pass_stream.rgb, pass_stream.a)"};
     unsigned buffers[2], array, first = 0;
-    nebel_gl_classic *classic = NULL;
-    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){.kind = kind}, &classic), NEBEL_OK);
+    nebel_gl_classic *const classic = classic_create(kind);
     assert_int_equal(nebel_gl_classic_method(classic), kind);
     bind_mesh(buffers, &array, kind == NEBEL_GL_CLASSIC_ALPHA ? NEBEL_VERTEX_ALPHA : NEBEL_VERTEX_RGBA_FLOAT);
     classic_clear();
@@ -458,10 +432,8 @@ static nebel_vertex_format format_of(nebel_gl_classic_kind kind)
 
 static void draw_all(nb_gl_language language, classic_image images[NEBEL_GL_CLASSIC_COUNT])
 {
-    nb_gl context;
-    classic_open(&context, language);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, language, GL_RGBA32F, &mesh);
     for (int kind = 0; kind < NEBEL_GL_CLASSIC_COUNT; kind++) {
         if (language == NB_GL_COMPATIBILITY)
             classic_draw((nebel_gl_classic_kind)kind, &mesh, format_of((nebel_gl_classic_kind)kind), 0);
@@ -469,8 +441,7 @@ static void draw_all(nb_gl_language language, classic_image images[NEBEL_GL_CLAS
             draw_with_shaders((nebel_gl_classic_kind)kind, language == NB_GL_300ES);
         classic_read(&images[kind]);
     }
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 static void test_shaders_draw_what_the_fixed_pipeline_does(void **state)

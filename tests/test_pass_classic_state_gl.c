@@ -21,13 +21,6 @@
 
 static classic_mesh mesh;
 
-static nebel_gl_classic *create(nebel_gl_classic_kind kind)
-{
-    nebel_gl_classic *classic = NULL;
-    assert_int_equal(nebel_create_gl_classic(&(nebel_gl_classic_desc){.kind = kind}, &classic), NEBEL_OK);
-    return classic;
-}
-
 static nebel_vertex_format format_of(nebel_gl_classic_kind kind)
 {
     static const nebel_vertex_format formats[NEBEL_GL_CLASSIC_COUNT] = {
@@ -214,7 +207,7 @@ static void use(nebel_gl_classic_kind kind, fixed_snapshot *during)
 {
     const float color[3] = {.1f, .2f, .3f};
     const nebel_vertex_output stream = classic_stream(&mesh, format_of(kind));
-    nebel_gl_classic *const classic = create(kind);
+    nebel_gl_classic *const classic = classic_create(kind);
     assert_int_equal(nebel_gl_begin_classic(classic, color), NEBEL_OK);
     assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_OK);
     take_fixed(during);
@@ -228,10 +221,8 @@ static void test_named_state_alone_changes_and_comes_back(void **state)
     (void)state;
     static fixed_snapshot before, during, after;
     for (int kind = 0; kind < NEBEL_GL_CLASSIC_COUNT; kind++) {
-        nb_gl context;
-        classic_open(&context, NB_GL_COMPATIBILITY);
-        const classic_target target = classic_make_target(GL_RGBA8);
-        classic_make_mesh(&mesh);
+        classic_stage stage;
+        classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA8, &mesh);
         classic_set_mesh(&mesh);
         for (int old = 0; old < 2; old++) {
             if (old) set_old_state();
@@ -242,8 +233,7 @@ static void test_named_state_alone_changes_and_comes_back(void **state)
             assert_memory_equal(&before, &after, sizeof before);
         }
         assert_true(glIsEnabled(GL_FOG));
-        classic_delete_target(&target);
-        pass_close(&context);
+        classic_end(&stage);
     }
 }
 
@@ -254,10 +244,8 @@ static void test_old_state_does_not_show_in_second_passes(void **state)
     static classic_image plain, old;
     static fixed_snapshot during;
     for (int kind = NEBEL_GL_CLASSIC_TWO_PASS; kind < NEBEL_GL_CLASSIC_COUNT; kind++) {
-        nb_gl context;
-        classic_open(&context, NB_GL_COMPATIBILITY);
-        const classic_target target = classic_make_target(GL_RGBA32F);
-        classic_make_mesh(&mesh);
+        classic_stage stage;
+        classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
         for (int turn = 0; turn < 2; turn++) {
             classic_clear();
             classic_set_mesh(&mesh);
@@ -267,8 +255,7 @@ static void test_old_state_does_not_show_in_second_passes(void **state)
             classic_read(turn ? &old : &plain);
         }
         assert_memory_equal(&plain, &old, sizeof plain);
-        classic_delete_target(&target);
-        pass_close(&context);
+        classic_end(&stage);
     }
 }
 
@@ -285,7 +272,7 @@ static void check_odd_state(nb_gl_language language)
             const classic_target target = classic_make_target(GL_RGBA8);
             odd_set(&o, desktop, on);
             odd_take(&before, desktop);
-            nebel_gl_classic *const classic = create((nebel_gl_classic_kind)kind);
+            nebel_gl_classic *const classic = classic_create((nebel_gl_classic_kind)kind);
             assert_int_equal(nebel_gl_begin_classic(classic, classic_color_float), NEBEL_OK);
             if (kind != NEBEL_GL_CLASSIC_FOG_COORD) {
                 GLint function;
@@ -375,7 +362,7 @@ static void draw_fed(nebel_gl_classic *classic, nebel_vertex_format format, feed
 
 static void draw_feeding(nebel_vertex_format format, nebel_gl_classic_kind kind, feeding how, classic_image *image)
 {
-    nebel_gl_classic *const classic = create(kind);
+    nebel_gl_classic *const classic = classic_create(kind);
     classic_clear();
     classic_set_mesh(&mesh);
     if (kind != NEBEL_GL_CLASSIC_FOG_COORD) classic_draw_plain(&mesh);
@@ -391,10 +378,8 @@ static void test_every_feeding_draws_the_same_bits(void **state)
 {
     (void)state;
     static classic_image first, other;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     for (int kind = 0; kind < NEBEL_GL_CLASSIC_COUNT; kind++) {
         draw_feeding(format_of((nebel_gl_classic_kind)kind), (nebel_gl_classic_kind)kind, INTERLEAVED, &first);
         for (int how = PACKED; how < FEEDINGS; how++) {
@@ -403,8 +388,7 @@ static void test_every_feeding_draws_the_same_bits(void **state)
             assert_true(classic_compare(&first, &other) <= 1e-6);
         }
     }
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* Several meshes within one begin: each feed holds until the next. */
@@ -413,13 +397,11 @@ static void test_a_feed_replaces_the_last(void **state)
     (void)state;
     static classic_image right, refed;
     static classic_mesh other;
-    nb_gl context;
-    classic_open(&context, NB_GL_COMPATIBILITY);
-    const classic_target target = classic_make_target(GL_RGBA32F);
-    classic_make_mesh(&mesh);
+    classic_stage stage;
+    classic_start(&stage, NB_GL_COMPATIBILITY, GL_RGBA32F, &mesh);
     classic_draw(NEBEL_GL_CLASSIC_TWO_PASS, &mesh, NEBEL_VERTEX_RGBA8, 0);
     classic_read(&right);
-    nebel_gl_classic *const classic = create(NEBEL_GL_CLASSIC_TWO_PASS);
+    nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_TWO_PASS);
     const nebel_vertex_output nothing = classic_stream(&other, NEBEL_VERTEX_RGBA8);
     const nebel_vertex_output stream = classic_stream(&mesh, NEBEL_VERTEX_RGBA_FLOAT);
     const nebel_vertex_output bytes = classic_stream(&mesh, NEBEL_VERTEX_RGBA8);
@@ -435,8 +417,7 @@ static void test_a_feed_replaces_the_last(void **state)
     classic_read(&refed);
     assert_memory_equal(&right, &refed, sizeof right);
     nebel_destroy_gl_classic(classic);
-    classic_delete_target(&target);
-    pass_close(&context);
+    classic_end(&stage);
 }
 
 /* ---- contexts -------------------------------------------------------------------------------- */
@@ -556,7 +537,7 @@ static void test_streams_that_do_not_fit_are_refused(void **state)
     classic_open(&context, NB_GL_COMPATIBILITY);
     classic_make_mesh(&mesh);
     for (int kind = 0; kind < NEBEL_GL_CLASSIC_COUNT; kind++) {
-        nebel_gl_classic *const classic = create((nebel_gl_classic_kind)kind);
+        nebel_gl_classic *const classic = classic_create((nebel_gl_classic_kind)kind);
         const nebel_vertex_output good = classic_stream(&mesh, format_of((nebel_gl_classic_kind)kind));
         nebel_vertex_output bad = good;
         assert_int_equal(nebel_gl_feed_classic(classic, &good, 0), NEBEL_ERROR_ARGUMENT);
@@ -590,7 +571,7 @@ static void test_begin_and_end_come_in_pairs(void **state)
     nb_gl context;
     GLint depth;
     classic_open(&context, NB_GL_COMPATIBILITY);
-    nebel_gl_classic *const classic = create(NEBEL_GL_CLASSIC_FOG_COORD);
+    nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_FOG_COORD);
     take_fixed(&before);
     assert_int_equal(nebel_gl_end_classic(classic), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_ERROR_ARGUMENT);
@@ -619,7 +600,7 @@ static void test_without_a_fixed_pipeline_nothing_is_fed(void **state)
     classic_make_mesh(&mesh);
     const nebel_vertex_output stream = classic_stream(&mesh, NEBEL_VERTEX_RGBA8);
     classic_open(&context, NB_GL_330);
-    nebel_gl_classic *const classic = create(NEBEL_GL_CLASSIC_TWO_PASS);
+    nebel_gl_classic *const classic = classic_create(NEBEL_GL_CLASSIC_TWO_PASS);
     assert_int_equal(nebel_gl_begin_classic(classic, NULL), NEBEL_OK);
     assert_int_equal(nebel_gl_feed_classic(classic, &stream, 0), NEBEL_ERROR_UNSUPPORTED);
     assert_int_equal(nebel_gl_end_classic(classic), NEBEL_OK);
