@@ -14,15 +14,7 @@
 
 #include <epoxy/gl.h>
 
-static fog_messages messages;
-
-static void expect_message(nebel_result result, nebel_result wanted, const char *part)
-{
-    assert_int_equal(result, wanted);
-    if (messages.count == 0 || messages.result != wanted || strstr(messages.text, part) == NULL)
-        fail_msg("'%s' says nothing of '%s'", messages.text, part);
-    messages.count = 0;
-}
+#include "gl_errors.h"
 
 /* ---- a stage --------------------------------------------------------------------------------- */
 
@@ -142,13 +134,6 @@ static void test_another_context_is_refused(void **state)
     nebel_release_snapshot(s.fog);
 }
 
-static GLboolean EPOXY_CALLSPEC is_nothing(GLuint name)
-{
-    (void)name;
-    return GL_FALSE;
-}
-
-/* In a lost context no name is known any longer. */
 static void test_a_lost_context_is_survived(void **state)
 {
     (void)state;
@@ -203,14 +188,6 @@ static void test_shaders_that_the_driver_refuses(void **state)
     assert_int_equal(pass_count_objects(), objects);
     assert_int_equal(draw(&s), NEBEL_OK);
     close_stage(&s);
-}
-
-static PFNGLGETINTEGERVPROC true_get_integer;
-
-static void EPOXY_CALLSPEC narrow_textures(GLenum name, GLint *value)
-{
-    true_get_integer(name, value);
-    if (name == GL_MAX_TEXTURE_SIZE) *value = 3;
 }
 
 static void test_more_volumes_than_a_texture_holds(void **state)

@@ -17,15 +17,7 @@
 #include <epoxy/gl.h>
 #include <nebel/gl_render.h>
 
-static fog_messages messages;
-
-static void expect_message(nebel_result result, nebel_result wanted, const char *part)
-{
-    assert_int_equal(result, wanted);
-    if (messages.count == 0 || messages.result != wanted || strstr(messages.text, part) == NULL)
-        fail_msg("'%s' says nothing of '%s'", messages.text, part);
-    messages.count = 0;
-}
+#include "gl_errors.h"
 
 /* ---- a stage --------------------------------------------------------------------------------- */
 
@@ -182,13 +174,7 @@ static void test_extensions_that_are_missing(void **state)
     end(&s);
 }
 
-static GLboolean EPOXY_CALLSPEC is_nothing(GLuint name)
-{
-    (void)name;
-    return GL_FALSE;
-}
-
-/* In a lost context no name is known any longer; the test deletes what the renderer must leave alone. */
+/* The test deletes what the renderer must leave alone. */
 static void test_a_lost_context_is_survived(void **state)
 {
     (void)state;
@@ -247,14 +233,6 @@ static void test_shaders_that_the_driver_refuses(void **state)
     print_message("%d shaders, each refused once\n", refused - 1);
     assert_true(refused > 8);
     end(&s);
-}
-
-static PFNGLGETINTEGERVPROC true_get_integer;
-
-static void EPOXY_CALLSPEC narrow_textures(GLenum name, GLint *value)
-{
-    true_get_integer(name, value);
-    if (name == GL_MAX_TEXTURE_SIZE) *value = 3;
 }
 
 static void test_pictures_that_do_not_fit(void **state)
