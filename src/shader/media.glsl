@@ -290,15 +290,19 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
 }
 
 /* Soft edges of planes, as in src/march/trace_packet.h: the least of the faces' depths is linear from kink to kink. */
-float nb_planes_density(nb_profile profile, float s)
+float nb_planes_least(nb_profile profile, nb_vec3 place)
 {
-    nb_vec3 place = profile.offset + profile.slope * s;
     float least = 1.0;
     for (int i = 0; i < profile.count; i++) {
         nb_vec4 face = NEBEL_WORD(profile.first + i);
         least = min(least, face.w - dot(face.xyz, place));
     }
-    return max(least, 0.0);
+    return least;
+}
+
+float nb_planes_density(nb_profile profile, float s)
+{
+    return max(nb_planes_least(profile, profile.offset + profile.slope * s), 0.0);
 }
 
 /* What float loses of a depth. */
@@ -307,11 +311,7 @@ float nb_planes_density(nb_profile profile, float s)
 float nb_planes_kink(nb_profile profile, float s)
 {
     nb_vec3 place = profile.offset + profile.slope * s;
-    float least = 1.0;
-    for (int i = 0; i < profile.count; i++) {
-        nb_vec4 face = NEBEL_WORD(profile.first + i);
-        least = min(least, face.w - dot(face.xyz, place));
-    }
+    float least = nb_planes_least(profile, place);
     float lowest = least + NB_EDGE_NOISE >= 1.0 ? 0.0 : NB_FAR;
     for (int i = 0; i < profile.count; i++) {
         nb_vec4 face = NEBEL_WORD(profile.first + i);
