@@ -1,6 +1,7 @@
 /* The elementary functions: how exact they are, what they do with hostile numbers, and that every instruction set gives
  * the same bits. */
 #include "elementary_level.h"
+#include "gauss_rule.h"
 
 #include <float.h>
 #include <math.h>
@@ -96,29 +97,6 @@ static long double true_erfcx(long double a, long double b)
         term *= -(2 * n - 1) / (2 * a * a);
     }
     return sum / a * 0.564189583547756286948079451560772586L;
-}
-
-/* Nodes and weights of the 10-point Gauss-Legendre rule on -1..1, by Newton's method on the recurrence. */
-enum { RULE_POINTS = 10 };
-static long double rule_nodes[RULE_POINTS], rule_weights[RULE_POINTS];
-
-static void make_rule(void)
-{
-    for (int i = 0; i < RULE_POINTS; ++i) {
-        long double x = cosl(3.14159265358979323846264338327950288L * (i + 0.75L) / (RULE_POINTS + 0.5L)), slope = 1;
-        for (int round = 0; round < 20; ++round) {
-            long double before = 1, here = x;
-            for (int n = 1; n < RULE_POINTS; ++n) {
-                const long double next = ((2 * n + 1) * x * here - n * before) / (n + 1);
-                before = here;
-                here = next;
-            }
-            slope = RULE_POINTS * (x * here - before) / (x * x - 1);
-            x -= here / slope;
-        }
-        rule_nodes[i] = x;
-        rule_weights[i] = 2 / ((1 - x * x) * slope * slope);
-    }
 }
 
 /* e^(a^2) times the integral of e^(-t^2) from a >= 0 to b, in panels short enough for the rule to be exact; what lies
