@@ -363,29 +363,6 @@ static void test_cells_are_drawn_like_volumes(void **state)
     nebel_release_snapshot(fog);
 }
 
-/* Parallel rays have no eye that vertices could be fogged from. */
-static void test_orthographic_cameras_are_refused(void **state)
-{
-    (void)state;
-    static floor_mesh f;
-    nb_gl context;
-    nebel_snapshot *const fog = commit_mist();
-    nebel_gl_frame_desc desc = {.camera = camera_at(1, 1.5, 5), .width = WIDTH, .height = HEIGHT};
-    make_floor(&f, 1);
-    desc.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
-    desc.camera.view_height = 20;
-    pass_open(&context, NB_GL_330);
-    nebel_gl_renderer *const renderer = create(&f, fog);
-    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
-    desc.method = NEBEL_GL_METHOD_VERTEX;
-    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_UNSUPPORTED);
-    desc.method = NEBEL_GL_METHOD_COUNT;
-    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_ERROR_ARGUMENT);
-    nebel_destroy_gl_renderer(renderer);
-    pass_close(&context);
-    nebel_release_snapshot(fog);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -394,7 +371,6 @@ int main(void)
         cmocka_unit_test(test_additive_fog_hides_nothing),
         cmocka_unit_test(test_frames_do_not_depend_on_the_last),
         cmocka_unit_test(test_cells_are_drawn_like_volumes),
-        cmocka_unit_test(test_orthographic_cameras_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,7 +16,15 @@
 #include "picture_help.h"
 #include "random_fog.h"
 
-enum { DEMO_WIDTH = 320, DEMO_HEIGHT = 180, RANDOM_WIDTH = 96, RANDOM_HEIGHT = 64, RANDOM_SCENES = 40 };
+enum {
+    DEMO_WIDTH = 320,
+    DEMO_HEIGHT = 180,
+    ROUND_WIDTH = 288,
+    ROUND_HEIGHT = 144,
+    RANDOM_WIDTH = 96,
+    RANDOM_HEIGHT = 64,
+    RANDOM_SCENES = 40
+};
 
 static picture_report report;
 
@@ -46,7 +54,7 @@ static void expect_sameness(const picture_difference *d)
 
 /* ---- demo scenes ----------------------------------------------------------------------------- */
 
-static void render_demo(const nebel_scene *scene, picture_pair *pair)
+static void render_demo(const nebel_scene *scene, const nebel_camera *camera, picture_pair *pair)
 {
     const nebel_scene_data *const data = nebel_scene_contents(scene);
     nebel_snapshot *fog = NULL;
@@ -59,7 +67,7 @@ static void render_demo(const nebel_scene *scene, picture_pair *pair)
     particles.list = made;
     pass_open(&context, NB_GL_330);
     const int objects = pass_count_objects();
-    picture_render_particles(data, fog, &particles, &data->camera, 1, pair);
+    picture_render_particles(data, fog, &particles, camera, 1, pair);
     assert_int_equal(pass_count_objects(), objects);
     pass_close(&context);
     nebel_release_snapshot(fog);
@@ -70,12 +78,27 @@ static void render_demo(const nebel_scene *scene, picture_pair *pair)
 static void check_demo(const nebel_scene *scene, const char *name)
 {
     picture_pair pair = picture_make(DEMO_WIDTH, DEMO_HEIGHT);
-    render_demo(scene, &pair);
+    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    render_demo(scene, &data->camera, &pair);
     const picture_difference d = check(name, &pair);
     expect_sameness(&d);
-    const nebel_scene_data *const data = nebel_scene_contents(scene);
     if (data->volume_count + data->particle_count > 0) /* else the scene shows factors alone */
         assert_true(d.fogged > DEMO_WIDTH * DEMO_HEIGHT / 16);
+    assert_true(d.color < .02);
+    picture_free(&pair);
+}
+
+/* All around the same place. */
+static void check_panorama(const nebel_scene *scene, const char *name)
+{
+    char title[128];
+    picture_pair pair = picture_make(ROUND_WIDTH, ROUND_HEIGHT);
+    nebel_camera camera = nebel_scene_contents(scene)->camera;
+    camera.projection = NEBEL_PROJECTION_PANORAMA;
+    render_demo(scene, &camera, &pair);
+    snprintf(title, sizeof title, "%s-around", name);
+    const picture_difference d = check(title, &pair);
+    expect_sameness(&d);
     assert_true(d.color < .02);
     picture_free(&pair);
 }
@@ -89,6 +112,7 @@ static int try_demo(const char *path)
     const nebel_result models = nebel_load_scene_models(scene);
     if (models == NEBEL_OK) {
         check_demo(scene, name);
+        check_panorama(scene, name);
     } else {
         print_message("%s: left out: %s\n", name, nebel_result_text(models));
     }
@@ -141,7 +165,7 @@ static nebel_snapshot *commit(const random_fog *random)
     return fog_commit(&desc, random->volumes, random->count);
 }
 
-/* Every third camera is orthographic. */
+/* Every third camera is orthographic, every fifth sees all around. */
 static nebel_camera camera_for(const random_fog *fog, int number)
 {
     nebel_camera camera = {.up = {0, 1, 0}, .vertical_fov = 60, .view_height = 24};
@@ -152,6 +176,7 @@ static nebel_camera camera_for(const random_fog *fog, int number)
         camera.look_at[k] = fog->shift[k] + (far < 5 ? 2 * from[k] * (k != 1) : 0);
     }
     if (number % 3 == 2) camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    if (number % 5 == 3) camera.projection = NEBEL_PROJECTION_PANORAMA;
     return camera;
 }
 

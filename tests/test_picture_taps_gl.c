@@ -43,7 +43,8 @@ static void make_particles(nebel_particle particles[PARTICLES], int grey)
 
 static nebel_camera camera_of(nebel_projection projection)
 {
-    nebel_camera camera = test_camera(eye[0], eye[1], eye[2], 0, 0, 0);
+    const double near = projection == NEBEL_PROJECTION_PANORAMA ? .25 : 1;
+    nebel_camera camera = test_camera(near * eye[0], near * eye[1], near * eye[2], 0, 0, 0);
     camera.projection = projection;
     camera.view_height = 4.5;
     return camera;
@@ -75,7 +76,20 @@ static void draw(nb_gl_language language, const nebel_camera *camera, const nebe
 
 /* ---- the rendition --------------------------------------------------------------------------- */
 
-/* The ray through a pixel's middle, counted from the upper left corner, and its cosine with the camera's axis. */
+/* How far the ray through a pixel's middle goes forward, to the right and up. */
+static void find_way(const nebel_camera *camera, double x, double y, double way[3])
+{
+    const double pi = 3.14159265358979323846;
+    const int parallel = camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    const double half = parallel ? .5 * camera->view_height : tan(camera->vertical_fov * pi / 360);
+    way[0] = 1, way[1] = half * (2 * x - WIDTH) / HEIGHT, way[2] = half * (HEIGHT - 2 * y) / HEIGHT;
+    if (camera->projection != NEBEL_PROJECTION_PANORAMA) return;
+    const double longitude = 2 * pi * (x / WIDTH - .5), latitude = pi * (.5 - y / HEIGHT);
+    way[0] = cos(latitude) * cos(longitude), way[1] = cos(latitude) * sin(longitude), way[2] = sin(latitude);
+}
+
+/* The ray through a pixel's middle, counted from the upper left corner, and its cosine with the camera's axis: of a
+ * panorama each ray is its own. */
 static double make_ray(const nebel_camera *camera, double x, double y, nebel_ray *ray)
 {
     double forward[3], right[3], size = 0, cosine = 0;
@@ -86,19 +100,19 @@ static double make_ray(const nebel_camera *camera, double x, double y, nebel_ray
     const double up[3] = {right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2],
                           right[0] * forward[1] - right[1] * forward[0]};
     const int parallel = camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
-    const double half = parallel ? .5 * camera->view_height : tan(camera->vertical_fov * 3.14159265358979323846 / 360);
-    const double u = half * (2 * x - WIDTH) / HEIGHT, v = half * (HEIGHT - 2 * y) / HEIGHT;
+    double way[3];
+    find_way(camera, x, y, way);
     size = 0;
     for (int i = 0; i < 3; i++) {
-        const double side = u * right[i] + v * up[i];
+        const double side = way[1] * right[i] + way[2] * up[i];
         ray->origin[i] = camera->position[i] + (parallel ? side : 0);
-        ray->direction[i] = forward[i] + (parallel ? 0 : side);
+        ray->direction[i] = way[0] * forward[i] + (parallel ? 0 : side);
         size += ray->direction[i] * ray->direction[i];
     }
     for (int i = 0; i < 3; i++) ray->direction[i] /= sqrt(size);
     for (int i = 0; i < 3; i++) cosine += ray->direction[i] * forward[i];
     ray->t_max = HUGE_VAL;
-    return cosine;
+    return camera->projection == NEBEL_PROJECTION_PANORAMA ? 1 : cosine;
 }
 
 /* Distance along the axis of what is seen at a place of the picture, 0 to 1; the nearest pixel. Below 0: nothing. */
@@ -155,6 +169,7 @@ static void place_particles(const nebel_camera *camera, const nebel_particle *pa
             places[i].along += way * axis.direction[k];
             square += way * way;
         }
+        if (camera->projection == NEBEL_PROJECTION_PANORAMA) places[i].along = sqrt(square);
         places[i].order = camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC ? places[i].along : sqrt(square);
     }
     qsort(places, PARTICLES, sizeof *places, compare_orders);
@@ -235,6 +250,8 @@ static void test_constants_count(void **state)
     const nebel_gl_taps wide = {.offset = .023, .nothing = 3, .edge = .3, .margin = .4, .brightness = .6};
     check(NB_GL_330, NEBEL_PROJECTION_PERSPECTIVE, 0, &wide);
     check(NB_GL_300ES, NEBEL_PROJECTION_PERSPECTIVE, 1, &wide);
+    check(NB_GL_330, NEBEL_PROJECTION_PANORAMA, 0, &wide);
+    check(NB_GL_300ES, NEBEL_PROJECTION_PANORAMA, 1, NULL);
 }
 
 static void test_what_is_refused(void **state)

@@ -67,9 +67,9 @@ static const nb_option options[] = {
     [TESSELLATE] = {"tessellate", 0, "E",
                     "With --method vertex or additive of the CPU: smaller\ntriangles, until the fog's factor is "
                     "within E of the\nexact one for the camera, 0 < E <= 1."},
-    [DEVICE] = {"device", 0, "NAME",
-                "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No panoramas, --tolerance, --isa and\n"
-                "--threads with gl."},
+    [DEVICE] =
+        {"device", 0, "NAME",
+         "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No --tolerance, --isa and --threads with gl."},
     [ISA] = {"isa", 0, "NAME",
              "Instruction set: scalar, sse2, avx2, avx512 or neon.\nDefault: the best of this processor."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},

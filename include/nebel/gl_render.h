@@ -12,7 +12,8 @@
  * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun, which is attenuated by all fog
  * on its way, and by the ambient radiance; colour = transmittance * surface + in-scattering. Both renderers look
  * through the same points of each pixel. Shadows come from maps fitted to what is seen, so their edges are a texel of
- * the map wide. No panoramas. Link with libnebel_gl and libnebel.
+ * the map wide. Panoramas are no resampled views: each pixel has its own ray, which meets surfaces, fog and particles
+ * exactly. Link with libnebel_gl and libnebel.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
  * what nebel/gl.h lists it changes, while it runs, texture units 4 to 8, and TEXTURE_2D_ARRAY of unit 7; both
@@ -66,13 +67,14 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const 
 typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_EXACT = 0, /* fog of each pixel; particles count up to the surface, in closed form */
     NEBEL_GL_METHOD_FIVE_TAP,  /* each particle is a disc through its middle, across the view: all of it or nothing, by
-                                  the  classic comparison of depth at five places */
+                                  the classic comparison of depth at five places. Of a panorama depth is distance */
     NEBEL_GL_METHOD_VERTEX,    /* fog at the vertices of surfaces, by nebel_fog_vertices, interpolated over triangles:
                                   what fog coordinates, a second pass and alpha polygons draw (nebel/gl_classic.h). It
-                                  has one transmittance, that of red. Where no surface is there is no fog */
+                                  has one transmittance, that of red. Where no surface is there is no fog. Rays of
+                                  an orthographic camera begin in its plane, for CELLS, too */
     NEBEL_GL_METHOD_ADDITIVE,  /* the same, but fog only adds its light, and transmittance is 1 */
     NEBEL_GL_METHOD_CELLS,     /* the same by nebel_fog_cells, in place of the renderer's fog, which still dims the sun:
-                                  give it none where cells are all */
+                                  give it none where cells are all. Each ray of a panorama is its own axis of depth */
     NEBEL_GL_METHOD_COUNT
 } nebel_gl_method;
 
@@ -91,7 +93,7 @@ typedef struct nebel_gl_taps {
 nebel_gl_taps nebel_gl_default_taps(void);
 
 typedef struct nebel_gl_frame_desc {
-    nebel_camera camera;                                    /* not PANORAMA */
+    nebel_camera camera;
     uint32_t width, height;                                 /* pixels, 1 to GL_MAX_TEXTURE_SIZE */
     uint32_t samples;                                       /* per pixel, 1 to 4096; 0: 4 */
     int (*progress)(size_t done, size_t total, void *user); /* after each sample; nonzero stops the frame. NULL: none */
@@ -106,9 +108,9 @@ typedef struct nebel_gl_frame_desc {
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or
  * light as for nebel_render_frame; taps that are not finite or negative),
- * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (a panorama; more than one
- * sample where OpenGL ES cannot blend floats; an orthographic camera, which has no eye, with VERTEX, ADDITIVE or CELLS;
- * a shader that the driver does not take; the context is another one, or lost). */
+ * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (more than one
+ * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
+ * lost). The first panorama copies the triangles of all meshes: 108 bytes each, with fog per vertex 48 more. */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 
 /* What the last frame is made of: RGBA32F, linear light, the lowest row first, without filters or mipmaps. */

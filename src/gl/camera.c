@@ -95,13 +95,9 @@ static nebel_result set_orthographic(const nebel_camera *camera, const nebel_log
     return NEBEL_OK;
 }
 
-nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
-                                  nebel_view *view)
+nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                            nebel_view *view)
 {
-    const nebel_log silent = {0};
-    if (log == NULL) log = &silent;
-    if (camera == NULL || view == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "camera: it or the view is NULL");
-    if (width < 1 || height < 1) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "camera: a picture of no size");
     *view = (nebel_view){.width = width, .height = height};
     const nebel_result result = set_axes(camera, log, view->eye_from_world);
     if (result != NEBEL_OK) return result;
@@ -111,10 +107,23 @@ nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, ui
     case NEBEL_PROJECTION_ORTHOGRAPHIC:
         return set_orthographic(camera, log, view);
     case NEBEL_PROJECTION_PANORAMA:
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
-                       "camera: OpenGL draws no panorama; render it with the CPU, or six perspective views");
+        return NEBEL_OK;
     }
     return nb_fail(log, NEBEL_ERROR_VALUE, "camera: there is no projection %d", (int)camera->projection);
+}
+
+nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                                  nebel_view *view)
+{
+    const nebel_log silent = {0};
+    if (log == NULL) log = &silent;
+    if (camera == NULL || view == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "camera: it or the view is NULL");
+    if (width < 1 || height < 1) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "camera: a picture of no size");
+    if (camera->projection == NEBEL_PROJECTION_PANORAMA) {
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "camera: no matrix makes a panorama; take six perspective views, or nebel_gl_render_frame");
+    }
+    return nb_camera_look(camera, width, height, log, view);
 }
 
 /* ---- samples --------------------------------------------------------------------------------- */

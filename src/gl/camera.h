@@ -7,6 +7,11 @@
 
 #include <nebel/gl_render.h>
 
+/* The view of a camera as nebel_gl_camera_view makes it; of a panorama its size and eye_from_world alone, clip_from_eye
+ * 0. */
+nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
+                            nebel_view *view);
+
 /* The view whose pixel centres see what `view` sees at `point`. */
 nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point);
 

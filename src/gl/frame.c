@@ -1,7 +1,9 @@
 /* A frame of the scene renderer. Sample after sample, each through other places of the pixels: surfaces with their
  * properties; once, shadow maps around what the first sample sees; the fog up to the surfaces; the light of all that.
  */
+#include "corners.h"
 #include "gl.h"
+#include "panorama.h"
 #include "renderer.h"
 #include "vertex_fog.h"
 
@@ -25,9 +27,10 @@ typedef struct frame {
     uint32_t samples;
     lighting light;
     double eye[3];
-    nebel_view view;        /* through the pixels' centres */
+    int panorama;
+    nebel_view view;        /* through the pixels' centres; of a panorama without clip_from_eye */
     nebel_view sample_view; /* through the places of the present sample */
-    nebel_rays rays;        /* of sample_view */
+    nebel_rays rays;        /* of sample_view, or of the panorama */
     nebel_view sun_view;    /* of all that is seen, against the sun's light */
     int casts;              /* the sun shines, and there is something to cast shadows */
     int dims;               /* particles dim the sun */
@@ -91,13 +94,6 @@ static int is_by_vertex(const frame *f)
            f->desc->method == NEBEL_GL_METHOD_CELLS;
 }
 
-static nebel_result check_eye(const frame *f)
-{
-    if (!is_by_vertex(f) || f->view.clip_from_eye[15] == 0) return NEBEL_OK;
-    return nb_fail(&f->renderer->log, NEBEL_ERROR_UNSUPPORTED,
-                   "frame: fog at vertices is that on the way from an eye, and an orthographic camera has none");
-}
-
 static int is_light(const double rgb[3])
 {
     return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
@@ -133,8 +129,8 @@ static nebel_result set_frame(frame *f)
     if (result == NEBEL_OK) result = check_samples(r, f->samples);
     if (result == NEBEL_OK) result = check_method(r, desc);
     if (result == NEBEL_OK) result = set_lighting(r->scene, &f->light, &r->log);
-    if (result == NEBEL_OK) result = nebel_gl_camera_view(&desc->camera, desc->width, desc->height, &r->log, &f->view);
-    if (result == NEBEL_OK) result = check_eye(f);
+    if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
+    f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
     return result;
@@ -196,8 +192,12 @@ static void draw_meshes(const frame *f, unsigned program)
         glUniform3fv(color, 1, mesh->base_color);
         glUniform1i(has_texture, mesh->texture != 0);
         bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
-        glBindVertexArray(mesh->vertex_array);
-        glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
+        if (f->panorama) {
+            nb_corners_draw(mesh, NB_PANORAMA_STRIP);
+        } else {
+            glBindVertexArray(mesh->vertex_array);
+            glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
+        }
     }
 }
 
@@ -205,7 +205,7 @@ static void draw_surfaces(const frame *f)
 {
     static const GLfloat zeros[4] = {0, 0, 0, 0};
     const nebel_gl_renderer *const r = f->renderer;
-    const unsigned program = r->shading.surface;
+    const unsigned program = f->panorama ? r->shading.round_surface : r->shading.surface;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.surface_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     for (int i = 0; i < 3; i++) glClearBufferfv(GL_COLOR, i, zeros);
@@ -230,11 +230,18 @@ static void clear_fog(void)
     glClearBufferfv(GL_COLOR, 1, clear);
 }
 
+static nebel_result set_eye_fog(const frame *f)
+{
+    const nebel_gl_renderer *const r = f->renderer;
+    return f->panorama ? nb_gl_set_fog_around(r->eye_fog, r->fog, f->eye, f->view.width, f->view.height)
+                       : nebel_gl_set_fog(r->eye_fog, r->fog, &f->view);
+}
+
 /* The fog that vertices bring. Particles ask for the fog before them as ever. */
 static nebel_result draw_vertex_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    const unsigned program = r->shading.vertex_fog;
+    const unsigned program = f->panorama ? r->shading.round_vertex_fog : r->shading.vertex_fog;
     clear_fog();
     glUseProgram(program);
     set_rays(f, program);
@@ -242,7 +249,21 @@ static nebel_result draw_vertex_fog(const frame *f)
     glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method != NEBEL_GL_METHOD_ADDITIVE);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_meshes(f, program);
-    return r->particles.count > 0 && r->fog != NULL ? nebel_gl_set_fog(r->eye_fog, r->fog, &f->view) : NEBEL_OK;
+    return r->particles.count > 0 && r->fog != NULL ? set_eye_fog(f) : NEBEL_OK;
+}
+
+/* From the surfaces' distances. */
+static nebel_result draw_exact_fog(const frame *f)
+{
+    const nebel_gl_renderer *const r = f->renderer;
+    const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
+                                .depth_texture = r->targets.place,
+                                .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
+    nb_gl_picture picture = {
+        .rays = f->rays, .width = f->view.width, .height = f->view.height, .panorama = f->panorama};
+    if (!f->panorama && nebel_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
+        return NEBEL_ERROR_ARGUMENT;
+    return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
 }
 
 static nebel_result draw_fog(const frame *f)
@@ -255,11 +276,8 @@ static nebel_result draw_fog(const frame *f)
         return NEBEL_OK;
     }
     if (is_by_vertex(f)) return draw_vertex_fog(f);
-    const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
-                                .depth_texture = r->targets.place,
-                                .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
-    const nebel_result result = nebel_gl_set_fog(r->eye_fog, r->fog, &f->view);
-    return result == NEBEL_OK ? nb_gl_draw_fog(r->eye_fog, &pass, &f->sample_view) : result;
+    const nebel_result result = set_eye_fog(f);
+    return result == NEBEL_OK ? draw_exact_fog(f) : result;
 }
 
 /* ---- particles ------------------------------------------------------------------------------- */
@@ -280,19 +298,29 @@ static void set_taps(const frame *f, unsigned program)
 }
 
 /* Grey particles at once; of others each color by itself, because blending has room for one factor. */
-static void draw_channels(const nebel_gl_renderer *r, unsigned program)
+static void draw_channels(const frame *f, unsigned program)
 {
+    const nebel_gl_renderer *const r = f->renderer;
+    const int strip = f->panorama ? NB_PANORAMA_STRIP : 4;
     const GLint channel = glGetUniformLocation(program, "scene_channel");
     if (r->particles.is_grey) {
         glUniform3f(channel, 1, 0, 0);
-        nb_particles_draw(&r->particles);
+        nb_particles_draw(&r->particles, strip);
         return;
     }
     for (int c = 0; c < 3; c++) {
         glUniform3f(channel, c == 0, c == 1, c == 2);
         glColorMask(c == 0, c == 1, c == 2, GL_FALSE);
-        nb_particles_draw(&r->particles);
+        nb_particles_draw(&r->particles, strip);
     }
+}
+
+static void set_face_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
+{
+    const nebel_gl *const gl = f->renderer->eye_fog;
+    glUniform3i(glGetUniformLocation(program, "face_tiling"), (GLint)gl->views[0].width, NB_GL_TILE_SHIFT,
+                (GLint)fog->tile_columns);
+    glUniform1iv(glGetUniformLocation(program, "face_first"), 6, gl->face_first);
 }
 
 static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned program)
@@ -310,7 +338,11 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
     if (fog->tiles == 0) return;
     bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
-    glUniform2i(glGetUniformLocation(program, "tile_grid"), (GLint)fog->tile_size, (GLint)fog->tile_columns);
+    if (f->panorama) {
+        set_face_tiles(f, fog, program);
+    } else {
+        glUniform2i(glGetUniformLocation(program, "tile_grid"), (GLint)fog->tile_size, (GLint)fog->tile_columns);
+    }
 }
 
 /* The light that comes through the fog of a sample, and what it adds, pass through each particle. */
@@ -324,6 +356,7 @@ static nebel_result draw_particles(const frame *f)
     nebel_result result = has_fog ? nebel_gl_get_fog(r->eye_fog, &fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     const nb_light_kind kind = {.of_particles = 1,
+                                .panorama = f->panorama,
                                 .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
                                 .has_fog = has_fog,
                                 .in_texture = fog.texture != 0,
@@ -335,7 +368,7 @@ static nebel_result draw_particles(const frame *f)
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     nb_state_layer(&r->context);
     set_particles(f, &fog, program);
-    draw_channels(r, program);
+    draw_channels(f, program);
     return NEBEL_OK;
 }
 
@@ -397,7 +430,7 @@ static nebel_result prepare_sun(frame *f)
     nb_shadows_turn(&r->shadows, f->light.sun_direction);
     glBindVertexArray(r->vertex_array);
     nebel_result result = nb_shadows_fit(&r->shadows, &r->context, &r->allocator, &r->log, r->shading.survey,
-                                         &r->targets, &f->rays, &r->meshes);
+                                         &r->targets, &f->rays, f->panorama, &r->meshes);
     if (result != NEBEL_OK) return result;
     f->casts = r->shadows.seen_low[0] < r->shadows.seen_high[0];
     if (!f->casts) return NEBEL_OK;
@@ -452,6 +485,7 @@ static nebel_result draw_dimming(const frame *f)
     nebel_result result = nebel_gl_get_fog(r->sun_cloud, &fog);
     if (result != NEBEL_OK) return result;
     const nb_light_kind kind = {.of_dimming = 1,
+                                .panorama = f->panorama,
                                 .has_fog = 1,
                                 .in_texture = fog.texture != 0,
                                 .tiled = fog.tiles != 0,
@@ -511,6 +545,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_result result = has_fog ? nebel_gl_get_fog(r->sun_fog, &fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     const nb_light_kind kind = {.dimmed = f->dims,
+                                .panorama = f->panorama,
                                 .has_fog = has_fog,
                                 .in_texture = fog.texture != 0,
                                 .tiled = fog.tiles != 0,
@@ -528,14 +563,22 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
  * -------------------------------------------------------------------------------------------------------
  */
 
+static nebel_result set_sample(frame *f, nb_pixel_point point)
+{
+    if (f->panorama) {
+        nb_panorama_rays(&f->view, f->eye, point, &f->rays);
+        return NEBEL_OK;
+    }
+    f->sample_view = nb_camera_move(&f->view, point);
+    if (nebel_view_rays(&f->sample_view, NULL, &f->rays) == NEBEL_OK) return NEBEL_OK;
+    return nb_fail(&f->renderer->log, NEBEL_ERROR_VALUE,
+                   "camera: it is too far out, or its view too narrow, for numbers");
+}
+
 static nebel_result draw_sample(frame *f, uint32_t sample)
 {
-    f->sample_view = nb_camera_move(&f->view, nb_pixel_sample(sample, f->samples));
-    nebel_result result = nebel_view_rays(&f->sample_view, NULL, &f->rays);
-    if (result != NEBEL_OK) {
-        return nb_fail(&f->renderer->log, NEBEL_ERROR_VALUE,
-                       "camera: it is too far out, or its view too narrow, for numbers");
-    }
+    nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
+    if (result != NEBEL_OK) return result;
     draw_surfaces(f);
     if (sample == 0 && f->casts) result = prepare_sun(f);
     if (result == NEBEL_OK) result = draw_fog(f);
@@ -561,18 +604,35 @@ static nebel_result sort_particles(const frame *f)
     return nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL);
 }
 
+static int has_vertex_fog(const frame *f)
+{
+    return is_by_vertex(f) && (f->renderer->fog != NULL || f->desc->method == NEBEL_GL_METHOD_CELLS);
+}
+
 static nebel_result prepare_vertices(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const int by_cells = f->desc->method == NEBEL_GL_METHOD_CELLS;
-    nb_vertex_source source = {.fog = r->fog, .cells = by_cells ? f->desc->cells : NULL, .view = {.ignore_walls = 1}};
-    if (!is_by_vertex(f) || (r->fog == NULL && !by_cells)) return NEBEL_OK;
+    nb_vertex_source source = {.fog = r->fog,
+                               .cells = by_cells ? f->desc->cells : NULL,
+                               .view = {.ignore_walls = 1},
+                               .projection = f->desc->camera.projection};
+    if (!has_vertex_fog(f)) return NEBEL_OK;
     for (int i = 0; i < 3; i++) {
         source.view.eye[i] = f->eye[i];
-        source.view.forward[i] = f->desc->camera.look_at[i] - f->desc->camera.position[i];
+        source.view.forward[i] = -f->view.eye_from_world[4 * i + 2];
     }
     const nebel_result result = nb_shading_make_vertex_fog(&r->shading, &r->context, &r->log);
     return result == NEBEL_OK ? nb_vertex_fog_set(&r->meshes, &source) : result;
+}
+
+/* Behind the fog of the vertices, which corners take over. */
+static nebel_result prepare_panorama(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nebel_result result = nb_shading_make_round(&r->shading, &r->context, &r->log, is_by_vertex(f));
+    if (result == NEBEL_OK) result = nb_corners_make(&r->meshes);
+    return result == NEBEL_OK && has_vertex_fog(f) ? nb_corners_set_fog(&r->meshes) : result;
 }
 
 static nebel_result draw_samples(frame *f)
@@ -582,6 +642,7 @@ static nebel_result draw_samples(frame *f)
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
     if (result == NEBEL_OK && r->particles.count > 0) result = sort_particles(f);
     if (result == NEBEL_OK) result = prepare_vertices(f);
+    if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {
         result = draw_sample(f, i);
         if (result == NEBEL_OK) result = report(f, i + 1);

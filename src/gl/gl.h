@@ -19,7 +19,9 @@ struct nebel_gl {
     int has_warned;         /* of the turns of loops */
     int has_fog;            /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_snapshot *packed; /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
-    nebel_view view;
+    nebel_view views[6];    /* one, or six of a panorama */
+    int view_count;
+    int face_first[6]; /* entry of the first tile of each */
     nebel_gl_fog fog;
     nebel_word *words;
     size_t word_capacity;
@@ -27,9 +29,20 @@ struct nebel_gl {
     size_t entry_capacity;
 };
 
-/* nebel_gl_draw_fog along the rays of another view, whose pixels lie within those of the view that the fog was set for.
- */
-nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nebel_view *view);
+/* nebel_gl_set_fog for a panorama of so many pixels. */
+nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], uint32_t width,
+                                  uint32_t height);
+
+/* What a pass is drawn along: rays of another view, or panorama, than the fog was set for, whose pixels lie within
+ * those of that. */
+typedef struct nb_gl_picture {
+    nebel_rays rays; /* of a panorama: its words */
+    uint32_t width, height;
+    int panorama;
+} nb_gl_picture;
+
+/* nebel_gl_draw_fog along these. */
+nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_gl_picture *picture);
 
 /* The number of a tile's pixels in a row is 2 to this. */
 enum { NB_GL_TILE_SHIFT = 4 };

@@ -4,13 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-/* The last vertex of each triangle is its own and holds what is constant on the triangle. */
-typedef struct vertex {
-    float position[3], normal[3], uv[2], face[3];
-} vertex;
-
-_Static_assert(sizeof(vertex) == NB_VERTEX_SIZE && offsetof(vertex, position) == 0, "others read positions, too");
-
 /* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_textures(const nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene)
@@ -74,7 +67,7 @@ static nebel_result check_mesh(const nb_meshes *meshes, const nebel_scene_data *
 typedef struct draft {
     const nebel_mesh *mesh;
     nb_mesh *made;
-    vertex *vertices;
+    nb_vertex *vertices;
     uint32_t *indices;
     size_t vertex_count, index_count;
 } draft;
@@ -84,9 +77,9 @@ static const float *position_of(const nebel_mesh *mesh, uint32_t index)
     return mesh->positions + 3 * (size_t)index;
 }
 
-static vertex vertex_of(const nebel_mesh *mesh, uint32_t index)
+static nb_vertex vertex_of(const nebel_mesh *mesh, uint32_t index)
 {
-    vertex v = {.uv = {0, 0}};
+    nb_vertex v = {.uv = {0, 0}};
     memcpy(v.position, position_of(mesh, index), sizeof v.position);
     if (mesh->normals != NULL) memcpy(v.normal, mesh->normals + 3 * (size_t)index, sizeof v.normal);
     if (mesh->uvs != NULL) memcpy(v.uv, mesh->uvs + 2 * (size_t)index, sizeof v.uv);
@@ -123,7 +116,7 @@ static void include(nb_mesh *made, const float *position)
 static void add_triangle(draft *d, const uint32_t *corners)
 {
     const nebel_mesh *const mesh = d->mesh;
-    vertex last = vertex_of(mesh, corners[2]);
+    nb_vertex last = vertex_of(mesh, corners[2]);
     if (!set_face(position_of(mesh, corners[0]), position_of(mesh, corners[1]), last.position, last.face)) return;
     for (int k = 0; k < 3; k++) include(d->made, position_of(mesh, corners[k]));
     d->indices[d->index_count++] = corners[0];
@@ -148,7 +141,7 @@ static void fill(draft *d)
 static void set_attribute(GLuint place, GLint size, size_t offset)
 {
     glEnableVertexAttribArray(place);
-    glVertexAttribPointer(place, size, GL_FLOAT, GL_FALSE, sizeof(vertex), (const void *)offset);
+    glVertexAttribPointer(place, size, GL_FLOAT, GL_FALSE, sizeof(nb_vertex), (const void *)offset);
 }
 
 static nebel_result upload(const nb_meshes *meshes, const draft *d)
@@ -159,13 +152,13 @@ static nebel_result upload(const nb_meshes *meshes, const draft *d)
     glGenBuffers(1, &made->indices);
     glBindVertexArray(made->vertex_array);
     glBindBuffer(GL_ARRAY_BUFFER, made->vertices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(d->vertex_count * sizeof(vertex)), d->vertices, GL_STATIC_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(d->vertex_count * sizeof(nb_vertex)), d->vertices, GL_STATIC_DRAW);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, made->indices);
     glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(d->index_count * sizeof(uint32_t)), d->indices, GL_STATIC_DRAW);
-    set_attribute(NB_ATTRIBUTE_POSITION, 3, offsetof(vertex, position));
-    set_attribute(NB_ATTRIBUTE_NORMAL, 3, offsetof(vertex, normal));
-    set_attribute(NB_ATTRIBUTE_UV, 2, offsetof(vertex, uv));
-    set_attribute(NB_ATTRIBUTE_FACE, 3, offsetof(vertex, face));
+    set_attribute(NB_ATTRIBUTE_POSITION, 3, offsetof(nb_vertex, position));
+    set_attribute(NB_ATTRIBUTE_NORMAL, 3, offsetof(nb_vertex, normal));
+    set_attribute(NB_ATTRIBUTE_UV, 2, offsetof(nb_vertex, uv));
+    set_attribute(NB_ATTRIBUTE_FACE, 3, offsetof(nb_vertex, face));
     return nb_context_check_memory(&meshes->log, "the meshes; use fewer triangles");
 }
 
@@ -261,9 +254,11 @@ static void delete_objects(const nb_meshes *meshes)
 {
     glDeleteTextures((GLsizei)meshes->texture_count, meshes->textures);
     for (size_t i = 0; i < meshes->count; i++) {
-        const GLuint buffers[] = {meshes->list[i].vertices, meshes->list[i].indices, meshes->list[i].fog};
-        glDeleteVertexArrays(1, &meshes->list[i].vertex_array);
-        glDeleteBuffers(3, buffers);
+        const nb_mesh *const mesh = &meshes->list[i];
+        const GLuint arrays[] = {mesh->vertex_array, mesh->corner_array};
+        const GLuint buffers[] = {mesh->vertices, mesh->indices, mesh->fog, mesh->corners, mesh->corner_fog};
+        glDeleteVertexArrays(2, arrays);
+        glDeleteBuffers(5, buffers);
     }
 }
 

@@ -9,8 +9,10 @@
 /* Vertex attributes. */
 enum { NB_ATTRIBUTE_POSITION, NB_ATTRIBUTE_NORMAL, NB_ATTRIBUTE_UV, NB_ATTRIBUTE_FACE, NB_ATTRIBUTE_FOG };
 
-/* Bytes of a vertex, whose position comes first. */
-enum { NB_VERTEX_SIZE = 11 * sizeof(float) };
+/* The last vertex of each triangle is its own and holds what is constant on the triangle. */
+typedef struct nb_vertex {
+    float position[3], normal[3], uv[2], face[3];
+} nb_vertex;
 
 typedef struct nb_mesh {
     double origin[3];
@@ -18,6 +20,7 @@ typedef struct nb_mesh {
     float base_color[3];
     unsigned vertex_array, vertices, indices, texture; /* texture 0: none */
     unsigned fog; /* per vertex: the light that fog adds, and the amount of fog; 0: not made yet */
+    unsigned corner_array, corners, corner_fog; /* the same by triangles, as instances; 0: not made yet */
     size_t vertex_count;
     int index_count;
 } nb_mesh;

@@ -92,10 +92,10 @@ nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, co
     return nb_context_check_memory(log, "the particles; use fewer");
 }
 
-void nb_particles_draw(const nb_particles *particles)
+void nb_particles_draw(const nb_particles *particles, int vertices)
 {
     glBindVertexArray(particles->vertex_array);
-    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)particles->count);
+    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, vertices, (GLsizei)particles->count);
 }
 
 void nb_particles_delete(const nb_particles *particles)

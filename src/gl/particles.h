@@ -33,7 +33,8 @@ nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allo
 nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, const double eye[3],
                                const double *forward);
 
-void nb_particles_draw(const nb_particles *particles);
+/* Each a strip of so many vertices. */
+void nb_particles_draw(const nb_particles *particles, int vertices);
 
 /* In OpenGL. */
 void nb_particles_delete(const nb_particles *particles);

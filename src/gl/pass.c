@@ -6,6 +6,14 @@ typedef struct size {
     GLint width, height, samples;
 } size;
 
+/* The host's state is saved around this. */
+typedef struct task {
+    nebel_gl *gl;
+    const nebel_gl_pass *pass;
+    const nb_gl_picture *picture;
+    const nb_program *program;
+} task;
+
 static nebel_result fail(const nebel_gl *gl, nebel_result result, const char *what)
 {
     return nb_fail(&gl->log, result, "nebel_gl_draw_fog: %s", what);
@@ -58,14 +66,16 @@ static nebel_result check_output(const nebel_gl *gl, const nebel_gl_pass *pass)
 }
 
 /* With the texture bound to the active unit. OpenGL ES 3.0 does not tell sizes. */
-static nebel_result check_size(const nebel_gl *gl, const nebel_gl_pass *pass, GLenum target, const char *name)
+static nebel_result check_size(const task *t, GLenum target, const char *name)
 {
+    const nebel_gl *const gl = t->gl;
+    const nebel_gl_pass *const pass = t->pass;
     size s = {0, 0, 0};
     if (gl->context.es) return NEBEL_OK;
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_WIDTH, &s.width);
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_HEIGHT, &s.height);
     if (target == GL_TEXTURE_2D_MULTISAMPLE) glGetTexLevelParameteriv(target, 0, GL_TEXTURE_SAMPLES, &s.samples);
-    const uint64_t right = (uint64_t)pass->x + gl->view.width, top = (uint64_t)pass->y + gl->view.height;
+    const uint64_t right = (uint64_t)pass->x + t->picture->width, top = (uint64_t)pass->y + t->picture->height;
     if ((uint64_t)s.width < right || (uint64_t)s.height < top) {
         return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
                        "nebel_gl_draw_fog: the picture reaches to %llu, %llu, the %s texture is only %d x %d",
@@ -149,14 +159,6 @@ static nebel_result check_pass(const nebel_gl *gl, const nebel_gl_pass *pass)
 
 /* ---- drawing --------------------------------------------------------------------------------- */
 
-/* The host's state is saved around this. */
-typedef struct task {
-    nebel_gl *gl;
-    const nebel_gl_pass *pass;
-    nebel_rays rays;
-    const nb_program *program;
-} task;
-
 static void bind_texture(const nebel_gl *gl, GLuint unit, GLenum target, unsigned texture)
 {
     glActiveTexture(GL_TEXTURE0 + unit);
@@ -172,10 +174,10 @@ static nebel_result bind_textures(const task *t)
     if (gl->fog.block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, gl->fog.block);
     if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
     bind_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
-    const nebel_result result = check_size(gl, t->pass, target, "depth");
+    const nebel_result result = check_size(t, target, "depth");
     if (result != NEBEL_OK || t->pass->output != NEBEL_GL_OUTPUT_COMPOSE) return result;
     bind_texture(gl, NB_UNIT_COLOR, target, t->pass->color_texture);
-    return check_size(gl, t->pass, target, "color");
+    return check_size(t, target, "color");
 }
 
 /* A framebuffer of nothing, which older OpenGL finds complete only where no buffer is drawn to or read. */
@@ -215,12 +217,24 @@ static void set_samples(const task *t, GLuint target_framebuffer)
     glUniform2fv(t->program->sample_places, (GLsizei)t->pass->samples, places[0]);
 }
 
+static void set_tiling(const task *t)
+{
+    const nebel_gl *const gl = t->gl;
+    const GLint columns = (GLint)gl->fog.tile_columns;
+    if (!t->picture->panorama) {
+        glUniform2i(t->program->tiling, NB_GL_TILE_SHIFT, columns);
+    } else {
+        glUniform3i(t->program->tiling, (GLint)gl->views[0].width, NB_GL_TILE_SHIFT, columns);
+        glUniform1iv(t->program->face_first, 6, gl->face_first);
+    }
+}
+
 static void set_uniforms(const task *t, GLuint target_framebuffer)
 {
     const nb_program *const p = t->program;
-    glUniform4fv(p->rays, NEBEL_RAY_WORDS, t->rays.words[0].v);
+    glUniform4fv(p->rays, NEBEL_RAY_WORDS, t->picture->rays.words[0].v);
     glUniform2i(p->corner, (GLint)t->pass->x, (GLint)t->pass->y);
-    if (t->gl->fog.tiles != 0) glUniform2i(p->tiling, NB_GL_TILE_SHIFT, (GLint)t->gl->fog.tile_columns);
+    if (t->gl->fog.tiles != 0) set_tiling(t);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
 }
 
@@ -241,7 +255,7 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
     const nb_context *const context = &t->gl->context;
     const nebel_result result = bind_textures(t);
     if (result != NEBEL_OK) return result;
-    nb_state_clear(context, t->pass->x, t->pass->y, t->gl->view.width, t->gl->view.height);
+    nb_state_clear(context, t->pass->x, t->pass->y, t->picture->width, t->picture->height);
     if (t->pass->output == NEBEL_GL_OUTPUT_BLEND) nb_state_blend(context, GL_ONE, GL_SRC1_COLOR);
     if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GREY) nb_state_blend(context, GL_ONE, GL_SRC_ALPHA);
     glUseProgram(t->program->name);
@@ -259,7 +273,8 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .multisampled = t->pass->samples > 1,
                                   .output = t->pass->output,
                                   .depth = t->pass->depth.kind,
-                                  .from_eye = t->rays.from_eye,
+                                  .from_eye = t->picture->rays.from_eye,
+                                  .panorama = t->picture->panorama,
                                   .features = gl->fog.features};
     const nebel_result result =
         nb_programs_find(&gl->programs, &gl->context, &gl->allocator, &gl->log, &kind, &t->program);
@@ -271,18 +286,19 @@ nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     if (pass == NULL) return fail(gl, NEBEL_ERROR_ARGUMENT, "the pass is missing");
     if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
-    return nb_gl_draw_fog(gl, pass, &gl->view);
+    nb_gl_picture picture = {.width = gl->views[0].width, .height = gl->views[0].height};
+    if (nebel_view_rays(&gl->views[0], &pass->depth, &picture.rays) != NEBEL_OK) {
+        return fail(gl, NEBEL_ERROR_ARGUMENT, "the depth convention is none, or does not fit the view's projection");
+    }
+    return nb_gl_draw_fog(gl, pass, &picture);
 }
 
-nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nebel_view *view)
+nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_gl_picture *picture)
 {
     nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
     if (result == NEBEL_OK) result = check_pass(gl, pass);
     if (result != NEBEL_OK) return result;
-    task t = {.gl = gl, .pass = pass};
-    if (nebel_view_rays(view, &pass->depth, &t.rays) != NEBEL_OK) {
-        return fail(gl, NEBEL_ERROR_ARGUMENT, "the depth convention is none, or does not fit the view's projection");
-    }
+    task t = {.gl = gl, .pass = pass, .picture = picture};
     nb_state state;
     nb_state_save(&gl->context, &state);
     result = draw_with_program(&t, (GLuint)state.framebuffer);

@@ -1,5 +1,7 @@
 #include "program.h"
 
+#include "panorama.h"
+
 #include <epoxy/gl.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,7 +20,7 @@ static const char vertex_text[] =
 /* Behind the shader text. Texels are fetched by number, so that no filter and no coordinate of the host matters. */
 static const char fragment_text[] =
     "uniform ivec2 pass_corner;\n"
-    "#ifdef NEBEL_TILES\n"
+    "#if defined(NEBEL_TILES) && !defined(PASS_PANORAMA)\n"
     "uniform ivec2 pass_tiling;\n" /* the logarithm of the size, and how many in a row */
     "#endif\n"
     "#ifdef PASS_MULTISAMPLED\n"
@@ -39,10 +41,21 @@ static const char fragment_text[] =
     "\n"
     "nebel_light pass_fog(vec2 pixel, float depth)\n"
     "{\n"
+    "#ifdef PASS_PANORAMA\n"
+    "    nebel_sight sight;\n"
+    "    sight.origin = vec3(0.0);\n"
+    "    sight.direction = ray_direction(pixel);\n"
+    "    sight.t_max = depth > 0.0 && depth < 1e18 ? depth : 1e18;\n"
+    "#else\n"
     "    nebel_sight sight = nebel_see(pixel, depth);\n"
+    "#endif\n"
     "#ifdef NEBEL_TILES\n"
+    "#ifdef PASS_PANORAMA\n"
+    "    int entry = face_entry(sight.direction);\n"
+    "#else\n"
     "    ivec2 tile = ivec2(pixel) >> pass_tiling.x;\n"
     "    int entry = 2 * (tile.x + tile.y * pass_tiling.y);\n"
+    "#endif\n"
     "    return nebel_trace_list(sight.origin, sight.direction, sight.t_max, NEBEL_INDEX(entry), NEBEL_INDEX(entry + "
     "1));\n"
     "#else\n"
@@ -123,12 +136,14 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
     const char *const shares = kind->multisampled ? "(pass_sample_range.y - pass_sample_range.x)" : "1";
     (void)snprintf(text, size,
                    "%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
-                   "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n",
+                   "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
+                   "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
                    nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
                    nb_program_limits(context, shares, limits, sizeof limits),
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    kind->multisampled ? samples : "", output[kind->output],
-                   kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features);
+                   kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
+                   kind->panorama ? "#define PASS_PANORAMA\n" : "");
 }
 
 /* A message is one line. */
@@ -200,7 +215,8 @@ static void set_uniforms(nb_program *program)
     if (block != GL_INVALID_INDEX) glUniformBlockBinding(name, block, 0);
     program->rays = glGetUniformLocation(name, "nebel_rays");
     program->corner = glGetUniformLocation(name, "pass_corner");
-    program->tiling = glGetUniformLocation(name, "pass_tiling");
+    program->tiling = glGetUniformLocation(name, program->kind.panorama ? "face_tiling" : "pass_tiling");
+    program->face_first = glGetUniformLocation(name, "face_first");
     program->sample_range = glGetUniformLocation(name, "pass_sample_range");
     program->sample_places = glGetUniformLocation(name, "pass_sample_places");
     glUseProgram(name);
@@ -217,7 +233,9 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
-    const nb_texts fragment = {{head, fog, fragment_text}, 3};
+    const char *const ray = kind->panorama ? nb_panorama_ray_text : "";
+    const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
+    const nb_texts fragment = {{head, fog, ray, tile, fragment_text}, 5};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
@@ -227,7 +245,8 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
 static int is_same(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
-           a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->features == b->features;
+           a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
+           a->features == b->features;
 }
 
 nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,

@@ -13,7 +13,7 @@ enum { NB_SAMPLES_MOST = 32 };
 
 /* The texts of a shader, one after the other. */
 typedef struct nb_texts {
-    const char *list[6];
+    const char *list[8];
     int count;
 } nb_texts;
 
@@ -32,13 +32,15 @@ typedef struct nb_program_kind {
     nebel_gl_output output;
     nebel_depth_kind depth;
     int from_eye;      /* all rays start where the fog was packed for */
+    int panorama;      /* rays go all around, and tiles are of six faces; depth is the distance */
     uint32_t features; /* of the fog: what the text leaves out makes it faster */
 } nb_program_kind;
 
 typedef struct nb_program {
     nb_program_kind kind;
     unsigned name;
-    int rays, corner, tiling, sample_range, sample_places; /* where its uniforms are; -1: it has none such */
+    int rays, corner, tiling, face_first, sample_range,
+        sample_places; /* where its uniforms are; -1: it has none such */
 } nb_program;
 
 typedef struct nb_programs {

@@ -1,5 +1,7 @@
 #include "shading.h"
 
+#include "corners.h"
+#include "panorama.h"
 #include "targets.h"
 
 #include <epoxy/gl.h>
@@ -30,9 +32,11 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
                                           "}\n";
 
-/* The ray of a pixel: scene_rays are the words of nebel_view_rays. */
+/* The ray of a pixel: scene_rays are the words of nebel_view_rays, or of a panorama. */
+static const char words_text[] = "uniform vec3 scene_rays[6];\n"
+                                 "#define RAY_WORD(i) scene_rays[i]\n";
+
 static const char ray_text[] =
-    "uniform vec3 scene_rays[6];\n"
     "vec3 ray_origin(vec2 pixel)\n"
     "{\n"
     "    return scene_rays[0] + pixel.x * scene_rays[1] + pixel.y * scene_rays[2];\n"
@@ -45,10 +49,11 @@ static const char ray_text[] =
 /* Where a ray grazes its triangle the plane alone would be met anywhere: the interpolated distance, which is off by
  * rounding of far corners only, bounds it. Depth is 1 at the eye and falls to 0: floats are as fine in all distances.
  */
+static const char interpolated_text[] = "in vec3 surface_place;\n"
+                                        "flat in vec3 surface_corner;\n"
+                                        "flat in vec3 surface_face;\n";
+
 static const char distance_text[] =
-    "in vec3 surface_place;\n"
-    "flat in vec3 surface_corner;\n"
-    "flat in vec3 surface_face;\n"
     "float surface_distance(vec3 origin, vec3 direction)\n"
     "{\n"
     "    float met = dot(surface_face, surface_corner - origin) / dot(surface_face, direction);\n"
@@ -57,9 +62,11 @@ static const char distance_text[] =
     "    return met > near - slack && met < near + slack ? met : near;\n"
     "}\n";
 
+static const char attributes_text[] = "in vec3 surface_normal;\n"
+                                      "in vec2 surface_uv;\n"
+                                      "bool surface_is_met(vec3 direction) { return true; }\n";
+
 static const char surface_fragment_text[] =
-    "in vec3 surface_normal;\n"
-    "in vec2 surface_uv;\n"
     "uniform vec3 scene_color;\n"
     "uniform bool scene_has_texture;\n"
     "uniform highp sampler2D scene_texture;\n"
@@ -69,6 +76,7 @@ static const char surface_fragment_text[] =
     "void main()\n"
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
+    "    if (!surface_is_met(direction)) discard;\n"
     "    float t = surface_distance(origin, direction);\n"
     "    if (!(t > 0.0)) discard;\n"
     "    vec3 side = dot(surface_face, direction) > 0.0 ? -surface_face : surface_face;\n"
@@ -101,19 +109,98 @@ static const char vertex_fog_vertex_text[] = "layout(location = 0) in vec3 mesh_
                                              "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
                                              "}\n";
 
+static const char fog_attribute_text[] = "in vec4 surface_fog;\n"
+                                         "bool surface_is_met(vec3 direction) { return true; }\n";
+
 /* Of the surface that is seen alone; two programs need not find the same distance to the last bit. */
 static const char vertex_fog_fragment_text[] =
-    "in vec4 surface_fog;\n"
     "uniform highp sampler2D scene_place;\n"
     "uniform float scene_weakening;\n" /* 1: fog hides the surface, 0: it only adds */
     "layout(location = 0) out vec4 out_in_scattering;\n"
     "layout(location = 1) out vec4 out_transmittance;\n"
     "void main()\n"
     "{\n"
-    "    float t = surface_distance(ray_origin(gl_FragCoord.xy), ray_direction(gl_FragCoord.xy));\n"
+    "    vec3 direction = ray_direction(gl_FragCoord.xy);\n"
+    "    if (!surface_is_met(direction)) discard;\n"
+    "    float t = surface_distance(ray_origin(gl_FragCoord.xy), direction);\n"
     "    if (!(t > 0.0 && t <= 1.0001 * texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x)) discard;\n"
     "    out_in_scattering = vec4(surface_fog.rgb, 1.0);\n"
     "    out_transmittance = vec4(vec3(1.0 - scene_weakening * surface_fog.a), 1.0);\n"
+    "}\n";
+
+/* ---- surfaces of panoramas
+ * ------------------------------------------------------------------------------------------- Triangles are boxes here,
+ * and fragments ask whether their rays hit. Edges count from the nearer of their ends, which neighbours choose alike:
+ * no ray passes between them. */
+
+static const char round_surface_vertex_text[] =
+    "layout(location = 0) in mat3 corner_position;\n"
+    "layout(location = 9) in vec3 corner_face;\n"
+    "#ifdef SCENE_VERTEX_FOG\n"
+    "layout(location = 10) in mat3x4 corner_fog;\n"
+    "flat out mat3x4 corners_fog;\n"
+    "#else\n"
+    "layout(location = 3) in mat3 corner_normal;\n"
+    "layout(location = 6) in mat3x2 corner_uv;\n"
+    "flat out mat3 corners_normal;\n"
+    "flat out mat3x2 corners_uv;\n"
+    "#endif\n"
+    "uniform vec3 scene_offset;\n"
+    "flat out mat3 corners_place;\n"
+    "flat out vec3 surface_face;\n"
+    "void main()\n"
+    "{\n"
+    "    vec3 a = corner_position[0] + scene_offset, b = corner_position[1] + scene_offset,\n"
+    "         c = corner_position[2] + scene_offset;\n"
+    "    corners_place = mat3(a, b, c);\n"
+    "    surface_face = corner_face;\n"
+    "#ifdef SCENE_VERTEX_FOG\n"
+    "    corners_fog = corner_fog;\n"
+    "#else\n"
+    "    corners_normal = corner_normal;\n"
+    "    corners_uv = corner_uv;\n"
+    "#endif\n"
+    "    gl_Position = box_corner(box_of_three(a, b, c), gl_VertexID);\n"
+    "}\n";
+
+static const char round_surface_text[] =
+    "flat in mat3 corners_place;\n"
+    "flat in vec3 surface_face;\n"
+    "vec3 surface_place, surface_corner;\n"
+    "#ifdef SCENE_VERTEX_FOG\n"
+    "flat in mat3x4 corners_fog;\n"
+    "vec4 surface_fog;\n"
+    "#else\n"
+    "flat in mat3 corners_normal;\n"
+    "flat in mat3x2 corners_uv;\n"
+    "vec3 surface_normal;\n"
+    "vec2 surface_uv;\n"
+    "#endif\n"
+    /* The volume that a ray spans with an edge, and what rounding may make of it. */
+    "vec2 edge_volume(vec3 direction, vec3 a, vec3 b)\n"
+    "{\n"
+    "    vec3 from = dot(a, a) < dot(b, b) ? a : b;\n"
+    "    return vec2(dot(b - a, cross(direction, from)), 2e-7 * length(b - a) * length(from));\n"
+    "}\n"
+    "bool surface_is_met(vec3 direction)\n"
+    "{\n"
+    "    vec2 a = edge_volume(direction, corners_place[1], corners_place[2]);\n"
+    "    vec2 b = edge_volume(direction, corners_place[2], corners_place[0]);\n"
+    "    vec2 c = edge_volume(direction, corners_place[0], corners_place[1]);\n"
+    "    float whole = a.x + b.x + c.x, side = whole < 0.0 ? -1.0 : 1.0;\n"
+    "    vec3 weights = side * vec3(a.x, b.x, c.x);\n"
+    "    if (!(whole != 0.0 && all(greaterThanEqual(weights, -vec3(a.y, b.y, c.y))))) return false;\n"
+    "    weights = max(weights, 0.0);\n"
+    "    weights /= weights.x + weights.y + weights.z;\n"
+    "    surface_corner = corners_place[2];\n"
+    "    surface_place = corners_place * weights;\n"
+    "#ifdef SCENE_VERTEX_FOG\n"
+    "    surface_fog = corners_fog * weights;\n"
+    "#else\n"
+    "    surface_normal = corners_normal * weights;\n"
+    "    surface_uv = corners_uv * weights;\n"
+    "#endif\n"
+    "    return true;\n"
     "}\n";
 
 /* ---- shadow maps ---------------------------------------------------------------------------------------------------
@@ -297,6 +384,23 @@ static const char particle_vertex_text[] =
     "    gl_Position = !parallel && d < 1.05 * r ? vec4(corner, 0.0, 1.0) : scene_clip * vec4(at, 1.0);\n"
     "}\n";
 
+static const char round_particle_vertex_text[] =
+    "layout(location = 0) in vec4 ball_place;\n"
+    "layout(location = 1) in vec4 ball_extinction;\n"
+    "layout(location = 2) in vec4 ball_emission;\n"
+    "flat out vec4 place;\n"
+    "flat out vec4 extinction;\n"
+    "flat out vec4 emission;\n"
+    "void main()\n"
+    "{\n"
+    "    float d = length(ball_place.xyz), r = ball_place.w;\n"
+    "    place = ball_place;\n"
+    "    extinction = ball_extinction;\n"
+    "    emission = ball_emission;\n"
+    "    vec4 box = d < 1.05 * r ? box_around() : box_of_cone(ball_place.xyz / d, asin(r / d) / box_quarter);\n"
+    "    gl_Position = box_corner(box, gl_VertexID);\n"
+    "}\n";
+
 /* Each color by itself where they are dimmed by different factors: blending has room for one. */
 static const char particle_text[] =
     "flat in vec4 place;\n"
@@ -310,7 +414,7 @@ static const char particle_text[] =
     "uniform float scene_brightness;\n"
     "#endif\n"
     "uniform vec3 scene_channel;\n"
-    "#ifdef NEBEL_TILES\n"
+    "#if defined(NEBEL_TILES) && !defined(SCENE_PANORAMA)\n"
     "uniform ivec2 tile_grid;\n" /* pixels in a tile, tiles in a row */
     "#endif\n"
     "layout(location = 0) out highp vec4 out_in_scattering;\n"
@@ -323,21 +427,30 @@ static const char particle_text[] =
     "    clear.in_scattering = vec3(0.0);\n"
     "    return clear;\n"
     "#elif defined(NEBEL_TILES)\n"
+    "#ifdef SCENE_PANORAMA\n"
+    "    int entry = face_entry(direction);\n"
+    "#else\n"
     "    ivec2 tile = ivec2(gl_FragCoord.xy) / tile_grid.x;\n"
     "    int entry = 2 * (tile.x + tile.y * tile_grid.y);\n"
+    "#endif\n"
     "    return nebel_trace_list(origin, direction, t, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
     "#else\n"
     "    return nebel_trace(origin, direction, t);\n"
     "#endif\n"
     "}\n"
     "#ifdef SCENE_FIVE_TAPS\n"
+    "#ifdef SCENE_PANORAMA\n" /* each ray is its own axis */
+    "float axis_depth(vec3 at) { return length(at); }\n"
+    "#else\n"
+    "float axis_depth(vec3 at) { return dot(at, scene_axis); }\n"
+    "#endif\n"
     "float opaque_depth(vec2 place)\n"
     "{\n"
     "    ivec2 size = textureSize(scene_place, 0), texel = clamp(ivec2(floor(place * vec2(size))), ivec2(0), size - "
     "1);\n"
     "    vec2 pixel = vec2(texel) + 0.5;\n"
     "    float t = texelFetch(scene_place, texel, 0).x;\n"
-    "    return t > 0.0 ? dot(ray_origin(pixel) + t * ray_direction(pixel), scene_axis) : -1.0;\n"
+    "    return t > 0.0 ? axis_depth(ray_origin(pixel) + t * ray_direction(pixel)) : -1.0;\n"
     "}\n"
     "float brightness()\n"
     "{\n"
@@ -348,7 +461,7 @@ static const char particle_text[] =
     "    taps.margin = scene_taps.w;\n"
     "    taps.brightness = 1.0;\n"
     "    vec2 at = gl_FragCoord.xy / vec2(textureSize(scene_place, 0));\n"
-    "    if (!(nebel_five_taps(at, dot(place.xyz, scene_axis), taps) > 0.0)) discard;\n"
+    "    if (!(nebel_five_taps(at, axis_depth(place.xyz), taps) > 0.0)) discard;\n"
     "    return scene_brightness;\n"
     "}\n"
     "float ray_end() { return 1e18; }\n"
@@ -420,7 +533,9 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
-    const nb_texts surface_fragment = {{version, precision, ray_text, distance_text, surface_fragment_text}, 5};
+    const nb_texts surface_fragment = {{version, precision, words_text, ray_text, interpolated_text, attributes_text,
+                                        distance_text, surface_fragment_text},
+                                       8};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
     const nb_texts survey_vertex = {{version, light_vertex_text}, 2};
@@ -442,7 +557,9 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
 {
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), ray_text, distance_text, vertex_fog_fragment_text}, 5};
+    const nb_texts fragment = {{version, precision_of(context), words_text, ray_text, interpolated_text,
+                                fog_attribute_text, distance_text, vertex_fog_fragment_text},
+                               8};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
     if (result != NEBEL_OK) return result;
@@ -451,12 +568,39 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     return NEBEL_OK;
 }
 
+/* A program of panoramas' surfaces; what it looks up is on `unit`. */
+static nebel_result make_round(const nb_context *context, const nebel_log *log, const char *option,
+                               const char *fragment_text, const char *sampler, int unit, unsigned *name)
+{
+    const char *const version = nb_program_version(context), *const precision = precision_of(context);
+    const nb_texts vertex = {{version, option, words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
+    const nb_texts fragment = {{version, option, precision, words_text, nb_panorama_ray_text, round_surface_text,
+                                distance_text, fragment_text},
+                               8};
+    if (*name != 0) return NEBEL_OK;
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
+    if (result != NEBEL_OK) return result;
+    glUseProgram(*name);
+    set_unit(*name, sampler, unit);
+    return NEBEL_OK;
+}
+
+nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog)
+{
+    const nebel_result result = make_round(context, log, "", surface_fragment_text, "scene_texture",
+                                           NB_UNIT_REFLECTANCE, &shading->round_surface);
+    if (result != NEBEL_OK || !with_fog) return result;
+    return make_round(context, log, "#define SCENE_VERTEX_FOG\n", vertex_fog_fragment_text, "scene_place",
+                      NB_UNIT_PLACE, &shading->round_vertex_fog);
+}
+
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
     char limits[128];
-    (void)snprintf(text, size, "%s%s%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
+    (void)snprintf(text, size, "%s%s%s%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
                    nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
                    kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
+                   kind->panorama ? "#define SCENE_PANORAMA\n" : "",
                    kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
                    NB_CASCADES, (unsigned)kind->features, precision_of(context));
@@ -478,19 +622,29 @@ static void set_units(unsigned program)
     set_unit(program, "scene_dimming", NB_UNIT_DIMMING);
 }
 
+static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kind)
+{
+    const char *const version = nb_program_version(context);
+    if (!kind->of_particles) return (nb_texts){{version, light_vertex_text}, 2};
+    if (!kind->panorama) return (nb_texts){{version, particle_vertex_text}, 2};
+    return (nb_texts){{version, words_text, nb_panorama_box_text, round_particle_vertex_text}, 4};
+}
+
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
                                unsigned *name)
 {
     char head[512];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const int particles = kind->of_particles;
-    const nb_texts vertex = {{nb_program_version(context), particles ? particle_vertex_text : light_vertex_text}, 2};
-    const nb_texts light = {{head, kind->has_fog ? fog : "", ray_text, shadow_text, sun_text, light_text}, 6};
-    const nb_texts dimming = {{head, fog, ray_text, sun_text, dimming_text}, 5};
-    const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog, ray_text, particle_text}, 5};
+    const char *const ray = kind->panorama ? nb_panorama_ray_text : ray_text;
+    const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
+    const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text, light_text}, 7};
+    const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
+    const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog, words_text, ray, tile, particle_text},
+                               7};
+    const nb_texts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
-                                                 particles          ? &particle
+                                                 kind->of_particles ? &particle
                                                  : kind->of_dimming ? &dimming
                                                                     : &light,
                                                  name);
@@ -501,8 +655,8 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
-           a->five_taps == b->five_taps && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
-           a->tiled == b->tiled && a->features == b->features;
+           a->five_taps == b->five_taps && a->panorama == b->panorama && a->has_fog == b->has_fog &&
+           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
@@ -529,5 +683,7 @@ void nb_shading_delete(const nb_shading *shading)
     glDeleteProgram(shading->survey);
     glDeleteProgram(shading->shadow);
     glDeleteProgram(shading->vertex_fog);
+    glDeleteProgram(shading->round_surface);
+    glDeleteProgram(shading->round_vertex_fog);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

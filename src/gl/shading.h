@@ -24,6 +24,7 @@ typedef struct nb_light_kind {
     int of_dimming;   /* of the sun by particles, for `dimmed` ones */
     int dimmed;       /* that counts, too */
     int five_taps;    /* particles are discs, which are there or not */
+    int panorama;
     int has_fog;
     int in_texture, tiled;
     uint32_t features;
@@ -36,7 +37,7 @@ typedef struct nb_light_program {
 
 typedef struct nb_shading {
     unsigned surface, survey, shadow;
-    unsigned vertex_fog; /* 0 until it is needed */
+    unsigned vertex_fog, round_surface, round_vertex_fog; /* 0 until they are needed; round: of panoramas */
     nb_light_program *lights;
     size_t light_count, light_capacity;
 } nb_shading;
@@ -49,6 +50,9 @@ nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *contex
 
 /* Fog that vertices bring, over the surfaces that are seen. */
 nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log);
+
+/* Surfaces of panoramas, and the fog that vertices bring to them. */
+nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog);
 
 /* In OpenGL. */
 void nb_shading_delete(const nb_shading *shading);

@@ -1,6 +1,7 @@
 #include "shadows.h"
 
 #include "camera.h"
+#include "panorama.h"
 #include "state.h"
 
 #include "base/vector.h"
@@ -18,6 +19,7 @@ typedef struct rectangle {
 /* The surfaces of a picture, block by block of pixels: the nearest and the farthest of each. */
 typedef struct survey {
     const nebel_rays *rays;
+    int panorama;
     const float *blocks;    /* four floats each */
     uint32_t columns, rows; /* of blocks */
     uint32_t width, height; /* pixels */
@@ -90,17 +92,26 @@ typedef struct beam {
     double least_size, most_size;
 } beam;
 
+/* Pixels from the left, and from below. */
+typedef struct extent {
+    double left, low, right, high;
+} extent;
+
+static extent block_extent(const survey *s, uint32_t column, uint32_t row)
+{
+    const double left = column * (double)NB_SURVEY_BLOCK, low = row * (double)NB_SURVEY_BLOCK;
+    return (extent){left, low, fmin(left + NB_SURVEY_BLOCK, s->width), fmin(low + NB_SURVEY_BLOCK, s->height)};
+}
+
 /* Of a length, which bends away from its tangent plane, that plane is a lower bound, and the corners an upper. */
-static beam make_beam(const survey *s, uint32_t column, uint32_t row)
+static beam make_beam(const survey *s, const extent *e)
 {
     beam b = {.least_size = HUGE_VAL};
-    const double left = column * (double)NB_SURVEY_BLOCK, low = row * (double)NB_SURVEY_BLOCK;
-    const double right = fmin(left + NB_SURVEY_BLOCK, s->width), high = fmin(low + NB_SURVEY_BLOCK, s->height);
     double middle[3];
-    combine(s->rays->words + 3, .5 * (left + right), .5 * (low + high), middle);
+    combine(s->rays->words + 3, .5 * (e->left + e->right), .5 * (e->low + e->high), middle);
     const double size = nb_vector_length(middle);
     for (int i = 0; i < 4; i++) {
-        const double x = i & 1 ? right : left, y = i & 2 ? high : low;
+        const double x = i & 1 ? e->right : e->left, y = i & 2 ? e->high : e->low;
         combine(s->rays->words, x, y, b.origin[i]);
         combine(s->rays->words + 3, x, y, b.way[i]);
         b.least_size = fmin(b.least_size, nb_vector_dot(middle, b.way[i]) / size);
@@ -123,6 +134,53 @@ static void include_beam(const nb_shadows *shadows, const beam *b, double near, 
     }
 }
 
+/* Half the opening of the cone around a block of a panorama: its corners are the farthest from its middle, unless it
+ * reaches around. */
+static double opening_of(const survey *s, const extent *e, const double middle[3])
+{
+    double least = 1;
+    if (2 * (e->right - e->left) > s->width) return 3.2;
+    for (int i = 0; i < 4; i++) {
+        double corner[3];
+        nb_panorama_direction(s->rays, i & 1 ? e->right : e->left, i & 2 ? e->high : e->low, corner);
+        least = fmin(least, nb_vector_dot(middle, corner));
+    }
+    return acos(fmax(least, -1)) + 1e-6;
+}
+
+static void include_cone(const nb_shadows *shadows, const double middle[3], double opening, double near, double far,
+                         rectangle *seen)
+{
+    double at[2][2];
+    for (int k = 0; k < 2; k++) {
+        const double angle = acos(fmin(fmax(nb_vector_dot(shadows->across[k], middle), -1), 1));
+        const double most = cos(fmax(angle - opening, 0)), least = cos(fmin(angle + opening, 3.1415926535897932));
+        at[0][k] = fmin(near * least, far * least);
+        at[1][k] = fmax(near * most, far * most);
+    }
+    include(seen, at[0]);
+    include(seen, at[1]);
+}
+
+static void include_round(const nb_shadows *shadows, const survey *s, const extent *e, double near, double far,
+                          rectangle *seen)
+{
+    double middle[3];
+    nb_panorama_direction(s->rays, .5 * (e->left + e->right), .5 * (e->low + e->high), middle);
+    include_cone(shadows, middle, opening_of(s, e, middle), near, far, seen);
+}
+
+static void include_block(const nb_shadows *shadows, const survey *s, const extent *e, double near, double far,
+                          rectangle *seen)
+{
+    if (s->panorama) {
+        include_round(shadows, s, e, near, far, seen);
+    } else {
+        const beam b = make_beam(s, e);
+        include_beam(shadows, &b, near, far, seen);
+    }
+}
+
 /* Surfaces may be anywhere between the nearest and the farthest of their block. */
 static void find_rectangles(const nb_shadows *shadows, survey *s)
 {
@@ -131,12 +189,12 @@ static void find_rectangles(const nb_shadows *shadows, survey *s)
         for (uint32_t column = 0; column < s->columns; column++) {
             const float *const block = s->blocks + 4 * ((size_t)row * s->columns + column);
             if (!(block[0] > 0)) continue;
-            const beam b = make_beam(s, column, row);
+            const extent e = block_extent(s, column, row);
             double from = 0;
             for (int k = 0; k < NB_CASCADES; k++) {
                 const double near = fmax(from, (double)block[0]),
                              far = fmin((double)shadows->ends[k], (double)block[1]);
-                if (near <= far) include_beam(shadows, &b, near, far, &s->seen[k]);
+                if (near <= far) include_block(shadows, s, &e, near, far, &s->seen[k]);
                 from = (double)shadows->ends[k];
             }
         }
@@ -147,6 +205,7 @@ static void find_rectangles(const nb_shadows *shadows, survey *s)
 static double pixel_width(const survey *s, double t)
 {
     double width = 0;
+    if (s->panorama) return t * fmax(6.3 / s->width, 3.2 / s->height);
     for (int i = 0; i < 3; i++) {
         width = fmax(width, fabs((double)s->rays->words[1].v[i]) + t * fabs((double)s->rays->words[4].v[i]));
         width = fmax(width, fabs((double)s->rays->words[2].v[i]) + t * fabs((double)s->rays->words[5].v[i]));
@@ -166,8 +225,8 @@ static void lay_map(nb_shadows *shadows, const survey *s, int map)
     const double pixel = 2 * pixel_width(s, fmin((double)shadows->ends[map], s->farthest));
     for (int i = 0; i < 2; i++) {
         const double margin = pixel + .01 * (r.high[i] - r.low[i]);
-        const double extent = r.high[i] - r.low[i] + 2 * margin;
-        const double texels = (shadows->size - 2. * BORDER) / extent;
+        const double side = r.high[i] - r.low[i] + 2 * margin;
+        const double texels = (shadows->size - 2. * BORDER) / side;
         shadows->places[map][i] = (float)(r.low[i] - margin - BORDER / texels);
         shadows->places[map][2 + i] = (float)texels;
         shadows->seen_low[i] = fmin(shadows->seen_low[i], r.low[i] - margin);
@@ -223,9 +282,10 @@ static int read_survey(nb_shadows *shadows, const nebel_allocator *allocator, co
 
 nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, const nebel_allocator *allocator,
                             const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
-                            const nb_meshes *meshes)
+                            int panorama, const nb_meshes *meshes)
 {
     survey s = {.rays = rays,
+                .panorama = panorama,
                 .columns = targets->survey_width,
                 .rows = targets->survey_height,
                 .width = targets->width,

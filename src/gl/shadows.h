@@ -29,7 +29,7 @@ void nb_shadows_turn(nb_shadows *shadows, const double sun[3]);
  * MEMORY. */
 nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, const nebel_allocator *allocator,
                             const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
-                            const nb_meshes *meshes);
+                            int panorama, const nb_meshes *meshes);
 
 /* Draws the maps. Depth is tested afterwards. MEMORY, UNSUPPORTED. */
 nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, const nebel_log *log, unsigned program,

@@ -1,5 +1,6 @@
 /* The fog of a frame, packed and handed to OpenGL. */
 #include "gl.h"
+#include "panorama.h"
 #include "state.h"
 
 #include <string.h>
@@ -45,17 +46,51 @@ static nebel_result pack(nebel_gl *gl, const nebel_snapshot *snapshot)
     return nebel_pack_fog(snapshot, gl->fog.eye, gl->words, gl->word_capacity, &count);
 }
 
+/* The lists of one view, behind `before` entries of others. */
+static nebel_result list_view(nebel_gl *gl, const nebel_snapshot *snapshot, int view, size_t before, size_t *count)
+{
+    uint32_t *const entries = before < gl->entry_capacity ? gl->entries + before : NULL;
+    const size_t capacity = entries != NULL ? gl->entry_capacity - before : 0;
+    const nebel_result result = nebel_tile_volumes(snapshot, &gl->views[view], TILE_SIZE, entries, capacity, count);
+    if (result == NEBEL_OK || *count > capacity) return NEBEL_OK;
+    return nb_fail(&gl->log, result, "nebel_gl_set_fog: the volumes of the tiles cannot be listed: %s",
+                   nebel_result_text(result));
+}
+
+static size_t tile_count(const nebel_view *view)
+{
+    const size_t columns = (view->width + TILE_SIZE - 1) / TILE_SIZE;
+    return columns * ((view->height + TILE_SIZE - 1) / TILE_SIZE);
+}
+
+/* Lists count from the beginning of all. */
+static void shift_lists(nebel_gl *gl, int view, size_t before)
+{
+    const size_t tiles = tile_count(&gl->views[view]);
+    for (size_t i = 0; i < tiles && before > 0; i++) gl->entries[before + 2 * i] += (uint32_t)before;
+    gl->face_first[view] = (int)before;
+}
+
+/* *count may be more than there is room for; then there are no lists. */
+static nebel_result list_views(nebel_gl *gl, const nebel_snapshot *snapshot, size_t *count)
+{
+    nebel_result result = NEBEL_OK;
+    *count = 0;
+    for (int i = 0; i < gl->view_count && result == NEBEL_OK; i++) {
+        size_t entries = 0;
+        result = list_view(gl, snapshot, i, *count, &entries);
+        if (result == NEBEL_OK && *count + entries <= gl->entry_capacity) shift_lists(gl, i, *count);
+        *count += entries;
+    }
+    return result;
+}
+
 /* The lists of the last frame tell how much room this one's need; where it is more they are made once again. */
 static nebel_result list_tiles(nebel_gl *gl, const nebel_snapshot *snapshot, size_t *count)
 {
     for (;;) {
-        const nebel_result result =
-            nebel_tile_volumes(snapshot, &gl->view, TILE_SIZE, gl->entries, gl->entry_capacity, count);
-        if (result == NEBEL_OK && *count <= gl->entry_capacity) return result;
-        if (*count <= gl->entry_capacity) {
-            return nb_fail(&gl->log, result, "nebel_gl_set_fog: the volumes of the tiles cannot be listed: %s",
-                           nebel_result_text(result));
-        }
+        const nebel_result result = list_views(gl, snapshot, count);
+        if (result != NEBEL_OK || *count <= gl->entry_capacity) return result;
         void *entries = gl->entries;
         const int room = make_room(gl, &entries, sizeof *gl->entries, *count, &gl->entry_capacity);
         gl->entries = entries;
@@ -65,11 +100,11 @@ static nebel_result list_tiles(nebel_gl *gl, const nebel_snapshot *snapshot, siz
 
 static uint32_t fullest_tile(const nebel_gl *gl)
 {
-    const size_t columns = (gl->view.width + TILE_SIZE - 1) / TILE_SIZE;
-    const size_t rows = (gl->view.height + TILE_SIZE - 1) / TILE_SIZE;
     uint32_t most = 0;
-    for (size_t i = 0; i < columns * rows; i++) {
-        if (gl->entries[2 * i + 1] > most) most = gl->entries[2 * i + 1];
+    for (int view = 0; view < gl->view_count; view++) {
+        const uint32_t *const heads = gl->entries + gl->face_first[view];
+        const size_t tiles = tile_count(&gl->views[view]);
+        for (size_t i = 0; i < tiles; i++) most = heads[2 * i + 1] > most ? heads[2 * i + 1] : most;
     }
     return most;
 }
@@ -172,7 +207,7 @@ static nebel_result upload_tiles(nebel_gl *gl, size_t count)
     const nebel_result result = fill_texture(gl, &entry_texels, gl->entries, count, &gl->tiles, &gl->tile_rows);
     gl->fog.tiles = gl->tiles;
     gl->fog.tile_size = TILE_SIZE;
-    gl->fog.tile_columns = (gl->view.width + TILE_SIZE - 1) / TILE_SIZE;
+    gl->fog.tile_columns = (gl->views[0].width + TILE_SIZE - 1) / TILE_SIZE;
     gl->fog.tile_most = fullest_tile(gl);
     return result;
 }
@@ -203,14 +238,24 @@ static void keep(nebel_gl *gl, nebel_snapshot *snapshot)
     gl->packed = snapshot;
 }
 
+static int are_same_views(const nebel_gl *gl, const nebel_view *views, int count)
+{
+    int same = gl->view_count == count;
+    for (int i = 0; i < count && same; i++) same = is_same_view(&gl->views[i], &views[i]);
+    return same;
+}
+
 /* Where neither the fog nor the eye is another one the words stay, and in the same view the tiles, too. */
-static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view, const double eye[3])
+static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], const nebel_view *views,
+                            int view_count)
 {
     const int has_words = gl->packed == snapshot && memcmp(gl->fog.eye, eye, sizeof gl->fog.eye) == 0;
     size_t entry_count = 0;
     nebel_result result = NEBEL_OK;
-    if (has_words && is_same_view(&gl->view, view)) return NEBEL_OK;
-    gl->view = *view;
+    gl->has_fog = has_words && are_same_views(gl, views, view_count);
+    if (gl->has_fog) return NEBEL_OK;
+    memcpy(gl->views, views, (size_t)view_count * sizeof *views);
+    gl->view_count = view_count;
     if (!has_words) {
         gl->fog = (nebel_gl_fog){.eye = {eye[0], eye[1], eye[2]}, .features = nebel_pack_features(snapshot)};
         result = pack(gl, snapshot);
@@ -221,6 +266,7 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_
     if (result == NEBEL_OK) result = upload(gl, !has_words, entry_count);
     keep(gl, result == NEBEL_OK ? snapshot : NULL);
     if (result == NEBEL_OK) warn_of_turns(gl);
+    gl->has_fog = result == NEBEL_OK;
     return result;
 }
 
@@ -229,7 +275,7 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebe
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
     gl->has_fog = 0;
     if (view == NULL) return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: the view is missing");
-    nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
+    const nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
     if (result != NEBEL_OK) return result;
     nebel_rays rays;
     if (nebel_view_rays(view, NULL, &rays) != NEBEL_OK) {
@@ -239,7 +285,16 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebe
                        "eye_from_world is a rotation and a translation, clip_from_eye a projection",
                        (unsigned)view->width, (unsigned)view->height);
     }
-    result = prepare(gl, snapshot != NULL ? snapshot : gl->empty, view, rays.eye);
-    gl->has_fog = result == NEBEL_OK;
-    return result;
+    return prepare(gl, snapshot != NULL ? snapshot : gl->empty, rays.eye, view, 1);
+}
+
+nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], uint32_t width,
+                                  uint32_t height)
+{
+    nebel_view faces[6];
+    gl->has_fog = 0;
+    const nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
+    if (result != NEBEL_OK) return result;
+    nb_panorama_faces(eye, width, height, faces);
+    return prepare(gl, snapshot != NULL ? snapshot : gl->empty, eye, faces, 6);
 }

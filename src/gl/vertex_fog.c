@@ -31,19 +31,57 @@ static int unmap(unsigned buffer, const void *mapped)
     return mapped != NULL && glUnmapBuffer(GL_ARRAY_BUFFER);
 }
 
+/* As the ray to a place is seen. */
+static nebel_cell_view view_towards(const nb_vertex_source *source, const double place[3])
+{
+    nebel_cell_view view = source->view;
+    double depth = 0;
+    for (int i = 0; i < 3; i++) depth += (place[i] - view.eye[i]) * view.forward[i];
+    for (int i = 0; i < 3; i++) {
+        if (source->projection == NEBEL_PROJECTION_PANORAMA) view.forward[i] = place[i] - view.eye[i];
+        if (source->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) view.eye[i] = place[i] - depth * view.forward[i];
+    }
+    return view;
+}
+
+static void find_place(const nebel_vertices *vertices, size_t vertex, double place[3])
+{
+    const char *const positions = vertices->positions;
+    const float *const p = (const float *)(const void *)(positions + vertex * vertices->position_stride);
+    for (int i = 0; i < 3; i++) place[i] = vertices->origin[i] + (double)p[i];
+}
+
+/* A vertex in the eye of a panorama has no fog. */
 static nebel_result fog_by_cells(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
                                  float (*out)[4])
 {
-    const char *const positions = vertices->positions;
     nebel_result result = NEBEL_OK;
     for (size_t v = 0; v < count && result == NEBEL_OK; v++) {
-        const float *const p = (const float *)(const void *)(positions + v * vertices->position_stride);
         nebel_cell_point point = {.position = {0, 0, 0}};
-        nebel_cell_fog fog;
-        for (int i = 0; i < 3; i++) point.position[i] = vertices->origin[i] + (double)p[i];
-        result = nebel_fog_cells(source->cells, &source->view, 1, &point, 0, &fog, 0);
-        for (int i = 0; i < 3 && result == NEBEL_OK; i++) out[v][i] = (float)fog.color[i];
-        if (result == NEBEL_OK) out[v][3] = (float)fog.alpha;
+        nebel_cell_fog fog = {.alpha = 0};
+        find_place(vertices, v, point.position);
+        const nebel_cell_view view = view_towards(source, point.position);
+        const int is_eye = view.forward[0] == 0 && view.forward[1] == 0 && view.forward[2] == 0;
+        if (!is_eye) result = nebel_fog_cells(source->cells, &view, 1, &point, 0, &fog, 0);
+        for (int i = 0; i < 3; i++) out[v][i] = (float)fog.color[i];
+        out[v][3] = (float)fog.alpha;
+    }
+    return result;
+}
+
+static nebel_result fog_by_parallel_rays(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
+                                         float (*out)[4])
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t v = 0; v < count && result == NEBEL_OK; v++) {
+        const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out[v], 0};
+        nebel_vertices one = *vertices;
+        double place[3];
+        one.positions = (const char *)vertices->positions + v * vertices->position_stride;
+        find_place(vertices, v, place);
+        const nebel_cell_view view = view_towards(source, place);
+        for (int i = 0; i < 3; i++) one.eye[i] = view.eye[i];
+        result = nebel_fog_vertices(source->fog, NULL, 1, &one, &output, 1);
     }
     return result;
 }
@@ -52,8 +90,9 @@ static nebel_result fog_vertices(const nb_vertex_source *source, size_t count, c
                                  void *out)
 {
     const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out, 0};
-    return source->cells != NULL ? fog_by_cells(source, count, vertices, out)
-                                 : nebel_fog_vertices(source->fog, NULL, count, vertices, &output, 1);
+    if (source->cells != NULL) return fog_by_cells(source, count, vertices, out);
+    if (source->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) return fog_by_parallel_rays(source, count, vertices, out);
+    return nebel_fog_vertices(source->fog, NULL, count, vertices, &output, 1);
 }
 
 /* Positions are where OpenGL has them, and nowhere else. */
@@ -61,8 +100,8 @@ static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nb_
 {
     const size_t count = mesh->vertex_count;
     const GLbitfield writing = GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT;
-    nebel_vertices vertices = {.positions = map(mesh->vertices, count * NB_VERTEX_SIZE, GL_MAP_READ_BIT),
-                               .position_stride = NB_VERTEX_SIZE};
+    nebel_vertices vertices = {.positions = map(mesh->vertices, count * sizeof(nb_vertex), GL_MAP_READ_BIT),
+                               .position_stride = sizeof(nb_vertex)};
     void *const out = map(mesh->fog, count * FOG_SIZE, writing);
     const int mapped = vertices.positions != NULL && out != NULL;
     for (int i = 0; i < 3; i++) {
