@@ -76,7 +76,7 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
                                        .width = pair->width,
                                        .height = pair->height,
                                        .samples = samples,
-                                       .particles_dim_sun = particles != NULL && particles->dim_sun};
+                                       .particles_leave_sun = particles != NULL && particles->leave_sun};
     const nebel_gl_planes planes = {pair->gl.color, pair->gl.transmittance, pair->gl.in_scattering, pair->gl.depth,
                                     pair->gl.normal};
     assert_int_equal(nebel_create_gl_renderer(scene, fog, &desc, &renderer), NEBEL_OK);

@@ -21,7 +21,7 @@ typedef struct picture_particles {
     const nebel_particle *list;
     size_t count;
     nebel_snapshot *others; /* the fog without them */
-    int dim_sun;            /* in OpenGL */
+    int leave_sun;          /* in OpenGL: they do not dim it */
 } picture_particles;
 
 /* Renders a scene by both. particles NULL: none. */

@@ -95,11 +95,8 @@ static void end(stage *s)
 
 static nebel_result draw(stage *s, uint32_t width, uint32_t samples)
 {
-    const nebel_gl_frame_desc desc = {.camera = test_camera(3, 2, 5, 0, 0, 0),
-                                      .width = width,
-                                      .height = 24,
-                                      .samples = samples,
-                                      .particles_dim_sun = 1};
+    const nebel_gl_frame_desc desc = {
+        .camera = test_camera(3, 2, 5, 0, 0, 0), .width = width, .height = 24, .samples = samples};
     return nebel_gl_render_frame(s->renderer, &desc);
 }
 

@@ -161,7 +161,7 @@ static void test_particles_among_many_volumes(void **state)
     for (int i = 0; i < 2; i++) {
         nb_gl context;
         nebel_snapshot *const all = test_fog(MANY + PARTICLES, volumes), *const others = test_fog(MANY, volumes);
-        const picture_particles drawn = {.list = particles, .count = PARTICLES, .others = others, .dim_sun = 1};
+        const picture_particles drawn = {.list = particles, .count = PARTICLES, .others = others};
         picture_pair pair = picture_make(WIDTH, HEIGHT);
         pass_open(&context, languages[i]);
         picture_render_particles(&s.ball.scene, all, &drawn, &s.camera, 1, &pair);

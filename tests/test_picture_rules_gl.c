@@ -151,7 +151,7 @@ static void test_particles_are_fog(void **state)
 }
 
 /* How far the colours are apart where the sun shines through particles onto the floor. */
-static double compare_sunlight(const stage *s, nb_gl_language language, int grey, int dim_sun)
+static double compare_sunlight(const stage *s, nb_gl_language language, int grey, int leave_sun)
 {
     nebel_particle particles[9];
     nebel_volume_desc volumes[11] = {
@@ -161,7 +161,7 @@ static double compare_sunlight(const stage *s, nb_gl_language language, int grey
     picture_pair pair = picture_make(WIDTH, HEIGHT);
     make_particles(particles, volumes, grey);
     nebel_snapshot *const all = test_fog(11, volumes), *const others = test_fog(2, volumes);
-    const picture_particles drawn = {.list = particles, .count = 9, .others = others, .dim_sun = dim_sun};
+    const picture_particles drawn = {.list = particles, .count = 9, .others = others, .leave_sun = leave_sun};
     pass_open(&context, language);
     picture_render_particles(&s->ball.scene, all, &drawn, &s->camera, 1, &pair);
     pass_close(&context);
@@ -178,8 +178,8 @@ static void test_particles_dim_the_sun(void **state)
     static stage s;
     set_stage(&s, (double[3]){0, 0, 0});
     for (int i = 0; i < 2; i++) {
-        const double dimmed = compare_sunlight(&s, languages[i], i, 1),
-                     bright = compare_sunlight(&s, languages[i], i, 0);
+        const double dimmed = compare_sunlight(&s, languages[i], i, 0),
+                     bright = compare_sunlight(&s, languages[i], i, 1);
         print_message("dimmed %.2g, not dimmed %.2g\n", dimmed, bright);
         assert_true(dimmed < .01 && dimmed < .2 * bright);
     }
@@ -247,12 +247,8 @@ static void draw_all(nebel_gl_renderer *renderer, const stage *s, nebel_gl_metho
         .center = {.5, 0, 2}, .radius = .6, .extinction = {1, 2, 3}, .emission = {.1, .2, .3}};
     assert_int_equal(nebel_set_gl_renderer_particles(renderer, &particle, 1), NEBEL_OK);
     for (int i = 0; i < 2; i++) {
-        nebel_gl_frame_desc desc = {.camera = s->camera,
-                                    .width = LARGE_WIDTH,
-                                    .height = LARGE_HEIGHT,
-                                    .samples = 2,
-                                    .method = method,
-                                    .particles_dim_sun = 1};
+        nebel_gl_frame_desc desc = {
+            .camera = s->camera, .width = LARGE_WIDTH, .height = LARGE_HEIGHT, .samples = 2, .method = method};
         const nebel_gl_planes planes = {.color = out->color[i], .depth = out->depth[i]};
         if (i == 1) desc.camera.projection = NEBEL_PROJECTION_PANORAMA;
         assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);

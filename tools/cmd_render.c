@@ -426,7 +426,6 @@ static nebel_result draw_frame(studio *all)
         .samples = all->wanted->samples,
         .progress = show_progress,
         .progress_user = all,
-        .particles_dim_sun = 1,
         .method = gl_method(all->wanted->method),
         .cells = all->cells,
     };

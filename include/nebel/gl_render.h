@@ -58,7 +58,7 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapsh
  * nebel_commit_scene_volumes_at. They are copied; count 0: none. Each is drawn as a ball whose transmittance and light
  * up to the surface behind it have closed forms, from the farthest centre to the nearest: particles that overlap take
  * their light from each other as if one were behind the other, and fog counts before a particle's middle. They dim
- * the sun where a frame asks for that. O(count log count) for each frame, and what they cover. Errors: ARGUMENT,
+ * the sun unless a frame leaves that out. O(count log count) for each frame, and what they cover. Errors: ARGUMENT,
  * MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
 nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
                                              size_t count);
@@ -101,9 +101,10 @@ typedef struct nebel_gl_frame_desc {
     nebel_gl_method method;
     const nebel_gl_taps *taps; /* of FIVE_TAP; NULL: nebel_gl_default_taps */
     const nebel_cells *cells;  /* of CELLS */
-    int particles_dim_sun; /* nonzero: sunlight on surfaces is attenuated by all particles on its way, exactly, by the
-                              lists of particles along it; for a new eye or sun O(particles) more, some microseconds
-                              each. Not where `fog` excludes, replaces or limits what particles do */
+    int particles_leave_sun;   /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
+                                  exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
+                                  some microseconds each. Not where `fog` excludes, replaces or limits what particles
+                                  do. Nonzero: sunlight passes particles by: for many of them and an eye that moves */
 } nebel_gl_frame_desc;
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or

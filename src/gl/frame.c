@@ -416,7 +416,7 @@ static nebel_result set_sun_cloud(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_result result = NEBEL_OK;
-    f->dims = f->desc->particles_dim_sun && r->particles.count > 0;
+    f->dims = !f->desc->particles_leave_sun && r->particles.count > 0;
     if (!f->dims) return NEBEL_OK;
     if (r->cloud == NULL) result = nb_particles_commit(&r->particles, &r->allocator, &r->log, &r->cloud);
     if (result != NEBEL_OK) return result;

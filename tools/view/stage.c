@@ -111,7 +111,7 @@ static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t w
                          const nb_look *look, uint32_t samples, int quick)
 {
     nebel_gl_frame_desc desc = {
-        .camera = *camera, .width = width, .height = height, .samples = samples, .particles_dim_sun = !quick};
+        .camera = *camera, .width = width, .height = height, .samples = samples, .particles_leave_sun = quick};
     if (look->particles == NB_LOOK_AS_DISCS) desc.method = NEBEL_GL_METHOD_FIVE_TAP;
     if (samples > 1) {
         desc.progress = stop;
