@@ -7,9 +7,9 @@
  *     (h / 2) 64 M / (15 (1 - r^-2) r^2n),      M >= |integrand| on the Bernstein ellipse of parameter r
  *
  * (Trefethen, Approximation Theory and Approximation Practice, theorem 19.3), and M has a bound in closed form for
- * every profile. So the step is chosen by a proof, not by comparing two guesses: it is halved until the bound fits the
- * budget. Two cruder rules, whose bounds are better for steps that hardly attenuate or hardly differ, may take a step
- * before that. */
+ * every profile. So the step is chosen by a proof, not by comparing two guesses: it is shortened until the bound fits
+ * the budget. Two cruder rules, whose bounds are better for steps that hardly attenuate or hardly differ, may take a
+ * step before that. */
 
 #define NODE_COUNT 6
 #define MOST_STEPS 4096
@@ -43,14 +43,19 @@ static const double up_to_node[NODE_COUNT][NODE_COUNT] = {
      0.042831123094792586}};
 
 /* The parameter to begin with: so wide that a step over which the integrand hardly grows in the ellipse fits a budget
- * relative to the radiance. A step that does not fit gets a wider ellipse as it gets shorter, so that any budget is
- * met. */
-#define WIDEST_ELLIPSE 64.0
-
+ * relative to the radiance. */
 static nb_real choose_ellipse(double budget)
 {
     const double wanted = budget < 1e-15 ? 1e-15 : budget > 0.1 ? 0.1 : budget;
-    return nb_min(nb_exp(nb_log(REAL(120 / wanted)) * REAL(0.5 / NODE_COUNT)), REAL(WIDEST_ELLIPSE));
+    return nb_min(nb_exp(nb_log(REAL(120 / wanted)) * REAL(0.5 / NODE_COUNT)), REAL(64.0));
+}
+
+/* Where that is not good enough the ellipse belongs to the fog, not to the step: it reaches as far as the integrand
+ * hardly grows, and its parameter is reach / length. The best one is where M grows by e^12 or so, which balances r^12.
+ */
+static nb_real ellipse_of(nb_real reach, nb_real length)
+{
+    return nb_min(nb_max(reach / nb_max(length, NB_TINY), NB_F(1.25)), NB_F(64.0));
 }
 
 /* 64 / (15 (1 - r^-2) r^12) */
@@ -143,14 +148,37 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
     }
 }
 
+/* Light per extinction of the media of a piece: the least and the most. */
+typedef struct range {
+    nb_real least[3], most[3];
+    nb_mask emits; /* some medium shines without that quotient meaning anything */
+} range;
+
+static range find_range(const march *m)
+{
+    range r = {.emits = nb_mask_false};
+    for (int c = 0; c < 3; c++) {
+        r.least[c] = NB_HUGE;
+        r.most[c] = NB_F(0.0);
+    }
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
+        if (k->medium->emits) r.emits = nb_or(r.emits, k->inside);
+        for (int c = 0; c < 3; c++) {
+            r.least[c] = nb_select(k->inside, nb_min(k->radiance[c], r.least[c]), r.least[c]);
+            r.most[c] = nb_select(k->inside, nb_max(k->radiance[c], r.most[c]), r.most[c]);
+        }
+    }
+    return r;
+}
+
 /* A step that is being considered, in all lanes at once. */
 typedef struct step {
     nb_wide start;
     nb_real length;
     piece_sum sum;
-    nb_real least[3], most[3]; /* light per extinction of the media there */
-    nb_real behind[3];         /* transmittance at its end */
-    nb_real drop;              /* largest loss of transmittance over it */
+    nb_real behind[3]; /* transmittance at its end */
+    nb_real drop;      /* largest loss of transmittance over it */
     nb_real gauss_bound;
     nb_real crude_bound[2];
 } step;
@@ -184,37 +212,22 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     return bound;
 }
 
-/* The range of light per extinction. Returns where some medium shines without that quotient meaning anything. */
-static nb_mask find_range(const march *m, step *s)
+/* What is taken for the light between two transmittances if it is known by its range alone may be off by this. */
+static nb_real spread_over(const range *r, nb_real drop, int c)
 {
-    nb_mask emits = nb_mask_false;
-    for (int c = 0; c < 3; c++) {
-        s->least[c] = NB_HUGE;
-        s->most[c] = NB_F(0.0);
-    }
-    for (size_t i = m->present_first; i < m->window_count; i++) {
-        const contact *k = present(m, i);
-        if (k->medium->emits) emits = nb_or(emits, k->inside);
-        for (int c = 0; c < 3; c++) {
-            s->least[c] = nb_select(k->inside, nb_min(k->radiance[c], s->least[c]), s->least[c]);
-            s->most[c] = nb_select(k->inside, nb_max(k->radiance[c], s->most[c]), s->most[c]);
-        }
-    }
-    return emits;
+    return nb_select(r->emits, NB_HUGE, NB_F(0.5) * (r->most[c] - r->least[c]) * drop);
 }
 
 /* [0]: all light attenuated by something between the transmittances at both ends. [1]: light per extinction between the
  * least and the most radiant medium, which holds where nothing shines without absorbing. */
-static void bound_crude(const march *m, step *s, const gathered *g)
+static void bound_crude(const range *r, step *s, const gathered *g)
 {
-    nb_real spread = NB_F(0.0);
-    const nb_mask emits = find_range(m, s);
+    s->crude_bound[0] = s->crude_bound[1] = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real drop = g->transmittance[c] - s->behind[c];
-        spread = nb_max(spread, NB_F(0.5) * (s->most[c] - s->least[c]) * drop);
         s->crude_bound[0] = nb_max(s->crude_bound[0], NB_F(0.5) * s->sum.light[c] * drop);
+        s->crude_bound[1] = nb_max(s->crude_bound[1], spread_over(r, drop, c));
     }
-    s->crude_bound[1] = nb_select(emits, NB_HUGE, spread);
 }
 
 static piece_sum sum_step(const march *m, nb_wide start, nb_wide end, nb_real length)
@@ -224,17 +237,14 @@ static piece_sum sum_step(const march *m, nb_wide start, nb_wide end, nb_real le
     return sum;
 }
 
-static step consider(const march *m, const gathered *g, nb_real ellipse, nb_wide start, nb_real length,
-                     const piece_sum *sum)
+static step consider(const range *r, const gathered *g, nb_wide start, nb_real length, const piece_sum *sum)
 {
-    step s = {.start = start, .length = length, .sum = *sum, .drop = NB_F(0.0)};
-    s.crude_bound[0] = NB_F(0.0);
+    step s = {.start = start, .length = length, .sum = *sum, .drop = NB_F(0.0), .gauss_bound = NB_HUGE};
     for (int c = 0; c < 3; c++) {
         s.behind[c] = nb_exp(-(g->depth[c] + s.sum.depth[c]));
         s.drop = nb_max(s.drop, g->transmittance[c] - s.behind[c]);
     }
-    s.gauss_bound = bound_gauss(m, &s, g, ellipse);
-    bound_crude(m, &s, g);
+    bound_crude(r, &s, g);
     return s;
 }
 
@@ -304,24 +314,24 @@ static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real 
 }
 
 /* The middles of the two crude rules. */
-static void sum_crude(const step *s, const gathered *g, nb_mask between_media, nb_real radiance[3])
+static void sum_crude(const range *r, const step *s, const gathered *g, nb_mask between_media, nb_real radiance[3])
 {
     for (int c = 0; c < 3; c++) {
         const nb_real drop = g->transmittance[c] - s->behind[c];
         const nb_real attenuated = NB_F(0.5) * s->sum.light[c] * (g->transmittance[c] + s->behind[c]);
-        radiance[c] = nb_select(between_media, NB_F(0.5) * (s->least[c] + s->most[c]) * drop, attenuated);
+        radiance[c] = nb_select(between_media, NB_F(0.5) * (r->least[c] + r->most[c]) * drop, attenuated);
     }
 }
 
 /* Adds an accepted step in `lanes` by the rule with the smallest bound. */
-static void take_step(const march *m, const step *s, gathered *g, nb_mask lanes)
+static void take_step(const march *m, const range *r, const step *s, gathered *g, nb_mask lanes)
 {
     const nb_mask between_media = s->crude_bound[1] < s->crude_bound[0];
     const nb_real crude = nb_min(s->crude_bound[0], s->crude_bound[1]);
     const nb_mask fine = s->gauss_bound < crude;
     nb_real by_nodes[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, by_ends[3];
     if (nb_any(nb_and(lanes, fine))) sum_nodes(m, s, g, by_nodes);
-    sum_crude(s, g, between_media, by_ends);
+    sum_crude(r, s, g, between_media, by_ends);
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real light = nb_select(lanes, nb_select(fine, by_nodes[c], by_ends[c]), NB_F(0.0));
@@ -361,49 +371,125 @@ static nb_wide end_of_step(nb_wide t, nb_real length, nb_wide stop)
     return nb_wselect(nb_widen_mask(length >= nb_narrow(stop - t)), stop, t + nb_widen(length));
 }
 
-/* Halves the step in every lane until its bound fits. `whole` is the sum of the piece. */
-static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, nb_wide start,
-                     nb_wide stop, nb_real length, nb_mask pending, nb_real *ellipse, const piece_sum *whole)
+/* What the walk through a piece keeps from step to step. It adapts from where a step has not fit that was as long as it
+ * can be. */
+typedef struct pace {
+    nb_mask adapts;
+    nb_real length; /* of the next step, unless a kink or the end is nearer */
+    nb_real reach;
+} pace;
+
+/* How far the integrand hardly grows, to start the search for the best ellipse with. */
+static nb_real first_reach(const march *m, nb_wide t)
 {
+    nb_real growth = NB_F(0.0);
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
+        nb_real here = largest(k->extinction) * contact_density(k, t);
+        if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) here = here + nb_abs(nb_narrow(k->slope.x));
+        growth = growth + nb_select(k->inside, here, NB_F(0.0));
+    }
+    return nb_min(NB_F(48.0) / nb_max(growth, NB_TINY), NB_FAR);
+}
+
+/* The bound of a step; where the pace adapts with the better of two ellipses, towards which the reach moves. */
+static nb_real try_ellipses(const march *m, const step *s, const gathered *g, const allowance *may, const pace *now,
+                            nb_real *reach)
+{
+    const nb_real first = nb_select(now->adapts, ellipse_of(now->reach, s->length), may->ellipse);
+    const nb_real wide = bound_gauss(m, s, g, first);
+    *reach = now->reach;
+    if (!nb_any(now->adapts)) return wide;
+    const nb_real slim = bound_gauss(m, s, g, ellipse_of(NB_F(0.5) * now->reach, s->length));
+    *reach = nb_select(wide < slim, nb_min(NB_F(1.5) * now->reach, NB_FAR), *reach);
+    *reach = nb_select(slim < wide, NB_F(0.75) * now->reach, *reach);
+    return nb_select(now->adapts, nb_min(wide, slim), wide);
+}
+
+/* By what factor to change a step whose bound is `bound` where `allowed` was: with its ellipse kept, bounds go with the
+ * 2 NODE_COUNT + 1st power of the length, and what is allowed with the length. */
+static nb_real change_of_length(nb_real allowed, nb_real bound)
+{
+    const nb_real quotient = nb_min(nb_max(allowed / nb_max(bound, NB_TINY), NB_TINY), NB_HUGE);
+    return NB_F(0.9) * nb_exp(nb_log(quotient) * NB_F(0.083333333333333333));
+}
+
+/* After a step of `length` that does not fit. */
+static void slow_down(const march *m, nb_wide t, nb_real length, nb_mask lanes, nb_real change, nb_real reach,
+                      pace *now)
+{
+    const nb_mask begins = nb_and(lanes, nb_not(now->adapts));
+    const nb_real shorter = length * nb_min(change, NB_F(0.75));
+    now->length = nb_select(lanes, shorter, now->length);
+    now->reach = nb_select(lanes, reach, now->reach);
+    if (!nb_any(begins)) return;
+    const nb_real first = first_reach(m, t);
+    now->length = nb_select(begins, nb_min(shorter, first), now->length);
+    now->reach = nb_select(begins, first, now->reach);
+    now->adapts = nb_or(now->adapts, lanes);
+}
+
+/* Shortens the step in every lane until its bound fits. `whole` is the sum of the piece. */
+static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, const range *r,
+                     nb_wide start, nb_wide stop, nb_mask pending, pace *now, const piece_sum *whole)
+{
+    const nb_real longest = nb_narrow(stop - start);
     for (;;) {
+        const nb_real length = nb_min(now->length, longest);
         const int is_whole = nb_wall(start == p->start) && nb_all(length == p->length);
         const piece_sum sum = is_whole ? *whole : sum_step(m, start, end_of_step(start, length, stop), length);
-        const step s = consider(m, g, *ellipse, start, length, &sum);
+        step s = consider(r, g, start, length, &sum);
+        nb_real reach;
+        s.gauss_bound = try_ellipses(m, &s, g, may, now, &reach);
         const nb_mask last = length >= nb_narrow(p->end - start);
         const nb_real allowed = may->drop_share * s.drop + may->length_share * (length / p->length) +
                                 nb_select(last, may->last_share, NB_F(0.0));
         const nb_real bound = nb_min(s.gauss_bound, nb_min(s.crude_bound[0], s.crude_bound[1]));
         pending = nb_and(pending, bound > allowed);
-        if (!nb_any(pending)) return s;
-        length = nb_select(pending, NB_F(0.5) * length, length);
-        *ellipse = nb_select(pending, nb_min(NB_F(1.25) * *ellipse, REAL(WIDEST_ELLIPSE)), *ellipse);
+        if (nb_any(pending)) {
+            slow_down(m, start, length, pending, change_of_length(allowed, bound), reach, now);
+            continue;
+        }
+        if (!nb_any(now->adapts)) return s;
+        const nb_real longer = nb_max(length * change_of_length(allowed, bound), now->length);
+        now->length = nb_select(now->adapts, longer, now->length);
+        now->reach = nb_select(now->adapts, reach, now->reach);
+        return s;
     }
 }
 
-/* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. Steps that never fit
- * (their number is bounded) end in one crude step, across whatever kinks are left, whose honest bound the error then
- * shows. */
+/* Lanes in which the rest of the piece, up to the optical depth `depth`, may be one crude step. */
+static nb_mask rest_fits(const range *r, const gathered *g, const nb_real depth[3], const allowance *may)
+{
+    nb_real most = NB_F(0.0);
+    for (int c = 0; c < 3; c++) most = nb_max(most, spread_over(r, g->transmittance[c] - nb_exp(-depth[c]), c));
+    return most <= may->last_share;
+}
+
+/* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. As soon as the rest of
+ * the piece matters little it is one crude step, across whatever kinks are left. So is what steps that never fit leave
+ * (their number is bounded), whose honest bound the error then shows. */
 static void gather_mixed(const march *m, const piece *p, const piece_sum *whole, nb_mask lanes, const allowance *may,
                          gathered *g)
 {
+    const range r = find_range(m);
+    nb_real depth[3];
+    for (int c = 0; c < 3; c++) depth[c] = g->depth[c] + whole->depth[c];
     nb_wide t = p->start;
-    nb_real guess = p->length, ellipse = may->ellipse;
-    for (int i = 0; i < MOST_STEPS && nb_any(lanes); i++) {
+    pace now = {nb_mask_false, p->length, p->length};
+    for (int i = 0; i < MOST_STEPS; i++) {
+        nb_mask going = lanes;
+        if (nb_any(now.adapts)) going = nb_and(lanes, nb_not(nb_and(now.adapts, rest_fits(&r, g, depth, may))));
+        if (!nb_any(going)) break;
         const nb_wide stop = nearest_kink(m, t, p->end);
-        const nb_real rest = nb_narrow(stop - t);
-        const nb_real wish = nb_min(guess, rest);
-        const step s = fit_step(m, g, may, p, t, stop, wish, lanes, &ellipse, whole);
-        take_step(m, &s, g, lanes);
-        t = end_of_step(t, s.length, stop);
-        guess = s.length + s.length;
-        /* Only where the wish was granted: else the next step would be halved again, and none would ever grow. */
-        ellipse = nb_select(s.length >= wish, nb_max(NB_F(0.8) * ellipse, may->ellipse), ellipse);
+        const step s = fit_step(m, g, may, p, &r, t, stop, going, &now, whole);
+        take_step(m, &r, &s, g, going);
+        t = nb_wselect(nb_widen_mask(going), end_of_step(t, s.length, stop), t);
         lanes = nb_and(lanes, nb_narrow_mask(t < p->end));
     }
     if (!nb_any(lanes)) return;
     const nb_real rest = nb_narrow(p->end - t);
     const piece_sum sum = sum_step(m, t, p->end, rest);
-    step s = consider(m, g, ellipse, t, rest, &sum);
-    s.gauss_bound = NB_HUGE;
-    take_step(m, &s, g, lanes);
+    const step s = consider(&r, g, t, rest, &sum);
+    take_step(m, &r, &s, g, lanes);
 }
