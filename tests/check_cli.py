@@ -381,6 +381,48 @@ class RenderTest(PictureCase):
         self.assert_failed(done, "out of memory")
         self.assertNotIn("processor", done.err)
 
+    def test_no_lack_of_memory_ends_in_an_abort(self):
+        """Embree and its threads throw where nobody catches, in bands of a few MiB that differ from machine to machine."""
+        if "AddressSanitizer" in nebel("info").out:
+            self.skipTest("AddressSanitizer needs more address space than the limits leave")
+        seen = set()
+        for mebibytes in range(140, 260, 2):
+            limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (mebibytes << 20, mebibytes << 20))
+            done = self.render("a.png", "--samples", "1", "--threads", "2", preexec_fn=limit)
+            seen.add(done.returncode)
+            if done.returncode == 1:
+                self.assertRegex(done.err, "out of memory|Thread creation failed", f"{mebibytes} MiB")
+                self.assertEqual(self.files(), self.given, f"{mebibytes} MiB")
+            elif done.returncode == 0:
+                (self.folder / "a.png").unlink()
+        self.assertLessEqual(seen, {0, 1, 127})
+        self.assertIn(1, seen)
+
+    def test_signals_while_a_file_is_written(self):
+        """Two of each kind, from within the write: the picture is complete or absent, and nothing else is left."""
+        if "AddressSanitizer" in nebel("info").out:
+            self.skipTest("AddressSanitizer must be the first library to be loaded")
+        shim = self.folder / "shim.so"
+        (self.folder / "shim.c").write_text(
+            "#include <signal.h>\n#include <stdlib.h>\n"
+            "int fsync(int file) { int n = atoi(getenv(\"SHIM_SIGNAL\")); raise(n); raise(n); return file < 0; }\n")
+        subprocess.run([os.environ.get("CC", "cc"), "-shared", "-fPIC", "-o", shim, self.folder / "shim.c"], check=True)
+        given = self.files()
+        shutil.copy(self.folder / "shim.c", self.folder / "old.png")
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU):
+            calm = lambda: signal.signal(number, signal.SIG_DFL)
+            env = {"LD_PRELOAD": str(shim), "SHIM_SIGNAL": str(int(number))}
+            for name in ("a.png", "old.png"):
+                done = self.render(name, env=env, preexec_fn=calm)
+                self.assertEqual(done.returncode, -number, done.err)
+                self.assertTrue((self.folder / name).read_bytes().endswith(b"IEND\xaeB`\x82"), name)
+            self.assertEqual(self.files(), sorted([*given, "a.png", "old.png"]))
+            done = nebel("compare", "a.png", "old.png", "-o", "d.png", cwd=self.folder, env=env, preexec_fn=calm)
+            self.assertEqual(done.returncode, -number, done.err)
+            self.assertEqual(self.files(), sorted([*given, "a.png", "d.png", "old.png"]))
+            for name in ("a.png", "d.png"):
+                (self.folder / name).unlink()
+
     def test_exr_and_its_layers(self):
         self.assert_done(self.render("a.exr"))
         data = (self.folder / "a.exr").read_bytes()

@@ -2,6 +2,7 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "commands.h"
+#include "interrupt.h"
 #include "report.h"
 #include "target.h"
 
@@ -249,7 +250,9 @@ static int write_difference(const pair *both, const settings *wanted, nb_report_
     image.samples = pixels <= SIZE_MAX / (3 * sizeof(float)) ? malloc(pixels * 3 * sizeof(float)) : NULL;
     if (image.samples == NULL) return nb_report_failure("compare: %s: memory is out", wanted->output);
     paint(both, wanted, image.samples);
+    nb_interrupt_hold();
     const nebel_result result = nebel_write_image(wanted->output, &desc, &image);
+    nb_interrupt_release();
     free(image.samples);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(listener, wanted->output, result);
 }

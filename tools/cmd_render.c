@@ -366,7 +366,9 @@ static int write_picture(studio *all, const char *name)
     image.samples = all->interleaved != NULL ? all->interleaved : all->samples[COLOR];
     if (wanted->format == NEBEL_IMAGE_PNG) nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
     const nebel_scene_desc desc = {.log = nb_report_log(&all->listener)};
+    nb_interrupt_hold();
     const nebel_result result = nebel_write_image(name, &desc, &image);
+    nb_interrupt_release();
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, name, result);
 }
 

@@ -5,24 +5,43 @@
 #include <signal.h>
 #include <stddef.h>
 
-static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+static const int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGXCPU};
 
-static volatile sig_atomic_t received;
+static volatile sig_atomic_t received, again, is_held;
+static int is_listening;
+
+static void end_by(int number)
+{
+    (void)signal(number, SIG_DFL);
+    (void)raise(number);
+}
 
 static void receive(int number)
 {
-    received = number;
+    if (received == 0)
+        received = number;
+    else if (is_held)
+        again = number;
+    else
+        end_by(number);
 }
 
-void nb_interrupt_listen(void)
+/* Where `handler` is not what the caller wants to stay: SIG_IGN. */
+static void handle_with(void (*handler)(int))
 {
     for (size_t i = 0; i < sizeof signals / sizeof *signals; i++) {
         struct sigaction before;
-        struct sigaction ours = {.sa_handler = receive, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
+        struct sigaction ours = {.sa_handler = handler, .sa_flags = SA_RESTART};
         (void)sigemptyset(&ours.sa_mask);
         if (sigaction(signals[i], NULL, &before) != 0 || before.sa_handler == SIG_IGN) continue;
         (void)sigaction(signals[i], &ours, NULL);
     }
+}
+
+void nb_interrupt_listen(void)
+{
+    is_listening = 1;
+    handle_with(receive);
 }
 
 int nb_interrupt_is_requested(void)
@@ -32,7 +51,20 @@ int nb_interrupt_is_requested(void)
 
 void nb_interrupt_obey(void)
 {
-    if (received == 0) return;
-    (void)signal(received, SIG_DFL);
-    (void)raise(received);
+    if (received != 0) end_by(received);
+}
+
+void nb_interrupt_hold(void)
+{
+    is_held = 1;
+    if (!is_listening) handle_with(receive);
+}
+
+void nb_interrupt_release(void)
+{
+    is_held = 0;
+    if (again != 0) end_by(again);
+    if (is_listening) return;
+    handle_with(SIG_DFL);
+    nb_interrupt_obey();
 }

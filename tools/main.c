@@ -1,4 +1,5 @@
 /* nebel: exact fog from the command line. */
+#include "abort.h"
 #include "commands.h"
 #include "output.h"
 #include "report.h"
@@ -89,5 +90,6 @@ static int run(int count, char **words)
 int main(int count, char **words)
 {
     nb_output_prepare();
+    nb_abort_explain();
     return nb_output_finish(run(count > 0 ? count - 1 : 0, words + 1));
 }

@@ -1,5 +1,6 @@
 #include "draft.h"
 
+#include "../interrupt.h"
 #include "navigate.h"
 
 #include <math.h>
@@ -418,6 +419,8 @@ nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
     nebel_scene_data changed = *before;
     nb_edition_show(&draft->now, &changed);
     if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = round_camera(draft->data.camera);
+    nb_interrupt_hold();
     const nebel_result result = nebel_save_scene(path, &desc, before, &changed, draft->now.sources);
+    nb_interrupt_release();
     return result == NEBEL_OK ? read_back(draft, path) : result;
 }

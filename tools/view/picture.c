@@ -2,6 +2,7 @@
 
 #include "picture.h"
 
+#include "../interrupt.h"
 #include "../report.h"
 
 #include <epoxy/gl.h>
@@ -37,7 +38,9 @@ int nb_picture_write(const char *path, uint32_t width, uint32_t height, const ne
         glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
         glReadPixels(0, 0, (GLsizei)width, (GLsizei)height, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
         turn_over(width, height, rgba, rgb);
+        nb_interrupt_hold();
         result = nebel_write_image(path, &desc, &image);
+        nb_interrupt_release();
     } else {
         log->write(result, "memory is out for the picture", log->user);
     }
