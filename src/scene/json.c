@@ -58,13 +58,18 @@ static bool is_in_text(const nb_json *json, const char *string)
 
 /* A string with escapes lies in yajl's buffer for a moment only: it is copied, and its escapes looked at once more,
  * since yajl turns half a surrogate pair into a question mark. */
-static bool keep_string(reader *in, nb_arena *arena, uint32_t start, const char **string, size_t size)
+static bool keep_string(reader *in, nb_arena *arena, const nb_json_node *about, uint32_t start, const char **string,
+                        size_t size)
 {
     nb_json *json = in->json;
+    char path[NB_JSON_PATH];
     if (is_in_text(json, *string) || size == 0) return true;
-    if (nb_text_has_lone_surrogate(json->desc.text + start, in->end - start))
-        return fail_at(json, NEBEL_ERROR_FORMAT, start,
-                       "an escape \\uD800 to \\uDFFF stands alone; these come in pairs");
+    if (nb_text_has_lone_surrogate(json->desc.text + start, in->end - start)) {
+        nb_json_path(json, about, path);
+        return nb_json_fail_at(json, NEBEL_ERROR_FORMAT, start, path,
+                               "an escape \\uD800 to \\uDFFF stands alone; these come in pairs, or write the "
+                               "character itself");
+    }
     *string = nb_arena_copy_text(arena, *string, size);
     return *string != NULL || fail_memory(json);
 }
@@ -98,7 +103,9 @@ static nb_json_node *add_node(reader *in, nb_json_type type)
     }
     json->nodes = nodes;
     if (json->depth == 0 && type != NB_JSON_OBJECT) {
-        fail_at(json, NEBEL_ERROR_FORMAT, start, "a scene is an object: {\"nebel\": 1, \"fog\": [...]}");
+        nb_json_fail_at(json, NEBEL_ERROR_FORMAT, start, "",
+                        "found %s; a scene is an object and begins with {: at least {\"nebel\": 1, \"fog\": []}",
+                        nb_json_type_name(type));
         return NULL;
     }
     nb_json_node *node = &json->nodes[json->node_count];
@@ -197,7 +204,7 @@ static int on_number(void *user, const char *text, size_t size)
                             NB_NUMBER_LENGTH);
     if (!isfinite(node->number))
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "the number is too large; at most 1.797e308");
-    return close_scalar(in->json, node);
+    return nb_json_check_number(in->json, node) && close_scalar(in->json, node);
 }
 
 static int on_string(void *user, const unsigned char *text, size_t size)
@@ -207,7 +214,7 @@ static int on_string(void *user, const unsigned char *text, size_t size)
     if (node == NULL) return 0;
     node->string = (const char *)text;
     node->string_size = (uint32_t)size;
-    return keep_string(in, &in->json->strings, node->offset, &node->string, size) && close_scalar(in->json, node);
+    return keep_string(in, &in->json->strings, node, node->offset, &node->string, size) && close_scalar(in->json, node);
 }
 
 static int on_key(void *user, const unsigned char *text, size_t size)
@@ -216,7 +223,8 @@ static int on_key(void *user, const unsigned char *text, size_t size)
     nb_json *json = in->json;
     const uint32_t start = take_token(in);
     json->key = (nb_json_node){.key = (const char *)text, .key_size = (uint32_t)size, .key_offset = start};
-    return keep_string(in, json->depth == 1 ? &json->section_keys : &json->strings, start, &json->key.key, size);
+    return keep_string(in, json->depth == 1 ? &json->section_keys : &json->strings,
+                       &json->nodes[json->open[json->depth - 1]], start, &json->key.key, size);
 }
 
 static int on_object(void *user)

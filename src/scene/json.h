@@ -42,6 +42,9 @@ typedef struct nb_json_node {
 
 typedef struct nb_json nb_json;
 
+/* "a number", for messages. */
+const char *nb_json_type_name(nb_json_type type);
+
 /* Takes a complete tree. False, after nb_json_fail, stops the reading. */
 typedef bool (*nb_json_take)(nb_json *json, const nb_json_node *value, void *user);
 

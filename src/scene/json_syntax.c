@@ -52,16 +52,20 @@ size_t nb_json_skip_blanks(const nb_json *json, size_t at, size_t *comment)
     return at;
 }
 
-/* Letters and digits, and what else may be in a number or a name. */
-static bool is_word(char c)
+static bool is_letter(char c)
 {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           (c != '\0' && strchr("_.+-$", c) != NULL);
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
 static bool is_digit(char c)
 {
     return c >= '0' && c <= '9';
+}
+
+/* Letters and digits, and what else may be in a number or a name. */
+static bool is_word(char c)
+{
+    return is_letter(c) || is_digit(c) || (c != '\0' && strchr("_.+-$", c) != NULL);
 }
 
 /* The word around or behind a byte, for messages. */
@@ -142,8 +146,8 @@ static void explain_bracket(const spot *wrong)
 {
     char open[96];
     name_innermost(wrong, open);
-    FAIL(wrong, wrong->at, "%c cannot close %s; is a %c missing before it?", wrong->text[wrong->at], open,
-         closing(wrong));
+    FAIL(wrong, wrong->at, "%c cannot close %s; is a %c missing before it, or is it one too many?",
+         wrong->text[wrong->at], open, closing(wrong));
 }
 
 /* ---- strings --------------------------------------------------------------------------------- */
@@ -206,13 +210,39 @@ static const char *number_advice(word number)
     while (text < end && is_digit(*text)) text++;
     if (text < end && *text == '.' && (text + 1 == end || !is_digit(text[1])))
         return "leave out the point, or write a digit behind it";
-    return "numbers are decimal, without a unit: -0.5, 12, 2e3";
+    if (text < end && *text == '.') text++;
+    while (text < end && is_digit(*text)) text++;
+    if (text < end && (*text | 0x20) == 'x') return "numbers are decimal: -0.5, 12, 2e3";
+    return text < end && is_letter(*text) ? "write it without a unit: -0.5, 12, 2e3"
+                                          : "numbers look like -0.5, 12, 2e3";
+}
+
+/* An e behind which there are no digits: the beginning of a number that is not complete. */
+static bool lacks_exponent(word number)
+{
+    const char *const end = number.text + number.size;
+    const char *at = end;
+    if (at > number.text && strchr("+-", at[-1]) != NULL) at--;
+    return at - number.text > 1 && (at[-1] | 0x20) == 'e' && is_digit(at[-2]);
 }
 
 static void explain_number(const spot *wrong, size_t start)
 {
     const word number = word_from(wrong, start);
-    FAIL(wrong, start, "%.*s is no number of JSON; %s", number.size, number.text, number_advice(number));
+    const char *advice = lacks_exponent(number) ? "digits must follow the e, as in 2e3" : number_advice(number);
+    FAIL(wrong, start, "%.*s is no number of JSON; %s", number.size, number.text, advice);
+}
+
+/* What people write behind a number: a word, a percent or a degree sign, but no key, which has a colon. */
+static bool is_unit(const spot *wrong)
+{
+    static const char degree[] = "\xC2\xB0";
+    const char *text = wrong->text + wrong->at;
+    if (wrong->size - wrong->at >= 2 && memcmp(text, degree, 2) == 0) return true;
+    if (*text == '%') return true;
+    if (!is_word(*text) || is_digit(*text) || strchr("+-.", *text) != NULL) return false;
+    const size_t end = nb_json_skip_blanks(wrong->json, wrong->at + (size_t)word_from(wrong, wrong->at).size, NULL);
+    return end >= wrong->size || wrong->text[end] != ':';
 }
 
 static void explain_word(const spot *wrong, const char *what)
@@ -229,6 +259,11 @@ static void explain_word(const spot *wrong, const char *what)
         explain_number(wrong, wrong->at);
     else
         FAIL(wrong, wrong->at, "%s stand in double quotes; write \"%.*s\"", what, given.size, given.text);
+}
+
+static void explain_unit(const spot *wrong)
+{
+    FAIL(wrong, wrong->at, "a number has no unit behind it; remove this");
 }
 
 /* A character that begins nothing. */
@@ -249,8 +284,11 @@ static void explain_character(const spot *wrong, const char *wanted)
 
 static void explain_scene(const spot *wrong)
 {
+    const word found = word_from(wrong, wrong->at);
     if (wrong->text[wrong->at] == '#')
         FAIL(wrong, wrong->at, "found '#'; a scene is an object and begins with {, a comment with //");
+    else if (found.size > 0)
+        FAIL(wrong, wrong->at, "found '%.*s'; a scene is an object and begins with {", found.size, found.text);
     else
         explain_character(wrong, "a scene is an object and begins with {");
 }
@@ -352,12 +390,12 @@ static void explain_separator(const spot *wrong)
         explain_bracket(wrong);
     } else if (wrong->at == wrong->end && before == '"' && is_word(found)) {
         FAIL(wrong, wrong->at, "the string before this ends here; a comma is missing, or write \\\" for a \" in it");
-    } else if (wrong->at == wrong->end && is_word(before) && is_word(found)) {
-        size_t start = wrong->end;
-        while (start > 0 && is_word(wrong->text[start - 1])) start--;
+    } else if (is_digit(before) && is_unit(wrong)) {
+        const nb_json *json = wrong->json;
+        const uint32_t last = json->last[json->depth - 1]; /* 0: it was a tree of its own, and lies behind the others */
         spot number = *wrong;
-        number.about = &wrong->json->nodes[wrong->json->node_count - 1];
-        explain_number(&number, start);
+        number.about = &json->nodes[last != 0 ? last : json->node_count];
+        explain_unit(&number);
     } else if (found == ':') {
         FAIL(wrong, wrong->at, "a colon stands between a key and its value only; in { } write \"key\": value");
     } else if (found == '"' || found == '{' || found == '[' || is_word(found)) {
@@ -424,6 +462,18 @@ static bool take_separator(spot *wrong)
         return false;
     }
     return true;
+}
+
+bool nb_json_check_number(nb_json *json, const nb_json_node *number)
+{
+    const size_t at = number->end;
+    const spot wrong = {json, json->desc.text, json->desc.size, at, at, 0, SEPARATOR, number};
+    if (at >= json->desc.size || (!is_word(json->desc.text[at]) && !is_unit(&wrong)) || is_cut_off(&wrong)) return true;
+    if (is_word(json->desc.text[at]))
+        explain_number(&wrong, number->offset);
+    else
+        explain_unit(&wrong);
+    return false;
 }
 
 void nb_json_explain(nb_json *json, size_t end)

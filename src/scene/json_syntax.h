@@ -16,4 +16,7 @@ bool nb_json_check_text(nb_json *json);
  * wrong, but not what its writer meant. */
 void nb_json_explain(nb_json *json, size_t end);
 
+/* Whether nothing stands right behind a number that looks like a part of it: a unit, or digits of another base. */
+bool nb_json_check_number(nb_json *json, const nb_json_node *number);
+
 #endif

@@ -4,6 +4,12 @@
 #include <stdio.h>
 #include <string.h>
 
+const char *nb_json_type_name(nb_json_type type)
+{
+    static const char *const names[] = {"null", "true or false", "a number", "a string", "an array", "an object"};
+    return names[type];
+}
+
 const nb_json_node *nb_json_parent(const nb_json *json, const nb_json_node *node)
 {
     return node == json->nodes ? NULL : &json->nodes[node->parent];

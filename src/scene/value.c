@@ -151,12 +151,10 @@ int nb_value_type(nb_json *json, const nb_json_node *object, const char *const *
 
 /* ---- numbers --------------------------------------------------------------------------------- */
 
-static const char *const type_names[] = {"null", "true or false", "a number", "a string", "an array", "an object"};
-
 bool nb_value_is(nb_json *json, const nb_json_node *node, nb_json_type type, const char *wanted)
 {
     if (node->type == type) return true;
-    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %s; must be %s", type_names[node->type], wanted);
+    return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %s; must be %s", nb_json_type_name(node->type), wanted);
 }
 
 bool nb_value_number(nb_json *json, const nb_json_node *node, const nb_range *range, double *value)
@@ -191,10 +189,11 @@ bool nb_value_numbers(nb_json *json, const nb_json_node *node, const nb_range *r
     if (node == NULL) return true;
     if (node->type != NB_JSON_ARRAY)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is %s; must be an array of %zu numbers",
-                            type_names[node->type], count);
+                            nb_json_type_name(node->type), count);
     if (node->count != count)
-        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %lu elements; must be an array of %zu numbers",
-                            (unsigned long)node->count, count);
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %lu elements; must be an array of %zu numbers%s",
+                            (unsigned long)node->count, count,
+                            node->count == 2 * count ? "; decimals have a point, 0.5" : "");
     const nb_json_node *element = nb_json_first(json, node);
     for (size_t i = 0; i < count; i++, element = nb_json_next(json, element))
         if (!nb_value_number(json, element, range, &values[i])) return false;
