@@ -34,6 +34,18 @@ void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *ob
 void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key, const char *word,
                     const nb_place *places, const void *was, const void *now);
 
+void nb_save_integer(nb_save *save, const nb_json *json, const nb_edit_object *object, const char *key, double was,
+                     double now);
+
+/* The same for a shape, `was` and `now` in metres, and for the density of a volume or nebula, in the file's numbers. */
+void nb_save_shape(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, const nebel_shape *was,
+                   const nebel_shape *now);
+void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_density *was,
+                     const nebel_density *now);
+
+/* Whether two shapes differ in nothing but numbers. */
+bool nb_save_is_same_form(const nebel_shape *a, const nebel_shape *b);
+
 /* Keeps where an entry is, and whether it goes. */
 bool nb_save_keep_span(nb_save *save, const nb_scene_reader *in, nb_span_list *list, const nb_json_node *node,
                        bool goes);
@@ -52,6 +64,9 @@ bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node
 bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
+
+/* The camera, in the file or not. */
+void nb_save_camera(nb_save *save, const nb_scene_reader *in);
 
 /* After everything. */
 bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *root);

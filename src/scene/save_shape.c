@@ -1,0 +1,118 @@
+/* What sections share: numbers, shapes and densities, back into the file. */
+#include "scene/save.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* ---- numbers --------------------------------------------------------------------------------- */
+
+void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *object, const nb_place *places,
+                    unsigned mask, const void *was, const void *now)
+{
+    for (size_t i = 0; places[i].key != NULL; i++)
+        if ((mask >> i & 1) != 0)
+            nb_edit_numbers(&save->edit, json, object, places[i].key, places[i].count,
+                            nb_place_numbers(was, &places[i]), nb_place_numbers(now, &places[i]), places[i].style);
+}
+
+void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key, const char *word,
+                    const nb_place *places, const void *was, const void *now)
+{
+    const nb_edit_object object = nb_edit_find(json, nb_edit_member(json, owner->node, key));
+    char words[6 * NB_EDIT_NUMBERS] = "{";
+    if (object.last_end != 0) {
+        nb_save_places(save, json, &object, places, NB_ALL_PLACES, was, now);
+        return;
+    }
+    if (word[0] != '\0') snprintf(words, sizeof words, "{ %s", word);
+    for (size_t i = 0; places[i].key != NULL; i++) {
+        char numbers[NB_EDIT_NUMBERS];
+        if (!nb_place_differs(was, now, &places[i])) continue;
+        const size_t used = strlen(words);
+        nb_edit_write_numbers(places[i].count, nb_place_numbers(now, &places[i]), places[i].style, numbers);
+        snprintf(words + used, sizeof words - used, "%s\"%s\": %s", used > 1 ? ", " : " ", places[i].key, numbers);
+    }
+    if (words[1] == '\0') return;
+    strcat(words, " }");
+    if (object.node != NULL)
+        nb_edit_replace(&save->edit, object.node, words);
+    else
+        nb_edit_add(&save->edit, owner, key, words);
+}
+
+void nb_save_lose(nb_lost_keys *lost, const char *key)
+{
+    size_t count = 0;
+    while (lost->names[count] != NULL) count++;
+    lost->names[count] = key;
+}
+
+bool nb_save_keep_span(nb_save *save, const nb_scene_reader *in, nb_span_list *list, const nb_json_node *node,
+                       bool goes)
+{
+    void *spans = list->spans;
+    if (!nb_grow(&save->edit.arena.allocator, &spans, sizeof *list->spans, list->count, &list->capacity,
+                 list->count + 1))
+        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    list->spans = spans;
+    list->spans[list->count++] = (nb_edit_span){node->offset, node->end, goes};
+    return true;
+}
+
+void nb_save_integer(nb_save *save, const nb_json *json, const nb_edit_object *object, const char *key, double was,
+                     double now)
+{
+    nb_edit_numbers(&save->edit, json, object, key, 1, &was, &now, NB_EDIT_EACH);
+}
+
+/* ---- shapes ---------------------------------------------------------------------------------- */
+
+void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_density *was,
+                     const nebel_density *now)
+{
+    const nb_edit_object density = nb_edit_find(json, nb_edit_member(json, node, "density"));
+    if (density.node == NULL) return;
+    nb_save_places(save, json, &density, nb_density_places, nb_density_masks[now->type], was, now);
+    if (now->type == NEBEL_DENSITY_RADIAL) nb_save_integer(save, json, &density, "power", was->power, now->power);
+    if (now->type == NEBEL_DENSITY_HEIGHT && was->below != now->below)
+        nb_edit_word(&save->edit, json, &density, "below", nb_below_names[now->below]);
+}
+
+static void save_planes(nb_save *save, const nb_scene_reader *in, const nb_json_node *array, const nebel_shape *was,
+                        const nebel_shape *now)
+{
+    const nb_json_node *node = array != NULL ? nb_json_first(in->json, array) : NULL;
+    for (size_t i = 0; i < now->plane_count && node != NULL; i++, node = nb_json_next(in->json, node)) {
+        nebel_plane a = was->planes[i], b = now->planes[i];
+        nb_space_restore_plane(&in->space, &a);
+        nb_space_restore_plane(&in->space, &b);
+        const double from[4] = {a.normal[0], a.normal[1], a.normal[2], a.distance};
+        const double to[4] = {b.normal[0], b.normal[1], b.normal[2], b.distance};
+        nb_edit_elements(&save->edit, in->json, node, from, to);
+    }
+}
+
+/* `was` and `now` are in metres. The depth is that of shapes in a file. */
+void nb_save_shape(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, const nebel_shape *was,
+                   const nebel_shape *now)
+{
+    const nb_edit_object shape = nb_edit_find(in->json, node);
+    nebel_shape a = *was, b = *now;
+    nb_space_restore_shape(&in->space, &a);
+    nb_space_restore_shape(&in->space, &b);
+    nb_save_places(save, in->json, &shape, nb_shape_places, nb_shape_masks[now->type], &a, &b);
+    save_planes(save, in, nb_edit_member(in->json, node, "planes"), was, now);
+    const nb_json_node *parts = nb_edit_member(in->json, node, "shapes");
+    const nb_json_node *part = parts != NULL ? nb_json_first(in->json, parts) : NULL;
+    for (size_t i = 0; i < now->part_count && part != NULL; i++, part = nb_json_next(in->json, part))
+        nb_save_shape(save, in, part, &was->parts[i], &now->parts[i]);
+    nb_save_object(save, in->json, &shape, "transform", "", nb_transform_places, &a.transform, &b.transform);
+}
+
+bool nb_save_is_same_form(const nebel_shape *a, const nebel_shape *b)
+{
+    if (a->type != b->type || a->plane_count != b->plane_count || a->part_count != b->part_count) return false;
+    for (size_t i = 0; i < a->part_count; i++)
+        if (!nb_save_is_same_form(&a->parts[i], &b->parts[i])) return false;
+    return true;
+}
