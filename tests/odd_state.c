@@ -383,6 +383,84 @@ void odd_set(odd *o, int desktop, int on)
     if (desktop) set_odd_desktop();
 }
 
+void odd_plain_reading(int desktop)
+{
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    glPixelStorei(GL_PACK_ALIGNMENT, 4);
+    glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+    glPixelStorei(GL_PACK_SKIP_ROWS, 0);
+    glPixelStorei(GL_PACK_SKIP_PIXELS, 0);
+    if (desktop) glPixelStorei(GL_PACK_SWAP_BYTES, GL_FALSE);
+}
+
+/* ---- one thing alone ------------------------------------------------------------------------- */
+
+static void set_usual_masks(void)
+{
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    glViewport(0, 0, PASS_WIDTH, PASS_HEIGHT);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+}
+
+static int is_on_at_first(GLenum name)
+{
+    return name == GL_DITHER || name == GL_MULTISAMPLE;
+}
+
+static void set_switch(GLenum name, int on)
+{
+    if (on) {
+        glEnable(name);
+    } else {
+        glDisable(name);
+    }
+}
+
+void odd_prepare(void)
+{
+    set_odd_fragments();
+    set_odd_desktop();
+    set_usual_masks();
+    odd_plain_reading(1);
+    glPixelStorei(GL_UNPACK_SWAP_BYTES, GL_FALSE);
+    glPixelStorei(GL_UNPACK_LSB_FIRST, GL_FALSE);
+    glClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
+    for (size_t i = 0; i < sizeof switches / sizeof *switches; i++) {
+        set_switch(switches[i].name, is_on_at_first(switches[i].name));
+    }
+}
+
+static const char *set_mask_alone(int which)
+{
+    switch (which) {
+    case 0:
+        glColorMask(GL_TRUE, GL_FALSE, GL_TRUE, GL_FALSE);
+        return "the color mask";
+    case 1:
+        glColorMaski(1, GL_FALSE, GL_TRUE, GL_FALSE, GL_TRUE);
+        return "the color mask of draw buffer 1";
+    case 2:
+        glViewport(3, 4, 5, 6);
+        return "the viewport";
+    case 3:
+        glPolygonMode(GL_FRONT_AND_BACK, GL_POINT);
+        return "the polygon mode";
+    default:
+        return "";
+    }
+}
+
+const char *odd_set_alone(int which, int on)
+{
+    static char name[32];
+    const int count = sizeof switches / sizeof *switches;
+    set_usual_masks();
+    if (which >= count) return on ? set_mask_alone(which - count) : "";
+    set_switch(switches[which].name, on != is_on_at_first(switches[which].name));
+    snprintf(name, sizeof name, "switch 0x%x", switches[which].name);
+    return name;
+}
+
 void odd_delete(odd *o)
 {
     for (int unit = 0; unit < ODD_UNITS; unit++) {
@@ -395,14 +473,4 @@ void odd_delete(odd *o)
     glUseProgram(0);
     glDeleteProgram(o->program);
     glDeleteProgramPipelines(1, &o->pipeline);
-}
-
-void odd_plain_reading(int desktop)
-{
-    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-    glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    glPixelStorei(GL_PACK_ROW_LENGTH, 0);
-    glPixelStorei(GL_PACK_SKIP_ROWS, 0);
-    glPixelStorei(GL_PACK_SKIP_PIXELS, 0);
-    if (desktop) glPixelStorei(GL_PACK_SWAP_BYTES, GL_FALSE);
 }

@@ -23,6 +23,11 @@ typedef struct odd {
 /* Sets everything to odd values, with the switches on or off, but what belongs to the host's target. */
 void odd_set(odd *o, int desktop, int on);
 
+/* One odd thing alone, in OpenGL: which it is, "" behind the last. First odd_prepare: what the switches ask for is odd
+ * then, and the switches are as in a new context. */
+void odd_prepare(void);
+const char *odd_set_alone(int which, int on);
+
 /* Pixels are read into memory as usual again. */
 void odd_plain_reading(int desktop);
 

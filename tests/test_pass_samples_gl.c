@@ -9,6 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "odd_state.h"
 #include "pass_help.h"
 
 #include <epoxy/gl.h>
@@ -326,11 +327,49 @@ static void test_each_sample_is_blended_by_itself(void **state)
     close_stage(&s);
 }
 
+static void draw_into_samples(const stage *s, nebel_gl_output output, int which, const char **name, float *out)
+{
+    static odd_snapshot before, after;
+    const nebel_gl_pass pass = {.output = output, .depth_texture = s->depth, .samples = SAMPLES};
+    unsigned texture;
+    const unsigned framebuffer = make_target(&texture);
+    glUseProgram(0);
+    if (which == 0) odd_prepare();
+    if (which >= 0) *name = odd_set_alone(which, 1);
+    odd_take(&before, 1);
+    assert_int_equal(nebel_gl_draw_fog(s->gl, &pass), NEBEL_OK);
+    odd_take(&after, 1);
+    odd_expect_same(&before, &after);
+    if (which >= 0) (void)odd_set_alone(which, 0);
+    resolve(framebuffer, out);
+    pass_delete_framebuffer(framebuffer);
+    pass_delete_texture(texture);
+}
+
+/* Masks and coverage of samples are of multisampled targets alone, and some of them of an alpha other than 1. */
+static void test_each_odd_thing_alone(void **state)
+{
+    (void)state;
+    static float plain[4 * PASS_PIXELS], strange[4 * PASS_PIXELS];
+    for (int grey = 0; grey < 2; grey++) {
+        const nebel_gl_output output = grey ? NEBEL_GL_OUTPUT_BLEND_GREY : NEBEL_GL_OUTPUT_BLEND;
+        const char *name = "nothing";
+        stage s = open_stage();
+        draw_into_samples(&s, output, -1, &name, plain);
+        for (int which = 0; name[0] != '\0'; which++) {
+            draw_into_samples(&s, output, which, &name, strange);
+            if (memcmp(plain, strange, sizeof plain) != 0) fail_msg("%s changes the picture", name);
+        }
+        close_stage(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_the_mean_of_samples_has_no_outlines),
         cmocka_unit_test(test_each_sample_is_blended_by_itself),
+        cmocka_unit_test(test_each_odd_thing_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -107,6 +107,61 @@ static void test_state_neither_changes_nor_matters(void **state)
     }
 }
 
+/* ---- one thing at a time --------------------------------------------------------------------- */
+
+/* Into two targets with depth and stencil beside them. */
+static void draw_split(nebel_gl *gl, const nebel_gl_pass *pass, const unsigned targets[2], outcome *out)
+{
+    static odd_snapshot before, after;
+    const unsigned framebuffer = pass_framebuffer(targets[0], targets[1]);
+    const GLuint tested = attach_depth_and_stencil();
+    odd_take(&before, 1);
+    assert_int_equal(nebel_gl_draw_fog(gl, pass), NEBEL_OK);
+    odd_take(&after, 1);
+    odd_expect_same(&before, &after);
+    pass_delete_framebuffer(framebuffer);
+    glDeleteRenderbuffers(1, &tested);
+    pass_read(targets[0], PASS_WIDTH, PASS_HEIGHT, out->first);
+    pass_read(targets[1], PASS_WIDTH, PASS_HEIGHT, out->second);
+}
+
+static void expect_outcome(const outcome *wanted, const outcome *got, const char *name)
+{
+    if (memcmp(wanted, got, sizeof *got) != 0) fail_msg("%s changes the picture", name);
+}
+
+/* Names what went wrong, where all at once may hide each other. */
+static void test_each_odd_thing_alone(void **state)
+{
+    (void)state;
+    static outcome plain, strange;
+    nb_gl context;
+    nebel_gl *gl = NULL;
+    nebel_snapshot *const fog = pass_fog(60);
+    pass_picture picture = {.view = pass_view(PERSPECTIVE, (range){-1, 0}, .3, -.1), .clip = {-1, 0}};
+    pass_fill(&picture);
+    pass_open(&context, NB_GL_330);
+    const unsigned depth = pass_depth_texture(PASS_WIDTH, PASS_HEIGHT, picture.stored);
+    const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = depth};
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);
+    assert_int_equal(nebel_gl_set_fog(gl, fog, &picture.view), NEBEL_OK);
+    for (int which = -1;; which++) {
+        const unsigned targets[2] = {pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL),
+                                     pass_color_texture(PASS_WIDTH, PASS_HEIGHT, 4, NULL)};
+        if (which == 0) odd_prepare();
+        const char *const name = which < 0 ? "nothing" : odd_set_alone(which, 1);
+        draw_split(gl, &pass, targets, which < 0 ? &plain : &strange);
+        if (which >= 0) expect_outcome(&plain, &strange, name);
+        for (int i = 0; i < 2; i++) pass_delete_texture(targets[i]);
+        if (name[0] == '\0') break;
+        if (which >= 0) (void)odd_set_alone(which, 0);
+    }
+    pass_delete_texture(depth);
+    nebel_destroy_gl(gl);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+}
+
 /* ---- what odd state does not hold ------------------------------------------------------------ */
 
 /* A plain picture in its context. */
@@ -229,6 +284,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_state_neither_changes_nor_matters),
+        cmocka_unit_test(test_each_odd_thing_alone),
         cmocka_unit_test(test_transform_feedback_waits),
         cmocka_unit_test(test_conditional_rendering_stays),
         cmocka_unit_test(test_targets_in_srgb),

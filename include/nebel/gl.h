@@ -26,9 +26,9 @@
  *   - on texture units 0 to 3: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler;
  *   - the bindings UNIFORM_BUFFER (general and index 0) and PIXEL_UNPACK_BUFFER, and the parameters UNPACK_*;
  *   - the viewport (the first of an array); SCISSOR_TEST (of all viewports), STENCIL_TEST, DEPTH_TEST, CULL_FACE,
- *     RASTERIZER_DISCARD, SAMPLE_COVERAGE, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_MASK, COLOR_LOGIC_OP,
- *     POLYGON_SMOOTH, MULTISAMPLE, PRIMITIVE_RESTART and CLIP_DISTANCEi, all switched off where they exist; the polygon
- * mode;
+ *     RASTERIZER_DISCARD, SAMPLE_COVERAGE, SAMPLE_SHADING, SAMPLE_MASK, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE,
+ *     COLOR_LOGIC_OP, POLYGON_SMOOTH, MULTISAMPLE, PRIMITIVE_RESTART, CLIP_DISTANCEi, all switched off where they are;
+ *   - the polygon mode;
  *   - of draw buffers 0 to 3: BLEND, the colour mask, the blend function and equation;
  *   - the sample mask; the draw framebuffer, to ask where the samples of a multisampled texture are.
  *

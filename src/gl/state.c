@@ -1,25 +1,19 @@
 #include "state.h"
 
 /* Which contexts know a switch. */
-typedef enum nb_known { EVERYWHERE, DESKTOP, SAMPLE_MASKS, DEPTH_BOUNDS } nb_known;
+typedef enum nb_known { EVERYWHERE, DESKTOP, SAMPLE_MASKS, SAMPLE_SHADING, DEPTH_BOUNDS } nb_known;
 
 static const struct {
     GLenum name;
     nb_known known;
 } switches[] = {
-    {GL_STENCIL_TEST, EVERYWHERE},
-    {GL_DEPTH_TEST, EVERYWHERE},
-    {GL_CULL_FACE, EVERYWHERE},
-    {GL_RASTERIZER_DISCARD, EVERYWHERE},
-    {GL_SAMPLE_COVERAGE, EVERYWHERE},
-    {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
-    {GL_SAMPLE_MASK, SAMPLE_MASKS},
-    {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP},
-    {GL_COLOR_LOGIC_OP, DESKTOP},
-    {GL_POLYGON_SMOOTH, DESKTOP},
-    {GL_MULTISAMPLE, DESKTOP},
-    {GL_PRIMITIVE_RESTART, DESKTOP},
-    {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
+    {GL_STENCIL_TEST, EVERYWHERE},     {GL_DEPTH_TEST, EVERYWHERE},
+    {GL_CULL_FACE, EVERYWHERE},        {GL_RASTERIZER_DISCARD, EVERYWHERE},
+    {GL_SAMPLE_COVERAGE, EVERYWHERE},  {GL_SAMPLE_ALPHA_TO_COVERAGE, EVERYWHERE},
+    {GL_SAMPLE_MASK, SAMPLE_MASKS},    {GL_SAMPLE_SHADING, SAMPLE_SHADING},
+    {GL_SAMPLE_ALPHA_TO_ONE, DESKTOP}, {GL_COLOR_LOGIC_OP, DESKTOP},
+    {GL_POLYGON_SMOOTH, DESKTOP},      {GL_MULTISAMPLE, DESKTOP},
+    {GL_PRIMITIVE_RESTART, DESKTOP},   {GL_DEPTH_BOUNDS_TEST_EXT, DEPTH_BOUNDS},
 };
 enum { SWITCHES = sizeof switches / sizeof *switches };
 
@@ -38,6 +32,8 @@ static int knows(const nb_context *c, nb_known known)
         return !c->es;
     case SAMPLE_MASKS:
         return c->sample_mask;
+    case SAMPLE_SHADING:
+        return c->version >= (c->es ? 32 : 40);
     case DEPTH_BOUNDS:
         return c->depth_bounds;
     default:
