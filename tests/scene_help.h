@@ -85,6 +85,24 @@ static inline nebel_scene *parse_good(const char *text)
     return scene;
 }
 
+/* Every allocation fails once, with all that come after it. */
+static inline void parse_without_memory(const char *text)
+{
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (long k = 0; result != NEBEL_OK; k++) {
+        meter m;
+        journal kept;
+        nebel_scene *scene = NULL;
+        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        m.fail_at = k;
+        result = nebel_parse_scene(text, strlen(text), "s.json", &desc, &scene);
+        if (result != NEBEL_OK) assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        nebel_destroy_scene(scene);
+        assert_int_equal(m.live, 0);
+        assert_true(k < 2000);
+    }
+}
+
 /* A text with a mark ` where the message must point. */
 typedef struct rule {
     nebel_result result;
