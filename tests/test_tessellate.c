@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "fog_help.h"
+
 enum { SIDE = 6 };
 
 /* A wavy ground of 12 x 12 m. */
@@ -49,13 +51,7 @@ static nebel_triangles triangles_of(const ground *g)
 
 static nebel_snapshot *commit_limited(size_t count, const nebel_volume_desc *volumes, double max_opacity)
 {
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = max_opacity}, &fog), NEBEL_OK);
-    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
+    return fog_commit(&(nebel_fog_desc){.max_opacity = max_opacity}, volumes, count);
 }
 
 static nebel_snapshot *commit(size_t count, const nebel_volume_desc *volumes)
