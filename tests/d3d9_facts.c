@@ -158,7 +158,7 @@ const d3d9_ramp d3d9_ramps[D3D9_RAMP_COUNT] = {
 };
 /* clang-format on */
 
-double d3d9_ramp_z(int step)
+static double d3d9_ramp_z(int step)
 {
     return .001 + step / 10.02;
 }

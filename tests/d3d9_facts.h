@@ -35,7 +35,7 @@ double d3d9_factor_of(const nebel_d3d9_fog *fog, const d3d9_quad *quad, double p
 /* The colour of an object 0xRRGGBB at factor f, rounded. */
 int d3d9_color_of(const nebel_d3d9_fog *fog, int object, double f);
 
-/* fog_with_shader_test: red under green fog from .1 to .9, density 1, at z of d3d9_ramp_z(0) to d3d9_ramp_z(10). */
+/* fog_with_shader_test: red under green fog from .1 to .9, density 1, at z = .001 + step / 10.02. */
 enum { D3D9_RAMP_STEPS = 11, D3D9_RAMP_MOST = 13, D3D9_RAMP_OBJECT = 0xff0000 };
 
 typedef struct d3d9_ramp {
@@ -48,7 +48,6 @@ typedef struct d3d9_ramp {
 enum { D3D9_RAMP_COUNT = 8 };
 extern const d3d9_ramp d3d9_ramps[D3D9_RAMP_COUNT];
 
-double d3d9_ramp_z(int step);
 nebel_d3d9_fog d3d9_ramp_fog(const d3d9_ramp *ramp, uint32_t vertex_mode);
 d3d9_quad d3d9_ramp_quad(const d3d9_ramp *ramp, int step);
 

@@ -10,8 +10,8 @@ matrix multiply(matrix a, matrix b)
     return out;
 }
 
-/* Elimination with pivots. */
-void solve(matrix a, const double right[4], long double x[4])
+/* Solves a x = right by elimination with pivots. */
+static void solve(matrix a, const double right[4], long double x[4])
 {
     long double r[4][5];
     for (int i = 0; i < 4; i++) {

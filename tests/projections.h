@@ -12,9 +12,6 @@ typedef struct matrix {
 
 matrix multiply(matrix a, matrix b);
 
-/* Solves a x = right. */
-void solve(matrix a, const double right[4], long double x[4]);
-
 /* Clip z reaches from `low` to 1, and falls along the ray where reversed. */
 typedef struct range {
     double low;

@@ -19,7 +19,8 @@ static const double guessing_pause = 0.5;
 
 enum { DEFAULT_COLUMNS = 80, WIDEST_BAR = 40, NARROWEST_BAR = 8 };
 
-double nb_meter_clock(void)
+/* Seconds since some moment; never goes back. */
+static double clock_seconds(void)
 {
     struct timespec now;
     if (clock_gettime(CLOCK_MONOTONIC, &now) != 0) return 0;
@@ -30,7 +31,7 @@ nb_meter nb_meter_start(int quiet)
 {
     const char *const terminal = getenv("TERM");
     const int able = terminal != NULL && terminal[0] != '\0' && strcmp(terminal, "dumb") != 0;
-    return (nb_meter){.visible = !quiet && able && isatty(STDERR_FILENO), .started = nb_meter_clock(), .drawn = -1};
+    return (nb_meter){.visible = !quiet && able && isatty(STDERR_FILENO), .started = clock_seconds(), .drawn = -1};
 }
 
 void nb_meter_write_span(double seconds, char *text, size_t size)
@@ -80,7 +81,7 @@ static void draw(double done, const char *label, const char *left)
 void nb_meter_show(nb_meter *meter, double done, const char *label)
 {
     if (!meter->visible) return;
-    const double now = nb_meter_clock();
+    const double now = clock_seconds();
     if (meter->drawn >= 0 && now - meter->drawn < drawing_pause) return;
     meter->drawn = now;
     char span[32], left[48] = "";
@@ -97,5 +98,5 @@ void nb_meter_show(nb_meter *meter, double done, const char *label)
 double nb_meter_end(nb_meter *meter)
 {
     if (meter->visible) nb_report_status("");
-    return nb_meter_clock() - meter->started;
+    return clock_seconds() - meter->started;
 }

@@ -9,9 +9,6 @@ typedef struct nb_meter {
     double started, drawn; /* s */
 } nb_meter;
 
-/* Seconds since some moment; never goes back. */
-double nb_meter_clock(void);
-
 /* Starts the clock. The bar is drawn only where standard error is a terminal that can go back to the beginning of a
  * line. */
 nb_meter nb_meter_start(int quiet);
