@@ -48,7 +48,7 @@ static nebel_ray_planes camera_rays(const nb_frame *frame, nb_scratch *scratch)
     const int parallel = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
     for (int c = 0; c < 3; c++) {
         planes.origin[c] = frame->view.position[c];
-        planes.direction[c] = frame->view.forward[c];
+        planes.direction[c] = frame->view.axes.forward[c];
         if (parallel)
             planes.offset[c] = scratch->offset[c];
         else
@@ -87,13 +87,13 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
 
-/* Irradiance of the sun over pi, before fog, in samples->color. */
-NB_CLONES static void set_clear_sunlight(const float *irradiance, nb_scratch *scratch)
+/* The sun's light before fog, in samples->color. */
+NB_CLONES static void set_clear_sunlight(const float *sunlight, nb_scratch *scratch)
 {
     const int *lit = scratch->points.lit;
     const float *cosine = scratch->points.cosine;
     for (int c = 0; c < 3; c++) {
-        const float head_on = irradiance[c] * 0.318309886f;
+        const float head_on = sunlight[c];
         float *restrict color = scratch->samples.color[c];
         NB_SIMD
         for (int i = 0; i < NB_BATCH; i++) {
@@ -144,7 +144,7 @@ static int dims_sun(const nebel_renderer *renderer)
 
 static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
-    set_clear_sunlight(frame->lighting.irradiance, scratch);
+    set_clear_sunlight(frame->lighting.sunlight, scratch);
     if (!dims_sun(frame->renderer) || !frame->lighting.has_sun) return NEBEL_OK;
     const nebel_result result = trace_sun_fog(frame, scratch, scratch->sun_transmittance);
     if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->sun_transmittance, scratch->samples.color);

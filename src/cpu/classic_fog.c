@@ -14,11 +14,12 @@ static nebel_cell_view view_towards(const nb_view *camera, const double place[3]
     double depth = 0;
     for (int i = 0; i < 3; i++) {
         view.eye[i] = camera->position[i];
-        view.forward[i] = camera->forward[i];
-        depth += (place[i] - camera->position[i]) * camera->forward[i];
+        view.forward[i] = camera->axes.forward[i];
+        depth += (place[i] - camera->position[i]) * camera->axes.forward[i];
     }
     for (int i = 0; i < 3; i++) {
-        if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) view.eye[i] = place[i] - depth * camera->forward[i];
+        if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
+            view.eye[i] = place[i] - depth * camera->axes.forward[i];
         if (camera->projection == NEBEL_PROJECTION_PANORAMA) view.forward[i] = place[i] - camera->position[i];
     }
     return view;
@@ -44,9 +45,9 @@ static void set_eye_coordinates(const nb_view *camera, const double place[3], do
     const nebel_cell_view view = view_towards(camera, place);
     const double way[3] = {place[0] - view.eye[0], place[1] - view.eye[1], place[2] - view.eye[2]};
     const int panorama = camera->projection == NEBEL_PROJECTION_PANORAMA;
-    out[0] = panorama ? 0 : nb_vector_dot(way, camera->right);
-    out[1] = panorama ? 0 : nb_vector_dot(way, camera->up);
-    out[2] = panorama ? nb_vector_length(way) : nb_vector_dot(way, camera->forward);
+    out[0] = panorama ? 0 : nb_vector_dot(way, camera->axes.right);
+    out[1] = panorama ? 0 : nb_vector_dot(way, camera->axes.up);
+    out[2] = panorama ? nb_vector_length(way) : nb_vector_dot(way, camera->axes.forward);
 }
 
 static nb_vertex_fog fog_of_factor(const nb_frame *frame, const double place[3])

@@ -31,39 +31,12 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
     return NEBEL_OK;
 }
 
-static int is_light(const double rgb[3])
-{
-    return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
-}
-
-static nebel_result set_lighting(const nebel_scene_data *scene, nb_lighting *lighting, const nebel_log *log)
-{
-    if (!is_light(scene->background) || !is_light(scene->ambient) ||
-        (scene->has_sun && !is_light(scene->sun_irradiance))) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
-    }
-    const double *d = scene->sun_direction;
-    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    if (scene->has_sun && !(length > 0 && isfinite(length))) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
-    }
-    lighting->has_sun = scene->has_sun != 0;
-    for (int c = 0; c < 3; c++) {
-        lighting->background[c] = (float)scene->background[c];
-        lighting->ambient[c] = (float)scene->ambient[c];
-        lighting->irradiance[c] = scene->has_sun ? (float)scene->sun_irradiance[c] : 0;
-        lighting->sun_direction[c] = scene->has_sun ? d[c] / length : 0;
-        lighting->sun[c] = (float)lighting->sun_direction[c];
-    }
-    return NEBEL_OK;
-}
-
 static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
 {
     nebel_renderer *renderer = frame->renderer;
     nb_geometry *geometry = &renderer->geometry;
     nebel_result result = check_desc(desc, &renderer->log);
-    if (result == NEBEL_OK) result = set_lighting(renderer->scene, &frame->lighting, &renderer->log);
+    if (result == NEBEL_OK) result = nb_lighting_set(&frame->lighting, renderer->scene, &renderer->log);
     if (result == NEBEL_OK)
         result = nb_view_set(&frame->view, &desc->camera, desc->width, desc->height, &renderer->log);
     if (result != NEBEL_OK) return result;

@@ -26,7 +26,7 @@ static void invert(const double a[3], const double b[3], const double c[3], doub
 void nb_projection_set(nb_projection *projection, const nb_view *view)
 {
     projection->orthographic = view->projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
-    invert(view->step_x, view->step_y, projection->orthographic ? view->forward : view->corner, projection->rows);
+    invert(view->step_x, view->step_y, projection->orthographic ? view->axes.forward : view->corner, projection->rows);
     for (int i = 0; i < 3; i++) {
         projection->shift[i] = -view->start[i] - (projection->orthographic ? view->corner[i] : 0);
     }

@@ -9,6 +9,8 @@
 #include "surface.h"
 #include "view.h"
 
+#include "base/lighting.h"
+
 #include <nebel/render.h>
 
 /* One sample of every pixel of a batch. */
@@ -56,14 +58,6 @@ struct nebel_renderer {
     void *scratch_memory;
     nb_scratch *scratch; /* one per thread */
 };
-
-/* The light of a frame, in float. */
-typedef struct nb_lighting {
-    float background[3], ambient[3];
-    float sun[3], irradiance[3]; /* 0 where there is no sun */
-    double sun_direction[3];
-    int has_sun;
-} nb_lighting;
 
 typedef struct nb_frame {
     nebel_renderer *renderer;

@@ -1,60 +1,19 @@
 #include "view.h"
 
-#include "base/base.h"
-#include "base/vector.h"
-
 #include <math.h>
+#include <string.h>
 
 static const double pi = 3.14159265358979323846;
-
-static int is_finite(const double v[3])
-{
-    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
-}
-
-/* A horizontal direction where `up` is along the view: the axis that is farthest from it. */
-static void choose_right(nb_view *view)
-{
-    int least = 0;
-    for (int i = 1; i < 3; i++) {
-        if (fabs(view->forward[i]) < fabs(view->forward[least])) least = i;
-    }
-    double axis[3] = {0, 0, 0};
-    axis[least] = 1;
-    nb_vector_cross(view->forward, axis, view->right);
-    nb_vector_make_unit(view->right);
-}
-
-static nebel_result set_axes(nb_view *view, const nebel_camera *camera, const nebel_log *log)
-{
-    if (!is_finite(camera->position) || !is_finite(camera->look_at) || !is_finite(camera->up)) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "camera: position, look_at and up must be finite numbers");
-    }
-    double up[3];
-    for (int i = 0; i < 3; i++) {
-        view->position[i] = camera->position[i];
-        view->forward[i] = camera->look_at[i] - camera->position[i];
-        up[i] = camera->up[i];
-    }
-    if (!nb_vector_make_unit(view->forward)) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "camera: look_at is where the camera stands; move one of the two");
-    }
-    if (!nb_vector_make_unit(up)) return nb_fail(log, NEBEL_ERROR_VALUE, "camera: up has no direction");
-    nb_vector_cross(view->forward, up, view->right);
-    if (!(nb_vector_dot(view->right, view->right) > 1e-20) || !nb_vector_make_unit(view->right)) choose_right(view);
-    nb_vector_cross(view->right, view->forward, view->up);
-    return NEBEL_OK;
-}
 
 /* Steps of a plane of the given height, one unit before the camera or through it. */
 static void set_plane(nb_view *view, double plane_height, int through_camera, uint32_t width, uint32_t height)
 {
     const double pixel = plane_height / height;
     for (int i = 0; i < 3; i++) {
-        view->step_x[i] = pixel * view->right[i];
-        view->step_y[i] = -pixel * view->up[i];
+        view->step_x[i] = pixel * view->axes.right[i];
+        view->step_y[i] = -pixel * view->axes.up[i];
         view->corner[i] =
-            (through_camera ? 0 : view->forward[i]) - .5 * width * view->step_x[i] - .5 * height * view->step_y[i];
+            (through_camera ? 0 : view->axes.forward[i]) - .5 * width * view->step_x[i] - .5 * height * view->step_y[i];
     }
 }
 
@@ -71,30 +30,18 @@ static void set_panorama(nb_view *view, uint32_t width, uint32_t height)
 nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t width, uint32_t height,
                          const nebel_log *log)
 {
-    const nebel_result result = set_axes(view, camera, log);
+    nebel_result result = nb_camera_find_axes(camera, log, &view->axes);
+    if (result == NEBEL_OK) result = nb_camera_check_projection(camera, log);
     if (result != NEBEL_OK) return result;
+    memcpy(view->position, camera->position, sizeof view->position);
     view->projection = camera->projection;
-    switch (camera->projection) {
-    case NEBEL_PROJECTION_PERSPECTIVE:
-        if (!(camera->vertical_fov > 0 && camera->vertical_fov < 180)) {
-            return nb_fail(log, NEBEL_ERROR_VALUE,
-                           "camera: vertical_fov is %g, it must be above 0 and below 180 degrees",
-                           camera->vertical_fov);
-        }
+    if (camera->projection == NEBEL_PROJECTION_PERSPECTIVE)
         set_plane(view, 2 * tan(camera->vertical_fov * (pi / 360)), 0, width, height);
-        return NEBEL_OK;
-    case NEBEL_PROJECTION_ORTHOGRAPHIC:
-        if (!(camera->view_height > 0) || isinf(camera->view_height)) {
-            return nb_fail(log, NEBEL_ERROR_VALUE, "camera: view_height is %g, it must be above 0 metres",
-                           camera->view_height);
-        }
+    else if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         set_plane(view, camera->view_height, 1, width, height);
-        return NEBEL_OK;
-    case NEBEL_PROJECTION_PANORAMA:
+    else
         set_panorama(view, width, height);
-        return NEBEL_OK;
-    }
-    return nb_fail(log, NEBEL_ERROR_VALUE, "camera: there is no projection %d", (int)camera->projection);
+    return NEBEL_OK;
 }
 
 /* The least distance from the view's start to a box, along the view or, for a panorama, in any direction. */
@@ -105,7 +52,7 @@ static double distance_to(const nb_view *view, const float bounds_min[3], const 
         const double low = (double)bounds_min[i] - view->start[i], high = (double)bounds_max[i] - view->start[i];
         const double gap = fmax(0, fmax(low, -high));
         gap2 += gap * gap;
-        depth += fmin(low * view->forward[i], high * view->forward[i]);
+        depth += fmin(low * view->axes.forward[i], high * view->axes.forward[i]);
     }
     return view->projection == NEBEL_PROJECTION_PANORAMA ? sqrt(gap2) : depth;
 }
@@ -137,7 +84,7 @@ NB_CLONES static void plane_points(const nb_view *view, const double *restrict b
 static void orthographic_directions(const nb_view *view, nb_rays *rays)
 {
     for (int c = 0; c < 3; c++) {
-        for (int i = 0; i < NB_BATCH; i++) rays->direction[c][i] = view->forward[c];
+        for (int i = 0; i < NB_BATCH; i++) rays->direction[c][i] = view->axes.forward[c];
     }
 }
 
@@ -150,7 +97,8 @@ static void panorama_directions(const nb_view *view, const double base[3], const
         const double level = cos(latitude);
         const double along = level * cos(longitude), across = level * sin(longitude), above = sin(latitude);
         for (int c = 0; c < 3; c++) {
-            rays->direction[c][i] = along * view->forward[c] + across * view->right[c] + above * view->up[c];
+            rays->direction[c][i] =
+                along * view->axes.forward[c] + across * view->axes.right[c] + above * view->axes.up[c];
         }
     }
 }

@@ -4,16 +4,18 @@
 
 #include "lanes.h"
 
+#include "base/camera.h"
+
 #include <nebel/scene.h>
 
 /* A camera made ready for one size of picture. x and y are in pixels from the top left corner of the picture.
  * Perspective: direction = corner + x step_x + y step_y with depth 1 along the view, all rays from `position`.
- * Orthographic: direction = forward, the ray starts at position + corner + x step_x + y step_y.
+ * Orthographic: direction = axes.forward, the ray starts at position + corner + x step_x + y step_y.
  * Panorama: corner holds (longitude, latitude) at (0, 0), the steps their change per pixel. */
 typedef struct nb_view {
     nebel_projection projection;
     double position[3]; /* m, world */
-    double right[3], up[3], forward[3];
+    nb_axes axes;
     double corner[3], step_x[3], step_y[3];
     double start[3]; /* position relative to the origin of the geometry */
     double advance;  /* rays skip this multiple of their direction before they meet the geometry */

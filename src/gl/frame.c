@@ -7,25 +7,17 @@
 #include "renderer.h"
 #include "vertex_fog.h"
 
-#include "base/vector.h"
+#include "base/lighting.h"
 
 #include <math.h>
 
 enum { MOST_SIDE = 32768, MOST_SAMPLES = 4096 };
 
-/* The light of a frame. */
-typedef struct lighting {
-    float background[3], ambient[3];
-    float sun[3], sunlight[3]; /* 0 where there is no sun */
-    double sun_direction[3];
-    int has_sun;
-} lighting;
-
 typedef struct frame {
     nebel_gl_renderer *renderer;
     const nebel_gl_frame_desc *desc;
     uint32_t samples;
-    lighting light;
+    nb_lighting light;
     double eye[3];
     int panorama;
     nebel_view view;        /* through the pixels' centres; of a panorama without clip_from_eye */
@@ -94,32 +86,6 @@ static int is_by_vertex(const frame *f)
            f->desc->method == NEBEL_GL_METHOD_CELLS;
 }
 
-static int is_light(const double rgb[3])
-{
-    return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
-}
-
-static nebel_result set_lighting(const nebel_scene_data *scene, lighting *light, const nebel_log *log)
-{
-    double direction[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
-    if (!is_light(scene->background) || !is_light(scene->ambient) ||
-        (scene->has_sun && !is_light(scene->sun_irradiance))) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
-    }
-    light->has_sun = scene->has_sun != 0;
-    if (light->has_sun && !nb_vector_make_unit(direction)) {
-        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
-    }
-    for (int c = 0; c < 3; c++) {
-        light->background[c] = (float)scene->background[c];
-        light->ambient[c] = (float)scene->ambient[c];
-        light->sunlight[c] = light->has_sun ? (float)(scene->sun_irradiance[c] * 0.31830988618379067) : 0;
-        light->sun_direction[c] = light->has_sun ? direction[c] : 0;
-        light->sun[c] = (float)light->sun_direction[c];
-    }
-    return NEBEL_OK;
-}
-
 static nebel_result set_frame(frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -128,7 +94,7 @@ static nebel_result set_frame(frame *f)
     nebel_result result = check_size(r, desc);
     if (result == NEBEL_OK) result = check_samples(r, f->samples);
     if (result == NEBEL_OK) result = check_method(r, desc);
-    if (result == NEBEL_OK) result = set_lighting(r->scene, &f->light, &r->log);
+    if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];

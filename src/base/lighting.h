@@ -1,0 +1,44 @@
+/* The light of a scene, in float, as renderers want it. */
+#ifndef NB_LIGHTING_H
+#define NB_LIGHTING_H
+
+#include "base/base.h"
+#include "base/vector.h"
+
+#include <nebel/scene.h>
+
+typedef struct nb_lighting {
+    float background[3], ambient[3];
+    float sun[3], sunlight[3]; /* 0 where there is no sun; sunlight: its irradiance over pi */
+    double sun_direction[3];
+    int has_sun;
+} nb_lighting;
+
+static inline int nb_lighting_is_light(const double rgb[3])
+{
+    return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);
+}
+
+/* Errors: VALUE. */
+static inline nebel_result nb_lighting_set(nb_lighting *lighting, const nebel_scene_data *scene, const nebel_log *log)
+{
+    double direction[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
+    if (!nb_lighting_is_light(scene->background) || !nb_lighting_is_light(scene->ambient) ||
+        (scene->has_sun && !nb_lighting_is_light(scene->sun_irradiance))) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
+    }
+    lighting->has_sun = scene->has_sun != 0;
+    if (lighting->has_sun && !nb_vector_make_unit(direction)) {
+        return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
+    }
+    for (int c = 0; c < 3; c++) {
+        lighting->background[c] = (float)scene->background[c];
+        lighting->ambient[c] = (float)scene->ambient[c];
+        lighting->sunlight[c] = lighting->has_sun ? (float)(scene->sun_irradiance[c] * 0.31830988618379067) : 0;
+        lighting->sun_direction[c] = lighting->has_sun ? direction[c] : 0;
+        lighting->sun[c] = (float)lighting->sun_direction[c];
+    }
+    return NEBEL_OK;
+}
+
+#endif
