@@ -28,9 +28,7 @@ typedef struct frame {
     int dims;               /* particles dim the sun */
 } frame;
 
-/* ---- checks
- * ----------------------------------------------------------------------------------------------------------
- */
+/* ---- checks ---------------------------------------------------------------------------------- */
 
 static nebel_result check_size(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
@@ -102,9 +100,7 @@ static nebel_result set_frame(frame *f)
     return result;
 }
 
-/* ---- surfaces
- * --------------------------------------------------------------------------------------------------------
- */
+/* ---- surfaces -------------------------------------------------------------------------------- */
 
 static void set_vector(unsigned program, const char *name, const float v[3])
 {
@@ -184,9 +180,7 @@ static void draw_surfaces(const frame *f)
     draw_meshes(f, program);
 }
 
-/* ---- fog
- * -------------------------------------------------------------------------------------------------------------
- */
+/* ---- fog ------------------------------------------------------------------------------------- */
 
 /* Transmittance 1 and no light. */
 static void clear_fog(void)
@@ -311,24 +305,32 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     }
 }
 
+/* The program that asks the fog of `passes`, NULL: none, and that fog. The kind is given but for its fog. */
+static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_kind kind, nebel_gl_fog *fog,
+                               unsigned *program)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    *fog = (nebel_gl_fog){0};
+    const nebel_result result = passes != NULL ? nebel_gl_get_fog(passes, fog) : NEBEL_OK;
+    if (result != NEBEL_OK) return result;
+    kind.panorama = f->panorama;
+    kind.has_fog = passes != NULL;
+    kind.in_texture = fog->texture != 0;
+    kind.tiled = fog->tiles != 0;
+    kind.features = fog->features;
+    return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
+}
+
 /* The light that comes through the fog of a sample, and what it adds, pass through each particle. */
 static nebel_result draw_particles(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_gl_fog fog = {0};
+    nebel_gl_fog fog;
     unsigned program = 0;
     if (r->particles.count == 0) return NEBEL_OK;
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
-    nebel_result result = has_fog ? nebel_gl_get_fog(r->eye_fog, &fog) : NEBEL_OK;
-    if (result != NEBEL_OK) return result;
-    const nb_light_kind kind = {.of_particles = 1,
-                                .panorama = f->panorama,
-                                .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
-                                .has_fog = has_fog,
-                                .in_texture = fog.texture != 0,
-                                .tiled = fog.tiles != 0,
-                                .features = fog.features};
-    result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
+    const nb_light_kind kind = {.of_particles = 1, .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP};
+    const nebel_result result = find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
@@ -338,9 +340,7 @@ static nebel_result draw_particles(const frame *f)
     return NEBEL_OK;
 }
 
-/* ---- the sun
- * ---------------------------------------------------------------------------------------------------------
- */
+/* ---- the sun --------------------------------------------------------------------------------- */
 
 /* A square picture of all that is seen, against the sun's light, from the same eye: light coordinates are its metres.
  */
@@ -430,9 +430,7 @@ static void set_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
                 (GLint)fog->tile_size, (GLint)fog->tile_columns);
 }
 
-/* ---- light
- * -----------------------------------------------------------------------------------------------------------
- */
+/* ---- light ----------------------------------------------------------------------------------- */
 
 static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
@@ -445,18 +443,10 @@ static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 static nebel_result draw_dimming(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_gl_fog fog = {0};
+    nebel_gl_fog fog;
     unsigned program = 0;
     if (!f->dims) return NEBEL_OK;
-    nebel_result result = nebel_gl_get_fog(r->sun_cloud, &fog);
-    if (result != NEBEL_OK) return result;
-    const nb_light_kind kind = {.of_dimming = 1,
-                                .panorama = f->panorama,
-                                .has_fog = 1,
-                                .in_texture = fog.texture != 0,
-                                .tiled = fog.tiles != 0,
-                                .features = fog.features};
-    result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
+    const nebel_result result = find_light(f, r->sun_cloud, (nb_light_kind){.of_dimming = 1}, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.dimming_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
@@ -505,18 +495,10 @@ static void start_picture(const frame *f, uint32_t sample)
 static nebel_result draw_light(const frame *f, uint32_t sample)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_gl_fog fog = {0};
+    nebel_gl_fog fog;
     unsigned program = 0;
-    const int has_fog = f->casts && r->fog != NULL;
-    nebel_result result = has_fog ? nebel_gl_get_fog(r->sun_fog, &fog) : NEBEL_OK;
-    if (result != NEBEL_OK) return result;
-    const nb_light_kind kind = {.dimmed = f->dims,
-                                .panorama = f->panorama,
-                                .has_fog = has_fog,
-                                .in_texture = fog.texture != 0,
-                                .tiled = fog.tiles != 0,
-                                .features = fog.features};
-    result = nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, &program);
+    const nebel_gl *const passes = f->casts && r->fog != NULL ? r->sun_fog : NULL;
+    const nebel_result result = find_light(f, passes, (nb_light_kind){.dimmed = f->dims}, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
     set_light(f, &fog, program);
@@ -525,9 +507,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     return NEBEL_OK;
 }
 
-/* ---- the frame
- * -------------------------------------------------------------------------------------------------------
- */
+/* ---- the frame ------------------------------------------------------------------------------- */
 
 static nebel_result set_sample(frame *f, nb_pixel_point point)
 {

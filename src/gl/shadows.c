@@ -8,9 +8,7 @@
 
 #include <math.h>
 
-/* ---- what is seen
- * ----------------------------------------------------------------------------------------------------
- */
+/* ---- what is seen ---------------------------------------------------------------------------- */
 
 typedef struct rectangle {
     double low[2], high[2];
@@ -308,9 +306,7 @@ nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, cons
     return NEBEL_OK;
 }
 
-/* ---- maps
- * ------------------------------------------------------------------------------------------------------------
- */
+/* ---- maps ------------------------------------------------------------------------------------ */
 
 static nebel_result make_texture(nb_shadows *shadows, const nebel_log *log)
 {
