@@ -2,6 +2,8 @@
 
 #include "scene/value.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -47,11 +49,6 @@ void nb_affine_apply(const nb_affine *map, const double place[3], double result[
 /* Right angles are off by no more than this where float quaternions were multiplied a few times. */
 static const double most_shear = 1e-4;
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* Unit columns, and their lengths. */
 static bool split(const nb_affine *map, double axes[3][3], double scale[3])
 {
@@ -61,24 +58,24 @@ static bool split(const nb_affine *map, double axes[3][3], double scale[3])
         if (!(scale[j] > 0 && isfinite(scale[j]))) return false;
         for (int i = 0; i < 3; i++) axes[j][i] /= scale[j];
     }
-    return fabs(dot(axes[0], axes[1])) <= most_shear && fabs(dot(axes[1], axes[2])) <= most_shear &&
-           fabs(dot(axes[2], axes[0])) <= most_shear;
+    return fabs(nb_vector_dot(axes[0], axes[1])) <= most_shear && fabs(nb_vector_dot(axes[1], axes[2])) <= most_shear &&
+           fabs(nb_vector_dot(axes[2], axes[0])) <= most_shear;
 }
 
 /* Gram and Schmidt: the second axis is turned to be level with the first, the third follows from both. A mirror becomes
  * a negative scale along the third. */
 static void straighten(double axes[3][3], double scale[3])
 {
-    const double along = dot(axes[0], axes[1]);
+    const double along = nb_vector_dot(axes[0], axes[1]);
     for (int i = 0; i < 3; i++) axes[1][i] -= along * axes[0][i];
-    const double length = sqrt(dot(axes[1], axes[1]));
+    const double length = nb_vector_length(axes[1]);
     for (int i = 0; i < 3; i++) axes[1][i] /= length;
     double third[3];
     for (int i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         third[i] = axes[0][j] * axes[1][k] - axes[0][k] * axes[1][j];
     }
-    if (dot(third, axes[2]) < 0) scale[2] = -scale[2];
+    if (nb_vector_dot(third, axes[2]) < 0) scale[2] = -scale[2];
     for (int i = 0; i < 3; i++) axes[2][i] = third[i];
 }
 

@@ -2,6 +2,8 @@
 #include "scene/keyframes.h"
 #include "scene/scene_internal.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -15,18 +17,6 @@ nebel_camera nb_camera_default(void)
 
 /* ---- directions ------------------------------------------------------------------------------ */
 
-static void cross(const double a[3], const double b[3], double result[3])
-{
-    result[0] = a[1] * b[2] - a[2] * b[1];
-    result[1] = a[2] * b[0] - a[0] * b[2];
-    result[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* The unit view direction; zero where there is none. Halved first: the difference of two doubles may overflow. */
 static void find_view(const nebel_camera *camera, double view[3])
 {
@@ -38,7 +28,7 @@ bool nb_camera_is_apart(const nebel_camera *camera)
 {
     double view[3];
     find_view(camera, view);
-    return dot(view, view) > .5;
+    return nb_vector_dot(view, view) > .5;
 }
 
 /* Less than a millionth of a radian between up and view leaves the picture's roll to rounding. */
@@ -48,8 +38,8 @@ bool nb_camera_is_upright(const nebel_camera *camera)
     find_view(camera, view);
     memcpy(up, camera->up, sizeof up);
     nb_vector_normalize(up, 3);
-    cross(view, up, side);
-    return dot(side, side) > 1e-12;
+    nb_vector_cross(view, up, side);
+    return nb_vector_dot(side, side) > 1e-12;
 }
 
 /* ---- keys ------------------------------------------------------------------------------------ */
@@ -119,8 +109,8 @@ static nebel_camera turn(const nebel_camera *start, double frame, uint32_t frame
     memcpy(axis, start->up, sizeof axis);
     nb_vector_normalize(axis, 3);
     for (int i = 0; i < 3; i++) arm[i] = start->position[i] - start->look_at[i];
-    cross(axis, arm, side);
-    const double c = cos(angle), s = sin(angle), along = dot(axis, arm) * (1 - c);
+    nb_vector_cross(axis, arm, side);
+    const double c = cos(angle), s = sin(angle), along = nb_vector_dot(axis, arm) * (1 - c);
     nebel_camera camera = *start;
     for (int i = 0; i < 3; i++) camera.position[i] = start->look_at[i] + arm[i] * c + side[i] * s + axis[i] * along;
     return camera;
