@@ -1,11 +1,3 @@
 # The tests of classic fog in OpenGL watch their context as the passes do; every test_pass_classic_NAME.c shares a mesh.
-if(TARGET test_classic_gl)
-    target_sources(test_classic_gl PRIVATE pass_help.c projections.c)
-endif()
-nebel_glob(classic_tests test_pass_classic_*.c)
-foreach(source IN LISTS classic_tests)
-    get_filename_component(name ${source} NAME_WE)
-    if(TARGET ${name})
-        target_sources(${name} PRIVATE classic_help.c)
-    endif()
-endforeach()
+share_with(test_classic_gl pass_help.c projections.c)
+share_with(test_pass_classic_* classic_help.c)

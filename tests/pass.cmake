@@ -1,8 +1,3 @@
-# Every test_pass_NAME.c draws through pass_help.h.
-nebel_glob(pass_tests test_pass_*.c)
-foreach(source IN LISTS pass_tests)
-    get_filename_component(name ${source} NAME_WE)
-    if(TARGET ${name})
-        target_sources(${name} PRIVATE odd_state.c pass_help.c projections.c)
-    endif()
-endforeach()
+# Every test_pass_NAME.c draws through pass_help.h; views are judged by the same projections.
+share_with(test_pass_* odd_state.c pass_help.c projections.c)
+share_with(test_view_gl projections.c)
