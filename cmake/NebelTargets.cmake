@@ -85,11 +85,13 @@ function(nebel_add_core)
     add_library(nebel::nebel ALIAS nebel)
 endfunction()
 
-# A library on top of the core. It sees the core through include/ only and brings its own copy of the memory helpers.
+# A library on top of the core, with what nebel_find_<room>_dependencies has found. It sees the core through include/ only and
+# brings its own copy of the memory helpers.
 function(nebel_add_layer name room)
     nebel_glob(sources src/${room}/*.c)
     nebel_add_library(${name} "${sources};${PROJECT_SOURCE_DIR}/src/base/base.c" "")
-    target_link_libraries(${name} PUBLIC nebel PRIVATE m)
+    target_link_libraries(${name}_objects PRIVATE ${nebel_${room}_dependencies})
+    target_link_libraries(${name} PUBLIC nebel PRIVATE m ${nebel_${room}_dependencies})
     set_target_properties(${name} PROPERTIES EXPORT_NAME ${room})
     add_library(nebel::${room} ALIAS ${name})
 endfunction()
