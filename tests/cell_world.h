@@ -1,7 +1,9 @@
 /* Rooms in a row, and random worlds of convex cells: a cube cut again and again by planes between two of its places, so
- * that the cells fill it without a gap. Include after <cmocka.h> and fog_help.h. */
+ * that the cells fill it without a gap. */
 #ifndef CELL_WORLD_H
 #define CELL_WORLD_H
+
+#include "fog_help.h"
 
 #include <nebel/cells.h>
 

@@ -1,5 +1,5 @@
 /* What the tests of classic fog in OpenGL share: a context with the fixed pipeline, a target, and a mesh in fog with
- * every stream that OpenGL takes. Include after <cmocka.h>. */
+ * every stream that OpenGL takes. */
 #ifndef CLASSIC_HELP_H
 #define CLASSIC_HELP_H
 

@@ -1,6 +1,8 @@
-/* The optical depth along one ray, as every query sees it. Include after fog_help.h. */
+/* The optical depth along one ray, as every query sees it. */
 #ifndef DEPTH_HELP_H
 #define DEPTH_HELP_H
+
+#include "fog_help.h"
 
 #include <math.h>
 

@@ -1,8 +1,9 @@
 /* What the tests of the core's public face share: memory that keeps accounts, messages that can be read, fog in one
- * call, numbers. Include after <cmocka.h>. */
+ * call, numbers. */
 #ifndef FOG_HELP_H
 #define FOG_HELP_H
 
+#include "unit.h"
 #include "dice.h"
 
 #include <nebel/nebel.h>

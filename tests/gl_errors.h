@@ -1,7 +1,9 @@
 /* What the tests of errors in OpenGL share: messages, and functions that take the place of a driver's. Include after
- * fog_help.h and <epoxy/gl.h>. */
+ * <epoxy/gl.h>. */
 #ifndef GL_ERRORS_H
 #define GL_ERRORS_H
+
+#include "fog_help.h"
 
 static fog_messages messages;
 

@@ -1,6 +1,8 @@
-/* Numbers that should be near others. Include after <cmocka.h>. */
+/* Numbers that should be near others. */
 #ifndef NEAR_H
 #define NEAR_H
+
+#include "unit.h"
 
 #include <math.h>
 

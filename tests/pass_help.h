@@ -1,8 +1,9 @@
 /* What the tests of the passes share: a context in which every error of OpenGL is a failure, textures, pictures with
- * depth, and what nebel_trace says about the same pixels. Include after <cmocka.h>. */
+ * depth, and what nebel_trace says about the same pixels. */
 #ifndef PASS_HELP_H
 #define PASS_HELP_H
 
+#include "unit.h"
 #include "gl_harness.h"
 #include "projections.h"
 

@@ -1,6 +1,8 @@
-/* Pictures of one scene by both renderers, their differences, and a report of them. Include after <cmocka.h>. */
+/* Pictures of one scene by both renderers, their differences, and a report of them. */
 #ifndef PICTURE_HELP_H
 #define PICTURE_HELP_H
+
+#include "unit.h"
 
 #include <nebel/gl_render.h>
 #include <nebel/render.h>

@@ -3,16 +3,13 @@
 #ifndef NB_TESTS_SCENE_HELP_H
 #define NB_TESTS_SCENE_HELP_H
 
+#include "unit.h"
+
 #include <nebel/scene.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 typedef struct journal {
     int count;

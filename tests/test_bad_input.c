@@ -1,12 +1,6 @@
 /* What is not legal is refused: the right code, a message that names the thing and the rule, and nothing has changed.
  */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "fog_help.h"
 

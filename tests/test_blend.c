@@ -1,11 +1,6 @@
 /* Transparent surfaces in fog against layered transport: light carried from the background to the eye, surface by
  * surface and fog by fog, with no knowledge of frame buffers. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 

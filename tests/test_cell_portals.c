@@ -1,15 +1,6 @@
 /* Fog in cells with portals: portals given and derived, walls, and descriptions that are none. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include "fog_help.h"
-#include "near.h"
-
 #include "cell_world.h"
+#include "near.h"
 
 static const nebel_cell rooms[] = {BOX(0, 4, 0, 1, 1, 1), BOX(4, 9, .1, 1, 1, 1), BOX(9, 20, 0, 1, 1, 1)};
 static const double door[4][3] = {{4, -1, -1}, {4, 1, -1}, {4, 1, 1}, {4, -1, 1}};

@@ -1,15 +1,6 @@
 /* Fog in cells with portals: what a query answers. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include "fog_help.h"
-#include "near.h"
-
 #include "cell_world.h"
+#include "near.h"
 
 static nebel_cell_fog ask_at(const nebel_cells *cells, const nebel_cell_view *view, double x, double y, double z)
 {

@@ -1,14 +1,10 @@
 /* Direct3D 9 fog: its states, what was recorded of it on Windows (d3d9_facts.h), and what no device was asked. */
 #include "d3d9_facts.h"
+#include "unit.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static const double not_a_number = (double)NAN;
 

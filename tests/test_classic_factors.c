@@ -3,12 +3,7 @@
 #include <nebel/classic.h>
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "near.h"
 

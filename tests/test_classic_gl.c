@@ -6,13 +6,9 @@
  * GL_NV_fog_distance is found per vertex and interpolated, so that it is asked at vertices alone. LINEAR fog with
  * start == end has no value in OpenGL. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

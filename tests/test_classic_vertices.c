@@ -5,12 +5,6 @@
 #include <nebel/classic.h>
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "fog_help.h"
 

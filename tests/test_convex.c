@@ -2,13 +2,10 @@
 #include "media/convex.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
+
+#include "unit.h"
 
 enum { MOST = 1024 };
 

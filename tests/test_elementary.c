@@ -2,16 +2,13 @@
  * the same bits. */
 #include "elementary_level.h"
 #include "gauss_rule.h"
+#include "unit.h"
 
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { SAMPLES = 1 << 16, SLOW_SAMPLES = 1 << 13 };
 

@@ -1,15 +1,12 @@
 /* The elementary functions in GLSL 3.30 and GLSL ES 3.00 against the scalar C build. */
 #include "elementary_level.h"
 #include "gl_harness.h"
+#include "unit.h"
 
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { COUNT = 1 << 14, VECTORS = (NB_ELEMENTARY_COUNT + 3) / 4 };
 

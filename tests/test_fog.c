@@ -1,11 +1,5 @@
 /* Fog that is edited, and memory that fails: after an error everything is as it was. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "fog_help.h"
 

@@ -3,15 +3,12 @@
  * cancel. */
 #include "formula_inputs.h"
 #include "gl_harness.h"
+#include "unit.h"
 
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { COUNT = 1 << 13, INPUT_VECTORS = NB_FORMULA_INPUTS / 4 };
 

@@ -2,15 +2,11 @@
 #include <nebel/nebel.h>
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "unit.h"
 
 /* The sanitizers make every segment twenty times as dear. */
 #if defined(__SANITIZE_ADDRESS__)

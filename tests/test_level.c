@@ -1,12 +1,5 @@
 /* Rays that run level with a face, a side or an end of a body, in it or beside it by the last bits of double: where
  * float cannot tell on which side they are, its error must say so. The judge is double, which asks 113 bits. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "fog_help.h"
 #include "random_fog.h"
 

@@ -1,12 +1,6 @@
 /* Very many volumes: a million of them in the world, thousands of them on one ray. test_many_volumes [VOLUMES] */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <time.h>
-
-#include <cmocka.h>
 
 #include "fog_help.h"
 

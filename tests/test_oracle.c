@@ -2,15 +2,11 @@
  * against itself with its closed forms turned off. */
 #include "oracle.h"
 #include "truth_file.h"
+#include "unit.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
 
 static const char *const files[] = {"single0.json",  "single1.json",  "single2.json",   "single3.json",
                                     "overlap0.json", "overlap1.json", "profiles0.json", "profiles1.json",

@@ -1,13 +1,9 @@
 /* Nothing is packed, listed or handed to OpenGL again that the last call has left there: functions of OpenGL are
  * replaced by ones that count. What is drawn is compared with what a new nebel_gl draws. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "pass_help.h"
 

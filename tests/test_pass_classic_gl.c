@@ -1,14 +1,9 @@
 /* Classic fog in OpenGL: the methods against each other, against the formula they stand for, and shaders against the
  * fixed pipeline. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "classic_help.h"
 

@@ -2,16 +2,11 @@
 /* What the methods of classic fog touch, and that it comes back; every way in which a stream is fed; contexts that lack
  * fog coordinates; calls that are wrong. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 #include "classic_help.h"
 #include "fog_help.h"

@@ -1,13 +1,9 @@
 /* What is missing, wrong or lost is said, with what to do, and nothing is left behind. Where this machine's driver is
  * too good to fail, one of its functions is replaced. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

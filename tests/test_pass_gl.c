@@ -1,12 +1,8 @@
 /* The pictures that passes draw, pixel by pixel against nebel_trace in double. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "pass_help.h"
 

@@ -1,13 +1,9 @@
 /* Multisampled depth and colour: the mean over the samples of what each sees, at its own place in the pixel; and each
  * sample of a target by itself. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "odd_state.h"
 #include "pass_help.h"

@@ -1,13 +1,9 @@
 /* A host's own shader with nebel's text, reading what nebel_gl_get_fog hands out, gives the pixels of the pass; and the
  * C words lie as the driver wants them. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "pass_help.h"
 

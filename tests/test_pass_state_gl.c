@@ -1,13 +1,9 @@
 /* The passes leave all state of OpenGL as they found it: everything is set to odd values, every function is called, and
  * what glGet tells before and after must be the same. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "odd_state.h"
 #include "pass_help.h"

@@ -1,13 +1,9 @@
 /* Transparent surfaces of every mode, drawn from the back to the front over a fogged frame, against layered transport:
  * light carried from the background to the eye in double, which knows no frame buffer. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

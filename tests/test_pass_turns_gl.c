@@ -1,13 +1,9 @@
 /* Crowds: more volumes of different light in one place than Mesa's llvmpipe has turns of loops for. What comes out then
  * is what nebel/gl.h promises, and the log is told. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

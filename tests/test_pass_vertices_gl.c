@@ -1,14 +1,9 @@
 /* Scenes in OpenGL with fog at the vertices of their surfaces: interpolated as old hardware does, and nearer to the
  * exact picture the finer the triangles are. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

@@ -2,11 +2,8 @@
 #include <nebel/nebel.h>
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
+
+#include "unit.h"
 
 #define PI 3.14159265358979323846
 

@@ -1,13 +1,9 @@
 /* What the scene renderer cannot do is said, with what to do; nothing is left behind, and the host's state is as it
  * was. Where this machine's driver is too good to fail, one of its functions is replaced. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "odd_state.h"

@@ -1,12 +1,8 @@
 /* Panoramas in OpenGL, and what each way of fogging looks like through each kind of camera, beside the CPU. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

@@ -1,12 +1,8 @@
 /* The scene renderer's rules: what it refuses, which state it leaves, what samples, textures and shadows look like. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "odd_state.h"
 #include "pass_help.h"

@@ -1,13 +1,9 @@
 /* Particles by the comparison of five depths, as the scene renderer draws them, against a rendition on the CPU that
  * shares nothing with it: what the technique says, in doubles, with nebel_trace for the light of one particle. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "pass_help.h"

@@ -2,13 +2,9 @@
 #include <nebel/nebel.h>
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "unit.h"
 
 enum { WIDTH = 67, HEIGHT = 41, PIXELS = WIDTH * HEIGHT };
 

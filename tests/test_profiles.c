@@ -2,15 +2,12 @@
  * closed forms of the literature, quadrature in long double, and at level, steep, thin and endless pieces. */
 #include "formula_inputs.h"
 #include "formula_truth.h"
+#include "unit.h"
 
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
 
 #if defined(__SANITIZE_ADDRESS__)
 enum { PIECES = 4000 };

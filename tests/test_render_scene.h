@@ -4,13 +4,6 @@
 
 #include <nebel/render.h>
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include <math.h>
 
 #include "fog_help.h"

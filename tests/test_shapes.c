@@ -2,14 +2,11 @@
  * digits, and where a ray lies in a face, grazes, is far away or goes through an apex. */
 #include "formula_inputs.h"
 #include "formula_truth.h"
+#include "unit.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
 
 #if defined(__SANITIZE_ADDRESS__)
 enum { RAYS = 3000 };

@@ -2,14 +2,10 @@
 #include <nebel/shader.h>
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 #include "random_fog.h"

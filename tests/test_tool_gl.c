@@ -1,11 +1,6 @@
 /* The context of the program: OpenGL without a window. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include "gl_context.h"
+#include "unit.h"
 
 #include <epoxy/gl.h>
 

@@ -1,17 +1,12 @@
 /* Numbers of the command line: text to doubles and back. */
 #include "decimal.h"
 #include "shortest.h"
+#include "unit.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static uint64_t state;
 

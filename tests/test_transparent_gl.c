@@ -6,12 +6,8 @@
 
 #include <epoxy/gl.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <cmocka.h>
 
 #include "fog_help.h"
 

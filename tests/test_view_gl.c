@@ -2,17 +2,14 @@
  * matrix in long double: every projection times every convention of depth, in GLSL 3.30 and GLSL ES 3.00. */
 #include "gl_harness.h"
 #include "projections.h"
+#include "unit.h"
 
 #include <epoxy/gl.h>
 #include <math.h>
 #include <nebel/shader.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { WIDTH = 640, HEIGHT = 400, COUNT = 512, INPUTS = 4, OUTPUTS = 8 };
 
