@@ -30,8 +30,9 @@ void note_place(const char *name)
 {
     if (places == nullptr || !ImGui::IsItemVisible()) return;
     const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
-    fprintf(places, "%d %d %d %d %s%s\n", int(low.x), int(low.y), int(high.x - low.x), int(high.y - low.y), owners,
-            name);
+    const char *const unit = strstr(name, " [");
+    fprintf(places, "%d %d %d %d %s%.*s\n", int(low.x), int(low.y), int(high.x - low.x), int(high.y - low.y), owners,
+            unit != nullptr ? int(unit - name) : int(strlen(name)), name);
 }
 
 void explain(const char *text)
@@ -64,21 +65,30 @@ bool slide_whole(const char *name, int *value, int low, int high, bool logarithm
     return finish(ImGui::SliderInt(name, value, low, high, "%d", flags), name, help);
 }
 
+// Dear ImGui 1.86 forgets to take back the width of a group of one.
+static bool drag_numbers(const char *name, double *values, int count, float step, const double *low, const double *high,
+                         const char *format, ImGuiSliderFlags flags)
+{
+    return count == 1 ? ImGui::DragScalar(name, ImGuiDataType_Double, values, step, low, high, format, flags)
+                      : ImGui::DragScalarN(name, ImGuiDataType_Double, values, count, step, low, high, format, flags);
+}
+
 bool drag(const char *name, double *values, int count, double least, double low, const char *format, const char *help)
 {
     const double high = DBL_MAX;
     const bool has_low = low > -DBL_MAX;
     double largest = least;
     for (int i = 0; i < count; i++) largest = fmax(largest, fabs(values[i]));
-    const bool changed =
-        ImGui::DragScalarN(name, ImGuiDataType_Double, values, count, float(largest / 100), has_low ? &low : nullptr,
-                           has_low ? &high : nullptr, format, has_low ? ImGuiSliderFlags_AlwaysClamp : 0);
+    const bool changed = drag_numbers(name, values, count, float(largest / 100), has_low ? &low : nullptr,
+                                      has_low ? &high : nullptr, format, has_low ? ImGuiSliderFlags_AlwaysClamp : 0);
     return finish(changed, name, help);
 }
 
 bool drag_place(const char *name, double place[3], double reach, const char *help)
 {
-    return drag(name, place, 3, reach / 10, -DBL_MAX, "%.4g", help);
+    char label[48];
+    snprintf(label, sizeof label, "%s [m]", name);
+    return drag(label, place, 3, reach / 10, -DBL_MAX, "%.4g", help);
 }
 
 bool drag_length(const char *name, double *length, const char *help)
@@ -100,6 +110,15 @@ bool pick(const char *name, double color[3], bool is_share, const char *help)
 bool press(const char *name, const char *help)
 {
     return finish(ImGui::Button(name), name, help);
+}
+
+bool press_if(bool possible, const char *name, const char *help)
+{
+    if (possible) return press(name, help);
+    ImGui::BeginDisabled();
+    ImGui::Button(name);
+    ImGui::EndDisabled();
+    return false;
 }
 
 bool tick(const char *name, int *value, const char *help)

@@ -28,7 +28,8 @@ class Owner
     size_t length;
 };
 
-// Puts the control that was drawn last into the list, and a text beside the mouse that rests on it.
+// Puts the control that was drawn last into the list, without the unit in its name, and a text beside the mouse that
+// rests on it.
 void note_place(const char *name);
 void explain(const char *text);
 
@@ -47,6 +48,7 @@ bool drag_length(const char *name, double *length, const char *help);
 bool pick(const char *name, double color[3], bool is_share, const char *help);
 
 bool press(const char *name, const char *help);
+bool press_if(bool possible, const char *name, const char *help);
 bool tick(const char *name, int *value, const char *help);
 bool choose(const char *name, int *value, const char *const *names, int count, const char *help);
 bool open_section(const char *name, bool open);

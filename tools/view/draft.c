@@ -1,6 +1,7 @@
 #include "draft.h"
 
 #include "../interrupt.h"
+#include "keys.h"
 #include "navigate.h"
 
 #include <math.h>
@@ -48,15 +49,17 @@ static nebel_result add_cells(nebel_fog *fog, const nb_edition *edition)
 }
 
 /* Cells that overlap are no scene. */
-static nebel_result check_cells(const nb_draft *draft, const nb_edition *edition)
+static nebel_result make_cells(nb_draft *draft, const nb_edition *edition)
 {
     nebel_cells_desc desc = edition->cells_desc;
     nebel_cells *cells = NULL;
     if (edition->cells == NULL) return NEBEL_OK;
     desc.log = draft->log;
     const nebel_result result = nebel_create_cells(&desc, &cells);
-    nebel_destroy_cells(cells);
-    return result;
+    if (result != NEBEL_OK) return result;
+    nebel_destroy_cells(draft->cells);
+    draft->cells = cells;
+    return NEBEL_OK;
 }
 
 /* In place of the fog that is there. On an error that one stays. */
@@ -97,14 +100,62 @@ static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_
  * -------------------------------------------------------------------------------------------------------
  */
 
+static void rotate(const double q[4], double direction, double p[3])
+{
+    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const double x = direction * q[0] / length, y = direction * q[1] / length, z = direction * q[2] / length;
+    const double w = q[3] / length;
+    /* p + 2 w (v x p) + 2 v x (v x p), v the vector of the quaternion. */
+    const double a = y * p[2] - z * p[1], b = z * p[0] - x * p[2], c = x * p[1] - y * p[0];
+    const double moved[3] = {p[0] + 2 * (w * a + y * c - z * b), p[1] + 2 * (w * b + z * a - x * c),
+                             p[2] + 2 * (w * c + x * b - y * a)};
+    memcpy(p, moved, sizeof moved);
+}
+
+static void move_point(const nebel_transform *from, const nebel_transform *to, double p[3])
+{
+    for (int i = 0; i < 3; i++) p[i] -= from->position[i];
+    rotate(from->rotation, -1, p);
+    for (int i = 0; i < 3; i++) p[i] *= to->scale[i] / from->scale[i];
+    rotate(to->rotation, 1, p);
+    for (int i = 0; i < 3; i++) p[i] += to->position[i];
+}
+
+/* The scene's points, where the edition has put them: to be freed. */
+static double (*place_points(const nb_draft *draft, const nb_edition *edition, size_t index))[3]
+{
+    const nebel_nebula_desc *const nebula = &edition->nebulae[index];
+    const nebel_transform *const from = &nebel_scene_contents(draft->scene)->nebula_places[index];
+    double(*const points)[3] = malloc((nebula->count + 1) * sizeof *points);
+    for (size_t i = 0; i < nebula->count && points != NULL; i++) {
+        memcpy(points[i], nebula->points[i], sizeof *points);
+        move_point(from, &edition->nebula_places[index], points[i]);
+    }
+    return points;
+}
+
+static nebel_result scatter_nebula(const nb_draft *draft, const nb_edition *edition, size_t index,
+                                   nebel_particle *particles)
+{
+    nebel_nebula_desc desc = edition->nebulae[index];
+    desc.log = draft->log;
+    const nebel_transform *const from = &nebel_scene_contents(draft->scene)->nebula_places[index];
+    if (desc.points == NULL || memcmp(from, &edition->nebula_places[index], sizeof *from) == 0)
+        return nebel_scatter_nebula(&desc, particles);
+    double(*const points)[3] = place_points(draft, edition, index);
+    if (points == NULL) return fail_memory(draft);
+    desc.points = (const double(*)[3])points;
+    const nebel_result result = nebel_scatter_nebula(&desc, particles);
+    free(points);
+    return result;
+}
+
 static nebel_result scatter(const nb_draft *draft, const nb_edition *edition, nebel_particle *particles)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < edition->nebula_count && result == NEBEL_OK; i++) {
-        nebel_nebula_desc desc = edition->nebulae[i];
-        desc.log = draft->log;
-        result = nebel_scatter_nebula(&desc, particles);
-        particles += desc.count;
+        result = scatter_nebula(draft, edition, i, particles);
+        particles += edition->nebulae[i].count;
     }
     return result;
 }
@@ -165,23 +216,42 @@ nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole)
 nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume)
 {
     const size_t source = draft->now.sources[volume];
-    return source == NEBEL_NEW_VOLUME ? NEBEL_VOLUME_WRITTEN : nebel_scene_volume_origin(draft->file, source);
+    if (draft->now.entries[volume].key_count > 0) return NEBEL_VOLUME_MOVING;
+    const nebel_volume_origin origin =
+        source == NEBEL_NEW_VOLUME ? NEBEL_VOLUME_WRITTEN : nebel_scene_volume_origin(draft->file, source);
+    return origin == NEBEL_VOLUME_MOVING ? NEBEL_VOLUME_WRITTEN : origin;
 }
 
-/* Parts and planes do not move, and are the edition's own. */
-static void place_volume(const nb_draft *draft, nb_edition *edition, size_t index)
+/* Whether the file could hold its changes. */
+static int is_saved(const nb_draft *draft, size_t volume)
 {
-    nebel_shape *const shape = &edition->volumes[index].shape;
-    const nebel_shape own = *shape;
-    edition->volumes[index] = nebel_scene_volume(draft->file, edition->sources[index], draft->frame);
-    shape->parts = own.parts;
-    shape->planes = own.planes;
+    const nebel_volume_origin origin = nb_draft_origin(draft, volume);
+    return origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
 }
 
+static int find_camera_frames(const nebel_scene_data *scene, double range[2])
+{
+    const size_t count = scene->camera_key_count;
+    range[0] = count > 0 ? scene->camera_keys[0].frame : 0;
+    range[1] = count > 0 ? scene->camera_keys[count - 1].frame : scene->turntable_frames;
+    return count > 0 || scene->turntable_frames > 0;
+}
+
+int nb_draft_find_frames(const nb_draft *draft, double range[2])
+{
+    double camera[2];
+    const int fog_moves = nb_keys_find_range(&draft->now, range);
+    if (!find_camera_frames(nebel_scene_contents(draft->file), camera)) return fog_moves;
+    range[0] = fog_moves ? fmin(range[0], camera[0]) : camera[0];
+    range[1] = fog_moves ? fmax(range[1], camera[1]) : camera[1];
+    return 1;
+}
+
+/* What the file says stands at the same frame, to be compared. */
 static void place_volumes(nb_draft *draft)
 {
-    for (size_t i = 0; i < draft->now.count; i++)
-        if (nb_draft_origin(draft, i) == NEBEL_VOLUME_MOVING) place_volume(draft, &draft->now, i);
+    nb_keys_place(&draft->now, draft->frame);
+    nb_keys_place(&draft->written, draft->frame);
 }
 
 static void place_camera(nb_draft *draft)
@@ -216,6 +286,7 @@ nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log,
         draft->data = *nebel_scene_contents(draft->scene);
         result = make_editions(draft);
     }
+    if (result == NEBEL_OK) result = make_cells(draft, &draft->good);
     if (result == NEBEL_OK) result = fill_fog(draft, &draft->good);
     if (result == NEBEL_OK) result = strew(draft, &draft->good);
     if (result != NEBEL_OK) nb_draft_close(draft);
@@ -227,6 +298,7 @@ void nb_draft_close(nb_draft *draft)
     nebel_release_snapshot(draft->volumes);
     nebel_release_snapshot(draft->whole);
     nebel_destroy_fog(draft->fog);
+    nebel_destroy_cells(draft->cells);
     free(draft->ids);
     free(draft->particles);
     nb_history_forget(&draft->history);
@@ -248,7 +320,7 @@ static nebel_result apply(nb_draft *draft)
     nebel_result result = NEBEL_OK;
     if (!nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
     const int has_other_cells = !nb_edition_has_same_cells(now, was);
-    if (result == NEBEL_OK && has_other_cells) result = check_cells(draft, now);
+    if (result == NEBEL_OK && has_other_cells) result = make_cells(draft, now);
     if (result != NEBEL_OK) return result;
     return nb_edition_has_same_sources(now, was) && !has_other_cells ? change_fog(draft, was, now)
                                                                      : fill_fog(draft, now);
@@ -259,6 +331,7 @@ static void revert(nb_draft *draft)
 {
     nb_edition back;
     if (nb_edition_copy(&draft->good, &back) != 0) return;
+    if (!nb_edition_has_same_cells(&draft->now, &draft->good)) (void)make_cells(draft, &draft->good);
     if (!nb_edition_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
     nb_edition_free(&draft->now);
     draft->now = back;
@@ -275,6 +348,7 @@ static nebel_result settle(nb_draft *draft, int is_step)
         revert(draft);
     } else {
         if (is_step) nb_history_note(&draft->history, &draft->good);
+        if (!nb_edition_has_same_models(&draft->now, &draft->good)) draft->models_are_stale = 1;
         nb_edition_free(&draft->good);
         draft->good = fresh;
     }
@@ -282,8 +356,22 @@ static nebel_result settle(nb_draft *draft, int is_step)
     return result;
 }
 
+nebel_result nb_draft_place_models(nb_draft *draft)
+{
+    const nebel_result result = nebel_load_models_anew(draft->scene, draft->good.models, draft->good.model_count);
+    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    draft->models_are_stale = 0;
+    draft->data.meshes = scene->meshes;
+    draft->data.mesh_count = scene->mesh_count;
+    draft->data.textures = scene->textures;
+    draft->data.texture_count = scene->texture_count;
+    return result;
+}
+
 nebel_result nb_draft_commit(nb_draft *draft)
 {
+    if (nb_keys_store(&draft->now, &draft->good, draft->frame) != 0) return fail_memory(draft);
+    nb_keys_place(&draft->now, draft->frame);
     return nb_edition_is_same(&draft->now, &draft->good) ? NEBEL_OK : settle(draft, 1);
 }
 
@@ -315,26 +403,29 @@ int nb_draft_redo(nb_draft *draft, nebel_result *result)
  * --------------------------------------------------------------------------------------------------------
  */
 
-static int has_same_light(const nb_edition *a, const nb_edition *b)
-{
-    const size_t size = sizeof a->background;
-    return memcmp(a->background, b->background, size) == 0 && memcmp(a->ambient, b->ambient, size) == 0 &&
-           memcmp(a->sun_direction, b->sun_direction, size) == 0 &&
-           memcmp(a->sun_irradiance, b->sun_irradiance, size) == 0 && a->max_opacity == b->max_opacity;
-}
-
 int nb_draft_is_changed(const nb_draft *draft)
 {
     const nb_edition *const now = &draft->now, *const was = &draft->written;
     if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
-        !nb_edition_has_same_cells(now, was) || !has_same_light(now, was))
+        !nb_edition_has_same_cells(now, was) || !nb_edition_has_same_models(now, was) ||
+        !nb_edition_has_same_light(now, was))
         return 1;
     for (size_t i = 0; i < now->count; i++) {
-        if (nb_draft_origin(draft, i) != NEBEL_VOLUME_WRITTEN) continue;
-        if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]) || strcmp(now->names[i], was->names[i]) != 0)
+        if (!is_saved(draft, i)) continue;
+        if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]) ||
+            !nb_edition_is_same_entry(&now->entries[i], &was->entries[i]) || strcmp(now->names[i], was->names[i]) != 0)
             return 1;
     }
     return 0;
+}
+
+int nb_draft_must_be_read(const nb_draft *draft)
+{
+    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    const nb_edition *const now = &draft->now;
+    int brings_fog = 0;
+    for (size_t i = 0; i < now->model_count; i++) brings_fog |= scene->models[now->models[i].source].has_fog;
+    return now->model_count != scene->model_count || (brings_fog && !nb_edition_has_same_models(now, &draft->written));
 }
 
 int nb_draft_can_save_camera(const nb_draft *draft)
@@ -356,14 +447,12 @@ static nebel_camera round_camera(nebel_camera camera)
     return camera;
 }
 
-/* Points, colours and portals are those of the scene that stays. */
+/* Points and portals are those of the scene that stays. */
 static void adopt_arrays(const nb_draft *draft, nb_edition *edition)
 {
     const nebel_nebula_desc *const own = nebel_scene_contents(draft->scene)->nebulae;
     for (size_t i = 0; i < edition->nebula_count; i++) {
         edition->nebulae[i].points = own[i].points;
-        edition->nebulae[i].colors = own[i].colors;
-        edition->nebulae[i].color_count = own[i].color_count;
         if (own[i].points != NULL) edition->nebulae[i].count = own[i].count;
     }
     if (edition->cells != NULL) edition->cells_desc.portals = draft->now.cells_desc.portals;
@@ -383,7 +472,7 @@ static nebel_result use_written(nb_draft *draft, int has_moved)
     nb_edition now;
     if (nb_edition_copy(&draft->written, &now) != 0) return fail_memory(draft);
     for (size_t i = 0; i < now.count && !has_moved; i++)
-        if (nb_draft_origin(draft, i) != NEBEL_VOLUME_WRITTEN) exchange(&now.volumes[i], &draft->now.volumes[i]);
+        if (!is_saved(draft, i)) exchange(&now.volumes[i], &draft->now.volumes[i]);
     nb_edition_free(&draft->now);
     draft->now = now;
     if (has_moved) nb_history_forget(&draft->history);

@@ -19,7 +19,9 @@ typedef struct nb_draft {
     nebel_snapshot *whole;     /* with the particles; NULL: not asked for yet */
     nebel_particle *particles; /* of all nebulae */
     size_t particle_count;
-    double frame; /* of what moves */
+    nebel_cells *cells;   /* of `good`; NULL: the scene has none */
+    int models_are_stale; /* the scene's meshes are not where the models of `good` are */
+    double frame;         /* of what moves */
     nebel_log log;
 } nb_draft;
 
@@ -36,6 +38,10 @@ nebel_result nb_draft_commit(nb_draft *draft);
 /* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */
 nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole);
 
+/* Loads the models of `good` anew. Nobody may use the meshes of `data`, which are others then, or none where that
+ * fails. */
+nebel_result nb_draft_place_models(nb_draft *draft);
+
 /* Goes to another frame: everything that moves. Volumes that stand still keep their changes. */
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame);
 
@@ -48,6 +54,13 @@ int nb_draft_is_changed(const nb_draft *draft);
 
 /* What the volume of `now` comes from; those that are new will stand in the file. */
 nebel_volume_origin nb_draft_origin(const nb_draft *draft, size_t volume);
+
+/* The first and the last frame at which anything moves; 0: nothing does. */
+int nb_draft_find_frames(const nb_draft *draft, double range[2]);
+
+/* Whether what was saved cannot be shown without the scene being read anew: models that have gone, or have taken fog
+ * with them. */
+int nb_draft_must_be_read(const nb_draft *draft);
 
 /* Whether the camera is one that the file could hold. */
 int nb_draft_can_save_camera(const nb_draft *draft);

@@ -18,18 +18,73 @@ static char *copy_text(const char *text)
     return copy;
 }
 
+static void *copy_array(const void *from, size_t count, size_t size)
+{
+    void *const copy = malloc(count * size + 1);
+    if (copy != NULL && count > 0) memcpy(copy, from, count * size);
+    return copy;
+}
+
+static int grow(void **array, size_t count, size_t size)
+{
+    void *const larger = realloc(*array, count * size);
+    if (larger != NULL) *array = larger;
+    return larger != NULL ? 0 : -1;
+}
+
 static int make_room(nb_edition *edition)
 {
     const size_t wanted = edition->capacity > 0 ? 2 * edition->capacity : 8;
     if (edition->count < edition->capacity) return 0;
-    void *const volumes = realloc(edition->volumes, wanted * sizeof *edition->volumes);
-    if (volumes != NULL) edition->volumes = volumes;
-    void *const names = realloc(edition->names, wanted * sizeof *edition->names);
-    if (names != NULL) edition->names = names;
-    void *const sources = realloc(edition->sources, wanted * sizeof *edition->sources);
-    if (sources != NULL) edition->sources = sources;
-    if (volumes == NULL || names == NULL || sources == NULL) return -1;
+    if (grow((void **)&edition->volumes, wanted, sizeof *edition->volumes) != 0 ||
+        grow((void **)&edition->names, wanted, sizeof *edition->names) != 0 ||
+        grow((void **)&edition->sources, wanted, sizeof *edition->sources) != 0 ||
+        grow((void **)&edition->entries, wanted, sizeof *edition->entries) != 0)
+        return -1;
     edition->capacity = wanted;
+    return 0;
+}
+
+/* ---- entries
+ * ---------------------------------------------------------------------------------------------------------
+ */
+
+nebel_volume_entry nb_edition_plain_entry(void)
+{
+    return (nebel_volume_entry){.contrast = 0.05};
+}
+
+/* Parts and planes are those of the volume, at every frame. */
+static void strip(nebel_shape *shape)
+{
+    shape->parts = NULL;
+    shape->planes = NULL;
+    shape->part_count = shape->plane_count = 0;
+}
+
+static void free_entry(nebel_volume_entry *entry)
+{
+    free((void *)entry->keys);
+    free((void *)entry->own);
+    *entry = nb_edition_plain_entry();
+}
+
+static int own_entry(nebel_volume_entry *entry)
+{
+    const nebel_volume_entry given = *entry;
+    entry->keys = NULL;
+    entry->own = NULL;
+    if (given.key_count == 0) return 0;
+    nebel_volume_key *const keys = copy_array(given.keys, given.key_count, sizeof *keys);
+    nebel_volume_desc *const own = copy_array(given.own, 1, sizeof *own);
+    entry->keys = keys;
+    entry->own = own;
+    if (keys == NULL || own == NULL) {
+        free_entry(entry);
+        return -1;
+    }
+    for (size_t i = 0; i < given.key_count; i++) strip(&keys[i].volume.shape);
+    strip(&own->shape);
     return 0;
 }
 
@@ -37,25 +92,31 @@ static int make_room(nb_edition *edition)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-static int add(nb_edition *edition, const nebel_volume_desc *volume, const char *name, size_t source)
+static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry, const char *name,
+               size_t source)
 {
     if (make_room(edition) != 0) return -1;
     nebel_volume_desc own = *volume;
+    nebel_volume_entry own_keys = *entry;
     char *const own_name = copy_text(name);
-    if (nb_shape_own(&own.shape) != 0 || own_name == NULL) {
+    const int shape_failed = nb_shape_own(&own.shape), entry_failed = own_entry(&own_keys);
+    if (shape_failed || entry_failed || own_name == NULL) {
         nb_shape_free(&own.shape);
+        free_entry(&own_keys);
         free(own_name);
         return -1;
     }
     edition->volumes[edition->count] = own;
+    edition->entries[edition->count] = own_keys;
     edition->names[edition->count] = own_name;
     edition->sources[edition->count++] = source;
     return 0;
 }
 
-int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const char *name)
+int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry,
+                   const char *name)
 {
-    return add(edition, volume, name, NEBEL_NEW_VOLUME);
+    return add(edition, volume, entry, name, NEBEL_NEW_VOLUME);
 }
 
 int nb_edition_rename(nb_edition *edition, size_t index, const char *name)
@@ -71,9 +132,11 @@ void nb_edition_remove(nb_edition *edition, size_t index)
 {
     const size_t behind = --edition->count - index;
     nb_shape_free(&edition->volumes[index].shape);
+    free_entry(&edition->entries[index]);
     free(edition->names[index]);
     memmove(edition->volumes + index, edition->volumes + index + 1, behind * sizeof *edition->volumes);
     memmove(edition->names + index, edition->names + index + 1, behind * sizeof *edition->names);
+    memmove(edition->entries + index, edition->entries + index + 1, behind * sizeof *edition->entries);
     memmove(edition->sources + index, edition->sources + index + 1, behind * sizeof *edition->sources);
 }
 
@@ -81,16 +144,49 @@ void nb_edition_remove(nb_edition *edition, size_t index)
  * -------------------------------------------------------------------------------------------------------
  */
 
+static int own_nebula(nebel_nebula_desc *nebula)
+{
+    const double(*const given)[3] = nebula->colors;
+    nebula->colors = NULL;
+    if (nebula->color_count > 0) nebula->colors = copy_array(given, nebula->color_count, sizeof *given);
+    const int has_failed = nebula->color_count > 0 && nebula->colors == NULL;
+    return nb_shape_own(&nebula->shape) != 0 || has_failed ? -1 : 0;
+}
+
 /* Those that are there are counted one by one, so that an edition that is not complete can be freed. */
-static int add_nebulae(nb_edition *edition, const nebel_nebula_desc *nebulae, size_t count)
+static int add_nebulae(nb_edition *edition, const nebel_nebula_desc *nebulae, const nebel_transform *places,
+                       size_t count)
 {
     edition->nebulae = calloc(count + 1, sizeof *edition->nebulae);
+    edition->nebula_places = copy_array(places, count, sizeof *places);
     for (size_t i = 0; i < count && edition->nebulae != NULL; i++) {
         edition->nebulae[i] = nebulae[i];
         edition->nebula_count = i + 1;
-        if (nb_shape_own(&edition->nebulae[i].shape) != 0) return -1;
+        if (own_nebula(&edition->nebulae[i]) != 0) return -1;
     }
-    return edition->nebulae != NULL ? 0 : -1;
+    return edition->nebulae != NULL && edition->nebula_places != NULL ? 0 : -1;
+}
+
+int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count)
+{
+    double(*const colors)[3] = malloc((count + 1) * sizeof *colors);
+    if (colors == NULL) return -1;
+    for (size_t i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
+            colors[i][c] = nebula->color_count == 0  ? 1
+                           : i < nebula->color_count ? nebula->colors[i][c]
+                                                     : nebula->colors[nebula->color_count - 1][c];
+    free((void *)nebula->colors);
+    nebula->colors = (const double(*)[3])colors;
+    nebula->color_count = count;
+    return 0;
+}
+
+static int add_models(nb_edition *edition, const nebel_model *models, size_t count)
+{
+    edition->models = copy_array(models, count, sizeof *models);
+    edition->model_count = edition->models != NULL ? count : 0;
+    return edition->models != NULL ? 0 : -1;
 }
 
 static int add_cells(nb_edition *edition, const nebel_cells_desc *desc)
@@ -107,17 +203,24 @@ static int add_cells(nb_edition *edition, const nebel_cells_desc *desc)
     return edition->cells != NULL ? 0 : -1;
 }
 
+/* What a section has that is added: fog that one sees. */
+static const nebel_factor_desc plain_classic = {.end = 100, .density = 0.03, .color = {0.5, 0.5, 0.5}};
+
 int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
 {
-    nb_edition made = {.max_opacity = scene->max_opacity};
+    nb_edition made = {.max_opacity = scene->max_opacity,
+                       .has_sun = scene->has_sun,
+                       .has_classic = scene->classic != NULL,
+                       .classic = scene->classic != NULL ? *scene->classic : plain_classic};
     memcpy(made.background, scene->background, sizeof made.background);
     memcpy(made.ambient, scene->ambient, sizeof made.ambient);
     memcpy(made.sun_direction, scene->sun_direction, sizeof made.sun_direction);
     memcpy(made.sun_irradiance, scene->sun_irradiance, sizeof made.sun_irradiance);
-    int result = add_nebulae(&made, scene->nebulae, scene->nebula_count);
+    int result = add_nebulae(&made, scene->nebulae, scene->nebula_places, scene->nebula_count);
+    if (result == 0) result = add_models(&made, scene->models, scene->model_count);
     if (result == 0) result = add_cells(&made, scene->cells);
     for (size_t i = 0; i < scene->volume_count && result == 0; i++)
-        result = add(&made, &scene->volumes[i], scene->volume_names[i], i);
+        result = add(&made, &scene->volumes[i], &scene->volume_entries[i], scene->volume_names[i], i);
     if (result != 0) nb_edition_free(&made);
     *edition = made;
     return result;
@@ -129,14 +232,18 @@ int nb_edition_copy(const nb_edition *from, nb_edition *to)
     made.volumes = NULL;
     made.names = NULL;
     made.sources = NULL;
+    made.entries = NULL;
     made.nebulae = NULL;
+    made.nebula_places = NULL;
+    made.models = NULL;
     made.cells = NULL;
     made.cells_desc.cell_count = 0;
-    made.count = made.capacity = made.nebula_count = 0;
-    int result = add_nebulae(&made, from->nebulae, from->nebula_count);
+    made.count = made.capacity = made.nebula_count = made.model_count = 0;
+    int result = add_nebulae(&made, from->nebulae, from->nebula_places, from->nebula_count);
+    if (result == 0) result = add_models(&made, from->models, from->model_count);
     if (result == 0 && from->cells != NULL) result = add_cells(&made, &from->cells_desc);
     for (size_t i = 0; i < from->count && result == 0; i++)
-        result = add(&made, &from->volumes[i], from->names[i], from->sources[i]);
+        result = add(&made, &from->volumes[i], &from->entries[i], from->names[i], from->sources[i]);
     if (result != 0) nb_edition_free(&made);
     *to = made;
     return result;
@@ -146,25 +253,53 @@ void nb_edition_free(nb_edition *edition)
 {
     for (size_t i = 0; i < edition->count; i++) {
         nb_shape_free(&edition->volumes[i].shape);
+        free_entry(&edition->entries[i]);
         free(edition->names[i]);
     }
-    for (size_t i = 0; i < edition->nebula_count; i++) nb_shape_free(&edition->nebulae[i].shape);
+    for (size_t i = 0; i < edition->nebula_count; i++) {
+        nb_shape_free(&edition->nebulae[i].shape);
+        free((void *)edition->nebulae[i].colors);
+    }
     for (size_t i = 0; i < edition->cells_desc.cell_count; i++) nb_shape_free(&edition->cells[i].shape);
     free(edition->volumes);
     free(edition->names);
     free(edition->sources);
+    free(edition->entries);
     free(edition->nebulae);
+    free(edition->nebula_places);
+    free(edition->models);
     free(edition->cells);
     *edition = (nb_edition){.volumes = NULL};
 }
 
-void nb_edition_show(const nb_edition *edition, nebel_scene_data *scene)
+/* What the file says of a volume without its keys has the parts and planes that the volume has now. */
+static void lend_pieces(nb_edition *edition)
 {
+    for (size_t i = 0; i < edition->count; i++) {
+        const nebel_shape *const from = &edition->volumes[i].shape;
+        nebel_volume_desc *const own = (nebel_volume_desc *)edition->entries[i].own;
+        if (own == NULL) continue;
+        own->shape.parts = from->parts;
+        own->shape.planes = from->planes;
+        own->shape.part_count = from->part_count;
+        own->shape.plane_count = from->plane_count;
+    }
+}
+
+void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
+{
+    lend_pieces(edition);
     scene->volumes = edition->volumes;
+    scene->volume_entries = edition->entries;
     scene->volume_names = (const char *const *)edition->names;
     scene->volume_count = edition->count;
     scene->nebulae = edition->nebulae;
+    scene->nebula_places = edition->nebula_places;
+    scene->models = edition->models;
+    scene->model_count = edition->model_count;
     scene->cells = edition->cells != NULL ? &edition->cells_desc : NULL;
+    scene->classic = edition->has_classic ? &edition->classic : NULL;
+    scene->has_sun = edition->has_sun;
     scene->max_opacity = edition->max_opacity;
     memcpy(scene->background, edition->background, sizeof scene->background);
     memcpy(scene->ambient, edition->ambient, sizeof scene->ambient);
@@ -176,7 +311,9 @@ size_t nb_edition_size(const nb_edition *edition)
 {
     size_t size = sizeof *edition;
     for (size_t i = 0; i < edition->count; i++)
-        size += sizeof *edition->volumes + nb_shape_size(&edition->volumes[i].shape) + strlen(edition->names[i]);
+        size += sizeof *edition->volumes + sizeof *edition->entries + nb_shape_size(&edition->volumes[i].shape) +
+                (edition->entries[i].key_count + 1) * sizeof(nebel_volume_key) + strlen(edition->names[i]);
+    size += edition->model_count * sizeof *edition->models;
     for (size_t i = 0; i < edition->nebula_count; i++)
         size += sizeof *edition->nebulae + nb_shape_size(&edition->nebulae[i].shape);
     for (size_t i = 0; i < edition->cells_desc.cell_count; i++)
@@ -206,11 +343,35 @@ int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_des
            a->cutoff == b->cutoff;
 }
 
+static int is_same_still(const nebel_volume_desc *a, const nebel_volume_desc *b)
+{
+    nebel_volume_desc bare_a = *a, bare_b = *b;
+    strip(&bare_a.shape);
+    strip(&bare_b.shape);
+    return nb_edition_is_same_volume(&bare_a, &bare_b);
+}
+
+int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_entry *b)
+{
+    if (a->contrast != b->contrast || a->phase.type != b->phase.type || a->phase.g != b->phase.g ||
+        a->phase.diameter != b->phase.diameter || a->key_count != b->key_count)
+        return 0;
+    for (size_t i = 0; i < a->key_count; i++)
+        if (a->keys[i].frame != b->keys[i].frame || !is_same_still(&a->keys[i].volume, &b->keys[i].volume)) return 0;
+    return a->key_count == 0 || is_same_still(a->own, b->own);
+}
+
+static int has_same_colors(const nebel_nebula_desc *a, const nebel_nebula_desc *b)
+{
+    return a->color_count == b->color_count &&
+           (a->color_count == 0 || memcmp(a->colors, b->colors, a->color_count * sizeof *a->colors) == 0);
+}
+
 static int is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *b)
 {
     return nb_shape_is_same(&a->shape, &b->shape) && is_same_density(&a->density, &b->density) &&
            a->count == b->count && a->seed == b->seed && a->profile == b->profile &&
-           HAS_SAME(a, b, nebel_nebula_desc, size, colors) && a->turbulence == b->turbulence &&
+           HAS_SAME(a, b, nebel_nebula_desc, size, colors) && has_same_colors(a, b) && a->turbulence == b->turbulence &&
            a->turbulence_size == b->turbulence_size;
 }
 
@@ -218,7 +379,9 @@ int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b)
 {
     if (a->nebula_count != b->nebula_count) return 0;
     for (size_t i = 0; i < a->nebula_count; i++)
-        if (!is_same_nebula(&a->nebulae[i], &b->nebulae[i])) return 0;
+        if (!is_same_nebula(&a->nebulae[i], &b->nebulae[i]) ||
+            memcmp(&a->nebula_places[i], &b->nebula_places[i], sizeof *a->nebula_places) != 0)
+            return 0;
     return 1;
 }
 
@@ -230,11 +393,41 @@ static int is_same_cell(const nebel_cell *a, const nebel_cell *b)
 
 int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b)
 {
-    const size_t count = a->cells_desc.cell_count;
-    if (count != b->cells_desc.cell_count) return 0;
-    for (size_t i = 0; i < count; i++)
+    const nebel_cells_desc *const from = &a->cells_desc, *const to = &b->cells_desc;
+    if (from->cell_count != to->cell_count || from->model != to->model || from->span != to->span ||
+        from->ungrouped != to->ungrouped)
+        return 0;
+    for (size_t i = 0; i < from->cell_count; i++)
         if (!is_same_cell(&a->cells[i], &b->cells[i])) return 0;
     return 1;
+}
+
+static int is_same_model(const nebel_model *a, const nebel_model *b)
+{
+    return a->source == b->source && a->has_color == b->has_color && HAS_SAME(a, b, nebel_model, position, has_color) &&
+           memcmp(a->color, b->color, sizeof a->color) == 0;
+}
+
+int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b)
+{
+    if (a->model_count != b->model_count) return 0;
+    for (size_t i = 0; i < a->model_count; i++)
+        if (!is_same_model(&a->models[i], &b->models[i])) return 0;
+    return 1;
+}
+
+static int has_same_classic(const nb_edition *a, const nb_edition *b)
+{
+    const nebel_factor_desc *const from = &a->classic, *const to = &b->classic;
+    return a->has_classic == b->has_classic && from->coordinate == to->coordinate && from->stage == to->stage &&
+           HAS_SAME(from, to, nebel_factor_desc, start, color) &&
+           memcmp(from->color, to->color, sizeof from->color) == 0;
+}
+
+int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b)
+{
+    return a->has_sun == b->has_sun && a->max_opacity == b->max_opacity &&
+           HAS_SAME(a, b, nb_edition, background, max_opacity) && has_same_classic(a, b);
 }
 
 int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b)
@@ -246,10 +439,11 @@ int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b)
 int nb_edition_is_same(const nb_edition *a, const nb_edition *b)
 {
     if (!nb_edition_has_same_sources(a, b) || !nb_edition_has_same_nebulae(a, b) || !nb_edition_has_same_cells(a, b) ||
-        a->max_opacity != b->max_opacity || !HAS_SAME(a, b, nb_edition, background, max_opacity))
+        !nb_edition_has_same_models(a, b) || !nb_edition_has_same_light(a, b))
         return 0;
     for (size_t i = 0; i < a->count; i++)
-        if (!nb_edition_is_same_volume(&a->volumes[i], &b->volumes[i]) || strcmp(a->names[i], b->names[i]) != 0)
+        if (!nb_edition_is_same_volume(&a->volumes[i], &b->volumes[i]) ||
+            !nb_edition_is_same_entry(&a->entries[i], &b->entries[i]) || strcmp(a->names[i], b->names[i]) != 0)
             return 0;
     return 1;
 }

@@ -1,4 +1,5 @@
-/* What of a scene can be changed: fog, nebulae, cells and light, with all their parts, planes and names. */
+/* What of a scene can be changed: fog, nebulae, cells, models and light, with all their parts, planes, keys and names.
+ */
 #ifndef NB_EDITION_H
 #define NB_EDITION_H
 
@@ -12,18 +13,32 @@ typedef struct nb_edition {
     nebel_volume_desc *volumes; /* their parts and planes are the edition's, too, and may be written to */
     char **names;
     size_t *sources; /* which volume of the file each one is; NEBEL_NEW_VOLUME */
+    nebel_volume_entry
+        *entries; /* their keys are the edition's, too; shapes of keys and `own` have no parts or planes */
     size_t count, capacity;
-    nebel_nebula_desc *nebulae; /* their points and colours are the scene's */
+    nebel_nebula_desc *nebulae;     /* their points are the scene's */
+    nebel_transform *nebula_places; /* of the points */
     size_t nebula_count;
+    nebel_model *models; /* their file names are those of the file that was read: not to be used */
+    size_t model_count;
     nebel_cell *cells;
     nebel_cells_desc cells_desc; /* of them; its portals are the scene's */
+    int has_sun, has_classic;
+    nebel_factor_desc classic;
     double background[3], ambient[3], sun_direction[3], sun_irradiance[3], max_opacity;
 } nb_edition;
 
 /* All return 0, or -1 where memory is out and nothing has changed. */
 int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition);
 int nb_edition_copy(const nb_edition *from, nb_edition *to);
-int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const char *name);
+int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry,
+                   const char *name);
+/* An entry of a volume without keys, contrast or phase of its own. */
+nebel_volume_entry nb_edition_plain_entry(void);
+
+/* As many as wanted; those that come are copies of the last one, or 1. */
+int nb_edition_set_colors(nebel_nebula_desc *nebula, size_t count);
+
 int nb_edition_rename(nb_edition *edition, size_t index, const char *name);
 
 void nb_edition_remove(nb_edition *edition, size_t index);
@@ -33,14 +48,17 @@ void nb_edition_free(nb_edition *edition);
 
 int nb_edition_is_same(const nb_edition *a, const nb_edition *b);
 int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b);
+int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_entry *b);
 
 /* Whether both have the same nebulae, cells, volumes of the same sources. */
 int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b);
+int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b);
+int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b);
 
-/* Puts light, volumes, nebulae and cells in the place of the scene's, which points to the edition then. */
-void nb_edition_show(const nb_edition *edition, nebel_scene_data *scene);
+/* Puts light, volumes, nebulae, cells and models in the place of the scene's, which points to the edition then. */
+void nb_edition_show(nb_edition *edition, nebel_scene_data *scene);
 
 /* Bytes that it takes, more or less. */
 size_t nb_edition_size(const nb_edition *edition);

@@ -2,8 +2,10 @@
 #include "fog_panel.h"
 
 #include "controls.h"
+#include "keys.h"
 #include "shape.h"
 
+#include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <string.h>
@@ -28,33 +30,72 @@ bool is_zero(const double rgb[3])
  */
 
 // Visibility is that of the mean extinction; its slider keeps the colour.
-bool draw_amount(double extinction[3])
+bool draw_visibility(double extinction[3], double contrast)
 {
     const double farthest = 1e5, amount = mean(extinction);
-    double visibility = amount > 0 ? nebel_extinction_from_visibility(1, 0) / amount : farthest;
-    bool changed = false;
-    if (slide("visibility", &visibility, 0.1, farthest, amount > 0 ? "%.4g m" : "no fog", true,
-              "How far one sees: there contrast has fallen to 5 %. Keeps the colour of the extinction. Ctrl + click "
-              "types "
-              "a number in.")) {
-        const double wanted = nebel_extinction_from_visibility(visibility, 0);
-        for (int c = 0; c < 3; c++) extinction[c] = amount > 0 ? extinction[c] * (wanted / amount) : wanted;
-        changed = true;
-    }
-    return drag("extinction", extinction, 3, 1e-4, 0, "%.4g",
-                "Of red, green and blue [1/m]: after 1 / extinction metres 37 % of the light are left. 0: no fog.") ||
+    double visibility = amount > 0 ? nebel_extinction_from_visibility(1, contrast) / amount : farthest;
+    if (!slide("visibility", &visibility, 0.1, farthest, amount > 0 ? "%.4g m" : "no fog", true,
+               "How far one sees: there contrast has fallen to the number below. Keeps the colour of the extinction. "
+               "Ctrl + click types a number in."))
+        return false;
+    const double wanted = nebel_extinction_from_visibility(visibility, contrast);
+    for (int c = 0; c < 3; c++) extinction[c] = amount > 0 ? extinction[c] * (wanted / amount) : wanted;
+    return true;
+}
+
+// The visibility stays. A volume with keys has one contrast at each, which the file keeps.
+bool draw_contrast(double extinction[3], nebel_volume_entry *entry)
+{
+    double contrast = entry->contrast;
+    if (!slide("contrast", &contrast, 0.001, 0.9, "%.3g", true,
+               "What is left of the contrast at the visibility: 0.05 by the meteorologists, 0.02 by Koschmieder."))
+        return false;
+    if (!(contrast > 0 && contrast < 1)) return false;
+    for (int c = 0; c < 3; c++) extinction[c] *= log(contrast) / log(entry->contrast);
+    entry->contrast = contrast;
+    return true;
+}
+
+bool draw_amount(double extinction[3], nebel_volume_entry *entry)
+{
+    bool changed = draw_visibility(extinction, entry->contrast);
+    if (entry->key_count == 0) changed |= draw_contrast(extinction, entry);
+    return drag("extinction [1/m]", extinction, 3, 1e-4, 0, "%.4g",
+                "Of red, green and blue: after 1 / extinction metres 37 % of the light are left. 0: no fog.") ||
            changed;
 }
 
-bool draw_light(nebel_volume_desc *volume, bool has_sun)
+bool draw_phase(nebel_phase *phase)
 {
+    static const char *const names[] = {"isotropic", "Henyey-Greenstein", "Rayleigh", "Cornette-Shanks", "droplets"};
+    static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN, NEBEL_PHASE_RAYLEIGH,
+                                             NEBEL_PHASE_CORNETTE_SHANKS, NEBEL_PHASE_DROPLETS};
+    int type = 0;
+    while (type < 4 && types[type] != phase->type) type++;
+    bool changed = choose("phase", &type, names, 5,
+                          "Into which direction light is scattered. For files: under ambient light, the same from "
+                          "everywhere, all look the same.");
+    phase->type = types[type];
+    if (phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS)
+        changed |= slide("g", &phase->g, -0.99, 0.99, "%.3f", false, "Mean cosine: 1 goes straight on, -1 comes back.");
+    if (phase->type != NEBEL_PHASE_DROPLETS) return changed;
+    if (!(phase->diameter > 0)) phase->diameter = 10;
+    return slide("diameter", &phase->diameter, 0.1, NEBEL_LARGEST_DROPLET, "%.3g um", true, "Of a droplet.") || changed;
+}
+
+// A volume is lit in one way at all its keys.
+bool draw_light(nebel_volume_desc *volume, nebel_volume_entry *entry, bool has_sun)
+{
+    const bool is_lit = !is_zero(volume->albedo) || (entry->own != nullptr && !is_zero(entry->own->albedo));
     bool changed = false;
-    if (is_zero(volume->albedo))
+    if (!is_lit)
         changed |= pick("source", volume->source, false, "What thick fog looks like: the radiance of opaque fog.");
-    if (is_zero(volume->source) && (!has_sun || !is_zero(volume->albedo)))
+    if (is_lit || (is_zero(volume->source) && !has_sun && entry->key_count == 0)) {
         changed |= pick("albedo", volume->albedo, true,
                         "What share of the light it scatters: 0 is smoke, 1 is mist. Lit by the ambient light.");
-    return pick("emission", volume->emission, false, "What it shines by itself, radiance per metre.") || changed;
+        if (is_lit) changed |= draw_phase(&entry->phase);
+    }
+    return pick("emission [1/m]", volume->emission, false, "What it shines by itself, radiance per metre.") || changed;
 }
 
 bool draw_distances(nebel_volume_desc *volume)
@@ -79,7 +120,7 @@ void fit_density(nebel_volume_desc *volume)
         volume->density.type = NEBEL_DENSITY_CONSTANT;
 }
 
-bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, double reach, bool has_sun)
+bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry *entry, double reach, bool has_sun)
 {
     static const char *const operations[] = {"adds", "excludes", "replaces"};
     int operation = volume->operation;
@@ -89,8 +130,8 @@ bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, double reach, bool
                           "Replaces: this fog in the place of all of a lower priority.");
     volume->operation = nebel_operation(operation);
     if (volume->operation != NEBEL_OPERATION_EXCLUDE) {
-        changed |= draw_amount(volume->extinction);
-        changed |= draw_light(volume, has_sun);
+        changed |= draw_amount(volume->extinction, entry);
+        changed |= draw_light(volume, entry, has_sun);
         changed |= draw_density(&volume->density, panel->data->camera.look_at, reach);
     }
     changed |= draw_shape(panel, &volume->shape, reach, true);
@@ -115,8 +156,9 @@ bool draw_commands(nb_panel *panel, size_t index, nebel_volume_origin origin)
     char name[160];
     if (press("Duplicate", "A new volume with the same numbers. It will stand at the end of the file's fog.")) {
         const nebel_volume_desc copy = panel->now->volumes[index];
+        const nebel_volume_entry entry = panel->now->entries[index];
         snprintf(name, sizeof name, "%.120s copy", panel->now->names[index]);
-        panel->is_out_of_memory |= nb_edition_add(panel->now, &copy, name) != 0;
+        panel->is_out_of_memory |= nb_edition_add(panel->now, &copy, &entry, name) != 0;
         panel->fog_changed = 1;
     }
     if (origin != NEBEL_VOLUME_WRITTEN && origin != NEBEL_VOLUME_MOVING) return false;
@@ -127,16 +169,68 @@ bool draw_commands(nb_panel *panel, size_t index, nebel_volume_origin origin)
     return true;
 }
 
+/* ---- keys
+ * ------------------------------------------------------------------------------------------------------------
+ */
+
+// Returns whether it goes.
+bool draw_key(nb_panel *panel, size_t index, size_t key)
+{
+    const Owner owner("keys", key);
+    const bool is_here = panel->now->entries[index].keys[key].frame == *panel->frame;
+    double frame = panel->now->entries[index].keys[key].frame;
+    ImGui::SetNextItemWidth(90 * scale);
+    if (drag("##frame", &frame, 1, 25, -DBL_MAX, "frame %.4g", "When it is so. No further than to the next key.")) {
+        nb_keys_move(panel->now, index, key, frame);
+        panel->fog_changed = 1;
+    }
+    ImGui::SameLine();
+    if (press_if(!is_here, is_here ? "here" : "Go", "To this frame: what is changed then changes this key.")) {
+        *panel->frame = frame;
+        panel->frame_changed = 1;
+    }
+    ImGui::SameLine();
+    return press("x", "Takes this key away. The last one leaves the volume as it is there.");
+}
+
+void draw_keys(nb_panel *panel, size_t index)
+{
+    const nebel_volume_entry &entry = panel->now->entries[index];
+    const bool is_open =
+        ImGui::TreeNodeEx("keys", entry.key_count > 0 ? ImGuiTreeNodeFlags_DefaultOpen : 0,
+                          entry.key_count > 0 ? "keys: %u" : "keys: it stands still", unsigned(entry.key_count));
+    note_place("keys");
+    if (!is_open) return;
+    size_t gone = entry.key_count;
+    bool is_here = false;
+    for (size_t i = 0; i < entry.key_count; i++) {
+        is_here |= entry.keys[i].frame == *panel->frame;
+        if (draw_key(panel, index, i)) gone = i;
+    }
+    if (gone < entry.key_count) {
+        nb_keys_remove(panel->now, index, gone);
+        panel->fog_changed = 1;
+    } else if (!is_here && press("Add a key here", "At the present frame, see Time: the volume as it is then.")) {
+        panel->is_out_of_memory |= nb_keys_set(panel->now, index, *panel->frame) != 0;
+        panel->fog_changed = 1;
+    }
+    if (entry.key_count > 0 && !is_here) ImGui::TextDisabled("between keys: a change makes one here");
+    ImGui::TreePop();
+}
+
 bool draw_open_volume(nb_panel *panel, size_t index, double reach)
 {
-    static const char *const origins[] = {"", "moves by its keys: changes here are not saved",
-                                          "settings of another program: changes here are not saved",
+    static const char *const origins[] = {"", "", "settings of another program: changes here are not saved",
                                           "a node of a model: changes here are not saved"};
     const nebel_volume_origin origin = panel->origins[index];
-    if (origin != NEBEL_VOLUME_WRITTEN) ImGui::TextDisabled("%s", origins[origin]);
-    const bool has_sun = panel->data->has_sun && !is_zero(panel->now->sun_irradiance);
-    if (origin == NEBEL_VOLUME_WRITTEN) panel->fog_changed |= draw_name(panel, index);
-    panel->fog_changed |= draw_numbers(panel, &panel->now->volumes[index], reach, has_sun);
+    const bool is_saved = origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
+    const bool has_sun = panel->now->has_sun && !is_zero(panel->now->sun_irradiance);
+    if (is_saved)
+        panel->fog_changed |= draw_name(panel, index);
+    else
+        ImGui::TextDisabled("%s", origins[origin]);
+    panel->fog_changed |= draw_numbers(panel, &panel->now->volumes[index], &panel->now->entries[index], reach, has_sun);
+    if (is_saved) draw_keys(panel, index);
     return draw_commands(panel, index, origin);
 }
 
@@ -145,8 +239,9 @@ bool draw_volume(nb_panel *panel, size_t index, double reach)
     const Owner owner("fog", index);
     char title[200];
     const char *const name = panel->now->names[index];
+    static const char *const marks[] = {"", " (moves)", " *", " *"};
     snprintf(title, sizeof title, "%.100s%s###volume", name[0] != '\0' ? name : "(no name)",
-             panel->origins[index] != NEBEL_VOLUME_WRITTEN ? " *" : "");
+             marks[panel->origins[index]]);
     const bool is_open = ImGui::CollapsingHeader(title, panel->now->count <= 2 ? ImGuiTreeNodeFlags_DefaultOpen : 0);
     note_place("open");
     if (!is_open) return false;
@@ -175,7 +270,8 @@ void add_volume(nb_panel *panel, double reach)
         volume.source[i] = 0.5;
     }
     volume.shape.type = NEBEL_SHAPE_BOX;
-    panel->is_out_of_memory |= nb_edition_add(panel->now, &volume, "new") != 0;
+    const nebel_volume_entry entry = nb_edition_plain_entry();
+    panel->is_out_of_memory |= nb_edition_add(panel->now, &volume, &entry, "new") != 0;
     panel->fog_changed = 1;
 }
 
@@ -193,7 +289,7 @@ bool is_wanted(const nb_panel *panel, const ImGuiTextFilter &filter, size_t inde
 
 enum { MOST_PARTICLES = 1000000 };
 
-bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, double reach)
+bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *place, double reach)
 {
     int count = int(nebula->count), seed = int(nebula->seed);
     bool changed = false;
@@ -203,6 +299,7 @@ bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, double reach)
         changed |= draw_shape(panel, &nebula->shape, reach, true);
     } else {
         ImGui::TextDisabled("%u points of a model", unsigned(nebula->count));
+        changed |= draw_transform(place, reach);
     }
     changed |= ImGui::DragInt("seed", &seed, 0.1f, 0, INT_MAX, "%d", ImGuiSliderFlags_AlwaysClamp);
     note_place("seed");
@@ -222,18 +319,59 @@ bool draw_turbulence(nebel_nebula_desc *nebula, double reach)
            changed;
 }
 
-bool draw_nebula_numbers(nb_panel *panel, nebel_nebula_desc *nebula, double reach)
+// Factors of the emission.
+bool draw_colors(nb_panel *panel, nebel_nebula_desc *nebula)
+{
+    bool changed = false;
+    size_t wanted = nebula->color_count;
+    for (size_t i = 0; i < nebula->color_count; i++) {
+        const Owner owner("colors", i);
+        changed |= pick(i == 0 ? "colours" : "##color", const_cast<double *>(nebula->colors[i]), false,
+                        "Factors of the emission, which drift through the nebula from the first to the last.");
+    }
+    if (nebula->color_count < 64 && press("Add a colour", "Behind the last one.")) wanted++;
+    if (nebula->color_count > 0) {
+        ImGui::SameLine();
+        if (press("Remove the last", "Without any colour all particles shine alike.")) wanted--;
+    }
+    if (wanted == nebula->color_count) return changed;
+    panel->is_out_of_memory |= nb_edition_set_colors(nebula, wanted) != 0;
+    return true;
+}
+
+bool draw_nebula_numbers(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *place, double reach)
 {
     static const char *const profiles[] = {"soft", "gaussian", "ball"};
     int profile = nebula->profile;
-    bool changed = draw_strewing(panel, nebula, reach);
+    bool changed = draw_strewing(panel, nebula, place, reach);
     changed |= choose("profile", &profile, profiles, NEBEL_PARTICLE_COUNT,
                       "How a particle thins from its middle to its surface.");
     nebula->profile = nebel_particle_profile(profile);
-    changed |= drag("size", nebula->size, 2, 0.01, 1e-6, "%.4g m", "Radius of the smallest and the largest particle.");
-    changed |= drag("absorption", nebula->absorption, 3, 0.01, 0, "%.4g", "In the middle of a particle [1/m].");
-    changed |= pick("emission", nebula->emission, false, "What the middle of a particle shines, radiance per metre.");
+    changed |=
+        drag("size [m]", nebula->size, 2, 0.01, 1e-6, "%.4g", "Radius of the smallest and the largest particle.");
+    changed |= drag("absorption [1/m]", nebula->absorption, 3, 0.01, 0, "%.4g", "In the middle of a particle.");
+    changed |=
+        pick("emission [1/m]", nebula->emission, false, "What the middle of a particle shines, radiance per metre.");
+    changed |= draw_colors(panel, nebula);
     return draw_turbulence(nebula, reach) || changed;
+}
+
+// Of fog in cells, as the method of that name has it.
+bool draw_cells_section(nebel_cells_desc *desc)
+{
+    static const char *const models[] = {"linear", "exponential"};
+    static const char *const spans[] = {"along the ray", "depth", "depth as printed"};
+    int model = desc->model, span = desc->span, is_grouped = !desc->ungrouped;
+    bool changed = choose("model", &model, models, NEBEL_CELL_MODEL_COUNT,
+                          "Of the method cells alone: density times length, at most 1; or 1 - exp of that.");
+    changed |= choose("span", &span, spans, NEBEL_SPAN_COUNT,
+                      "Of the method cells alone: the length in fog is along the ray, or along the camera's axis; as "
+                      "printed it is wrong off the middle of the picture.");
+    changed |= tick("grouping", &is_grouped, "Cells that touch and have the same fog are one; otherwise a seam shows.");
+    desc->model = nebel_cell_model(model);
+    desc->span = nebel_cell_span(span);
+    desc->ungrouped = !is_grouped;
+    return changed;
 }
 
 } // namespace
@@ -262,13 +400,21 @@ void draw_nebulae(nb_panel *panel, double reach)
         note_place("open");
         if (!is_open) continue;
         ImGui::Indent(4 * scale);
-        panel->fog_changed |= draw_nebula_numbers(panel, &panel->now->nebulae[i], reach);
+        panel->fog_changed |= draw_nebula_numbers(panel, &panel->now->nebulae[i], &panel->now->nebula_places[i], reach);
         ImGui::Unindent(4 * scale);
     }
 }
 
 void draw_cells(nb_panel *panel, double reach)
 {
+    if (panel->now->cells == nullptr) return;
+    ImGui::Text("Cells: %u", unsigned(panel->now->cells_desc.cell_count));
+    const bool shows_method = ImGui::TreeNode("of the method cells");
+    note_place("of the method cells");
+    if (shows_method) {
+        panel->fog_changed |= draw_cells_section(&panel->now->cells_desc);
+        ImGui::TreePop();
+    }
     for (size_t i = 0; i < panel->now->cells_desc.cell_count; i++) {
         const Owner owner("cells", i);
         nebel_cell *const cell = &panel->now->cells[i];

@@ -13,6 +13,10 @@ void draw_cells(nb_panel *panel, double reach);
 // something has changed.
 bool draw_shape(nb_panel *panel, nebel_shape *shape, double reach, bool may_change);
 
+// Position, rotation and scale.
+bool draw_transform(nebel_transform *transform, double reach);
+bool draw_rotation(double rotation[4]);
+
 // `place` is where a new kind of density starts.
 bool draw_density(nebel_density *density, const double place[3], double reach);
 

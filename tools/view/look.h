@@ -2,6 +2,8 @@
 #ifndef NB_LOOK_H
 #define NB_LOOK_H
 
+#include <nebel/render.h>
+
 typedef enum nb_look_plane {
     NB_LOOK_COLOR = 0,
     NB_LOOK_TRANSMITTANCE,
@@ -14,6 +16,7 @@ typedef enum nb_look_compare {
     NB_LOOK_GL_ALONE = 0,
     NB_LOOK_SPLIT,      /* the CPU's picture left of the line, that of OpenGL right of it */
     NB_LOOK_DIFFERENCE, /* of what the screen would show of both */
+    NB_LOOK_CPU_ALONE,
     NB_LOOK_COMPARES
 } nb_look_compare;
 
@@ -26,6 +29,7 @@ typedef enum nb_look_particles {
 } nb_look_particles;
 
 typedef struct nb_look {
+    nebel_method method;
     nb_look_plane plane;
     nb_look_compare compare;
     nb_look_particles particles;
@@ -34,6 +38,7 @@ typedef struct nb_look {
     double gain;     /* of the difference */
     double range;    /* m: the depth that is shown as middle grey */
     int samples;     /* of each pixel, once everything stands still */
+    int rate;        /* frames in a second, where time goes on */
 } nb_look;
 
 #endif

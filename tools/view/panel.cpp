@@ -2,6 +2,7 @@
 
 #include "controls.h"
 #include "fog_panel.h"
+#include "scene_panel.h"
 
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
@@ -34,82 +35,19 @@ void note_area(int which)
     areas[which] = area{low, ImVec2(low.x + size.x, low.y + size.y)};
 }
 
-/* ---- light and camera
- * -----------------------------------------------------------------------------------------------
- */
-
-const double degree = 3.14159265358979323846 / 180;
-
-bool draw_sun(nb_edition *now)
-{
-    double *const d = now->sun_direction;
-    double height = asin(fmax(-1, fmin(1, d[1]))) / degree, turn = atan2(d[0], d[2]) / degree;
-    bool changed =
-        slide("sun turn", &turn, -180, 180, "%.1f deg", false, "Where it stands, seen from above: 0 is along z.");
-    changed |= slide("sun height", &height, -89, 89, "%.1f deg", false, "How high it stands above the horizon.");
-    if (changed) {
-        d[0] = cos(height * degree) * sin(turn * degree);
-        d[1] = sin(height * degree);
-        d[2] = cos(height * degree) * cos(turn * degree);
-    }
-    return pick("sun", now->sun_irradiance, false,
-                "Irradiance on a surface that faces the sun, before any fog. It lights surfaces, not yet fog.") ||
-           changed;
-}
-
-/* 0 and 1 are no limit. */
-bool draw_opacity(nb_edition *now)
-{
-    double opacity = now->max_opacity > 0 ? now->max_opacity : 1;
-    if (!slide("most opacity", &opacity, 0.01, 1, opacity < 1 ? "%.2f" : "no limit", false,
-               "All fog together hides no more than this. A look, not physics."))
-        return false;
-    now->max_opacity = opacity;
-    return true;
-}
-
-void draw_lights(nb_panel *panel)
-{
-    nb_edition *const now = panel->now;
-    if (!open_section("Light", false)) return;
-    bool changed =
-        pick("ambient", now->ambient, false, "Radiance from everywhere. Lights surfaces, and fog with an albedo.");
-    changed |= pick("background", now->background, false, "Radiance where no surface is: the sky.");
-    if (panel->data->has_sun) changed |= draw_sun(now);
-    panel->fog_changed |= draw_opacity(now) || changed;
-}
-
-void draw_camera(nb_panel *panel, double reach)
-{
-    nebel_camera *const camera = &panel->data->camera;
-    if (!open_section("Camera", false)) return;
-    bool changed = drag_place("eye", camera->position, reach, "Where the camera is [m].");
-    changed |=
-        drag_place("look at", camera->look_at, reach, "What is in the middle, and what a drag orbits about [m].");
-    changed |= drag("up", camera->up, 3, 1, -DBL_MAX, "%.3g", "Which way is up in the picture.");
-    if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
-        changed |= drag_length("view height", &camera->view_height, "What the height of the picture shows.");
-    else
-        changed |= slide("field of view", &camera->vertical_fov, 1, 150, "%.1f deg", false, "From bottom to top.");
-    panel->camera_changed |= changed;
-    if (panel->camera_is_keyed)
-        ImGui::TextDisabled("moves: changes here are not saved");
-    else
-        tick("save the camera, too", &panel->saves_camera, "Save writes where the camera is now into the file.");
-}
-
 /* ---- what is shown
  * ---------------------------------------------------------------------------------------------------
  */
 
 void draw_comparison(nb_panel *panel)
 {
-    static const char *const compares[] = {"OpenGL", "CPU | OpenGL", "difference"};
+    static const char *const compares[] = {"OpenGL", "CPU | OpenGL", "difference", "CPU"};
     nb_look *const look = panel->look;
     int compare = look->compare;
     panel->look_changed |=
         choose("drawn by", &compare, compares, NB_LOOK_COMPARES,
-               "The CPU's picture on the left of a line that can be dragged, or the difference of both.");
+               "The CPU's picture on the left of a line that can be dragged, the difference of both, or the CPU's "
+               "alone.");
     look->compare = nb_look_compare(compare);
     if (compare == NB_LOOK_SPLIT) slide("split", &look->split, 0, 1, "%.2f", false, "Where the line is.");
     if (compare == NB_LOOK_DIFFERENCE)
@@ -117,11 +55,65 @@ void draw_comparison(nb_panel *panel)
               "How much brighter the difference is shown: 255 makes one byte white.");
 }
 
+const char *describe_method(nebel_method method)
+{
+    switch (method) {
+    case NEBEL_METHOD_EXACT:
+        return "exact";
+    case NEBEL_METHOD_CELLS:
+        return "cells, at vertices";
+    case NEBEL_METHOD_CELLS_PIXEL:
+        return "cells, per pixel";
+    case NEBEL_METHOD_VERTEX:
+        return "at vertices";
+    case NEBEL_METHOD_ADDITIVE:
+        return "additive, at vertices";
+    default:
+        return nebel_method_word(method);
+    }
+}
+
+// A method that needs what the scene has not is not offered.
+bool is_offered(const nb_panel *panel, nebel_method method)
+{
+    switch (method) {
+    case NEBEL_METHOD_CELLS:
+    case NEBEL_METHOD_CELLS_PIXEL:
+        return panel->now->cells != nullptr;
+    case NEBEL_METHOD_LINEAR:
+    case NEBEL_METHOD_EXP:
+    case NEBEL_METHOD_EXP2:
+        return panel->now->has_classic != 0;
+    default:
+        return method != NEBEL_METHOD_FIVE_TAP;
+    }
+}
+
+void draw_method(nb_panel *panel)
+{
+    nebel_method methods[NEBEL_METHOD_COUNT];
+    const char *names[NEBEL_METHOD_COUNT];
+    int count = 0, chosen = 0;
+    for (int i = 0; i < NEBEL_METHOD_COUNT; i++) {
+        if (!is_offered(panel, nebel_method(i))) continue;
+        if (panel->look->method == nebel_method(i)) chosen = count;
+        names[count] = describe_method(nebel_method(i));
+        methods[count++] = nebel_method(i);
+    }
+    panel->look_changed |= choose("method", &chosen, names, count,
+                                  "How fog gets onto the picture: exactly, or as old engines did it, on surfaces "
+                                  "alone. Cells and the factors linear, exp and exp2 are offered where the scene has "
+                                  "such sections; see Classic fog below.");
+    panel->look->method = methods[chosen];
+    if (panel->note[0] != '\0') ImGui::TextDisabled("%s", panel->note);
+}
+
 void draw_technique(nb_panel *panel)
 {
     static const char *const names[] = {"balls: fast", "five-tap discs", "fog: exact"};
     int particles = panel->look->particles;
-    if (panel->now->nebula_count == 0) return;
+    draw_method(panel);
+    if (panel->now->nebula_count == 0 || panel->look->method != NEBEL_METHOD_EXACT) return;
     panel->look_changed |=
         choose("particles", &particles, names, NB_LOOK_PARTICLES,
                "Balls: each particle in closed form, from the farthest to the nearest. Five-tap: a disc that "
@@ -142,20 +134,17 @@ void draw_look(nb_panel *panel)
           "One more doubles the light. Of the window alone.");
     panel->look_changed |=
         slide_whole("samples", &look->samples, 1, 64, false, "Of each pixel, once everything rests.");
-    draw_comparison(panel);
     draw_technique(panel);
+    draw_comparison(panel);
     if (look->plane == NB_LOOK_DEPTH)
         slide("grey at", &look->range, 0.1, 10000, "%.4g m", true, "The distance that is shown in middle grey.");
-    if (panel->moves)
-        panel->frame_changed =
-            drag("frame", panel->frame, 1, 50, -DBL_MAX, "%.1f", "Of the camera and the fog that move.");
 }
 
 /* ---- state and commands
  * --------------------------------------------------------------------------------------------
  */
 
-void draw_time(const char *who, double seconds, unsigned samples)
+void draw_seconds(const char *who, double seconds, unsigned samples)
 {
     const bool is_long = seconds >= 1;
     ImGui::Text("%s: %.3g %s, %u sample%s", who, is_long ? seconds : seconds * 1e3, is_long ? "s" : "ms", samples,
@@ -168,19 +157,10 @@ void draw_state(nb_panel *panel)
     const char *const folder_end = strrchr(panel->scene, '/');
     ImGui::Text("%s%s", panel->is_changed ? "* " : "", folder_end != nullptr ? folder_end + 1 : panel->scene);
     explain(panel->scene);
-    draw_time("OpenGL", panel->seconds, panel->samples);
+    draw_seconds("OpenGL", panel->seconds, panel->samples);
     explain(panel->driver);
-    if (panel->cpu_seconds > 0) draw_time("CPU", panel->cpu_seconds, 1);
+    if (panel->cpu_seconds > 0) draw_seconds("CPU", panel->cpu_seconds, 1);
     ImGui::TextDisabled("%s", panel->picture);
-}
-
-bool press_if(bool possible, const char *name, const char *help)
-{
-    if (possible) return press(name, help);
-    ImGui::BeginDisabled();
-    ImGui::Button(name);
-    ImGui::EndDisabled();
-    return false;
 }
 
 void draw_commands(nb_panel *panel)
@@ -257,7 +237,7 @@ void draw_help(nb_panel *panel)
         {"Home, H", "the camera of the file"},
         {"1 2 3 4", "colour, transmittance, in-scattering, depth"},
         {"[ ]", "exposure"},
-        {"C", "OpenGL, split, difference"},
+        {"C", "OpenGL, split, difference, CPU"},
         {"F12, Shift + F12", "save the picture, the window"},
         {"Ctrl + S, F5", "save the scene, read it again"},
         {"Ctrl + Z, Ctrl + Y", "undo, redo"},
@@ -307,12 +287,14 @@ void draw_window(nb_panel *panel)
     draw_commands(panel);
     ImGui::Separator();
     draw_look(panel);
-    ImGui::Separator();
     const double reach = find_reach(panel->data->camera);
+    draw_time(panel);
     draw_fog(panel, reach);
     draw_nebulae(panel, reach);
     draw_cells(panel, reach);
+    draw_models(panel, reach);
     draw_lights(panel);
+    draw_classic(panel, reach);
     draw_camera(panel, reach);
     ImGui::PopItemWidth();
     note_area(WINDOW);

@@ -19,10 +19,13 @@ typedef struct nb_panel {
     nb_edition *now;                    /* fog and light, changed in place */
     const nebel_volume_origin *origins; /* of the volumes */
     const char *const *cell_names;
+    const nebel_model *models; /* of the file: their names */
     nb_look *look;
+    const char *note;    /* why the picture is not what was chosen; "": it is */
     double *frame;       /* of what moves */
-    int moves;           /* whether anything does */
-    int camera_is_keyed; /* ... the camera */
+    double frames[2];    /* the first and the last at which anything moves; the same: nothing does */
+    int plays;           /* the frame goes on by itself */
+    int camera_is_keyed; /* the camera moves by its keys */
     int saves_camera;
     const char *message; /* "": none */
     int is_fault;        /* the message says what went wrong */

@@ -48,6 +48,7 @@ static const char show_text[] =
     "    if (compare == 1 && at.x < split * size.x) shown = traced;\n"
     "    if (compare == 1 && abs(at.x - split * size.x) < 1.0) shown = vec3(1.0, 0.75, 0.2);\n"
     "    if (compare == 2) shown = min(abs(drawn - traced) * gain, 1.0);\n"
+    "    if (compare == 3) shown = traced;\n"
     "    color = vec4(floor(shown * 255.0 + threshold(ivec2(at.x, size.y - at.y))) / 255.0, 1.0);\n"
     "}\n";
 

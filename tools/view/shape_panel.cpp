@@ -46,12 +46,14 @@ void make_rotation(const double turns[3], double q[4])
     q[3] = cy * cx * cz + sy * sx * sz;
 }
 
+} // namespace
+
 bool draw_rotation(double rotation[4])
 {
     double turns[3];
     find_turns(rotation, turns);
-    if (!drag("rotation", turns, 3, 50, -DBL_MAX, "%.4g",
-              "Degrees about the vertical, then about the axis to the right, then about the one towards you."))
+    if (!drag("rotation [deg]", turns, 3, 50, -DBL_MAX, "%.4g",
+              "About the vertical, then about the axis to the right, then about the one towards you."))
         return false;
     turns[1] = fmax(-90, fmin(90, turns[1]));
     make_rotation(turns, rotation);
@@ -65,13 +67,16 @@ bool draw_transform(nebel_transform *transform, double reach)
         return false;
     }
     note_place("transform");
-    bool changed = drag_place("position", transform->position, reach, "Moves the shape [m].");
+    bool changed = drag_place("position", transform->position, reach, "Moves the shape.");
     changed |= draw_rotation(transform->rotation);
     changed |= drag("scale", transform->scale, 3, 0.1, -DBL_MAX, "%.4g",
                     "Stretches the shape along its axes, before it is turned. Less than 0 mirrors; 0 is not possible.");
     ImGui::TreePop();
     return changed;
 }
+
+namespace
+{
 
 /* ---- what is made of pieces
  * -------------------------------------------------------------------------------------------
@@ -143,8 +148,8 @@ bool draw_parts(nb_panel *panel, nebel_shape *shape, double reach)
 
 bool draw_axis(nebel_shape *shape, double reach)
 {
-    bool changed = drag_place("from", shape->from, reach, "One end of the axis [m].");
-    return drag_place("to", shape->to, reach, "The other end of the axis [m].") || changed;
+    bool changed = drag_place("from", shape->from, reach, "One end of the axis.");
+    return drag_place("to", shape->to, reach, "The other end of the axis.") || changed;
 }
 
 bool draw_numbers(nb_panel *panel, nebel_shape *shape, double reach)
@@ -152,18 +157,18 @@ bool draw_numbers(nb_panel *panel, nebel_shape *shape, double reach)
     bool changed = false;
     switch (shape->type) {
     case NEBEL_SHAPE_HALF_SPACE:
-        changed = drag_place("point", shape->point, reach, "A place in the plane that bounds the fog [m].");
+        changed = drag_place("point", shape->point, reach, "A place in the plane that bounds the fog.");
         return drag("normal", shape->normal, 3, 1, -DBL_MAX, "%.3g", "Which way the plane faces: out of the fog.") ||
                changed;
     case NEBEL_SHAPE_BOX:
         changed = drag_place("min", shape->min, reach, "The lowest corner [m]: less than max in x, y and z.");
-        return drag_place("max", shape->max, reach, "The highest corner [m].") || changed;
+        return drag_place("max", shape->max, reach, "The highest corner.") || changed;
     case NEBEL_SHAPE_SPHERE:
-        changed = drag_place("center", shape->center, reach, "Where the sphere is [m].");
+        changed = drag_place("center", shape->center, reach, "Where the sphere is.");
         return drag_length("radius", &shape->radius, "From the centre to the surface.") || changed;
     case NEBEL_SHAPE_ELLIPSOID:
-        changed = drag_place("center", shape->center, reach, "Where the ellipsoid is [m].");
-        return drag("radii", shape->radii, 3, 0.01, 1e-6, "%.4g", "From the centre along x, y and z [m].") || changed;
+        changed = drag_place("center", shape->center, reach, "Where the ellipsoid is.");
+        return drag("radii", shape->radii, 3, 0.01, 1e-6, "%.4g", "From the centre along x, y and z.") || changed;
     case NEBEL_SHAPE_CYLINDER:
     case NEBEL_SHAPE_CAPSULE:
         changed = draw_axis(shape, reach);
@@ -218,13 +223,13 @@ bool draw_density_numbers(nebel_density *density, double reach)
     case NEBEL_DENSITY_HEIGHT:
         return draw_height(density, reach);
     case NEBEL_DENSITY_LINEAR:
-        changed = drag_place("none at", density->from, reach, "Where the density is 0 [m].");
-        return drag_place("full at", density->to, reach, "Where the density is 1 [m].") || changed;
+        changed = drag_place("none at", density->from, reach, "Where the density is 0.");
+        return drag_place("full at", density->to, reach, "Where the density is 1.") || changed;
     case NEBEL_DENSITY_RADIAL:
         return slide_whole("power", &density->power, 1, 3, false,
                            "(1 - r^2)^power from the centre to the surface: more is softer.");
     case NEBEL_DENSITY_GAUSSIAN:
-        changed = drag_place("middle", density->center, reach, "Where the fog is thickest [m].");
+        changed = drag_place("middle", density->center, reach, "Where the fog is thickest.");
         return drag_length("sigma", &density->sigma, "How far from there it has thinned to 61 %.") || changed;
     case NEBEL_DENSITY_SOFT_EDGE:
         return drag_length("edge", &density->distance, "How far inside of the surface the fog is full.");

@@ -106,13 +106,31 @@ static int stop(size_t done, size_t total, void *user)
     return stage->was_stopped;
 }
 
+static nebel_gl_method find_method(const nb_look *look)
+{
+    switch (look->method) {
+    case NEBEL_METHOD_CELLS:
+        return NEBEL_GL_METHOD_CELLS;
+    case NEBEL_METHOD_VERTEX:
+        return NEBEL_GL_METHOD_VERTEX;
+    case NEBEL_METHOD_ADDITIVE:
+        return NEBEL_GL_METHOD_ADDITIVE;
+    default:
+        return look->particles == NB_LOOK_AS_DISCS ? NEBEL_GL_METHOD_FIVE_TAP : NEBEL_GL_METHOD_EXACT;
+    }
+}
+
 /* Many particles take long to dim the sun for an eye that moves. */
 static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t width, uint32_t height,
                          const nb_look *look, uint32_t samples, int quick)
 {
-    nebel_gl_frame_desc desc = {
-        .camera = *camera, .width = width, .height = height, .samples = samples, .particles_leave_sun = quick};
-    if (look->particles == NB_LOOK_AS_DISCS) desc.method = NEBEL_GL_METHOD_FIVE_TAP;
+    nebel_gl_frame_desc desc = {.camera = *camera,
+                                .width = width,
+                                .height = height,
+                                .samples = samples,
+                                .particles_leave_sun = quick,
+                                .method = find_method(look),
+                                .cells = stage->cells};
     if (samples > 1) {
         desc.progress = stop;
         desc.progress_user = stage;

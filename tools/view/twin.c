@@ -106,8 +106,18 @@ static void take_light(nebel_scene_data *scene, const nebel_scene_data *light)
 {
     memcpy(scene->background, light->background, sizeof scene->background);
     memcpy(scene->ambient, light->ambient, sizeof scene->ambient);
+    scene->has_sun = light->has_sun;
     memcpy(scene->sun_direction, light->sun_direction, sizeof scene->sun_direction);
     memcpy(scene->sun_irradiance, light->sun_irradiance, sizeof scene->sun_irradiance);
+}
+
+static nebel_result set_method(work *w)
+{
+    const nb_twin_wish *const wish = &w->wish;
+    const nebel_cell_stage stage = wish->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
+    const nebel_result result = nebel_set_renderer_cells(w->renderer, wish->cells, stage);
+    if (result != NEBEL_OK || wish->cells != NULL) return result;
+    return nebel_set_renderer_method(w->renderer, wish->method, &wish->factor);
 }
 
 static nebel_result prepare(work *w)
@@ -115,8 +125,18 @@ static nebel_result prepare(work *w)
     nb_twin *const twin = w->twin;
     const nebel_renderer_desc desc = {.threads = 0};
     take_light(&twin->scene, &w->wish.light);
-    if (w->renderer != NULL) return nebel_set_renderer_fog(w->renderer, w->wish.fog);
-    return nebel_create_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
+    const nebel_result result = w->renderer != NULL
+                                    ? nebel_set_renderer_fog(w->renderer, w->wish.fog)
+                                    : nebel_create_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
+    return result == NEBEL_OK ? set_method(w) : result;
+}
+
+static void forget(nb_twin_wish *wish)
+{
+    nebel_release_snapshot(wish->fog);
+    nebel_destroy_cells(wish->cells);
+    wish->fog = NULL;
+    wish->cells = NULL;
 }
 
 /* Waits for a wish; 0 at the end. */
@@ -130,6 +150,7 @@ static int take_wish(work *w)
     if (goes_on) {
         w->wish = twin->wish;
         twin->wish.fog = NULL;
+        twin->wish.cells = NULL;
         twin->is_asked = 0;
         twin->is_working = 1;
     }
@@ -145,7 +166,8 @@ static int run(void *user)
         if (prepare(&w) == NEBEL_OK) {
             while (make_picture(&w, by) && by > 1) by /= 2;
         }
-        nebel_release_snapshot(w.wish.fog);
+        /* The renderer does not look at cells between frames. */
+        forget(&w.wish);
     }
     nebel_destroy_renderer(w.renderer);
     return 0;
@@ -184,7 +206,7 @@ void nb_twin_close(nb_twin *twin)
     cnd_signal(&twin->news);
     mtx_unlock(&twin->lock);
     (void)thrd_join(twin->thread, NULL);
-    nebel_release_snapshot(twin->wish.fog);
+    forget(&twin->wish);
     cnd_destroy(&twin->news);
     mtx_destroy(&twin->lock);
     free(twin->made.rgb);
@@ -196,13 +218,13 @@ void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish)
 {
     nebel_snapshot *const fog = nebel_retain_snapshot(wish->fog);
     mtx_lock(&twin->lock);
-    nebel_snapshot *const before = twin->wish.fog;
+    nb_twin_wish before = twin->wish;
     twin->wish = *wish;
     twin->wish.fog = fog;
     twin->is_asked = 1;
     cnd_signal(&twin->news);
     mtx_unlock(&twin->lock);
-    nebel_release_snapshot(before);
+    forget(&before);
 }
 
 int nb_twin_take(nb_twin *twin, nb_twin_picture *picture)

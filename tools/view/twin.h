@@ -14,6 +14,9 @@ typedef struct nb_twin_wish {
     nebel_camera camera;
     uint32_t width, height;
     nb_look_plane plane;
+    nebel_method method;
+    nebel_factor_desc factor;
+    nebel_cells *cells;     /* of the methods of that name; the twin's from then on */
     nebel_scene_data light; /* sun, ambient and background of it */
     nebel_snapshot *fog;
 } nb_twin_wish;

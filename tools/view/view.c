@@ -15,6 +15,7 @@
 #include "watch.h"
 #include "window.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,6 +50,7 @@ typedef struct viewer {
     double moved;       /* when something changed last [s] */
     double frame;
     int wants_picture, wants_window_picture;
+    double placing_seconds; /* that models took to be loaded last */
 } viewer;
 
 /* ---- messages
@@ -136,6 +138,8 @@ static int open_window(viewer *all, uint32_t width, uint32_t height)
     const nb_view_settings *const settings = all->settings;
     nb_window *const window = &all->window;
     if (nb_window_open(window, settings->scene, width, height) != NB_DONE) return NB_FAILED;
+    /* Who reads where the controls are waits for them. */
+    if (settings->controls != NULL) window->patience = 0.05;
     nebel_result result = nb_screen_open(&all->log, &all->screen);
     if (result == NEBEL_OK) result = open_stage(all);
     if (result != NEBEL_OK) return fail(all, result);
@@ -173,6 +177,53 @@ static void close_viewer(viewer *all)
     free(all->origins);
 }
 
+/* ---- methods
+ * ---------------------------------------------------------------------------------------------------------
+ */
+
+static int is_of_cells(nebel_method method)
+{
+    return method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL;
+}
+
+static int has_factor(nebel_method method)
+{
+    return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
+}
+
+static int is_of_cpu(nebel_method method)
+{
+    return has_factor(method) || method == NEBEL_METHOD_CELLS_PIXEL;
+}
+
+/* A method whose section has gone is none any longer. */
+static void check_method(viewer *all)
+{
+    const nb_edition *const good = &all->draft.good;
+    const nebel_method method = all->look.method;
+    if ((is_of_cells(method) && good->cells == NULL) || (has_factor(method) && !good->has_classic))
+        all->look.method = NEBEL_METHOD_EXACT;
+}
+
+/* OpenGL does not have all methods, and some of them not from everywhere. */
+static const char *explain_method(const viewer *all)
+{
+    const nebel_method method = all->look.method;
+    const int has_eye = all->draft.data.camera.projection == NEBEL_PROJECTION_PERSPECTIVE;
+    if (is_of_cpu(method)) return "drawn by the CPU alone";
+    return method != NEBEL_METHOD_EXACT && !has_eye ? "drawn by the CPU alone: there is no eye" : "";
+}
+
+/* What can be shown of what is wished for. */
+static nb_look shown_look(const viewer *all)
+{
+    nb_look look = all->look;
+    if (explain_method(all)[0] == '\0') return look;
+    look.method = NEBEL_METHOD_EXACT;
+    look.compare = NB_LOOK_CPU_ALONE;
+    return look;
+}
+
 /* ---- changes
  * ---------------------------------------------------------------------------------------------------------
  */
@@ -186,7 +237,7 @@ static void note_change(viewer *all)
 
 static int is_moving(const viewer *all)
 {
-    return all->settings->screenshot == NULL && all->window.time - all->moved < rest;
+    return all->settings->screenshot == NULL && (all->panel.plays || all->window.time - all->moved < rest);
 }
 
 /* What ends the program: memory that is out, and a context that draws nothing any longer. All else is said, and
@@ -196,12 +247,45 @@ static nebel_result forgive(nebel_result result)
     return result == NEBEL_ERROR_MEMORY || result == NEBEL_ERROR_UNSUPPORTED ? result : NEBEL_OK;
 }
 
+/* A stage with the draft's scene in the place of ours, which stays where that fails. */
+static nebel_result renew_stage(viewer *all)
+{
+    nb_stage old = all->stage;
+    const nebel_result result = open_stage(all);
+    if (result != NEBEL_OK) {
+        nb_stage_close(&all->stage);
+        all->stage = old;
+        return result;
+    }
+    nb_stage_close(&old);
+    return NEBEL_OK;
+}
+
+/* Models that take longer to be loaded follow once the control is let go [s]. */
+static const double quick_placing = 0.1;
+
+static nebel_result place_models(viewer *all)
+{
+    if (!all->draft.models_are_stale) return NEBEL_OK;
+    if (all->panel.is_held && all->placing_seconds > quick_placing) return NEBEL_OK;
+    const double start = nb_window_now();
+    nb_twin_close(all->twin);
+    all->twin = NULL;
+    nebel_result result = nb_draft_place_models(&all->draft);
+    if (result == NEBEL_OK) result = renew_stage(all);
+    all->placing_seconds = nb_window_now() - start;
+    note_change(all);
+    return forgive(result);
+}
+
 /* What the fog does not take is undone and said. */
 static nebel_result use_fog(viewer *all, nebel_result committed)
 {
     if (forgive(committed) != NEBEL_OK) return committed;
     note_change(all);
-    return forgive(set_fog(all));
+    check_method(all);
+    const nebel_result result = forgive(set_fog(all));
+    return result == NEBEL_OK ? place_models(all) : result;
 }
 
 static nebel_result commit(viewer *all)
@@ -229,23 +313,20 @@ static int is_same_camera(const nebel_camera *a, const nebel_camera *b)
 /* The fresh draft in the place of ours, unless it cannot be drawn. */
 static nebel_result replace_draft(viewer *all, const nb_draft *fresh)
 {
-    nb_draft old_draft = all->draft;
-    nb_stage old_stage = all->stage;
+    nb_draft old = all->draft;
     nb_twin_close(all->twin);
     all->twin = NULL;
     all->draft = *fresh;
     nb_edition_show(&all->draft.now, &all->draft.data);
-    const nebel_result result = open_stage(all);
+    const nebel_result result = renew_stage(all);
     if (result != NEBEL_OK) {
-        nb_stage_close(&all->stage);
         nb_draft_close(&all->draft);
-        all->stage = old_stage;
-        all->draft = old_draft;
+        all->draft = old;
         nb_edition_show(&all->draft.now, &all->draft.data);
         return result;
     }
-    nb_stage_close(&old_stage);
-    nb_draft_close(&old_draft);
+    nb_draft_close(&old);
+    check_method(all);
     return NEBEL_OK;
 }
 
@@ -282,7 +363,7 @@ static nebel_result watch_file(viewer *all)
 static nebel_result save(viewer *all)
 {
     const char *const path = all->settings->scene;
-    const int was_newer = all->panel.file_is_newer;
+    const int was_newer = all->panel.file_is_newer, must_read = nb_draft_must_be_read(&all->draft);
     say(all, "");
     if (!was_newer && nb_watch_find_changed(&all->watch) != NULL) {
         all->panel.file_is_newer = 1;
@@ -293,7 +374,7 @@ static nebel_result save(viewer *all)
     nb_report_message("view: saved %s", path);
     all->panel.file_is_newer = 0;
     nb_watch_take(&all->watch);
-    const nebel_result used = was_newer ? read_again(all) : use_fog(all, NEBEL_OK);
+    const nebel_result used = was_newer || must_read ? read_again(all) : use_fog(all, NEBEL_OK);
     if (all->message[0] == '\0') say(all, "Saved.");
     return used;
 }
@@ -360,7 +441,21 @@ static nebel_result obey_panel(viewer *all)
     if (panel->fog_changed && result == NEBEL_OK) result = commit(all);
     if (panel->frame_changed && result == NEBEL_OK) result = use_fog(all, nb_draft_set_frame(&all->draft, all->frame));
     if (!panel->is_held) nb_history_close(&all->draft.history);
+    if (!panel->is_held && result == NEBEL_OK) result = place_models(all);
     return result;
+}
+
+/* From the last frame on it begins again. */
+static nebel_result play(viewer *all)
+{
+    const double *const range = all->panel.frames, length = range[1] - range[0];
+    if (!all->panel.plays) return NEBEL_OK;
+    if (!(length > 0)) {
+        all->panel.plays = 0;
+        return NEBEL_OK;
+    }
+    const double frame = all->draft.frame - range[0] + all->look.rate * all->window.elapsed;
+    return use_fog(all, nb_draft_set_frame(&all->draft, range[0] + frame - length * floor(frame / length)));
 }
 
 /* Those of the keys and of the panel's buttons, one at a time. */
@@ -401,7 +496,9 @@ static int fill_panel(viewer *all)
     all->frame = all->draft.frame;
     panel->frame = &all->frame;
     panel->camera_is_keyed = !nb_draft_can_save_camera(&all->draft);
-    panel->moves = data->moving_volume_count > 0 || data->camera_key_count > 0 || data->turntable_frames > 0;
+    panel->models = nebel_scene_contents(all->draft.scene)->models;
+    panel->note = explain_method(all);
+    if (!nb_draft_find_frames(&all->draft, panel->frames)) panel->frames[0] = panel->frames[1] = 0;
     panel->is_changed = nb_draft_is_changed(&all->draft);
     panel->has_past = all->draft.history.at > 0;
     panel->has_future = all->draft.history.at < all->draft.history.count;
@@ -410,7 +507,7 @@ static int fill_panel(viewer *all)
     panel->picture = states[all->stage.state];
     panel->seconds = all->stage.seconds;
     panel->samples = all->stage.samples;
-    panel->cpu_seconds = all->look.compare != NB_LOOK_GL_ALONE && all->has_cpu ? all->cpu_seconds : 0;
+    panel->cpu_seconds = shown_look(all).compare != NB_LOOK_GL_ALONE && all->has_cpu ? all->cpu_seconds : 0;
     return NB_DONE;
 }
 
@@ -418,30 +515,43 @@ static int fill_panel(viewer *all)
  * ------------------------------------------------------------------------------------------------
  */
 
-static void ask_twin(viewer *all)
+/* NULL where the method needs none. */
+static nebel_result make_cells(viewer *all, nebel_cells **cells)
 {
-    nebel_snapshot *fog = NULL;
-    if (nb_draft_whole(&all->draft, &fog) != NEBEL_OK) return;
-    const nb_twin_wish wish = {.camera = all->draft.data.camera,
-                               .width = all->window.width,
-                               .height = all->window.height,
-                               .plane = all->look.plane,
-                               .light = all->draft.data,
-                               .fog = fog};
-    if (all->twin == NULL) all->twin = nb_twin_open(&all->draft.data);
-    if (all->twin == NULL) {
+    *cells = NULL;
+    if (!is_of_cells(all->look.method)) return NEBEL_OK;
+    nebel_cells_desc desc = all->draft.good.cells_desc;
+    desc.log = all->log;
+    return nebel_create_cells(&desc, cells);
+}
+
+static nebel_result ask_twin(viewer *all)
+{
+    nb_twin_wish wish = {.camera = all->draft.data.camera,
+                         .width = all->window.width,
+                         .height = all->window.height,
+                         .plane = all->look.plane,
+                         .method = all->look.method,
+                         .factor = all->draft.good.classic,
+                         .light = all->draft.data};
+    nebel_result result = nb_draft_whole(&all->draft, &wish.fog);
+    if (result == NEBEL_OK && all->twin == NULL) all->twin = nb_twin_open(&all->draft.data);
+    if (result == NEBEL_OK && all->twin == NULL) {
         say(all, "Memory or threads are out for the picture of the CPU.");
-        return;
+        return NEBEL_ERROR_MEMORY;
     }
+    if (result == NEBEL_OK) result = make_cells(all, &wish.cells);
+    if (result != NEBEL_OK) return result;
     nb_twin_ask(all->twin, &wish);
     all->twin_is_stale = 0;
+    return NEBEL_OK;
 }
 
 static void compare(viewer *all)
 {
     nb_twin_picture picture;
-    if (all->look.compare == NB_LOOK_GL_ALONE) return;
-    if (all->twin_is_stale) ask_twin(all);
+    if (shown_look(all).compare == NB_LOOK_GL_ALONE) return;
+    if (all->twin_is_stale) (void)ask_twin(all);
     if (all->twin == NULL || !nb_twin_take(all->twin, &picture)) return;
     nb_screen_set_cpu(&all->screen, picture.width, picture.height, picture.rgb);
     all->has_cpu = 1;
@@ -451,7 +561,7 @@ static void compare(viewer *all)
 static int is_complete(const viewer *all)
 {
     if (all->stage.state != NB_STAGE_FINE) return 0;
-    return all->look.compare == NB_LOOK_GL_ALONE || all->twin == NULL ||
+    return shown_look(all).compare == NB_LOOK_GL_ALONE || all->twin == NULL ||
            (!all->twin_is_stale && nb_twin_is_done(all->twin));
 }
 
@@ -490,7 +600,8 @@ static int show(viewer *all)
 {
     const nb_window *const window = &all->window;
     compare(all);
-    nb_screen_draw(&all->screen, all->stage.texture, all->has_cpu, &all->look, window->width, window->height);
+    const nb_look look = shown_look(all);
+    nb_screen_draw(&all->screen, all->stage.texture, all->has_cpu, &look, window->width, window->height);
     int status = take_pictures(all, 0);
     if (status == NB_DONE) status = fill_panel(all);
     if (status != NB_DONE) return status;
@@ -504,8 +615,10 @@ static int show(viewer *all)
 static nebel_result draw(viewer *all)
 {
     nb_window *const window = &all->window;
+    const nb_look look = shown_look(all);
+    all->stage.cells = all->draft.cells;
     const nebel_result result =
-        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &all->look, is_moving(all));
+        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
     if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
     return nb_window_is_lost(window) ? NEBEL_OK : forgive(result);
 }
@@ -520,6 +633,7 @@ static int turn(viewer *all)
     nb_hands_move(&all->hands, window, &all->draft.data.camera, &all->look);
     obey_keys(all);
     nebel_result result = watch_file(all);
+    if (result == NEBEL_OK) result = play(all);
     if (result == NEBEL_OK) result = draw(all);
     if (result != NEBEL_OK) return fail(all, result);
     const int status = show(all);
@@ -530,9 +644,10 @@ static int turn(viewer *all)
 
 int nb_view_run(const nb_view_settings *settings)
 {
-    viewer all = {.settings = settings,
-                  .look = {.exposure = settings->exposure, .split = .5, .gain = 16, .range = 50, .samples = 4},
-                  .panel = {.shown = 1}};
+    viewer all = {
+        .settings = settings,
+        .look = {.exposure = settings->exposure, .split = .5, .gain = 16, .range = 50, .samples = 4, .rate = 24},
+        .panel = {.shown = 1}};
     all.log = (nebel_log){.write = listen, .user = &all};
     nb_interrupt_listen();
     int status = open_viewer(&all);

@@ -49,7 +49,8 @@ static void on_button(GLFWwindow *handle, int button, int action, int modifiers)
 {
     const nb_window_event_kind kind = action == GLFW_RELEASE ? NB_WINDOW_BUTTON_UP : NB_WINDOW_BUTTON_DOWN;
     nb_window_event event = {.kind = kind, .code = button, .modifiers = modifiers};
-    glfwGetCursorPos(handle, &event.x, &event.y);
+    event.x = find_window(handle)->cursor_x;
+    event.y = find_window(handle)->cursor_y;
     add_event(handle, event);
 }
 
@@ -60,6 +61,8 @@ static void on_wheel(GLFWwindow *handle, double x, double y)
 
 static void on_cursor(GLFWwindow *handle, double x, double y)
 {
+    find_window(handle)->cursor_x = x;
+    find_window(handle)->cursor_y = y;
     add_event(handle, (nb_window_event){.kind = NB_WINDOW_MOTION, .x = x, .y = y});
 }
 
@@ -120,6 +123,7 @@ static void listen(nb_window *window)
     (void)glfwSetMouseButtonCallback(window->handle, on_button);
     (void)glfwSetScrollCallback(window->handle, on_wheel);
     (void)glfwSetCursorPosCallback(window->handle, on_cursor);
+    glfwGetCursorPos(window->handle, &window->cursor_x, &window->cursor_y);
     (void)glfwSetFramebufferSizeCallback(window->handle, on_size);
 }
 
@@ -161,7 +165,7 @@ void nb_window_wait(nb_window *window, int busy)
     const double before = window->time;
     if (window->news) window->awake = SETTLING;
     if (window->width == 0 || (!busy && window->awake == 0 && !window->news)) {
-        glfwWaitEventsTimeout(longest_wait);
+        glfwWaitEventsTimeout(window->patience > 0 && window->width > 0 ? window->patience : longest_wait);
     } else {
         glfwPollEvents();
     }
@@ -182,6 +186,11 @@ void nb_window_poll(nb_window *window)
 int nb_window_has_news(const nb_window *window)
 {
     return window->news;
+}
+
+double nb_window_now(void)
+{
+    return glfwGetTime();
 }
 
 void nb_window_show(nb_window *window)

@@ -31,12 +31,14 @@ typedef struct nb_window {
     int was_resized;
     nb_window_event events[NB_WINDOW_EVENTS]; /* that wait; who takes them sets event_count to 0 */
     int event_count;
-    int news;         /* events since the turn began */
-    int awake;        /* turns that do not wait */
-    char driver[256]; /* GL_RENDERER and GL_VERSION */
-    int can_be_lost;  /* the driver would say so */
-    int is_lost;      /* it has */
-    double scale;     /* of what people read: 1 on a screen of 96 pixels per inch */
+    double cursor_x, cursor_y; /* after the events so far: where the cursor is by now says nothing about a press */
+    int news;                  /* events since the turn began */
+    int awake;                 /* turns that do not wait */
+    char driver[256];          /* GL_RENDERER and GL_VERSION */
+    int can_be_lost;           /* the driver would say so */
+    int is_lost;               /* it has */
+    double scale;              /* of what people read: 1 on a screen of 96 pixels per inch */
+    double patience;           /* s: how long a turn waits at most where nothing happens; 0: a quarter */
 } nb_window;
 
 /* A window with a context of OpenGL 3.3 core, which is current. Returns an exit status; what went wrong was said. */
@@ -51,6 +53,9 @@ void nb_window_wait(nb_window *window, int busy);
 /* In the middle of a turn: whether something has happened that somebody waits for. */
 void nb_window_poll(nb_window *window);
 int nb_window_has_news(const nb_window *window);
+
+/* Now [s], on the clock of the turns. */
+double nb_window_now(void);
 
 void nb_window_show(nb_window *window);
 int nb_window_is_ended(const nb_window *window);

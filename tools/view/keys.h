@@ -1,0 +1,34 @@
+/* Fog that moves: keys of volumes in an edition. */
+#ifndef NB_KEYS_H
+#define NB_KEYS_H
+
+#include "edition.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Puts what a volume is now into its key at a frame, which is made where there is none; the first one makes it move. 0,
+ * or -1 where memory is out and nothing has changed. */
+int nb_keys_set(nb_edition *edition, size_t volume, double frame);
+
+/* Without its last key a volume stays as it was there. */
+void nb_keys_remove(nb_edition *edition, size_t volume, size_t key);
+
+/* Moves a key to another frame, no further than to its neighbours. */
+void nb_keys_move(nb_edition *edition, size_t volume, size_t key, double frame);
+
+/* All that moves, as it is at a frame. */
+void nb_keys_place(nb_edition *edition, double frame);
+
+/* What was changed by hand since `before`, of the same volumes at the same frame, goes into keys: numbers that move
+ * into the key of that frame, all else into all keys. 0, or -1 where memory is out. */
+int nb_keys_store(nb_edition *edition, const nb_edition *before, double frame);
+
+/* The first and the last frame of all keys; 0: there is none. */
+int nb_keys_find_range(const nb_edition *edition, double range[2]);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,261 @@
+// Time, models, light, classic fog and the camera.
+#include "scene_panel.h"
+
+#include "controls.h"
+#include "fog_panel.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+namespace
+{
+
+using namespace controls;
+
+const double degree = 3.14159265358979323846 / 180;
+
+/* ---- light
+ * -----------------------------------------------------------------------------------------------------------
+ */
+
+bool is_black(const double rgb[3])
+{
+    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
+}
+
+bool is_any_lit(const nb_edition *now)
+{
+    for (size_t i = 0; i < now->count; i++)
+        if (!is_black(now->volumes[i].albedo)) return true;
+    return false;
+}
+
+// In the middle of the sky, so that one sees what it does.
+void add_sun(nb_edition *now)
+{
+    now->has_sun = 1;
+    for (int i = 0; i < 3; i++) {
+        now->sun_direction[i] = i == 1 ? 0.8 : i == 0 ? 0.36 : 0.48;
+        now->sun_irradiance[i] = 3;
+    }
+}
+
+bool draw_sun(nb_edition *now)
+{
+    double *const d = now->sun_direction;
+    double height = asin(fmax(-1, fmin(1, d[1]))) / degree, turn = atan2(d[0], d[2]) / degree;
+    bool changed =
+        slide("sun turn", &turn, -180, 180, "%.1f deg", false, "Where it stands, seen from above: 0 is along z.");
+    changed |= slide("sun height", &height, -89, 89, "%.1f deg", false, "How high it stands above the horizon.");
+    if (changed) {
+        d[0] = cos(height * degree) * sin(turn * degree);
+        d[1] = sin(height * degree);
+        d[2] = cos(height * degree) * cos(turn * degree);
+    }
+    changed |= pick("sun", now->sun_irradiance, false,
+                    "Irradiance on a surface that faces the sun, before any fog. It lights surfaces, not yet fog.");
+    if (!press("Remove the sun", "Takes it out of the scene. Ctrl + Z brings it back.")) return changed;
+    now->has_sun = 0;
+    return true;
+}
+
+bool draw_missing_sun(nb_edition *now)
+{
+    const bool is_possible = !is_any_lit(now);
+    const bool wants = press_if(is_possible, "Add a sun", "Lights surfaces, through all fog on its way.");
+    if (!is_possible) ImGui::TextDisabled("no sun beside fog with an albedo");
+    if (wants) add_sun(now);
+    return wants;
+}
+
+/* 0 and 1 are no limit. */
+bool draw_opacity(nb_edition *now)
+{
+    double opacity = now->max_opacity > 0 ? now->max_opacity : 1;
+    if (!slide("most opacity", &opacity, 0.01, 1, opacity < 1 ? "%.2f" : "no limit", false,
+               "All fog together hides no more than this. A look, not physics."))
+        return false;
+    now->max_opacity = opacity;
+    return true;
+}
+
+/* ---- models
+ * ----------------------------------------------------------------------------------------------------------
+ */
+
+const char *name_of(const char *path)
+{
+    const char *const folder_end = strrchr(path, '/');
+    return folder_end != nullptr ? folder_end + 1 : path;
+}
+
+// Scales of 0 would leave nothing.
+bool draw_scale(nebel_model *model)
+{
+    double scales[3] = {model->scale[0], model->scale[1], model->scale[2]};
+    if (!drag("scale", scales, 3, 0.1, -DBL_MAX, "%.4g",
+              "Stretches the model, before it is turned. Less than 0 mirrors."))
+        return false;
+    for (int i = 0; i < 3; i++)
+        if (scales[i] != 0) model->scale[i] = scales[i];
+    return true;
+}
+
+bool draw_model_place(nebel_model *model, double reach)
+{
+    bool changed = drag_place("position", model->position, reach, "Where the model is.");
+    if (!model->is_heightfield) {
+        changed |= draw_rotation(model->rotation);
+        return draw_scale(model) || changed;
+    }
+    changed |= drag("size [m]", model->size, 2, reach / 10, 1e-6, "%.4g", "How far it reaches along x and z.");
+    return drag_length("height", &model->height, "Of white above black.") || changed;
+}
+
+bool draw_model(nebel_model *model, double reach, bool *goes)
+{
+    if (model->has_fog) ImGui::TextDisabled("brings fog, which follows once it is saved");
+    bool changed = draw_model_place(model, reach);
+    changed |= tick("one colour", &model->has_color, "In the place of the model's own colours and textures.");
+    if (model->has_color) changed |= pick("colour", model->color, true, "What share of the light it sends back.");
+    *goes = press("Remove", "Takes the model out of the scene. Ctrl + Z brings it back.");
+    return changed;
+}
+
+bool draw_model_header(nb_panel *panel, size_t index, double reach, bool *goes)
+{
+    nebel_model *const model = &panel->now->models[index];
+    const Owner owner("models", model->source);
+    char title[160];
+    snprintf(title, sizeof title, "%.100s###model", name_of(panel->models[model->source].file));
+    const bool is_open = ImGui::CollapsingHeader(title);
+    note_place("open");
+    if (!is_open) return false;
+    ImGui::Indent(4 * scale);
+    const bool changed = draw_model(model, reach, goes);
+    ImGui::Unindent(4 * scale);
+    return changed;
+}
+
+/* ---- classic fog
+ * -----------------------------------------------------------------------------------------------------
+ */
+
+bool draw_factor(nebel_factor_desc *factor, double reach)
+{
+    static const char *const coordinates[] = {"depth", "distance"}, *const stages[] = {"vertex", "pixel"};
+    int coordinate = factor->coordinate, stage = factor->stage;
+    bool changed = drag("start", &factor->start, 1, reach / 10, -DBL_MAX, "%.4g m", "Linear: where fog begins.");
+    changed |= drag("end", &factor->end, 1, reach / 10, -DBL_MAX, "%.4g m", "Linear: where nothing but fog is seen.");
+    changed |= slide("density", &factor->density, 1e-4, 10, "%.4g / m", true, "Exp and exp2: how thick the fog is.");
+    changed |= pick("colour", factor->color, false, "Of opaque fog.");
+    changed |= choose("coordinate", &coordinate, coordinates, 2,
+                      "What counts as far: the depth along the camera's axis, which changes when the camera turns, or "
+                      "the distance to the camera.");
+    changed |= choose("stage", &stage, stages, 2, "Computed at each vertex and linear in between, or at each pixel.");
+    factor->coordinate = nebel_factor_coordinate(coordinate);
+    factor->stage = nebel_factor_stage(stage);
+    return changed;
+}
+
+/* ---- camera
+ * ----------------------------------------------------------------------------------------------------------
+ */
+
+// What is in the middle stays as large as it is.
+void change_projection(nebel_camera *camera, nebel_projection projection, double reach)
+{
+    const double tangent = tan(camera->vertical_fov * degree / 2);
+    if (projection == NEBEL_PROJECTION_ORTHOGRAPHIC) camera->view_height = 2 * reach * tangent;
+    camera->projection = projection;
+}
+
+bool draw_projection(nebel_camera *camera, double reach)
+{
+    static const char *const names[] = {"perspective", "orthographic"};
+    int projection = camera->projection;
+    bool changed = choose("projection", &projection, names, 2,
+                          "Perspective, or without any: things far away are as large as near ones.");
+    if (changed) change_projection(camera, nebel_projection(projection), reach);
+    if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
+        return drag_length("view height", &camera->view_height, "What the height of the picture shows.") || changed;
+    return slide("field of view", &camera->vertical_fov, 1, 150, "%.1f deg", false, "From bottom to top.") || changed;
+}
+
+} // namespace
+
+void draw_time(nb_panel *panel)
+{
+    const bool moves = panel->frames[0] < panel->frames[1];
+    const double low = fmin(moves ? panel->frames[0] : 0, *panel->frame);
+    const double high = fmax(moves ? panel->frames[1] : 100, *panel->frame);
+    if (!open_section("Time", moves)) return;
+    panel->frame_changed |= slide("frame", panel->frame, low, high, "%.0f", false,
+                                  "Of the camera and the fog that move. Ctrl + click types a number in.");
+    if (press_if(moves, panel->plays ? "Stop" : "Play", "From the first key to the last, again and again."))
+        panel->plays = !panel->plays;
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(110 * scale);
+    slide_whole("per second", &panel->look->rate, 1, 60, false, "Frames.");
+}
+
+void draw_models(nb_panel *panel, double reach)
+{
+    nb_edition *const now = panel->now;
+    size_t gone = now->model_count;
+    if (now->model_count == 0) return;
+    ImGui::Text("Models: %u", unsigned(now->model_count));
+    for (size_t i = 0; i < now->model_count; i++) {
+        bool goes = false;
+        panel->fog_changed |= draw_model_header(panel, i, reach, &goes);
+        if (goes) gone = i;
+    }
+    if (gone == now->model_count) return;
+    memmove(now->models + gone, now->models + gone + 1, (now->model_count - gone - 1) * sizeof *now->models);
+    now->model_count--;
+    panel->fog_changed = 1;
+}
+
+void draw_lights(nb_panel *panel)
+{
+    nb_edition *const now = panel->now;
+    if (!open_section("Light", false)) return;
+    bool changed =
+        pick("ambient", now->ambient, false, "Radiance from everywhere. Lights surfaces, and fog with an albedo.");
+    changed |= pick("background", now->background, false, "Radiance where no surface is: the sky.");
+    changed |= draw_opacity(now);
+    panel->fog_changed |= (now->has_sun ? draw_sun(now) : draw_missing_sun(now)) || changed;
+}
+
+void draw_classic(nb_panel *panel, double reach)
+{
+    nb_edition *const now = panel->now;
+    if (!open_section("Classic fog", false)) return;
+    const Owner owner("classic", 0);
+    if (!now->has_classic) {
+        if (!press("Add", "Numbers for the methods linear, exp and exp2, which fog surfaces in one colour.")) return;
+        now->has_classic = 1;
+        panel->fog_changed = 1;
+        return;
+    }
+    panel->fog_changed |= draw_factor(&now->classic, reach);
+    if (!press("Remove", "Takes the section out of the scene. Ctrl + Z brings it back.")) return;
+    now->has_classic = 0;
+    panel->fog_changed = 1;
+}
+
+void draw_camera(nb_panel *panel, double reach)
+{
+    nebel_camera *const camera = &panel->data->camera;
+    if (!open_section("Camera", false)) return;
+    bool changed = draw_projection(camera, reach);
+    changed |= drag_place("eye", camera->position, reach, "Where the camera is.");
+    changed |= drag_place("look at", camera->look_at, reach, "What is in the middle, and what a drag orbits about.");
+    changed |= drag("up", camera->up, 3, 1, -DBL_MAX, "%.3g", "Which way is up in the picture.");
+    panel->camera_changed |= changed;
+    if (panel->camera_is_keyed)
+        ImGui::TextDisabled("moves: changes here are not saved");
+    else
+        tick("save the camera, too", &panel->saves_camera, "Save writes where the camera is now into the file.");
+}

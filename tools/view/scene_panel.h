@@ -1,0 +1,14 @@
+// The controls of what stands around the fog: time, models, light, classic fog, camera. C++: behind panel.h only.
+#ifndef NB_SCENE_PANEL_H
+#define NB_SCENE_PANEL_H
+
+#include "panel.h"
+
+// `reach` is how far away what is looked at is [m]: what steps are measured by.
+void draw_time(nb_panel *panel);
+void draw_models(nb_panel *panel, double reach);
+void draw_lights(nb_panel *panel);
+void draw_classic(nb_panel *panel, double reach);
+void draw_camera(nb_panel *panel, double reach);
+
+#endif
