@@ -62,15 +62,12 @@ typedef struct block {
     float light[3][NB_VERTEX_BLOCK];
 } block;
 
+/* Bytes; of longer ones most is not read. */
+enum { LONGEST_STRUCTURE = 256 };
+
 static const unsigned char *position_at(const nebel_vertices *vertices, size_t i)
 {
     return (const unsigned char *)vertices->positions + i * vertices->position_stride;
-}
-
-/* So far ahead, two pages, memory is asked for a structure that will be read and written. */
-static void fetch_ahead(const unsigned char *structure)
-{
-    __builtin_prefetch((const void *)((uintptr_t)structure + 8192), 1);
 }
 
 /* The block's positions one after the other: where they are, or copied. */
@@ -80,7 +77,6 @@ static const float *gather_points(const nebel_vertices *vertices, block *b)
     const unsigned char *from = position_at(vertices, b->first);
     if (stride == size && (uintptr_t)from % _Alignof(float) == 0) return (const float *)(const void *)from;
     for (size_t i = 0; i < b->count; i++, from += stride) {
-        fetch_ahead(from);
         memcpy(b->points + 3 * i, from, size);
     }
     return b->points;
@@ -118,11 +114,22 @@ static nebel_result trace_block(const call *c, block *b)
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
 
+/* Structures are so much memory that the next block's are asked for while this one's fog is found. */
 static void transmit_block(const call *c, block *b)
 {
-    const size_t size = 3 * sizeof(float);
-    transmit_kernels[c->level](&(nb_transmit_job){c->boxes, c->snapshot->medium_count, b->count, c->start,
-                                                  gather_points(&c->vertices, b), 0, size, sizeof(float), b->factor});
+    const size_t stride = c->vertices.position_stride;
+    nb_transmit_job job = {.boxes = c->boxes,
+                           .box_count = c->snapshot->medium_count,
+                           .count = b->count,
+                           .from = c->start,
+                           .to = gather_points(&c->vertices, b),
+                           .to_stride = 3 * sizeof(float),
+                           .out_stride = sizeof(float),
+                           .out = b->factor,
+                           .next_stride = stride};
+    if (stride != job.to_stride && stride <= LONGEST_STRUCTURE)
+        job.next = (const void *)((uintptr_t)position_at(&c->vertices, b->first) + b->count * stride);
+    transmit_kernels[c->level](&job);
 }
 
 /* A last packet reaches beyond the vertices, and is to find numbers there. */
@@ -167,11 +174,18 @@ static void write_block(const call *c, const nebel_vertex_output *outputs, size_
     }
 }
 
+/* Small blocks of structures, so that those of the next one have room in the nearest cache, too. */
+static size_t most_in_block(const call *c)
+{
+    return c->vertices.position_stride == 3 * sizeof(float) ? NB_VERTEX_BLOCK : NB_VERTEX_BLOCK / 4;
+}
+
 static nebel_result run(const call *c, size_t n, const nebel_vertex_output *outputs, size_t output_count)
 {
+    const size_t most = most_in_block(c);
     block b;
     for (b.first = 0; b.first < n; b.first += b.count) {
-        b.count = n - b.first < NB_VERTEX_BLOCK ? n - b.first : NB_VERTEX_BLOCK;
+        b.count = n - b.first < most ? n - b.first : most;
         const nebel_result result = find_factors(c, &b);
         if (result != NEBEL_OK) return result;
         write_block(c, outputs, output_count, &b);

@@ -13,6 +13,8 @@ typedef struct nb_transmit_job {
     const float *from, *to; /* three floats each; strides in bytes */
     size_t from_stride, to_stride, out_stride;
     float *out;
+    const void *next; /* memory that is wanted afterwards, next_stride bytes for each segment; NULL: none */
+    size_t next_stride;
 } nb_transmit_job;
 
 typedef void nb_transmit_fn(const nb_transmit_job *job);

@@ -132,6 +132,15 @@ NB_INLINE void fetch_points(const float *points, size_t next, size_t line)
     for (size_t k = 0; k < 3; k++) __builtin_prefetch(beyond(points, 3 * next + line + PAGE * k), 0);
 }
 
+/* Asks for what the caller will want afterwards, the part that comes to the next LINE segments: while these are worked
+ * on memory has nothing else to do. */
+NB_INLINE void fetch_next(const nb_transmit_job *job, size_t i)
+{
+    enum { BYTES = 64 };
+    const uintptr_t first = (uintptr_t)job->next + i * job->next_stride, end = first + LINE * job->next_stride;
+    for (uintptr_t p = first; p < end; p += BYTES) __builtin_prefetch((const void *)p, 1);
+}
+
 /* Before the first of every LINE segments: asks memory for what the next PAGE of them needs there, one line of each of
  * its pages. Processors fetch ahead by themselves, but begin anew in every page and only once its address is
  * translated, and packets are too long for them to get there in time. Several pages at once keep as many requests under
@@ -139,7 +148,9 @@ NB_INLINE void fetch_points(const float *points, size_t next, size_t line)
 NB_INLINE void fetch_ahead(const nb_transmit_job *job, size_t i)
 {
     const size_t line = i % PAGE, next = i - line + PAGE;
-    if (i % LINE != 0 || next + PAGE > job->count) return;
+    if (i % LINE != 0) return;
+    if (job->next != NULL) fetch_next(job, i);
+    if (next + PAGE > job->count) return;
     fetch_points(job->to, next, line);
     if (job->from_stride != 0) fetch_points(job->from, next, line);
     __builtin_prefetch(beyond(job->out, next + line), 1);

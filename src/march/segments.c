@@ -90,6 +90,7 @@ nebel_result nebel_transmit_segments(const nebel_snapshot *snapshot, nebel_isa i
     nb_fog_box boxes[NB_FOG_BOXES];
     if (!nb_boxes_list(snapshot, s.origin, channel, s.ignore_distances, boxes))
         return trace_segments(snapshot, isa, channel, n, &s, out, stride);
-    kernel(&(nb_transmit_job){boxes, snapshot->medium_count, n, s.from, s.to, s.from_stride, s.to_stride, stride, out});
+    kernel(&(nb_transmit_job){boxes, snapshot->medium_count, n, s.from, s.to, s.from_stride, s.to_stride, stride, out,
+                              NULL, 0});
     return NEBEL_OK;
 }
