@@ -11,7 +11,7 @@ set(nebel_flags_sse2 -msse2)
 set(nebel_flags_avx2 -mavx2 -mfma)
 set(nebel_flags_avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mavx2)
 
-if(CMAKE_SIZEOF_VOID_P EQUAL 8 AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+if(nebel_is_x86_32 OR (CMAKE_SIZEOF_VOID_P EQUAL 8 AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$"))
     set(nebel_levels scalar sse2 avx2 avx512)
 elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
     set(nebel_levels scalar neon)
@@ -21,7 +21,7 @@ endif()
 
 # gcc aligns the stack to 16 bytes on 64-bit Windows but moves wide vectors there as if it were to 32 or 64 (gcc bug 54412; Debian's
 # gcc is mended). Assemblers since binutils 2.38 can make unaligned moves of these, as fast where the address is aligned.
-if(MINGW AND CMAKE_C_COMPILER_ID STREQUAL GNU AND "avx2" IN_LIST nebel_levels)
+if(MINGW AND NOT nebel_is_x86_32 AND CMAKE_C_COMPILER_ID STREQUAL GNU AND "avx2" IN_LIST nebel_levels)
     include(CheckCCompilerFlag)
     set(unaligned_moves -Wa,-muse-unaligned-vector-move)
     check_c_compiler_flag(${unaligned_moves} NEBEL_HAVE_UNALIGNED_MOVES)

@@ -13,6 +13,16 @@ endif()
 # Results must be the same bits in every build: no fused multiply-add unless written, no errno from the maths library.
 set(nebel_arithmetic -ffp-contract=off -fno-math-errno)
 
+# For x86 in 32 bits gcc computes in the x87 unit, whose results are wider and hang on the thread's setting. Windows promises only 4
+# bytes of alignment for the stack there.
+if(CMAKE_SIZEOF_VOID_P EQUAL 4 AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(i[3-6]86|x86|x86_64|AMD64|amd64)$")
+    set(nebel_is_x86_32 ON)
+    list(APPEND nebel_arithmetic -msse2 -mfpmath=sse)
+    if(MINGW)
+        list(APPEND nebel_arithmetic -mstackrealign)
+    endif()
+endif()
+
 set(nebel_sanitizers "")
 if(NEBEL_SANITIZE)
     set(nebel_sanitizers -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)

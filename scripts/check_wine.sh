@@ -1,7 +1,8 @@
 #!/bin/bash
 # check_wine.sh BUILD: the core as a Windows library. Builds it and its tests with MinGW in BUILD/windows and runs them in Wine, whose
-# prefix (700 MB) is BUILD/wine-prefix; compares the bits of light with those of BUILD/libnebel.a, where that is. Where MinGW or Wine are
-# missing it says so and succeeds, unless CI=true.
+# prefix (700 MB) is BUILD/wine-prefix; compares the bits of light, static and from a DLL, with those of BUILD/libnebel.a, where that is.
+# Builds the same for 32 bits in BUILD/windows-32, and runs it where there is a Wine of 32 bits (WINE32; Debian: wine32 of i386). Where
+# MinGW or Wine are missing it says so and succeeds, unless CI=true.
 set -euo pipefail
 
 build=$(cd "${1:?usage: check_wine.sh BUILD}" && pwd)
@@ -9,9 +10,10 @@ source=$(cd "$(dirname "$0")/.." && pwd)
 windows=$build/windows
 wine=$source/tests/cross/wine.sh
 export NEBEL_WINE_PREFIX=$build/wine-prefix
+wine32=${WINE32:-$(ls /usr/lib/wine/wine 2>/dev/null || true)}
 
 missing=()
-for program in x86_64-w64-mingw32-gcc /usr/lib/wine/wine64 /usr/lib/wine/wineserver64 xvfb-run; do
+for program in x86_64-w64-mingw32-gcc i686-w64-mingw32-gcc /usr/lib/wine/wine64 /usr/lib/wine/wineserver64 xvfb-run; do
     command -v "$program" >/dev/null || missing+=("$program")
 done
 if [ ${#missing[@]} -gt 0 ]; then
@@ -20,11 +22,34 @@ if [ ${#missing[@]} -gt 0 ]; then
     exit 0
 fi
 
+# configure FOLDER TOOLCHAIN [OPTION...]
+configure() {
+    local folder=$1 toolchain=$2
+    shift 2
+    cmake -S "$source" -B "$build/$folder" --toolchain "$source/cmake/$toolchain.cmake" -DNEBEL_WERROR=ON -DNEBEL_BUILD_SCENE=OFF \
+        -DNEBEL_BUILD_CPU=OFF -DNEBEL_BUILD_GL=OFF -DCMAKE_CROSSCOMPILING_EMULATOR="$wine" "$@"
+}
+
 build_windows() {
-    cmake -S "$source" -B "$windows" --toolchain "$source/cmake/mingw-w64.cmake" -DNEBEL_WERROR=ON -DNEBEL_BUILD_SCENE=OFF \
-        -DNEBEL_BUILD_CPU=OFF -DNEBEL_BUILD_GL=OFF \
-        -DCMAKE_CROSSCOMPILING_EMULATOR="$wine"
+    configure windows mingw-w64
     cmake --build "$windows" -j "$(nproc)"
+    configure windows-dll mingw-w64 -DBUILD_SHARED_LIBS=ON -DCMAKE_RUNTIME_OUTPUT_DIRECTORY="$build/windows-dll/bin"
+    cmake --build "$build/windows-dll" -j "$(nproc)" --target bits
+    configure windows-32 mingw-w64-32
+    cmake --build "$build/windows-32" -j "$(nproc)"
+}
+
+# What the DLL gives away, and what it needs of others.
+check_dll() {
+    local dll=$build/windows-dll/bin/libnebel.dll described names needed
+    described=$(x86_64-w64-mingw32-objdump -p "$dll")
+    names=$(sed -n '/Ordinal\/Name/,/^$/p' <<<"$described" | awk '/^\t\[/ { print $NF }')
+    needed=$(sed -n 's/.*DLL Name: //p' <<<"$described" | grep -viE '^(kernel32|msvcrt)\.dll$' || true)
+    if [ -z "$names" ] || grep -qv '^nebel_' <<<"$names" || [ -n "$needed" ]; then
+        echo "check_wine: libnebel.dll exports $(grep -v '^nebel_' <<<"$names" | xargs), needs $needed"
+        exit 1
+    fi
+    echo "check_wine: libnebel.dll exports $(wc -l <<<"$names") functions"
 }
 
 wineserver() {
@@ -44,18 +69,44 @@ stop_wine() {
     wineserver -w
 }
 
+# compare_bits WINE PROGRAM
 compare_bits() {
+    "$1" "$2" 2>/dev/null | tr -d '\r' | grep '^fog' | diff "$build/bits.txt" -
+    echo "check_wine: ${2#"$build/"}: the same bits as here, $(wc -l <"$build/bits.txt") times"
+}
+
+compare_all_bits() {
     cc -std=c11 -O1 -I"$source/include" "$source/tests/cross/bits.c" "$build/libnebel.a" -lm -o "$build/bits"
     "$build/bits" >"$build/bits.txt"
-    "$wine" "$windows/tests/bits.exe" 2>/dev/null | tr -d '\r' | diff "$build/bits.txt" -
-    echo "check_wine: the same bits as here, $(wc -l <"$build/bits.txt") times"
+    compare_bits "$wine" "$windows/tests/bits.exe"
+    compare_bits "$wine" "$build/windows-dll/bin/bits.exe"
+    if [ -n "$wine32" ]; then compare_bits run_32 "$build/windows-32/tests/bits.exe"; fi
+}
+
+# A prefix of its own, because the other has a server of 64 bits.
+run_32() {
+    WINEPREFIX=$NEBEL_WINE_PREFIX-32 WINEARCH=win32 WINEDEBUG=-all WINEDLLOVERRIDES="mscoree,mshtml=;winemenubuilder.exe=d" "$wine32" "$@"
+}
+
+# The tests but those of Direct3D, one after the other.
+run_tests_32() {
+    local program name
+    mkdir -p "$NEBEL_WINE_PREFIX-32"
+    for program in "$build"/windows-32/tests/test_*.exe; do
+        name=$(basename "$program" .exe)
+        if [[ $name = test_d3d9 || $name = test_specular_example ]]; then continue; fi
+        (cd "$source/tests" && run_32 "$program") >"$build/windows-32/$name.log" 2>&1 || { cat "$build/windows-32/$name.log"; exit 1; }
+    done
+    echo "check_wine: the tests pass in 32 bits"
 }
 
 if ! build_windows >"$build/windows.log" 2>&1; then
     cat "$build/windows.log"
     exit 1
 fi
+check_dll
 trap stop_wine EXIT
 start_wine </dev/null >"$build/wine.log" 2>&1
 xvfb-run -a -s "-screen 0 640x480x24" ctest --test-dir "$windows" --output-on-failure --no-tests=error -j 2 2>&1
-if [ -e "$build/libnebel.a" ]; then compare_bits; fi
+if [ -n "$wine32" ]; then run_tests_32; else echo "check_wine: the tests of 32 bits are built, but there is no Wine to run them"; fi
+if [ -e "$build/libnebel.a" ]; then compare_all_bits; fi

@@ -6,6 +6,8 @@
 
 #if defined(__SANITIZE_ADDRESS__)
 static size_t volume_count = 50000;
+#elif SIZE_MAX == UINT32_MAX
+static size_t volume_count = 200000; /* programs of 32 bits have 2 GiB of Windows */
 #else
 static size_t volume_count = 1000000;
 #endif

@@ -132,7 +132,7 @@ static void compare(const random_fog *fog, const nebel_snapshot *snapshot, shari
     static ray_numbers numbers;
     static light_numbers found;
     const int fine = (int)(variant & 1), wants_light = (variant & 2) != 0, wants_error = (variant & 4) != 0;
-    const size_t stride = variant & 8 ? STRIDE : 1, n = RAYS - (variant >> 4) % 11;
+    const size_t stride = variant & 8 ? STRIDE : 1, n = RAYS - (size_t)((variant >> 4) % 11);
     nebel_ray rays[RAYS];
     nebel_light expected[RAYS];
     make_rays(fog, shared, fine, stride, &numbers, rays);
@@ -256,7 +256,7 @@ static void compare_masked(const random_fog *fog, const nebel_snapshot *snapshot
     static ray_numbers numbers;
     static light_numbers masked, plain;
     nebel_ray rays[RAYS];
-    const size_t first = fog->seed % 5;
+    const size_t first = (size_t)(fog->seed % 5);
     make_rays(fog, shared, 0, 1, &numbers, rays);
     for (size_t i = first; i < RAYS; i += 5) numbers.t_max[i] = 0;
     const nebel_ray_planes from = planes_of(&numbers, shared, 0, 1);

@@ -41,7 +41,7 @@ static void ask(const random_fog *fog, const nebel_ray rays[RAYS], answers *got)
     assert_int_equal(nebel_scatter_nebula(&nebula, got->particles), NEBEL_OK);
 }
 
-#if defined(__x86_64__) && LDBL_MANT_DIG == 64
+#if (defined(__x86_64__) || defined(__i386__)) && LDBL_MANT_DIG == 64
 
 static unsigned control_word(void)
 {

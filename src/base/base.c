@@ -27,11 +27,47 @@ nebel_allocator nb_resolve_allocator(const nebel_allocator *allocator)
     return (nebel_allocator){heap_allocate, heap_release, NULL};
 }
 
+#if defined(__MINGW32__) && defined(__i386__)
+
+/* malloc aligns to 8 bytes there, and so may callers; numbers of 128 bits need 16. The byte before aligned memory says
+ * how far it was moved. */
+enum { ALIGNMENT = 16 };
+
+static void *align(void *memory)
+{
+    if (memory == NULL) return NULL;
+    const size_t move = ALIGNMENT - (uintptr_t)memory % ALIGNMENT;
+    unsigned char *const aligned = (unsigned char *)memory + move;
+    aligned[-1] = (unsigned char)move;
+    return aligned;
+}
+
+static void *find_start(void *memory)
+{
+    return (unsigned char *)memory - ((unsigned char *)memory)[-1];
+}
+
+#else
+
+enum { ALIGNMENT = 0 };
+
+static void *align(void *memory)
+{
+    return memory;
+}
+
+static void *find_start(void *memory)
+{
+    return memory;
+}
+
+#endif
+
 void *nb_allocate(const nebel_allocator *allocator, size_t count, size_t size)
 {
-    if (size != 0 && count > SIZE_MAX / size) return NULL;
+    if (size != 0 && count > (SIZE_MAX - ALIGNMENT) / size) return NULL;
     const size_t bytes = count * size;
-    return allocator->allocate(bytes > 0 ? bytes : 1, allocator->user);
+    return align(allocator->allocate((bytes > 0 ? bytes : 1) + ALIGNMENT, allocator->user));
 }
 
 void *nb_allocate_zero(const nebel_allocator *allocator, size_t count, size_t size)
@@ -43,7 +79,7 @@ void *nb_allocate_zero(const nebel_allocator *allocator, size_t count, size_t si
 
 void nb_release(const nebel_allocator *allocator, void *memory)
 {
-    if (memory != NULL) allocator->release(memory, allocator->user);
+    if (memory != NULL) allocator->release(find_start(memory), allocator->user);
 }
 
 int nb_grow(const nebel_allocator *allocator, void **array, size_t size, size_t used, size_t *capacity, size_t wanted)

@@ -2,7 +2,7 @@
 
 #include <float.h>
 
-#if defined(__x86_64__) && LDBL_MANT_DIG == 64
+#if (defined(__x86_64__) || defined(__i386__)) && LDBL_MANT_DIG == 64
 
 /* Bits 8 and 9 of the x87 control word; both set: 64 bits of significand (Intel 64 manual, volume 1, 8.1.5). The other
  * fields, exceptions among them, stay the thread's. */
