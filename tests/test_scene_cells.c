@@ -217,7 +217,15 @@ static void test_memory_runs_out(void **state)
 
 /* ---- saving ---------------------------------------------------------------------------------- */
 
-static char path[] = "/tmp/nebel_cells_XXXXXX";
+static char path[32];
+
+static void make_file(void)
+{
+    strcpy(path, "/tmp/nebel_cells_XXXXXX");
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    close(file);
+}
 
 static void write_text(const char *text)
 {
@@ -248,9 +256,7 @@ static void test_only_what_changes_is_written(void **state)
         "{\"type\": "
         "\"box\", \"min\": [4, 0, 0], \"max\": [9, 3, 9]}, \"density\": 0.05, \"color\": [0.5, 0.75, 1]}] /* two */, "
         "\"model\": \"exponential\", \"span\": \"depth\", \"grouping\": false}}";
-    const int file = mkstemp(path);
-    assert_true(file >= 0);
-    close(file);
+    make_file();
     write_text(before);
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = {.log = {NULL, NULL}};
@@ -281,13 +287,70 @@ static void test_only_what_changes_is_written(void **state)
     remove(path);
 }
 
+static void test_names_and_portals_are_written(void **state)
+{
+    (void)state;
+#define FILE_OF(hall, crypt, portals)                                                                                  \
+    "{\"nebel\": 1, \"unit\": 0.5, \"up\": \"z\", \"fog\": [], \"cells\": {\"cells\": ["                               \
+    "{\"name\": " hall ", \"shape\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [4, 3, 9]}}, "                   \
+    "{\"shape\": {\"type\": \"box\", \"min\": [4, 0, 0], \"max\": [9, 3, 9]}, \"name\": " crypt                        \
+    "}], \"portals\": " portals "}}"
+#define POLYGON "\"polygon\": [[4, 0, 4], [4, 2, 4], [4, 2, 6]]"
+    static const char derived[] = FILE_OF("\"a\"", "\"b\"", "\"derived\""),
+                      given[] = FILE_OF("\"a\"", "\"b\"", "[{\"cells\": [\"b\", \"a\"] /* mine */, " POLYGON "}]");
+    make_file();
+    write_text(given);
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = {.log = {NULL, NULL}};
+    assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
+    const nebel_scene_data *was = nebel_scene_contents(scene);
+    nebel_scene_data now = *was;
+    nebel_cells_desc cells = *was->cells;
+    nebel_portal two[2] = {was->cells->portals[0], was->cells->portals[0]};
+    now.cells = &cells;
+    now.cell_names = (const char *const[]){"the \"hall\"", "b"};
+    assert_int_equal(nebel_save_scene(path, &desc, was, &now, NULL), NEBEL_OK);
+    check_text(FILE_OF("\"the \\\"hall\\\"\"", "\"b\"",
+                       "[{\"cells\": [\"b\", \"the \\\"hall\\\"\"] /* mine */, " POLYGON "}]"));
+    write_text(given);
+    now.cell_names = was->cell_names;
+    cells.portals = two;
+    cells.portal_count = 2;
+    two[1].cells[0] = 0;
+    two[1].cells[1] = 1;
+    assert_int_equal(nebel_save_scene(path, &desc, was, &now, NULL), NEBEL_OK);
+    check_text(FILE_OF("\"a\"", "\"b\"",
+                       "[{ \"cells\": [\"b\", \"a\"], " POLYGON " }, { \"cells\": [\"a\", \"b\"], " POLYGON " }]"));
+    write_text(given);
+    cells.portals = NULL;
+    cells.portal_count = 0;
+    assert_int_equal(nebel_save_scene(path, &desc, was, &now, NULL), NEBEL_OK);
+    check_text(derived);
+    nebel_destroy_scene(scene);
+    assert_int_equal(nebel_load_scene(path, &desc, &scene), NEBEL_OK);
+    was = nebel_scene_contents(scene);
+    now = *was;
+    cells = *was->cells;
+    now.cells = &cells;
+    cells.portals = two; /* all there are: none */
+    assert_int_equal(nebel_save_scene(path, &desc, was, &now, NULL), NEBEL_OK);
+    check_text(FILE_OF("\"a\"", "\"b\"", "[]"));
+    nebel_destroy_scene(scene);
+    remove(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_everything_it_may_say), cmocka_unit_test(test_what_it_leaves_out),
-        cmocka_unit_test(test_other_units_and_axes),  cmocka_unit_test(test_cells_are_exact_fog_too),
-        cmocka_unit_test(test_what_no_cell_has),      cmocka_unit_test(test_what_no_portal_has),
-        cmocka_unit_test(test_memory_runs_out),       cmocka_unit_test(test_only_what_changes_is_written),
+        cmocka_unit_test(test_names_and_portals_are_written),
+        cmocka_unit_test(test_everything_it_may_say),
+        cmocka_unit_test(test_what_it_leaves_out),
+        cmocka_unit_test(test_other_units_and_axes),
+        cmocka_unit_test(test_cells_are_exact_fog_too),
+        cmocka_unit_test(test_what_no_cell_has),
+        cmocka_unit_test(test_what_no_portal_has),
+        cmocka_unit_test(test_memory_runs_out),
+        cmocka_unit_test(test_only_what_changes_is_written),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

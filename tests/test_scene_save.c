@@ -225,6 +225,56 @@ static void test_the_projection(void **state)
     check_saved(&d, SCENE("\"camera\": {\"look_at\": [0, 0, -9], \"projection\": \"perspective\"}, \"fog\": []"));
 }
 
+static void test_how_the_camera_moves(void **state)
+{
+    (void)state;
+    static const char turning[] =
+        SCENE("\"camera\": {\"turntable\": {\"frames\": 9}, \"look_at\": [0, 0, -9]}, \"fog\": []"),
+                      still[] = SCENE("\"camera\": {\"look_at\": [0, 0, -9]}, \"fog\": []"),
+                      moving[] =
+                          SCENE("\"unit\": 0.5, \"camera\": {\"keys\": [{\"frame\": 2}, {\"frame\": 4, \"position\": "
+                                "[2, 0, 0]}]}, \"fog\": []");
+    nebel_camera_key keys[2] = {{.frame = 1}, {.frame = 3}};
+    draft d = open_draft(turning);
+    d.data.turntable_frames = 12;
+    check_saved(&d, SCENE("\"camera\": {\"turntable\": { \"frames\": 12 }, \"look_at\": [0, 0, -9]}, \"fog\": []"));
+    d = open_draft(turning);
+    d.data.turntable_frames = 0;
+    check_saved(&d, still);
+    d = open_draft(SCENE("\"fog\": []"));
+    d.data.turntable_frames = 5;
+    check_saved(&d, SCENE("\"fog\": [],\n  \"camera\": { \"turntable\": { \"frames\": 5 } }"));
+    d = open_draft(turning);
+    keys[0].camera = keys[1].camera = d.data.camera;
+    keys[1].camera.vertical_fov = 20;
+    d.data.turntable_frames = 0;
+    d.data.camera_keys = keys;
+    d.data.camera_key_count = 2;
+#define VIEW "\"position\": [0, 1.7, 0], \"look_at\": [0, 0, -9], \"up\": [0, 1, 0], "
+    check_saved(&d, SCENE("\"camera\": {\"look_at\": [0, 0, -9], \"keys\": [{ \"frame\": 1, " VIEW
+                          "\"vertical_fov\": 50, \"view_height\": 10 }, { \"frame\": 3, " VIEW
+                          "\"vertical_fov\": 20, \"view_height\": 10 }]}, \"fog\": []"));
+    d = open_draft(moving);
+    check_saved(&d, moving);
+    d = open_draft(moving);
+    d.data.camera_keys = NULL;
+    d.data.camera_key_count = 0;
+    d.data.camera.view_height = 4;
+    check_saved(&d, SCENE("\"unit\": 0.5, \"camera\": { \"look_at\": [0, 3.4, -2], \"view_height\": 8 }, \"fog\": []"));
+}
+
+/* What a key leaves out it takes from the camera: it stays as it was where that changes. */
+static void test_keys_stay_where_their_camera_moves(void **state)
+{
+    (void)state;
+    draft d = open_draft(SCENE("\"camera\": {\"keys\": [{\"frame\": 2, \"vertical_fov\": 9}]}, \"fog\": []"));
+    d.data.camera.position[0] = 5;
+    check_saved(&d,
+                SCENE("\"camera\": { \"position\": [5, 1.7, 0], \"look_at\": [0, 1.7, -1], \"keys\": [{ \"frame\": 2, "
+                      "\"position\": [0, 1.7, 0], \"look_at\": [0, 1.7, -1], \"up\": [0, 1, 0], \"vertical_fov\": 9, "
+                      "\"view_height\": 10 }] }, \"fog\": []"));
+}
+
 static void test_classic_fog(void **state)
 {
     (void)state;
@@ -658,6 +708,7 @@ static void test_memory_runs_out(void **state)
         m.fail_at = fail_at;
         d.volumes[0].shape.max[0] = 5;
         d.volumes[0].source[0] = 5;
+        d.data.turntable_frames = 7;
         d.volumes[1] = d.volumes[0];
         d.names[1] = "a \"new\" one";
         const nebel_volume_desc own = d.volumes[0];
@@ -705,6 +756,8 @@ int main(void)
         cmocka_unit_test(test_camera_and_light),
         cmocka_unit_test(test_the_sun_comes_and_goes),
         cmocka_unit_test(test_the_projection),
+        cmocka_unit_test(test_how_the_camera_moves),
+        cmocka_unit_test(test_keys_stay_where_their_camera_moves),
         cmocka_unit_test(test_classic_fog),
         cmocka_unit_test(test_models),
         cmocka_unit_test(test_contrast_and_phase),

@@ -207,11 +207,11 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
- * of it with other numbers in the camera, the background, the sun, the ambient light, max_opacity, the classic fog, the
- * nebulae (points by their place alone), the cells (but for names and portals; model, span and grouping, too), the
- * models (fewer may be left, in their order), and with other names, numbers or kinds of volumes of origin WRITTEN or
- * MOVING. The sun and the section "classic" may come and go. Its
- * volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
+ * of it with other numbers in the camera and its motion, the background, the sun, the ambient light, max_opacity, the
+ * classic fog, the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
+ * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), and with
+ * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and
+ * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
  * MOVING. sources NULL: the same volumes. changed->volume_entries is as long as changed->volumes; of a volume with keys
  * `own` counts and not what stands in `volumes`. NULL: keys, contrast and phase are as they were.

@@ -29,9 +29,8 @@ struct nb_save {
 void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *object, const nb_place *places,
                     unsigned mask, const void *was, const void *now);
 
-/* The same for an object that the file may lack: then it is added, with what has changed, behind the member `word`; "":
- * none. */
-void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key, const char *word,
+/* The same for an object that the file may lack: then it is added, with what has changed. */
+void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key,
                     const nb_place *places, const void *was, const void *now);
 
 void nb_save_integer(nb_save *save, const nb_json *json, const nb_edit_object *object, const char *key, double was,
@@ -42,6 +41,19 @@ void nb_save_shape(nb_save *save, const nb_scene_reader *in, const nb_json_node 
                    const nebel_shape *now);
 void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_density *was,
                      const nebel_density *now);
+
+/* Words to be put together. Once memory is out, which the edit notes, nothing more is added. */
+typedef struct nb_words {
+    nb_save *save;
+    nb_bytes bytes; /* with a zero byte behind them, after nb_words_end */
+} nb_words;
+
+void nb_words_put(nb_words *out, const char *words);
+void nb_words_put_text(nb_words *out, const char *text); /* in quotes */
+void nb_words_put_numbers(nb_words *out, size_t count, const double *numbers, nb_edit_style style);
+
+/* NULL when memory is out. Free out->bytes.data with nb_release. */
+const char *nb_words_end(nb_words *out);
 
 /* Whether two shapes differ in nothing but numbers. */
 bool nb_save_is_same_form(const nebel_shape *a, const nebel_shape *b);

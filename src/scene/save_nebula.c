@@ -79,6 +79,8 @@ static void change_nebula(nb_save *save, const nb_scene_reader *in, const nb_jso
     nb_save_places(save, json, &nebula, nb_nebula_places, NB_ALL_PLACES, &was, &now);
     if (now.points == NULL) nb_save_integer(save, json, &nebula, "count", (double)was.count, (double)now.count);
     nb_save_integer(save, json, &nebula, "seed", (double)was.seed, (double)now.seed);
+    if (strcmp(save->before->nebula_names[index], save->changed->nebula_names[index]) != 0)
+        nb_edit_word(&save->edit, json, &nebula, "name", save->changed->nebula_names[index]);
     if (was.profile != now.profile) nb_edit_word(&save->edit, json, &nebula, "profile", nb_profile_names[now.profile]);
     save_colors(save, json, &nebula, &was, &now);
     save_points(save, in, node, save->before->nebula_places[index], save->changed->nebula_places[index]);

@@ -15,7 +15,7 @@ void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *ob
                             nb_place_numbers(was, &places[i]), nb_place_numbers(now, &places[i]), places[i].style);
 }
 
-void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key, const char *word,
+void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key,
                     const nb_place *places, const void *was, const void *now)
 {
     const nb_edit_object object = nb_edit_find(json, nb_edit_member(json, owner->node, key));
@@ -24,7 +24,6 @@ void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *ow
         nb_save_places(save, json, &object, places, NB_ALL_PLACES, was, now);
         return;
     }
-    if (word[0] != '\0') snprintf(words, sizeof words, "{ %s", word);
     for (size_t i = 0; places[i].key != NULL; i++) {
         char numbers[NB_EDIT_NUMBERS];
         if (!nb_place_differs(was, now, &places[i])) continue;
@@ -63,6 +62,40 @@ void nb_save_integer(nb_save *save, const nb_json *json, const nb_edit_object *o
                      double now)
 {
     nb_edit_numbers(&save->edit, json, object, key, 1, &was, &now, NB_EDIT_EACH);
+}
+
+/* ---- words ----------------------------------------------------------------------------------- */
+
+static void add_bytes(nb_words *out, const char *words, size_t size)
+{
+    nb_edit *edit = &out->save->edit;
+    if (!edit->out_of_memory && !nb_bytes_write(&edit->arena.allocator, &out->bytes, out->bytes.size, words, size))
+        edit->out_of_memory = true;
+}
+
+void nb_words_put(nb_words *out, const char *words)
+{
+    add_bytes(out, words, strlen(words));
+}
+
+void nb_words_put_text(nb_words *out, const char *text)
+{
+    nb_edit *edit = &out->save->edit;
+    if (!edit->out_of_memory && !nb_edit_write_text(&edit->arena.allocator, &out->bytes, text))
+        edit->out_of_memory = true;
+}
+
+void nb_words_put_numbers(nb_words *out, size_t count, const double *numbers, nb_edit_style style)
+{
+    char text[NB_EDIT_NUMBERS];
+    nb_edit_write_numbers(count, numbers, style, text);
+    nb_words_put(out, text);
+}
+
+const char *nb_words_end(nb_words *out)
+{
+    add_bytes(out, "", 1);
+    return out->save->edit.out_of_memory ? NULL : (const char *)out->bytes.data;
 }
 
 /* ---- shapes ---------------------------------------------------------------------------------- */
@@ -106,7 +139,7 @@ void nb_save_shape(nb_save *save, const nb_scene_reader *in, const nb_json_node 
     const nb_json_node *part = parts != NULL ? nb_json_first(in->json, parts) : NULL;
     for (size_t i = 0; i < now->part_count && part != NULL; i++, part = nb_json_next(in->json, part))
         nb_save_shape(save, in, part, &was->parts[i], &now->parts[i]);
-    nb_save_object(save, in->json, &shape, "transform", "", nb_transform_places, &a.transform, &b.transform);
+    nb_save_object(save, in->json, &shape, "transform", nb_transform_places, &a.transform, &b.transform);
 }
 
 bool nb_save_is_same_form(const nebel_shape *a, const nebel_shape *b)

@@ -139,7 +139,7 @@ void nb_space_restore_direction(const nb_space *space, double direction[3])
     swap_y_and_z(direction);
 }
 
-static void restore_place(const nb_space *space, double place[3])
+void nb_space_restore_place(const nb_space *space, double place[3])
 {
     nb_space_restore_direction(space, place);
     for (int i = 0; i < 3; i++) place[i] /= space->unit;
@@ -147,15 +147,15 @@ static void restore_place(const nb_space *space, double place[3])
 
 void nb_space_restore_placement(const nb_space *space, double position[3], double rotation[4], double scale[3])
 {
-    restore_place(space, position);
+    nb_space_restore_place(space, position);
     nb_space_restore_direction(space, rotation);
     convert_extents(space, 1, scale);
 }
 
 void nb_space_restore_camera(const nb_space *space, nebel_camera *camera)
 {
-    restore_place(space, camera->position);
-    restore_place(space, camera->look_at);
+    nb_space_restore_place(space, camera->position);
+    nb_space_restore_place(space, camera->look_at);
     nb_space_restore_direction(space, camera->up);
     camera->view_height /= space->unit;
 }
@@ -170,7 +170,7 @@ void nb_space_restore_shape(const nb_space *space, nebel_shape *shape)
     }
     double *const places[] = {shape->min, shape->max, shape->center, shape->from, shape->to, shape->point};
     nb_space_restore_placement(space, transform->position, transform->rotation, transform->scale);
-    for (size_t i = 0; i < sizeof places / sizeof *places; i++) restore_place(space, places[i]);
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) nb_space_restore_place(space, places[i]);
     nb_space_restore_direction(space, shape->normal);
     convert_extents(space, back, shape->radii);
     shape->radius *= back;
@@ -187,9 +187,9 @@ void nb_space_restore_plane(const nb_space *space, nebel_plane *plane)
 static void restore_density(const nb_space *space, nebel_density *density)
 {
     const double back = 1 / space->unit;
-    restore_place(space, density->from);
-    restore_place(space, density->to);
-    restore_place(space, density->center);
+    nb_space_restore_place(space, density->from);
+    nb_space_restore_place(space, density->to);
+    nb_space_restore_place(space, density->center);
     density->base *= back;
     density->scale_height *= back;
     density->sigma *= back;

@@ -29,6 +29,7 @@ void nb_space_convert_camera(const nb_space *space, nebel_camera *camera);
 
 /* The other way: from metres, y up, to the file's numbers. */
 void nb_space_restore_direction(const nb_space *space, double direction[3]);
+void nb_space_restore_place(const nb_space *space, double place[3]);
 void nb_space_restore_placement(const nb_space *space, double position[3], double rotation[4], double scale[3]);
 void nb_space_restore_camera(const nb_space *space, nebel_camera *camera);
 
