@@ -96,6 +96,26 @@ static nebel_result draw(stage *s, uint32_t width, uint32_t samples)
     return nebel_gl_render_frame(s->renderer, &desc);
 }
 
+/* All around, with fog at vertices and without. */
+static nebel_result draw_round(stage *s)
+{
+    nebel_gl_frame_desc desc = {.camera = test_camera(3, 2, 5, 0, 0, 0),
+                                .width = 32,
+                                .height = 16,
+                                .samples = 1,
+                                .method = NEBEL_GL_METHOD_VERTEX};
+    desc.camera.projection = NEBEL_PROJECTION_PANORAMA;
+    const nebel_result result = nebel_gl_render_frame(s->renderer, &desc);
+    desc.method = NEBEL_GL_METHOD_EXACT;
+    return result == NEBEL_OK ? nebel_gl_render_frame(s->renderer, &desc) : result;
+}
+
+static nebel_result draw_all(stage *s)
+{
+    const nebel_result result = draw(s, 32, 1);
+    return result == NEBEL_OK ? draw_round(s) : result;
+}
+
 /* ---- contexts -------------------------------------------------------------------------------- */
 
 static const char *version_text, *hidden;
@@ -216,7 +236,7 @@ static void test_shaders_that_the_driver_refuses(void **state)
         epoxy_glShaderSource = spoil_source;
         result = create(&s, NULL);
         if (result == NEBEL_OK) result = nebel_set_gl_renderer_particles(s.renderer, s.particles, PARTICLES);
-        if (result == NEBEL_OK) result = draw(&s, 32, 1);
+        if (result == NEBEL_OK) result = draw_all(&s);
         epoxy_glShaderSource = true_shader_source;
         if (result != NEBEL_OK) expect_message(result, NEBEL_ERROR_UNSUPPORTED, "no_such_function");
         assert_int_equal(pass_take_errors(), result != NEBEL_OK);
@@ -269,14 +289,49 @@ static void test_a_driver_without_memory(void **state)
         epoxy_glGetError = run_out;
         result = create(&s, NULL);
         if (result == NEBEL_OK) result = nebel_set_gl_renderer_particles(s.renderer, s.particles, PARTICLES);
-        if (result == NEBEL_OK) result = draw(&s, 32, 1);
+        if (result == NEBEL_OK) result = draw_all(&s);
         epoxy_glGetError = true_get_error;
         if (result != NEBEL_OK) expect_message(result, NEBEL_ERROR_MEMORY, "no memory for");
-        if (s.renderer != NULL) assert_int_equal(draw(&s, 32, 1), NEBEL_OK);
+        if (s.renderer != NULL) assert_int_equal(draw_all(&s), NEBEL_OK);
         expect_nothing_left(&s);
         assert_true(failures < 100);
     }
     print_message("out of memory at %d places\n", failures - 1);
+    assert_true(failures > 4);
+    end(&s);
+}
+
+static PFNGLMAPBUFFERRANGEPROC true_map;
+static int maps_left; /* that work */
+
+static void *EPOXY_CALLSPEC refuse_map(GLenum target, GLintptr offset, GLsizeiptr length, GLbitfield access)
+{
+    return maps_left-- == 0 ? NULL : true_map(target, offset, length, access);
+}
+
+/* Each buffer in turn; the next frame is whole again. */
+static void test_a_driver_that_maps_nothing(void **state)
+{
+    (void)state;
+    static stage s;
+    int failures = 0;
+    start(&s, NB_GL_330);
+    assert_int_equal(create(&s, NULL), NEBEL_OK);
+    assert_int_equal(draw_all(&s), NEBEL_OK);
+    expect_nothing_left(&s);
+    true_map = epoxy_glMapBufferRange;
+    for (nebel_result result = NEBEL_ERROR_MEMORY; result != NEBEL_OK; failures++) {
+        assert_int_equal(create(&s, NULL), NEBEL_OK);
+        maps_left = failures;
+        epoxy_glMapBufferRange = refuse_map;
+        result = draw_round(&s);
+        epoxy_glMapBufferRange = true_map;
+        if (result != NEBEL_OK) expect_message(result, NEBEL_ERROR_MEMORY, "no access to the");
+        assert_int_equal(draw_round(&s), NEBEL_OK);
+        expect_nothing_left(&s);
+        assert_true(failures < 100);
+    }
+    print_message("no access at %d places\n", failures - 1);
     assert_true(failures > 4);
     end(&s);
 }
@@ -289,6 +344,7 @@ static nebel_result use_all(stage *s, fog_memory *memory)
     nebel_result result = create(s, memory);
     if (result == NEBEL_OK) result = nebel_set_gl_renderer_particles(s->renderer, s->particles, PARTICLES);
     if (result == NEBEL_OK) result = draw(s, 32, 2);
+    if (result == NEBEL_OK) result = draw_round(s);
     if (result == NEBEL_OK) result = nebel_gl_read_planes(s->renderer, &(nebel_gl_planes){.depth = depth});
     return result;
 }
@@ -317,7 +373,7 @@ int main(void)
         cmocka_unit_test(test_contexts_that_are_not_enough), cmocka_unit_test(test_extensions_that_are_missing),
         cmocka_unit_test(test_a_lost_context_is_survived),   cmocka_unit_test(test_shaders_that_the_driver_refuses),
         cmocka_unit_test(test_pictures_that_do_not_fit),     cmocka_unit_test(test_a_driver_without_memory),
-        cmocka_unit_test(test_memory_that_runs_out),
+        cmocka_unit_test(test_a_driver_that_maps_nothing),   cmocka_unit_test(test_memory_that_runs_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -124,6 +124,11 @@ static void gather_fog(const uint32_t *indices, const void *vertices, void *corn
 static nebel_result make_fog(const nb_meshes *meshes, nb_mesh *mesh)
 {
     const nebel_result result = make_buffer(meshes, mesh, &mesh->corner_fog, CORNERS_FOG_SIZE);
+    if (result != NEBEL_OK) {
+        glDeleteBuffers(1, &mesh->corner_fog);
+        mesh->corner_fog = 0;
+        return result;
+    }
     glBindVertexArray(mesh->corner_array);
     set_attributes(NB_CORNER_FOG, 3, 4, CORNERS_FOG_SIZE, 0);
     return result;

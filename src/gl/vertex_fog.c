@@ -10,12 +10,18 @@ static nebel_result make_attribute(const nb_meshes *meshes, nb_mesh *mesh)
 {
     if (mesh->fog != 0) return NEBEL_OK;
     glGenBuffers(1, &mesh->fog);
-    glBindVertexArray(mesh->vertex_array);
     glBindBuffer(GL_ARRAY_BUFFER, mesh->fog);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(mesh->vertex_count * FOG_SIZE), NULL, GL_STREAM_DRAW);
+    const nebel_result result = nb_context_check_memory(&meshes->log, "fog at vertices; use fewer triangles");
+    if (result != NEBEL_OK) {
+        glDeleteBuffers(1, &mesh->fog);
+        mesh->fog = 0;
+        return result;
+    }
+    glBindVertexArray(mesh->vertex_array);
     glEnableVertexAttribArray(NB_ATTRIBUTE_FOG);
     glVertexAttribPointer(NB_ATTRIBUTE_FOG, 4, GL_FLOAT, GL_FALSE, FOG_SIZE, NULL);
-    return nb_context_check_memory(&meshes->log, "fog at vertices; use fewer triangles");
+    return result;
 }
 
 static void *map(unsigned buffer, size_t size, GLbitfield access)
