@@ -10,7 +10,8 @@ these may be off themselves. What must hold, L being max(1, the largest source r
              thousand rays one may be above)
     all instruction sets give the same bytes
 
-To own comes the rounding of a sum of 50,000 doubles, 1e-13.
+To own comes the rounding of a sum of 50,000 doubles, 1e-13; with a sun 2e-6, since its own differences were of two
+neighbouring numbers of pieces, which the roots at silhouettes make alike.
 """
 
 import json
@@ -23,6 +24,8 @@ import tempfile
 NEBEL = os.environ["NEBEL"]
 TRUTH = pathlib.Path(__file__).resolve().parent / "truth"
 TOLERANCES = (1e-7, 0.002)
+SUN_TOLERANCES = (1e-5, 0.001)
+SUN_OWN = 2e-6
 ROUNDING = 1e-13
 HEADER = "T_r,T_g,T_b,S_r,S_g,S_b,error"
 
@@ -76,7 +79,7 @@ def judge(report, name, truth, results, tolerance, is_float):
     loose = 0
     report.check(len(results) == len(truth["expected"]), f"{name}: {len(results)} results for {len(truth['expected'])} rays")
     for number, (expected, result) in enumerate(zip(truth["expected"], results)):
-        own = expected[6] + ROUNDING
+        own = expected[6] + (SUN_OWN if "sun" in truth["scene"] else ROUNDING)
         apart = [abs(a - b) for a, b in zip(expected[:6], result[:6])]
         t, s = max(apart[:3]), max(apart[3:])
         worst_t, worst_s = max(worst_t, t), max(worst_s, s)
@@ -98,7 +101,7 @@ def check_file(report, path, folder, isas):
     scene = os.path.join(folder, path.name)
     pathlib.Path(scene).write_text(json.dumps(truth["scene"]))
     loose = count = 0
-    for tolerance in TOLERANCES:
+    for tolerance in SUN_TOLERANCES if "sun" in truth["scene"] else TOLERANCES:
         options = ["--tolerance", repr(tolerance)]
         worst = judge(report, f"{path.name} double {tolerance:g}", truth,
                       numbers_of(trace(scene, truth["rays"], *options)), tolerance, False)

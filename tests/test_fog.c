@@ -97,7 +97,8 @@ typedef struct bench {
 
 static nebel_fog *make_fog(bench *b)
 {
-    const nebel_fog_desc desc = {fog_memory_allocator(&b->memory), fog_messages_log(&b->messages), {.1, .2, .3}, 0};
+    const nebel_fog_desc desc = {
+        .allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages), .ambient = {.1, .2, .3}};
     nebel_fog *fog = NULL;
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     return fog;
@@ -151,7 +152,8 @@ static size_t fail_each_in_fog(act *perform, act *undo, const nebel_volume_desc 
 
 static nebel_result create(bench *b)
 {
-    const nebel_fog_desc desc = {fog_memory_allocator(&b->memory), fog_messages_log(&b->messages), {0}, 0};
+    const nebel_fog_desc desc = {
+        .allocator = fog_memory_allocator(&b->memory), .log = fog_messages_log(&b->messages), .ambient = {0}};
     nebel_fog *fog = (nebel_fog *)&desc;
     const nebel_result result = nebel_create_fog(&desc, &fog);
     if (result != NEBEL_OK) assert_null(fog);

@@ -312,19 +312,6 @@ static void test_rings_of_nodes(void **state)
     nebel_destroy_scene(scene);
 }
 
-static void test_albedo_and_sun_are_refused_at_the_model(void **state)
-{
-    (void)state;
-    static const char text[] = "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"" GLTF
-                               "\"}], \"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 1}}";
-    journal kept = {0};
-    nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {remember, &kept}};
-    write_gltf(NODE("\"extras\": {\"nebel_extinction\": 1, \"nebel_albedo\": 1}"));
-    assert_int_equal(nebel_parse_scene(text, strlen(text), "a.json", &desc, &scene), UNSUPPORTED);
-    assert_non_null(strstr(kept.last, "a.json:1:45: models[0].file: this version cannot light fog with the sun"));
-}
-
 static void test_every_failing_allocation_is_survived(void **state)
 {
     (void)state;
@@ -379,7 +366,6 @@ int main(void)
         cmocka_unit_test(test_messages_about_a_text_in_a_property),
         cmocka_unit_test(test_messages_about_nodes),
         cmocka_unit_test(test_rings_of_nodes),
-        cmocka_unit_test(test_albedo_and_sun_are_refused_at_the_model),
         cmocka_unit_test(test_every_failing_allocation_is_survived),
         cmocka_unit_test(test_every_garbled_byte_is_survived),
     };

@@ -440,8 +440,6 @@ static void test_what_no_import_has(void **state)
         {FORMAT, FOG("\"import\": `{\"type\": \"bevy_distance_fog\", \"color\": 1}"), "fog[0].import: has \"density\""},
         {UNSUPPORTED, IMPORT("\"type\": \"bevy_distance_fog\", \"extinction\": 1, \"inscattering\": `2"),
          "fog[0].import.inscattering: differs from"},
-        {UNSUPPORTED, LIT("`{\"type\": \"bevy_fog_volume\"}"),
-         "fog[0].import: this version cannot light fog with the sun"},
     };
     CHECK(rules);
 }

@@ -305,11 +305,6 @@ static void test_what_no_key_has(void **state)
          "fog[0].keys[0].density.type: unknown key; a linear density has: from, to"},
         {FORMAT, FOG("\"operation\": \"exclude\", " BALL ", \"keys\": [{\"frame\": 1, `\"extinction\": 1}]"),
          "fog[0].keys[0].extinction: unknown key; a key of excluded fog has: shape, frame"},
-        {UNSUPPORTED,
-         "{\"nebel\": 1, \"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 1}, \"fog\": [{" BALL
-         ", \"extinction\": 1, \"albedo\": 0, "
-         "\"keys\": [{\"frame\": 0, \"albedo\": `1}]}]}",
-         "fog[0].keys[0].albedo: this version cannot light fog with the sun"},
     };
     CHECK(rules);
 }

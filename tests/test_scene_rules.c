@@ -342,25 +342,6 @@ static void test_what_only_the_core_knows_is_reported(void **state)
 
 #define SUN "\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": [0, 2, 0]}"
 
-static void test_sunlight_in_fog_is_refused_where_it_would_be_seen(void **state)
-{
-    (void)state;
-    const rule rules[] = {
-        {UNSUPPORTED,
-         "{\"nebel\": 1, " SUN ", \"fog\": [{" WORLD ", \"extinction\": 1, \"albedo\": 0},\n{" WORLD
-         ", \"extinction\": 1, \"albedo\": `[0, 0.5, 0]}]}",
-         "fog[1].albedo: this version cannot light fog with the sun; give the volume a \"source\" instead, or remove "
-         "\"sun\""},
-        {UNSUPPORTED, "{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1, \"albedo\": `1}], " SUN "}",
-         "fog[0].albedo: "},
-    };
-    CHECK(rules);
-    nebel_destroy_scene(
-        parse_good("{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1, \"source\": 1}], " SUN "}"));
-    nebel_destroy_scene(parse_good("{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1, \"albedo\": 1}], \"sun\": "
-                                   "{\"direction\": [0, 1, 0], \"irradiance\": 0}}"));
-}
-
 static void test_nesting_has_a_limit(void **state)
 {
     (void)state;
@@ -489,7 +470,6 @@ int main(void)
         cmocka_unit_test(test_what_no_volume_has),
         cmocka_unit_test(test_what_no_nebula_has),
         cmocka_unit_test(test_what_only_the_core_knows_is_reported),
-        cmocka_unit_test(test_sunlight_in_fog_is_refused_where_it_would_be_seen),
         cmocka_unit_test(test_nesting_has_a_limit),
         cmocka_unit_test(test_numbers_have_a_longest_form),
         cmocka_unit_test(test_one_volume_has_a_limit_of_leaves),

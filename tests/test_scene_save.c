@@ -334,15 +334,15 @@ static void test_contrast_and_phase(void **state)
                          ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"rayleigh\"}}]"));
     nebel_volume_entry entries[3];
     for (int i = 0; i < 3; i++) entries[i] = d.data.volume_entries[i];
-    assert_int_equal(entries[2].phase.type, NEBEL_PHASE_RAYLEIGH);
+    assert_int_equal(d.volumes[2].phase.type, NEBEL_PHASE_RAYLEIGH);
     for (int c = 0; c < 3; c++) {
         d.volumes[0].extinction[c] = nebel_extinction_from_visibility(5, .02);
         d.volumes[1].extinction[c] = nebel_extinction_from_visibility(8, .1);
     }
     entries[0].contrast = .02;
     entries[1].contrast = .1;
-    entries[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .75};
-    entries[2].phase = (nebel_phase){.type = NEBEL_PHASE_DROPLETS, .diameter = 12.5};
+    d.volumes[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .75};
+    d.volumes[2].phase = (nebel_phase){.type = NEBEL_PHASE_DROPLETS, .diameter = 12.5};
     d.entries = entries;
     check_saved(
         &d, SCENE("\"fog\": [{" BOX ", \"visibility\": 5, \"contrast\": 0.02}, {" BOX

@@ -234,14 +234,14 @@ typedef enum nebel_phase_type {
     NEBEL_PHASE_COUNT
 } nebel_phase_type;
 
-#define NEBEL_LARGEST_G 0.9999
-#define NEBEL_LARGEST_DROPLET 50
+#define NEBEL_MAX_G 0.9999
+#define NEBEL_MAX_DROPLET 50
 
 typedef struct nebel_phase {
     nebel_phase_type type;
-    double g;        /* -NEBEL_LARGEST_G to NEBEL_LARGEST_G; < 0: backwards */
+    double g;        /* -NEBEL_MAX_G to NEBEL_MAX_G; < 0: backwards */
     double alpha;    /* 0 to 1e9 */
-    double diameter; /* micrometres, > 0, at most NEBEL_LARGEST_DROPLET */
+    double diameter; /* micrometres, 1e-6 to NEBEL_MAX_DROPLET */
 } nebel_phase;
 
 typedef enum nebel_operation {
@@ -263,7 +263,8 @@ typedef struct nebel_volume_desc {
     nebel_density density;
     double extinction[3]; /* 1/m, 0 to 1e9, where the density is 1 */
     double source[3];     /* radiance of opaque fog, 0 to 1e9: alone it gives source * (1 - transmittance) */
-    double albedo[3];     /* 0..1: lit by the fog's ambient light, scattered evenly; not together with source */
+    double albedo[3];     /* 0..1: lit by the fog's ambient light and its sun; not together with source */
+    nebel_phase phase;    /* where the sun's light is scattered to; ambient light comes from everywhere */
     double emission[3];   /* radiance per metre, 0 to 1e9, where the density is 1 */
     double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
                              operation; cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
@@ -293,10 +294,18 @@ typedef struct nebel_fog nebel_fog;
 typedef struct nebel_snapshot nebel_snapshot;
 typedef uint64_t nebel_volume_id; /* 0 is never one */
 
+/* Light from one direction, from endlessly far. What it brings to a place is what all fog on the way there lets
+ * through; light that was scattered once is not scattered again. */
+typedef struct nebel_sun {
+    double direction[3];  /* towards the sun, any length but 0 where it shines */
+    double irradiance[3]; /* 0 to 1e9, on a surface that faces it; all zero: no sun */
+} nebel_sun;
+
 typedef struct nebel_fog_desc {
     nebel_allocator allocator;
     nebel_log log;
     double ambient[3];  /* radiance, the same from everywhere, 0 to 1e9; lights volumes with an albedo */
+    nebel_sun sun;      /* lights volumes with an albedo */
     double max_opacity; /* 0 to 1; 0: 1. See nebel_set_max_opacity */
 } nebel_fog_desc;
 
@@ -321,6 +330,9 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
 /* Sets the ambient radiance, 0 to 1e9. Cost O(1). Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
+
+/* Sets the sun. Cost O(1). Errors: ARGUMENT, VALUE. */
+nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
  * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T).

@@ -71,7 +71,6 @@ typedef struct nebel_volume_key {
 /* What the file says of a volume, beside what it is at one frame. */
 typedef struct nebel_volume_entry {
     double contrast;              /* that is left at its visibility, 0 < contrast < 1 */
-    nebel_phase phase;            /* of fog with an albedo; in this version nothing but the file knows of it */
     size_t key_count;             /* 0: it stands still */
     const nebel_volume_key *keys; /* ascending frames */
     const nebel_volume_desc *own; /* without its keys; NULL where there are none */
@@ -214,7 +213,7 @@ void nebel_destroy_scene(nebel_scene *scene);
  * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or
  * MOVING. sources NULL: the same volumes. changed->volume_entries is as long as changed->volumes; of a volume with keys
- * `own` counts and not what stands in `volumes`. NULL: keys, contrast and phase are as they were.
+ * `own` counts and not what stands in `volumes`. NULL: keys and contrast are as they were.
  *
  * What differs between the two is written in its place, in the file's own unit, axes and words (a visibility stays a
  * visibility, where the fog is not of extinction 0), with 15 digits; a key that is missing is added, one that has

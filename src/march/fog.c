@@ -33,6 +33,7 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "allocator: needs allocate and release, or neither");
     nebel_result result = nb_check_color(&desc->log, "ambient", desc->ambient, NEBEL_MAX_AMOUNT);
+    if (result == NEBEL_OK) result = nb_check_sun(&desc->log, &desc->sun);
     if (result == NEBEL_OK) result = check_opacity(&desc->log, desc->max_opacity);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
@@ -41,6 +42,7 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     made->allocator = allocator;
     made->log = desc->log;
     memcpy(made->ambient, desc->ambient, sizeof made->ambient);
+    made->sun = desc->sun;
     made->max_opacity = desc->max_opacity;
     *fog = made;
     return NEBEL_OK;
@@ -140,6 +142,15 @@ nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3])
     if (ambient == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "ambient: must not be NULL");
     const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK) memcpy(fog->ambient, ambient, sizeof fog->ambient);
+    return result;
+}
+
+nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)
+{
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (sun == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "sun: must not be NULL");
+    const nebel_result result = nb_check_sun(&fog->log, sun);
+    if (result == NEBEL_OK) fog->sun = *sun;
     return result;
 }
 

@@ -15,6 +15,7 @@ struct nebel_fog {
     nebel_allocator allocator;
     nebel_log log;
     double ambient[3];
+    nebel_sun sun;
     double max_opacity;
     nb_slot *slots;
     size_t slot_count, slot_capacity, first_free, free_count;

@@ -20,7 +20,7 @@ static double proportion_of(const nb_volume *v)
     return most;
 }
 
-static void light_medium(nb_medium *medium, const double ambient[3])
+static void light_medium(nb_medium *medium, const double ambient[3], const nebel_sun *sun)
 {
     const nb_volume *v = &medium->body;
     for (int c = 0; c < 3; c++) {
@@ -29,6 +29,8 @@ static void light_medium(nb_medium *medium, const double ambient[3])
         medium->densest = fmax(medium->densest, v->extinction[c]);
         medium->brightest = fmax(medium->brightest, medium->light[c]);
         medium->emits = medium->emits || v->emission[c] > 0;
+        medium->shine[c] = v->albedo[c] * sun->irradiance[c];
+        medium->is_sunlit = medium->is_sunlit || medium->shine[c] * v->extinction[c] > 0;
     }
     medium->proportion = proportion_of(v);
 }
@@ -62,7 +64,8 @@ static int copy_media(const nebel_fog *fog, nebel_snapshot *s)
         nb_medium *medium = &s->media[s->medium_count];
         if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
         s->medium_count++;
-        light_medium(medium, fog->ambient);
+        light_medium(medium, fog->ambient, &fog->sun);
+        s->is_sunlit = s->is_sunlit || medium->is_sunlit;
         for (int c = 0; c < 3; c++) s->largest_radiance = fmax(s->largest_radiance, medium->radiance[c]);
     }
     return 1;
@@ -98,6 +101,18 @@ static nebel_result index_media(nebel_snapshot *s)
     return result;
 }
 
+/* Adding +0 makes every zero positive, as the march does with directions of its own. */
+static void point_to_sun(nebel_snapshot *s, const nebel_sun *sun)
+{
+    const double *d = sun->direction;
+    const double size = fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2]));
+    if (!(size > 0)) return;
+    const double x = d[0] / size, y = d[1] / size, z = d[2] / size, length = sqrt(x * x + y * y + z * z);
+    s->to_sun[0] = x / length + 0;
+    s->to_sun[1] = y / length + 0;
+    s->to_sun[2] = z / length + 0;
+}
+
 nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
 {
     if (snapshot != NULL) *snapshot = NULL;
@@ -110,6 +125,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     s->log = fog->log;
     s->max_opacity = fog->max_opacity > 0 ? fog->max_opacity : 1;
     atomic_init(&s->owners, 1);
+    point_to_sun(s, &fog->sun);
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (copy_media(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);

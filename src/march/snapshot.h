@@ -17,6 +17,8 @@ typedef struct nb_medium {
     double proportion;  /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
                            for margins */
     int emits;
+    int is_sunlit;
+    double shine[3]; /* albedo times the sun's irradiance: of opaque fog, if the phase function were 1 */
 } nb_medium;
 
 struct nebel_snapshot {
@@ -27,6 +29,8 @@ struct nebel_snapshot {
     nb_medium *media;        /* in the order of nb_volume_compare: ranks ascend */
     double largest_radiance; /* of all volumes and channels */
     double max_opacity;      /* 1 where there is no limit */
+    int is_sunlit;           /* whether any medium is */
+    double to_sun[3];        /* of length 1; not read where nothing is sunlit */
     size_t endless_count;    /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
     nb_bvh bvh;        /* over the others */

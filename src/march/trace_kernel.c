@@ -18,6 +18,7 @@
 #include "formulas/shapes.inc"
 #include "formulas/profiles.inc"
 #include "formulas/medium.inc"
+#include "formulas/phase.inc"
 
 #include <float.h>
 #include <math.h>
@@ -124,6 +125,7 @@ static void open_workspace(workspace *w)
     w->m.stretches = w->stretches;
     w->m.lasts = w->lasts;
     w->m.total = NULL;
+    w->m.sun = NULL;
     w->m.spans = w->spans;
 }
 
@@ -311,6 +313,8 @@ static void note_clear(const march *m, const piece *p, gathered *g)
     }
 }
 
+#include "trace_sun.h"
+
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
 {
     const piece_sum sum = sum_piece(m, p);
@@ -319,6 +323,7 @@ static void gather_piece(const march *m, const piece *p, const allowance *may, g
         return;
     }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
+    if (m->sun != NULL) gather_sunlight(m->sun, m, p, g);
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);
@@ -390,7 +395,8 @@ static nb_real most_radiance(const march *m, int c)
     for (size_t i = 0; i < m->contact_count; i++) {
         const contact *k = &m->contacts[i];
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
-        most = nb_max(most, nb_select(met, k->medium->emits ? NB_HUGE : k->radiance[c], NB_F(0.0)));
+        const nb_real radiance = k->radiance[c] + k->glow[c] / nb_max(k->extinction[c], NB_TINY);
+        most = nb_max(most, nb_select(met, k->medium->emits ? NB_HUGE : radiance, NB_F(0.0)));
     }
     return most;
 }
@@ -473,9 +479,8 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
             if (!nb_volume_has_fog(&k->medium->body)) continue;
             const nb_mask counts =
                 nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
-            const nb_real radiance = opaque_radiance(k, c);
-            least = nb_select(counts, nb_min(radiance, least), least);
-            most = nb_select(counts, nb_max(radiance, most), most);
+            least = nb_select(counts, nb_min(k->radiance[c], least), least);
+            most = nb_select(counts, nb_max(opaque_radiance(k, c), most), most);
         }
         const nb_real absorbed = NB_F(1.0) - g->transmittance[c];
         const nb_real high = most * nb_min(absorbed + transmittance_error, NB_F(1.0));
@@ -563,7 +568,9 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     share.last_share = share.last_share / pieces;
     share.length_share = share.length_share / pieces;
     nb_mask unbounded;
+    if (w->m.sun != NULL) find_turns(w->m.sun, &w->m.rays);
     *g = gather_light(&w->m, &share, &unbounded);
+    if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)
         if (nb_lane(unbounded, i)) {
@@ -664,7 +671,7 @@ enum { MOST_MARCHES = 8 };
  * smaller error, from which the next march learns. */
 static nb_real weigh_ends(nb_trace_job *job, workspace *w, const allowance *may, const gathered *g, nb_real error)
 {
-    if (job->transmittance_only) return error;
+    if (job->transmittance_only || w->m.sun != NULL) return error;
     known total = {{g->radiance[0], g->radiance[1], g->radiance[2]}, error};
     w->m.total = &total;
     for (int i = 0; i < MOST_MARCHES && in_doubt(job, total.error); i++) {
@@ -717,6 +724,36 @@ static nebel_result trace_structures(nb_trace_job *job, workspace *w, const allo
 #include "trace_planes.h"
 #endif
 
+static nebel_result trace_job(nb_trace_job *job, workspace *w)
+{
+    const allowance may = share_budget(job);
+#if defined(NB_DOUBLE)
+    return trace_structures(job, w, &may);
+#else
+    return job->ray_planes == NULL ? trace_structures(job, w, &may) : trace_planes(job, w, &may);
+#endif
+}
+
+/* With a second march, to the sun. */
+static nebel_result trace_sunlit(nb_trace_job *job, workspace *w)
+{
+    const nebel_allocator *allocator = &job->snapshot->allocator;
+    workspace way;
+    nb_wide turns[STACK_TURNS];
+    open_workspace(&way);
+    sunlight sun = {.snapshot = job->snapshot,
+                    .direction = unit_vector(wide_vector(job->snapshot->to_sun)),
+                    .way = &way,
+                    .turns = turns,
+                    .turn_capacity = STACK_TURNS,
+                    .share = 0.3 * job->budget};
+    w->m.sun = &sun;
+    const nebel_result result = trace_job(job, w);
+    nb_release(allocator, sun.turn_memory);
+    close_workspace(&way, allocator);
+    return result;
+}
+
 nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
 {
 #if !defined(NB_DOUBLE)
@@ -724,12 +761,8 @@ nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
 #endif
     workspace w;
     open_workspace(&w);
-    const allowance may = share_budget(job);
-#if defined(NB_DOUBLE)
-    const nebel_result result = trace_structures(job, &w, &may);
-#else
-    const nebel_result result = job->ray_planes == NULL ? trace_structures(job, &w, &may) : trace_planes(job, &w, &may);
-#endif
+    const int wants_sun = job->snapshot->is_sunlit && !job->transmittance_only;
+    const nebel_result result = wants_sun ? trace_sunlit(job, &w) : trace_job(job, &w);
     close_workspace(&w, &job->snapshot->allocator);
     return result;
 }

@@ -39,7 +39,7 @@ static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
         sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
         const nb_real seen =
             nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
-        sum->light[c] = sum->light[c] + seen * k->light[c];
+        sum->light[c] = sum->light[c] + seen * (k->light[c] + k->glow[c]);
     }
 }
 
@@ -157,11 +157,11 @@ static leaf_span clip_interval(const march *m, const contact *k, const nb_interv
     return span;
 }
 
-/* Light per extinction of a medium: the radiance it has where it is opaque. */
+/* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight. */
 static nb_real opaque_radiance(const contact *k, int c)
 {
-    const nb_real ratio = k->light[c] / nb_max(k->extinction[c], NB_TINY);
-    return nb_select(k->extinction[c] > NB_F(0.0), ratio, k->light[c] * NB_HUGE);
+    const nb_real light = k->light[c] + k->glow[c];
+    return nb_select(k->extinction[c] > NB_F(0.0), light / nb_max(k->extinction[c], NB_TINY), light * NB_HUGE);
 }
 
 /* Up to this optical depth what an end may do is as good as proportional to its slack. */
@@ -240,6 +240,9 @@ static void count_drift(march *m, const contact *k)
 }
 #endif
 
+struct sunlight;
+static void set_glow(contact *k, const packet *rays, const struct sunlight *sun);
+
 /* Adds a medium to the march when any ray meets it. */
 static void meet_medium(march *m, const nb_medium *medium)
 {
@@ -252,7 +255,9 @@ static void meet_medium(march *m, const nb_medium *medium)
         k->extinction[c] = REAL(medium->body.extinction[c]);
         k->light[c] = REAL(medium->light[c]);
         k->radiance[c] = REAL(medium->radiance[c]);
+        k->glow[c] = NB_F(0.0);
     }
+    if (m->sun != NULL && medium->is_sunlit) set_glow(k, &m->rays, m->sun);
     k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
     if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;

@@ -36,6 +36,7 @@ typedef struct contact {
     size_t first_span;
     nb_wide hull_enter, hull_leave; /* from the first entry to the last exit */
     nb_real extinction[3], light[3], radiance[3];
+    nb_real glow[3];        /* radiance per metre that full sunlight adds where the density is 1 */
     double least_slack;     /* the length over which the medium's extinction and light come to 1 */
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths of a box; `ends` of a round body */
@@ -59,8 +60,9 @@ typedef struct known {
 
 typedef struct march {
     packet rays;
-    int wants_error;    /* 0: media that no ray comes near may be left out */
-    const known *total; /* NULL the first time */
+    int wants_error;      /* 0: media that no ray comes near may be left out */
+    const known *total;   /* NULL the first time */
+    struct sunlight *sun; /* NULL where sunlight is not asked for, or none is there */
     int ignores_distances;
     size_t contact_count, span_count;
     contact *contacts;

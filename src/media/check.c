@@ -1,5 +1,6 @@
 #include "check.h"
 
+#include "phase.h"
 #include "volume.h"
 
 #include <math.h>
@@ -206,8 +207,17 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
     }
 }
 
+nebel_result nb_check_sun(const nebel_log *log, const nebel_sun *sun)
+{
+    if (!is_zero(sun->irradiance, 3) && !is_direction(length_of(sun->direction)))
+        return bad(log, "sun direction", DIRECTION_RULE);
+    return nb_check_color(log, "sun irradiance", sun->irradiance, NEBEL_MAX_AMOUNT);
+}
+
 static nebel_result check_light(const nebel_log *log, const nebel_volume_desc *desc)
 {
+    const char *fault = nb_phase_fault(&desc->phase);
+    if (fault != NULL) return nb_fail(log, NEBEL_ERROR_VALUE, "%s", fault);
     nebel_result result = nb_check_color(log, "extinction", desc->extinction, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK) result = nb_check_color(log, "source", desc->source, NEBEL_MAX_AMOUNT);
     if (result == NEBEL_OK) result = nb_check_color(log, "albedo", desc->albedo, 1);

@@ -21,11 +21,11 @@ const char *nb_phase_fault(const nebel_phase *phase)
         /* fall through */
     case NEBEL_PHASE_HENYEY_GREENSTEIN:
     case NEBEL_PHASE_CORNETTE_SHANKS:
-        return fabs(phase->g) <= NEBEL_LARGEST_G ? NULL : "phase g: must be within -0.9999 and 0.9999";
+        return fabs(phase->g) <= NEBEL_MAX_G ? NULL : "phase g: must be within -0.9999 and 0.9999";
     case NEBEL_PHASE_DROPLETS:
-        return phase->diameter > 0 && phase->diameter <= NEBEL_LARGEST_DROPLET
+        return phase->diameter >= 1e-6 && phase->diameter <= NEBEL_MAX_DROPLET
                    ? NULL
-                   : "phase diameter: must be more than 0 and at most 50 micrometres";
+                   : "phase diameter: must be within 1e-6 and 50 micrometres";
     default:
         return "phase: the type is unknown";
     }

@@ -7,6 +7,8 @@
 #ifndef NB_MEDIA_VOLUME_H
 #define NB_MEDIA_VOLUME_H
 
+#include "phase.h"
+
 #include "base/base.h"
 #include "formulas/quad.h"
 
@@ -71,6 +73,7 @@ typedef struct nb_volume {
     nb_edge edge; /* soft edges of round bodies */
     double extinction[3], source[3], albedo[3], emission[3];
     int lit; /* albedo rather than source */
+    nb_phase phase;
     size_t leaf_count, face_count, step_count;
     nb_leaf *leaves;
     nb_face *faces;

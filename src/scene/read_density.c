@@ -120,8 +120,6 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
 
 /* ---- phase ----------------------------------------------------------------------------------- */
 
-/* Under ambient light, the same from everywhere, each of these scatters as much as the isotropic one: they integrate
- * to 1. That is why the core is not told. */
 bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase)
 {
     enum { PHASE_TYPE, G, DIAMETER, COUNT };
@@ -136,7 +134,10 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "a rayleigh phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a cornette_shanks phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
-    static const nb_range g_range = {.low = -1, .high = 1, .open = true, .text = "a number > -1 and < 1"};
+    static const nb_range g_range = {
+        .low = -NEBEL_MAX_G, .high = NEBEL_MAX_G, .text = "a number within -0.9999 and 0.9999"};
+    static const nb_range diameter_range = {
+        .low = 1e-6, .high = NEBEL_MAX_DROPLET, .text = "a diameter within 1e-6 and 50 micrometres"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
     const int type = nb_value_type(in->json, node, phase_names, 5);
@@ -144,5 +145,5 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
     phase->type = types[type];
     return nb_value_members(in->json, node, &keys[type], found) &&
            nb_value_number(in->json, found[G], &g_range, &phase->g) &&
-           nb_value_number(in->json, found[DIAMETER], &nb_range_positive, &phase->diameter);
+           nb_value_number(in->json, found[DIAMETER], &diameter_range, &phase->diameter);
 }

@@ -177,21 +177,15 @@ static nebel_result read_nodes(nodes_reader *nodes, const nb_bytes *text)
 }
 
 /* What the reader knows of the scene's own file gives way to what it knows of the model's, and comes back. */
-static nebel_result read_inside(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model,
-                                const nb_bytes *text)
+static nebel_result read_inside(nb_scene_reader *in, nb_model_source *model, const nb_bytes *text)
 {
     nb_json *const outer = in->json;
     const nb_space space = in->space;
-    const bool was_lit = in->lit_offset != 0;
     nodes_reader nodes = {.in = in, .model = model, .place = nb_model_place(model)};
     in->space = NB_SPACE_OURS;
     const nebel_result result = read_nodes(&nodes, text);
     in->json = outer;
     in->space = space;
-    if (!was_lit && in->lit_offset != 0) {
-        in->lit_offset = node->offset;
-        nb_json_path(in->json, node, in->lit_path);
-    }
     return result;
 }
 
@@ -200,7 +194,7 @@ bool nb_read_nodes(nb_scene_reader *in, const nb_json_node *node, nb_model_sourc
     nb_bytes text;
     nebel_result result = nb_gltf_read_text(&in->scene->allocator, model->file, &text);
     if (result != NEBEL_OK) return nb_json_fail(in->json, result, node, "out of memory");
-    if (speaks_of_fog(&text)) result = read_inside(in, node, model, &text);
+    if (speaks_of_fog(&text)) result = read_inside(in, model, &text);
     nb_release(&in->scene->allocator, text.data);
     return result == NEBEL_OK || nb_json_stop(in->json, result);
 }

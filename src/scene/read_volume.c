@@ -108,15 +108,7 @@ static bool read_amount(nb_json *json, const nb_json_node *const *found, double 
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
-static void remember_lit(nb_scene_reader *in, const nb_json_node *albedo, const double color[3])
-{
-    if (in->lit_offset != 0 || (color[0] == 0 && color[1] == 0 && color[2] == 0)) return;
-    in->lit_offset = albedo->offset;
-    nb_json_path(in->json, albedo, in->lit_path);
-}
-
-static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume,
-                       nebel_phase *phase)
+static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
     nb_json *json = in->json;
     if (found[SOURCE] != NULL && found[ALBEDO] != NULL)
@@ -126,10 +118,9 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[PHASE], "belongs to \"albedo\", which is absent");
     if (!nb_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
-        !nb_read_phase(in, found[PHASE], phase) ||
+        !nb_read_phase(in, found[PHASE], &volume->phase) ||
         !nb_value_color(json, found[EMISSION], &nb_range_amount, volume->emission))
         return false;
-    if (found[ALBEDO] != NULL) remember_lit(in, found[ALBEDO], volume->albedo);
     return true;
 }
 
@@ -220,7 +211,7 @@ static bool read_key(nb_scene_reader *in, const nb_json_node *node, const nb_jso
            nb_read_shape_key(in, found[SHAPE], &volume->shape) &&
            nb_read_density_key(in, found[DENSITY], &volume->density) &&
            read_amount(json, found, volume->extinction, &contrast) && check_light_key(json, entry, found) &&
-           read_light(in, found, volume, NULL);
+           read_light(in, found, volume);
 }
 
 /* The parts are those of the volume, which are converted with it, once. */
@@ -338,7 +329,6 @@ static bool keep_imported(nb_scene_reader *in, const nb_json_node *const found[3
     const nebel_volume_entry entry = nb_volume_entry_default();
     if (found[2] != NULL) memcpy(volume->albedo, black, sizeof black);
     if (!nb_value_color(in->json, found[2], &nb_range_light, volume->source)) return false;
-    remember_lit(in, found[1], volume->albedo);
     return nb_read_try(in, found[1], "", volume) &&
            keep_volume(in, found[1], volume, &entry, name, NEBEL_VOLUME_IMPORTED);
 }
@@ -402,7 +392,7 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
          !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction, &entry.contrast) ||
-         !read_light(in, found, &volume, &entry.phase)))
+         !read_light(in, found, &volume)))
         return false;
     return finish_volume(in, node, found, &volume, &entry, name);
 }

@@ -110,7 +110,7 @@ static unsigned find_mask(const nb_lost_keys *lost)
 static void save_phase(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_written_volume *was,
                        const nb_written_volume *now)
 {
-    const nebel_phase *from = &was->entry.phase, *to = &now->entry.phase;
+    const nebel_phase *from = &was->volume.phase, *to = &now->volume.phase;
     const nb_json_node *node = nb_edit_member(json, volume->node, "phase");
     char words[NB_EDIT_NUMBERS];
     if (is_zero(now->volume.albedo)) return;

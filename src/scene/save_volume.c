@@ -297,7 +297,7 @@ static void put_members(writer *out, const nebel_volume_desc *own, const nb_writ
         put_amount(out, own, written->entry.contrast);
     }
     put_places(out, nb_volume_places, has_fog ? NB_ALL_PLACES : distances, own, &nothing);
-    if (has_fog && !is_zero(own->albedo)) put_phase(out, &written->entry.phase);
+    if (has_fog && !is_zero(own->albedo)) put_phase(out, &own->phase);
     if (has_fog && is_zero(own->albedo) && nb_save_has_lit_key(&written->entry)) {
         put_key(out, "albedo");
         put(out, "0");

@@ -130,17 +130,12 @@ static bool read_element(nb_scene_reader *in, const nb_json_node *array, const n
 /* Sections come in any order, so what joins two of them waits for the end. */
 static bool check_whole(nb_scene_reader *in, const nb_json_node *root)
 {
-    const double *sun = in->scene->data.sun_irradiance;
     const uint32_t missing = section_keys.required & ~in->seen;
     if (missing != 0)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, root, "the key \"%s\" is missing; a scene needs it",
                             (missing & NB_BIT(NEBEL)) != 0 ? "nebel" : "fog");
     if ((in->seen & NB_BIT(MAX_OPACITY)) == 0) in->scene->data.max_opacity = in->imported_opacity;
-    if (in->lit_offset == 0 || (sun[0] == 0 && sun[1] == 0 && sun[2] == 0)) return true;
-    return nb_json_fail_at(
-        in->json, NEBEL_ERROR_UNSUPPORTED, in->lit_offset, in->lit_path,
-        "this version cannot light fog with the sun; give the volume a \"source\" instead, or remove "
-        "\"sun\"");
+    return true;
 }
 
 static bool take(nb_json *json, const nb_json_node *value, void *user)
@@ -337,6 +332,8 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
     *snapshot = NULL;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
+    memcpy(desc.sun.direction, scene->data.sun_direction, sizeof desc.sun.direction);
+    memcpy(desc.sun.irradiance, scene->data.sun_irradiance, sizeof desc.sun.irradiance);
     desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);

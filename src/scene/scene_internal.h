@@ -86,8 +86,6 @@ typedef struct nb_scene_reader {
     char core_message[512];                    /* what the core said about the last one */
     uint32_t seen;                             /* sections */
     size_t section_offsets[NB_SCENE_SECTIONS]; /* of the keys of those seen */
-    size_t lit_offset;                         /* of the first albedo that is not 0; 0: none */
-    char lit_path[NB_JSON_PATH];
     double imported_opacity; /* the largest one, where the file has none of its own; 0: none */
 } nb_scene_reader;
 

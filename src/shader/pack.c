@@ -267,6 +267,9 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (!(fabs(eye[i]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
+    if (snapshot->is_sunlit)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot light fog with the sun yet; give volumes a source instead of an albedo");
     *count = count_words(snapshot);
     if (*count > MOST_WORDS)
         return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words; shaders can address %zu", *count,

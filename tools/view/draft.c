@@ -18,10 +18,19 @@ static nebel_result fail_memory(const nb_draft *draft)
  * -------------------------------------------------------------------------------------------------------------
  */
 
+static nebel_sun sun_of(const nb_edition *edition)
+{
+    nebel_sun sun = {{0}, {0}};
+    memcpy(sun.direction, edition->sun_direction, sizeof sun.direction);
+    memcpy(sun.irradiance, edition->sun_irradiance, sizeof sun.irradiance);
+    return sun;
+}
+
 static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
     memcpy(desc.ambient, edition->ambient, sizeof desc.ambient);
+    desc.sun = sun_of(edition);
     return nebel_create_fog(&desc, fog);
 }
 
@@ -92,6 +101,8 @@ static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_
         if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]))
             result = nebel_change_volume(draft->fog, draft->ids[i], &now->volumes[i]);
     if (result == NEBEL_OK) result = nebel_set_ambient(draft->fog, now->ambient);
+    const nebel_sun sun = sun_of(now);
+    if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
     if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
     return result == NEBEL_OK ? commit_fog(draft) : result;
 }

@@ -336,10 +336,16 @@ static int is_same_density(const nebel_density *a, const nebel_density *b)
            a->distance == b->distance;
 }
 
+static int is_same_phase(const nebel_phase *a, const nebel_phase *b)
+{
+    return a->type == b->type && a->g == b->g && a->diameter == b->diameter;
+}
+
 int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)
 {
     return a->operation == b->operation && a->priority == b->priority && nb_shape_is_same(&a->shape, &b->shape) &&
-           is_same_density(&a->density, &b->density) && HAS_SAME(a, b, nebel_volume_desc, extinction, cutoff) &&
+           is_same_density(&a->density, &b->density) && HAS_SAME(a, b, nebel_volume_desc, extinction, phase) &&
+           is_same_phase(&a->phase, &b->phase) && HAS_SAME(a, b, nebel_volume_desc, emission, cutoff) &&
            a->cutoff == b->cutoff;
 }
 
@@ -353,9 +359,7 @@ static int is_same_still(const nebel_volume_desc *a, const nebel_volume_desc *b)
 
 int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_entry *b)
 {
-    if (a->contrast != b->contrast || a->phase.type != b->phase.type || a->phase.g != b->phase.g ||
-        a->phase.diameter != b->phase.diameter || a->key_count != b->key_count)
-        return 0;
+    if (a->contrast != b->contrast || a->key_count != b->key_count) return 0;
     for (size_t i = 0; i < a->key_count; i++)
         if (a->keys[i].frame != b->keys[i].frame || !is_same_still(&a->keys[i].volume, &b->keys[i].volume)) return 0;
     return a->key_count == 0 || is_same_still(a->own, b->own);

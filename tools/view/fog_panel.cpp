@@ -80,7 +80,7 @@ bool draw_phase(nebel_phase *phase)
         changed |= slide("g", &phase->g, -0.99, 0.99, "%.3f", false, "Mean cosine: 1 goes straight on, -1 comes back.");
     if (phase->type != NEBEL_PHASE_DROPLETS) return changed;
     if (!(phase->diameter > 0)) phase->diameter = 10;
-    return slide("diameter", &phase->diameter, 0.1, NEBEL_LARGEST_DROPLET, "%.3g um", true, "Of a droplet.") || changed;
+    return slide("diameter", &phase->diameter, 0.1, NEBEL_MAX_DROPLET, "%.3g um", true, "Of a droplet.") || changed;
 }
 
 // A volume is lit in one way at all its keys.
@@ -93,7 +93,7 @@ bool draw_light(nebel_volume_desc *volume, nebel_volume_entry *entry, bool has_s
     if (is_lit || (is_zero(volume->source) && !has_sun && entry->key_count == 0)) {
         changed |= pick("albedo", volume->albedo, true,
                         "What share of the light it scatters: 0 is smoke, 1 is mist. Lit by the ambient light.");
-        if (is_lit) changed |= draw_phase(&entry->phase);
+        if (is_lit) changed |= draw_phase(&volume->phase);
     }
     return pick("emission [1/m]", volume->emission, false, "What it shines by itself, radiance per metre.") || changed;
 }

@@ -1,0 +1,244 @@
+/* Sunlight in fog: layers of the collected physics (T16), the contracts of every query, and the error that is told. */
+#include "random_fog.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <cmocka.h>
+
+#include "fog_help.h"
+
+#define PI 3.14159265358979323846
+
+/* ---- layers ---------------------------------------------------------------------------------- */
+
+typedef struct layer {
+    double depth, view, sun; /* vertical optical depth, cosines of the ways of view and of the sun */
+    double reflected, transmitted;
+} layer;
+
+static const layer layers[] = {{0.1, 1, 0.5, 0.006875010222976228, 0.006852150680609921},
+                               {0.1, 0.5, 0.5, 0.01311754857793413, 0.01303050464137108},
+                               {0.1, 0.3, 0.8, 0.02127834094789953, 0.02113139548135406},
+                               {1, 1, 0.5, 0.02520518084318261, 0.01850527611123527},
+                               {1, 0.5, 0.5, 0.03905997965671679, 0.02153927930184863},
+                               {1, 0.3, 0.8, 0.05728300254168366, 0.03193676980703678},
+                               {5, 1, 0.5, 0.02652581573433815, 0.0005325759739789651}};
+
+/* Fog between y = 0 and 10, even or denser below, of that optical depth. */
+static nebel_snapshot *make_layer(const layer *l, int is_even)
+{
+    const nebel_plane planes[] = {{{0, -1, 0}, 0}, {{0, 1, 0}, 10}};
+    const double scale = 3, thick = is_even ? 10 : scale * (1 - exp(-10 / scale)), s = l->depth / thick;
+    const nebel_volume_desc volume = {
+        .shape = {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 2},
+        .density = {.type = is_even ? NEBEL_DENSITY_CONSTANT : NEBEL_DENSITY_HEIGHT, .scale_height = scale},
+        .extinction = {s, s, s},
+        .albedo = {1, 1, 1}};
+    const nebel_fog_desc desc = {.sun = {.direction = {sqrt(1 - l->sun * l->sun), l->sun, 0}, .irradiance = {1, 1, 1}}};
+    return fog_commit(&desc, &volume, 1);
+}
+
+/* From above the light that comes back, from below what comes through. */
+static void layers_are_those_of_T16(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < 2 * sizeof layers / sizeof layers[0]; i++) {
+        const layer *l = &layers[i / 2];
+        nebel_snapshot *snapshot = make_layer(l, i % 2 == 0);
+        const double across = sqrt(1 - l->view * l->view);
+        const nebel_ray rays[] = {{{0, 20, 0}, {0, -l->view, across}, HUGE_VAL},
+                                  {{0, -5, 0}, {0, l->view, across}, HUGE_VAL}};
+        for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+            nebel_light lights[2];
+            const nebel_trace_desc desc = {.precision = (nebel_precision)precision,
+                                           .tolerance = precision == NEBEL_PRECISION_DOUBLE ? 1e-9 : 1e-5};
+            assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+            const double may = precision == NEBEL_PRECISION_DOUBLE ? 1e-10 : 1e-6;
+            assert_true(fabs(lights[0].in_scattering[0] - l->reflected) < may);
+            assert_true(fabs(lights[1].in_scattering[1] - l->transmitted) < may);
+            assert_true(lights[0].error >= fabs(lights[0].in_scattering[0] - l->reflected));
+            assert_true(lights[1].error >= fabs(lights[1].in_scattering[0] - l->transmitted));
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
+/* ---- random fog ------------------------------------------------------------------------------ */
+
+enum { RAYS = 24, SEEDS = 6 };
+
+static random_fog fog;
+static nebel_fog_desc sky;
+
+/* Random fog, with every second volume that has a source lit instead. */
+static void make_sunlit(random_fog_kind kind, uint64_t seed)
+{
+    uint64_t numbers = seed * 977 + (uint64_t)kind;
+    random_fog_make(&fog, kind, seed);
+    for (size_t i = 0; i < fog.count; i++) {
+        nebel_volume_desc *volume = &fog.volumes[i];
+        const double peak = dice(&numbers, -0.7, 0.9);
+        if (volume->operation == NEBEL_OPERATION_EXCLUDE || i % 3 == 2) continue;
+        for (int c = 0; c < 3; c++) {
+            volume->source[c] = 0;
+            volume->albedo[c] = dice(&numbers, 0.3, 1);
+        }
+        volume->phase = (nebel_phase){.type = (nebel_phase_type)(i % NEBEL_PHASE_DROPLETS), .g = peak, .alpha = 3};
+    }
+    sky = (nebel_fog_desc){
+        .sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}, .irradiance = {5, 4, 3}}};
+    memcpy(sky.ambient, fog.ambient, sizeof sky.ambient);
+}
+
+static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray rays[RAYS],
+                  nebel_light lights[RAYS])
+{
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
+static void draw_rays(nebel_ray rays[RAYS])
+{
+    for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
+}
+
+static double apart(const nebel_light *a, const nebel_light *b)
+{
+    double most = 0;
+    for (int c = 0; c < 3; c++) {
+        most = fmax(most, fabs(a->transmittance[c] - b->transmittance[c]));
+        most = fmax(most, fabs(a->in_scattering[c] - b->in_scattering[c]));
+    }
+    return most;
+}
+
+/* What the tolerance is relative to. */
+static double brightest(void)
+{
+    double most = 1;
+    for (size_t i = 0; i < fog.count; i++)
+        for (int c = 0; c < 3; c++)
+            most = fmax(most, fmax(fog.volumes[i].source[c], fog.volumes[i].albedo[c] * sky.ambient[c]));
+    return most;
+}
+
+/* Against the same light within a thousandth of the tolerance. */
+static void errors_are_told(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
+        double worst = 0, slack = 0;
+        for (uint64_t seed = 0; seed < SEEDS; seed++) {
+            nebel_ray rays[RAYS];
+            nebel_light fine[RAYS], light[RAYS];
+            make_sunlit((random_fog_kind)kind, seed);
+            nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
+            draw_rays(rays);
+            trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6}, rays, fine);
+            for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+                trace(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, rays, light);
+                for (int i = 0; i < RAYS; i++) {
+                    const double off = apart(&light[i], &fine[i]);
+                    worst = fmax(worst, (off - fine[i].error) / light[i].error);
+                    slack = fmax(slack, light[i].error);
+                    if (precision == NEBEL_PRECISION_DOUBLE) assert_true(light[i].error <= 0.002 * brightest() + 1e-8);
+                }
+            }
+            nebel_release_snapshot(snapshot);
+        }
+        print_message("kind %d: off by at most %.3f of the error told; at most %.1e told\n", kind, worst, slack);
+        assert_true(worst <= 1);
+    }
+}
+
+static void light_is_the_same_in_any_order_and_set(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
+        nebel_ray rays[RAYS];
+        nebel_light first[RAYS], other[RAYS];
+        make_sunlit((random_fog_kind)kind, 3);
+        nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
+        draw_rays(rays);
+        for (size_t i = 0; i < fog.count / 2; i++) {
+            const nebel_volume_desc swapped = fog.volumes[i];
+            fog.volumes[i] = fog.volumes[fog.count - 1 - i];
+            fog.volumes[fog.count - 1 - i] = swapped;
+        }
+        nebel_snapshot *turned = fog_commit(&sky, fog.volumes, fog.count);
+        trace(snapshot, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR}, rays, first);
+        for (int isa = NEBEL_ISA_DEFAULT; isa < NEBEL_ISA_COUNT; isa++) {
+            if (!nebel_isa_available((nebel_isa)isa)) continue;
+            const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
+            trace(turned, &desc, rays, other);
+            assert_memory_equal(first, other, sizeof first);
+            for (int i = 0; i < RAYS; i++)
+                assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+            assert_memory_equal(first, other, sizeof first);
+        }
+        nebel_release_snapshot(snapshot);
+        nebel_release_snapshot(turned);
+    }
+}
+
+/* ---- rules ----------------------------------------------------------------------------------- */
+
+static void suns_are_checked(void **state)
+{
+    const double nan = (double)NAN;
+    const nebel_sun wrong[] = {{.irradiance = {1, 1, 1}},
+                               {.direction = {0, nan, 0}, .irradiance = {1, 1, 1}},
+                               {.direction = {0, 1, 0}, .irradiance = {-1, 1, 1}},
+                               {.direction = {0, 1, 0}, .irradiance = {nan, 1, 1}},
+                               {.direction = {0, 1, 0}, .irradiance = {1e10, 1, 1}}};
+    const nebel_sun right = {.direction = {0, 1e30, 0}, .irradiance = {1e9, 0, 0}};
+    nebel_fog *made = NULL;
+    (void)state;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        const nebel_fog_desc desc = {.sun = wrong[i]};
+        assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_ERROR_VALUE);
+        assert_null(made);
+    }
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &made), NEBEL_OK);
+    assert_int_equal(nebel_set_sun(made, &wrong[0]), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_set_sun(made, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_sun(NULL, &right), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_sun(made, &right), NEBEL_OK);
+    const nebel_volume_desc peaked = {.albedo = {1, 1, 1}, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 1}};
+    assert_int_equal(nebel_add_volume(made, &peaked, NULL), NEBEL_ERROR_VALUE);
+    nebel_destroy_fog(made);
+}
+
+/* An endless world of fog lets no sun in; fog without end above, less and less of it, does. */
+static void endless_fog_is_answered(void **state)
+{
+    const nebel_fog_desc desc = {.sun = {.direction = {0.2, 1, 0.1}, .irradiance = {5, 5, 5}}};
+    nebel_volume_desc volume = {.extinction = {0.01, 0.02, 0.03}, .albedo = {1, 1, 1}};
+    const nebel_ray rays[] = {{{0, 2, 0}, {0.3, -0.1, 1}, HUGE_VAL}, {{0, 2, 0}, {0.3, 0.2, 1}, HUGE_VAL}};
+    nebel_light lights[2];
+    (void)state;
+    nebel_snapshot *world = fog_commit(&desc, &volume, 1);
+    assert_int_equal(nebel_trace(world, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, lights, sizeof *lights), 0);
+    for (int c = 0; c < 3; c++) assert_true(lights[0].in_scattering[c] <= lights[0].error);
+    nebel_release_snapshot(world);
+    volume.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
+    nebel_snapshot *height = fog_commit(&desc, &volume, 1);
+    assert_int_equal(nebel_trace(height, &(nebel_trace_desc){0}, 2, rays, sizeof *rays, lights, sizeof *lights), 0);
+    for (int c = 0; c < 3; c++) assert_true(lights[1].in_scattering[c] > 0.05 && lights[1].error < 0.0021);
+    nebel_release_snapshot(height);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(layers_are_those_of_T16),
+        cmocka_unit_test(errors_are_told),
+        cmocka_unit_test(light_is_the_same_in_any_order_and_set),
+        cmocka_unit_test(suns_are_checked),
+        cmocka_unit_test(endless_fog_is_answered),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
