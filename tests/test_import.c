@@ -1,21 +1,11 @@
 /* Fog in the words of game engines becomes the volumes that docs/engines.md promises. */
+#include "near.h"
 #include "scene_help.h"
 
 #include <math.h>
 
 #define FOG(entry) "{\"nebel\": 1, \"up\": \"z\", \"unit\": 0.01, \"fog\": [{" entry "}]}"
 #define IMPORT(members) FOG("\"import\": {" members "}")
-
-static void assert_number(double got, double wanted)
-{
-    if (!(fabs(got - wanted) <= 1e-14 * fmax(1, fabs(wanted)))) fail_msg("%.17g should be %.17g", got, wanted);
-}
-
-static void assert_vector(const double *got, double x, double y, double z)
-{
-    const double wanted[3] = {x, y, z};
-    for (int i = 0; i < 3; i++) assert_number(got[i], wanted[i]);
-}
 
 static void assert_grey(const double *got, double wanted)
 {
@@ -100,8 +90,8 @@ static void test_unreal_start_and_largest_opacity(void **state)
         const double x = places[i][0] / 100, y = (places[i][1] - 150) / 100;
         const double transmittance = unreal_transmittance((const double[]){0, 150}, places[i], 700, .8);
         const nebel_light light = light_along(scene, &(nebel_ray){{0, 1.5, 0}, {x, y, 0}, hypot(x, y)});
-        assert_number(light.transmittance[0], transmittance);
-        for (int c = 0; c < 3; c++) assert_number(light.in_scattering[c], (c + 1) * (1 - transmittance));
+        assert_near(light.transmittance[0], transmittance, 1e-14);
+        for (int c = 0; c < 3; c++) assert_near(light.in_scattering[c], (c + 1) * (1 - transmittance), 1e-14);
     }
     nebel_destroy_scene(scene);
     (void)import(IMPORT("\"type\": \"unreal_height_fog\", \"FogMaxOpacity\": 0"), 0, &scene);

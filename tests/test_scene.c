@@ -1,20 +1,8 @@
 /* What a scene file says, and what it leaves to its defaults. */
+#include "near.h"
 #include "scene_help.h"
 
 #include <math.h>
-
-static void assert_vector(const double *got, double x, double y, double z)
-{
-    const double wanted[3] = {x, y, z};
-    for (int i = 0; i < 3; i++)
-        if (!(fabs(got[i] - wanted[i]) <= 1e-15 * fmax(1, fabs(wanted[i]))))
-            fail_msg("(%.17g, %.17g, %.17g) should be (%.17g, %.17g, %.17g)", got[0], got[1], got[2], x, y, z);
-}
-
-static void assert_number(double got, double wanted)
-{
-    if (!(fabs(got - wanted) <= 1e-15 * fabs(wanted))) fail_msg("%.17g should be %.17g", got, wanted);
-}
 
 static const char contract[] =
     "{ \"nebel\": 1, // the version\n"

@@ -1,6 +1,7 @@
 /* The section "cells" of scene files: what it becomes, what is wrong with it, and how it is saved. */
 #define _POSIX_C_SOURCE 200809L
 
+#include "near.h"
 #include "scene_help.h"
 
 #include <math.h>
@@ -16,11 +17,6 @@
 #define DOOR "[[4, 0, 4], [4, 2, 4], [4, 2, 6], [4, 0, 6]]"
 #define PORTALS(portals) SCENE("\"cells\": [" HALL ", " CRYPT "], \"portals\": " portals)
 #define AND(members) SCENE("\"cells\": [" HALL "], " members)
-
-static void assert_number(double got, double wanted)
-{
-    if (!(fabs(got - wanted) <= 1e-14 * fmax(1, fabs(wanted)))) fail_msg("%.17g should be %.17g", got, wanted);
-}
 
 /* ---- what it becomes ------------------------------------------------------------------------- */
 

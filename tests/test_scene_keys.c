@@ -1,21 +1,11 @@
 /* Fog that moves from key to key. */
+#include "near.h"
 #include "scene_help.h"
 
 #include <math.h>
 
 #define FOG(members) "{\"nebel\": 1, \"fog\": [{" members "}]}"
 #define BALL "\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 2}"
-
-static void assert_number(double got, double wanted)
-{
-    if (!(fabs(got - wanted) <= 1e-14 * fmax(1, fabs(wanted)))) fail_msg("%.17g should be %.17g", got, wanted);
-}
-
-static void assert_vector(const double *got, double x, double y, double z)
-{
-    const double wanted[3] = {x, y, z};
-    for (int i = 0; i < 3; i++) assert_number(got[i], wanted[i]);
-}
 
 /* ---- between keys ---------------------------------------------------------------------------- */
 
