@@ -16,19 +16,6 @@ static nebel_result no_access(const nb_meshes *meshes)
     return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL: no access to the triangles; try again");
 }
 
-static void *map(unsigned buffer, size_t size, GLbitfield access)
-{
-    glBindBuffer(GL_ARRAY_BUFFER, buffer);
-    return glMapBufferRange(GL_ARRAY_BUFFER, 0, (GLsizeiptr)size, access);
-}
-
-/* 0 where the driver lost what was written. */
-static int unmap(unsigned buffer, const void *mapped)
-{
-    glBindBuffer(GL_ARRAY_BUFFER, buffer);
-    return mapped != NULL && glUnmapBuffer(GL_ARRAY_BUFFER);
-}
-
 /* For each triangle, out of what vertices have. */
 typedef void gather(const uint32_t *indices, const void *vertices, void *corners);
 
@@ -37,12 +24,13 @@ static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, unsigned 
                          size_t size, gather *one)
 {
     const size_t count = (size_t)mesh->index_count / 3;
-    const uint32_t *const indices = map(mesh->indices, 3 * count * sizeof *indices, GL_MAP_READ_BIT);
-    const void *const vertices = map(from, mesh->vertex_count * from_size, GL_MAP_READ_BIT);
-    char *const corners = map(to, count * size, GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
+    const uint32_t *const indices = nb_meshes_map(mesh->indices, 3 * count * sizeof *indices, GL_MAP_READ_BIT);
+    const void *const vertices = nb_meshes_map(from, mesh->vertex_count * from_size, GL_MAP_READ_BIT);
+    char *const corners = nb_meshes_map(to, count * size, GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
     const int good = indices != NULL && vertices != NULL && corners != NULL;
     for (size_t i = 0; i < count && good; i++) one(indices + 3 * i, vertices, corners + i * size);
-    const int known = unmap(mesh->indices, indices), read = unmap(from, vertices), written = unmap(to, corners);
+    const int known = nb_meshes_unmap(mesh->indices, indices), read = nb_meshes_unmap(from, vertices),
+              written = nb_meshes_unmap(to, corners);
     return known && read && written ? NEBEL_OK : no_access(meshes);
 }
 

@@ -262,6 +262,18 @@ static void delete_objects(const nb_meshes *meshes)
     }
 }
 
+void *nb_meshes_map(unsigned buffer, size_t size, unsigned access)
+{
+    glBindBuffer(GL_ARRAY_BUFFER, buffer);
+    return glMapBufferRange(GL_ARRAY_BUFFER, 0, (GLsizeiptr)size, access);
+}
+
+int nb_meshes_unmap(unsigned buffer, const void *mapped)
+{
+    glBindBuffer(GL_ARRAY_BUFFER, buffer);
+    return mapped != NULL && glUnmapBuffer(GL_ARRAY_BUFFER);
+}
+
 void nb_meshes_delete(nb_meshes *meshes, int in_context)
 {
     if (in_context) delete_objects(meshes);

@@ -39,6 +39,11 @@ typedef struct nb_meshes {
  * the active unit, ARRAY_BUFFER and the vertex array. Errors: as nebel_create_gl_renderer. */
 nebel_result nb_meshes_make(nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene);
 
+/* A buffer's bytes in memory, as glMapBufferRange gives them, and back; 0 where the driver lost what was written.
+ * Change the binding of ARRAY_BUFFER. */
+void *nb_meshes_map(unsigned buffer, size_t size, unsigned access);
+int nb_meshes_unmap(unsigned buffer, const void *mapped);
+
 /* In OpenGL, where the context is still there; then in memory. */
 void nb_meshes_delete(nb_meshes *meshes, int in_context);
 

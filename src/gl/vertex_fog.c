@@ -24,19 +24,6 @@ static nebel_result make_attribute(const nb_meshes *meshes, nb_mesh *mesh)
     return result;
 }
 
-static void *map(unsigned buffer, size_t size, GLbitfield access)
-{
-    glBindBuffer(GL_ARRAY_BUFFER, buffer);
-    return glMapBufferRange(GL_ARRAY_BUFFER, 0, (GLsizeiptr)size, access);
-}
-
-/* 0 where the driver lost what was written. */
-static int unmap(unsigned buffer, const void *mapped)
-{
-    glBindBuffer(GL_ARRAY_BUFFER, buffer);
-    return mapped != NULL && glUnmapBuffer(GL_ARRAY_BUFFER);
-}
-
 /* As the ray to a place is seen. */
 static nebel_cell_view view_towards(const nb_vertex_source *source, const double place[3])
 {
@@ -106,16 +93,16 @@ static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nb_
 {
     const size_t count = mesh->vertex_count;
     const GLbitfield writing = GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT;
-    nebel_vertices vertices = {.positions = map(mesh->vertices, count * sizeof(nb_vertex), GL_MAP_READ_BIT),
+    nebel_vertices vertices = {.positions = nb_meshes_map(mesh->vertices, count * sizeof(nb_vertex), GL_MAP_READ_BIT),
                                .position_stride = sizeof(nb_vertex)};
-    void *const out = map(mesh->fog, count * FOG_SIZE, writing);
+    void *const out = nb_meshes_map(mesh->fog, count * FOG_SIZE, writing);
     const int mapped = vertices.positions != NULL && out != NULL;
     for (int i = 0; i < 3; i++) {
         vertices.origin[i] = mesh->origin[i];
         vertices.eye[i] = source->view.eye[i];
     }
     const nebel_result result = mapped ? fog_vertices(source, count, &vertices, out) : NEBEL_OK;
-    const int read = unmap(mesh->vertices, vertices.positions), written = unmap(mesh->fog, out);
+    const int read = nb_meshes_unmap(mesh->vertices, vertices.positions), written = nb_meshes_unmap(mesh->fog, out);
     if (read && written) return result;
     return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL: no access to the vertices; try again");
 }
