@@ -125,6 +125,20 @@ void pass_delete_framebuffer(unsigned framebuffer)
     glDeleteFramebuffers(1, &framebuffer);
 }
 
+void pass_attach(unsigned program, unsigned kind, int count, const char *const *texts)
+{
+    GLint good = 0;
+    char words[512] = "";
+    const unsigned shader = glCreateShader(kind);
+    glShaderSource(shader, count, texts, NULL);
+    glCompileShader(shader);
+    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
+    glGetShaderInfoLog(shader, sizeof words, NULL, words);
+    if (!good) fail_msg("%s", words);
+    glAttachShader(program, shader);
+    glDeleteShader(shader);
+}
+
 /* ---- pictures -------------------------------------------------------------------------------- */
 
 const double pass_eye[3] = {4e4, 12, -7e4};

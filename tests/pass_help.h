@@ -42,6 +42,9 @@ void pass_read(unsigned texture, int width, int height, float *texels);
 void pass_delete_texture(unsigned texture);
 void pass_delete_framebuffer(unsigned framebuffer);
 
+/* Compiles a shader of so many texts into a program; `kind`: GL_VERTEX_SHADER, GL_FRAGMENT_SHADER. */
+void pass_attach(unsigned program, unsigned kind, int count, const char *const *texts);
+
 /* ---- pictures -------------------------------------------------------------------------------- */
 
 enum { PASS_WIDTH = 96, PASS_HEIGHT = 64, PASS_PIXELS = PASS_WIDTH * PASS_HEIGHT };

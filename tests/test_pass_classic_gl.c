@@ -324,20 +324,6 @@ static const char fragment_text[] = "in vec4 pass_color, pass_stream;\n"
                                     "    fragment = OUTPUT;\n"
                                     "}\n";
 
-static unsigned compile(GLenum kind, const char *version, const char *head, const char *text)
-{
-    const char *const texts[] = {version, head, nebel_gl_classic_text(), text};
-    const unsigned shader = glCreateShader(kind);
-    GLint good = 0;
-    char words[512] = "";
-    glShaderSource(shader, 4, texts, NULL);
-    glCompileShader(shader);
-    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-    glGetShaderInfoLog(shader, sizeof words, NULL, words);
-    if (!good) fail_msg("%s", words);
-    return shader;
-}
-
 /* A program whose fragments are `output`, an expression; it is current. */
 static unsigned use_program(int es, const char *output)
 {
@@ -347,15 +333,15 @@ static unsigned use_program(int es, const char *output)
     float matrix_float[16];
     const matrix m = multiply(mesh.clip_from_eye, mesh.eye_from_object);
     snprintf(head, sizeof head, "#define OUTPUT %s\n", output);
-    const unsigned shaders[2] = {compile(GL_VERTEX_SHADER, version, "", vertex_text),
-                                 compile(GL_FRAGMENT_SHADER, version, head, fragment_text)};
-    for (int i = 0; i < 2; i++) glAttachShader(program, shaders[i]);
+    const char *const vertex[] = {version, nebel_gl_classic_text(), vertex_text};
+    const char *const fragment[] = {version, head, nebel_gl_classic_text(), fragment_text};
+    pass_attach(program, GL_VERTEX_SHADER, 3, vertex);
+    pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
     glBindAttribLocation(program, 0, "place");
     glBindAttribLocation(program, 1, "color");
     glBindAttribLocation(program, 2, "stream");
     glBindAttribLocation(program, 3, "coordinate");
     glLinkProgram(program);
-    for (int i = 0; i < 2; i++) glDeleteShader(shaders[i]);
     for (int i = 0; i < 16; i++) matrix_float[i] = (float)m.m[i];
     glUseProgram(program);
     glUniformMatrix4fv(glGetUniformLocation(program, "clip_from_object"), 1, GL_FALSE, matrix_float);

@@ -26,17 +26,6 @@ static unsigned make_samples(GLenum format)
     return name;
 }
 
-static unsigned compile(GLenum kind, const char *text)
-{
-    GLint good = 0;
-    const unsigned shader = glCreateShader(kind);
-    glShaderSource(shader, 1, &text, NULL);
-    glCompileShader(shader);
-    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-    assert_true(good);
-    return shader;
-}
-
 static unsigned fill_program(void)
 {
     const char *const vertex = "#version 400 core\n"
@@ -51,12 +40,9 @@ static unsigned fill_program(void)
                                  "    gl_FragDepth = texelFetch(depths, at, 0).x;\n"
                                  "    color = texelFetch(colors, at, 0);\n"
                                  "}\n";
-    const unsigned program = glCreateProgram(),
-                   parts[] = {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)};
-    for (int i = 0; i < 2; i++) {
-        glAttachShader(program, parts[i]);
-        glDeleteShader(parts[i]);
-    }
+    const unsigned program = glCreateProgram();
+    pass_attach(program, GL_VERTEX_SHADER, 1, &vertex);
+    pass_attach(program, GL_FRAGMENT_SHADER, 1, &fragment);
     glLinkProgram(program);
     glUseProgram(program);
     glUniform1i(glGetUniformLocation(program, "depths"), 0);

@@ -13,33 +13,6 @@ static const range usual = {-1, 0};
 
 /* ---- the host's program ---------------------------------------------------------------------- */
 
-static unsigned compile(GLenum kind, int count, const char *const *texts)
-{
-    GLint good = 0;
-    char words[512] = "";
-    const unsigned shader = glCreateShader(kind);
-    glShaderSource(shader, count, texts, NULL);
-    glCompileShader(shader);
-    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-    glGetShaderInfoLog(shader, sizeof words, NULL, words);
-    if (!good) fail_msg("%s", words);
-    return shader;
-}
-
-static unsigned link(unsigned vertex, unsigned fragment)
-{
-    GLint good = 0;
-    const unsigned program = glCreateProgram();
-    glAttachShader(program, vertex);
-    glAttachShader(program, fragment);
-    glLinkProgram(program);
-    glGetProgramiv(program, GL_LINK_STATUS, &good);
-    assert_true(good);
-    glDeleteShader(vertex);
-    glDeleteShader(fragment);
-    return program;
-}
-
 static unsigned make_program(const nebel_gl_fog *fog, int es)
 {
     const char *const version = es ? "#version 300 es\n" : "#version 330 core\n";
@@ -68,7 +41,14 @@ static unsigned make_program(const nebel_gl_fog *fog, int es)
              fog->texture ? "#define NEBEL_TEXTURE\n" : "", fog->tiles ? "#define NEBEL_TILES\n" : "");
     const char *const fragment[] = {
         version, defines, nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), main_text};
-    return link(compile(GL_VERTEX_SHADER, 2, vertex), compile(GL_FRAGMENT_SHADER, 4, fragment));
+    const unsigned program = glCreateProgram();
+    GLint good = 0;
+    pass_attach(program, GL_VERTEX_SHADER, 2, vertex);
+    pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
+    glLinkProgram(program);
+    glGetProgramiv(program, GL_LINK_STATUS, &good);
+    assert_true(good);
+    return program;
 }
 
 /* ---- the words, as the driver wants them ----------------------------------------------------- */

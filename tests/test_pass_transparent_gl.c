@@ -118,20 +118,6 @@ static const char fragment_text[] =
     "#endif\n"
     "}\n";
 
-static void attach(unsigned program, GLenum kind, int count, const char *const *texts)
-{
-    GLint good = 0;
-    char words[512] = "";
-    const unsigned shader = glCreateShader(kind);
-    glShaderSource(shader, count, texts, NULL);
-    glCompileShader(shader);
-    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-    glGetShaderInfoLog(shader, sizeof words, NULL, words);
-    if (!good) fail_msg("%s", words);
-    glAttachShader(program, shader);
-    glDeleteShader(shader);
-}
-
 static unsigned make_program(const nebel_gl *gl, nb_gl_language language, path how)
 {
     const int es = language == NB_GL_300ES;
@@ -148,8 +134,8 @@ static unsigned make_program(const nebel_gl *gl, nb_gl_language language, path h
         version, defines, nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), fragment_text};
     const unsigned program = glCreateProgram();
     GLint good = 0;
-    attach(program, GL_VERTEX_SHADER, 2, vertex);
-    attach(program, GL_FRAGMENT_SHADER, 4, fragment);
+    pass_attach(program, GL_VERTEX_SHADER, 2, vertex);
+    pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
     glLinkProgram(program);
     glGetProgramiv(program, GL_LINK_STATUS, &good);
     assert_true(good);
