@@ -11,35 +11,13 @@
 
 #include <nebel/cells.h>
 
-enum { WIDTH = 192, HEIGHT = 96, TEXELS = 16, MANY = 60, PARTICLES = 40 };
+enum { WIDTH = 192, HEIGHT = 96, MANY = 60, PARTICLES = 40 };
 
 static const nb_gl_language languages[] = {NB_GL_330, NB_GL_300ES};
 
-/* ---- the scene: a ball over a textured floor ------------------------------------------------- */
-
-typedef struct stage {
-    test_ball ball;
-    uint8_t texels[4 * TEXELS * TEXELS];
-    nebel_texture texture;
-    nebel_snapshot *fog;
-    nebel_camera camera;
-} stage;
-
-static void set_stage(stage *s, const double center[3])
+static void set_stage(test_stage *s, const double center[3])
 {
-    test_ball_make(&s->ball, center);
-    for (size_t i = 0; i < sizeof s->texels; i++) s->texels[i] = (uint8_t)(37 * i + i / 64 * 11);
-    s->texture = (nebel_texture){TEXELS, TEXELS, s->texels};
-    s->ball.meshes[1].uvs = test_square_uvs;
-    s->ball.meshes[1].texture = 0;
-    s->ball.scene.texture_count = 1;
-    s->ball.scene.textures = &s->texture;
-    const nebel_volume_desc volumes[] = {
-        {.extinction = {.02, .03, .04}, .source = {.5, .6, .7}},
-        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {center[0] + 2, center[1], center[2]}, .radius = 1.5},
-         .extinction = {.5, .5, .3}}};
-    s->fog = test_fog(2, volumes);
-    s->camera = test_camera(center[0] + 1.2, center[1] + .3, center[2] + 1.1, center[0], center[1], center[2]);
+    test_stage_set(s, center, (const double[3]){1.2, .3, 1.1});
     s->camera.projection = NEBEL_PROJECTION_PANORAMA;
 }
 
@@ -57,7 +35,7 @@ static picture_difference tell(const picture_pair *pair)
 static void test_all_around_is_as_on_the_cpu(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     static const double centers[2][3] = {{0, 0, 0}, {1e7, -3e6, 5e6}};
     static const double ways[5][3] = {{-1, 0, -1}, {1, .2, 1.3}, {0, 1, 0}, {.01, -1, 0}, {-1, -.3, .5}};
     static const uint32_t sizes[5][2] = {{WIDTH, HEIGHT}, {WIDTH, HEIGHT}, {64, 200}, {37, 19}, {5, 3}};
@@ -125,7 +103,7 @@ static void test_triangles_around_the_eye(void **state)
 static void test_particles_among_many_volumes(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     static nebel_particle particles[PARTICLES];
     static nebel_volume_desc volumes[MANY + PARTICLES];
     uint64_t dice_state = 9;
@@ -178,7 +156,7 @@ static void test_particles_among_many_volumes(void **state)
 static void test_kinds_of_frames_take_turns(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     static float first[3][3 * WIDTH * HEIGHT], again[3 * WIDTH * HEIGHT];
     static const nebel_gl_method methods[3] = {NEBEL_GL_METHOD_EXACT, NEBEL_GL_METHOD_EXACT, NEBEL_GL_METHOD_VERTEX};
     nb_gl context;
@@ -214,7 +192,7 @@ static const method_pair methods[] = {{NEBEL_METHOD_VERTEX, NEBEL_GL_METHOD_VERT
                                       {NEBEL_METHOD_ADDITIVE, NEBEL_GL_METHOD_ADDITIVE},
                                       {NEBEL_METHOD_CELLS, NEBEL_GL_METHOD_CELLS}};
 
-static void render_cpu(const stage *s, const nebel_cells *cells, const nebel_camera *camera, nebel_method method,
+static void render_cpu(const test_stage *s, const nebel_cells *cells, const nebel_camera *camera, nebel_method method,
                        picture_pair *pair)
 {
     nebel_renderer *renderer = NULL;
@@ -229,7 +207,7 @@ static void render_cpu(const stage *s, const nebel_cells *cells, const nebel_cam
     nebel_destroy_renderer(renderer);
 }
 
-static void render_gl(const stage *s, const nebel_cells *cells, const nebel_camera *camera, nebel_gl_method method,
+static void render_gl(const test_stage *s, const nebel_cells *cells, const nebel_camera *camera, nebel_gl_method method,
                       picture_pair *pair)
 {
     nebel_gl_renderer *renderer = NULL;
@@ -248,7 +226,7 @@ static void render_gl(const stage *s, const nebel_cells *cells, const nebel_came
 static void test_methods_are_those_of_the_cpu(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     static const nebel_cell rooms[] = {{.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, -3, -9}, .max = {9, 0, 9}},
                                         .density = .2,
                                         .color = {.9, .4, .2}},

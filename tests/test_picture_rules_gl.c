@@ -11,38 +11,16 @@
 
 #include <epoxy/gl.h>
 
-enum { WIDTH = 96, HEIGHT = 64, TEXELS = 16 };
+enum { WIDTH = 96, HEIGHT = 64 };
 
 static const nb_gl_language languages[] = {NB_GL_330, NB_GL_300ES};
 
-/* ---- the scene: a ball over a textured floor ------------------------------------------------- */
-
-typedef struct stage {
-    test_ball ball;
-    uint8_t texels[4 * TEXELS * TEXELS];
-    nebel_texture texture;
-    nebel_snapshot *fog;
-    nebel_camera camera;
-} stage;
-
-static void set_stage(stage *s, const double center[3])
+static void set_stage(test_stage *s, const double center[3])
 {
-    test_ball_make(&s->ball, center);
-    for (size_t i = 0; i < sizeof s->texels; i++) s->texels[i] = (uint8_t)(37 * i + i / 64 * 11);
-    s->texture = (nebel_texture){TEXELS, TEXELS, s->texels};
-    s->ball.meshes[1].uvs = test_square_uvs;
-    s->ball.meshes[1].texture = 0;
-    s->ball.scene.texture_count = 1;
-    s->ball.scene.textures = &s->texture;
-    const nebel_volume_desc volumes[] = {
-        {.extinction = {.02, .03, .04}, .source = {.5, .6, .7}},
-        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {center[0] + 2, center[1], center[2]}, .radius = 1.5},
-         .extinction = {.5, .5, .3}}};
-    s->fog = test_fog(2, volumes);
-    s->camera = test_camera(center[0] + 3, center[1] + 2, center[2] + 5, center[0], center[1], center[2]);
+    test_stage_set(s, center, (const double[3]){3, 2, 5});
 }
 
-static nebel_gl_renderer *make_renderer(const stage *s)
+static nebel_gl_renderer *make_renderer(const test_stage *s)
 {
     nebel_gl_renderer *renderer = NULL;
     assert_int_equal(nebel_create_gl_renderer(&s->ball.scene, s->fog, &(nebel_gl_renderer_desc){0}, &renderer),
@@ -50,12 +28,12 @@ static nebel_gl_renderer *make_renderer(const stage *s)
     return renderer;
 }
 
-static nebel_gl_frame_desc frame_of(const stage *s, uint32_t samples)
+static nebel_gl_frame_desc frame_of(const test_stage *s, uint32_t samples)
 {
     return (nebel_gl_frame_desc){.camera = s->camera, .width = WIDTH, .height = HEIGHT, .samples = samples};
 }
 
-static void draw(nebel_gl_renderer *renderer, const stage *s, uint32_t samples, float *color)
+static void draw(nebel_gl_renderer *renderer, const test_stage *s, uint32_t samples, float *color)
 {
     const nebel_gl_frame_desc desc = frame_of(s, samples);
     assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
@@ -68,7 +46,7 @@ static void draw(nebel_gl_renderer *renderer, const stage *s, uint32_t samples, 
 static void test_light_is_that_of_the_cpu(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     static const double centers[2][3] = {{0, 0, 0}, {1e7, -3e6, 5e6}};
     for (int i = 0; i < 2; i++) {
         nb_gl context;
@@ -105,7 +83,7 @@ static void make_particles(nebel_particle particles[9], nebel_volume_desc volume
     for (int i = 0; i < 9; i++) volumes[2 + i] = nebel_particle_volume(&particles[i]);
 }
 
-static void check_particles(const stage *s, nb_gl_language language, int grey, nebel_projection projection)
+static void check_particles(const test_stage *s, nb_gl_language language, int grey, nebel_projection projection)
 {
     nebel_particle particles[9];
     nebel_volume_desc volumes[11] = {
@@ -135,7 +113,7 @@ static void check_particles(const stage *s, nb_gl_language language, int grey, n
 static void test_particles_are_fog(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     set_stage(&s, (double[3]){0, 0, 0});
     for (int i = 0; i < 2; i++) {
         for (int grey = 0; grey < 2; grey++) {
@@ -147,7 +125,7 @@ static void test_particles_are_fog(void **state)
 }
 
 /* How far the colours are apart where the sun shines through particles onto the floor. */
-static double compare_sunlight(const stage *s, nb_gl_language language, int grey, int leave_sun)
+static double compare_sunlight(const test_stage *s, nb_gl_language language, int grey, int leave_sun)
 {
     nebel_particle particles[9];
     nebel_volume_desc volumes[11] = {
@@ -171,7 +149,7 @@ static double compare_sunlight(const stage *s, nb_gl_language language, int grey
 static void test_particles_dim_the_sun(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     set_stage(&s, (double[3]){0, 0, 0});
     for (int i = 0; i < 2; i++) {
         const double dimmed = compare_sunlight(&s, languages[i], i, 0),
@@ -186,7 +164,7 @@ static void test_particles_dim_the_sun(void **state)
 static void test_samples_smooth_edges(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     double color[2];
     nb_gl context;
     set_stage(&s, (double[3]){0, 0, 0});
@@ -213,7 +191,7 @@ static void test_samples_smooth_edges(void **state)
 static void test_outlines_agree_sample_by_sample(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     nb_gl context;
     set_stage(&s, (double[3]){0, 0, 0});
     for (uint32_t samples = 3; samples <= 4; samples++) {
@@ -237,7 +215,7 @@ typedef struct outcome {
 } outcome;
 
 /* Through each kind of camera, with particles. */
-static void draw_all(nebel_gl_renderer *renderer, const stage *s, nebel_gl_method method, outcome *out)
+static void draw_all(nebel_gl_renderer *renderer, const test_stage *s, nebel_gl_method method, outcome *out)
 {
     static const nebel_particle particle = {
         .center = {.5, 0, 2}, .radius = .6, .extinction = {1, 2, 3}, .emission = {.1, .2, .3}};
@@ -254,7 +232,7 @@ static void draw_all(nebel_gl_renderer *renderer, const stage *s, nebel_gl_metho
 
 static void draw_in_odd_state(nb_gl_language language, nebel_gl_method method, int odd_state, outcome *out)
 {
-    static stage s;
+    static test_stage s;
     static odd_snapshot before, after;
     const int desktop = language == NB_GL_330;
     nb_gl context;
@@ -297,7 +275,7 @@ static int stop(size_t done, size_t total, void *user)
     return *calls == 2;
 }
 
-static void check_frames(nebel_gl_renderer *renderer, const stage *s)
+static void check_frames(nebel_gl_renderer *renderer, const test_stage *s)
 {
     nebel_gl_textures textures;
     size_t calls = 0;
@@ -331,7 +309,7 @@ static void check_frames(nebel_gl_renderer *renderer, const stage *s)
 static void test_what_is_refused(void **state)
 {
     (void)state;
-    static stage s;
+    static test_stage s;
     nb_gl context;
     nebel_gl_renderer *renderer = NULL;
     const nebel_gl_renderer_desc usual = {0}, tiny = {.shadow_size = 1};

@@ -215,4 +215,36 @@ static inline void test_ball_make(test_ball *ball, const double center[3])
                                      .meshes = ball->meshes};
 }
 
+/* ---- a ball over a textured floor, in fog ---------------------------------------------------- */
+
+enum { TEST_TEXELS = 16 };
+
+/* Points into itself. */
+typedef struct test_stage {
+    test_ball ball;
+    uint8_t texels[4 * TEST_TEXELS * TEST_TEXELS];
+    nebel_texture texture;
+    nebel_snapshot *fog;
+    nebel_camera camera;
+} test_stage;
+
+/* The camera is beside the ball, `aside` of its centre. */
+static inline void test_stage_set(test_stage *s, const double center[3], const double aside[3])
+{
+    test_ball_make(&s->ball, center);
+    for (size_t i = 0; i < sizeof s->texels; i++) s->texels[i] = (uint8_t)(37 * i + i / 64 * 11);
+    s->texture = (nebel_texture){TEST_TEXELS, TEST_TEXELS, s->texels};
+    s->ball.meshes[1].uvs = test_square_uvs;
+    s->ball.meshes[1].texture = 0;
+    s->ball.scene.texture_count = 1;
+    s->ball.scene.textures = &s->texture;
+    const nebel_volume_desc volumes[] = {
+        {.extinction = {.02, .03, .04}, .source = {.5, .6, .7}},
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {center[0] + 2, center[1], center[2]}, .radius = 1.5},
+         .extinction = {.5, .5, .3}}};
+    s->fog = test_fog(2, volumes);
+    s->camera =
+        test_camera(center[0] + aside[0], center[1] + aside[1], center[2] + aside[2], center[0], center[1], center[2]);
+}
+
 #endif
