@@ -51,8 +51,8 @@ enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
     X(fog_linear, of_real(nb_fog_linear(r0, r1, r2)))                                                                  \
     X(fog_exp, of_real(nb_fog_exp(r0, r1)))                                                                            \
     X(fog_exp2, of_real(nb_fog_exp2(r0, r1)))                                                                          \
-    X(phase_lobe, of_real(nb_phase_lobe(r0, r1, r2, r3, nb_turn_between(v6, v9))))             \
-    X(turn_cosine, of_real(nb_turn_between(v6, v9).cosine))                                    \
+    X(phase_lobe, of_real(nb_phase_lobe(r0, r1, r2, r3, nb_turn_between(v6, v9))))                                     \
+    X(turn_cosine, of_real(nb_turn_between(v6, v9).cosine))                                                            \
     X(turn_ahead, of_real(nb_turn_between(v6, v9).ahead))
 
 #define NB_FORMULAS(X) NB_FORMULA_INTERVALS(X) NB_FORMULA_INTEGRALS(X) NB_FORMULA_VALUES(X)

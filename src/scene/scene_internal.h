@@ -86,7 +86,7 @@ typedef struct nb_scene_reader {
     char core_message[512];                    /* what the core said about the last one */
     uint32_t seen;                             /* sections */
     size_t section_offsets[NB_SCENE_SECTIONS]; /* of the keys of those seen */
-    double imported_opacity; /* the largest one, where the file has none of its own; 0: none */
+    double imported_opacity;                   /* the largest one, where the file has none of its own; 0: none */
 } nb_scene_reader;
 
 /* nebel_parse_scene; with `save`, notes what is to be changed in the text. */
