@@ -157,5 +157,6 @@ const char *nb_bench_vertices(const nb_bench_desc *desc, nb_figures *figures)
     const char *fault = measure_setting(&terrain, NB_FOG_BANK, desc, figures);
     if (fault == NULL) fault = measure_setting(&terrain, NB_FOG_OVER_ALL, desc, figures);
     nb_terrain_free(&terrain);
-    return fault == NULL ? nb_bench_tessellation(desc, figures) : fault;
+    if (fault == NULL) fault = nb_bench_tessellation(desc, figures);
+    return fault == NULL ? nb_bench_cells(desc, figures) : fault;
 }
