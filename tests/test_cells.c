@@ -486,6 +486,24 @@ static void test_points_that_are_none(void **state)
     nebel_destroy_cells(cells);
 }
 
+static void test_streams_that_share_bytes_are_refused(void **state)
+{
+    (void)state;
+    nebel_cells *cells = create(&(nebel_cells_desc){.cells = clear_then_fog, .cell_count = 3});
+    static nebel_cell_point points[4];
+    static nebel_cell_fog fog[8];
+    nebel_cell_fog *const inside = (void *)((char *)points + 8);
+    const size_t whole = sizeof *points, part = sizeof *fog;
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, fog, part), NEBEL_OK);
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole - 8, fog, part), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, fog, part - 8), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, inside, whole), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, inside, part), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 4, points, whole, fog, SIZE_MAX / 2), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_fog_cells(cells, &along_x, 0, points, 1, inside, 1), NEBEL_OK);
+    nebel_destroy_cells(cells);
+}
+
 static void test_strides(void **state)
 {
     (void)state;
@@ -533,6 +551,7 @@ int main(void)
         cmocka_unit_test(test_an_eye_outside_all_cells),
         cmocka_unit_test(test_what_is_behind_the_eye),
         cmocka_unit_test(test_points_that_are_none),
+        cmocka_unit_test(test_streams_that_share_bytes_are_refused),
         cmocka_unit_test(test_strides),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -136,7 +136,8 @@ typedef struct nebel_cell_layer {
     size_t first, last; /* cells in which it begins and ends */
 } nebel_cell_layer;
 
-/* What the cells do to each of n points. Strides in bytes; 0: without gaps. points and fog must not overlap.
+/* What the cells do to each of n points. Strides in bytes; 0: without gaps. points and fog share no bytes,
+ * but may lie in the same structures.
  *
  * The way goes straight from the eye to the point. With portals given it begins in the eye's cell and ends where it
  * leaves a cell other than through a portal: behind that wall there is no fog, as there is none for an eye outside all
@@ -145,7 +146,7 @@ typedef struct nebel_cell_layer {
  * of the eye (Z <= 0) has no fog; with FAITHFUL a plane that is seen edge-on (C = 0) is met where the ray crosses it,
  * and Z is kept between 0 and the point's Zmax. A way that runs in a face belongs to one of the two cells, by the rule
  * of docs/scene-file.md. A point that is not finite has no fog. Any thread. Errors: ARGUMENT (NULL, an eye that is not
- * finite, a forward that has no direction). */
+ * finite, a forward that has no direction, a stride shorter than its elements, points and fog that share bytes). */
 nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
                              const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
                              size_t fog_stride);

@@ -2,6 +2,7 @@
 #include "cells.h"
 
 #include "base/vector.h"
+#include "classic/layout.h"
 
 #include <math.h>
 #include <string.h>
@@ -245,6 +246,14 @@ static void add_layer(const nebel_cell_layer *layer, void *user)
     fog->alpha = 1 - seen * (1 - layer->intensity);
 }
 
+/* Each element has bytes of its own. */
+static int are_streams(const nb_span *points, const nb_span *fog, size_t n)
+{
+    if (n == 0) return 1;
+    return points->stride >= points->size && fog->stride >= fog->size && nb_span_fits(points, n) &&
+           nb_span_fits(fog, n) && !nb_spans_share_bytes(points, fog, n);
+}
+
 nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *view, size_t n,
                              const nebel_cell_point *points, size_t point_stride, nebel_cell_fog *fog,
                              size_t fog_stride)
@@ -255,6 +264,9 @@ nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *vi
     if (result != NEBEL_OK) return result;
     if (point_stride == 0) point_stride = sizeof *points;
     if (fog_stride == 0) fog_stride = sizeof *fog;
+    const nb_span from = {(uintptr_t)points, sizeof *points, point_stride};
+    const nb_span to = {(uintptr_t)fog, sizeof *fog, fog_stride};
+    if (!are_streams(&from, &to, n)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
         const nebel_cell_point *point = (const void *)((const char *)points + i * point_stride);
         nebel_cell_fog *out = (void *)((char *)fog + i * fog_stride);

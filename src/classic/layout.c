@@ -2,12 +2,6 @@
 
 static const size_t position_size = 3 * sizeof(float);
 
-/* The bytes of n elements: `size` at `first`, and again every `stride`. */
-typedef struct span {
-    uintptr_t first;
-    size_t size, stride;
-} span;
-
 static size_t size_of(nebel_vertex_format format)
 {
     return format == NEBEL_VERTEX_RGBA_FLOAT ? 4 * sizeof(float) : sizeof(float);
@@ -18,34 +12,33 @@ size_t nb_layout_stride(const nebel_vertex_output *output)
     return output->stride != 0 ? output->stride : size_of(output->format);
 }
 
-static span span_of_positions(const nebel_vertices *v)
+static nb_span span_of_positions(const nebel_vertices *v)
 {
-    return (span){(uintptr_t)v->positions, position_size, v->position_stride != 0 ? v->position_stride : position_size};
+    return (nb_span){(uintptr_t)v->positions, position_size,
+                     v->position_stride != 0 ? v->position_stride : position_size};
 }
 
 /* Of a colour that keeps its red, green and blue the last byte alone. */
-static span span_of_output(const nebel_vertex_output *output)
+static nb_span span_of_output(const nebel_vertex_output *output)
 {
     const uintptr_t first = (uintptr_t)output->data;
     const size_t size = size_of(output->format), stride = nb_layout_stride(output);
     if (output->format == NEBEL_VERTEX_SPECULAR_ALPHA || output->format == NEBEL_VERTEX_ALPHA)
-        return (span){first + size - 1, 1, stride};
-    return (span){first, size, stride};
+        return (nb_span){first + size - 1, 1, stride};
+    return (nb_span){first, size, stride};
 }
 
-/* Whether n elements end within the address space. */
-static int fits(const span *s, size_t n)
+int nb_span_fits(const nb_span *s, size_t n)
 {
     return n - 1 <= (UINTPTR_MAX - s->size - s->first) / s->stride;
 }
 
-static uintptr_t end_of(const span *s, size_t n)
+static uintptr_t end_of(const nb_span *s, size_t n)
 {
     return s->first + (n - 1) * s->stride + s->size;
 }
 
-/* Elements of equal strides keep their places within the stride. Of others only arrays apart are taken. */
-static int share_bytes(const span *a, const span *b, size_t n)
+int nb_spans_share_bytes(const nb_span *a, const nb_span *b, size_t n)
 {
     if (a->first >= end_of(b, n) || b->first >= end_of(a, n)) return 0;
     if (a->stride != b->stride) return 1;
@@ -61,16 +54,16 @@ static const char *fault_of_output(const nebel_vertex_output *output, size_t n)
     if (output->data == NULL) return "an output's data must not be NULL";
     if (nb_layout_stride(output) < size_of(output->format))
         return "an output's stride is shorter than its format: its elements overlap";
-    const span s = span_of_output(output);
-    return fits(&s, n) ? NULL : "an output reaches beyond all memory";
+    const nb_span s = span_of_output(output);
+    return nb_span_fits(&s, n) ? NULL : "an output reaches beyond all memory";
 }
 
 static const char *fault_of_positions(const nebel_vertices *vertices, size_t n)
 {
-    const span s = span_of_positions(vertices);
+    const nb_span s = span_of_positions(vertices);
     if (vertices->positions == NULL) return "positions must not be NULL";
     if (s.stride < position_size) return "position_stride must be 12 or more";
-    return fits(&s, n) ? NULL : "positions reach beyond all memory";
+    return nb_span_fits(&s, n) ? NULL : "positions reach beyond all memory";
 }
 
 const char *nb_layout_fault(size_t n, const nebel_vertices *vertices, const nebel_vertex_output *outputs,
@@ -80,13 +73,13 @@ const char *nb_layout_fault(size_t n, const nebel_vertices *vertices, const nebe
     const char *fault = fault_of_positions(vertices, n);
     for (size_t i = 0; i < output_count && fault == NULL; i++) fault = fault_of_output(&outputs[i], n);
     if (fault != NULL) return fault;
-    const span positions = span_of_positions(vertices);
+    const nb_span positions = span_of_positions(vertices);
     for (size_t i = 0; i < output_count; i++) {
-        const span a = span_of_output(&outputs[i]);
-        if (share_bytes(&a, &positions, n)) return "an output and the positions share bytes";
+        const nb_span a = span_of_output(&outputs[i]);
+        if (nb_spans_share_bytes(&a, &positions, n)) return "an output and the positions share bytes";
         for (size_t k = 0; k < i; k++) {
-            const span b = span_of_output(&outputs[k]);
-            if (share_bytes(&a, &b, n)) return "two outputs share bytes";
+            const nb_span b = span_of_output(&outputs[k]);
+            if (nb_spans_share_bytes(&a, &b, n)) return "two outputs share bytes";
         }
     }
     return NULL;
