@@ -323,6 +323,8 @@ static void same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)
     SAME(&a->extinction, &b->extinction);
     SAME(&a->source, &b->source);
     SAME(&a->albedo, &b->albedo);
+    WHOLE(a->phase.type, b->phase.type);
+    SAME(&a->phase.g, &b->phase.g);
     SAME(&a->emission, &b->emission);
     SAME(&a->start, &b->start);
     SAME(&a->cutoff, &b->cutoff);
@@ -341,8 +343,6 @@ static void same_volumes(const nebel_scene_data *a, const nebel_scene_data *b)
             SAME(&x->keys[k].frame, &y->keys[k].frame);
             same_volume(&x->keys[k].volume, &y->keys[k].volume);
         }
-        WHOLE(x->phase.type, y->phase.type);
-        SAME(&x->phase.g, &y->phase.g);
     }
 }
 
