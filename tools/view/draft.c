@@ -442,8 +442,7 @@ int nb_draft_must_be_read(const nb_draft *draft)
 int nb_draft_can_save_camera(const nb_draft *draft)
 {
     const nebel_scene_data *const file = nebel_scene_contents(draft->file);
-    return file->camera_key_count == 0 && file->turntable_frames == 0 &&
-           file->camera.projection != NEBEL_PROJECTION_PANORAMA;
+    return file->camera_key_count == 0 && file->turntable_frames == 0;
 }
 
 /* To a hundred-thousandth of the distance: nobody sees the difference, and the file stays readable. */

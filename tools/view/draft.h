@@ -38,7 +38,7 @@ nebel_result nb_draft_commit(nb_draft *draft);
 /* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */
 nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole);
 
-/* Loads the models of `good` anew. Nobody may use the meshes of `data`, which are others then, or none where that
+/* Loads the models of `good` anew. Nobody may use the meshes of `data` meanwhile: they are others then, unless that
  * fails. */
 nebel_result nb_draft_place_models(nb_draft *draft);
 

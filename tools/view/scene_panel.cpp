@@ -173,13 +173,16 @@ void change_projection(nebel_camera *camera, nebel_projection projection, double
 
 bool draw_projection(nebel_camera *camera, double reach)
 {
-    static const char *const names[] = {"perspective", "orthographic"};
+    static const char *const names[] = {"perspective", "orthographic", "panorama"};
     int projection = camera->projection;
-    bool changed = choose("projection", &projection, names, 2,
-                          "Perspective, or without any: things far away are as large as near ones.");
+    bool changed =
+        choose("projection", &projection, names, 3,
+               "Perspective; orthographic, where things far away are as large as near ones; or a panorama of "
+               "360 x 180 degrees.");
     if (changed) change_projection(camera, nebel_projection(projection), reach);
     if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return drag_length("view height", &camera->view_height, "What the height of the picture shows.") || changed;
+    if (camera->projection == NEBEL_PROJECTION_PANORAMA) return changed;
     return slide("field of view", &camera->vertical_fov, 1, 150, "%.1f deg", false, "From bottom to top.") || changed;
 }
 

@@ -99,13 +99,7 @@ static int is_needed(void *user)
 
 static void set_home(viewer *all)
 {
-    nebel_camera *const camera = &all->draft.data.camera;
-    if (camera->projection == NEBEL_PROJECTION_PANORAMA) {
-        camera->projection = NEBEL_PROJECTION_PERSPECTIVE;
-        camera->vertical_fov = 75;
-        say(all, "The scene's camera is a panorama; this is a part of it.");
-    }
-    all->home = *camera;
+    all->home = all->draft.data.camera;
 }
 
 /* The draft's fog to the renderer, particles in the way that is wished for. */
@@ -209,7 +203,9 @@ static void check_method(viewer *all)
 static const char *explain_method(const viewer *all)
 {
     const nebel_method method = all->look.method;
-    const int has_eye = all->draft.data.camera.projection == NEBEL_PROJECTION_PERSPECTIVE;
+    const nebel_projection projection = all->draft.data.camera.projection;
+    const int has_eye = projection == NEBEL_PROJECTION_PERSPECTIVE;
+    if (projection == NEBEL_PROJECTION_PANORAMA) return "drawn by the CPU alone: a panorama";
     if (is_of_cpu(method)) return "drawn by the CPU alone";
     return method != NEBEL_METHOD_EXACT && !has_eye ? "drawn by the CPU alone: there is no eye" : "";
 }
@@ -616,9 +612,12 @@ static nebel_result draw(viewer *all)
 {
     nb_window *const window = &all->window;
     const nb_look look = shown_look(all);
+    nebel_camera camera = all->draft.data.camera;
+    /* Behind the CPU's picture. */
+    if (camera.projection == NEBEL_PROJECTION_PANORAMA) camera.projection = NEBEL_PROJECTION_PERSPECTIVE;
     all->stage.cells = all->draft.cells;
     const nebel_result result =
-        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
+        nb_stage_draw(&all->stage, &camera, window->width, window->height, &look, is_moving(all));
     if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
     return nb_window_is_lost(window) ? NEBEL_OK : forgive(result);
 }
