@@ -21,6 +21,7 @@ static nebel_result fail_memory(const nb_draft *draft)
 static nebel_sun sun_of(const nb_edition *edition)
 {
     nebel_sun sun = {{0}, {0}};
+    if (!edition->has_sun) return sun;
     memcpy(sun.direction, edition->sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, edition->sun_irradiance, sizeof sun.irradiance);
     return sun;
@@ -437,6 +438,20 @@ int nb_draft_must_be_read(const nb_draft *draft)
     int brings_fog = 0;
     for (size_t i = 0; i < now->model_count; i++) brings_fog |= scene->models[now->models[i].source].has_fog;
     return now->model_count != scene->model_count || (brings_fog && !nb_edition_has_same_models(now, &draft->written));
+}
+
+static int is_black(const double rgb[3])
+{
+    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
+}
+
+int nb_draft_is_sunlit(const nb_draft *draft)
+{
+    const nb_edition *const good = &draft->good;
+    if (!good->has_sun || is_black(good->sun_irradiance)) return 0;
+    for (size_t i = 0; i < good->count; i++)
+        if (!is_black(good->volumes[i].albedo)) return 1;
+    return 0;
 }
 
 int nb_draft_can_save_camera(const nb_draft *draft)

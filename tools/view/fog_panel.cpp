@@ -72,9 +72,10 @@ bool draw_phase(nebel_phase *phase)
                                              NEBEL_PHASE_CORNETTE_SHANKS, NEBEL_PHASE_DROPLETS};
     int type = 0;
     while (type < 4 && types[type] != phase->type) type++;
-    bool changed = choose("phase", &type, names, 5,
-                          "Into which direction light is scattered. For files: under ambient light, the same from "
-                          "everywhere, all look the same.");
+    bool changed = choose(
+        "phase", &type, names, 5,
+        "Into which direction sunlight is scattered. Under ambient light, the same from everywhere, all look the "
+        "same.");
     phase->type = types[type];
     if (phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS)
         changed |= slide("g", &phase->g, -0.99, 0.99, "%.3f", false, "Mean cosine: 1 goes straight on, -1 comes back.");
@@ -84,15 +85,16 @@ bool draw_phase(nebel_phase *phase)
 }
 
 // A volume is lit in one way at all its keys.
-bool draw_light(nebel_volume_desc *volume, nebel_volume_entry *entry, bool has_sun)
+bool draw_light(nebel_volume_desc *volume, const nebel_volume_entry *entry)
 {
     const bool is_lit = !is_zero(volume->albedo) || (entry->own != nullptr && !is_zero(entry->own->albedo));
     bool changed = false;
     if (!is_lit)
         changed |= pick("source", volume->source, false, "What thick fog looks like: the radiance of opaque fog.");
-    if (is_lit || (is_zero(volume->source) && !has_sun && entry->key_count == 0)) {
-        changed |= pick("albedo", volume->albedo, true,
-                        "What share of the light it scatters: 0 is smoke, 1 is mist. Lit by the ambient light.");
+    if (is_lit || (is_zero(volume->source) && entry->key_count == 0)) {
+        changed |=
+            pick("albedo", volume->albedo, true,
+                 "What share of the light it scatters: 0 is smoke, 1 is mist. Lit by the ambient light and the sun.");
         if (is_lit) changed |= draw_phase(&volume->phase);
     }
     return pick("emission [1/m]", volume->emission, false, "What it shines by itself, radiance per metre.") || changed;
@@ -120,7 +122,7 @@ void fit_density(nebel_volume_desc *volume)
         volume->density.type = NEBEL_DENSITY_CONSTANT;
 }
 
-bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry *entry, double reach, bool has_sun)
+bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry *entry, double reach)
 {
     static const char *const operations[] = {"adds", "excludes", "replaces"};
     int operation = volume->operation;
@@ -131,7 +133,7 @@ bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry
     volume->operation = nebel_operation(operation);
     if (volume->operation != NEBEL_OPERATION_EXCLUDE) {
         changed |= draw_amount(volume->extinction, entry);
-        changed |= draw_light(volume, entry, has_sun);
+        changed |= draw_light(volume, entry);
         changed |= draw_density(&volume->density, panel->data->camera.look_at, reach);
     }
     changed |= draw_shape(panel, &volume->shape, reach, true);
@@ -224,12 +226,11 @@ bool draw_open_volume(nb_panel *panel, size_t index, double reach)
                                           "a node of a model: changes here are not saved"};
     const nebel_volume_origin origin = panel->origins[index];
     const bool is_saved = origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
-    const bool has_sun = panel->now->has_sun && !is_zero(panel->now->sun_irradiance);
     if (is_saved)
         panel->fog_changed |= draw_name(panel, index);
     else
         ImGui::TextDisabled("%s", origins[origin]);
-    panel->fog_changed |= draw_numbers(panel, &panel->now->volumes[index], &panel->now->entries[index], reach, has_sun);
+    panel->fog_changed |= draw_numbers(panel, &panel->now->volumes[index], &panel->now->entries[index], reach);
     if (is_saved) draw_keys(panel, index);
     return draw_commands(panel, index, origin);
 }

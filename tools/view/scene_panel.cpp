@@ -19,18 +19,6 @@ const double degree = 3.14159265358979323846 / 180;
  * -----------------------------------------------------------------------------------------------------------
  */
 
-bool is_black(const double rgb[3])
-{
-    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
-}
-
-bool is_any_lit(const nb_edition *now)
-{
-    for (size_t i = 0; i < now->count; i++)
-        if (!is_black(now->volumes[i].albedo)) return true;
-    return false;
-}
-
 // In the middle of the sky, so that one sees what it does.
 void add_sun(nb_edition *now)
 {
@@ -54,7 +42,7 @@ bool draw_sun(nb_edition *now)
         d[2] = cos(height * degree) * cos(turn * degree);
     }
     changed |= pick("sun", now->sun_irradiance, false,
-                    "Irradiance on a surface that faces the sun, before any fog. It lights surfaces, not yet fog.");
+                    "Irradiance on a surface that faces the sun, before any fog. It lights fog with an albedo, too.");
     if (!press("Remove the sun", "Takes it out of the scene. Ctrl + Z brings it back.")) return changed;
     now->has_sun = 0;
     return true;
@@ -62,11 +50,9 @@ bool draw_sun(nb_edition *now)
 
 bool draw_missing_sun(nb_edition *now)
 {
-    const bool is_possible = !is_any_lit(now);
-    const bool wants = press_if(is_possible, "Add a sun", "Lights surfaces, through all fog on its way.");
-    if (!is_possible) ImGui::TextDisabled("no sun beside fog with an albedo");
-    if (wants) add_sun(now);
-    return wants;
+    if (!press("Add a sun", "Lights surfaces, and fog with an albedo, through all fog on its way.")) return false;
+    add_sun(now);
+    return true;
 }
 
 /* 0 and 1 are no limit. */

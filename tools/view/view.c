@@ -109,6 +109,8 @@ static nebel_result set_fog(viewer *all)
     nebel_snapshot *fog = draft->volumes;
     const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
     nebel_result result = is_whole ? nb_draft_whole(draft, &fog) : NEBEL_OK;
+    /* Behind the CPU's picture. */
+    if (nb_draft_is_sunlit(draft)) fog = NULL;
     if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(all->stage.renderer, fog);
     if (result != NEBEL_OK) return result;
     return nebel_set_gl_renderer_particles(all->stage.renderer, draft->particles, is_whole ? 0 : draft->particle_count);
@@ -207,6 +209,7 @@ static const char *explain_method(const viewer *all)
     const int has_eye = projection == NEBEL_PROJECTION_PERSPECTIVE;
     if (projection == NEBEL_PROJECTION_PANORAMA) return "drawn by the CPU alone: a panorama";
     if (is_of_cpu(method)) return "drawn by the CPU alone";
+    if (nb_draft_is_sunlit(&all->draft)) return "drawn by the CPU alone: sunlit fog";
     return method != NEBEL_METHOD_EXACT && !has_eye ? "drawn by the CPU alone: there is no eye" : "";
 }
 
