@@ -2,25 +2,44 @@
 
 #include <string.h>
 
-/* The process first: see bench/process.c. */
 typedef const char *group_fn(const nb_bench_desc *desc, nb_figures *figures);
 
+#if defined(NEBEL_HAVE_GL)
+#define IN_OPENGL(function) function
+#else
+#define IN_OPENGL(function) NULL
+#endif
+
+typedef struct nb_group {
+    group_fn *on_cpu, *in_opengl; /* NULL: not measured there */
+} nb_group;
+
+/* The process first: see bench/process.c. */
 const char *const nb_bench_groups[] = {"process", "segments", "vertices", "frame", "pass", "particles", NULL};
 
-static group_fn *const functions[] = {nb_bench_process, nb_bench_segments, nb_bench_vertices,
-                                      nb_bench_frame,   nb_bench_pass,     nb_bench_particles};
+static const nb_group groups[] = {{nb_bench_process, NULL},
+                                  {nb_bench_segments, NULL},
+                                  {nb_bench_vertices, NULL},
+                                  {nb_bench_frame, NULL},
+                                  {nb_bench_pass, IN_OPENGL(nb_bench_opengl_pass)},
+                                  {nb_bench_particles, IN_OPENGL(nb_bench_opengl_particles)}};
+
+static group_fn *function_of(size_t group, int opengl)
+{
+    return opengl ? groups[group].in_opengl : groups[group].on_cpu;
+}
+
+int nb_bench_has(int group, int opengl)
+{
+    return function_of((size_t)group, opengl) != NULL;
+}
 
 int nb_bench_run(const nb_bench_desc *desc, nb_figures *figures, const char **fault)
 {
-#if defined(NEBEL_HAVE_GL)
-    if (desc->opengl) {
-        *fault = nb_bench_opengl(desc, figures);
-        return *fault == NULL ? 0 : -1;
-    }
-#endif
     for (size_t i = 0; nb_bench_groups[i] != NULL; i++) {
-        if (desc->group != NULL && strcmp(desc->group, nb_bench_groups[i]) != 0) continue;
-        *fault = functions[i](desc, figures);
+        group_fn *const function = function_of(i, desc->opengl);
+        if (function == NULL || (desc->group != NULL && strcmp(desc->group, nb_bench_groups[i]) != 0)) continue;
+        *fault = function(desc, figures);
         if (*fault != NULL) return -1;
     }
     return 0;

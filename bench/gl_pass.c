@@ -422,7 +422,7 @@ static void delete_all(nb_gl_bench *b)
     glDeleteProgram(b->floor_program);
 }
 
-const char *nb_bench_opengl(const nb_bench_desc *desc, nb_figures *figures)
+const char *nb_bench_opengl_pass(const nb_bench_desc *desc, nb_figures *figures)
 {
     nb_gl_bench b = {.repetitions = desc->quick ? 1 : 7, .figures = figures};
     const char *fault = failed;

@@ -1,53 +1,33 @@
 /* A nebula of very many particles, drawn by the CPU renderer. */
 #include "groups.h"
 #include "measure.h"
-#include "scenes.h"
+#include "sky.h"
 
 #include <nebel/nebula.h>
 #include <nebel/render.h>
 
-#include <math.h>
 #include <stdlib.h>
 
 static const char out_of_memory[] = "particles: out of memory";
 static const char failed[] = "particles: the renderer failed";
 
-enum { COUNT = 100000, QUICK_COUNT = 500 };
-
-/* A cloud that fills most of the picture, with about thirty particles on a pixel that it covers. */
-typedef struct nb_sky {
-    size_t count;
-    uint32_t width, height;
-    nebel_particle *particles;
+typedef struct nb_drawing {
+    nb_sky sky;
     nebel_scene_data scene;
     nebel_snapshot *fog;
     nebel_renderer *renderer;
     float *color, *transmittance;
-} nb_sky;
+} nb_drawing;
 
 static double run_frame(void *user)
 {
-    nb_sky *const sky = user;
+    nb_drawing *const d = user;
     const nebel_frame_desc desc = {
-        .camera = sky->scene.camera, .width = sky->width, .height = sky->height, .samples = 1};
-    const nebel_frame frame = {.color = sky->color, .transmittance = sky->transmittance};
+        .camera = d->sky.camera, .width = d->sky.width, .height = d->sky.height, .samples = 1};
+    const nebel_frame frame = {.color = d->color, .transmittance = d->transmittance};
     const double start = nb_clock_wall();
-    if (nebel_render_frame(sky->renderer, &desc, &frame) != NEBEL_OK) return -1;
+    if (nebel_render_frame(d->renderer, &desc, &frame) != NEBEL_OK) return -1;
     return nb_clock_wall() - start;
-}
-
-static int strew(nb_sky *sky)
-{
-    static const double colors[3][3] = {{.2, .1, .8}, {.9, .3, .4}, {1, .8, .5}};
-    const nebel_nebula_desc desc = {.shape = {.type = NEBEL_SHAPE_ELLIPSOID, .radii = {8, 4.5, 4}},
-                                    .count = sky->count,
-                                    .size = {.08, .16},
-                                    .absorption = {.5, .7, .9},
-                                    .emission = {.6, .6, .6},
-                                    .colors = colors,
-                                    .color_count = 3,
-                                    .turbulence = 2};
-    return nebel_scatter_nebula(&desc, sky->particles) == NEBEL_OK ? 0 : -1;
 }
 
 static nebel_snapshot *commit(const nb_sky *sky)
@@ -64,36 +44,14 @@ static nebel_snapshot *commit(const nb_sky *sky)
     return snapshot;
 }
 
-static int set_up(const nb_bench_desc *desc, nb_sky *sky)
+static int set_up(const nb_bench_desc *desc, nb_drawing *d)
 {
-    sky->count = desc->quick ? QUICK_COUNT : COUNT;
-    sky->width = desc->quick ? 160 : NB_BENCH_WIDTH;
-    sky->height = desc->quick ? 90 : NB_BENCH_HEIGHT;
-    sky->scene.camera = (nebel_camera){.position = {0, 0, 18}, .up = {0, 1, 0}, .vertical_fov = 38};
-    sky->particles = malloc(sky->count * sizeof *sky->particles);
-    sky->color = malloc(3 * sizeof(float) * sky->width * sky->height);
-    sky->transmittance = malloc(3 * sizeof(float) * sky->width * sky->height);
-    return sky->particles != NULL && sky->color != NULL && sky->transmittance != NULL ? strew(sky) : -1;
-}
-
-static double covered_pixels(const nb_sky *sky)
-{
-    size_t covered = 0;
-    for (size_t i = 0; i < (size_t)sky->width * sky->height; i++) covered += sky->transmittance[3 * i] < 1;
-    return (double)covered;
-}
-
-/* A ball covers the pixels within its outline; far enough that perspective does not stretch it. */
-static double pixels_of_particles(const nb_sky *sky)
-{
-    const double pi = acos(-1), half = tan(sky->scene.camera.vertical_fov * pi / 360);
-    double sum = 0;
-    for (size_t i = 0; i < sky->count; i++) {
-        const double depth = sky->scene.camera.position[2] - sky->particles[i].center[2];
-        const double radius = sky->particles[i].radius / (depth * half) * sky->height / 2;
-        sum += pi * radius * radius;
-    }
-    return sum;
+    if (nb_sky_make(desc->quick, &d->sky) != 0) return -1;
+    const size_t floats = 3 * (size_t)d->sky.width * d->sky.height;
+    d->scene.camera = d->sky.camera;
+    d->color = malloc(floats * sizeof(float));
+    d->transmittance = malloc(floats * sizeof(float));
+    return d->color != NULL && d->transmittance != NULL ? 0 : -1;
 }
 
 static void add_figure(nb_figures *figures, const nb_sky *sky, const char *name, const char *unit, double value,
@@ -107,17 +65,17 @@ static void add_figure(nb_figures *figures, const nb_sky *sky, const char *name,
     nb_figures_add(figures, &figure);
 }
 
-static const char *measure(nb_sky *sky, int repetitions, nb_figures *figures)
+static const char *measure(nb_drawing *d, int repetitions, nb_figures *figures)
 {
+    const nb_sky *const sky = &d->sky;
     const double start = nb_clock_wall();
-    sky->fog = commit(sky);
+    d->fog = commit(sky);
     const double committed = nb_clock_wall() - start;
-    if (sky->fog == NULL) return out_of_memory;
-    if (nebel_create_renderer(&sky->scene, sky->fog, &(nebel_renderer_desc){0}, &sky->renderer) != NEBEL_OK)
-        return failed;
-    nb_contest contest = {.run = run_frame, .user = sky};
+    if (d->fog == NULL) return out_of_memory;
+    if (nebel_create_renderer(&d->scene, d->fog, &(nebel_renderer_desc){0}, &d->renderer) != NEBEL_OK) return failed;
+    nb_contest contest = {.run = run_frame, .user = d};
     if (nb_measure(&contest, 1, repetitions) != 0) return failed;
-    const double covered = covered_pixels(sky), overlap = pixels_of_particles(sky) / covered;
+    const double covered = nb_sky_covered(sky, d->transmittance), overlap = nb_sky_pixels(sky) / covered;
     add_figure(figures, sky, "committing them", "s", committed, 0);
     add_figure(figures, sky, "particles on a covered pixel", "", overlap, 0);
     add_figure(figures, sky, "the frame", "s", contest.seconds, 3);
@@ -127,13 +85,13 @@ static const char *measure(nb_sky *sky, int repetitions, nb_figures *figures)
 
 const char *nb_bench_particles(const nb_bench_desc *desc, nb_figures *figures)
 {
-    nb_sky sky = {0};
+    nb_drawing d = {0};
     const char *fault = out_of_memory;
-    if (set_up(desc, &sky) == 0) fault = measure(&sky, desc->quick ? 1 : 3, figures);
-    nebel_destroy_renderer(sky.renderer);
-    nebel_release_snapshot(sky.fog);
-    free(sky.particles);
-    free(sky.color);
-    free(sky.transmittance);
+    if (set_up(desc, &d) == 0) fault = measure(&d, desc->quick ? 1 : 3, figures);
+    nebel_destroy_renderer(d.renderer);
+    nebel_release_snapshot(d.fog);
+    nb_sky_free(&d.sky);
+    free(d.color);
+    free(d.transmittance);
     return fault;
 }

@@ -61,9 +61,17 @@ class BenchTest(unittest.TestCase):
             self.assertIn(figure["name"], done.stdout)
             self.assertTrue(math.isfinite(figure["value"]))
 
+    def test_particles_in_opengl_are_judged_by_sprites(self):
+        done = bench("--quick", "--device", "gl", "--group", "particles", "--json", self.file)
+        if "built without OpenGL" in done.stderr:
+            self.skipTest("built without OpenGL")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        figures = json.loads(self.file.read_text())["figures"]
+        self.assertEqual({figure["floor"]["name"] for figure in figures if "floor" in figure}, {"additive sprites"})
+
     def test_wrong_calls(self):
         for words in (["--group", "nothing"], ["scene.json"], ["--fast"], ["--device", "none"],
-                      ["--device", "gl", "--group", "pass"]):
+                      ["--device", "gl", "--group", "segments"]):
             done = bench(*words)
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertEqual(done.stdout, "")

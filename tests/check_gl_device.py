@@ -99,6 +99,19 @@ class GlDeviceTest(PictureCase):
         self.assertIn("OpenGL: none: ", nebel("info", env=nothing).out)
         self.assertNotIn("a.png", self.files())
 
+    def test_with_a_driver_that_is_too_old(self):
+        old = {"MESA_GL_VERSION_OVERRIDE": "2.1", "MESA_GLES_VERSION_OVERRIDE": "2.0"}
+        self.assert_failed(self.draw("a.png", env=old), "OpenGL 3.3", "update", "--device cpu")
+
+    def test_no_warning_of_what_dims_alone(self):
+        cloud = {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "count": 200, "size": [0.5, 1], "absorption": 1,
+                 "emission": [1, 2, 3], "colors": [[1, 0, 0], [0, 0, 1]]}
+        self.scene = self.write_scene("cloud.json", [], nebula=[cloud], models=[{"file": "triangle.obj"}],
+                                      sun={"direction": [0, 0, 1], "irradiance": 1}, camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        done = self.draw("a.png")
+        self.assert_done(done)
+        self.assertNotIn("mixed", done.err)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -23,9 +23,9 @@ static const char about[] = "Measures, and prints each figure beside a floor mea
                             "bench/NOTES.md says what to expect.\n";
 
 static const nb_option options[] = {
-    {"device", 'd', "NAME",
-     "cpu (default), or gl: fog over pictures in OpenGL,\non a graphics processor or in Mesa's software"},
-    {"group", 'g', "NAME", "only one group: process, segments, vertices,\nframe, pass or particles"},
+    {"device", 'd', "NAME", "cpu (default), or gl: OpenGL on a graphics\nprocessor or in Mesa's software"},
+    {"group", 'g', "NAME",
+     "only one group; on the cpu: process, segments,\nvertices, frame, pass, particles; on gl: pass,\nparticles"},
     {"json", 'j', "FILE", "also write the figures to FILE, as JSON"},
     {"quick", 'q', NULL, "small and short: whether everything runs; the\nfigures mean little"},
 };
@@ -109,15 +109,15 @@ static int run(int count, char **words)
     if (status >= 0) return status;
     char path[4096];
     nb_bench_desc desc = {.quick = arguments.values[OPTION_QUICK] != NULL, .program = find_program(path, sizeof path)};
+    static const char *const devices[] = {"cpu", "gl", NULL};
+    desc.opengl = nb_options_choice(&arguments, OPTION_DEVICE, devices, 0) == 1;
     if (arguments.values[OPTION_GROUP] != NULL) {
         const int group = nb_options_choice(&arguments, OPTION_GROUP, nb_bench_groups, 0);
         if (arguments.misused) return nb_report_misuse("bench", "bench: nothing was done");
         desc.group = nb_bench_groups[group];
+        if (desc.opengl && !nb_bench_has(group, 1))
+            nb_options_reject(&arguments, OPTION_GROUP, "is measured on the cpu alone; on gl are pass and particles");
     }
-    static const char *const devices[] = {"cpu", "gl", NULL};
-    desc.opengl = nb_options_choice(&arguments, OPTION_DEVICE, devices, 0) == 1;
-    if (desc.opengl && desc.group != NULL)
-        nb_options_reject(&arguments, OPTION_GROUP, "is measured on the cpu, not on gl");
     if (arguments.misused) return nb_report_misuse("bench", "bench: nothing was done");
     if (desc.opengl) return bench_opengl(&desc, arguments.values[OPTION_JSON]);
     return bench(&desc, arguments.values[OPTION_JSON], NULL);

@@ -80,7 +80,7 @@ static void print_opengl(void)
 {
 #if defined(NEBEL_HAVE_GL)
     nb_gl_context gl;
-    if (nb_gl_context_open(&gl, NB_GL_API_DESKTOP) == 0 || nb_gl_context_open(&gl, NB_GL_API_ES) == 0) {
+    if (nb_gl_context_open_any(&gl) == 0) {
         (void)printf("OpenGL: %s\n", gl.renderer);
         nb_gl_context_close(&gl);
     } else {

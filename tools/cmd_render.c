@@ -14,6 +14,7 @@
 #include "workers.h"
 
 #include <nebel/render.h>
+#include <nebel/shader.h>
 
 #if defined(NEBEL_HAVE_GL)
 #include "gl_painter.h"
@@ -581,10 +582,28 @@ static int open_renderer(studio *all)
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
+/* Before the long work. */
+static int check_count(const studio *all)
+{
+    const size_t count = nebel_scene_contents(all->loaded.scene)->volume_count;
+    if (!all->wanted->gl || count <= NEBEL_MOST_PACKED_VOLUMES) return NB_DONE;
+    return nb_report_failure("render: --device gl: %s: %zu volumes are too many for shaders, which take %d; use fewer, "
+                             "or say --device cpu",
+                             all->wanted->scene, count, NEBEL_MOST_PACKED_VOLUMES);
+}
+
+static int load(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
+    if (status == NB_DONE) status = check_count(all);
+    return status == NB_DONE ? nb_load_fog(wanted->scene, wanted->first_frame, &all->listener, &all->loaded) : status;
+}
+
 static int set_up(studio *all)
 {
     const settings *const wanted = all->wanted;
-    int status = nb_load_scene(wanted->scene, 1, wanted->first_frame, &all->listener, &all->loaded);
+    int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
     status = make_cells(all);

@@ -7,8 +7,14 @@
 
 enum { DEVICES_MOST = 16 };
 
-static int fail(nb_gl_context *gl, const char *what)
+/* What an attempt comes past, one after the other. */
+enum { STAGE_NONE, STAGE_DISPLAY, STAGE_CONFIG, STAGE_SURFACE, STAGE_CONTEXT };
+
+/* Of several attempts the one counts that came farthest, and of those the first. */
+static int fail(nb_gl_context *gl, int stage, const char *what)
 {
+    if (stage <= gl->stage) return -1;
+    gl->stage = stage;
     (void)snprintf(gl->fault, sizeof gl->fault, "%s (EGL error 0x%x)", what, (unsigned)eglGetError());
     return -1;
 }
@@ -67,31 +73,28 @@ static int open_on(nb_gl_context *gl, EGLDisplay display, nb_gl_api api)
     const EGLint pixel[] = {EGL_WIDTH, 1, EGL_HEIGHT, 1, EGL_NONE};
     EGLConfig config;
     EGLint count = 0;
-    if (display == EGL_NO_DISPLAY || !eglInitialize(display, NULL, NULL)) return fail(gl, "no display of EGL starts");
+    if (display == EGL_NO_DISPLAY || !eglInitialize(display, NULL, NULL))
+        return fail(gl, STAGE_DISPLAY, "no display of EGL starts");
     if (!eglBindAPI(api == NB_GL_API_ES ? EGL_OPENGL_ES_API : EGL_OPENGL_API) ||
         !eglChooseConfig(display, kinds, &config, 1, &count) || count < 1) {
-        return fail(gl, "EGL offers no such OpenGL");
+        return fail(gl, STAGE_CONFIG,
+                    api == NB_GL_API_ES ? "EGL offers no OpenGL ES 3.0" : "EGL offers no OpenGL but OpenGL ES");
     }
     gl->display = display;
     gl->surface = eglCreatePbufferSurface(display, config, pixel);
-    if (gl->surface == EGL_NO_SURFACE) return fail(gl, "EGL makes no surface off the screen");
+    if (gl->surface == EGL_NO_SURFACE) return fail(gl, STAGE_SURFACE, "EGL makes no surface off the screen");
     gl->context = make_context(display, config, api);
     if (gl->context != EGL_NO_CONTEXT && eglMakeCurrent(display, gl->surface, gl->surface, gl->context)) return 0;
-    (void)fail(gl, api == NB_GL_API_ES ? "the driver has no OpenGL ES 3.0" : "the driver has no OpenGL 3.3 core");
+    (void)fail(gl, STAGE_CONTEXT,
+               api == NB_GL_API_ES ? "the driver has no OpenGL ES 3.0" : "the driver has no OpenGL 3.3 core");
     if (gl->context != EGL_NO_CONTEXT) eglDestroyContext(display, gl->context);
     eglDestroySurface(display, gl->surface);
     return -1;
 }
 
-int nb_gl_context_open(nb_gl_context *gl, nb_gl_api api)
+static int open_on_any(nb_gl_context *gl, nb_gl_api api)
 {
     EGLDisplay displays[DEVICES_MOST + 2];
-    *gl = (nb_gl_context){.fault = ""};
-    if (!epoxy_has_egl()) {
-        (void)snprintf(gl->fault, sizeof gl->fault,
-                       "there is no EGL; install a driver, or Mesa's software (Debian: libegl1 libgl1-mesa-dri)");
-        return -1;
-    }
     const int count = list_displays(displays);
     for (int i = 0; i < count; i++) {
         if (open_on(gl, displays[i], api) != 0) continue;
@@ -99,10 +102,35 @@ int nb_gl_context_open(nb_gl_context *gl, nb_gl_api api)
                        (const char *)glGetString(GL_VERSION));
         return 0;
     }
+    return -1;
+}
+
+static int open_one(nb_gl_context *gl, const nb_gl_api *apis, int count)
+{
+    *gl = (nb_gl_context){.stage = STAGE_NONE};
+    if (!epoxy_has_egl()) {
+        (void)snprintf(gl->fault, sizeof gl->fault,
+                       "there is no EGL; install a driver, or Mesa's software (Debian: libegl1 libgl1-mesa-dri)");
+        return -1;
+    }
+    for (int i = 0; i < count; i++) {
+        if (open_on_any(gl, apis[i]) == 0) return 0;
+    }
     const size_t used = strlen(gl->fault);
     (void)snprintf(gl->fault + used, sizeof gl->fault - used,
                    "; update the driver, or install Mesa's software (Debian: libegl1 libgl1-mesa-dri)");
     return -1;
+}
+
+int nb_gl_context_open(nb_gl_context *gl, nb_gl_api api)
+{
+    return open_one(gl, &api, 1);
+}
+
+int nb_gl_context_open_any(nb_gl_context *gl)
+{
+    static const nb_gl_api apis[] = {NB_GL_API_DESKTOP, NB_GL_API_ES};
+    return open_one(gl, apis, 2);
 }
 
 /* The display stays: to terminate it would unload the driver for everyone else in the process. */

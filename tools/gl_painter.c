@@ -17,8 +17,7 @@ int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_r
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
     *painter = (nb_gl_painter){.loaded = loaded};
-    if (nb_gl_context_open(&painter->context, NB_GL_API_DESKTOP) != 0 &&
-        nb_gl_context_open(&painter->context, NB_GL_API_ES) != 0) {
+    if (nb_gl_context_open_any(&painter->context) != 0) {
         return nb_report_failure("render: --device gl: %s; or say --device cpu", painter->context.fault);
     }
     nebel_result result =

@@ -18,14 +18,29 @@ nebel_result nb_load_move_fog(nb_load_result *result, double frame)
     return NEBEL_OK;
 }
 
-int nb_load_scene(const char *path, int with_models, double frame, nb_report_listener *listener, nb_load_result *result)
+static int finish(const char *path, nebel_result done, nb_report_listener *listener, nb_load_result *result)
+{
+    if (done == NEBEL_OK) return NB_DONE;
+    nb_load_free(result);
+    return nb_report_result(listener, path, done);
+}
+
+int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result)
 {
     *result = (nb_load_result){0};
     const nebel_scene_desc desc = {.log = nb_report_log(listener)};
-    nebel_result failed = nebel_load_scene(path, &desc, &result->scene);
-    if (failed == NEBEL_OK && with_models) failed = nebel_load_scene_models(result->scene);
-    if (failed == NEBEL_OK) failed = nebel_commit_scene_fog_at(result->scene, frame, &result->fog);
-    if (failed == NEBEL_OK) return NB_DONE;
-    nb_load_free(result);
-    return nb_report_result(listener, path, failed);
+    nebel_result done = nebel_load_scene(path, &desc, &result->scene);
+    if (done == NEBEL_OK && with_models) done = nebel_load_scene_models(result->scene);
+    return finish(path, done, listener, result);
+}
+
+int nb_load_fog(const char *path, double frame, nb_report_listener *listener, nb_load_result *result)
+{
+    return finish(path, nebel_commit_scene_fog_at(result->scene, frame, &result->fog), listener, result);
+}
+
+int nb_load_scene(const char *path, int with_models, double frame, nb_report_listener *listener, nb_load_result *result)
+{
+    const int status = nb_load_file(path, with_models, listener, result);
+    return status == NB_DONE ? nb_load_fog(path, frame, listener, result) : status;
 }

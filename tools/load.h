@@ -17,6 +17,10 @@ typedef struct nb_load_result {
 int nb_load_scene(const char *path, int with_models, double frame, nb_report_listener *listener,
                   nb_load_result *result);
 
+/* The two halves of it. */
+int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result);
+int nb_load_fog(const char *path, double frame, nb_report_listener *listener, nb_load_result *result);
+
 /* Puts the fog of another frame in place of the snapshot, where it moves at all. Returns a result; the log has said
  * why. */
 nebel_result nb_load_move_fog(nb_load_result *result, double frame);

@@ -391,8 +391,8 @@ typedef struct nebel_trace_desc {
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
 
-/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. rays and lights must not
- * overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
+/* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. desc NULL: the same as all
+ * zero. rays and lights must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
  * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN,
  * infinite where it must not be, of no direction, of negative t_max), UNSUPPORTED (isa not available), UNBOUNDED
  * (emission in an endless volume that does not absorb), MEMORY (scratch for very many volumes on one ray). On an error

@@ -3,8 +3,8 @@
  *     size_t count = 0;
  *     nebel_pack_fog(snapshot, camera_position, NULL, 0, &count);           // how many words?
  *     nebel_pack_fog(snapshot, camera_position, words, capacity, &count);   // each frame: 4 floats a word
- *     // upload the words into a uniform block of 16 KiB or a float texture, put nebel_shader_text() behind your
- * #version line, and
+ *     // upload the words into a uniform block of 16 KiB or a float texture, put nebel_shader_text() behind
+ *     // your #version line, and
  *
  *     nebel_light fog = nebel_trace(vec3(0), direction, distance);          // in the shader
  *     color = fog.transmittance * color + fog.in_scattering;
@@ -19,26 +19,30 @@
  *     struct nebel_light { vec3 transmittance; vec3 in_scattering; };
  *     nebel_light nebel_trace(vec3 origin, vec3 direction, float t_max);
  *         Light along origin + t direction, 0 <= t <= t_max: origin in metres relative to the packed eye, direction of
- * unit length, t_max in metres, 1e18 or more for an endless ray. All volumes, exact overlap, any number. nebel_light
- * nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count); The same for the volumes
- * NEBEL_INDEX(first) ... NEBEL_INDEX(first + count - 1) alone, ascending: see nebel_tiles. vec3 nebel_transmit(vec3
- * origin, vec3 direction, float t_max); vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first,
- * int count); Transmittance alone. vec3 nebel_transmit_light(vec3 origin, vec3 direction, float t_max); vec3
- * nebel_transmit_light_list(vec3 origin, vec3 direction, float t_max, int first, int count); The same for a ray that
- * does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not count.
+ *         unit length, t_max in metres, 1e18 or more for an endless ray. All volumes, exact overlap, any number.
+ *     nebel_light nebel_trace_list(vec3 origin, vec3 direction, float t_max, int first, int count);
+ *         The same for the volumes NEBEL_INDEX(first) ... NEBEL_INDEX(first + count - 1) alone, ascending: see
+ *         nebel_tiles.
+ *     vec3 nebel_transmit(vec3 origin, vec3 direction, float t_max);
+ *     vec3 nebel_transmit_list(vec3 origin, vec3 direction, float t_max, int first, int count);
+ *         Transmittance alone.
+ *     vec3 nebel_transmit_light(vec3 origin, vec3 direction, float t_max);
+ *     vec3 nebel_transmit_light_list(vec3 origin, vec3 direction, float t_max, int first, int count);
+ *         The same for a ray that does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not
+ *         count.
  *
  * With NEBEL_VIEW defined before it, the text also declares, in every dialect:
  *
  *     struct nebel_sight { vec3 origin; vec3 direction; float t_max; };
  *     nebel_sight nebel_see(vec2 pixel, float depth);
  *         The ray of a pixel (gl_FragCoord.xy) up to the surface at `depth`, ready for nebel_trace; 1e18 where there is
- * none. See nebel_view_rays. Where NEBEL_DEPTH_KIND is defined as the number of a nebel_depth_kind, the text knows no
- * other; where NEBEL_FROM_EYE is, all rays start at the eye, as nebel_rays says. It reads NEBEL_RAY(i), a vec4 of
- * nebel_rays; GLSL 3.30 and ES 3.00 declare `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];` unless the host defines
- * NEBEL_RAY itself.
+ *         none. See nebel_view_rays. Where NEBEL_DEPTH_KIND is defined as the number of a nebel_depth_kind, the text
+ *         knows no other; where NEBEL_FROM_EYE is, all rays start at the eye, as nebel_rays says. It reads
+ *         NEBEL_RAY(i), a vec4 of nebel_rays; GLSL 3.30 and ES 3.00 declare `uniform vec4 nebel_rays[NEBEL_RAY_WORDS];`
+ *         unless the host defines NEBEL_RAY itself.
  *
  * With NEBEL_TRANSPARENT defined before it, the text also declares, in every dialect, what transparent surfaces and
- * particles need:
+ * particles need. Blending, for each mode as nebel_blend_surface does it:
  *
  *     struct nebel_blend { vec3 source; vec3 factor; };
  *     nebel_blend nebel_blend_over(vec3 color, float alpha, nebel_light fog);
@@ -47,31 +51,45 @@
  *     nebel_blend nebel_blend_multiply(vec3 color, nebel_light fog);
  *     nebel_blend nebel_blend_screen(vec3 color, nebel_light fog);
  *     nebel_blend nebel_blend_medium(nebel_light medium, nebel_light fog);
- *         nebel_blend_surface for each mode, over a picture that has its fog already: `fog` is nebel_trace up to the
- * surface, and the pixel becomes source + factor * pixel. MEDIUM is a particle: pixel behind times its transmittance,
- * plus its own in-scattering. Two outputs, location 0 index 0 and 1: glBlendFuncSeparate(GL_ONE, GL_SRC1_COLOR,
- * GL_ZERO, GL_ONE), all modes, draw from the back to the front; needs OpenGL 3.3 or GL_EXT_blend_func_extended. vec4
- * nebel_blend_grey(nebel_blend blend); Source, and the mean factor as alpha: glBlendFuncSeparate(GL_ONE, GL_SRC_ALPHA,
- * GL_ZERO, GL_ONE), one output, everywhere. Exact where the factors of the colours are equal: over, premultiplied,
- * additive; multiply, screen and medium if they are grey. Coloured ones without two outputs are drawn twice, exact too:
- * first the factor with glBlendFunc(GL_ZERO, GL_SRC_COLOR), then the source with glBlendFunc(GL_ONE, GL_ONE). float
- * nebel_ball_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, int power); float
- * nebel_gaussian_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, float sigma); The density
- * of a particle integrated along the ray from t = 0 to t_max [m], closed form: (1 - r^2)^power, r the distance from the
- * centre in radii, power 0 (even) to 3; exp(-distance^2 / (2 sigma^2)) within the radius (1e18: without bound). With
- * the t_max of nebel_see, that is with the opaque surface's depth, edges are soft because they are right. Radius and
- * sigma > 0. Positions are floats: a particle 10,000 radii away still has its digits. nebel_light
- * nebel_medium_light(float length, vec3 extinction, vec3 light); What so much of a medium does to light: extinction and
- * radiance per metre where the density is 1 [1/m]. struct nebel_tap_constants { float offset; float nothing; float
- * edge; float margin; float brightness; }; nebel_tap_constants nebel_default_taps(); 0.0005 of the screen, 100000, 0.5,
- * 0.125, 1: constants of the classic comparison of a particle with the opaque depth around. vec2
- * nebel_screen_place(vec4 clip); Where clip space is on the screen, 0 to 1. float nebel_compare_taps(float depth, float
- * center, vec4 corners, nebel_tap_constants taps); What to multiply a particle's colour by: `brightness`, or 0 where it
- * is hidden. Depths are in metres along the camera's axis: the particle's, and those of the opaque picture at the pixel
- * and `offset` away along both diagonals; below 0 nothing is there and `nothing` counts. Drawn where they differ by
- * more than `edge`, and where none is nearer than depth - margin. float nebel_five_taps(vec2 place, float depth,
- * nebel_tap_constants taps); The same with depths from NEBEL_OPAQUE_DEPTH(place), which the host defines before the
- * text; else the function is not there.
+ *         Over a picture that has its fog already: `fog` is nebel_trace up to the surface, and the pixel becomes
+ *         source + factor * pixel. MEDIUM is a particle: the pixel behind times its transmittance, plus its own
+ *         in-scattering. With two outputs, location 0 index 0 and 1, all modes are drawn from the back to the front by
+ *         glBlendFuncSeparate(GL_ONE, GL_SRC1_COLOR, GL_ZERO, GL_ONE); that needs OpenGL 3.3 or
+ *         GL_EXT_blend_func_extended.
+ *     vec4 nebel_blend_grey(nebel_blend blend);
+ *         Source, and the mean factor as alpha, for one output everywhere:
+ *         glBlendFuncSeparate(GL_ONE, GL_SRC_ALPHA, GL_ZERO, GL_ONE). Exact where the factors of the colours are equal:
+ *         over, premultiplied, additive; multiply, screen and medium if they are grey. Coloured ones without two
+ *         outputs are drawn twice, exact too: first the factor with glBlendFunc(GL_ZERO, GL_SRC_COLOR), then the source
+ *         with glBlendFunc(GL_ONE, GL_ONE).
+ *
+ * Particles:
+ *
+ *     float nebel_ball_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, int power);
+ *     float nebel_gaussian_length(vec3 origin, vec3 direction, float t_max, vec3 center, float radius, float sigma);
+ *         The density of a particle integrated along the ray from t = 0 to t_max [m], closed form:
+ *         (1 - r^2)^power, r the distance from the centre in radii, power 0 (even) to 3;
+ *         exp(-distance^2 / (2 sigma^2)) within the radius (1e18: without bound). With the t_max of nebel_see, that is
+ *         with the opaque surface's depth, edges are soft because they are right. Radius and sigma > 0. Positions are
+ *         floats: a particle 10,000 radii away still has its digits.
+ *     nebel_light nebel_medium_light(float length, vec3 extinction, vec3 light);
+ *         What so much of a medium does to light: extinction and radiance per metre where the density is 1 [1/m].
+ *
+ * The classic comparison of a particle with the opaque depth around:
+ *
+ *     struct nebel_tap_constants { float offset; float nothing; float edge; float margin; float brightness; };
+ *     nebel_tap_constants nebel_default_taps();
+ *         0.0005 of the screen, 100000, 0.5, 0.125, 1.
+ *     vec2 nebel_screen_place(vec4 clip);
+ *         Where clip space is on the screen, 0 to 1.
+ *     float nebel_compare_taps(float depth, float center, vec4 corners, nebel_tap_constants taps);
+ *         What to multiply a particle's colour by: `brightness`, or 0 where it is hidden. Depths are in metres along
+ *         the camera's axis: the particle's, and those of the opaque picture at the pixel and `offset` away along both
+ *         diagonals; below 0 nothing is there and `nothing` counts. Drawn where they differ by more than `edge`, and
+ *         where none is nearer than depth - margin.
+ *     float nebel_five_taps(vec2 place, float depth, nebel_tap_constants taps);
+ *         The same with depths from NEBEL_OPAQUE_DEPTH(place), which the host defines before the text; else the
+ *         function is not there.
  *
  * Where the words come from: NEBEL_WORD(i), a vec4. By default (GLSL 3.30 and ES 3.00) the text declares
  *
@@ -113,6 +131,8 @@ const char *nebel_shader_text(nebel_dialect dialect);
 
 #define NEBEL_BLOCK_WORDS 1024   /* what the uniform block holds: 16 KiB, which every OpenGL ES 3.0 has */
 #define NEBEL_TEXTURE_WIDTH 1024 /* words in a row of the texture */
+
+#define NEBEL_MOST_PACKED_VOLUMES 1677721 /* more never fit; of bodies with faces, or of several parts, fewer */
 
 /* One word of packed fog: a vec4. */
 typedef struct nebel_word {

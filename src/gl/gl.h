@@ -16,6 +16,7 @@ struct nebel_gl {
     uint32_t texture_rows, tile_rows; /* allocated */
     nb_programs programs;
 
+    int dims_alone;         /* the fog is asked for transmittance alone: nothing of it is mixed */
     int has_warned;         /* of the turns of loops */
     int has_fog;            /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_snapshot *packed; /* what words and tiles are made of, as `view` sees it; NULL: of nothing */

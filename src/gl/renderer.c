@@ -1,6 +1,8 @@
 /* The scene renderer is made, destroyed and read. */
 #include "renderer.h"
 
+#include "gl.h"
+
 #include <math.h>
 
 enum { USUAL_SHADOW_SIZE = 2048, LEAST_SHADOW_SIZE = 64, MOST_SHADOW_SIZE = 16384 };
@@ -46,6 +48,7 @@ static nebel_result make(nebel_gl_renderer *r)
     if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_fog);
     if (result == NEBEL_OK) result = nebel_create_gl(&desc, &r->sun_cloud);
     if (result != NEBEL_OK) return result;
+    r->sun_fog->dims_alone = r->sun_cloud->dims_alone = 1;
     nb_scene_state_enter(&r->context, &state);
     result = make_objects(r);
     nb_scene_state_leave(&r->context, &state);

@@ -115,7 +115,7 @@ enum { SURELY_WALKED = 40 };
 static void warn_of_turns(nebel_gl *gl)
 {
     const int walks = (gl->fog.features & NEBEL_FEATURE_MIXED) != 0 && gl->fog.tile_most > SURELY_WALKED;
-    if (gl->context.most_turns == 0 || gl->has_warned || !walks) return;
+    if (gl->context.most_turns == 0 || gl->has_warned || gl->dims_alone || !walks) return;
     gl->has_warned = 1;
     (void)nb_fail(
         &gl->log, NEBEL_OK,
@@ -278,12 +278,14 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebe
     const nebel_result result = nb_context_check(&gl->log, gl->vertex_array);
     if (result != NEBEL_OK) return result;
     nebel_rays rays;
+    if (view->width - 1 > 65535 || view->height - 1 > 65535) {
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: the view has %u x %u pixels; 1 to 65536 each",
+                       (unsigned)view->width, (unsigned)view->height);
+    }
     if (nebel_view_rays(view, NULL, &rays) != NEBEL_OK) {
         return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
-                       "nebel_gl_set_fog: %u x %u pixels, and matrices that make no view: sizes are 1 to 65536, all "
-                       "numbers finite, "
-                       "eye_from_world is a rotation and a translation, clip_from_eye a projection",
-                       (unsigned)view->width, (unsigned)view->height);
+                       "nebel_gl_set_fog: the matrices make no view: all numbers must be finite, eye_from_world a "
+                       "rotation and a translation, clip_from_eye a projection");
     }
     return prepare(gl, snapshot != NULL ? snapshot : gl->empty, rays.eye, view, 1);
 }

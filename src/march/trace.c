@@ -148,8 +148,9 @@ nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc 
                          size_t ray_stride, nebel_light *lights, size_t light_stride)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (desc == NULL || (n > 0 && lights == NULL))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: description and lights must not be NULL");
+    const nebel_trace_desc plain = {0};
+    if (desc == NULL) desc = &plain;
+    if (n > 0 && lights == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "trace: lights must not be NULL");
     const nebel_result valid = check_rays(snapshot, n, rays, ray_stride, desc->failed_ray);
     if (valid != NEBEL_OK) return valid;
     const int is_float = desc->precision == NEBEL_PRECISION_FLOAT;

@@ -11,6 +11,9 @@
 
 #define MOST_WORDS ((size_t)1 << 24) /* indices are exact floats */
 
+_Static_assert(NEBEL_MOST_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_WORDS) / NB_MEDIUM_WORDS,
+               "what the public header says");
+
 /* Beyond this a float's square is none. */
 #define FARTHEST 1e18L
 
@@ -272,8 +275,10 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
                        "pack: shaders cannot light fog with the sun yet; give volumes a source instead of an albedo");
     *count = count_words(snapshot);
     if (*count > MOST_WORDS)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words; shaders can address %zu", *count,
-                       MOST_WORDS);
+        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+                       "pack: %zu volumes are too many for shaders: they take %zu words, of which %zu can be "
+                       "addressed; use fewer volumes, or nebel_trace",
+                       snapshot->medium_count, *count, MOST_WORDS);
     if (words == NULL) return NEBEL_OK;
     if (capacity < *count)
         return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words are needed, there is room for %zu", *count,
