@@ -70,7 +70,11 @@ endif()
 if(TARGET nebel_tool)
     install(TARGETS nebel_tool)
 endif()
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+    DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# What headers and messages point to, by the names that they use.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR}
+    PATTERN internal.md EXCLUDE PATTERN CMakeLists.txt EXCLUDE)
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/nebelConfig.cmake.in ${PROJECT_BINARY_DIR}/nebelConfig.cmake
     INSTALL_DESTINATION ${nebel_package_dir} NO_SET_AND_CHECK_MACRO)

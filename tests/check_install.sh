@@ -11,6 +11,11 @@ library=$(dirname "$(find "$prefix" -name nebel.pc)")/..
 library=$(cd "$library" && pwd)
 export PKG_CONFIG_PATH=$library/pkgconfig LD_LIBRARY_PATH=$library
 
+# What the headers point to.
+sed -n 's/.*\(docs\/[a-z-]*\.md\).*/\1/p' "$prefix"/include/nebel/*.h | sort -u | while read -r page; do
+    test -e "$(find "$prefix" -path "*/doc/nebel/$page")"
+done
+
 mkdir "$work/consumer"
 cat >"$work/consumer/core.c" <<'C'
 #include <math.h>

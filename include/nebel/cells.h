@@ -9,8 +9,10 @@
  *
  *     const nebel_cell rooms[] = {
  *         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {0, 0, 0}, .max = {4, 3, 9}}},                        // no fog
- *         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {4, 0, 0}, .max = {9, 3, 9}}, .density = .1, .color = {.5, .5,
- * .6}}}; nebel_cells *cells = NULL; nebel_create_cells(&(nebel_cells_desc){.cells = rooms, .cell_count = 2}, &cells);
+ *         {.shape = {.type = NEBEL_SHAPE_BOX, .min = {4, 0, 0}, .max = {9, 3, 9}},
+ *          .density = .1, .color = {.5, .5, .6}}};
+ *     nebel_cells *cells = NULL;
+ *     nebel_create_cells(&(nebel_cells_desc){.cells = rooms, .cell_count = 2}, &cells);
  *
  *     const nebel_cell_view view = {.eye = {1, 1, 4}, .forward = {1, 0, 0}};
  *     const nebel_cell_point point = {.position = {9, 1, 4}};
