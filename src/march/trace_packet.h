@@ -41,7 +41,7 @@ typedef struct contact {
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths of a box; `ends` of a round body */
     nb_real level;          /* gaussian: m; radial: c */
-    nb_real noise;          /* of the density, from the rounding of the frame */
+    nb_real noise;          /* of the density, from the rounding of the frame; height: relative to it */
     nb_real drift;          /* linear: what the density may be off by per metre of the ray, besides */
     nb_mask inside;         /* within the current piece of the ray */
     nb_wvec3 side;          /* soft edge of a round body */
@@ -219,6 +219,7 @@ static void height_contact(contact *k, const packet *rays, const nebel_density *
     const nb_wide inverse = NB_W(1.0) / WIDE(density->scale_height);
     k->offset.x = (rays->origin.y - WIDE(density->base)) * inverse;
     k->slope.x = rays->direction.y * inverse;
+    k->noise = nb_narrow(nb_wabs(k->offset.x) * (NB_W(8.0) * NB_WEPSILON));
 }
 
 static void linear_contact(contact *k, const packet *rays, const nebel_density *density)
@@ -244,6 +245,7 @@ static void gaussian_contact(contact *k, const packet *rays, const nebel_density
     k->offset.x = -closest * inverse;
     k->slope.x = inverse;
     k->level = nb_narrow(nb_wmin(nb_wdot3(q, q), NB_W(1e9)));
+    k->noise = nb_narrow(nb_wabs(k->offset.x) * (NB_W(32.0) * NB_WEPSILON));
 }
 
 /* x = (t - closest approach) |d| / radius, c = 1 - (closest distance / radius)^2 */
@@ -564,28 +566,47 @@ static nb_estimate blur_linear(nb_estimate estimate, const contact *k, nb_wide s
     return blur(estimate, nb_select(varies, nb_min(noise, NB_F(1.0)), NB_F(0.0)), length);
 }
 
-/* The density integrated from start to end, h metres. The end counts by its place: h has lost digits of it where fog is
- * far from where the piece starts. */
-static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end, nb_real h)
+/* The density integrated from start to end, h metres, of profiles that no polynomial of a low degree describes. In
+ * line, so that a caller who does not ask for the error does not pay for it. */
+static inline __attribute__((always_inline)) nb_estimate curved_integral(const contact *k, nb_wide start, nb_wide end,
+                                                                         nb_real h)
 {
     const nebel_density *density = &k->medium->body.density;
-    const nb_real u = coordinate(k, start);
-    const nb_real slope = nb_narrow(k->slope.x);
-    switch (density->type) {
-    case NEBEL_DENSITY_HEIGHT: {
-        /* from the dense end, where a ray comes down from so far that its start has lost the digits of the height */
-        const nb_real u_end = coordinate(k, end);
-        const nb_mask down = nb_and(slope < NB_F(0.0), nb_abs(u_end) < nb_abs(u));
-        const nb_real from = nb_select(down, u_end, u), rise = nb_select(down, -slope, slope);
-        return density->below == NEBEL_BELOW_GROW ? nb_height_integral(from, rise, h)
-                                                  : nb_height_capped_integral(from, rise, h);
-    }
-    case NEBEL_DENSITY_LINEAR:
-        return blur_linear(nb_linear_integral(u, slope, h), k, start, h);
-    case NEBEL_DENSITY_GAUSSIAN:
-        return nb_gaussian_integral(k->level, u, coordinate(k, end), slope);
-    case NEBEL_DENSITY_RADIAL:
+    const nb_real u = coordinate(k, start), slope = nb_narrow(k->slope.x);
+    if (density->type == NEBEL_DENSITY_RADIAL)
         return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
+    const nb_real u_end = coordinate(k, end);
+    if (density->type == NEBEL_DENSITY_GAUSSIAN)
+        return blur(nb_gaussian_integral(k->level, u, u_end, slope), nb_min(k->noise, NB_F(1.0)),
+                    nb_min(h, NB_F(16.0) * nb_rcp_bounded(slope)));
+    /* from the dense end, where a ray comes down from so far that its start has lost the digits of the height */
+    const nb_mask down = nb_and(slope < NB_F(0.0), nb_abs(u_end) < nb_abs(u));
+    const nb_real from = nb_select(down, u_end, u), rise = nb_select(down, -slope, slope);
+    const nb_estimate height = density->below == NEBEL_BELOW_GROW ? nb_height_integral(from, rise, h)
+                                                                  : nb_height_capped_integral(from, rise, h);
+    return blur(height, nb_min(k->noise, NB_F(4.0)), height.value);
+}
+
+/* From the end that is nearer to the limits: see nb_linear_integral. */
+static nb_estimate linear_integral(const contact *k, nb_wide start, nb_wide end, nb_real h)
+{
+    const nb_real u = coordinate(k, start), u_end = coordinate(k, end), slope = nb_narrow(k->slope.x);
+    const nb_mask backwards = nb_abs(u_end) < nb_abs(u);
+    const nb_real from = nb_select(backwards, u_end, u), rise = nb_select(backwards, -slope, slope);
+    return blur_linear(nb_linear_integral(from, rise, h), k, start, h);
+}
+
+/* The same of any profile. The end counts by its place: h has lost digits of it where fog is far from where the piece
+ * starts. */
+static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end, nb_real h)
+{
+    switch (k->medium->body.density.type) {
+    case NEBEL_DENSITY_HEIGHT:
+    case NEBEL_DENSITY_GAUSSIAN:
+    case NEBEL_DENSITY_RADIAL:
+        return curved_integral(k, start, end, h);
+    case NEBEL_DENSITY_LINEAR:
+        return linear_integral(k, start, end, h);
     case NEBEL_DENSITY_SOFT_EDGE:
         return soft_edge_integral(k, start, h);
     default:
