@@ -29,6 +29,16 @@
 #define ASKS_QUAD
 #endif
 
+/* Beyond this optical depth exp gives 0 in this precision, and nothing behind adds a bit. What it gives before that is
+ * at least the smallest normal number. */
+#if defined(NB_DOUBLE)
+#define OPAQUE_DEPTH NB_F(800.0)
+#define SMALLEST NB_F(2.2250738585072014e-308)
+#else
+#define OPAQUE_DEPTH NB_F(120.0)
+#define SMALLEST NB_F(1.17549435e-38)
+#endif
+
 #include "trace_packet.h"
 #include "trace_meet.h"
 #include "trace_bounds.h"
@@ -285,13 +295,6 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
 
 /* ---- light out ------------------------------------------------------------------------------- */
 
-/* Beyond this optical depth exp gives 0 in this precision, and nothing behind adds a bit. */
-#if defined(NB_DOUBLE)
-#define OPAQUE_DEPTH NB_F(800.0)
-#else
-#define OPAQUE_DEPTH NB_F(120.0)
-#endif
-
 static gathered nothing_gathered(void)
 {
     const nb_real zero = NB_F(0.0), one = NB_F(1.0);
@@ -318,6 +321,7 @@ static void note_clear(const march *m, const piece *p, gathered *g)
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
 {
     const piece_sum sum = sum_piece(m, p);
+    note_overflow(m, p, g);
     if (may->transmittance_only) {
         pass_piece(g, &sum);
         return;
@@ -441,6 +445,21 @@ static nb_real doubtful_light(const march *m, const gathered *g, int c)
     return nb_select(in_doubt, nb_min(most, NB_HUGE) * seen, NB_F(0.0));
 }
 
+/* Transmittance below the smallest normal number is 0: this is what fog behind that may still shine. */
+static nb_real flushed_light(const march *m, const gathered *g, int c)
+{
+    const nb_mask flushed = g->transmittance[c] < SMALLEST;
+    nb_real light = NB_F(0.0);
+    for (size_t i = 0; i < m->contact_count && nb_any(flushed); i++) {
+        const contact *k = &m->contacts[i];
+        const nebel_density *density = &k->medium->body.density;
+        const nb_real length = nb_narrow(nb_wmax(k->hull_leave - k->hull_enter, NB_W(0.0)));
+        const nb_real reach = grows_without_bound(density) ? nb_min(length * NB_HUGE, NB_HUGE) : length;
+        light = light + nb_min(k->light[c] * reach, nb_min(opaque_radiance(k, c), NB_HUGE));
+    }
+    return nb_select(flushed, light * SMALLEST, NB_F(0.0));
+}
+
 /* exp(-depth) is steepest on the thin side, so the transmittance errs most where the optical depth is less by its
  * error. Ends that are watched have been counted on the way. */
 static bounds bound_errors(const march *m, const gathered *g)
@@ -454,9 +473,10 @@ static bounds bound_errors(const march *m, const gathered *g)
         const nb_real error = (end_depth + g->depth_error[c]) * (NB_F(1.0) + NB_F(8.0) * NB_EPSILON);
         const nb_real rise = nb_exp(-nb_max(g->depth[c] - error, g->least_depth[c])) - g->transmittance[c];
         const nb_real rounding = g->transmittance[c] * (error + NB_F(4.0) * NB_EPSILON);
-        const nb_real other = (NB_F(4.0) * NB_EPSILON + m->event_count * LEAST_DOUBT) * g->transmittance[c];
+        const nb_real other = (NB_F(4.0) * NB_EPSILON + m->event_count * LEAST_DOUBT) * g->transmittance[c] + SMALLEST;
         transmittance = nb_max(transmittance, nb_max(rise, nb_min(rounding, g->transmittance[c])) + other);
-        radiance = nb_max(radiance, end_light + doubtful_light(m, g, c) + m->event_count * LEAST_DOUBT +
+        const nb_real hidden = doubtful_light(m, g, c) + flushed_light(m, g, c);
+        radiance = nb_max(radiance, end_light + hidden + m->event_count * LEAST_DOUBT +
                                         g->radiance[c] * (nb_min(end_depth, NB_F(1.0)) + pieces * NB_EPSILON));
     }
     /* fog that the ray may only graze is not among what it met */
@@ -544,12 +564,17 @@ static size_t packet_size(const nb_trace_job *job, size_t first)
     return job->count - first < NB_WIDTH ? job->count - first : NB_WIDTH;
 }
 
+/* Of the largest radiance. Gauss's rule errs by some thousandth of what is proved. Within this budget steps that fall
+ * differently, because a volume is cut or a ray begins elsewhere, change no more than rounding in float does. */
+#define LARGEST_BUDGET 3e-4
+
 /* Where the budget goes: most by loss of transmittance and by length, a tenth to the last steps of the pieces, of which
  * there are at most two per leaf. */
 static allowance share_budget(const nb_trace_job *job)
 {
-    const double budget = job->budget, most = job->snapshot->largest_radiance;
+    const double most = job->snapshot->largest_radiance;
     const double radiance = most > 1 ? most : 1;
+    const double budget = fmin(job->budget, LARGEST_BUDGET * radiance);
     return (allowance){job->transmittance_only, REAL(0.14 * budget), REAL(0.4 * budget), REAL(0.1 * budget),
                        choose_ellipse(budget / radiance)};
 }

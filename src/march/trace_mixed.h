@@ -218,15 +218,33 @@ static nb_real spread_over(const range *r, nb_real drop, int c)
     return nb_select(r->emits, NB_HUGE, NB_F(0.5) * (r->most[c] - r->least[c]) * drop);
 }
 
-/* [0]: all light attenuated by something between the transmittances at both ends. [1]: light per extinction between the
- * least and the most radiant medium, which holds where nothing shines without absorbing. */
+/* A crude rule in one channel: the radiance is within `off` of `middle`. */
+typedef struct crude_rule {
+    nb_real middle, off;
+} crude_rule;
+
+/* All light attenuated by something between the transmittances at both ends. */
+static crude_rule attenuated_light(const step *s, const gathered *g, int c)
+{
+    const nb_real half = NB_F(0.5) * s->sum.light[c];
+    const nb_real drop = (g->transmittance[c] - s->behind[c]) + g->transmittance[c] * (NB_F(4.0) * NB_EPSILON);
+    return (crude_rule){half * (g->transmittance[c] + s->behind[c]), half * drop};
+}
+
+/* Light per extinction between that of the least and of the most radiant medium, where nothing shines without
+ * absorbing. */
+static crude_rule light_between(const range *r, const step *s, const gathered *g, int c)
+{
+    const nb_real drop = g->transmittance[c] * nb_medium_gather(s->sum.depth[c], s->sum.depth[c]);
+    return (crude_rule){NB_F(0.5) * (r->least[c] + r->most[c]) * drop, spread_over(r, drop, c)};
+}
+
 static void bound_crude(const range *r, step *s, const gathered *g)
 {
     s->crude_bound[0] = s->crude_bound[1] = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        const nb_real drop = g->transmittance[c] - s->behind[c];
-        s->crude_bound[0] = nb_max(s->crude_bound[0], NB_F(0.5) * s->sum.light[c] * drop);
-        s->crude_bound[1] = nb_max(s->crude_bound[1], spread_over(r, drop, c));
+        s->crude_bound[0] = nb_max(s->crude_bound[0], attenuated_light(s, g, c).off);
+        s->crude_bound[1] = nb_max(s->crude_bound[1], light_between(r, s, g, c).off);
     }
 }
 
@@ -280,7 +298,7 @@ static void add_to_node(node *n, const contact *k, const step *s)
         return;
     }
     const nb_real before =
-        nb_select(k->inside, contact_integral(k, s->start, s->start + nb_widen(n->h), n->h).value, NB_F(0.0));
+        nb_select(k->inside, curved_integral(k, s->start, s->start + nb_widen(n->h), n->h).value, NB_F(0.0));
     for (int c = 0; c < 3; c++) n->depth[c] = n->depth[c] + k->extinction[c] * before;
 }
 
@@ -313,28 +331,38 @@ static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real 
     }
 }
 
-/* The middles of the two crude rules. */
-static void sum_crude(const range *r, const step *s, const gathered *g, nb_mask between_media, nb_real radiance[3])
-{
-    for (int c = 0; c < 3; c++) {
-        const nb_real drop = g->transmittance[c] - s->behind[c];
-        const nb_real attenuated = NB_F(0.5) * s->sum.light[c] * (g->transmittance[c] + s->behind[c]);
-        radiance[c] = nb_select(between_media, NB_F(0.5) * (r->least[c] + r->most[c]) * drop, attenuated);
-    }
-}
+/* Below this the middle of a crude rule is as good as Gauss's rule in float. */
+#define FINE_ENOUGH NB_F(1e-7)
 
-/* Adds an accepted step in `lanes` by the rule with the smallest bound. */
-static void take_step(const march *m, const range *r, const step *s, gathered *g, nb_mask lanes)
+/* The radiance of a step; returns the bound of its error. Gauss's rule is by far better than the proof of it: where a
+ * crude rule proves more, it says between which limits the result of the nodes is taken. */
+static nb_real sum_step_light(const march *m, const range *r, const step *s, const gathered *g, nb_mask lanes,
+                              nb_real radiance[3])
 {
     const nb_mask between_media = s->crude_bound[1] < s->crude_bound[0];
     const nb_real crude = nb_min(s->crude_bound[0], s->crude_bound[1]);
-    const nb_mask fine = s->gauss_bound < crude;
-    nb_real by_nodes[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, by_ends[3];
+    const nb_mask proven = s->gauss_bound < crude;
+    const nb_mask fine = nb_and(s->gauss_bound < NB_HUGE, nb_or(proven, crude > FINE_ENOUGH));
+    nb_real by_nodes[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, apart = NB_F(0.0);
     if (nb_any(nb_and(lanes, fine))) sum_nodes(m, s, g, by_nodes);
-    sum_crude(r, s, g, between_media, by_ends);
-    nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
-        const nb_real light = nb_select(lanes, nb_select(fine, by_nodes[c], by_ends[c]), NB_F(0.0));
+        const crude_rule attenuated = attenuated_light(s, g, c), between = light_between(r, s, g, c);
+        const nb_real middle = nb_select(between_media, between.middle, attenuated.middle);
+        const nb_real off = nb_select(between_media, between.off, attenuated.off);
+        const nb_real limited = nb_max(nb_min(by_nodes[c], middle + off), middle - off);
+        radiance[c] = nb_select(fine, limited, middle);
+        apart = nb_max(apart, off + nb_abs(radiance[c] - middle));
+    }
+    return nb_select(proven, s->gauss_bound, apart);
+}
+
+/* Adds an accepted step in `lanes`. */
+static void take_step(const march *m, const range *r, const step *s, gathered *g, nb_mask lanes)
+{
+    nb_real radiance[3], most = NB_F(0.0);
+    const nb_real bound = sum_step_light(m, r, s, g, lanes, radiance);
+    for (int c = 0; c < 3; c++) {
+        const nb_real light = nb_select(lanes, radiance[c], NB_F(0.0));
         const nb_real rounding = s->sum.light_error[c] * g->transmittance[c] * nb_exp_ratio(s->sum.depth[c]);
         g->radiance[c] = g->radiance[c] + light;
         most = nb_max(most, rounding + light * attenuation_error(g, &s->sum, c) + g->radiance[c] * NB_EPSILON);
@@ -343,7 +371,7 @@ static void take_step(const march *m, const range *r, const step *s, gathered *g
         const nb_real depth_rounding = s->sum.depth_error[c] + g->depth[c] * (NB_F(2.0) * NB_EPSILON);
         g->depth_error[c] = g->depth_error[c] + nb_select(lanes, depth_rounding, NB_F(0.0));
     }
-    g->radiance_error = g->radiance_error + nb_select(lanes, most + nb_min(s->gauss_bound, crude), NB_F(0.0));
+    g->radiance_error = g->radiance_error + nb_select(lanes, most + bound, NB_F(0.0));
 }
 
 /* What the whole march may spend, and how it is shared out: by the loss of transmittance, by length, and a little for
@@ -429,6 +457,9 @@ static void slow_down(const march *m, nb_wide t, nb_real length, nb_mask lanes, 
     now->adapts = nb_or(now->adapts, lanes);
 }
 
+/* The bounds of the crude rules are nearly reached, that of Gauss's never is. */
+#define CRUDE_WEIGHT NB_F(32.0)
+
 /* Shortens the step in every lane until its bound fits. `whole` is the sum of the piece. */
 static step fit_step(const march *m, const gathered *g, const allowance *may, const piece *p, const range *r,
                      nb_wide start, nb_wide stop, nb_mask pending, pace *now, const piece_sum *whole)
@@ -444,7 +475,7 @@ static step fit_step(const march *m, const gathered *g, const allowance *may, co
         const nb_mask last = length >= nb_narrow(p->end - start);
         const nb_real allowed = may->drop_share * s.drop + may->length_share * (length / p->length) +
                                 nb_select(last, may->last_share, NB_F(0.0));
-        const nb_real bound = nb_min(s.gauss_bound, nb_min(s.crude_bound[0], s.crude_bound[1]));
+        const nb_real bound = nb_min(s.gauss_bound, CRUDE_WEIGHT * nb_min(s.crude_bound[0], s.crude_bound[1]));
         pending = nb_and(pending, bound > allowed);
         if (nb_any(pending)) {
             slow_down(m, start, length, pending, change_of_length(allowed, bound), reach, now);
@@ -463,7 +494,7 @@ static nb_mask rest_fits(const range *r, const gathered *g, const nb_real depth[
 {
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) most = nb_max(most, spread_over(r, g->transmittance[c] - nb_exp(-depth[c]), c));
-    return most <= may->last_share;
+    return CRUDE_WEIGHT * most <= may->last_share;
 }
 
 /* Integrates a piece in its mixed lanes; depth and transmittance of *g are used up on the way. As soon as the rest of

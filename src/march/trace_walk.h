@@ -200,6 +200,27 @@ static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
     g->radiance_error = g->radiance_error + most;
 }
 
+/* The density of fog that grows without bound ends to grow at 1e18: see nb_height_density. Where a piece of fog so
+ * dense lets light through, nothing is known of the light: it may be beyond all numbers. */
+static void note_overflow(const march *m, const piece *p, gathered *g)
+{
+    for (size_t i = m->present_first; i < m->window_count; i++) {
+        const contact *k = present(m, i);
+        if (!grows_without_bound(&k->medium->body.density)) continue;
+        const nb_real lowest = nb_min(coordinate(k, p->start), coordinate(k, p->end));
+        const nb_mask overflows = nb_and(nb_and(p->lanes, k->inside), lowest < NB_F(-41.0));
+        if (!nb_any(overflows)) continue;
+        const nb_real length = contact_integral(k, p->start, p->end, p->length).value;
+        for (int c = 0; c < 3; c++) {
+            const nb_mask clear = nb_and(overflows, g->depth[c] + k->extinction[c] * length < OPAQUE_DEPTH);
+            const nb_mask absorbs = nb_and(clear, k->extinction[c] > NB_F(0.0));
+            const nb_mask shines = nb_and(clear, k->light[c] > NB_F(0.0));
+            g->depth_error[c] = nb_select(absorbs, NB_HUGE, g->depth_error[c]);
+            g->radiance_error = nb_select(shines, NB_HUGE, g->radiance_error);
+        }
+    }
+}
+
 /* Moves behind the piece. */
 static void pass_piece(gathered *g, const piece_sum *sum)
 {
