@@ -11,6 +11,7 @@
 #include "workers.h"
 
 #include <errno.h>
+#include <float.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdint.h>
@@ -46,8 +47,8 @@ static const char about[] = "Reads rays from standard input and writes to standa
                             "\n"
                             "Out: CSV with the header T_r,T_g,T_b,S_r,S_g,S_b,error and a line for each ray:\n"
                             "transmittance, in-scattered radiance, and a bound of the absolute error of the\n"
-                            "six. Numbers have as many digits as it takes to read them back exactly: as\n"
-                            "doubles, or with --precision float as floats.\n"
+                            "six as they are written. Numbers have as many digits as it takes to read them\n"
+                            "back exactly: as doubles, or with --precision float as floats.\n"
                             "\n"
                             "All rays are checked and traced before the first byte is written: on an error\n"
                             "standard output stays empty and the message names the line.\n";
@@ -189,12 +190,19 @@ typedef struct page {
     size_t sizes[NB_WORKERS_MOST];
 } page;
 
-/* A float has its own shortest text. A bound that is no float is written as it is: rounding could make it too small. */
 static size_t write_number(double number, nebel_precision precision, char *text)
 {
-    const float narrow = (float)number;
-    if (precision == NEBEL_PRECISION_FLOAT && (double)narrow == number) return nb_shortest_write_float(narrow, text);
+    if (precision == NEBEL_PRECISION_FLOAT) return nb_shortest_write_float((float)number, text);
     return nb_shortest_write_double(number, text);
+}
+
+/* The shortest text of a float, taken as a real number, is off by up to half a unit in the float's last place, which
+ * the bound then has to hold for, too. It is a text of that kind itself, so that the next larger float is written. */
+static double bound_of_floats(const double numbers[COLUMNS - 1], double bound)
+{
+    double largest = 0;
+    for (int i = 0; i < COLUMNS - 1; i++) largest = fmax(largest, fabs(numbers[i]));
+    return (double)nextafterf((float)(bound + largest * (double)(FLT_EPSILON / 2)), HUGE_VALF);
 }
 
 static size_t write_light(const nebel_light *light, nebel_precision precision, char *text)
@@ -202,7 +210,7 @@ static size_t write_light(const nebel_light *light, nebel_precision precision, c
     double numbers[COLUMNS];
     memcpy(numbers, light->transmittance, sizeof light->transmittance);
     memcpy(numbers + 3, light->in_scattering, sizeof light->in_scattering);
-    numbers[6] = light->error;
+    numbers[6] = precision == NEBEL_PRECISION_FLOAT ? bound_of_floats(numbers, light->error) : light->error;
     size_t size = 0;
     for (int i = 0; i < COLUMNS; i++) {
         size += write_number(numbers[i], precision, text + size);
