@@ -368,7 +368,9 @@ typedef struct nebel_light {
     double in_scattering[3]; /* RGB radiance, >= 0 */
     double error; /* bound of the absolute error of the six numbers. In double never more than the tolerance and 1e-8,
                      in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
-                     touch a surface or run level with one to the last bits */
+                     touch a surface or run level with one to the last bits. Transmittance below the smallest normal
+                     number of the precision is 0, and the error that number at least. 1e30: nothing is known of
+                     light from height fog that grows beyond 1e18 times its extinction and lets light through */
 } nebel_light;
 
 typedef enum nebel_precision {
