@@ -266,7 +266,7 @@ class SceneTest(ViewTest):
         self.assertTrue(self.same(viewer.take_picture(), self.draw_like("sun.png", "--device", "gl"), ROUNDING_TOGETHER))
         viewer.choose("projection", "panorama")
         self.assertEqual(viewer.save()["camera"]["projection"], "panorama")
-        self.assertTrue(self.same(viewer.take_picture(), self.draw_like("panorama.png"), ROUNDING_TOGETHER))
+        self.assertTrue(self.same(viewer.take_picture(), self.draw_like("panorama.png", "--device", "gl"), ROUNDING_TOGETHER))
         viewer.choose("projection", "perspective")
         viewer.press("save the camera, too", 0.05)
         viewer.press("Remove the sun")

@@ -201,16 +201,11 @@ static void check_method(viewer *all)
         all->look.method = NEBEL_METHOD_EXACT;
 }
 
-/* OpenGL does not have all methods, and some of them not from everywhere. */
+/* What OpenGL does not draw. */
 static const char *explain_method(const viewer *all)
 {
-    const nebel_method method = all->look.method;
-    const nebel_projection projection = all->draft.data.camera.projection;
-    const int has_eye = projection == NEBEL_PROJECTION_PERSPECTIVE;
-    if (projection == NEBEL_PROJECTION_PANORAMA) return "drawn by the CPU alone: a panorama";
-    if (is_of_cpu(method)) return "drawn by the CPU alone";
-    if (nb_draft_is_sunlit(&all->draft)) return "drawn by the CPU alone: sunlit fog";
-    return method != NEBEL_METHOD_EXACT && !has_eye ? "drawn by the CPU alone: there is no eye" : "";
+    if (is_of_cpu(all->look.method)) return "drawn by the CPU alone";
+    return nb_draft_is_sunlit(&all->draft) ? "drawn by the CPU alone: sunlit fog" : "";
 }
 
 /* What can be shown of what is wished for. */
@@ -615,12 +610,9 @@ static nebel_result draw(viewer *all)
 {
     nb_window *const window = &all->window;
     const nb_look look = shown_look(all);
-    nebel_camera camera = all->draft.data.camera;
-    /* Behind the CPU's picture. */
-    if (camera.projection == NEBEL_PROJECTION_PANORAMA) camera.projection = NEBEL_PROJECTION_PERSPECTIVE;
     all->stage.cells = all->draft.cells;
     const nebel_result result =
-        nb_stage_draw(&all->stage, &camera, window->width, window->height, &look, is_moving(all));
+        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
     if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
     return nb_window_is_lost(window) ? NEBEL_OK : forgive(result);
 }
