@@ -329,7 +329,8 @@ static nebel_result draw_particles(const frame *f)
     unsigned program = 0;
     if (r->particles.count == 0) return NEBEL_OK;
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
-    const nb_light_kind kind = {.of_particles = 1, .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP};
+    const nb_light_kind kind = {.of_particles = r->particles.profiles,
+                                .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP};
     const nebel_result result = find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);

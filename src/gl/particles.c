@@ -22,9 +22,11 @@ nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *al
     particles->balls = balls;
     particles->count = count;
     particles->is_grey = 1;
+    particles->profiles = 0;
     for (size_t i = 0; i < count; i++) {
         const double *const e = list[i].extinction;
         particles->is_grey &= e[0] == e[1] && e[1] == e[2];
+        particles->profiles |= 1 << (int)list[i].profile;
     }
     return NEBEL_OK;
 }

@@ -17,7 +17,8 @@ typedef struct nb_particles {
     nebel_particle *list; /* in the world */
     nb_ball *balls;
     size_t count;
-    int is_grey; /* every one takes all colours alike */
+    int is_grey;  /* every one takes all colours alike */
+    int profiles; /* 2 to the number of each that occurs */
     unsigned vertex_array, buffer;
 } nb_particles;
 

@@ -36,15 +36,18 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
 static const char words_text[] = "uniform vec3 scene_rays[6];\n"
                                  "#define RAY_WORD(i) scene_rays[i]\n";
 
-static const char ray_text[] =
-    "vec3 ray_origin(vec2 pixel)\n"
-    "{\n"
-    "    return scene_rays[0] + pixel.x * scene_rays[1] + pixel.y * scene_rays[2];\n"
-    "}\n"
-    "vec3 ray_direction(vec2 pixel)\n"
-    "{\n"
-    "    return normalize(scene_rays[3] + pixel.x * scene_rays[4] + pixel.y * scene_rays[5]);\n"
-    "}\n";
+/* By way of the vertices, the same for all fragments: see vertex_text of program.c. */
+static const char passed_words_text[] = "flat in vec3 pass_rays[6];\n"
+                                        "#define RAY_WORD(i) pass_rays[i]\n";
+
+static const char ray_text[] = "vec3 ray_origin(vec2 pixel)\n"
+                               "{\n"
+                               "    return RAY_WORD(0) + pixel.x * RAY_WORD(1) + pixel.y * RAY_WORD(2);\n"
+                               "}\n"
+                               "vec3 ray_direction(vec2 pixel)\n"
+                               "{\n"
+                               "    return normalize(RAY_WORD(3) + pixel.x * RAY_WORD(4) + pixel.y * RAY_WORD(5));\n"
+                               "}\n";
 
 /* Where a ray grazes its triangle the plane alone would be met anywhere: the interpolated distance, which is off by
  * rounding of far corners only, bounds it. Depth is 1 at the eye and falls to 0: floats are as fine in all distances.
@@ -365,6 +368,8 @@ static const char particle_vertex_text[] =
     "layout(location = 2) in vec4 ball_emission;\n"   /* and distance */
     "uniform mat4 scene_clip;\n"
     "uniform vec3 scene_forward;\n" /* 0 where rays meet in the eye */
+    "uniform vec3 scene_rays[6];\n"
+    "flat out vec3 pass_rays[6];\n"
     "flat out vec4 place;\n"
     "flat out vec4 extinction;\n"
     "flat out vec4 emission;\n"
@@ -378,6 +383,7 @@ static const char particle_vertex_text[] =
     "    vec3 right = normalize(cross(way, axis)), up = cross(right, way);\n"
     "    float size = parallel ? r : r * d * inversesqrt(max((d - r) * (d + r), 1e-30));\n"
     "    vec3 at = ball_place.xyz + 1.001 * size * (corner.x * right + corner.y * up);\n"
+    "    pass_rays = scene_rays;\n"
     "    place = ball_place;\n"
     "    extinction = ball_extinction;\n"
     "    emission = ball_emission;\n"
@@ -473,14 +479,31 @@ static const char particle_text[] =
     "    return surface > 0.0 ? surface : 1e18;\n"
     "}\n"
     "#endif\n"
+    "float ball_length(vec3 origin, vec3 direction, float end, int power)\n"
+    "{\n"
+    "    return nebel_ball_length(origin, direction, end, place.xyz, place.w, power);\n"
+    "}\n"
+    "float gaussian_length(vec3 origin, vec3 direction, float end)\n"
+    "{\n"
+    "    return nebel_gaussian_length(origin, direction, end, place.xyz, place.w, place.w / 3.0);\n"
+    "}\n"
+    "float particle_length(vec3 origin, vec3 direction, float end)\n"
+    "{\n"
+    "#if SCENE_PARTICLES == 1\n" /* branches are no jumps in software: one profile alone has none */
+    "    return ball_length(origin, direction, end, 2);\n"
+    "#elif SCENE_PARTICLES == 2\n"
+    "    return gaussian_length(origin, direction, end);\n"
+    "#else\n"
+    "    int profile = int(extinction.w);\n"
+    "    return profile == 1 ? gaussian_length(origin, direction, end)\n"
+    "                        : ball_length(origin, direction, end, profile == 0 ? 2 : 0);\n"
+    "#endif\n"
+    "}\n"
     "void main()\n"
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
     "    float end = ray_end();\n"
-    "    int profile = int(extinction.w);\n"
-    "    float depth = profile == 1\n"
-    "        ? nebel_gaussian_length(origin, direction, end, place.xyz, place.w, place.w / 3.0)\n"
-    "        : nebel_ball_length(origin, direction, end, place.xyz, place.w, profile == 0 ? 2 : 0);\n"
+    "    float depth = particle_length(origin, direction, end);\n"
     "    if (!(depth > 0.0)) discard;\n"
     "    float middle = clamp(dot(place.xyz - origin, direction), 0.0, end);\n"
     "    nebel_blend blend = nebel_blend_medium(nebel_medium_light(depth, extinction.xyz, emission.xyz),\n"
@@ -597,13 +620,13 @@ nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *contex
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
     char limits[128];
-    (void)snprintf(text, size, "%s%s%s%s%s%s%s%s#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
-                   nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
-                   kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
-                   kind->panorama ? "#define SCENE_PANORAMA\n" : "",
-                   kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
-                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-                   NB_CASCADES, (unsigned)kind->features, precision_of(context));
+    (void)snprintf(
+        text, size, "%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
+        nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
+        kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
+        kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
+        kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+        kind->of_particles, NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -640,7 +663,8 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text, light_text}, 7};
     const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
-    const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog, words_text, ray, tile, particle_text},
+    const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog,
+                                kind->panorama ? words_text : passed_words_text, ray, tile, particle_text},
                                7};
     const nb_texts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,

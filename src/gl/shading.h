@@ -20,7 +20,8 @@ enum { NB_CASCADES = 4 };
 
 /* What a program that asks fog is made for. */
 typedef struct nb_light_kind {
-    int of_particles; /* and the fog before them; else of surfaces, and the fog between them and the sun */
+    int of_particles; /* and the fog before them: 2 to the number of each profile that occurs; 0: of surfaces, and the
+                         fog between them and the sun */
     int of_dimming;   /* of the sun by particles, for `dimmed` ones */
     int dimmed;       /* that counts, too */
     int five_taps;    /* particles are discs, which are there or not */
