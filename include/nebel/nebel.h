@@ -398,7 +398,14 @@ typedef struct nebel_trace_desc {
  * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN,
  * infinite where it must not be, of no direction, of negative t_max), UNSUPPORTED (isa not available), UNBOUNDED
  * (emission in an endless volume that does not absorb), MEMORY (scratch for very many volumes on one ray). On an error
- * the contents of lights are undefined. */
+ * the contents of lights are undefined.
+ *
+ * Cost of a ray that meets n of N volumes, at most k of them in one place: O(n + log N) to find them where they lie
+ * apart, O(N) where all lie over each other. Then O(n log n), however they overlap, for volumes of constant density
+ * that add, are of one priority, neither emit nor are lit by the sun, and are neither union nor intersection, from 64
+ * of them on a ray. For other volumes O(n k) in float and O(n^2) in double; where k of them differ in light and their
+ * density varies each piece of the ray between two ends is integrated, mostly in one to ten steps of O(k). The sun asks
+ * for as much again at each place where its light is looked at. */
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
                          size_t ray_stride, nebel_light *lights, size_t light_stride);
 

@@ -46,6 +46,28 @@ static void free_snapshot(nebel_snapshot *s)
     nb_release(&allocator, s);
 }
 
+static int may_join(const nb_medium *medium)
+{
+    const nb_volume *v = &medium->body;
+    return v->operation == NEBEL_OPERATION_ADD && v->density.type == NEBEL_DENSITY_CONSTANT && v->leaf_count == 1 &&
+           !medium->emits && !medium->is_sunlit;
+}
+
+/* Of the media that may join, those of the rank that has most of them do. */
+static void join_media(nebel_snapshot *s)
+{
+    size_t counted = 0;
+    for (size_t i = 0; i < s->medium_count; i++) {
+        nb_medium *medium = &s->media[i];
+        if (i > 0 && medium->body.rank != s->media[i - 1].body.rank) counted = 0;
+        if (!may_join(medium) || ++counted <= s->joining_count) continue;
+        s->joining_count = counted;
+        s->joining = medium;
+    }
+    for (size_t i = 0; i < s->medium_count; i++)
+        s->media[i].joins = may_join(&s->media[i]) && s->media[i].body.rank == s->joining->body.rank;
+}
+
 static int has_body(const nb_volume *volume)
 {
     for (int i = 0; i < 3; i++)
@@ -129,6 +151,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     nebel_result result = NEBEL_ERROR_MEMORY;
     if (copy_media(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
+        join_media(s);
         result = index_media(s);
     }
     if (result != NEBEL_OK) {

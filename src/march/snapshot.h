@@ -19,19 +19,25 @@ typedef struct nb_medium {
     int emits;
     int is_sunlit;
     double shine[3]; /* albedo times the sun's irradiance: of opaque fog, if the phase function were 1 */
+    int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium;
+
+/* From so many such media on one ray on, they are summed in a tree. */
+#define NB_LEAST_CROWD 64
 
 struct nebel_snapshot {
     nebel_allocator allocator;
     nebel_log log;
     atomic_size_t owners;
     size_t medium_count;
-    nb_medium *media;        /* in the order of nb_volume_compare: ranks ascend */
-    double largest_radiance; /* of all volumes and channels */
-    double max_opacity;      /* 1 where there is no limit */
-    int is_sunlit;           /* whether any medium is */
-    double to_sun[3];        /* of length 1; not read where nothing is sunlit */
-    size_t endless_count;    /* media without finite bounds, by index: every ray may meet them */
+    nb_medium *media;         /* in the order of nb_volume_compare: ranks ascend */
+    double largest_radiance;  /* of all volumes and channels */
+    double max_opacity;       /* 1 where there is no limit */
+    int is_sunlit;            /* whether any medium is */
+    double to_sun[3];         /* of length 1; not read where nothing is sunlit */
+    const nb_medium *joining; /* one that joins; NULL where none does */
+    size_t joining_count;     /* how many do; they are of one rank */
+    size_t endless_count;     /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
     nb_bvh bvh;        /* over the others */
     uint32_t *bounded; /* the media that the tree's boxes stand for */

@@ -8,7 +8,7 @@ static nb_real depth_within(const march *m, int channel, nb_wide start, nb_real 
 {
     nb_real depth = NB_F(0.0);
     *extinction = NB_F(0.0);
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         depth = depth + k->extinction[channel] * contact_integral(k, start, start + nb_widen(h), h).value;
         *extinction = *extinction + k->extinction[channel] * contact_density(k, start + nb_widen(h));
@@ -53,6 +53,7 @@ static double find_depth(march *m, int channel, nb_real wanted)
     nb_real depth = NB_F(0.0);
     nb_wide t = NB_W(0.0);
     piece p;
+    m->crowd.is_walking = nb_any(m->crowd.lanes);
     open_window(m, nb_any(ends_matter(m)));
     while (next_piece(m, t, m->rays.t_max > t, &p)) {
         if (mark_inside(m, &p)) {

@@ -42,110 +42,14 @@
 #include "trace_packet.h"
 #include "trace_meet.h"
 #include "trace_bounds.h"
+#include "trace_crowd.h"
 #include "trace_window.h"
 #include "trace_walk.h"
 #include "trace_mixed.h"
+#include "trace_workspace.h"
 
 #define JOIN_NAMES(a, b) a##b
 #define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
-
-/* ---- memory for very many media on one ray --------------------------------------------------- */
-
-/* Most rays meet few media: their contacts live on the stack. Beyond that the job takes memory once and keeps it. */
-#define STACK_CONTACTS 24
-#define ALIGNMENT 64
-
-typedef struct workspace {
-    contact contacts[STACK_CONTACTS];
-    leaf_span spans[2 * STACK_CONTACTS];
-    uint32_t window[STACK_CONTACTS], present[STACK_CONTACTS];
-    stretch stretches[STACK_CONTACTS];
-    double lasts[STACK_CONTACTS];
-    size_t contact_capacity, span_capacity;
-    void *contact_memory, *window_memory, *span_memory; /* as allocated; NULL while the stack suffices */
-    uint32_t *found;                                    /* media that the packet may meet, by index */
-    size_t found_count, found_capacity;
-    march m;
-} workspace;
-
-/* Moves `used` of an array of `size` bytes per element to a larger aligned one. NULL when memory is out. */
-static void *grow_aligned(const nebel_allocator *allocator, const void *old, size_t used, size_t size, size_t *capacity,
-                          size_t wanted, void **memory)
-{
-    size_t larger = *capacity;
-    while (larger < wanted) larger *= 2;
-    char *raw = nb_allocate(allocator, larger + 1, size > ALIGNMENT ? size : ALIGNMENT);
-    if (raw == NULL) return NULL;
-    char *aligned = raw + (ALIGNMENT - (uintptr_t)raw % ALIGNMENT) % ALIGNMENT;
-    memcpy(aligned, old, used * size);
-    nb_release(allocator, *memory);
-    *memory = raw;
-    *capacity = larger;
-    return aligned;
-}
-
-/* Room for a window of `capacity` contacts, which are not known yet. 0 when memory is out. */
-static int reserve_window(workspace *w, const nebel_allocator *allocator, size_t capacity)
-{
-    march *m = &w->m;
-    nb_release(allocator, w->window_memory);
-    w->window_memory =
-        nb_allocate(allocator, capacity, sizeof *m->stretches + sizeof *m->lasts + 2 * sizeof *m->window);
-    if (w->window_memory == NULL) return 0;
-    m->stretches = w->window_memory;
-    m->lasts = (double *)(void *)(m->stretches + capacity);
-    m->window = (uint32_t *)(void *)(m->lasts + capacity);
-    m->present = m->window + capacity;
-    return 1;
-}
-
-/* Room for one more contact and its leaves. 0 when memory is out. */
-static int reserve(workspace *w, const nebel_allocator *allocator, size_t leaves)
-{
-    march *m = &w->m;
-    if (m->contact_count + 1 > w->contact_capacity) {
-        contact *moved = grow_aligned(allocator, m->contacts, m->contact_count, sizeof *moved, &w->contact_capacity,
-                                      m->contact_count + 1, &w->contact_memory);
-        if (moved == NULL) return 0;
-        m->contacts = moved;
-        if (!reserve_window(w, allocator, w->contact_capacity)) return 0;
-    }
-    if (m->span_count + leaves > w->span_capacity) {
-        leaf_span *moved = grow_aligned(allocator, m->spans, m->span_count, sizeof *moved, &w->span_capacity,
-                                        m->span_count + leaves, &w->span_memory);
-        if (moved == NULL) return 0;
-        m->spans = moved;
-    }
-    return 1;
-}
-
-static void open_workspace(workspace *w)
-{
-    w->contact_capacity = STACK_CONTACTS;
-    w->span_capacity = 2 * STACK_CONTACTS;
-    w->contact_memory = NULL;
-    w->window_memory = NULL;
-    w->span_memory = NULL;
-    w->found = NULL;
-    w->found_count = 0;
-    w->found_capacity = 0;
-    w->m.contacts = w->contacts;
-    w->m.window = w->window;
-    w->m.present = w->present;
-    w->m.stretches = w->stretches;
-    w->m.lasts = w->lasts;
-    w->m.total = NULL;
-    w->m.sun = NULL;
-    w->m.spans = w->spans;
-}
-
-static void close_workspace(workspace *w, const nebel_allocator *allocator)
-{
-    nb_release(allocator, w->contact_memory);
-    nb_release(allocator, w->window_memory);
-    nb_release(allocator, w->span_memory);
-    nb_release(allocator, w->found);
-}
 
 /* ---- rays in --------------------------------------------------------------------------------- */
 
@@ -285,12 +189,12 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
     if (snapshot->bounded_count <= FEW_MEDIA) {
         for (size_t i = 0; i < snapshot->medium_count; i++)
             if (!meet_one(w, snapshot, i)) return 0;
-        return 1;
+    } else {
+        if (!find_media(w, snapshot)) return 0;
+        for (size_t i = 0; i < w->found_count; i++)
+            if (!meet_one(w, snapshot, w->found[i])) return 0;
     }
-    if (!find_media(w, snapshot)) return 0;
-    for (size_t i = 0; i < w->found_count; i++)
-        if (!meet_one(w, snapshot, w->found[i])) return 0;
-    return 1;
+    return open_crowd(m, &snapshot->allocator, snapshot);
 }
 
 /* ---- light out ------------------------------------------------------------------------------- */
@@ -350,6 +254,7 @@ static void gather_single(march *m, const allowance *may, gathered *g, nb_mask *
     m->window_count = 1;
     m->present[0] = 0;
     m->present_first = 0;
+    m->present_end = 1;
     gather_piece(m, &p, may, g, unbounded);
 }
 
@@ -359,13 +264,13 @@ static int is_single(const march *m)
            !nb_any(ends_matter(m));
 }
 
-/* From event to event along all rays at once. */
-static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
+/* From event to event along the rays of some lanes at once. */
+static gathered walk_lanes(march *m, const allowance *may, nb_mask which, nb_mask *unbounded)
 {
     gathered g = nothing_gathered();
     nb_wide t = NB_W(0.0);
-    nb_wmask lanes = m->rays.t_max > NB_W(0.0);
-    const nb_mask watched = ends_matter(m);
+    nb_wmask lanes = nb_wand(m->rays.t_max > NB_W(0.0), nb_widen_mask(which));
+    const nb_mask watched = nb_and(ends_matter(m), which);
     *unbounded = nb_mask_false;
     if (m->contact_count == 0) return g;
     if (is_single(m)) {
@@ -389,6 +294,40 @@ static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
         }
         t = nb_wselect(nb_wand(nb_wor(lanes, to_the_end), nb_widen_mask(here)), p.end, t);
     }
+    return g;
+}
+
+static void select_reals(nb_mask mask, nb_real to[3], const nb_real from[3])
+{
+    for (int c = 0; c < 3; c++) to[c] = nb_select(mask, from[c], to[c]);
+}
+
+/* *to = *from in the lanes of the mask. */
+static void select_gathered(nb_mask mask, gathered *to, const gathered *from)
+{
+    select_reals(mask, to->depth, from->depth);
+    select_reals(mask, to->transmittance, from->transmittance);
+    select_reals(mask, to->radiance, from->radiance);
+    select_reals(mask, to->depth_error, from->depth_error);
+    select_reals(mask, to->ends_depth, from->ends_depth);
+    select_reals(mask, to->least_depth, from->least_depth);
+    select_reals(mask, to->clear_depth, from->clear_depth);
+    to->radiance_error = nb_select(mask, from->radiance_error, to->radiance_error);
+}
+
+/* Lanes that are crowded and those that are not, each kind by itself. */
+static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded)
+{
+    const nb_mask crowded = m->crowd.lanes;
+    if (!nb_any(crowded)) return walk_lanes(m, may, nb_mask_true, unbounded);
+    m->crowd.is_walking = 1;
+    gathered g = walk_lanes(m, may, crowded, unbounded);
+    m->crowd.is_walking = 0;
+    if (nb_all(crowded)) return g;
+    nb_mask others_unbounded;
+    const gathered others = walk_lanes(m, may, nb_not(crowded), &others_unbounded);
+    select_gathered(nb_not(crowded), &g, &others);
+    *unbounded = nb_or(*unbounded, others_unbounded);
     return g;
 }
 

@@ -161,7 +161,7 @@ static range find_range(const march *m)
         r.least[c] = NB_HUGE;
         r.most[c] = NB_F(0.0);
     }
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         if (k->medium->emits) r.emits = nb_or(r.emits, k->inside);
         for (int c = 0; c < 3; c++) {
@@ -193,7 +193,7 @@ static nb_real bound_gauss(const march *m, const step *s, const gathered *g, nb_
     const nb_real along = NB_F(0.5) * (ellipse + NB_F(1.0) / ellipse) * radius;
     const nb_real across = NB_F(0.5) * (ellipse - NB_F(1.0) / ellipse) * radius;
     nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, light[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_real ceiling = nb_select(k->inside, density_ceiling(k, middle, along, across), NB_F(0.0));
         for (int c = 0; c < 3; c++) {
@@ -251,7 +251,7 @@ static void bound_crude(const range *r, step *s, const gathered *g)
 static piece_sum sum_step(const march *m, nb_wide start, nb_wide end, nb_real length)
 {
     piece_sum sum = no_sum();
-    for (size_t i = m->present_first; i < m->window_count; i++) add_contact(&sum, present(m, i), start, end, length);
+    for (size_t i = m->present_first; i < m->present_end; i++) add_contact(&sum, present(m, i), start, end, length);
     return sum;
 }
 
@@ -318,7 +318,7 @@ static void sum_nodes(const march *m, const step *s, const gathered *g, nb_real 
     for (int n = 0; n < NODE_COUNT; n++) {
         node sum = {.h = s->length * shares[n], .share = shares[n]};
         for (int c = 0; c < 3; c++) sum.light[c] = sum.depth[c] = sum.extinction[c] = NB_F(0.0);
-        for (size_t i = m->present_first; i < m->window_count; i++) add_to_node(&sum, present(m, i), s);
+        for (size_t i = m->present_first; i < m->present_end; i++) add_to_node(&sum, present(m, i), s);
         nodes[n] = sum;
     }
     for (int c = 0; c < 3; c++) {
@@ -385,7 +385,7 @@ typedef struct allowance {
 static nb_wide nearest_kink(const march *m, nb_wide t, nb_wide end)
 {
     nb_wide nearest = end;
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_wide kink = contact_kink(k, t);
         nearest = nb_wselect(nb_wand(nb_widen_mask(k->inside), kink < nearest), kink, nearest);
@@ -411,7 +411,7 @@ typedef struct pace {
 static nb_real first_reach(const march *m, nb_wide t)
 {
     nb_real growth = NB_F(0.0);
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         nb_real here = largest(k->extinction) * contact_density(k, t);
         if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) here = here + nb_abs(nb_narrow(k->slope.x));

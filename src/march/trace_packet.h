@@ -53,6 +53,24 @@ typedef struct ends {
     nb_real depth[3], light[3];
 } ends;
 
+/* See trace_crowd.h. */
+typedef struct crowd_event crowd_event;
+typedef struct crowd_sum crowd_sum;
+
+typedef struct crowd {
+    nb_mask lanes;                                             /* that are crowded */
+    int is_walking;                                            /* whether the walk is that of the crowded lanes */
+    int64_t rank;                                              /* of all its media */
+    nb_mask is_even;                                           /* all have one radiance, */
+    nb_real radiance[3];                                       /* this one */
+    size_t seats;                                              /* of each lane, a power of two */
+    crowd_event *events;                                       /* 2 seats for each lane, sorted */
+    crowd_sum *sums;                                           /* 2 seats for each lane: [1] is the root */
+    size_t count[NB_WIDTH], next[NB_WIDTH], present[NB_WIDTH]; /* events, those passed, media that are there */
+    void *memory;
+    size_t capacity; /* seats that there is memory for */
+} crowd;
+
 /* The light of the whole ray, as a march has found it before. */
 typedef struct known {
     nb_real radiance[3], error;
@@ -77,13 +95,15 @@ typedef struct march {
 
     uint32_t *window; /* the contacts that the walk looks at, ascending; see trace_window.h */
     size_t window_count;
-    uint32_t
-        *present; /* of the window those within the current piece in any lane: from present_first to window_count */
-    size_t present_first;
+    uint32_t *
+        present; /* the contacts within the current piece in any lane: of the window from present_first on, the crowd */
+    size_t present_first, present_end;
     double window_end;         /* up to here they are all there are */
     struct stretch *stretches; /* of all contacts, by their first places */
     double *lasts;             /* of all contacts */
-    size_t entered;            /* how many of the stretches the window has had */
+    size_t stretch_count;
+    size_t entered; /* how many of the stretches the window has had */
+    crowd crowd;
 } march;
 
 /* What the rounding of a dot product is relative to. */
@@ -610,7 +630,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end
     case NEBEL_DENSITY_SOFT_EDGE:
         return soft_edge_integral(k, start, h);
     default:
-        return nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON));
+        return blur(nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON)), k->noise, h);
     }
 }
 

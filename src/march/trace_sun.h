@@ -286,7 +286,7 @@ static void depth_until(const march *m, const piece *p, const gathered *g, nb_wi
         error[c] = g->depth_error[c];
     }
     const nb_real h = nb_narrow(end - p->start);
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_estimate along = contact_integral(k, p->start, end, h);
         for (int c = 0; c < 3; c++) {
@@ -328,7 +328,7 @@ static sun_node light_node(sunlight *sun, const march *m, const piece *p, const 
     const sun_depth to_sun = depth_to_sun(sun, m, t, lanes);
     nb_real depth[3], error[3], glow[3] = {zero, zero, zero}, extinction[3] = {zero, zero, zero};
     depth_until(m, p, g, t, depth, error);
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_real density = nb_select(k->inside, contact_density(k, t), zero);
         for (int c = 0; c < 3; c++) {
@@ -373,7 +373,7 @@ static void sum_sun_nodes(sunlight *sun, const march *m, const piece *p, const g
 static void limit_step(const march *m, const nb_real before[3], sun_step *s)
 {
     nb_real crude = NB_F(0.0), most[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         for (int c = 0; c < 3; c++) {
             const nb_real radiance = k->glow[c] / nb_max(k->extinction[c], NB_TINY);
@@ -414,7 +414,7 @@ static sun_step try_step(sunlight *sun, const march *m, const piece *p, const ga
 static nb_mask sunlit_lanes(const march *m, const piece *p)
 {
     nb_mask lit = nb_mask_false;
-    for (size_t i = m->present_first; i < m->window_count; i++)
+    for (size_t i = m->present_first; i < m->present_end; i++)
         if (present(m, i)->medium->is_sunlit) lit = nb_or(lit, present(m, i)->inside);
     return nb_and(lit, p->lanes);
 }

@@ -42,7 +42,7 @@ static nb_wide next_event(const march *m, nb_wide t)
             next = nb_wselect(nb_wand(some, nb_wand(span->leave > t, span->leave < next)), span->leave, next);
         }
     }
-    return next;
+    return m->crowd.is_walking ? nb_wmin(next, next_in_crowd(&m->crowd)) : next;
 }
 
 /* ANY or ALL of a body's program: the two topmost masks become one. Returns the new height. */
@@ -57,6 +57,7 @@ static int fold_step(nb_step step, nb_mask *stack, int top)
  * Returns 0 when no lane has a piece left. */
 static int next_piece(march *m, nb_wide t, nb_wmask lanes, piece *p)
 {
+    if (m->crowd.is_walking) advance_crowd(m, t);
     for (;;) {
         const nb_wide next = next_event(m, t);
         const nb_wmask within = nb_wand(lanes, nb_wand(next <= NB_WFAR, next <= WIDE(m->window_end)));
@@ -64,7 +65,7 @@ static int next_piece(march *m, nb_wide t, nb_wmask lanes, piece *p)
             *p = (piece){t, next, nb_narrow(next - t), nb_narrow_mask(within)};
             return 1;
         }
-        if (m->entered == m->contact_count || !nb_wany(lanes)) return 0;
+        if (m->entered == m->stretch_count || !nb_wany(lanes)) return 0;
         move_window(m, earliest(t, lanes));
     }
 }
@@ -91,7 +92,7 @@ static nb_mask is_inside(const march *m, const contact *k, nb_wide start)
  * ranks below it. */
 static int mark_inside(march *m, const piece *p)
 {
-    nb_mask covered = nb_not(p->lanes), covered_below = covered;
+    nb_mask covered = nb_not(p->lanes), covered_below = covered, crowd_covered = covered;
     int64_t rank = INT64_MAX;
     size_t first = m->window_count;
     for (size_t i = m->window_count; i-- > 0;) {
@@ -101,12 +102,16 @@ static int mark_inside(march *m, const piece *p)
         rank = body->rank;
         k->inside = is_inside(m, k, p->start);
         if (nb_volume_covers(body)) covered_below = nb_or(covered_below, k->inside);
+        if (rank > m->crowd.rank) crowd_covered = covered_below;
         if (!nb_volume_has_fog(body)) continue;
         k->inside = nb_and(k->inside, nb_not(covered));
         if (nb_any(k->inside)) m->present[--first] = m->window[i];
     }
     m->present_first = first;
-    return first < m->window_count;
+    m->present_end = m->window_count;
+    if (m->crowd.is_walking && mark_crowd(m, nb_not(crowd_covered)))
+        m->present[m->present_end++] = (uint32_t)m->contact_count;
+    return first < m->present_end;
 }
 
 static nb_real largest(const nb_real v[3])
@@ -142,7 +147,7 @@ static piece_sum sum_piece(const march *m, const piece *p)
     piece_sum sum = no_sum();
     nb_mask seen = nb_mask_false, uneven = nb_mask_false, emits = nb_mask_false, varies = nb_mask_false;
     nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         add_contact(&sum, k, p->start, p->end, p->length);
         const nb_mask again = nb_and(k->inside, seen);
@@ -204,7 +209,7 @@ static void gather_closed(gathered *g, const piece_sum *sum, nb_mask lanes)
  * dense lets light through, nothing is known of the light: it may be beyond all numbers. */
 static void note_overflow(const march *m, const piece *p, gathered *g)
 {
-    for (size_t i = m->present_first; i < m->window_count; i++) {
+    for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         if (!grows_without_bound(&k->medium->body.density)) continue;
         const nb_real lowest = nb_min(coordinate(k, p->start), coordinate(k, p->end));
@@ -368,7 +373,27 @@ static void pass_ends_of(const march *m, const gathered *g, passing *p, const co
     }
 }
 
-/* The window holds all media where ends are watched. */
+/* Ends of the crowd that may be at t, of those not passed yet. */
+static void pass_ends_of_crowd(const march *m, const gathered *g, passing *p, nb_mask lanes)
+{
+    const crowd *c = &m->crowd;
+    for (int i = 0; i < NB_WIDTH; i++) {
+        if (!nb_lane(lanes, i)) continue;
+        const crowd_event *events = &c->events[2 * c->seats * (size_t)i];
+        const lane_place here = nb_lane(p->t, i);
+        p->lanes = one_lane(i);
+        for (size_t j = c->next[i]; j < c->count[i] && events[j].reach <= here; j++) {
+            const contact *k = &m->contacts[events[j].contact];
+            const leaf_span *span = &m->spans[k->first_span];
+            if (events[j].enters)
+                pass_end(m, g, p, k, 0, span->enter, span->enter_slack, 0);
+            else
+                pass_end(m, g, p, k, 0, span->leave, span->leave_slack, 1);
+        }
+    }
+}
+
+/* Window and crowd hold all media where ends are watched. */
 static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
 {
     passing p = {t, lanes, no_ends(), no_ends(), {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
@@ -376,6 +401,7 @@ static void pass_ends(const march *m, gathered *g, nb_wide t, nb_mask lanes)
         const contact *k = in_window(m, i);
         pass_ends_of(m, g, &p, k, lanes);
     }
+    if (m->crowd.is_walking) pass_ends_of_crowd(m, g, &p, lanes);
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real doubt = g->depth_error[c] + g->ends_depth[c] + p.less.depth[c] + m->revealed[c];
@@ -393,7 +419,7 @@ static nb_mask is_unbounded(const march *m, const piece *p, const piece_sum *sum
 {
     nb_mask endless = nb_mask_false;
     const nb_mask open = nb_and(p->lanes, p->length >= NB_F(0.5) * NB_FAR);
-    for (size_t i = m->present_first; i < m->window_count && nb_any(open); i++) {
+    for (size_t i = m->present_first; i < m->present_end && nb_any(open); i++) {
         const contact *k = present(m, i);
         if (!k->medium->emits) continue;
         const nb_mask here = nb_and(

@@ -1,4 +1,5 @@
-/* Which media the walk along the rays looks at: where very many lie on them, only those about the place where it is.
+/* Which media the walk along the rays looks at: where very many lie on them, only those about the place where it is,
+ * and the crowd (trace_crowd.h) as a whole. Included by trace_kernel.c after that.
  *
  * Media are sorted by where the packet first enters one. All lanes walk up to the first entry that the window does not
  * hold, then the window moves on: it lets go of what they have left behind and takes in what comes next. A lane's
@@ -52,9 +53,10 @@ static int compare_stretches(const void *a, const void *b)
 /* All media at once: where there are few of them, or where ends of one may lie beyond its reach. */
 static void look_at_all(march *m)
 {
-    for (uint32_t i = 0; i < m->contact_count; i++) m->window[i] = i;
-    m->window_count = m->contact_count;
-    m->entered = m->contact_count;
+    m->window_count = 0;
+    for (uint32_t i = 0; i < m->contact_count; i++)
+        if (!is_in_crowd(m, i)) m->window[m->window_count++] = i;
+    m->stretch_count = m->entered = m->window_count;
     m->window_end = HUGE_VAL;
 }
 
@@ -64,7 +66,7 @@ static void move_window(march *m, double behind)
     size_t kept = 0;
     for (size_t i = 0; i < m->window_count; i++)
         if (m->lasts[m->window[i]] > behind) m->window[kept++] = m->window[i];
-    const size_t stop = m->entered + WINDOW_STEP < m->contact_count ? m->entered + WINDOW_STEP : m->contact_count;
+    const size_t stop = m->entered + WINDOW_STEP < m->stretch_count ? m->entered + WINDOW_STEP : m->stretch_count;
     for (; m->entered < stop; m->entered++) { /* ascending by index: the canonical order */
         const uint32_t index = m->stretches[m->entered].contact;
         size_t place = kept++;
@@ -72,7 +74,7 @@ static void move_window(march *m, double behind)
         m->window[place] = index;
     }
     m->window_count = kept;
-    m->window_end = m->entered < m->contact_count ? m->stretches[m->entered].first : HUGE_VAL;
+    m->window_end = m->entered < m->stretch_count ? m->stretches[m->entered].first : HUGE_VAL;
 }
 
 static void open_window(march *m, int at_all)
@@ -81,11 +83,14 @@ static void open_window(march *m, int at_all)
         look_at_all(m);
         return;
     }
+    m->stretch_count = 0;
     for (uint32_t i = 0; i < m->contact_count; i++) {
-        m->stretches[i] = stretch_of(m, i);
-        m->lasts[i] = m->stretches[i].last;
+        if (is_in_crowd(m, i)) continue;
+        const stretch s = stretch_of(m, i);
+        m->stretches[m->stretch_count++] = s;
+        m->lasts[i] = s.last;
     }
-    qsort(m->stretches, m->contact_count, sizeof *m->stretches, compare_stretches);
+    qsort(m->stretches, m->stretch_count, sizeof *m->stretches, compare_stretches);
     m->window_count = 0;
     m->entered = 0;
     move_window(m, 0);
