@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 /* A drag over the height of the window turns by half a circle; a notch of the wheel is a tenth nearer; flying crosses
  * half of the distance to the aim in a second, four times that with Shift. */
@@ -167,16 +168,24 @@ static void take_event(nb_hands *hands, const nb_window *window, const nb_window
     }
 }
 
+/* What comes behind a command waits until it is obeyed, so that each counts, in its order. */
+static int has_command(const nb_hands *hands)
+{
+    return hands->wants_undo || hands->wants_redo || hands->wants_save || hands->wants_reload;
+}
+
 void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_look *look)
 {
     *hands = (nb_hands){
         .x = hands->x, .y = hands->y, .grip = hands->grip, .button = hands->button, .keys_down = hands->keys_down};
     unsigned keys = 0;
-    for (int i = 0; i < window->event_count; i++) {
-        take_event(hands, window, &window->events[i], camera, look);
+    int taken = 0;
+    while (taken < window->event_count && !has_command(hands)) {
+        take_event(hands, window, &window->events[taken++], camera, look);
         keys |= hands->keys_down;
     }
-    window->event_count = 0;
+    window->event_count -= taken;
+    memmove(window->events, window->events + taken, (size_t)window->event_count * sizeof *window->events);
     fly(hands, keys, window, camera);
 }
 

@@ -164,7 +164,7 @@ void nb_window_wait(nb_window *window, int busy)
 {
     const double before = window->time;
     if (window->news) window->awake = SETTLING;
-    if (window->width == 0 || (!busy && window->awake == 0 && !window->news)) {
+    if (window->width == 0 || (!busy && window->awake == 0 && !window->news && window->event_count == 0)) {
         glfwWaitEventsTimeout(window->patience > 0 && window->width > 0 ? window->patience : longest_wait);
     } else {
         glfwPollEvents();
