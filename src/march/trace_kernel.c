@@ -438,7 +438,7 @@ static nb_real bound_by_range(const march *m, const gathered *g, nb_real transmi
             if (!nb_volume_has_fog(&k->medium->body)) continue;
             const nb_mask counts =
                 nb_and(nb_narrow_mask(k->hull_enter < k->hull_leave), k->extinction[c] + k->light[c] > NB_F(0.0));
-            least = nb_select(counts, nb_min(k->radiance[c], least), least);
+            least = nb_select(counts, nb_min(shaded_radiance(k, c), least), least);
             most = nb_select(counts, nb_max(opaque_radiance(k, c), most), most);
         }
         const nb_real absorbed = NB_F(1.0) - g->transmittance[c];

@@ -157,11 +157,20 @@ static leaf_span clip_interval(const march *m, const contact *k, const nb_interv
     return span;
 }
 
-/* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight. */
+static nb_real per_extinction(const contact *k, int c, nb_real light)
+{
+    return nb_select(k->extinction[c] > NB_F(0.0), light / nb_max(k->extinction[c], NB_TINY), light * NB_HUGE);
+}
+
+/* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight and without any. */
 static nb_real opaque_radiance(const contact *k, int c)
 {
-    const nb_real light = k->light[c] + k->glow[c];
-    return nb_select(k->extinction[c] > NB_F(0.0), light / nb_max(k->extinction[c], NB_TINY), light * NB_HUGE);
+    return per_extinction(k, c, k->light[c] + k->glow[c]);
+}
+
+static nb_real shaded_radiance(const contact *k, int c)
+{
+    return per_extinction(k, c, k->light[c]);
 }
 
 /* Up to this optical depth what an end may do is as good as proportional to its slack. */

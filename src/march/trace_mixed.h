@@ -431,6 +431,11 @@ static nb_real try_ellipses(const march *m, const step *s, const gathered *g, co
     const nb_real slim = bound_gauss(m, s, g, ellipse_of(NB_F(0.5) * now->reach, s->length));
     *reach = nb_select(wide < slim, nb_min(NB_F(1.5) * now->reach, NB_FAR), *reach);
     *reach = nb_select(slim < wide, NB_F(0.75) * now->reach, *reach);
+    /* Neither is better: both ellipses are the least one, or beyond all numbers. */
+    const nb_mask alike = nb_not(nb_or(wide < slim, slim < wide));
+    const nb_real otherwise =
+        nb_select(now->reach > NB_F(2.0) * s->length, NB_F(0.75) * now->reach, NB_F(4.0) * s->length);
+    *reach = nb_select(alike, otherwise, *reach);
     return nb_select(now->adapts, nb_min(wide, slim), wide);
 }
 
