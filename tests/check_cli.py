@@ -385,6 +385,9 @@ class RenderTest(PictureCase):
         """Embree and its threads throw where nobody catches, in bands of a few MiB that differ from machine to machine."""
         if "AddressSanitizer" in nebel("info").out:
             self.skipTest("AddressSanitizer needs more address space than the limits leave")
+        allowed = {0, 1, 127}
+        if "libomp.so" in subprocess.run(["ldd", NEBEL], capture_output=True, text=True).stdout:
+            allowed.add(-signal.SIGSEGV)  # LLVM's calls itself without end where a thread lacks memory
         seen = set()
         for mebibytes in range(140, 260, 2):
             limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (mebibytes << 20, mebibytes << 20))
@@ -395,7 +398,7 @@ class RenderTest(PictureCase):
                 self.assertEqual(self.files(), self.given, f"{mebibytes} MiB")
             elif done.returncode == 0:
                 (self.folder / "a.png").unlink()
-        self.assertLessEqual(seen, {0, 1, 127})
+        self.assertLessEqual(seen, allowed)
         self.assertIn(1, seen)
 
     def test_signals_while_a_file_is_written(self):
