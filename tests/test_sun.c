@@ -1,17 +1,10 @@
 /* Sunlight in fog: layers of the collected physics (T16), the contracts of every query, and the error that is told. */
+#include "unit.h"
+
+#include "fog_help.h"
 #include "random_fog.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <cmocka.h>
-
-#include "fog_help.h"
-
-#define PI 3.14159265358979323846
 
 /* ---- layers ---------------------------------------------------------------------------------- */
 
@@ -231,6 +224,46 @@ static void endless_fog_is_answered(void **state)
     nebel_release_snapshot(height);
 }
 
+/* Boxes on a line, all with edges that the way to the sun passes: more of them than the stack has room for. */
+static void lost_memory_is_survived(void **state)
+{
+    enum { BOXES = 40 };
+    static nebel_volume_desc boxes[BOXES];
+    const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
+    fog_memory memory = {0};
+    fog_messages messages = {0};
+    (void)state;
+    for (int i = 0; i < BOXES; i++)
+        boxes[i] =
+            (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, 2 * i}, .max = {1, 1, 2 * i + 1}},
+                                .extinction = {0.01, 0.01, 0.01},
+                                .albedo = {1, 1, 1}};
+    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory),
+                                 .log = fog_messages_log(&messages),
+                                 .sun = {.direction = {0.3, 1, 0.2}, .irradiance = {1, 1, 1}}};
+    nebel_snapshot *snapshot = fog_commit(&desc, boxes, BOXES);
+    const size_t live = memory.live;
+    for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+        const nebel_trace_desc asked = {.precision = (nebel_precision)precision};
+        nebel_light light;
+        nebel_result result = NEBEL_ERROR_MEMORY;
+        size_t failed = 0;
+        for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
+            memory.fail_first = k;
+            memory.fail_count = 1;
+            result = nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0);
+            failed += result == NEBEL_ERROR_MEMORY;
+            assert_int_equal(memory.live, live);
+        }
+        assert_int_equal(result, NEBEL_OK);
+        assert_true(failed >= 2);
+        assert_true(light.in_scattering[0] > 0);
+        memory.fail_first = 0;
+    }
+    nebel_release_snapshot(snapshot);
+    assert_int_equal(memory.live, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -239,6 +272,7 @@ int main(void)
         cmocka_unit_test(light_is_the_same_in_any_order_and_set),
         cmocka_unit_test(suns_are_checked),
         cmocka_unit_test(endless_fog_is_answered),
+        cmocka_unit_test(lost_memory_is_survived),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
