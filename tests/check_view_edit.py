@@ -7,7 +7,7 @@ import time
 import unittest
 
 from check_cli import FOG, nebel
-from view_case import ROUNDING, Viewer, ViewTest
+from view_case import LEAVING, ROUNDING, Viewer, ViewTest
 
 
 # The same program of OpenGL draws both: where light is at the edge of a byte the driver may round it otherwise. One byte in twenty is
@@ -37,6 +37,18 @@ class FogTest(ViewTest):
         self.assertEqual(after.replace(number[0], '"extinction": 0.1'), before, "one number has changed, and nothing else")
         self.assertTrue(self.same(changed, self.draw("saved.png"), ROUNDING))
         viewer.end()
+
+    def test_changes_are_not_left_without_a_word(self):
+        viewer = Viewer(self)
+        before = self.scene.read_text()
+        viewer.press("fog[0].visibility", 0.2)
+        viewer.say(LEAVING, lambda: viewer.key("ctrl+q"))
+        viewer.take_picture()
+        viewer.press("fog[0].visibility", 0.4)
+        viewer.say(LEAVING, lambda: viewer.key("ctrl+q"))
+        viewer.key("ctrl+q")
+        self.assertEqual(viewer.process.wait(60), 0)
+        self.assertEqual(self.scene.read_text(), before)
 
     def test_the_file_changes(self):
         viewer = Viewer(self)

@@ -20,6 +20,7 @@ os.environ["ASAN_OPTIONS"] = "detect_leaks=0"
 
 ROUNDING = 0.004  # a byte: where light is at the edge of one
 WAIT = 120  # s; software OpenGL on a busy machine
+LEAVING = "view: changes are not saved"
 PAUSE = 0.05  # s, between events, as a hand would leave
 
 
@@ -98,7 +99,13 @@ class Viewer:
             self.process.wait()
 
     def end(self):
+        """Once more where there are changes."""
+        warned = self.said(LEAVING)
         self.key("ctrl+q")
+        while self.process.poll() is None and self.said(LEAVING) == warned:
+            time.sleep(0.02)
+        if self.process.poll() is None:
+            self.key("ctrl+q")
         self.case.assertEqual(self.process.wait(WAIT), 0, self.log.read_text())
 
     def key(self, name):

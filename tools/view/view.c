@@ -50,6 +50,7 @@ typedef struct viewer {
     double moved;       /* when something changed last [s] */
     double frame;
     int wants_picture, wants_window_picture;
+    int was_warned;         /* that changes are lost if the window is left */
     double placing_seconds; /* that models took to be loaded last */
 } viewer;
 
@@ -225,6 +226,7 @@ static nb_look shown_look(const viewer *all)
 static void note_change(viewer *all)
 {
     all->moved = all->window.time;
+    all->was_warned = 0;
     all->twin_is_stale = 1;
     if (all->stage.state > NB_STAGE_COARSE) all->stage.state = NB_STAGE_COARSE;
 }
@@ -636,6 +638,18 @@ static int turn(viewer *all)
     return result == NEBEL_OK ? status : fail(all, result);
 }
 
+/* The first wish to leave changes behind is answered with a word, the next one without a change between is obeyed. */
+static int is_ended(viewer *all)
+{
+    if (!nb_window_is_ended(&all->window)) return 0;
+    if (all->settings->screenshot != NULL || all->was_warned || !nb_draft_is_changed(&all->draft)) return 1;
+    nb_window_stay(&all->window);
+    all->was_warned = 1;
+    say(all, "Your changes are not saved. Ctrl+S saves them; Ctrl+Q again leaves without them.");
+    nb_report_message("view: changes are not saved; asked to leave once more before they are lost");
+    return 0;
+}
+
 int nb_view_run(const nb_view_settings *settings)
 {
     viewer all = {
@@ -646,7 +660,7 @@ int nb_view_run(const nb_view_settings *settings)
     nb_interrupt_listen();
     int status = open_viewer(&all);
     all.look.range = status == NB_DONE ? nb_navigate_distance(&all.draft.data.camera) : 1;
-    while (status == NB_DONE && !nb_window_is_ended(&all.window) && !nb_interrupt_is_requested()) status = turn(&all);
+    while (status == NB_DONE && !is_ended(&all) && !nb_interrupt_is_requested()) status = turn(&all);
     close_viewer(&all);
     nb_interrupt_obey();
     return status;

@@ -208,6 +208,11 @@ void nb_window_end(nb_window *window)
     glfwSetWindowShouldClose(window->handle, GLFW_TRUE);
 }
 
+void nb_window_stay(nb_window *window)
+{
+    glfwSetWindowShouldClose(window->handle, GLFW_FALSE);
+}
+
 int nb_window_is_lost(nb_window *window)
 {
     if (window->can_be_lost && glGetGraphicsResetStatusARB() != GL_NO_ERROR) window->is_lost = 1;

@@ -60,6 +60,7 @@ double nb_window_now(void);
 void nb_window_show(nb_window *window);
 int nb_window_is_ended(const nb_window *window);
 void nb_window_end(nb_window *window);
+void nb_window_stay(nb_window *window);
 
 /* Whether the driver has lost the context: for good. */
 int nb_window_is_lost(nb_window *window);
