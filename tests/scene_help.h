@@ -73,9 +73,10 @@ static inline char *unmark(const char *marked, char place[32])
     return text;
 }
 
+/* The scene may have something to say as long as it lives. */
 static inline nebel_scene *parse_good(const char *text)
 {
-    journal kept = {0};
+    static journal kept;
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = {.log = {remember, &kept}};
     if (nebel_parse_scene(text, strlen(text), "test.json", &desc, &scene) != NEBEL_OK) fail_msg("%s", kept.last);

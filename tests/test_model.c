@@ -40,9 +40,10 @@ static nebel_scene *load(const char *members, nebel_result *result, journal *kep
     return scene;
 }
 
+/* The scene may have something to say as long as it lives. */
 static nebel_scene *load_good(const char *members)
 {
-    journal kept;
+    static journal kept;
     nebel_result result;
     nebel_scene *scene = load(members, &result, &kept);
     if (result != NEBEL_OK) fail_msg("%s", kept.last);

@@ -46,7 +46,7 @@ typedef struct draft {
 
 static draft open_draft(const char *text)
 {
-    journal kept = {0};
+    static journal kept; /* as long as the scene lives */
     const nebel_scene_desc desc = {.log = {remember, &kept}};
     draft d = {0};
     write_file(text);
