@@ -532,7 +532,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     share.last_share = share.last_share / pieces;
     share.length_share = share.length_share / pieces;
     nb_mask unbounded;
-    if (w->m.sun != NULL) find_turns(w->m.sun, &w->m.rays);
+    if (w->m.sun != NULL) w->m.sun->has_turns = 0;
     *g = gather_light(&w->m, &share, &unbounded);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);

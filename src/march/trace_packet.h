@@ -137,21 +137,22 @@ static nb_wvec3 from_origin(const packet *rays, const nb_leaf *leaf)
 #endif
 }
 
+static nb_wvec3 in_frame(const nb_leaf *leaf, nb_wvec3 v)
+{
+    nb_wvec3 row[3];
+    if (leaf->aligned) return v;
+    for (int i = 0; i < 3; i++)
+        row[i] = nb_wvec3(WIDE(FRAME(leaf, matrix)[3 * i]), WIDE(FRAME(leaf, matrix)[3 * i + 1]),
+                          WIDE(FRAME(leaf, matrix)[3 * i + 2]));
+    return nb_wvec3(nb_wdot3(row[0], v), nb_wdot3(row[1], v), nb_wdot3(row[2], v));
+}
+
 static local_ray localize(const packet *rays, const nb_leaf *leaf)
 {
     const nb_wvec3 p = from_origin(rays, leaf);
-    local_ray local = {p, rays->direction, NB_W(0.0)};
+    local_ray local = {in_frame(leaf, p), in_frame(leaf, rays->direction), NB_W(0.0)};
     nb_wide distance = nb_wabs(p.x) + nb_wabs(p.y) + nb_wabs(p.z);
-    if (!leaf->aligned) {
-        nb_wvec3 row[3];
-        for (int i = 0; i < 3; i++)
-            row[i] = nb_wvec3(WIDE(FRAME(leaf, matrix)[3 * i]), WIDE(FRAME(leaf, matrix)[3 * i + 1]),
-                              WIDE(FRAME(leaf, matrix)[3 * i + 2]));
-        local.p = nb_wvec3(nb_wdot3(row[0], p), nb_wdot3(row[1], p), nb_wdot3(row[2], p));
-        local.d = nb_wvec3(nb_wdot3(row[0], rays->direction), nb_wdot3(row[1], rays->direction),
-                           nb_wdot3(row[2], rays->direction));
-        distance = distance * WIDE(leaf->scale);
-    }
+    if (!leaf->aligned) distance = distance * WIDE(leaf->scale);
     local.reach = (distance + WIDE(leaf->size)) * (NB_W(8.0) * NB_WEPSILON) + WIDE(ORIGIN_ERROR(leaf) * leaf->scale);
     return local;
 }

@@ -16,7 +16,7 @@
 #define MOST_TURNING_MEDIA 256
 
 /* Kronrod's extension of Gauss's rule of three nodes, on [0, 1]. Source: Kronrod, Nodes and Weights of Quadrature
- * Formulas, 1965; both sets derived again with 40 digits. */
+ * Formulas, 1965; derived again with 50 digits from the polynomial of Stieltjes. */
 static const double sun_nodes[SUN_NODES] = {0.019754365645989861, 0.11270166537925831, 0.28287812532659871, 0.5,
                                             0.71712187467340129,  0.88729833462074169, 0.98024563435401014};
 static const double sun_weights[SUN_NODES] = {0.052328113013233632, 0.13424404493416672, 0.20069870738798111,
@@ -34,6 +34,7 @@ typedef struct sunlight {
     workspace *way;     /* from places on the rays to the sun */
     nb_wide *turns;     /* of all media in all lanes, in any order; NB_WFAR and more: none */
     size_t turn_count, turn_capacity;
+    int has_turns; /* of the packet at hand */
     void *turn_memory;
     double share; /* what steps may add to the error of radiance, all together */
     int out_of_memory;
@@ -174,16 +175,6 @@ static void note_round(sunlight *sun, const nb_leaf *leaf, const sun_plane *s)
     }
 }
 
-static nb_wvec3 turned(const nb_leaf *leaf, nb_wvec3 v)
-{
-    nb_wvec3 row[3];
-    if (leaf->aligned) return v;
-    for (int i = 0; i < 3; i++)
-        row[i] = nb_wvec3(WIDE(FRAME(leaf, matrix)[3 * i]), WIDE(FRAME(leaf, matrix)[3 * i + 1]),
-                          WIDE(FRAME(leaf, matrix)[3 * i + 2]));
-    return nb_wvec3(nb_wdot3(row[0], v), nb_wdot3(row[1], v), nb_wdot3(row[2], v));
-}
-
 /* The shadow of a gaussian has no edge: its steep parts and its middle. */
 static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density *density)
 {
@@ -197,7 +188,7 @@ static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, 
 {
     if (leaf->type == NB_LEAF_WORLD) return;
     const local_ray local = localize(rays, leaf);
-    const sun_plane s = {local.p, local.d, turned(leaf, sun->direction)};
+    const sun_plane s = {local.p, local.d, in_frame(leaf, sun->direction)};
     if (leaf->type == NB_LEAF_BOX)
         note_box(sun, leaf, &s);
     else if (leaf->type == NB_LEAF_PLANES)
@@ -211,6 +202,7 @@ static void find_turns(sunlight *sun, const packet *rays)
 {
     const nebel_snapshot *snapshot = sun->snapshot;
     sun->turn_count = 0;
+    sun->has_turns = 1;
     if (snapshot->medium_count > MOST_TURNING_MEDIA) return;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
@@ -450,6 +442,7 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathe
 {
     const nb_mask lit = sunlit_lanes(m, p);
     if (!nb_any(lit)) return;
+    if (!sun->has_turns) find_turns(sun, &m->rays);
     const gathered start = *g;
     const nb_real whole = nb_max(p->length, NB_TINY), pieces = m->event_count + NB_F(1.0);
     sun_walk w = begin_walk(m, p, g, lit);
