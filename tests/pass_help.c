@@ -139,6 +139,14 @@ void pass_attach(unsigned program, unsigned kind, int count, const char *const *
     glDeleteShader(shader);
 }
 
+void pass_link(unsigned program)
+{
+    GLint good = 0;
+    glLinkProgram(program);
+    glGetProgramiv(program, GL_LINK_STATUS, &good);
+    assert_true(good);
+}
+
 /* ---- pictures -------------------------------------------------------------------------------- */
 
 const double pass_eye[3] = {4e4, 12, -7e4};

@@ -44,6 +44,7 @@ void pass_delete_framebuffer(unsigned framebuffer);
 
 /* Compiles a shader of so many texts into a program; `kind`: GL_VERTEX_SHADER, GL_FRAGMENT_SHADER. */
 void pass_attach(unsigned program, unsigned kind, int count, const char *const *texts);
+void pass_link(unsigned program);
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 

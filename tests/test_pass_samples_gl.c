@@ -43,7 +43,7 @@ static unsigned fill_program(void)
     const unsigned program = glCreateProgram();
     pass_attach(program, GL_VERTEX_SHADER, 1, &vertex);
     pass_attach(program, GL_FRAGMENT_SHADER, 1, &fragment);
-    glLinkProgram(program);
+    pass_link(program);
     glUseProgram(program);
     glUniform1i(glGetUniformLocation(program, "depths"), 0);
     glUniform1i(glGetUniformLocation(program, "colors"), 1);

@@ -133,12 +133,9 @@ static unsigned make_program(const nebel_gl *gl, nb_gl_language language, path h
     const char *const fragment[] = {
         version, defines, nebel_shader_text(es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330), fragment_text};
     const unsigned program = glCreateProgram();
-    GLint good = 0;
     pass_attach(program, GL_VERTEX_SHADER, 2, vertex);
     pass_attach(program, GL_FRAGMENT_SHADER, 4, fragment);
-    glLinkProgram(program);
-    glGetProgramiv(program, GL_LINK_STATUS, &good);
-    assert_true(good);
+    pass_link(program);
     return program;
 }
 
