@@ -177,6 +177,136 @@ static void light_is_the_same_in_any_order_and_set(void **state)
     }
 }
 
+/* ---- lit pieces ------------------------------------------------------------------------------ */
+
+/* A box of even fog under a sun at right angles to the ray: the depth to the sun is the same all along. */
+static nebel_snapshot *make_slab(void)
+{
+    const nebel_plane planes[] = {{{0, -1, 0}, 0}, {{0, 1, 0}, 10}};
+    const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 2},
+                                      .extinction = {0.1, 0.2, 0.3},
+                                      .albedo = {1, 0.5, 1}};
+    const nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}, .irradiance = {1, 2, 3}}};
+    return fog_commit(&desc, &volume, 1);
+}
+
+/* What the ray (0, 4, 0) + t (1, 0, 0) gathers from a to b in the slab: albedo irradiance / 4 pi, e^-6s for the way to
+ * the sun, and e^-sa - e^-sb. */
+static double slab_light(int c, double a, double b)
+{
+    static const double s[] = {0.1, 0.2, 0.3}, shine[] = {1, 1, 3};
+    return shine[c] / 12.566370614359172 * exp(-6 * s[c]) * (exp(-s[c] * a) - exp(-s[c] * b));
+}
+
+enum { MANY = 5121 };
+
+static void pieces_are_those_of_the_closed_form(void **state)
+{
+    static float comb[MANY];
+    static const float toggles[] = {2, 3, 0, 0, 5, 1, 1, 4, 50, HUGE_VALF, 7};
+    static const uint32_t first[] = {0, 2, 3, 5, 10, 10, 11};
+    static const struct {
+        size_t count;
+        double ends[4];
+    } lit[] = {{2, {0, 2, 3, 20}}, {0, {0}}, {1, {5, 20}}, {1, {0, 4}}, {1, {0, 20}}, {1, {0, 7}}};
+    enum { CASES = sizeof lit / sizeof lit[0] };
+    const nebel_lit_pieces pieces = {first, toggles};
+    nebel_snapshot *snapshot = make_slab();
+    nebel_ray rays[CASES];
+    (void)state;
+    for (int i = 0; i < CASES; i++) rays[i] = (nebel_ray){{0, 4, 0}, {1, 0, 0}, 20};
+    for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+        nebel_light lights[CASES];
+        const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = 1e-7, .sunlit = &pieces};
+        assert_int_equal(nebel_trace(snapshot, &desc, CASES, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+        for (int i = 0; i < CASES; i++)
+            for (int c = 0; c < 3; c++) {
+                double sum = 0;
+                for (size_t k = 0; k < lit[i].count; k++)
+                    sum += slab_light(c, lit[i].ends[2 * k], i == 2 ? 20 : lit[i].ends[2 * k + 1]);
+                assert_true(fabs(lights[i].in_scattering[c] - sum) < 2e-7);
+                assert_true(lights[i].transmittance[c] == lights[4].transmittance[c]);
+            }
+    }
+    for (int i = 0; i < MANY; i++) comb[i] = (float)i * 0.00390625f; /* to the end of the ray, and no rounding */
+    double sum = 0;
+    for (int i = 1; i < MANY; i += 2) sum += slab_light(0, (double)comb[i], (double)comb[i + 1]);
+    const nebel_lit_pieces thin = {(const uint32_t[]){0, MANY}, comb};
+    nebel_light light;
+    assert_int_equal(nebel_trace(snapshot, &(nebel_trace_desc){.sunlit = &thin}, 1, rays, 0, &light, 0), NEBEL_OK);
+    assert_true(fabs(light.in_scattering[0] - sum) < 1e-6);
+    nebel_release_snapshot(snapshot);
+}
+
+static void pieces_that_are_none_are_refused(void **state)
+{
+    static const float ascends[] = {1, 2, 3}, descends[] = {1, 3, 2}, below[] = {1, -1e-9f, 3}, none[] = {1, NAN, 3};
+    static const uint32_t first[] = {0, 1, 3}, back[] = {0, 3, 1};
+    const nebel_lit_pieces wrong[] = {{first, descends}, {first, below},  {first, none},
+                                      {back, ascends},   {NULL, ascends}, {first, NULL}};
+    const nebel_ray rays[2] = {{{0, 4, 0}, {1, 0, 0}, 20}, {{0, 4, 0}, {1, 0, 0}, 20}};
+    nebel_snapshot *snapshot = make_slab();
+    (void)state;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        nebel_light lights[2];
+        size_t failed = 9;
+        const nebel_trace_desc desc = {.sunlit = &wrong[i], .failed_ray = &failed};
+        assert_int_equal(nebel_trace(snapshot, &desc, 2, rays, sizeof *rays, lights, sizeof *lights),
+                         NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(failed, i < 4 ? 1 : i == 4 ? 9 : 0);
+    }
+    nebel_release_snapshot(snapshot);
+}
+
+/* Random pieces of random fog: every set, split and way of asking gives the same bits, transmittance those without. */
+static void pieces_are_the_same_in_any_set_and_split(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
+        static float toggles[RAYS * 8];
+        uint32_t first[RAYS + 1] = {0};
+        uint64_t numbers = (uint64_t)kind + 5;
+        nebel_ray rays[RAYS];
+        nebel_light all[RAYS], expected[RAYS], other[RAYS];
+        make_sunlit((random_fog_kind)kind, 4);
+        nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
+        draw_rays(rays);
+        for (uint32_t i = 0; i < RAYS; i++) {
+            const uint32_t count = (uint32_t)dice(&numbers, 0, 8);
+            double t = 0;
+            for (uint32_t k = 0; k < count; k++) toggles[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
+            first[i + 1] = first[i] + count;
+        }
+        const nebel_lit_pieces pieces = {first, toggles};
+        nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
+        trace(snapshot, &desc, rays, all);
+        desc.sunlit = &pieces;
+        trace(snapshot, &desc, rays, expected);
+        for (int i = 0; i < RAYS; i++)
+            assert_memory_equal(all[i].transmittance, expected[i].transmittance, sizeof all[i].transmittance);
+        for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
+            if (!nebel_isa_available(desc.isa)) continue;
+            desc.sunlit = &pieces;
+            trace(snapshot, &desc, rays, other);
+            assert_memory_equal(expected, other, sizeof expected);
+            for (int i = 0; i < RAYS; i++) {
+                const nebel_lit_pieces one = {first + i, toggles};
+                desc.sunlit = &one;
+                assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+            }
+            assert_memory_equal(expected, other, sizeof expected);
+        }
+        nebel_light fine[RAYS], reference[RAYS];
+        trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6, .sunlit = &pieces}, rays, fine);
+        trace(snapshot, &(nebel_trace_desc){.sunlit = &pieces}, rays, reference);
+        for (int i = 0; i < RAYS; i++) {
+            assert_true(apart(&reference[i], &fine[i]) <= reference[i].error + fine[i].error);
+            assert_true(apart(&expected[i], &fine[i]) <= expected[i].error + fine[i].error);
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
 /* ---- rules ----------------------------------------------------------------------------------- */
 
 static void suns_are_checked(void **state)
@@ -270,6 +400,9 @@ int main(void)
         cmocka_unit_test(layers_are_those_of_T16),
         cmocka_unit_test(errors_are_told),
         cmocka_unit_test(light_is_the_same_in_any_order_and_set),
+        cmocka_unit_test(pieces_are_those_of_the_closed_form),
+        cmocka_unit_test(pieces_that_are_none_are_refused),
+        cmocka_unit_test(pieces_are_the_same_in_any_set_and_split),
         cmocka_unit_test(suns_are_checked),
         cmocka_unit_test(endless_fog_is_answered),
         cmocka_unit_test(lost_memory_is_survived),

@@ -378,6 +378,16 @@ typedef enum nebel_precision {
     NEBEL_PRECISION_FLOAT       /* 32 bit with 64-bit positions, several rays at once */
 } nebel_precision;
 
+/* Along which pieces of its way each of n rays is reached by a light, as whoever knows the surfaces has found out. A
+ * ray begins where the light reaches it; at each of its toggles [m from its start] the light ceases to reach it, or
+ * begins to again. One that begins in shadow has 0 as its first toggle. Toggles are 0 or more and do not descend;
+ * INFINITY, those beyond the ray's end and pairs of equal ones are legal and do nothing. */
+typedef struct nebel_lit_pieces {
+    const uint32_t *first; /* n + 1 numbers that do not descend: those of ray i are toggles[first[i]] up to but not
+                              toggles[first[i + 1]] */
+    const float *toggles;  /* may be NULL where there are none */
+} nebel_lit_pieces;
+
 typedef struct nebel_trace_desc {
     nebel_precision precision;
     nebel_isa isa;      /* float only */
@@ -389,6 +399,9 @@ typedef struct nebel_trace_desc {
                              transmittance. */
     int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
                              those to a   light, since `start` and `cutoff` of a volume count from where a ray starts. */
+    const nebel_lit_pieces *sunlit; /* of the rays of the call: where the sun reaches them past surfaces. NULL:
+                             everywhere. Fog in shadow scatters no sunlight; transmittance stays as it is, to the bit.
+                             The ends of pieces are taken as exact: `error` says nothing of them */
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
@@ -396,9 +409,9 @@ typedef struct nebel_trace_desc {
 /* What the fog does along each of n rays. `ray_stride` and `light_stride` are in bytes. desc NULL: the same as all
  * zero. rays and lights must not overlap. A ray with t_max 0 gives transmittance 1, in-scattering 0. Float results are the same bits for every isa and
  * for every way of splitting the rays into calls. Any thread. Errors: ARGUMENT (NULL, a tolerance or a ray that is NaN,
- * infinite where it must not be, of no direction, of negative t_max), UNSUPPORTED (isa not available), UNBOUNDED
- * (emission in an endless volume that does not absorb), MEMORY (scratch for very many volumes on one ray). On an error
- * the contents of lights are undefined.
+ * infinite where it must not be, of no direction, of negative t_max; toggles that descend, are negative or NaN),
+ * UNSUPPORTED (isa not available), UNBOUNDED (emission in an endless volume that does not absorb), MEMORY (scratch for
+ * very many volumes on one ray). On an error the contents of lights are undefined.
  *
  * Cost of a ray that meets n of N volumes, at most k of them in one place: O(n + log N) to find them where they lie
  * apart, O(N) where all lie over each other. Then O(n log n), however they overlap, for volumes of constant density
@@ -450,9 +463,9 @@ typedef struct nebel_light_planes {
 
 /* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of
  * transmittance and in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero)
- * `isa`, `tolerance`, `failed_ray` and `ignore_distances` are read. rays and lights must not overlap. Same bits for
- * every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be worth
- * it. Any thread. Errors as nebel_trace. */
+ * `isa`, `tolerance`, `failed_ray`, `ignore_distances` and `sunlit` are read. rays and lights must not overlap. Same
+ * bits for every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be
+ * worth it. Any thread. Errors as nebel_trace. */
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,
                                 const nebel_ray_planes *rays, const nebel_light_planes *lights);
 

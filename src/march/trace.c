@@ -120,6 +120,34 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
     return nb_fail(&job->snapshot->log, result, "ray %zu: out of memory for the fog it meets", job->failed);
 }
 
+static const char *fault_of_pieces(const nebel_lit_pieces *pieces, size_t i)
+{
+    const uint32_t first = pieces->first[i], end = pieces->first[i + 1];
+    if (first > end) return "`first` must not descend";
+    if (first < end && pieces->toggles == NULL) return "toggles must not be NULL";
+    float last = 0;
+    for (uint32_t k = first; k < end; k++) {
+        if (!(pieces->toggles[k] >= last)) return "toggles must be 0 or more and not descend";
+        last = pieces->toggles[k];
+    }
+    return NULL;
+}
+
+/* Where light reaches the rays of a call. */
+static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n)
+{
+    const nebel_lit_pieces *pieces = desc->sunlit;
+    if (pieces == NULL) return NEBEL_OK;
+    if (pieces->first == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "sunlit: `first` must not be NULL");
+    for (size_t i = 0; i < n; i++) {
+        const char *fault = fault_of_pieces(pieces, i);
+        if (fault == NULL) continue;
+        if (desc->failed_ray != NULL) *desc->failed_ray = i;
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "sunlit: ray %zu: %s", i, fault);
+    }
+    return NEBEL_OK;
+}
+
 /* What the error may be beyond the tolerance. */
 #define FLOAT_ROUNDING 1e-4
 #define DOUBLE_ROUNDING 1e-8
@@ -134,6 +162,12 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     if (kernel == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(desc->isa));
+    const nebel_result pieces = check_pieces(snapshot, desc, n);
+    if (pieces != NEBEL_OK) return pieces;
+    if (desc->sunlit != NULL) {
+        job->first_toggle = desc->sunlit->first;
+        job->toggles = desc->sunlit->toggles;
+    }
     job->snapshot = snapshot;
     job->budget = tolerance * fmax(1, snapshot->largest_radiance);
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);

@@ -532,7 +532,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     share.last_share = share.last_share / pieces;
     share.length_share = share.length_share / pieces;
     nb_mask unbounded;
-    if (w->m.sun != NULL) w->m.sun->has_turns = 0;
+    if (w->m.sun != NULL) begin_sun(w->m.sun, job, first, count);
     *g = gather_light(&w->m, &share, &unbounded);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
@@ -561,9 +561,18 @@ static nb_mask in_doubt(const nb_trace_job *job, nb_real error)
 
 #endif
 
+#if !defined(NB_QUAD)
+
+static const uint32_t *toggles_of(const nb_trace_job *job, size_t i)
+{
+    return job->first_toggle != NULL ? job->first_toggle + i : NULL;
+}
+
+#endif
+
 #if !defined(NB_DOUBLE)
 
-static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const nebel_light *light)
+static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ray, const nebel_light *light)
 {
     nebel_light truth;
     nb_trace_job one = {.snapshot = job->snapshot,
@@ -572,6 +581,8 @@ static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const n
                         .transmittance_only = job->transmittance_only,
                         .ignore_distances = job->ignore_distances,
                         .wants_error = 1,
+                        .first_toggle = toggles_of(job, i),
+                        .toggles = job->toggles,
                         .count = 1,
                         .rays = ray,
                         .ray_stride = sizeof *ray,
@@ -587,7 +598,7 @@ static double settle_lane(const nb_trace_job *job, const nebel_ray *ray, const n
     return bound < light->error ? bound : light->error;
 }
 
-/* The error where the lanes in doubt are settled; `rays` are the packet's. */
+/* The error where the lanes in doubt are settled; `rays` are those of the packet that was answered last. */
 static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real error, const nebel_ray *rays,
                              size_t stride, size_t count)
 {
@@ -602,7 +613,7 @@ static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real
             light.transmittance[c] = (double)nb_lane(g->transmittance[c], i);
             light.in_scattering[c] = (double)nb_lane(g->radiance[c], i);
         }
-        lane[i] = (nb_scalar)settle_lane(job, ray_at(rays, stride, i), &light);
+        lane[i] = (nb_scalar)settle_lane(job, job->failed + i, ray_at(rays, stride, i), &light);
     }
     return nb_load_lanes(lane);
 }
@@ -621,6 +632,7 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
 {
     nb_trace_job one = *job;
     one.count = 1;
+    one.first_toggle = toggles_of(job, i);
     one.rays = ray_at(job->rays, job->ray_stride, i);
     one.lights = light_at(job->lights, job->light_stride, i);
     job->failed = i;

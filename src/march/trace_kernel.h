@@ -18,7 +18,9 @@ typedef struct nb_trace_job {
     nebel_light *lights;
     const nebel_ray_planes *ray_planes; /* NULL: structures. What all rays share is checked, no stride is 0 */
     const nebel_light_planes *light_planes;
-    size_t failed; /* out: the ray that was an error */
+    const uint32_t *first_toggle; /* of each ray in `toggles`, and one more; NULL: the sun reaches all of every ray */
+    const float *toggles;         /* checked */
+    size_t failed;                /* out: the ray that was an error */
 } nb_trace_job;
 
 typedef nebel_result nb_trace_fn(nb_trace_job *job);

@@ -27,6 +27,15 @@ static const double sun_weights_of_three[SUN_NODES] = {0, 5.0 / 18, 0, 8.0 / 18,
 /* More turns than these take memory once. */
 #define STACK_TURNS 64
 
+/* Where surfaces keep the sun away, lane by lane. A lane passes its toggles once, as its pieces come along the ray. */
+typedef struct shade {
+    const float *toggles; /* NULL: the sun reaches all */
+    size_t next[NB_WIDTH], end[NB_WIDTH];
+    nb_scalar dark[NB_WIDTH]; /* 1 where the sun is kept away before the next toggle */
+    nb_wide toggle;           /* the next one of each lane */
+    nb_wmask is_dark;
+} shade;
+
 /* What sunlight needs besides the march of the rays. */
 typedef struct sunlight {
     const nebel_snapshot *snapshot;
@@ -36,6 +45,7 @@ typedef struct sunlight {
     size_t turn_count, turn_capacity;
     int has_turns; /* of the packet at hand */
     void *turn_memory;
+    shade shade;
     double share; /* what steps may add to the error of radiance, all together */
     int out_of_memory;
 } sunlight;
@@ -221,6 +231,51 @@ static nb_wide next_turn(const sunlight *sun, nb_wide t, nb_wide end)
     return end;
 }
 
+/* ---- shade ----------------------------------------------------------------------------------- */
+
+static void look_ahead(shade *s)
+{
+    lane_place lane[NB_WIDTH];
+    for (int i = 0; i < NB_WIDTH; i++)
+        lane[i] = s->next[i] < s->end[i] ? (lane_place)s->toggles[s->next[i]] : (lane_place)2e18;
+    s->toggle = load_places(lane);
+    s->is_dark = nb_widen_mask(nb_load_lanes(s->dark) > NB_F(0.0));
+}
+
+/* Of `count` rays, the first of them by the number `first`. */
+static void begin_shade(shade *s, const nb_trace_job *job, size_t first, size_t count)
+{
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        const int counts = job->first_toggle != NULL && i < count;
+        s->next[i] = counts ? job->first_toggle[first + i] : 0;
+        s->end[i] = counts ? job->first_toggle[first + i + 1] : 0;
+        s->dark[i] = 0;
+    }
+    s->toggles = job->toggles;
+    look_ahead(s);
+}
+
+/* Turns are found where they are asked for. */
+static void begin_sun(sunlight *sun, const nb_trace_job *job, size_t first, size_t count)
+{
+    sun->has_turns = 0;
+    begin_shade(&sun->shade, job, first, count);
+}
+
+/* Passes the toggles up to t. */
+static void pass_toggles(shade *s, nb_wide t, nb_wmask lanes)
+{
+    const nb_wmask passes = nb_wand(lanes, s->toggle <= t);
+    if (!nb_wany(passes)) return;
+    for (int i = 0; i < NB_WIDTH; i++) {
+        if (!nb_lane(passes, i)) continue;
+        const lane_place here = nb_lane(t, i);
+        for (; s->next[i] < s->end[i] && (lane_place)s->toggles[s->next[i]] <= here; s->next[i]++)
+            s->dark[i] = 1 - s->dark[i];
+    }
+    look_ahead(s);
+}
+
 /* ---- the way to the sun ---------------------------------------------------------------------- */
 
 static int meet_fog(workspace *w, const nebel_snapshot *snapshot);
@@ -388,6 +443,7 @@ static void limit_step(const march *m, const nb_real before[3], sun_step *s)
 typedef struct sun_walk {
     nb_wide t;
     nb_wmask lanes, at_turn;
+    nb_real left;             /* steps that the lane may still try before its next toggle */
     nb_real guess, before[3]; /* length of the next step; transmittance up to here */
 } sun_walk;
 
@@ -414,7 +470,8 @@ static nb_mask sunlit_lanes(const march *m, const piece *p)
 /* A first step of a few optical depths: endless pieces would be halved for ever. */
 static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb_mask lanes)
 {
-    sun_walk w = {.t = p->start, .lanes = nb_widen_mask(lanes), .at_turn = nb_wmask_false};
+    sun_walk w = {
+        .t = p->start, .lanes = nb_widen_mask(lanes), .at_turn = nb_wmask_false, .left = NB_F(1.0) * MOST_SUN_STEPS};
     nb_real depth[3], error[3];
     depth_until(m, p, g, p->end, depth, error);
     const nb_real within = nb_max(largest(depth) - largest(g->depth), NB_F(4.0));
@@ -437,29 +494,61 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     w->guess = nb_select(taken, nb_max(w->guess, s->length + s->length), NB_F(0.5) * s->length);
 }
 
+/* What steps of a piece share. */
+typedef struct sun_piece {
+    const piece *p;
+    gathered before;       /* what was gathered before it */
+    nb_real whole, pieces; /* its length; how many there may be */
+} sun_piece;
+
+static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
+{
+    const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
+    const nb_wide bright = nb_wmin(sun->shade.toggle, s->p->end);
+    const nb_wide next = nb_wmin(next_turn(sun, w->t, bright), nearest_kink(m, w->t, bright));
+    const nb_wide stop = nb_wselect(nb_widen_mask(last), bright, next);
+    const nb_real rest = nb_narrow(stop - w->t), length = nb_select(last, rest, nb_min(w->guess, rest));
+    const nb_wmask to_stop = nb_widen_mask(length >= rest);
+    const nb_wide end = nb_wselect(to_stop, stop, w->t + nb_widen(length));
+    const nb_wmask turns = nb_wand(to_stop, stop < bright);
+    const sun_step tried = try_step(sun, m, s->p, &s->before, w, length, end, turns);
+    const nb_real least = NB_F(8.0) * NB_EPSILON * largest(tried.light); /* what no halving makes less */
+    const nb_real allowed =
+        least + REAL(sun->share) *
+                    (NB_F(0.5) * tried.drop + NB_F(0.25) * (length / s->whole) / s->pieces + NB_F(0.001) / s->pieces);
+    const nb_mask fits = nb_or(last, tried.error <= allowed);
+    take_sun_step(g, w, &tried, end, turns, nb_and(fits, nb_narrow_mask(w->lanes)));
+    w->left = w->left - NB_F(1.0);
+}
+
+/* To where the sun comes back. */
+static void pass_shadow(const sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, nb_wmask dark)
+{
+    const nb_wide end = nb_wmin(sun->shade.toggle, s->p->end);
+    const nb_mask lanes = nb_narrow_mask(dark);
+    nb_real before[3];
+    transmittance_until(m, s->p, &s->before, end, before);
+    for (int c = 0; c < 3; c++) w->before[c] = nb_select(lanes, before[c], w->before[c]);
+    w->left = nb_select(lanes, NB_F(1.0) * MOST_SUN_STEPS, w->left);
+    w->at_turn = nb_wand(w->at_turn, nb_wnot(dark));
+    w->t = nb_wselect(dark, end, w->t);
+}
+
 /* Adds the sunlight of a piece; `g` is what was gathered before it. A lane's steps are its own. */
 static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathered *g)
 {
     const nb_mask lit = sunlit_lanes(m, p);
     if (!nb_any(lit)) return;
     if (!sun->has_turns) find_turns(sun, &m->rays);
-    const gathered start = *g;
-    const nb_real whole = nb_max(p->length, NB_TINY), pieces = m->event_count + NB_F(1.0);
+    const sun_piece s = {p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0)};
     sun_walk w = begin_walk(m, p, g, lit);
-    for (int i = 1; i <= MOST_SUN_STEPS && nb_wany(w.lanes); i++) {
-        const nb_wide next = nb_wmin(next_turn(sun, w.t, p->end), nearest_kink(m, w.t, p->end));
-        const nb_wide stop = i < MOST_SUN_STEPS ? next : p->end;
-        const nb_real rest = nb_narrow(stop - w.t), length = i < MOST_SUN_STEPS ? nb_min(w.guess, rest) : rest;
-        const nb_wmask to_stop = nb_widen_mask(length >= rest);
-        const nb_wide end = nb_wselect(to_stop, stop, w.t + nb_widen(length));
-        const nb_wmask turns = nb_wand(to_stop, stop < p->end);
-        const sun_step s = try_step(sun, m, p, &start, &w, length, end, turns);
-        const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
-        const nb_real allowed =
-            least +
-            REAL(sun->share) * (NB_F(0.5) * s.drop + NB_F(0.25) * (length / whole) / pieces + NB_F(0.001) / pieces);
-        const nb_mask fits = i < MOST_SUN_STEPS ? s.error <= allowed : nb_narrow_mask(w.lanes);
-        take_sun_step(g, &w, &s, end, turns, nb_and(fits, nb_narrow_mask(w.lanes)));
+    while (nb_wany(w.lanes)) {
+        pass_toggles(&sun->shade, w.t, w.lanes);
+        const nb_wmask dark = nb_wand(w.lanes, sun->shade.is_dark);
+        if (nb_wany(dark))
+            pass_shadow(sun, m, &s, &w, dark);
+        else
+            step_along(sun, m, &s, &w, g);
         w.lanes = nb_wand(w.lanes, w.t < p->end);
     }
 }
