@@ -484,12 +484,40 @@ class RenderTest(PictureCase):
         self.assert_done(self.render("a.exr", "--method", "vertex"))
         done = self.render("b.exr", "--method", "vertex", "--tessellate", "0.004")
         self.assert_done(done)
-        self.assertRegex(done.err, r"note: 1 triangles became \d\d+; .* within 0.0\d+ of the exact one, 0 triangles above")
+        self.assertRegex(done.err, r"note: \S*box.json: 1 triangles became \d\d+; .* within 0.00[0-4]\d* of the exact one\n")
+        self.assertNotIn("limit", done.err)
         self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
         vertex = ("--method", "vertex", "--tessellate")
-        self.assert_misused(self.render("c.png", *vertex, "0"), "--tessellate", "more than 0")
-        self.assert_misused(self.render("c.png", "--tessellate", "0.1"), "--tessellate", "--method vertex")
+        self.assert_misused(self.render("c.png", *vertex, "1e-6"), "--tessellate", "more than 1e-6")
+        misused = self.render("c.png", "--tessellate", "0.1")
+        self.assert_misused(misused, "--tessellate needs --method vertex")
+        self.assertNotIn("0.1", misused.err)
+        self.assert_misused(self.render("c.png", *vertex, "0.1", "--tessellate-depth", "49"), "from 1 to 48")
+        self.assert_misused(self.render("c.png", "--tessellate-triangles", "9"), "--tessellate-triangles", "without --tessellate")
         self.assert_misused(self.render("c%d.png", *vertex, "0.1", "--frames", "0-1"), "--tessellate", "one frame")
+
+    def test_limits_of_tessellation(self):
+        box = {"shape": {"type": "box", "min": [-9, -0.5, -9], "max": [9, 0.5, 9]}, "extinction": 0.3, "source": 1}
+        self.scene = self.write_scene("box.json", [box], models=[{"file": "triangle.obj"}],
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        call = ("a.png", "--method", "vertex", "--tessellate", "0.004", "--tessellate-triangles", "100")
+        for limit, fewest, most in (("--tessellate-triangles", 100, 200), ("--tessellate-depth", 2, 20)):
+            done = self.render(*call, *(("--tessellate-depth", "3") if "depth" in limit else ()))
+            self.assert_done(done)
+            count = int(re.search(r"1 triangles became (\d+)", done.err).group(1))
+            self.assertTrue(fewest <= count <= most, count)
+            self.assertRegex(done.err, rf"note: \S*box.json: \d+ triangles are left above --tessellate, .* more with {limit}, or")
+
+    def test_fog_that_cannot_be_tessellated_is_named(self):
+        box = {"shape": {"type": "box", "min": [-9, -0.5, -9], "max": [9, 0.5, 9]}, "extinction": 0.3, "source": 1}
+        soft = {**box, "shape": {"type": "cylinder", "from": [0, -1, 0], "to": [0, 1, 0], "radius": 1},
+                "density": {"type": "soft_edge", "distance": 0.2}}
+        holes = [{"shape": {"type": "sphere", "center": [i, 0, 0], "radius": 1}, "operation": "exclude", "priority": 1} for i in range(8)]
+        for fog, at, reason in (([box, soft, box], 1, "soft edge of a cylinder"), ([box, *holes, box], 8, "more than 8 parts")):
+            self.scene = self.write_scene("odd.json", fog, models=[{"file": "triangle.obj"}],
+                                          camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+            self.assert_failed(self.render("a.png", "--method", "vertex", "--tessellate", "0.1"), "odd.json", f"fog[{at}]: ", reason,
+                               "leave out --tessellate")
 
     def test_quiet(self):
         done = self.render("a.png", "--quiet")

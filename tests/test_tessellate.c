@@ -540,6 +540,9 @@ static void test_limits_are_told(void **state)
     assert_true(few->triangle_count >= 400 && few->triangle_count < 800 && few->over_count > 0);
     assert_no_junctions(few);
     assert_true(flat->over_count > 0 && flat->error > 1. / 255);
+    assert_int_equal(none->deepest_count, 0);
+    assert_int_equal(few->deepest_count, 0);
+    assert_int_equal(flat->deepest_count, flat->over_count);
     nebel_destroy_tessellation(none);
     nebel_destroy_tessellation(few);
     nebel_destroy_tessellation(flat);

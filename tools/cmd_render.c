@@ -37,6 +37,8 @@ enum {
     TOLERANCE,
     METHOD,
     TESSELLATE,
+    TESSELLATE_TRIANGLES,
+    TESSELLATE_DEPTH,
     DEVICE,
     ISA,
     THREADS,
@@ -67,7 +69,12 @@ static const nb_option options[] = {
          "pixels. five-tap, of --device gl:\nparticles meet surfaces by five depths."},
     [TESSELLATE] = {"tessellate", 0, "E",
                     "With --method vertex or additive of the CPU: smaller\ntriangles, until the fog's factor is "
-                    "within E of the\nexact one for the camera, 0 < E <= 1."},
+                    "within E of the\nexact one for the camera, 1e-6 < E <= 1."},
+    [TESSELLATE_TRIANGLES] = {"tessellate-triangles", 0, "N",
+                              "No triangle of a model that has come to so many is\nhalved for its error, up to 10^9. "
+                              "Default: 262144."},
+    [TESSELLATE_DEPTH] = {"tessellate-depth", 0, "N",
+                          "How often a triangle may be halved for its error, 1\nto 48. Default: 20."},
     [DEVICE] =
         {"device", 0, "NAME",
          "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No --tolerance, --isa and --threads with gl."},
@@ -96,6 +103,9 @@ static const char examples[] = "Examples:\n"
                                "\n"
                                "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
 
+/* What nebel_tessellate counts for rounding. */
+#define LEAST_TESSELLATION 1e-6
+
 /* Pictures of more samples are not written. */
 enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, LAST_FRAME = 1000000 };
 
@@ -103,7 +113,8 @@ typedef struct settings {
     const char *scene, *output;
     nebel_image_format format;
     uint32_t width, height, samples;
-    double exposure, tolerance, tessellate; /* 0: the triangles of the models */
+    double exposure, tolerance;
+    nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
     uint32_t first_frame, last_frame;
     int many_frames, aov, quiet, gl;
     nebel_method method;
@@ -183,13 +194,24 @@ static int is_of_gl(nebel_method method)
 
 static void read_tessellate(nb_arguments *arguments, settings *wanted)
 {
-    if (arguments->values[TESSELLATE] == NULL) return;
-    wanted->tessellate = nb_options_number(arguments, TESSELLATE, 0, 1, 0);
-    if (wanted->tessellate == 0) nb_options_reject(arguments, TESSELLATE, "is not more than 0");
+    nebel_tessellation_desc *const desc = &wanted->tessellation;
+    desc->most_triangles = nb_options_whole(arguments, TESSELLATE_TRIANGLES, 1, 1000000000, 1 << 18);
+    desc->deepest = nb_options_whole(arguments, TESSELLATE_DEPTH, 1, 48, 20);
+    if (arguments->values[TESSELLATE] == NULL) {
+        static const int limits[] = {TESSELLATE_TRIANGLES, TESSELLATE_DEPTH};
+        for (size_t i = 0; i < sizeof limits / sizeof *limits; i++)
+            if (arguments->values[limits[i]] != NULL)
+                nb_options_refuse(arguments, limits[i], "does nothing without --tessellate; add that, or leave it out");
+        return;
+    }
+    desc->bound = nb_options_number(arguments, TESSELLATE, 0, 1, 1);
+    if (desc->bound <= LEAST_TESSELLATION)
+        nb_options_reject(arguments, TESSELLATE, "is not more than 1e-6, which rounding may take");
     if (wanted->gl || (wanted->method != NEBEL_METHOD_VERTEX && wanted->method != NEBEL_METHOD_ADDITIVE))
-        nb_options_reject(arguments, TESSELLATE, "is for --method vertex or additive of --device cpu");
+        nb_options_refuse(arguments, TESSELLATE,
+                          "needs --method vertex or additive, and --device cpu; say so, or leave it out");
     if (wanted->many_frames)
-        nb_options_reject(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
+        nb_options_refuse(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
 }
 
 static void read_device(nb_arguments *arguments, settings *wanted)
@@ -202,7 +224,7 @@ static void read_device(nb_arguments *arguments, settings *wanted)
     wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
     for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
         if (arguments->values[of_cpu[i]] != NULL) {
-            nb_options_reject(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
+            nb_options_refuse(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
         }
     }
     if (wanted->gl && !is_of_gl(wanted->method))
@@ -211,7 +233,7 @@ static void read_device(nb_arguments *arguments, settings *wanted)
     if (!wanted->gl && wanted->method == NEBEL_METHOD_FIVE_TAP)
         nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
     if (wanted->method != NEBEL_METHOD_EXACT && arguments->values[TOLERANCE] != NULL)
-        nb_options_reject(arguments, TOLERANCE, "is for --method exact; leave it out with another");
+        nb_options_refuse(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
 
 /* -1 to go on, or the exit status. */
@@ -556,29 +578,62 @@ static int choose_method(studio *all)
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
-static nebel_result tessellate(studio *all)
+/* Which of the limits left triangles above the bound. */
+static const char *name_limit(const nb_finer *finer)
+{
+    if (finer->deepest_count == 0) return "--tessellate-triangles";
+    return finer->deepest_count == finer->over_count ? "--tessellate-depth"
+                                                     : "--tessellate-triangles and --tessellate-depth";
+}
+
+static void note_tessellation(const settings *wanted, const nb_finer *finer)
+{
+    if (wanted->quiet) return;
+    nb_report_message("note: %s: %zu triangles became %zu; the fog's factor is within %.3g of the exact one",
+                      wanted->scene, finer->triangles_before, finer->triangles, finer->error);
+    if (finer->over_count == 0) return;
+    nb_report_message("note: %s: %zu triangles are left above --tessellate, because a limit ended it; allow more with "
+                      "%s, or a larger error",
+                      wanted->scene, finer->over_count, name_limit(finer));
+}
+
+static int refuse_tessellation(const studio *all)
+{
+    const nebel_scene *const scene = all->loaded.scene;
+    const size_t volume = nb_finer_find_unproven(scene, all->wanted->first_frame);
+    char place[32] = "fog";
+    if (volume < nebel_scene_contents(scene)->volume_count) (void)snprintf(place, sizeof place, "fog[%zu]", volume);
+    return nb_report_failure("render: %s: %s: %s, or leave out --tessellate", all->wanted->scene, place,
+                             all->listener.kept);
+}
+
+static int tessellate(studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_camera camera = nebel_scene_camera(all->loaded.scene, wanted->first_frame);
-    nb_finer *const finer = &all->finer;
-    const nebel_result result = nb_finer_make(nebel_scene_contents(all->loaded.scene), all->loaded.fog, camera.position,
-                                              wanted->tessellate, finer);
-    if (result == NEBEL_OK && !wanted->quiet)
-        nb_report_message("note: %zu triangles became %zu; the fog's factor is within %.3g of the exact one, %zu "
-                          "triangles above --tessellate",
-                          finer->triangles_before, finer->triangles, finer->error, finer->over_count);
-    return result;
+    nebel_tessellation_desc desc = wanted->tessellation;
+    for (int i = 0; i < 3; i++) desc.eye[i] = camera.position[i];
+    all->listener.mode = NB_REPORT_KEEP; /* which volume it is the library does not know */
+    const nebel_result result =
+        nb_finer_make(nebel_scene_contents(all->loaded.scene), all->loaded.fog, &desc, &all->finer);
+    all->listener.mode = NB_REPORT_PRINT;
+    if (result == NEBEL_ERROR_UNSUPPORTED) return refuse_tessellation(all);
+    if (result != NEBEL_OK)
+        return nb_report_failure("render: %s: %s", wanted->scene,
+                                 all->listener.kept[0] != '\0' ? all->listener.kept : nebel_result_text(result));
+    note_tessellation(wanted, &all->finer);
+    return NB_DONE;
 }
 
 static int open_renderer(studio *all)
 {
     nebel_renderer_desc desc = all->wanted->renderer;
     desc.log = nb_report_log(&all->listener);
-    const int is_finer = all->wanted->tessellate > 0;
-    nebel_result result = is_finer ? tessellate(all) : NEBEL_OK;
-    if (result != NEBEL_OK) return nb_report_result(&all->listener, all->wanted->scene, result);
+    const int is_finer = all->wanted->tessellation.bound > 0;
+    const int status = is_finer ? tessellate(all) : NB_DONE;
+    if (status != NB_DONE) return status;
     const nebel_scene_data *const scene = is_finer ? &all->finer.data : nebel_scene_contents(all->loaded.scene);
-    result = nebel_create_renderer(scene, all->loaded.fog, &desc, &all->renderer);
+    const nebel_result result = nebel_create_renderer(scene, all->loaded.fog, &desc, &all->renderer);
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 

@@ -46,24 +46,54 @@ static nebel_result add_mesh(const nebel_snapshot *fog, const nebel_tessellation
     finer->triangles_before += mesh->triangle_count;
     finer->triangles += made->triangle_count;
     finer->over_count += made->over_count;
+    finer->deepest_count += made->deepest_count;
     finer->error = made->error > finer->error ? made->error : finer->error;
     return refine_mesh(mesh, made, &finer->meshes[i], &finer->attributes[i]);
 }
 
-nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3], double bound,
-                           nb_finer *finer)
+nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
+                           const nebel_tessellation_desc *desc, nb_finer *finer)
 {
     const size_t count = scene->mesh_count;
-    const nebel_tessellation_desc desc = {.eye = {eye[0], eye[1], eye[2]}, .bound = bound};
     *finer = (nb_finer){.data = *scene};
     finer->meshes = calloc(count + 1, sizeof *finer->meshes);
     finer->made = calloc(count + 1, sizeof *finer->made);
     finer->attributes = calloc(count + 1, sizeof *finer->attributes);
     if (finer->meshes == NULL || finer->made == NULL || finer->attributes == NULL) return NEBEL_ERROR_MEMORY;
     nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < count && result == NEBEL_OK; i++) result = add_mesh(fog, &desc, i, finer);
+    for (size_t i = 0; i < count && result == NEBEL_OK; i++) result = add_mesh(fog, desc, i, finer);
     finer->data.meshes = finer->meshes;
     return result;
+}
+
+static int is_unproven(const nebel_scene *scene, double frame, size_t count)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    nebel_tessellation *made = NULL;
+    nebel_result result = nebel_create_fog(&(nebel_fog_desc){0}, &fog);
+    for (size_t i = 0; i < count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
+        result = nebel_add_volume(fog, &volume, NULL);
+    }
+    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    if (result == NEBEL_OK)
+        result = nebel_tessellate(snapshot, &(nebel_tessellation_desc){.deepest = 1}, &(nebel_triangles){0}, &made);
+    nebel_destroy_tessellation(made);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+    return result == NEBEL_ERROR_UNSUPPORTED;
+}
+
+/* By halves, because no volume proves anything of those before it. */
+size_t nb_finer_find_unproven(const nebel_scene *scene, double frame)
+{
+    size_t proven = 0, count = nebel_scene_contents(scene)->volume_count + 1;
+    while (count - proven > 1) {
+        const size_t middle = proven + (count - proven) / 2;
+        *(is_unproven(scene, frame, middle) ? &count : &proven) = middle;
+    }
+    return proven;
 }
 
 void nb_finer_free(nb_finer *finer)

@@ -10,15 +10,17 @@ typedef struct nb_finer {
     nebel_scene_data data;
     nebel_mesh *meshes;
     nebel_tessellation **made;
-    float **attributes; /* of each mesh: normals, then texture coordinates */
-    size_t triangles_before, triangles, over_count;
+    float **attributes;                                            /* of each mesh: normals, then texture coordinates */
+    size_t triangles_before, triangles, over_count, deepest_count; /* of all meshes */
     double error;
 } nb_finer;
 
-/* Tessellates every mesh, so that fog at its vertices is within `bound` for this eye. Errors: those of
- * nebel_tessellate. */
-nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3], double bound,
-                           nb_finer *finer);
+/* Tessellates every mesh, each within the limits of `desc`. Errors: those of nebel_tessellate. */
+nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
+                           const nebel_tessellation_desc *desc, nb_finer *finer);
+
+/* The volume with which the fog of the scene up to there has no proof at a frame; their number where none is found. */
+size_t nb_finer_find_unproven(const nebel_scene *scene, double frame);
 void nb_finer_free(nb_finer *finer);
 
 #endif

@@ -188,6 +188,13 @@ void nb_options_reject(nb_arguments *arguments, int option, const char *problem)
     arguments->misused = 1;
 }
 
+void nb_options_refuse(nb_arguments *arguments, int option, const char *problem)
+{
+    const nb_command *const command = arguments->command;
+    nb_report_message("%s: --%s %s", command->name, command->options[option].name, problem);
+    arguments->misused = 1;
+}
+
 double nb_options_number(nb_arguments *arguments, int option, double low, double high, double fallback)
 {
     const char *const text = arguments->values[option];

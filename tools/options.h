@@ -55,6 +55,9 @@ int nb_options_choice(nb_arguments *arguments, int option, const char *const *na
 /* Reports that the option's value is wrong: "NAME: --option: 'value' PROBLEM". */
 void nb_options_reject(nb_arguments *arguments, int option, const char *problem);
 
+/* Reports that the option has no place here, whatever its value: "NAME: --option PROBLEM". */
+void nb_options_refuse(nb_arguments *arguments, int option, const char *problem);
+
 /* The name that `word` was likely meant to be; NULL: none is near. */
 const char *nb_options_nearest(const char *word, const char *const *names, size_t count);
 

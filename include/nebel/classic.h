@@ -277,8 +277,9 @@ typedef struct nebel_tessellation {
     size_t vertex_count_before;  /* of the input */
     const uint32_t (*parents)[2];
     size_t added_triangles;
-    double error;      /* proven bound of what is left, of all triangles; at most 1 */
-    size_t over_count; /* triangles whose bound is above the one asked for: 0 where it was met */
+    double error;         /* proven bound of what is left, of all triangles; at most 1 */
+    size_t over_count;    /* triangles whose bound is above the one asked for: 0 where it was met */
+    size_t deepest_count; /* those of them that `deepest` left; the others were left by `most_triangles` */
 } nebel_tessellation;
 
 /* Splits triangles until |f - L| <= bound everywhere on each, where f is the exact transmittance between the eye and

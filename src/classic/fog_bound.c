@@ -623,16 +623,36 @@ static int is_known_density(const nb_volume *body)
            (leaf->type == NB_LEAF_PLANES && leaf->face_count <= MOST_SOFT_PLANES);
 }
 
+static nebel_result refuse_edge(const nebel_log *log, const nb_volume *body)
+{
+    const nb_leaf_type type = body->leaves[0].type;
+    const char *const name = type == NB_LEAF_TUBE      ? "cylinder"
+                             : type == NB_LEAF_CONE    ? "cone"
+                             : type == NB_LEAF_CAPSULE ? "capsule"
+                                                       : "body of more than 32 planes";
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                   "tessellation: nothing is proven of the soft edge of a %s; give it another density", name);
+}
+
+static nebel_result refuse_parts(const nebel_log *log)
+{
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                   "tessellation: nothing is proven of a volume that has, with those that exclude or replace its fog, "
+                   "more than %d parts; make it of fewer",
+                   MOST_LEAVES);
+}
+
 /* A body of one leaf of which nothing is taken away, as most are, is one part. */
 static nebel_result add_body(nb_fog_bound *bound, const nebel_snapshot *snapshot, const nb_volume *body, int channel)
 {
     mixture m = {.body_count = 0};
     nebel_result result = NEBEL_OK;
-    if (!is_known_density(body) || !mix(&m, body, bound->eye)) return NEBEL_ERROR_UNSUPPORTED;
+    if (!is_known_density(body)) return refuse_edge(&snapshot->log, body);
+    if (!mix(&m, body, bound->eye)) return refuse_parts(&snapshot->log);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *const other = &snapshot->media[i].body;
         if (!nb_volume_covers(other) || other->rank <= body->rank || !overlap(other, body)) continue;
-        if (!mix(&m, other, bound->eye)) return NEBEL_ERROR_UNSUPPORTED;
+        if (!mix(&m, other, bound->eye)) return refuse_parts(&snapshot->log);
     }
     for (size_t leaves = 1; leaves >> m.leaf_count == 0 && result == NEBEL_OK; leaves++) {
         const int times = coefficient(&m, leaves);

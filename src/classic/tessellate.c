@@ -409,7 +409,9 @@ static void *finish_indices(mesh *m)
         const triangle *const t = &m->triangles[i];
         for (size_t k = 0; k < 3; k++) m->indices[3 * i + k] = t->corners[k];
         m->made.error = fmax(m->made.error, (double)t->error);
-        m->made.over_count += (double)t->error > m->desc.bound;
+        if ((double)t->error <= m->desc.bound) continue;
+        m->made.over_count++;
+        m->made.deepest_count += t->depth >= m->desc.deepest;
     }
     return m->indices;
 }
@@ -444,12 +446,6 @@ static nebel_result finish(mesh *m, size_t triangle_count)
 static nebel_result tessellate(mesh *m, const nebel_triangles *given)
 {
     nebel_result result = nb_make_fog_bound(&m->allocator, m->snapshot, m->desc.eye, m->desc.channel, &m->bound);
-    if (result == NEBEL_ERROR_UNSUPPORTED)
-        return nb_fail(
-            &m->snapshot->log, result,
-            "tessellation: nothing is proven of soft edges of cylinders, cones, capsules and bodies of more "
-            "than 32 planes, nor of a volume that has, with those that exclude or replace its fog, more than "
-            "8 parts");
     if (result == NEBEL_OK) result = take(m, given);
     if (result == NEBEL_OK) result = refine(m);
     if (result == NEBEL_OK) result = finish(m, given->triangle_count);
