@@ -477,6 +477,16 @@ class RenderTest(PictureCase):
         self.assertEqual(len(set(pictures.values())), len(pictures))
         self.assert_misused(self.render("a.png", "--method", "exp", "--device", "gl"), "--method", "--device cpu")
 
+    def test_triangles_that_are_large_against_the_factor_are_told(self):
+        classic = {"start": 1, "end": 2, "color": 1}
+        for stage, method, note in (("vertex", "linear", r"up to [\d.]+ m long, where fog grows within 1 m"), ("pixel", "linear", None),
+                                    ("vertex", "exp", None)):
+            self.scene = self.write_scene("classic.json", [], models=[{"file": "triangle.obj"}],
+                                          classic={**classic, "stage": stage, "density": 1e-3}, camera={"position": [0, 0, 6]})
+            done = self.render("a.png", "--method", method)
+            self.assert_done(done)
+            self.assertNotIn("edges", done.err) if note is None else self.assertRegex(done.err, note)
+
     def test_tessellation(self):
         box = {"shape": {"type": "box", "min": [-9, -0.5, -9], "max": [9, 0.5, 9]}, "extinction": 0.3, "source": 1}
         self.scene = self.write_scene("box.json", [box], models=[{"file": "triangle.obj"}],

@@ -20,6 +20,7 @@
 #include "gl_painter.h"
 #endif
 
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -562,6 +563,26 @@ static int takes_factor(nebel_method method)
     return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
 }
 
+/* Over an edge as long as that the factor goes most of its way from 1 to 0, which no two vertices know of. */
+static double reach_of(nebel_method method, const nebel_factor_desc *factor)
+{
+    if (method != NEBEL_METHOD_LINEAR) return 1 / factor->density;
+    return factor->start < factor->end ? factor->end - factor->start : (double)INFINITY;
+}
+
+static void note_coarseness(const nebel_scene_data *scene, const settings *wanted)
+{
+    nebel_factor_desc factor;
+    if (wanted->quiet || !takes_factor(wanted->method) || scene->classic->stage != NEBEL_STAGE_VERTEX ||
+        nebel_resolve_factor(scene->classic, &factor) != NEBEL_OK)
+        return;
+    const double longest = nb_finer_find_longest_edge(scene), reach = reach_of(wanted->method, &factor);
+    if (longest <= reach) return;
+    nb_report_message("note: %s: the factor is computed at vertices, and edges are up to %.3g m long, where fog grows "
+                      "within %.3g m; \"stage\": \"pixel\" in \"classic\" computes it everywhere",
+                      wanted->scene, longest, reach);
+}
+
 static int choose_method(studio *all)
 {
     const settings *const wanted = all->wanted;
@@ -570,6 +591,7 @@ static int choose_method(studio *all)
         return nb_report_failure("render: %s: there is no section \"classic\" for --method %s; add one, or say "
                                  "--method exact",
                                  wanted->scene, nebel_method_word(wanted->method));
+    note_coarseness(scene, wanted);
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
     const nebel_result result = takes_cells(wanted->method)

@@ -1,5 +1,6 @@
 #include "finer.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -106,4 +107,26 @@ void nb_finer_free(nb_finer *finer)
     free(finer->made);
     free(finer->attributes);
     *finer = (nb_finer){.triangles = 0};
+}
+
+static double edge_of(const nebel_mesh *mesh, uint32_t a, uint32_t b)
+{
+    double square = 0;
+    for (size_t k = 0; k < 3; k++) {
+        const double way = (double)mesh->positions[3 * (size_t)b + k] - (double)mesh->positions[3 * (size_t)a + k];
+        square += way * way;
+    }
+    return sqrt(square);
+}
+
+double nb_finer_find_longest_edge(const nebel_scene_data *scene)
+{
+    double longest = 0;
+    for (size_t i = 0; i < scene->mesh_count; i++) {
+        const nebel_mesh *const mesh = &scene->meshes[i];
+        for (size_t t = 0; t < mesh->triangle_count; t++)
+            for (size_t k = 0; k < 3; k++)
+                longest = fmax(longest, edge_of(mesh, mesh->indices[3 * t + k], mesh->indices[3 * t + (k + 1) % 3]));
+    }
+    return longest;
 }

@@ -23,4 +23,7 @@ nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *
 size_t nb_finer_find_unproven(const nebel_scene *scene, double frame);
 void nb_finer_free(nb_finer *finer);
 
+/* m */
+double nb_finer_find_longest_edge(const nebel_scene_data *scene);
+
 #endif

@@ -6,8 +6,9 @@
  *
  *     nebel_gl_classic *classic = NULL;
  *     nebel_create_gl_classic(&(nebel_gl_classic_desc){.log = log}, &classic);    // in the engine's context
- *     method = nebel_gl_classic_method(classic);          // what this context can, where it lacks what was asked for
+ *     method = nebel_gl_classic_method(classic);          // TWO_PASS where the context lacks fog coordinates
  *
+ *     // The stream follows from the method: feed refuses another one.
  *     // FOG_COORD, one pass: the mesh as ever, within
  *     const nebel_vertex_output fog = {NEBEL_VERTEX_COORDINATE, &mesh[0].fog, sizeof *mesh};
  *     nebel_fog_vertices(snapshot, NULL, count, &points, &fog, 1);
@@ -16,7 +17,7 @@
  *     draw_mesh(mesh);
  *     nebel_gl_end_classic(classic);
  *
- *     // the others, two passes: the mesh as ever, and then its positions alone, within
+ *     // TWO_PASS, ADDITIVE: the mesh as ever, and then its positions alone, within
  *     const nebel_vertex_output fog = {NEBEL_VERTEX_RGBA8, &mesh[0].fog, sizeof *mesh};
  *     draw_mesh(mesh);
  *     nebel_gl_begin_classic(classic, NULL);
