@@ -77,6 +77,29 @@ class GlDeviceTest(PictureCase):
             self.assert_done(nebel("compare", "cpu.exr", "gl.exr", "-c", channel, "--fail-above", 1e-5, cwd=self.folder))
             self.assertEqual(nebel("compare", "exact.exr", "gl.exr", "-c", channel, "--fail-above", 1e-2, cwd=self.folder).returncode, 1)
 
+    # Reflectances are halves in OpenGL.
+    def assert_same_as_cpu(self, method, *words):
+        self.assert_done(self.render("cpu.exr", "--aov", "--samples", 1, "--method", method, *words))
+        self.assert_done(self.draw("gl.exr", "--aov", "--samples", 1, "--method", method, *words))
+        for channel, most in (("R", 2e-4), ("transmittance.G", 1e-5), ("in_scattering.B", 1e-5)):
+            self.assert_done(nebel("compare", "cpu.exr", "gl.exr", "-c", channel, "--fail-above", most, cwd=self.folder))
+
+    def write_classic(self, classic, **more):
+        camera = {"position": [0.4, 0.3, 3], "look_at": [0, 0, 0], **more}
+        self.scene = self.write_scene("classic.json", [FOG], models=[{"file": "triangle.obj"}], background=1, ambient=1,
+                                      classic=classic, camera=camera, sun={"direction": [0, 0, 1], "irradiance": 1})
+
+    def test_fog_factors(self):
+        for projection in ({}, {"projection": "panorama"}, {"projection": "orthographic", "view_height": 3}):
+            for coordinate in ("plane", "radial"):
+                for stage in ("vertex", "pixel"):
+                    self.write_classic({"start": 2.5, "end": 4, "density": 0.2, "color": [0.9, 0.5, 0.1], "coordinate": coordinate,
+                                        "stage": stage}, **projection)
+                    for method in ("linear", "exp", "exp2"):
+                        self.assert_same_as_cpu(method)
+        self.scene = self.write_scene("bare.json", [FOG])
+        self.assert_failed(self.draw("a.png", "--method", "exp"), "classic", "--method exp")
+
     def test_what_is_of_the_cpu_alone(self):
         for words in (("--threads", 2), ("--isa", "scalar"), ("--tolerance", 0.1)):
             self.assert_misused(self.draw("a.png", *words), words[0], "--device cpu")

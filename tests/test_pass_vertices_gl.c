@@ -358,6 +358,139 @@ static void test_cells_are_drawn_like_volumes(void **state)
     nebel_release_snapshot(fog);
 }
 
+/* ---- factors --------------------------------------------------------------------------------- */
+
+static nebel_result draw_factor(nebel_gl_renderer *renderer, const nebel_camera *camera, nebel_gl_method method,
+                                const nebel_factor_desc *factor, planes *p)
+{
+    const nebel_gl_frame_desc desc = {
+        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .method = method, .factor = factor};
+    const nebel_gl_planes wanted = {
+        .transmittance = p->transmittance[0], .in_scattering = p->in_scattering[0], .depth = p->depth};
+    const nebel_result result = nebel_gl_render_frame(renderer, &desc);
+    return result == NEBEL_OK ? nebel_gl_read_planes(renderer, &wanted) : result;
+}
+
+static double depth_of(const nebel_view *view, const double from_eye[3])
+{
+    double depth = 0;
+    for (int k = 0; k < 3; k++) depth -= from_eye[k] * view->eye_from_world[4 * k + 2];
+    return depth;
+}
+
+/* Written anew, of a place relative to the eye. */
+static double factor_of(nebel_gl_method method, const nebel_factor_desc *factor, const nebel_view *view,
+                        const double from_eye[3])
+{
+    const double radius = sqrt(from_eye[0] * from_eye[0] + from_eye[1] * from_eye[1] + from_eye[2] * from_eye[2]);
+    const double c = factor->coordinate == NEBEL_COORDINATE_RADIAL ? radius : fabs(depth_of(view, from_eye));
+    if (method == NEBEL_GL_METHOD_EXP) return exp(-factor->density * c);
+    if (method == NEBEL_GL_METHOD_EXP2) return exp(-factor->density * factor->density * c * c);
+    return fmin(fmax((factor->end - c) / (factor->end - factor->start), 0), 1);
+}
+
+static double factor_of_pixel(nebel_gl_method method, const nebel_factor_desc *factor, const nebel_view *view,
+                              int pixel, double distance)
+{
+    const line ray = line_of(view, pixel % WIDTH + .5, HEIGHT - 1 - pixel / WIDTH + .5);
+    double from_eye[3];
+    for (int k = 0; k < 3; k++) from_eye[k] = distance * (double)ray.direction[k];
+    return factor_of(method, factor, view, from_eye);
+}
+
+static void check_factor(nebel_gl_renderer *renderer, const floor_mesh *f, const nebel_camera *camera,
+                         nebel_gl_method method, const nebel_factor_desc *factor)
+{
+    static planes p;
+    nebel_view view;
+    float corners[3][4] = {{0}};
+    double lowest = 1, highest = 0;
+    assert_int_equal(nebel_gl_camera_view(camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
+    for (int i = 0; i < 3; i++) {
+        double from_eye[3];
+        for (int k = 0; k < 3; k++) from_eye[k] = middle[k] + (double)f->positions[i][k] - camera->position[k];
+        corners[i][3] = (float)(1 - factor_of(method, factor, &view, from_eye));
+    }
+    assert_int_equal(draw_factor(renderer, camera, method, factor, &p), NEBEL_OK);
+    for (int i = 0; i < PIXELS; i++) {
+        double wanted = 0, of_corners[4];
+        if (isfinite(p.depth[i])) {
+            interpolate(f, corners, &view, i, of_corners);
+            wanted = factor->stage == NEBEL_STAGE_VERTEX
+                         ? of_corners[3]
+                         : 1 - factor_of_pixel(method, factor, &view, i, (double)p.depth[i]);
+            lowest = fmin(lowest, wanted);
+            highest = fmax(highest, wanted);
+        }
+        for (int c = 0; c < 3; c++) {
+            assert_true(fabs((double)p.transmittance[i][c] - (1 - wanted)) < 2e-5);
+            assert_true(fabs((double)p.in_scattering[i][c] - wanted * factor->color[c]) < 2e-5);
+        }
+    }
+    assert_true(highest - lowest > .2);
+}
+
+static void test_factors(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    static planes p;
+    nb_gl context;
+    nebel_snapshot *const fog = commit_mist(); /* is not drawn */
+    const nebel_camera camera = camera_at(1, 1.5, 5);
+    const nebel_factor_desc user = {.coordinate = NEBEL_COORDINATE_USER}, bad = {.density = -1};
+    make_triangle(&f);
+    for (int language = 0; language < 2; language++) {
+        pass_open(&context, language == 0 ? NB_GL_330 : NB_GL_300ES);
+        const int objects = pass_count_objects();
+        nebel_gl_renderer *const renderer = create(&f, fog);
+        for (int way = 0; way < 12; way++) {
+            const nebel_factor_desc factor = {.coordinate = (nebel_factor_coordinate)(way & 1),
+                                              .stage = (nebel_factor_stage)(way >> 1 & 1),
+                                              .start = 4,
+                                              .end = 31,
+                                              .density = .03,
+                                              .color = {.9, .6, .3}};
+            check_factor(renderer, &f, &camera, (nebel_gl_method)(NEBEL_GL_METHOD_LINEAR + way / 4), &factor);
+        }
+        assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_EXP, NULL, &p), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_EXP, &user, &p), NEBEL_ERROR_ARGUMENT);
+        assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_EXP, &bad, &p), NEBEL_ERROR_VALUE);
+        nebel_destroy_gl_renderer(renderer);
+        assert_int_equal(pass_count_objects(), objects);
+        pass_close(&context);
+    }
+    nebel_release_snapshot(fog);
+}
+
+/* Start = end: all fog at vertices, a step at pixels. */
+static void test_start_is_end(void **state)
+{
+    (void)state;
+    static floor_mesh f;
+    static planes p;
+    nb_gl context;
+    const nebel_camera camera = camera_at(1, 1.5, 5);
+    nebel_factor_desc factor = {.coordinate = NEBEL_COORDINATE_RADIAL, .start = 15, .end = 15};
+    make_floor(&f, 1);
+    pass_open(&context, NB_GL_330);
+    nebel_gl_renderer *const renderer = create(&f, NULL);
+    for (int stage = 0; stage < 2; stage++) {
+        int clear = 0, hidden = 0;
+        factor.stage = (nebel_factor_stage)stage;
+        assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_LINEAR, &factor, &p), NEBEL_OK);
+        for (int i = 0; i < PIXELS; i++) {
+            const int is_clear = !isfinite(p.depth[i]) || (stage == 1 && p.depth[i] < 15);
+            assert_true(fabs((double)p.transmittance[i][1] - is_clear) < 1e-6);
+            clear += isfinite(p.depth[i]) && is_clear;
+            hidden += !is_clear;
+        }
+        assert_true(hidden > 50 && (clear > 50) == (stage == 1));
+    }
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -366,6 +499,8 @@ int main(void)
         cmocka_unit_test(test_additive_fog_hides_nothing),
         cmocka_unit_test(test_frames_do_not_depend_on_the_last),
         cmocka_unit_test(test_cells_are_drawn_like_volumes),
+        cmocka_unit_test(test_factors),
+        cmocka_unit_test(test_start_is_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -187,10 +187,15 @@ static void read_output(nb_arguments *arguments, settings *wanted)
     }
 }
 
+static int takes_factor(nebel_method method)
+{
+    return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
+}
+
 static int is_of_gl(nebel_method method)
 {
     return method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE ||
-           method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_FIVE_TAP;
+           method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_FIVE_TAP || takes_factor(method);
 }
 
 static void read_tessellate(nb_arguments *arguments, settings *wanted)
@@ -229,8 +234,7 @@ static void read_device(nb_arguments *arguments, settings *wanted)
         }
     }
     if (wanted->gl && !is_of_gl(wanted->method))
-        nb_options_reject(arguments, METHOD,
-                          "is for --device cpu; with gl there are exact, vertex, additive, cells, five-tap");
+        nb_options_reject(arguments, METHOD, "is for --device cpu; with gl there are all others");
     if (!wanted->gl && wanted->method == NEBEL_METHOD_FIVE_TAP)
         nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
     if (wanted->method != NEBEL_METHOD_EXACT && arguments->values[TOLERANCE] != NULL)
@@ -436,11 +440,13 @@ static nebel_result trace_frame(studio *all)
 #if defined(NEBEL_HAVE_GL)
 static nebel_gl_method gl_method(nebel_method method)
 {
-    return method == NEBEL_METHOD_FIVE_TAP   ? NEBEL_GL_METHOD_FIVE_TAP
-           : method == NEBEL_METHOD_VERTEX   ? NEBEL_GL_METHOD_VERTEX
-           : method == NEBEL_METHOD_ADDITIVE ? NEBEL_GL_METHOD_ADDITIVE
-           : method == NEBEL_METHOD_CELLS    ? NEBEL_GL_METHOD_CELLS
-                                             : NEBEL_GL_METHOD_EXACT;
+    static const nebel_gl_method methods[NEBEL_METHOD_COUNT] = {
+        [NEBEL_METHOD_EXACT] = NEBEL_GL_METHOD_EXACT,   [NEBEL_METHOD_FIVE_TAP] = NEBEL_GL_METHOD_FIVE_TAP,
+        [NEBEL_METHOD_VERTEX] = NEBEL_GL_METHOD_VERTEX, [NEBEL_METHOD_ADDITIVE] = NEBEL_GL_METHOD_ADDITIVE,
+        [NEBEL_METHOD_CELLS] = NEBEL_GL_METHOD_CELLS,   [NEBEL_METHOD_LINEAR] = NEBEL_GL_METHOD_LINEAR,
+        [NEBEL_METHOD_EXP] = NEBEL_GL_METHOD_EXP,       [NEBEL_METHOD_EXP2] = NEBEL_GL_METHOD_EXP2,
+    };
+    return methods[method];
 }
 
 static nebel_result draw_frame(studio *all)
@@ -454,6 +460,7 @@ static nebel_result draw_frame(studio *all)
         .progress_user = all,
         .method = gl_method(all->wanted->method),
         .cells = all->cells,
+        .factor = nebel_scene_contents(all->loaded.scene)->classic,
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[COLOR],
@@ -558,11 +565,6 @@ static int make_cells(studio *all)
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 
-static int takes_factor(nebel_method method)
-{
-    return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
-}
-
 /* Over an edge as long as that the factor goes most of its way from 1 to 0, which no two vertices know of. */
 static double reach_of(nebel_method method, const nebel_factor_desc *factor)
 {
@@ -583,7 +585,7 @@ static void note_coarseness(const nebel_scene_data *scene, const settings *wante
                       wanted->scene, longest, reach);
 }
 
-static int choose_method(studio *all)
+static int check_classic(const studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
@@ -592,6 +594,13 @@ static int choose_method(studio *all)
                                  "--method exact",
                                  wanted->scene, nebel_method_word(wanted->method));
     note_coarseness(scene, wanted);
+    return NB_DONE;
+}
+
+static int choose_method(studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
     const nebel_result result = takes_cells(wanted->method)
@@ -683,7 +692,8 @@ static int set_up(studio *all)
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
-    status = make_cells(all);
+    status = check_classic(all);
+    if (status == NB_DONE) status = make_cells(all);
     if (status == NB_DONE) status = allocate_planes(all);
     if (status != NB_DONE) return status;
     return wanted->gl ? open_gl(all) : open_renderer(all);

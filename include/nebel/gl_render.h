@@ -75,6 +75,10 @@ typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_ADDITIVE,  /* the same, but fog only adds its light, and transmittance is 1 */
     NEBEL_GL_METHOD_CELLS,     /* the same by nebel_fog_cells, in place of the renderer's fog, which still dims the sun:
                                   give it none where cells are all. Each ray of a panorama is its own axis of depth */
+    NEBEL_GL_METHOD_LINEAR,    /* a fog factor, at vertices or at each pixel, in place of the renderer's fog and
+                                  particles, which do not dim the sun either */
+    NEBEL_GL_METHOD_EXP,
+    NEBEL_GL_METHOD_EXP2,
     NEBEL_GL_METHOD_COUNT
 } nebel_gl_method;
 
@@ -99,16 +103,18 @@ typedef struct nebel_gl_frame_desc {
     int (*progress)(size_t done, size_t total, void *user); /* after each sample; nonzero stops the frame. NULL: none */
     void *progress_user;
     nebel_gl_method method;
-    const nebel_gl_taps *taps; /* of FIVE_TAP; NULL: nebel_gl_default_taps */
-    const nebel_cells *cells;  /* of CELLS */
-    int particles_leave_sun;   /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
+    const nebel_gl_taps *taps;       /* of FIVE_TAP; NULL: nebel_gl_default_taps */
+    const nebel_cells *cells;        /* of CELLS */
+    const nebel_factor_desc *factor; /* of LINEAR, EXP and EXP2, but for its mode; not COORDINATE_USER */
+    int particles_leave_sun; /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
                                   some microseconds each. Not where `fog` excludes, replaces or limits what particles
                                   do. Nonzero: sunlight passes particles by: for many of them and an eye that moves */
 } nebel_gl_frame_desc;
 
-/* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not), VALUE (a camera or
- * light as for nebel_render_frame; taps that are not finite or negative),
+/* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
+ * needs), VALUE (a camera or light as for nebel_render_frame; taps that are not finite or negative; a factor as for
+ * nebel_resolve_factor),
  * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (more than one
  * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
  * lost). The first panorama copies the triangles of all meshes: 108 bytes each, with fog per vertex 48 more. */

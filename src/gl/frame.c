@@ -20,12 +20,14 @@ typedef struct frame {
     nb_lighting light;
     double eye[3];
     int panorama;
-    nebel_view view;        /* through the pixels' centres; of a panorama without clip_from_eye */
-    nebel_view sample_view; /* through the places of the present sample */
-    nebel_rays rays;        /* of sample_view, or of the panorama */
-    nebel_view sun_view;    /* of all that is seen, against the sun's light */
-    int casts;              /* the sun shines, and there is something to cast shadows */
-    int dims;               /* particles dim the sun */
+    int has_factor;
+    nebel_factor_desc factor; /* of the methods that have one; resolved */
+    nebel_view view;          /* through the pixels' centres; of a panorama without clip_from_eye */
+    nebel_view sample_view;   /* through the places of the present sample */
+    nebel_rays rays;          /* of sample_view, or of the panorama */
+    nebel_view sun_view;      /* of all that is seen, against the sun's light */
+    int casts;                /* the sun shines, and there is something to cast shadows */
+    int dims;                 /* particles dim the sun */
 } frame;
 
 /* ---- checks ---------------------------------------------------------------------------------- */
@@ -78,10 +80,31 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
                    "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
 }
 
+static int takes_factor(nebel_gl_method method)
+{
+    return method == NEBEL_GL_METHOD_LINEAR || method == NEBEL_GL_METHOD_EXP || method == NEBEL_GL_METHOD_EXP2;
+}
+
 static int is_by_vertex(const frame *f)
 {
     return f->desc->method == NEBEL_GL_METHOD_VERTEX || f->desc->method == NEBEL_GL_METHOD_ADDITIVE ||
-           f->desc->method == NEBEL_GL_METHOD_CELLS;
+           f->desc->method == NEBEL_GL_METHOD_CELLS || (f->has_factor && f->factor.stage == NEBEL_STAGE_VERTEX);
+}
+
+static nebel_result set_factor(frame *f)
+{
+    const nebel_log *const log = &f->renderer->log;
+    const nebel_gl_method method = f->desc->method;
+    f->has_factor = takes_factor(method);
+    if (!f->has_factor) return NEBEL_OK;
+    if (f->desc->factor == NULL || f->desc->factor->coordinate == NEBEL_COORDINATE_USER)
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "frame: this method needs a factor, of depth or of distance");
+    f->factor = *f->desc->factor;
+    f->factor.mode = method == NEBEL_GL_METHOD_LINEAR ? NEBEL_FACTOR_LINEAR
+                     : method == NEBEL_GL_METHOD_EXP  ? NEBEL_FACTOR_EXP
+                                                      : NEBEL_FACTOR_EXP2;
+    const nebel_result result = nebel_resolve_factor(&f->factor, &f->factor);
+    return result == NEBEL_OK ? result : nb_fail(log, result, "frame: the fog factor is not valid");
 }
 
 static nebel_result set_frame(frame *f)
@@ -92,6 +115,7 @@ static nebel_result set_frame(frame *f)
     nebel_result result = check_size(r, desc);
     if (result == NEBEL_OK) result = check_samples(r, f->samples);
     if (result == NEBEL_OK) result = check_method(r, desc);
+    if (result == NEBEL_OK) result = set_factor(f);
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
@@ -197,8 +221,8 @@ static nebel_result set_eye_fog(const frame *f)
                        : nebel_gl_set_fog(r->eye_fog, r->fog, &f->view);
 }
 
-/* The fog that vertices bring. Particles ask for the fog before them as ever. */
-static nebel_result draw_vertex_fog(const frame *f)
+/* The fog that vertices bring. */
+static void draw_vertex_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     const unsigned program = f->panorama ? r->shading.round_vertex_fog : r->shading.vertex_fog;
@@ -209,7 +233,39 @@ static nebel_result draw_vertex_fog(const frame *f)
     glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method != NEBEL_GL_METHOD_ADDITIVE);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_meshes(f, program);
-    return r->particles.count > 0 && r->fog != NULL ? set_eye_fog(f) : NEBEL_OK;
+}
+
+/* Distance is depth where rays do not part. */
+static void set_axis(const frame *f, unsigned program)
+{
+    const double *const eye = f->view.eye_from_world;
+    const int parallel = f->view.clip_from_eye[15] != 0;
+    const int has_axis = !f->panorama && (parallel || f->factor.coordinate == NEBEL_COORDINATE_PLANE);
+    float axis[3];
+    for (int i = 0; i < 3; i++) axis[i] = has_axis ? (float)-eye[4 * i + 2] : 0;
+    set_vector(program, "scene_axis", axis);
+}
+
+static nebel_result draw_factor(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const nebel_result result = nb_shading_make_factor(&r->shading, &r->context, &r->log, f->panorama);
+    if (result != NEBEL_OK) return result;
+    const unsigned program = f->panorama ? r->shading.round_factor : r->shading.factor;
+    float color[3];
+    for (int i = 0; i < 3; i++) color[i] = (float)f->factor.color[i];
+    clear_fog();
+    glUseProgram(program);
+    set_rays(f, program);
+    set_axis(f, program);
+    glUniform1i(glGetUniformLocation(program, "factor_mode"), (GLint)f->factor.mode);
+    glUniform3f(glGetUniformLocation(program, "factor_range"), (float)f->factor.start, (float)f->factor.end,
+                (float)f->factor.density);
+    set_vector(program, "factor_color", color);
+    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    glBindVertexArray(r->vertex_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    return NEBEL_OK;
 }
 
 /* From the surfaces' distances. */
@@ -226,18 +282,35 @@ static nebel_result draw_exact_fog(const frame *f)
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
 }
 
+/* Cells and factors have no need of the renderer's fog. */
+static int has_fog(const frame *f)
+{
+    return f->renderer->fog != NULL || f->desc->method == NEBEL_GL_METHOD_CELLS || f->has_factor;
+}
+
+static int has_particles(const frame *f)
+{
+    return f->renderer->particles.count > 0 && !f->has_factor;
+}
+
+/* Particles ask for the renderer's fog before them whatever is on surfaces. */
 static nebel_result draw_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
-    if (r->fog == NULL && f->desc->method != NEBEL_GL_METHOD_CELLS) {
+    if (!has_fog(f)) {
         clear_fog();
         return NEBEL_OK;
     }
-    if (is_by_vertex(f)) return draw_vertex_fog(f);
-    const nebel_result result = set_eye_fog(f);
-    return result == NEBEL_OK ? draw_exact_fog(f) : result;
+    nebel_result result = NEBEL_OK;
+    if (is_by_vertex(f))
+        draw_vertex_fog(f);
+    else if (f->has_factor)
+        result = draw_factor(f);
+    const int is_exact = !is_by_vertex(f) && !f->has_factor;
+    if (result == NEBEL_OK && r->fog != NULL && (is_exact || has_particles(f))) result = set_eye_fog(f);
+    return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
 
 /* ---- particles ------------------------------------------------------------------------------- */
@@ -327,7 +400,7 @@ static nebel_result draw_particles(const frame *f)
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    if (r->particles.count == 0) return NEBEL_OK;
+    if (!has_particles(f)) return NEBEL_OK;
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
     const nb_light_kind kind = {.of_particles = r->particles.profiles,
                                 .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP};
@@ -373,7 +446,7 @@ static void set_sun_view(frame *f)
 static nebel_result set_sun_fog(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    if (r->fog == NULL || !(r->shadows.seen_low[0] < r->shadows.seen_high[0])) return NEBEL_OK;
+    if (r->fog == NULL || f->has_factor || !(r->shadows.seen_low[0] < r->shadows.seen_high[0])) return NEBEL_OK;
     set_sun_view(f);
     return nebel_gl_set_fog(r->sun_fog, r->fog, &f->sun_view);
 }
@@ -383,7 +456,7 @@ static nebel_result set_sun_cloud(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nebel_result result = NEBEL_OK;
-    f->dims = !f->desc->particles_leave_sun && r->particles.count > 0;
+    f->dims = !f->desc->particles_leave_sun && has_particles(f);
     if (!f->dims) return NEBEL_OK;
     if (r->cloud == NULL) result = nb_particles_commit(&r->particles, &r->allocator, &r->log, &r->cloud);
     if (result != NEBEL_OK) return result;
@@ -498,7 +571,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    const nebel_gl *const passes = f->casts && r->fog != NULL ? r->sun_fog : NULL;
+    const nebel_gl *const passes = f->casts && r->fog != NULL && !f->has_factor ? r->sun_fog : NULL;
     const nebel_result result = find_light(f, passes, (nb_light_kind){.dimmed = f->dims}, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
@@ -553,7 +626,7 @@ static nebel_result sort_particles(const frame *f)
 
 static int has_vertex_fog(const frame *f)
 {
-    return is_by_vertex(f) && (f->renderer->fog != NULL || f->desc->method == NEBEL_GL_METHOD_CELLS);
+    return is_by_vertex(f) && has_fog(f);
 }
 
 static nebel_result prepare_vertices(const frame *f)
@@ -562,6 +635,7 @@ static nebel_result prepare_vertices(const frame *f)
     const int by_cells = f->desc->method == NEBEL_GL_METHOD_CELLS;
     nb_vertex_source source = {.fog = r->fog,
                                .cells = by_cells ? f->desc->cells : NULL,
+                               .factor = f->has_factor ? &f->factor : NULL,
                                .view = {.ignore_walls = 1},
                                .projection = f->desc->camera.projection};
     if (!has_vertex_fog(f)) return NEBEL_OK;

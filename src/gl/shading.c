@@ -131,6 +131,36 @@ static const char vertex_fog_fragment_text[] =
     "    out_transmittance = vec4(vec3(1.0 - scene_weakening * surface_fog.a), 1.0);\n"
     "}\n";
 
+/* ---- fog factors ----------------------------------------------------------------------------- */
+
+/* As src/classic/factors.c has them for the stage of pixels. Depth is along the camera's axis; the axis is 0 where the
+ * distance counts. */
+static const char factor_text[] =
+    "uniform highp sampler2D scene_place;\n"
+    "uniform vec3 scene_axis;\n"
+    "uniform int factor_mode;\n"   /* nebel_factor_mode */
+    "uniform vec3 factor_range;\n" /* start, end, density */
+    "uniform vec3 factor_color;\n"
+    "layout(location = 0) out highp vec4 out_in_scattering;\n"
+    "layout(location = 1) out highp vec4 out_transmittance;\n"
+    "float fog_factor(float c)\n"
+    "{\n"
+    "    float x = factor_range.z * c;\n"
+    "    if (factor_mode == 0) return exp(-x);\n"
+    "    if (factor_mode == 1) return exp(-x * x);\n"
+    "    if (factor_range.x == factor_range.y) return c < factor_range.x ? 1.0 : 0.0;\n"
+    "    return clamp((factor_range.y - c) / (factor_range.y - factor_range.x), 0.0, 1.0);\n"
+    "}\n"
+    "void main()\n"
+    "{\n"
+    "    float t = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
+    "    if (!(t > 0.0)) discard;\n"
+    "    vec3 at = ray_origin(gl_FragCoord.xy) + t * ray_direction(gl_FragCoord.xy);\n"
+    "    float f = fog_factor(scene_axis == vec3(0.0) ? length(at) : abs(dot(at, scene_axis)));\n"
+    "    out_in_scattering = vec4((1.0 - f) * factor_color, 1.0);\n"
+    "    out_transmittance = vec4(vec3(f), 1.0);\n"
+    "}\n";
+
 /* ---- surfaces of panoramas
  * ------------------------------------------------------------------------------------------- Triangles are boxes here,
  * and fragments ask whether their rays hit. Edges count from the nearer of their ends, which neighbours choose alike:
@@ -591,6 +621,20 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     return NEBEL_OK;
 }
 
+nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
+{
+    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : ray_text;
+    const nb_texts vertex = {{version, light_vertex_text}, 2};
+    const nb_texts fragment = {{version, precision_of(context), words_text, ray, factor_text}, 5};
+    unsigned *const name = panorama ? &shading->round_factor : &shading->factor;
+    if (*name != 0) return NEBEL_OK;
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
+    if (result != NEBEL_OK) return result;
+    glUseProgram(*name);
+    set_unit(*name, "scene_place", NB_UNIT_PLACE);
+    return NEBEL_OK;
+}
+
 /* A program of panoramas' surfaces; what it looks up is on `unit`. */
 static nebel_result make_round(const nb_context *context, const nebel_log *log, const char *option,
                                const char *fragment_text, const char *sampler, int unit, unsigned *name)
@@ -709,5 +753,7 @@ void nb_shading_delete(const nb_shading *shading)
     glDeleteProgram(shading->vertex_fog);
     glDeleteProgram(shading->round_surface);
     glDeleteProgram(shading->round_vertex_fog);
+    glDeleteProgram(shading->factor);
+    glDeleteProgram(shading->round_factor);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

@@ -39,6 +39,7 @@ typedef struct nb_light_program {
 typedef struct nb_shading {
     unsigned surface, survey, shadow;
     unsigned vertex_fog, round_surface, round_vertex_fog; /* 0 until they are needed; round: of panoramas */
+    unsigned factor, round_factor;
     nb_light_program *lights;
     size_t light_count, light_capacity;
 } nb_shading;
@@ -51,6 +52,9 @@ nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *contex
 
 /* Fog that vertices bring, over the surfaces that are seen. */
 nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log);
+
+/* Fog factors of pixels. */
+nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama);
 
 /* Surfaces of panoramas, and the fog that vertices bring to them. */
 nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog);

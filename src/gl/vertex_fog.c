@@ -3,6 +3,7 @@
 #include <nebel/classic.h>
 
 #include <epoxy/gl.h>
+#include <math.h>
 
 enum { FOG_SIZE = 4 * sizeof(float) };
 
@@ -62,6 +63,27 @@ static nebel_result fog_by_cells(const nb_vertex_source *source, size_t count, c
     return result;
 }
 
+/* What counts of a place in eye coordinates is its depth and its distance. */
+static void fog_by_factor(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices, float (*out)[4])
+{
+    const nebel_factor_desc *const factor = source->factor;
+    for (size_t v = 0; v < count; v++) {
+        double place[3], length2 = 0, depth = 0;
+        find_place(vertices, v, place);
+        const nebel_cell_view view = view_towards(source, place);
+        for (int i = 0; i < 3; i++) {
+            const double way = place[i] - view.eye[i];
+            length2 += way * way;
+            depth += way * source->view.forward[i];
+        }
+        if (source->projection == NEBEL_PROJECTION_PANORAMA) depth = sqrt(length2);
+        const double seen[3] = {sqrt(fmax(length2 - depth * depth, 0)), 0, depth};
+        const double amount = 1 - nebel_compute_fog_factor(factor, nebel_compute_fog_coordinate(factor, seen, 0));
+        for (int i = 0; i < 3; i++) out[v][i] = (float)(amount * factor->color[i]);
+        out[v][3] = (float)amount;
+    }
+}
+
 static nebel_result fog_by_parallel_rays(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
                                          float (*out)[4])
 {
@@ -84,6 +106,10 @@ static nebel_result fog_vertices(const nb_vertex_source *source, size_t count, c
 {
     const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out, 0};
     if (source->cells != NULL) return fog_by_cells(source, count, vertices, out);
+    if (source->factor != NULL) {
+        fog_by_factor(source, count, vertices, out);
+        return NEBEL_OK;
+    }
     if (source->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) return fog_by_parallel_rays(source, count, vertices, out);
     return nebel_fog_vertices(source->fog, NULL, count, vertices, &output, 1);
 }

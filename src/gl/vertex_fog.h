@@ -4,12 +4,13 @@
 
 #include "meshes.h"
 
-/* What fogs the vertices: volumes, or cells in their place. Rays of an orthographic camera begin in the plane across
+/* What fogs the vertices: volumes, or cells or a fog factor in their place. Rays of an orthographic camera begin in the plane across
  * them through the eye; each ray of a panorama is its own axis. */
 typedef struct nb_vertex_source {
     const nebel_snapshot *fog;
-    const nebel_cells *cells; /* NULL: none */
-    nebel_cell_view view;     /* of unit forward */
+    const nebel_cells *cells;        /* NULL: none */
+    const nebel_factor_desc *factor; /* resolved; NULL: none */
+    nebel_cell_view view;            /* of unit forward */
     nebel_projection projection;
 } nb_vertex_source;
 

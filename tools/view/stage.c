@@ -111,6 +111,12 @@ static nebel_gl_method find_method(const nb_look *look)
     switch (look->method) {
     case NEBEL_METHOD_CELLS:
         return NEBEL_GL_METHOD_CELLS;
+    case NEBEL_METHOD_LINEAR:
+        return NEBEL_GL_METHOD_LINEAR;
+    case NEBEL_METHOD_EXP:
+        return NEBEL_GL_METHOD_EXP;
+    case NEBEL_METHOD_EXP2:
+        return NEBEL_GL_METHOD_EXP2;
     case NEBEL_METHOD_VERTEX:
         return NEBEL_GL_METHOD_VERTEX;
     case NEBEL_METHOD_ADDITIVE:
@@ -130,7 +136,8 @@ static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t w
                                 .samples = samples,
                                 .particles_leave_sun = quick,
                                 .method = find_method(look),
-                                .cells = stage->cells};
+                                .cells = stage->cells,
+                                .factor = stage->factor};
     if (samples > 1) {
         desc.progress = stop;
         desc.progress_user = stage;

@@ -23,6 +23,7 @@ typedef struct nb_stage {
     double seconds;                           /* of the last frame that was finished */
     uint32_t samples;                         /* of that frame */
     const nebel_cells *cells;                 /* of the method of that name */
+    const nebel_factor_desc *factor;          /* of the methods that have one */
     int was_quick;                            /* the last frame did without what takes long for a new eye */
     int was_stopped;                          /* the fine picture was given up */
     int (*is_needed)(void *user);             /* nonzero: something happens, give up the fine picture */

@@ -188,11 +188,6 @@ static int has_factor(nebel_method method)
     return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
 }
 
-static int is_of_cpu(nebel_method method)
-{
-    return has_factor(method) || method == NEBEL_METHOD_CELLS_PIXEL;
-}
-
 /* A method whose section has gone is none any longer. */
 static void check_method(viewer *all)
 {
@@ -205,7 +200,7 @@ static void check_method(viewer *all)
 /* What OpenGL does not draw. */
 static const char *explain_method(const viewer *all)
 {
-    if (is_of_cpu(all->look.method)) return "drawn by the CPU alone";
+    if (all->look.method == NEBEL_METHOD_CELLS_PIXEL) return "drawn by the CPU alone";
     return nb_draft_is_sunlit(&all->draft) ? "drawn by the CPU alone: sunlit fog" : "";
 }
 
@@ -613,6 +608,7 @@ static nebel_result draw(viewer *all)
     nb_window *const window = &all->window;
     const nb_look look = shown_look(all);
     all->stage.cells = all->draft.cells;
+    all->stage.factor = &all->draft.good.classic;
     const nebel_result result =
         nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
     if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
