@@ -475,7 +475,7 @@ class RenderTest(PictureCase):
             pictures[method] = (self.folder / "a.exr").read_bytes()
             self.assertEqual(b"error\0" in pictures[method], method == "exact")
         self.assertEqual(len(set(pictures.values())), len(pictures))
-        self.assert_misused(self.render("a.png", "--method", "exp", "--device", "gl"), "--method", "--device cpu")
+        self.assert_misused(self.render("a.png", "--method", "cells-pixel", "--device", "gl"), "--method", "--device cpu")
 
     def test_triangles_that_are_large_against_the_factor_are_told(self):
         classic = {"start": 1, "end": 2, "color": 1}

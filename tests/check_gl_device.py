@@ -100,6 +100,16 @@ class GlDeviceTest(PictureCase):
         self.scene = self.write_scene("bare.json", [FOG])
         self.assert_failed(self.draw("a.png", "--method", "exp"), "classic", "--method exp")
 
+    def test_tessellation(self):
+        box = {"shape": {"type": "box", "min": [-9, -0.5, -9], "max": [9, 0.5, 9]}, "extinction": 0.3, "source": 1}
+        self.scene = self.write_scene("box.json", [box], models=[{"file": "triangle.obj"}], background=1, ambient=1,
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        self.assert_done(self.draw("coarse.exr", "--samples", 1, "--method", "vertex"))
+        for method in ("vertex", "additive"):
+            self.assert_same_as_cpu(method, "--tessellate", 0.004)
+        self.assertIn("triangles became", self.draw("gl.exr", "--samples", 1, "--method", "vertex", "--tessellate", 0.004).err)
+        self.assertEqual(nebel("compare", "coarse.exr", "gl.exr", "--fail-above", 1e-3, cwd=self.folder).returncode, 1)
+
     def test_what_is_of_the_cpu_alone(self):
         for words in (("--threads", 2), ("--isa", "scalar"), ("--tolerance", 0.1)):
             self.assert_misused(self.draw("a.png", *words), words[0], "--device cpu")

@@ -69,8 +69,8 @@ static const nb_option options[] = {
          "or "
          "pixels. five-tap, of --device gl:\nparticles meet surfaces by five depths."},
     [TESSELLATE] = {"tessellate", 0, "E",
-                    "With --method vertex or additive of the CPU: smaller\ntriangles, until the fog's factor is "
-                    "within E of the\nexact one for the camera, 1e-6 < E <= 1."},
+                    "With --method vertex or additive: smaller triangles,\nuntil the fog's factor is within E of the "
+                    "exact one\nfor the camera, 1e-6 < E <= 1."},
     [TESSELLATE_TRIANGLES] = {"tessellate-triangles", 0, "N",
                               "No triangle of a model that has come to so many is\nhalved for its error, up to 10^9. "
                               "Default: 262144."},
@@ -213,9 +213,8 @@ static void read_tessellate(nb_arguments *arguments, settings *wanted)
     desc->bound = nb_options_number(arguments, TESSELLATE, 0, 1, 1);
     if (desc->bound <= LEAST_TESSELLATION)
         nb_options_reject(arguments, TESSELLATE, "is not more than 1e-6, which rounding may take");
-    if (wanted->gl || (wanted->method != NEBEL_METHOD_VERTEX && wanted->method != NEBEL_METHOD_ADDITIVE))
-        nb_options_refuse(arguments, TESSELLATE,
-                          "needs --method vertex or additive, and --device cpu; say so, or leave it out");
+    if (wanted->method != NEBEL_METHOD_VERTEX && wanted->method != NEBEL_METHOD_ADDITIVE)
+        nb_options_refuse(arguments, TESSELLATE, "needs --method vertex or additive; say so, or leave it out");
     if (wanted->many_frames)
         nb_options_refuse(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
 }
@@ -362,11 +361,11 @@ static void free_studio(studio *all)
     for (int i = 0; i < PLANES; i++) free(all->samples[i]);
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
-    nb_finer_free(&all->finer);
     nebel_destroy_cells(all->cells);
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter_close(&all->painter);
 #endif
+    nb_finer_free(&all->finer);
     nb_load_free(&all->loaded);
 }
 
@@ -437,6 +436,11 @@ static nebel_result trace_frame(studio *all)
     return result == NEBEL_OK ? nebel_render_frame(all->renderer, &desc, &frame) : result;
 }
 
+static const nebel_scene_data *surfaces_of(const studio *all)
+{
+    return all->wanted->tessellation.bound > 0 ? &all->finer.data : nebel_scene_contents(all->loaded.scene);
+}
+
 #if defined(NEBEL_HAVE_GL)
 static nebel_gl_method gl_method(nebel_method method)
 {
@@ -475,7 +479,7 @@ static nebel_result draw_frame(studio *all)
 static int open_gl(studio *all)
 {
     const settings *const wanted = all->wanted;
-    const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, &all->listener);
+    const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, surfaces_of(all), &all->listener);
     if (status != NB_DONE || wanted->quiet) return status;
     nb_report_message("note: --device gl: %s", all->painter.context.renderer);
     if (wanted->aov) nb_report_message("note: --device gl: there is no channel error; OpenGL knows no bound of it");
@@ -641,6 +645,7 @@ static int refuse_tessellation(const studio *all)
 static int tessellate(studio *all)
 {
     const settings *const wanted = all->wanted;
+    if (wanted->tessellation.bound == 0) return NB_DONE;
     const nebel_camera camera = nebel_scene_camera(all->loaded.scene, wanted->first_frame);
     nebel_tessellation_desc desc = wanted->tessellation;
     for (int i = 0; i < 3; i++) desc.eye[i] = camera.position[i];
@@ -660,11 +665,7 @@ static int open_renderer(studio *all)
 {
     nebel_renderer_desc desc = all->wanted->renderer;
     desc.log = nb_report_log(&all->listener);
-    const int is_finer = all->wanted->tessellation.bound > 0;
-    const int status = is_finer ? tessellate(all) : NB_DONE;
-    if (status != NB_DONE) return status;
-    const nebel_scene_data *const scene = is_finer ? &all->finer.data : nebel_scene_contents(all->loaded.scene);
-    const nebel_result result = nebel_create_renderer(scene, all->loaded.fog, &desc, &all->renderer);
+    const nebel_result result = nebel_create_renderer(surfaces_of(all), all->loaded.fog, &desc, &all->renderer);
     return result == NEBEL_OK ? choose_method(all) : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
@@ -694,6 +695,7 @@ static int set_up(studio *all)
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
     status = check_classic(all);
     if (status == NB_DONE) status = make_cells(all);
+    if (status == NB_DONE) status = tessellate(all);
     if (status == NB_DONE) status = allocate_planes(all);
     if (status != NB_DONE) return status;
     return wanted->gl ? open_gl(all) : open_renderer(all);

@@ -13,15 +13,14 @@ static nebel_result set_particles(const nb_gl_painter *painter)
 }
 
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
-                       nb_report_listener *listener)
+                       const nebel_scene_data *scene, nb_report_listener *listener)
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
     *painter = (nb_gl_painter){.loaded = loaded};
     if (nb_gl_context_open_any(&painter->context) != 0) {
         return nb_report_failure("render: --device gl: %s; or say --device cpu", painter->context.fault);
     }
-    nebel_result result =
-        nebel_create_gl_renderer(nebel_scene_contents(loaded->scene), NULL, &desc, &painter->renderer);
+    nebel_result result = nebel_create_gl_renderer(scene, NULL, &desc, &painter->renderer);
     if (result == NEBEL_OK) result = set_particles(painter);
     if (result == NEBEL_OK) return NB_DONE;
     nebel_destroy_gl_renderer(painter->renderer);

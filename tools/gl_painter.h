@@ -13,10 +13,11 @@ typedef struct nb_gl_painter {
     const nb_load_result *loaded;
 } nb_gl_painter;
 
-/* Opens a context, of OpenGL ES where there is no OpenGL, and hands it the scene. NB_DONE; or NB_FAILED, said on
- * standard error, with nothing to close. `loaded` must outlive the painter. */
+/* Opens a context, of OpenGL ES where there is no OpenGL, and hands it `scene`: what is loaded, or the same in smaller
+ * triangles. NB_DONE; or NB_FAILED, said on standard error, with nothing to close. `loaded` and `scene` must outlive the
+ * painter. */
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
-                       nb_report_listener *listener);
+                       const nebel_scene_data *scene, nb_report_listener *listener);
 
 /* Draws a frame with the fog that is loaded for it, and reads its planes. Returns a result; the log has said why. */
 nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebel_gl_frame_desc *desc,
