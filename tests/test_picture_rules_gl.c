@@ -66,6 +66,26 @@ static void test_light_is_that_of_the_cpu(void **state)
     }
 }
 
+/* Also where the sun is behind the triangle, but not behind the normal; a panorama has triangles of its own. */
+static void test_light_fades_evenly_on_a_coarse_column(void **state)
+{
+    (void)state;
+    static test_barrel barrel;
+    static const nebel_projection looks[] = {NEBEL_PROJECTION_PERSPECTIVE, NEBEL_PROJECTION_PANORAMA};
+    test_barrel_make(&barrel);
+    for (int i = 0; i < 2; i++) {
+        nb_gl context;
+        nebel_camera camera = test_camera(.5, .3, 3, 0, 0, 0);
+        picture_pair pair = picture_make(WIDTH, HEIGHT);
+        camera.projection = looks[i];
+        pass_open(&context, languages[i]);
+        picture_render(&barrel.scene, NULL, &camera, 1, &pair);
+        pass_close(&context);
+        assert_true(test_barrel_error(&barrel, pair.gl.color, pair.gl.normal, (size_t)WIDTH * HEIGHT) < 1e-3);
+        picture_free(&pair);
+    }
+}
+
 /* A few balls of every profile beside fog and over a floor, which some reach into; one holds the eye. They do not
  * overlap. */
 static void make_particles(nebel_particle particles[9], nebel_volume_desc volumes[11], int grey)
@@ -339,6 +359,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_light_is_that_of_the_cpu),
+        cmocka_unit_test(test_light_fades_evenly_on_a_coarse_column),
         cmocka_unit_test(test_particles_are_fog),
         cmocka_unit_test(test_particles_dim_the_sun),
         cmocka_unit_test(test_samples_smooth_edges),

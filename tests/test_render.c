@@ -167,6 +167,22 @@ static void test_smooth_normals_are_interpolated(void **state)
     test_picture_free(&picture);
 }
 
+/* Also where the sun is behind the triangle, but not behind the normal; from outside, and inside no normal is lit but by
+ * what comes over the rim. */
+static void test_light_fades_evenly_on_a_coarse_column(void **state)
+{
+    (void)state;
+    static test_barrel barrel;
+    test_barrel_make(&barrel);
+    test_picture picture = test_picture_make(96, 64);
+    const nebel_camera outside = test_camera(.5, .3, 3, 0, 0, 0), inside = test_camera(0, 0, 0, -1, 0, 0);
+    test_render(&barrel.scene, NULL, &plain, &outside, 1, &picture);
+    assert_true(test_barrel_error(&barrel, picture.planes.color, picture.planes.normal, 96 * 64) < 1e-6);
+    test_render(&barrel.scene, NULL, &plain, &inside, 1, &picture);
+    for (size_t i = 0; i < 96 * 64 * 3; i++) assert_float_equal(picture.planes.color[i], 0, 0);
+    test_picture_free(&picture);
+}
+
 static void test_textures_are_linear_bilinear_and_repeat(void **state)
 {
     (void)state;
@@ -607,6 +623,7 @@ int main(void)
         cmocka_unit_test(test_shadow_leaves_the_ambient_light),
         cmocka_unit_test(test_surfaces_have_two_sides),
         cmocka_unit_test(test_smooth_normals_are_interpolated),
+        cmocka_unit_test(test_light_fades_evenly_on_a_coarse_column),
         cmocka_unit_test(test_textures_are_linear_bilinear_and_repeat),
         cmocka_unit_test(test_same_segment_same_light_for_every_camera),
         cmocka_unit_test(test_pixels_look_where_they_should),

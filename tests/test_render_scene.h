@@ -108,6 +108,59 @@ static inline nebel_mesh test_square(void)
                         .texture = -1};
 }
 
+/* ---- barrel ---------------------------------------------------------------------------------- */
+
+/* A round column around the y axis, of radius 1 and without ends, of few sides: normals make it round. */
+enum { TEST_BARREL_SIDES = 8, TEST_BARREL_VERTICES = 2 * TEST_BARREL_SIDES };
+
+typedef struct test_barrel {
+    float positions[TEST_BARREL_VERTICES][3], normals[TEST_BARREL_VERTICES][3];
+    uint32_t indices[TEST_BARREL_SIDES][6];
+    nebel_mesh mesh;
+    nebel_scene_data scene; /* under a sun that stands above a face's edge */
+} test_barrel;
+
+static inline void test_barrel_make(test_barrel *b)
+{
+    for (int i = 0; i < TEST_BARREL_VERTICES; i++) {
+        const double angle = 2 * test_pi * (i / 2) / TEST_BARREL_SIDES;
+        const float x = (float)cos(angle), z = (float)sin(angle);
+        memcpy(b->normals[i], (const float[3]){x, 0, z}, sizeof b->normals[i]);
+        memcpy(b->positions[i], (const float[3]){x, i % 2 ? 2 : -2, z}, sizeof b->positions[i]);
+    }
+    for (uint32_t i = 0; i < TEST_BARREL_SIDES; i++) {
+        const uint32_t a = 2 * i, c = (2 * i + 2) % TEST_BARREL_VERTICES;
+        memcpy(b->indices[i], (const uint32_t[6]){a, a + 1, c, c, a + 1, c + 1}, sizeof b->indices[i]);
+    }
+    b->mesh = (nebel_mesh){.positions = b->positions[0],
+                           .normals = b->normals[0],
+                           .indices = b->indices[0],
+                           .vertex_count = TEST_BARREL_VERTICES,
+                           .triangle_count = 2 * TEST_BARREL_SIDES,
+                           .base_color = {.5f, .25f, .75f},
+                           .texture = -1};
+    b->scene = (nebel_scene_data){.mesh_count = 1,
+                                  .meshes = &b->mesh,
+                                  .has_sun = 1,
+                                  .sun_direction = {cos(.3), 0, -sin(.3)},
+                                  .sun_irradiance = {3, 3, 3}};
+}
+
+/* The largest difference from Lambert's law for the shading normals of a picture of the barrel. */
+static inline double test_barrel_error(const test_barrel *b, const float *color, const float *normal, size_t pixels)
+{
+    double most = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        double cosine = 0;
+        for (size_t k = 0; k < 3; k++) cosine += (double)normal[3 * i + k] * b->scene.sun_direction[k];
+        for (size_t k = 0; k < 3; k++) {
+            const double light = (double)b->mesh.base_color[k] * b->scene.sun_irradiance[k] / test_pi * fmax(cosine, 0);
+            most = fmax(most, fabs((double)color[3 * i + k] - light));
+        }
+    }
+    return most;
+}
+
 /* ---- ground ---------------------------------------------------------------------------------- */
 
 /* A square of 10 m in y = 0, its vertices far apart. Its diagonal goes from (-5, -5) to (5, 5). */

@@ -75,14 +75,25 @@ NB_CLONES static void set_sides(const nb_rays *rays, const nb_hits *hits, nb_poi
     }
 }
 
+/* Three numbers of each corner of a triangle. */
+typedef struct nb_corners {
+    const float *at[3];
+} nb_corners;
+
+static nb_corners corners_of(const nebel_mesh *mesh, const float *numbers, uint32_t triangle)
+{
+    const uint32_t *index = mesh->indices + 3 * (size_t)triangle;
+    return (nb_corners){
+        {numbers + 3 * (size_t)index[0], numbers + 3 * (size_t)index[1], numbers + 3 * (size_t)index[2]}};
+}
+
 static void set_smooth_normal(const nebel_mesh *mesh, const nb_hits *hits, int i, nb_points *points)
 {
-    const uint32_t *index = mesh->indices + 3 * (size_t)hits->triangle[i];
-    const float *a = mesh->normals + 3 * (size_t)index[0];
-    const float *b = mesh->normals + 3 * (size_t)index[1];
-    const float *c = mesh->normals + 3 * (size_t)index[2];
+    const nb_corners normal = corners_of(mesh, mesh->normals, hits->triangle[i]);
     const float u = hits->u[i], v = hits->v[i], w = 1 - u - v;
-    for (int k = 0; k < 3; k++) points->normal[k][i] = w * a[k] + u * b[k] + v * c[k];
+    for (int k = 0; k < 3; k++) {
+        points->normal[k][i] = w * normal.at[0][k] + u * normal.at[1][k] + v * normal.at[2][k];
+    }
 }
 
 static void multiply_texture(const nebel_texture *texture, const nb_srgb_table *table, const nebel_mesh *mesh,
@@ -115,7 +126,8 @@ static void fetch(const nb_geometry *geometry, const nebel_scene_data *scene, co
     }
 }
 
-/* Unit length, on the side of the camera; the triangle's own where the interpolated normal is none. */
+/* Unit length, on the side of the camera; the triangle's own where the interpolated normal is none. The interpolated
+ * one alone says whether a surface faces the sun: its triangles would leave a hard line along their edges. */
 NB_CLONES static void finish_normals(const float *restrict sun, nb_points *points)
 {
     const float sun_x = sun[0], sun_y = sun[1], sun_z = sun[2];
@@ -133,7 +145,46 @@ NB_CLONES static void finish_normals(const float *restrict sun, nb_points *point
         points->normal[2][i] = nz;
         points->cosine[i] = cosine;
         const float above = sx * sun_x + sy * sun_y + sz * sun_z;
-        points->lit[i] = -((cosine > 0) & (above > 0));
+        points->lit[i] = -(cosine > 0);
+        points->away[i] = -((cosine > 0) & !(above > 0));
+        points->rise[i] = 0;
+    }
+}
+
+/* How far the round surface that the normals stand for lies above its triangle: the heights of the corners' tangent
+ * planes, in the mean that interpolates the corners. With P = sum w_i V_i that is
+ *     sum w_i (V_i - P) . N_i = sum over edges w_i w_j (V_i - V_j) . (N_i - N_j).
+ * After Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, whose heights are bounded one by one. */
+static float height_of_tangents(const nebel_mesh *mesh, const nb_hits *hits, int i)
+{
+    const nb_corners place = corners_of(mesh, mesh->positions, hits->triangle[i]);
+    const nb_corners normal = corners_of(mesh, mesh->normals, hits->triangle[i]);
+    const float u = hits->u[i], v = hits->v[i], weight[3] = {1 - u - v, u, v};
+    float height = 0;
+    for (int a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3;
+        float bend = 0;
+        for (int k = 0; k < 3; k++) {
+            bend += (place.at[a][k] - place.at[b][k]) * (normal.at[a][k] - normal.at[b][k]);
+        }
+        height += weight[a] * weight[b] * bend;
+    }
+    return height;
+}
+
+/* Triangles that face away from the sun where their normals do not would shade themselves: shadow rays start on the
+ * round surface there. Hollow ones do shade themselves. */
+static void set_rises(const nb_geometry *geometry, const nb_hits *hits, nb_points *points)
+{
+    for (int i = 0; i < NB_BATCH; i++) {
+        if (!points->away[i] || hits->surface[i] == NB_NONE) continue;
+        const nebel_mesh *mesh = geometry->surfaces[hits->surface[i]].mesh;
+        if (mesh->normals == NULL) continue;
+        const float *given = corners_of(mesh, mesh->normals, hits->triangle[i]).at[0];
+        const float turn =
+            given[0] * points->normal[0][i] + given[1] * points->normal[1][i] + given[2] * points->normal[2][i];
+        const float height = height_of_tangents(mesh, hits, i);
+        points->rise[i] = fmaxf(turn < 0 ? -height : height, 0);
     }
 }
 
@@ -150,11 +201,14 @@ NB_CLONES static void lift(const nb_rays *rays, const nb_hits *hits, nb_points *
         const float z = rays->start[2][i] + t * rays->unit[2][i];
         const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
         const float axy = ax > ay ? ax : ay, largest = axy > az ? axy : az;
-        const float height = 0x1p-20f * (t + largest + points->edge[i]);
+        const float height = 0x1p-20f * (t + largest + points->edge[i]), rise = points->rise[i];
+        const float px = x + rise * points->normal[0][i] + height * points->side[0][i];
+        const float py = y + rise * points->normal[1][i] + height * points->side[1][i];
+        const float pz = z + rise * points->normal[2][i] + height * points->side[2][i];
         const int hit = hits->surface[i] != NB_NONE;
-        points->start[0][i] = hit ? nb_clamp_coordinate(x + height * points->side[0][i]) : 0;
-        points->start[1][i] = hit ? nb_clamp_coordinate(y + height * points->side[1][i]) : 0;
-        points->start[2][i] = hit ? nb_clamp_coordinate(z + height * points->side[2][i]) : 0;
+        points->start[0][i] = hit ? nb_clamp_coordinate(px) : 0;
+        points->start[1][i] = hit ? nb_clamp_coordinate(py) : 0;
+        points->start[2][i] = hit ? nb_clamp_coordinate(pz) : 0;
         points->lit[i] = hit ? points->lit[i] : 0;
     }
 }
@@ -165,5 +219,6 @@ void nb_surface_points(const nb_geometry *geometry, const nebel_scene_data *scen
     set_sides(rays, hits, points);
     fetch(geometry, scene, table, hits, points);
     finish_normals(sun, points);
+    set_rises(geometry, hits, points);
     lift(rays, hits, points);
 }

@@ -16,7 +16,9 @@ typedef struct nb_points {
     float cosine[NB_BATCH];         /* between shading normal and sun */
     float side[3][NB_BATCH];        /* the triangle's normal, unit length, on the side of the camera */
     float edge[NB_BATCH];           /* longest edge of the mesh */
-    _Alignas(64) int lit[NB_BATCH]; /* -1 where the sun is above shading normal and triangle, else 0 */
+    float rise[NB_BATCH];           /* m, of the start of a shadow ray along the shading normal */
+    /* -1 or 0: where the sun is above the shading normal's surface; and where it is, but not above the triangle. */
+    _Alignas(64) int lit[NB_BATCH], away[NB_BATCH];
 } nb_points;
 
 void nb_srgb_table_set(nb_srgb_table *table);

@@ -20,6 +20,7 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "uniform vec3 scene_offset;\n"
                                           "out vec3 surface_place;\n"
                                           "out vec3 surface_normal;\n"
+                                          "out float surface_support;\n"
                                           "out vec2 surface_uv;\n"
                                           "flat out vec3 surface_corner;\n"
                                           "flat out vec3 surface_face;\n"
@@ -27,6 +28,7 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "{\n"
                                           "    surface_place = surface_corner = mesh_position + scene_offset;\n"
                                           "    surface_normal = mesh_normal;\n"
+                                          "    surface_support = dot(surface_place, mesh_normal);\n"
                                           "    surface_uv = mesh_uv;\n"
                                           "    surface_face = mesh_face;\n"
                                           "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
@@ -66,9 +68,12 @@ static const char distance_text[] =
     "}\n";
 
 static const char attributes_text[] = "in vec3 surface_normal;\n"
+                                      "in float surface_support;\n"
                                       "in vec2 surface_uv;\n"
                                       "bool surface_is_met(vec3 direction) { return true; }\n";
 
+/* surface_rise: how far the round surface that the normals stand for lies above the triangle, as height_of_tangents of
+ * the CPU renderer has it: sum w_i V_i . N_i, which is surface_support, less P . sum w_i N_i. */
 static const char surface_fragment_text[] =
     "uniform vec3 scene_color;\n"
     "uniform bool scene_has_texture;\n"
@@ -84,11 +89,14 @@ static const char surface_fragment_text[] =
     "    if (!(t > 0.0)) discard;\n"
     "    vec3 side = dot(surface_face, direction) > 0.0 ? -surface_face : surface_face;\n"
     "    float size = dot(surface_normal, surface_normal);\n"
-    "    vec3 normal = size > 1e-12 && size < 1e12 ? surface_normal * inversesqrt(size) : side;\n"
+    "    bool is_smooth = size > 1e-12 && size < 1e12;\n"
+    "    float turn = is_smooth && dot(surface_normal, side) < 0.0 ? -1.0 : 1.0;\n"
+    "    vec3 normal = is_smooth ? surface_normal * (turn * inversesqrt(size)) : side;\n"
+    "    float rise = turn * (surface_support - dot(surface_place, surface_normal));\n"
     "    vec3 reflectance = scene_color;\n"
     "    if (scene_has_texture) reflectance *= textureLod(scene_texture, surface_uv, 0.0).rgb;\n"
     "    out_place = vec4(t, side);\n"
-    "    out_normal = vec4(dot(normal, side) < 0.0 ? -normal : normal, 0.0);\n"
+    "    out_normal = vec4(normal, is_smooth ? max(rise, 0.0) : 0.0);\n"
     "    out_reflectance = vec4(reflectance, 0.0);\n"
     "    gl_FragDepth = 1.0 / (1.0 + t);\n"
     "}\n";
@@ -207,6 +215,7 @@ static const char round_surface_text[] =
     "flat in mat3 corners_normal;\n"
     "flat in mat3x2 corners_uv;\n"
     "vec3 surface_normal;\n"
+    "float surface_support;\n"
     "vec2 surface_uv;\n"
     "#endif\n"
     /* The volume that a ray spans with an edge, and what rounding may make of it. */
@@ -231,6 +240,8 @@ static const char round_surface_text[] =
     "    surface_fog = corners_fog * weights;\n"
     "#else\n"
     "    surface_normal = corners_normal * weights;\n"
+    "    surface_support = dot(weights, vec3(dot(corners_place[0], corners_normal[0]),\n"
+    "        dot(corners_place[1], corners_normal[1]), dot(corners_place[2], corners_normal[2])));\n"
     "    surface_uv = corners_uv * weights;\n"
     "#endif\n"
     "    return true;\n"
@@ -355,12 +366,15 @@ static const char light_text[] =
     "layout(location = 1) out highp vec4 out_transmittance;\n"
     "layout(location = 2) out highp vec4 out_in_scattering;\n"
     "layout(location = 3) out highp vec4 out_surface;\n"
-    "vec3 sunlight(vec3 place, vec3 normal, vec3 side, float t)\n"
+    /* Triangles that face away from the sun where their normals do not would shade themselves: the round surface that
+       the normals stand for is looked up in their place. */
+    "vec3 sunlight(vec3 place, vec3 normal, float rise, vec3 side, float t)\n"
     "{\n"
     "    float cosine = dot(normal, scene_sun);\n"
-    "    if (!(cosine > 0.0 && dot(side, scene_sun) > 0.0)) return vec3(0.0);\n"
-    "    vec3 at = scene_light * place;\n"
-    "    float visible = shadow(at, side, t);\n"
+    "    if (!(cosine > 0.0)) return vec3(0.0);\n"
+    "    bool away = !(dot(side, scene_sun) > 0.0);\n"
+    "    vec3 at = scene_light * (away ? place + rise * normal : place);\n"
+    "    float visible = shadow(at, away ? normal : side, t);\n"
     "    if (!(visible > 0.0)) return vec3(0.0);\n"
     "    vec3 light = visible * cosine * scene_sunlight * sun_transmittance(place, at.xy);\n"
     "#ifdef SCENE_DIMMED\n"
@@ -374,18 +388,18 @@ static const char light_text[] =
     "    vec4 place = texelFetch(scene_place, texel, 0);\n"
     "    vec3 transmittance = texelFetch(scene_transmittance, texel, 0).rgb;\n"
     "    vec3 in_scattering = texelFetch(scene_in_scattering, texel, 0).rgb;\n"
-    "    vec3 normal = texelFetch(scene_normal, texel, 0).xyz;\n"
+    "    vec4 normal = texelFetch(scene_normal, texel, 0);\n"
     "    vec3 surface = scene_background;\n"
     "    if (place.x > 0.0) {\n"
     "        vec3 at = ray_origin(gl_FragCoord.xy) + place.x * ray_direction(gl_FragCoord.xy);\n"
-    "        vec3 light = scene_ambient + sunlight(at, normal, place.yzw, place.x);\n"
+    "        vec3 light = scene_ambient + sunlight(at, normal.xyz, normal.w, place.yzw, place.x);\n"
     "        surface = texelFetch(scene_reflectance, texel, 0).rgb * light;\n"
     "    }\n"
     "    float hit = place.x > 0.0 ? scene_share : 0.0;\n"
     "    out_color = vec4(scene_share * (transmittance * surface + in_scattering), hit);\n"
     "    out_transmittance = vec4(scene_share * transmittance, scene_share);\n"
     "    out_in_scattering = vec4(scene_share * in_scattering, scene_share);\n"
-    "    out_surface = hit * vec4(normal, place.x);\n"
+    "    out_surface = hit * vec4(normal.xyz, place.x);\n"
     "}\n";
 
 /* ---- particles ------------------------------------------------------------------------------- */
