@@ -475,7 +475,6 @@ class RenderTest(PictureCase):
             pictures[method] = (self.folder / "a.exr").read_bytes()
             self.assertEqual(b"error\0" in pictures[method], method == "exact")
         self.assertEqual(len(set(pictures.values())), len(pictures))
-        self.assert_misused(self.render("a.png", "--method", "cells-pixel", "--device", "gl"), "--method", "--device cpu")
 
     def test_triangles_that_are_large_against_the_factor_are_told(self):
         classic = {"start": 1, "end": 2, "color": 1}
@@ -561,7 +560,6 @@ class RenderTest(PictureCase):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
         self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap")
-        self.assert_misused(self.render("a.png", "--method", "cells-pixel", "--device", "gl"), "--method", "--device cpu")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)

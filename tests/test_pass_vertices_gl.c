@@ -321,6 +321,37 @@ static nebel_cells *create_rooms(void)
     return cells;
 }
 
+/* At pixels walls count: through the door, or not at all beyond the wall. */
+static void check_pixels(nebel_gl_renderer *renderer, nebel_gl_frame_desc desc, const nebel_cells *cells)
+{
+    static planes p;
+    const nebel_gl_planes wanted = {
+        .transmittance = p.transmittance[0], .in_scattering = p.in_scattering[0], .depth = p.depth};
+    nebel_view view;
+    int fogged = 0;
+    desc.method = NEBEL_GL_METHOD_CELLS_PIXEL;
+    assert_int_equal(nebel_gl_camera_view(&desc.camera, WIDTH, HEIGHT, NULL, &view), NEBEL_OK);
+    assert_int_equal(nebel_gl_render_frame(renderer, &desc), NEBEL_OK);
+    assert_int_equal(nebel_gl_read_planes(renderer, &wanted), NEBEL_OK);
+    for (int i = 0; i < PIXELS; i++) {
+        nebel_cell_fog fog = {.alpha = 0};
+        nebel_cell_point point = {.position = {0, 0, 0}};
+        const line ray = line_of(&view, i % WIDTH + .5, HEIGHT - 1 - i / WIDTH + .5);
+        nebel_cell_view from = {.forward = {0, 0, -1}};
+        for (int k = 0; k < 3; k++) {
+            from.eye[k] = desc.camera.position[k];
+            point.position[k] = from.eye[k] + (double)p.depth[i] * (double)ray.direction[k];
+        }
+        if (isfinite(p.depth[i])) assert_int_equal(nebel_fog_cells(cells, &from, 1, &point, 0, &fog, 0), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            assert_true(fabs((double)p.transmittance[i][c] - (1 - fog.alpha)) < 1e-5);
+            assert_true(fabs((double)p.in_scattering[i][c] - fog.color[c]) < 1e-5);
+        }
+        fogged += fog.alpha > .1;
+    }
+    assert_true(fogged > PIXELS / 8);
+}
+
 /* Along the ray the exponential model is that of volumes; vertices behind the wall are fogged as if they were seen. */
 static void test_cells_are_drawn_like_volumes(void **state)
 {
@@ -351,6 +382,7 @@ static void test_cells_are_drawn_like_volumes(void **state)
         assert_int_equal(nebel_gl_read_planes(renderer, &wanted), NEBEL_OK);
         assert_true(largest_difference(&by_volumes, &by_cells) < 2e-5);
         assert_true(by_cells.transmittance[PIXELS / 2 + WIDTH / 2][0] < .9f);
+        check_pixels(renderer, desc, cells);
         nebel_destroy_gl_renderer(renderer);
         pass_close(&context);
     }

@@ -192,12 +192,6 @@ static int takes_factor(nebel_method method)
     return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
 }
 
-static int is_of_gl(nebel_method method)
-{
-    return method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE ||
-           method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_FIVE_TAP || takes_factor(method);
-}
-
 static void read_tessellate(nb_arguments *arguments, settings *wanted)
 {
     nebel_tessellation_desc *const desc = &wanted->tessellation;
@@ -232,8 +226,6 @@ static void read_device(nb_arguments *arguments, settings *wanted)
             nb_options_refuse(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
         }
     }
-    if (wanted->gl && !is_of_gl(wanted->method))
-        nb_options_reject(arguments, METHOD, "is for --device cpu; with gl there are all others");
     if (!wanted->gl && wanted->method == NEBEL_METHOD_FIVE_TAP)
         nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
     if (wanted->method != NEBEL_METHOD_EXACT && arguments->values[TOLERANCE] != NULL)
@@ -447,8 +439,9 @@ static nebel_gl_method gl_method(nebel_method method)
     static const nebel_gl_method methods[NEBEL_METHOD_COUNT] = {
         [NEBEL_METHOD_EXACT] = NEBEL_GL_METHOD_EXACT,   [NEBEL_METHOD_FIVE_TAP] = NEBEL_GL_METHOD_FIVE_TAP,
         [NEBEL_METHOD_VERTEX] = NEBEL_GL_METHOD_VERTEX, [NEBEL_METHOD_ADDITIVE] = NEBEL_GL_METHOD_ADDITIVE,
-        [NEBEL_METHOD_CELLS] = NEBEL_GL_METHOD_CELLS,   [NEBEL_METHOD_LINEAR] = NEBEL_GL_METHOD_LINEAR,
-        [NEBEL_METHOD_EXP] = NEBEL_GL_METHOD_EXP,       [NEBEL_METHOD_EXP2] = NEBEL_GL_METHOD_EXP2,
+        [NEBEL_METHOD_CELLS] = NEBEL_GL_METHOD_CELLS,   [NEBEL_METHOD_CELLS_PIXEL] = NEBEL_GL_METHOD_CELLS_PIXEL,
+        [NEBEL_METHOD_LINEAR] = NEBEL_GL_METHOD_LINEAR, [NEBEL_METHOD_EXP] = NEBEL_GL_METHOD_EXP,
+        [NEBEL_METHOD_EXP2] = NEBEL_GL_METHOD_EXP2,
     };
     return methods[method];
 }

@@ -52,7 +52,7 @@ static nebel_result clear_fog(const nb_gl_painter *painter)
 nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebel_gl_frame_desc *desc,
                                 const nebel_gl_planes *planes)
 {
-    const int by_cells = desc->method == NEBEL_GL_METHOD_CELLS;
+    const int by_cells = desc->method == NEBEL_GL_METHOD_CELLS || desc->method == NEBEL_GL_METHOD_CELLS_PIXEL;
     nebel_result result = by_cells ? clear_fog(painter) : set_fog(painter, frame);
     if (result == NEBEL_OK) result = nebel_gl_render_frame(painter->renderer, desc);
     return result == NEBEL_OK ? nebel_gl_read_planes(painter->renderer, planes) : result;

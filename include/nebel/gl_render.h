@@ -75,7 +75,9 @@ typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_ADDITIVE,  /* the same, but fog only adds its light, and transmittance is 1 */
     NEBEL_GL_METHOD_CELLS,     /* the same by nebel_fog_cells, in place of the renderer's fog, which still dims the sun:
                                   give it none where cells are all. Each ray of a panorama is its own axis of depth */
-    NEBEL_GL_METHOD_LINEAR,    /* a fog factor, at vertices or at each pixel, in place of the renderer's fog and
+    NEBEL_GL_METHOD_CELLS_PIXEL, /* the same at each pixel, which the processor computes of the distances that OpenGL
+                                    has drawn: some microseconds a pixel and sample. For pictures, not for films */
+    NEBEL_GL_METHOD_LINEAR,      /* a fog factor, at vertices or at each pixel, in place of the renderer's fog and
                                   particles, which do not dim the sun either */
     NEBEL_GL_METHOD_EXP,
     NEBEL_GL_METHOD_EXP2,
@@ -104,7 +106,7 @@ typedef struct nebel_gl_frame_desc {
     void *progress_user;
     nebel_gl_method method;
     const nebel_gl_taps *taps;       /* of FIVE_TAP; NULL: nebel_gl_default_taps */
-    const nebel_cells *cells;        /* of CELLS */
+    const nebel_cells *cells;        /* of CELLS and CELLS_PIXEL */
     const nebel_factor_desc *factor; /* of LINEAR, EXP and EXP2, but for its mode; not COORDINATE_USER */
     int particles_leave_sun; /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,

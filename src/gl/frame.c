@@ -4,6 +4,7 @@
 #include "corners.h"
 #include "gl.h"
 #include "panorama.h"
+#include "pixel_fog.h"
 #include "renderer.h"
 #include "vertex_fog.h"
 
@@ -64,13 +65,18 @@ static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
     return NEBEL_OK;
 }
 
+static int takes_cells(nebel_gl_method method)
+{
+    return method == NEBEL_GL_METHOD_CELLS || method == NEBEL_GL_METHOD_CELLS_PIXEL;
+}
+
 static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     if ((unsigned)desc->method >= NEBEL_GL_METHOD_COUNT) {
         return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: there is no method %d", (int)desc->method);
     }
-    if (desc->method == NEBEL_GL_METHOD_CELLS && desc->cells == NULL)
-        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: the method CELLS needs cells; they are NULL");
+    if (takes_cells(desc->method) && desc->cells == NULL)
+        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: this method needs cells; they are NULL");
     const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
     if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
         isfinite(taps.offset + taps.nothing + taps.edge + taps.margin + taps.brightness)) {
@@ -285,7 +291,30 @@ static nebel_result draw_exact_fog(const frame *f)
 /* Cells and factors have no need of the renderer's fog. */
 static int has_fog(const frame *f)
 {
-    return f->renderer->fog != NULL || f->desc->method == NEBEL_GL_METHOD_CELLS || f->has_factor;
+    return f->renderer->fog != NULL || takes_cells(f->desc->method) || f->has_factor;
+}
+
+/* A wall may hide a vertex whose triangle is seen beside it. */
+static nb_vertex_source find_source(const frame *f)
+{
+    const nebel_gl_method method = f->desc->method;
+    nb_vertex_source source = {.fog = f->renderer->fog,
+                               .cells = takes_cells(method) ? f->desc->cells : NULL,
+                               .factor = f->has_factor ? &f->factor : NULL,
+                               .view = {.ignore_walls = method != NEBEL_GL_METHOD_CELLS_PIXEL},
+                               .projection = f->desc->camera.projection};
+    for (int i = 0; i < 3; i++) {
+        source.view.eye[i] = f->eye[i];
+        source.view.forward[i] = -f->view.eye_from_world[4 * i + 2];
+    }
+    return source;
+}
+
+static nebel_result draw_pixel_fog(const frame *f)
+{
+    const nebel_gl_renderer *const r = f->renderer;
+    const nb_vertex_source source = find_source(f);
+    return nb_pixel_fog_set(&r->targets, &r->allocator, &r->log, &f->rays, &source);
 }
 
 static int has_particles(const frame *f)
@@ -308,7 +337,9 @@ static nebel_result draw_fog(const frame *f)
         draw_vertex_fog(f);
     else if (f->has_factor)
         result = draw_factor(f);
-    const int is_exact = !is_by_vertex(f) && !f->has_factor;
+    else if (takes_cells(f->desc->method))
+        result = draw_pixel_fog(f);
+    const int is_exact = !is_by_vertex(f) && !f->has_factor && !takes_cells(f->desc->method);
     if (result == NEBEL_OK && r->fog != NULL && (is_exact || has_particles(f))) result = set_eye_fog(f);
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
@@ -632,17 +663,8 @@ static int has_vertex_fog(const frame *f)
 static nebel_result prepare_vertices(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const int by_cells = f->desc->method == NEBEL_GL_METHOD_CELLS;
-    nb_vertex_source source = {.fog = r->fog,
-                               .cells = by_cells ? f->desc->cells : NULL,
-                               .factor = f->has_factor ? &f->factor : NULL,
-                               .view = {.ignore_walls = 1},
-                               .projection = f->desc->camera.projection};
     if (!has_vertex_fog(f)) return NEBEL_OK;
-    for (int i = 0; i < 3; i++) {
-        source.view.eye[i] = f->eye[i];
-        source.view.forward[i] = -f->view.eye_from_world[4 * i + 2];
-    }
+    const nb_vertex_source source = find_source(f);
     const nebel_result result = nb_shading_make_vertex_fog(&r->shading, &r->context, &r->log);
     return result == NEBEL_OK ? nb_vertex_fog_set(&r->meshes, &source) : result;
 }

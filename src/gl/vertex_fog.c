@@ -101,8 +101,8 @@ static nebel_result fog_by_parallel_rays(const nb_vertex_source *source, size_t 
     return result;
 }
 
-static nebel_result fog_vertices(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
-                                 void *out)
+nebel_result nb_vertex_fog_find(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
+                                float (*out)[4])
 {
     const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out, 0};
     if (source->cells != NULL) return fog_by_cells(source, count, vertices, out);
@@ -127,7 +127,7 @@ static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nb_
         vertices.origin[i] = mesh->origin[i];
         vertices.eye[i] = source->view.eye[i];
     }
-    const nebel_result result = mapped ? fog_vertices(source, count, &vertices, out) : NEBEL_OK;
+    const nebel_result result = mapped ? nb_vertex_fog_find(source, count, &vertices, out) : NEBEL_OK;
     const int read = nb_meshes_unmap(mesh->vertices, vertices.positions), written = nb_meshes_unmap(mesh->fog, out);
     if (read && written) return result;
     return nb_fail(&meshes->log, NEBEL_ERROR_MEMORY, "OpenGL: no access to the vertices; try again");

@@ -18,4 +18,8 @@ typedef struct nb_vertex_source {
  * Errors: MEMORY, and those of nebel_fog_vertices or nebel_fog_cells. */
 nebel_result nb_vertex_fog_set(nb_meshes *meshes, const nb_vertex_source *source);
 
+/* The same of places in memory, whose stride is not 0: the light that fog adds, and the amount of fog. Calls no OpenGL. */
+nebel_result nb_vertex_fog_find(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
+                                float (*fog)[4]);
+
 #endif
