@@ -335,6 +335,35 @@ static void suns_are_checked(void **state)
     nebel_destroy_fog(made);
 }
 
+/* A box around what is lit: not around fog with a source, and without end where lit fog has none. */
+static void sunlit_fog_is_bounded(void **state)
+{
+    const nebel_fog_desc desc = {.sun = {.direction = {0, 5, 0}, .irradiance = {5, 5, 5}}};
+    nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 2, 3}, .radius = 2},
+                                    .extinction = {1, 1, 1},
+                                    .albedo = {1, 0, 0}},
+                                   {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {50, 2, 3}, .radius = 2},
+                                    .extinction = {1, 1, 1},
+                                    .source = {1, 1, 1}}};
+    nebel_sunlit_fog lit;
+    (void)state;
+    nebel_snapshot *snapshot = fog_commit(&desc, volumes, 2);
+    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &lit), 1);
+    for (int c = 0; c < 3; c++) {
+        assert_true(lit.direction[c] == (c == 1));
+        assert_true(fabs(lit.min[c] - (c - 1)) < 1e-6 && fabs(lit.max[c] - (c + 3)) < 1e-6);
+    }
+    nebel_release_snapshot(snapshot);
+    snapshot = fog_commit(&desc, &volumes[1], 1);
+    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &lit), 0);
+    nebel_release_snapshot(snapshot);
+    volumes[1] = (nebel_volume_desc){.extinction = {1, 1, 1}, .albedo = {1, 1, 1}};
+    snapshot = fog_commit(&desc, volumes, 2);
+    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &lit), 1);
+    for (int c = 0; c < 3; c++) assert_true(lit.min[c] == -HUGE_VAL && lit.max[c] == HUGE_VAL);
+    nebel_release_snapshot(snapshot);
+}
+
 /* An endless world of fog lets no sun in; fog without end above, less and less of it, does. */
 static void endless_fog_is_answered(void **state)
 {
@@ -404,6 +433,7 @@ int main(void)
         cmocka_unit_test(pieces_that_are_none_are_refused),
         cmocka_unit_test(pieces_are_the_same_in_any_set_and_split),
         cmocka_unit_test(suns_are_checked),
+        cmocka_unit_test(sunlit_fog_is_bounded),
         cmocka_unit_test(endless_fog_is_answered),
         cmocka_unit_test(lost_memory_is_survived),
     };

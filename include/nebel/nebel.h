@@ -355,6 +355,15 @@ void nebel_release_snapshot(nebel_snapshot *snapshot);
 /* How many volumes the snapshot holds. */
 size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot);
 
+/* What a renderer that casts the shadows of its surfaces into fog wants to know: see nebel_lit_pieces. */
+typedef struct nebel_sunlit_fog {
+    double direction[3];   /* towards the sun, of length 1 */
+    double min[3], max[3]; /* m: no fog that the sun lights is outside of this box; infinite where it has no end */
+} nebel_sunlit_fog;
+
+/* Returns 1, or 0 where the sun lights no fog of the snapshot; *fog is then untouched. Cost O(n). Any thread. */
+int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *fog);
+
 /* ---- asking ---------------------------------------------------------------------------------- */
 
 typedef struct nebel_ray {

@@ -68,6 +68,17 @@ static nebel_light_planes light_samples(const nb_frame *frame, nb_light_samples 
     return planes;
 }
 
+static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebel_lit_pieces *pieces)
+{
+    if (!frame->has_shafts) return NEBEL_OK;
+    const nebel_renderer *renderer = frame->renderer;
+    const nebel_result result =
+        nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_tree, &frame->sunlit_box, &scratch->rays,
+                       frame->view.advance, scratch->distance);
+    *pieces = (nebel_lit_pieces){scratch->shafts.first, scratch->shafts.toggles};
+    return result;
+}
+
 static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_light_samples *samples = &scratch->samples;
@@ -82,7 +93,12 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     set_distances(frame->view.advance, &scratch->rays, &scratch->hits, scratch->inside, scratch->distance);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
     const nebel_light_planes lights = light_samples(frame, samples);
-    return nebel_trace_planes(frame->renderer->fog, &frame->trace, NB_BATCH, &rays, &lights);
+    nebel_trace_desc trace = frame->trace;
+    nebel_lit_pieces pieces;
+    const nebel_result result = find_shafts(frame, scratch, &pieces);
+    if (result != NEBEL_OK) return result;
+    if (frame->has_shafts) trace.sunlit = &pieces;
+    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */

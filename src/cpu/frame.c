@@ -31,6 +31,24 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
     return NEBEL_OK;
 }
 
+/* Surfaces between the sun and fog that it lights. */
+static nebel_result set_shafts(nb_frame *frame)
+{
+    nebel_renderer *renderer = frame->renderer;
+    const nb_geometry *geometry = &renderer->geometry;
+    nebel_sunlit_fog fog;
+    frame->has_shafts = renderer->fog != NULL && renderer->method == NEBEL_METHOD_EXACT && geometry->scene != NULL &&
+                        nebel_snapshot_sunlit_fog(renderer->fog, &fog);
+    if (!frame->has_shafts) return NEBEL_OK;
+    for (int c = 0; c < 3; c++) {
+        frame->sunlit_box.low[c] = (float)(fog.min[c] - geometry->origin[c]);
+        frame->sunlit_box.high[c] = (float)(fog.max[c] - geometry->origin[c]);
+    }
+    const nebel_result result = nb_sun_tree_set(&renderer->sun_tree, geometry, fog.direction, renderer->threads);
+    if (result == NEBEL_OK) return NEBEL_OK;
+    return nb_fail(&renderer->log, result, "frame: out of memory for the shadows that surfaces cast into fog");
+}
+
 static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
 {
     nebel_renderer *renderer = frame->renderer;
@@ -56,7 +74,7 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     result = nb_classic_fog_set_vertices(frame);
     if (result != NEBEL_OK)
         return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
-    return NEBEL_OK;
+    return set_shafts(frame);
 }
 
 /* ---- regions --------------------------------------------------------------------------------- */

@@ -6,6 +6,7 @@
 #include "hits.h"
 #include "raster.h"
 #include "sampling.h"
+#include "shafts.h"
 #include "surface.h"
 #include "view.h"
 
@@ -35,6 +36,7 @@ typedef struct nb_scratch {
     float offset[3][NB_BATCH];            /* of the rays' starts from the camera's position; orthographic only */
     float sun_transmittance[3][NB_BATCH]; /* of the way to the sun */
     uint32_t hit_counts[NB_PIXELS];       /* samples of a pixel that met a surface */
+    nb_shafts shafts;
 } nb_scratch;
 
 /* What fog does to a vertex: the light that it adds, and what it hides. */
@@ -54,6 +56,7 @@ struct nebel_renderer {
     nebel_isa fog_isa;
     int threads;
     nb_geometry geometry;
+    nb_sun_tree sun_tree; /* for the last frame with fog that the sun lights */
     nb_srgb_table table;
     void *scratch_memory;
     nb_scratch *scratch; /* one per thread */
@@ -67,6 +70,8 @@ typedef struct nb_frame {
     int rasters; /* first hits come from `raster`, not from Embree */
     nb_lighting lighting;
     nebel_trace_desc trace;
+    int has_shafts; /* surfaces cast shadows into fog that the sun lights, which is in */
+    nb_sunlit_box sunlit_box;
     uint32_t width, height, samples;
 } nb_frame;
 

@@ -178,3 +178,19 @@ size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot)
 {
     return snapshot->medium_count;
 }
+
+int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *fog)
+{
+    if (!snapshot->is_sunlit) return 0;
+    for (int c = 0; c < 3; c++) {
+        fog->direction[c] = snapshot->to_sun[c];
+        fog->min[c] = HUGE_VAL;
+        fog->max[c] = -HUGE_VAL;
+        for (size_t i = 0; i < snapshot->medium_count; i++) {
+            if (!snapshot->media[i].is_sunlit) continue;
+            fog->min[c] = fmin(fog->min[c], snapshot->media[i].body.low[c]);
+            fog->max[c] = fmax(fog->max[c], snapshot->media[i].body.high[c]);
+        }
+    }
+    return 1;
+}

@@ -1,0 +1,35 @@
+/* Where the sun reaches the rays of a batch past the surfaces: the ends of shadows along each of them. */
+#ifndef NB_CPU_SHAFTS_H
+#define NB_CPU_SHAFTS_H
+
+#include "sun_tree.h"
+#include "view.h"
+
+/* The fog that the sun lights, relative to the origin of the geometry; infinite where it has no end. */
+typedef struct nb_sunlit_box {
+    float low[3], high[3];
+} nb_sunlit_box;
+
+/* A stretch of a packet's ray in shadow. */
+typedef struct nb_shadow {
+    uint32_t lane;
+    float enter, leave;
+} nb_shadow;
+
+/* What a thread works in; all zero at first. */
+typedef struct nb_shafts {
+    nb_shadow *shadows;
+    size_t shadow_count, shadow_capacity;
+    float *toggles; /* m from where fog begins to count, which is before a ray is advanced */
+    size_t toggle_count, toggle_capacity;
+    uint32_t first[NB_BATCH + 1]; /* see nebel_lit_pieces */
+} nb_shafts;
+
+/* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Errors:
+ * MEMORY. */
+nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_tree *tree,
+                            const nb_sunlit_box *box, const nb_rays *rays, double advance, const float *distance);
+
+void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator);
+
+#endif

@@ -1,0 +1,288 @@
+/* Shadows of surfaces in fog that the sun lights: ends against Embree's visibility, light against closed forms and fine
+ * steps. */
+#include "test_render_scene.h"
+
+#include "cpu/renderer.h"
+#include "dice.h"
+
+/* ---- ends of shadows ------------------------------------------------------------------------- */
+
+enum { TRIANGLES = 700, PLACES = 40 };
+
+static int is_in_shadow(const nb_geometry *geometry, const float place[3], const double sun[3])
+{
+    struct RTCIntersectContext context;
+    struct RTCRay ray = {.org_x = place[0],
+                         .org_y = place[1],
+                         .org_z = place[2],
+                         .dir_x = (float)sun[0],
+                         .dir_y = (float)sun[1],
+                         .dir_z = (float)sun[2],
+                         .tfar = INFINITY,
+                         .mask = UINT32_MAX};
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(geometry->scene, &context, &ray);
+    return ray.tfar < 0;
+}
+
+/* Triangles of all sizes, long ones and needles among them. */
+static void draw_triangles(uint64_t *numbers, float (*positions)[3])
+{
+    for (int t = 0; t < TRIANGLES; t++) {
+        const double size = pow(10, dice(numbers, -2, 0.6));
+        double center[3];
+        for (int i = 0; i < 3; i++) center[i] = dice(numbers, -10, 10);
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < 3; i++) positions[3 * t + k][i] = (float)(center[i] + size * dice(numbers, -1, 1));
+    }
+}
+
+typedef struct trial {
+    nb_sun_tree tree;
+    nb_shafts shafts;
+    nb_rays rays;
+    nb_view view;
+    float distance[NB_BATCH];
+    size_t toggles, shadows, wrong;
+} trial;
+
+/* Whether a place t m from the fog's start is in shadow; NAN where an end is too near to say. */
+static float shadow_at(const trial *run, int ray, float t)
+{
+    const uint32_t first = run->shafts.first[ray], end = run->shafts.first[ray + 1];
+    float dark = 0;
+    for (uint32_t i = first; i < end; i++) {
+        if (fabsf(run->shafts.toggles[i] - t) < 2e-4f + 1e-5f * t) return NAN;
+        if (run->shafts.toggles[i] <= t) dark = 1 - dark;
+    }
+    return dark;
+}
+
+static void compare_places(trial *run, const nb_geometry *geometry, const double sun[3], int ray, uint64_t *numbers)
+{
+    const float skipped = (float)run->view.advance * run->rays.length[ray], far = fminf(run->distance[ray], 60);
+    for (int k = 0; k < PLACES; k++) {
+        const float t = (float)dice(numbers, 0, (double)far), expected = shadow_at(run, ray, t);
+        float place[3];
+        if (isnan(expected)) continue;
+        for (int i = 0; i < 3; i++) place[i] = run->rays.start[i][ray] + (t - skipped) * run->rays.unit[i][ray];
+        const int dark = is_in_shadow(geometry, place, sun);
+        run->shadows += (size_t)dark;
+        run->wrong += dark != (expected > 0);
+    }
+}
+
+/* One in 10,000 places may be within rounding of a needle. */
+static void ends_are_those_of_visibility(void **state)
+{
+    static const nebel_projection projections[] = {NEBEL_PROJECTION_PERSPECTIVE, NEBEL_PROJECTION_ORTHOGRAPHIC,
+                                                   NEBEL_PROJECTION_PANORAMA};
+    static float positions[3 * TRIANGLES][3];
+    static uint32_t indices[3 * TRIANGLES];
+    static trial run;
+    (void)state;
+    for (uint32_t i = 0; i < 3 * TRIANGLES; i++) indices[i] = i;
+    for (uint64_t seed = 0; seed < 12; seed++) {
+        uint64_t numbers = 31 * seed + 7;
+        draw_triangles(&numbers, positions);
+        positions[5][1] = NAN;
+        const nebel_mesh mesh = {.positions = positions[0],
+                                 .indices = indices,
+                                 .vertex_count = 3 * TRIANGLES,
+                                 .triangle_count = TRIANGLES,
+                                 .texture = -1};
+        const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
+        nb_geometry geometry = {.allocator = nb_resolve_allocator(&(nebel_allocator){0})};
+        double sun[3] = {dice(&numbers, -1, 1), seed == 3 ? 0 : dice(&numbers, 0, 1), seed == 4 ? 0 : 1};
+        if (seed == 5) sun[0] = sun[1] = 0;
+        nb_vector_make_unit(sun);
+        assert_int_equal(nb_geometry_make(&geometry, &scene, NEBEL_ISA_DEFAULT, 1), NEBEL_OK);
+        nebel_camera camera = test_camera(3, 2, seed % 4 == 3 ? 900 : 22, 0, 0, 0);
+        camera.projection = projections[seed % 3];
+        camera.vertical_fov = seed % 4 == 3 ? 2 : 50;
+        camera.view_height = 25;
+        assert_int_equal(nb_geometry_place(&geometry, camera.position), NEBEL_OK);
+        assert_int_equal(nb_view_set(&run.view, &camera, 64, 64, &(nebel_log){0}), NEBEL_OK);
+        nb_view_place(&run.view, geometry.origin, geometry.bounds_min, geometry.bounds_max);
+        assert_int_equal(nb_sun_tree_set(&run.tree, &geometry, sun, 1), NEBEL_OK);
+        nb_region_points points;
+        nb_sample_region(0, 1, &points);
+        for (int first = 0; first < NB_PIXELS; first += 4 * NB_BATCH) {
+            const nb_sunlit_box box = {{-12, -12, -12}, {12, seed == 2 ? 3 : 12, 12}};
+            nb_view_rays(&run.view, 0, 0, points.x + first, points.y + first, &run.rays);
+            for (int i = 0; i < NB_BATCH; i++) run.distance[i] = i % 5 == 0 ? 20 : INFINITY;
+            const nb_sunlit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+            assert_int_equal(nb_shafts_find(&run.shafts, &geometry.allocator, &run.tree, seed == 2 ? &box : &all,
+                                            &run.rays, run.view.advance, run.distance),
+                             NEBEL_OK);
+            run.toggles += run.shafts.toggle_count;
+            for (int i = 0; i < NB_BATCH; i++) {
+                const uint32_t end = run.shafts.first[i + 1];
+                for (uint32_t k = run.shafts.first[i] + 1; k < end; k++)
+                    assert_true(run.shafts.toggles[k] >= run.shafts.toggles[k - 1]);
+                if (seed != 2) compare_places(&run, &geometry, sun, i, &numbers);
+            }
+        }
+        nb_sun_tree_free(&run.tree, &geometry.allocator);
+        nb_geometry_free(&geometry);
+    }
+    const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
+    nb_shafts_free(&run.shafts, &allocator);
+    print_message("%zu ends, %zu places in shadow, %zu wrong\n", run.toggles, run.shadows, run.wrong);
+    assert_true(run.toggles > 10000 && run.shadows > 10000);
+    assert_true(run.wrong <= run.shadows / 10000);
+}
+
+/* ---- light ----------------------------------------------------------------------------------- */
+
+enum { SIDE = 24 };
+
+static const float box_corners[8][3] = {{-1, 10, -2}, {1, 10, -2}, {-1, 11, -2}, {1, 11, -2},
+                                        {-1, 10, 2},  {1, 10, 2},  {-1, 11, 2},  {1, 11, 2}};
+static const uint32_t box_indices[36] = {0, 1, 3, 0, 3, 2, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                         2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 3, 7, 1, 7, 5};
+
+static nebel_mesh box_mesh(void)
+{
+    return (nebel_mesh){.positions = box_corners[0],
+                        .indices = box_indices,
+                        .vertex_count = 8,
+                        .triangle_count = 12,
+                        .base_color = {.5f, .5f, .5f},
+                        .texture = -1};
+}
+
+/* What level rays through a layer gather from a to b where the sun shines; the layer ends at y = 10. */
+static double layer_light(double s, double albedo, double y, double rise, double a, double b)
+{
+    return albedo / (4 * test_pi) * exp(-s * (10 - y) / rise) * (exp(-s * a) - exp(-s * b));
+}
+
+/* A box above a layer of even fog: level rays cross its shadow, whose ends are planes. */
+static void the_shadow_of_a_box_is_cut_out(void **state)
+{
+    const double s = 0.03, albedo = 0.9, rise = 0.8, slant = 0.6 / rise;
+    const nebel_plane planes[] = {{{0, -1, 0}, 0}, {{0, 1, 0}, 10}};
+    const nebel_volume_desc layer = {.shape = {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 2},
+                                     .extinction = {s, s, s},
+                                     .albedo = {albedo, albedo, albedo}};
+    const nebel_fog_desc desc = {.sun = {.direction = {0.6, 0.8, 0}, .irradiance = {1, 1, 1}}};
+    const nebel_mesh mesh = box_mesh();
+    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
+    nebel_camera camera = test_camera(-20, 5, 0, 0, 5, 0);
+    nebel_snapshot *fog = fog_commit(&desc, &layer, 1);
+    test_picture picture = test_picture_make(SIDE, SIDE);
+    nebel_renderer *renderer = NULL;
+    int dark = 0;
+    (void)state;
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.view_height = 9;
+    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    const nebel_frame_desc frame = {.camera = camera, .width = SIDE, .height = SIDE, .samples = 1, .tolerance = 1e-6};
+    assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
+    for (uint32_t i = 0; i < SIDE; i++)
+        for (uint32_t k = 0; k < SIDE; k++) {
+            const double y = 5 + (0.5 * SIDE - 0.5 - i) / SIDE * 9, z = (k + 0.5 - 0.5 * SIDE) / SIDE * 9;
+            double light = layer_light(s, albedo, y, rise, 0, HUGE_VAL);
+            if (fabs(z) < 2) {
+                light -= layer_light(s, albedo, y, rise, 19 - (11 - y) * slant, 21 - (10 - y) * slant);
+                dark++;
+            }
+            assert_true(fabs((double)test_in_scattering(&picture, k, i)[1] - light) < 2e-6);
+        }
+    assert_true(dark > 200);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+enum { STEPS = 8000 };
+
+/* Pillars and a floor in height fog, integrated in small steps, at each of which Embree says whether the sun shines. */
+static double stepped_light(const nb_geometry *geometry, const float from[3], const float way[3], double begin,
+                            double end, const double sun[3])
+{
+    const double s = 0.05, scale = 8, h = (end - begin) / STEPS, high = (double)from[1] + geometry->origin[1];
+    double sum = 0;
+    for (int i = 0; i < STEPS; i++) {
+        const double t = begin + (i + 0.5) * h, y = high + t * (double)way[1], slope = (double)way[1] / scale;
+        const double density = s * exp(-y / scale), start = s * exp(-high / scale);
+        const double depth = fabs(slope * t) < 1e-9 ? start * t : start * -expm1(-slope * t) / slope;
+        float place[3];
+        for (int c = 0; c < 3; c++) place[c] = from[c] + (float)t * way[c];
+        if (!is_in_shadow(geometry, place, sun)) sum += density * exp(-depth - density * scale / sun[1]) * h;
+    }
+    return sum;
+}
+
+static void shafts_are_those_of_small_steps(void **state)
+{
+    enum { PILLARS = 5 };
+    nebel_mesh meshes[PILLARS + 1];
+    const nebel_volume_desc volume = {.density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 8},
+                                      .extinction = {.05, .05, .05},
+                                      .albedo = {1, 1, 1}};
+    double sun[3] = {-0.8, 0.35, -0.3};
+    nb_vector_make_unit(sun);
+    const nebel_fog_desc desc = {.sun = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {20, 10, 5}}};
+    const nebel_camera camera = test_camera(6, 3, 24, 0, 4, 0);
+    nebel_snapshot *fog = fog_commit(&desc, &volume, 1);
+    test_picture picture = test_picture_make(SIDE, SIDE);
+    nebel_renderer *renderer = NULL;
+    (void)state;
+    for (int i = 0; i < PILLARS; i++) {
+        meshes[i] = box_mesh();
+        meshes[i].origin[0] = 5 * i - 12;
+        meshes[i].origin[1] = -5;
+        meshes[i].origin[2] = i % 2 ? 4 : -3;
+    }
+    meshes[PILLARS] = test_square();
+    meshes[PILLARS].positions = (const float[]){-60, 0, -60, -60, 0, 60, 60, 0, 60, 60, 0, -60};
+    const nebel_scene_data scene = {.mesh_count = PILLARS + 1, .meshes = meshes};
+    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    const nebel_frame_desc frame = {.camera = camera, .width = SIDE, .height = SIDE, .samples = 1};
+    assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
+    double worst = 0, square = 0;
+    static nb_rays rays;
+    nb_view view;
+    nb_region_points points;
+    nb_sample_region(0, 1, &points);
+    assert_int_equal(nb_view_set(&view, &camera, SIDE, SIDE, &(nebel_log){0}), NEBEL_OK);
+    nb_view_place(&view, renderer->geometry.origin, renderer->geometry.bounds_min, renderer->geometry.bounds_max);
+    assert_true(view.advance <= 0);
+    for (uint32_t first = 0; first < NB_PIXELS; first += NB_BATCH) {
+        nb_view_rays(&view, 0, 0, points.x + first, points.y + first, &rays);
+        for (uint32_t i = 0; i < NB_BATCH; i++) {
+            const uint32_t x = nb_lane_x(first + i), y = nb_lane_y(first + i);
+            if (x >= SIDE || y >= SIDE) continue;
+            float from[3], way[3];
+            for (int c = 0; c < 3; c++) {
+                from[c] = rays.start[c][i];
+                way[c] = rays.unit[c][i];
+            }
+            /* finer where shadows are */
+            const double length = fmin((double)test_depth(&picture, x, y), 5000), near = fmin(length, 100);
+            const double light = (stepped_light(&renderer->geometry, from, way, 0, near, sun) +
+                                  stepped_light(&renderer->geometry, from, way, near, length, sun)) *
+                                 10 / (4 * test_pi);
+            const double off = fabs((double)test_in_scattering(&picture, x, y)[1] - light);
+            worst = fmax(worst, off);
+            square += off * off;
+        }
+    }
+    print_message("off by at most %.5f, %.6f in the root mean square\n", worst, sqrt(square / SIDE / SIDE));
+    assert_true(worst < 0.002);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ends_are_those_of_visibility),
+        cmocka_unit_test(the_shadow_of_a_box_is_cut_out),
+        cmocka_unit_test(shafts_are_those_of_small_steps),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
