@@ -88,6 +88,7 @@ static int copy_media(const nebel_fog *fog, nebel_snapshot *s)
         s->medium_count++;
         light_medium(medium, fog->ambient, &fog->sun);
         s->is_sunlit = s->is_sunlit || medium->is_sunlit;
+        s->covering_count += nb_volume_covers(&medium->body) ? 1 : 0;
         for (int c = 0; c < 3; c++) s->largest_radiance = fmax(s->largest_radiance, medium->radiance[c]);
     }
     return 1;

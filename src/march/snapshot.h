@@ -37,6 +37,7 @@ struct nebel_snapshot {
     double to_sun[3];         /* of length 1; not read where nothing is sunlit */
     const nb_medium *joining; /* one that joins; NULL where none does */
     size_t joining_count;     /* how many do; they are of one rank */
+    size_t covering_count;    /* media that cover others */
     size_t endless_count;     /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
     nb_bvh bvh;        /* over the others */

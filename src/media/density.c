@@ -1,5 +1,7 @@
 #include "density.h"
 
+#include <math.h>
+
 #define NB_DOUBLE
 #include "formulas/prelude.h"
 
@@ -60,7 +62,7 @@ static int is_in_leaf(const nb_volume *volume, const nb_leaf *leaf, const double
     }
 }
 
-static int is_in_body(const nb_volume *volume, const double place[3])
+int nb_volume_holds(const nb_volume *volume, const double place[3])
 {
     int stack[NB_STEP_STACK], top = 0;
     size_t leaf = 0;
@@ -151,24 +153,119 @@ static double edge_density(const nb_volume *volume, const double place[3])
     }
 }
 
-double nb_density_at(const nb_volume *volume, const double place[3])
+static double height_density(const nebel_density *density, double y)
+{
+    const double u = (y - density->base) / density->scale_height;
+    return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
+}
+
+static double gaussian_density(const nebel_density *density, const double place[3])
+{
+    return nb_gaussian_density(square_distance(place, density->center) / (2 * density->sigma * density->sigma), 0);
+}
+
+double nb_density_within(const nb_volume *volume, const double place[3])
 {
     const nebel_density *density = &volume->density;
-    if (!is_in_body(volume, place)) return 0;
     switch (density->type) {
-    case NEBEL_DENSITY_HEIGHT: {
-        const double u = (place[1] - density->base) / density->scale_height;
-        return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
-    }
+    case NEBEL_DENSITY_HEIGHT:
+        return height_density(density, place[1]);
     case NEBEL_DENSITY_LINEAR:
         return linear_density(density, place);
     case NEBEL_DENSITY_RADIAL:
         return radial_density(volume, place);
     case NEBEL_DENSITY_GAUSSIAN:
-        return nb_gaussian_density(square_distance(place, density->center) / (2 * density->sigma * density->sigma), 0);
+        return gaussian_density(density, place);
     case NEBEL_DENSITY_SOFT_EDGE:
         return edge_density(volume, place);
     default:
         return 1;
+    }
+}
+
+double nb_density_at(const nb_volume *volume, const double place[3])
+{
+    return nb_volume_holds(volume, place) ? nb_density_within(volume, place) : 0;
+}
+
+/* ---- bounds along a ray ---------------------------------------------------------------------- */
+
+static void place_at(const nb_line *line, double t, double place[3])
+{
+    for (int i = 0; i < 3; i++)
+        place[i] = line->direction[i] == 0 ? line->origin[i] : line->origin[i] + t * line->direction[i];
+}
+
+/* How far `point` lies along the line. */
+static double along_line(const nb_line *line, const double point[3])
+{
+    double along = 0;
+    for (int i = 0; i < 3; i++) along += (point[i] - line->origin[i]) * line->direction[i];
+    return along;
+}
+
+/* What ends nowhere is at one of its ends in the end, or level. */
+static double most_linear(const nebel_density *density, const nb_line *line, double from, double to)
+{
+    double rise = 0, start[3], end[3];
+    for (int i = 0; i < 3; i++) rise += line->direction[i] * (density->to[i] - density->from[i]);
+    if (isinf(to) && rise > 0) return 1;
+    place_at(line, from, start);
+    place_at(line, isinf(to) ? from : to, end);
+    return fmax(linear_density(density, start), linear_density(density, end));
+}
+
+double nb_density_most(const nb_volume *volume, const nb_line *line, double from, double to)
+{
+    const nebel_density *density = &volume->density;
+    double place[3];
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+        place_at(line, line->direction[1] < 0 ? to : from, place);
+        return height_density(density, place[1]);
+    case NEBEL_DENSITY_LINEAR:
+        return most_linear(density, line, from, to);
+    case NEBEL_DENSITY_GAUSSIAN:
+        place_at(line, fmin(fmax(along_line(line, density->center), from), to), place);
+        return gaussian_density(density, place);
+    default:
+        return 1;
+    }
+}
+
+/* Under the base of fog that is capped there, and where fog that grows is at its limit, nothing changes any more. */
+static double height_scale(const nebel_density *density, const nb_line *line, double from)
+{
+    double place[3];
+    place_at(line, from, place);
+    const double u = (place[1] - density->base) / density->scale_height;
+    const double level = density->below == NEBEL_BELOW_GROW ? -log(NB_FAR) : 0;
+    return line->direction[1] < 0 && u < level ? HUGE_VAL : density->scale_height / fabs(line->direction[1]);
+}
+
+static double linear_scale(const nebel_density *density, const nb_line *line, double from)
+{
+    double rise = 0, square = 0, along = 0;
+    for (int i = 0; i < 3; i++) {
+        const double axis = density->to[i] - density->from[i];
+        rise += line->direction[i] * axis;
+        along += (line->origin[i] - density->from[i]) * axis;
+        square += axis * axis;
+    }
+    const double u = (along + from * rise) / square;
+    return (rise > 0 && u > 1) || (rise < 0 && u < 0) ? HUGE_VAL : 0.25 * square / fabs(rise);
+}
+
+double nb_density_scale(const nb_volume *volume, const nb_line *line, double from)
+{
+    switch (volume->density.type) {
+    case NEBEL_DENSITY_HEIGHT:
+        return height_scale(&volume->density, line, from);
+    case NEBEL_DENSITY_LINEAR:
+        return linear_scale(&volume->density, line, from);
+    case NEBEL_DENSITY_GAUSSIAN:
+        return 0.5 * volume->density.sigma;
+    default:
+        return HUGE_VAL;
     }
 }

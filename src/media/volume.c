@@ -153,6 +153,7 @@ static int is_round(const nebel_shape *shape)
 static void resolve_light(const nebel_volume_desc *desc, nb_volume *volume)
 {
     volume->phase = nb_phase_resolve(&desc->phase);
+    volume->described_phase = desc->phase;
     for (int i = 0; i < 3; i++) {
         volume->extinction[i] = desc->extinction[i];
         volume->source[i] = desc->source[i];

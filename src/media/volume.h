@@ -74,6 +74,7 @@ typedef struct nb_volume {
     double extinction[3], source[3], albedo[3], emission[3];
     int lit; /* albedo rather than source */
     nb_phase phase;
+    nebel_phase described_phase; /* the same as it was given */
     size_t leaf_count, face_count, step_count;
     nb_leaf *leaves;
     nb_face *faces;
