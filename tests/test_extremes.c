@@ -142,7 +142,7 @@ static void make_density(scene *s, const nebel_shape *shape, nebel_density *d)
     const int round = shape->type == NEBEL_SHAPE_SPHERE || shape->type == NEBEL_SHAPE_ELLIPSOID;
     const int has_edge = shape->type != NEBEL_SHAPE_WORLD && shape->type < NEBEL_SHAPE_UNION;
     do {
-        d->type = (nebel_density_type)dice_below(&s->state, NEBEL_DENSITY_COUNT);
+        d->type = (nebel_density_type)dice_below(&s->state, NEBEL_DENSITY_GRID);
     } while ((d->type == NEBEL_DENSITY_RADIAL && !round) || (d->type == NEBEL_DENSITY_SOFT_EDGE && !has_edge));
     d->below = one_in(s, 2) ? NEBEL_BELOW_GROW : NEBEL_BELOW_CONSTANT;
     d->base = coordinate(s);

@@ -200,7 +200,7 @@ static int has_soft_edge(nebel_shape_type type)
 static nebel_volume_desc volume_of(int which)
 {
     const nebel_shape_type type = (nebel_shape_type)(which % NEBEL_SHAPE_COUNT);
-    nebel_density_type density = (nebel_density_type)(which / NEBEL_SHAPE_COUNT % NEBEL_DENSITY_COUNT);
+    nebel_density_type density = (nebel_density_type)(which / NEBEL_SHAPE_COUNT % NEBEL_DENSITY_GRID);
     const int is_ball = type == NEBEL_SHAPE_SPHERE || type == NEBEL_SHAPE_ELLIPSOID;
     if (density == NEBEL_DENSITY_RADIAL && !is_ball) density = NEBEL_DENSITY_CONSTANT;
     if (density == NEBEL_DENSITY_SOFT_EDGE && !has_soft_edge(type)) density = NEBEL_DENSITY_GAUSSIAN;
@@ -216,7 +216,7 @@ static nebel_volume_desc volume_of(int which)
     return v;
 }
 
-enum { KINDS = (int)NEBEL_SHAPE_COUNT * (int)NEBEL_DENSITY_COUNT };
+enum { KINDS = (int)NEBEL_SHAPE_COUNT * (int)NEBEL_DENSITY_GRID };
 
 /* Now and then what takes the fog of others away. */
 static void make_cover(nebel_volume_desc *volume)

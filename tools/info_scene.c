@@ -9,8 +9,8 @@
 static const char *const shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_space", "box",         "sphere",
                                                            "ellipsoid", "cylinder",   "capsule",     "cone",
                                                            "convex",    "union",      "intersection"};
-static const char *const density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",   "linear",
-                                                               "radial",   "gaussian", "soft_edge"};
+static const char *const density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",    "linear", "radial",
+                                                               "gaussian", "soft_edge", "grid"};
 
 enum { X, Y, Z };
 

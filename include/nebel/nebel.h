@@ -174,8 +174,50 @@ typedef struct nebel_shape {
 #define NEBEL_MAX_LEAVES 1024
 #define NEBEL_MAX_DEPTH 16
 
-/* What fraction of the stated extinction a place has. Height, linear and gaussian are in world coordinates; radial and
- * soft edge follow the shape and its transform. */
+/* Voxels: measured or simulated densities. Immutable, owned by whoever retains it. */
+typedef struct nebel_grid nebel_grid;
+
+typedef enum nebel_voxel_type {
+    NEBEL_VOXEL_FLOAT = 0,
+    NEBEL_VOXEL_UINT8, /* 0 to 255 stand for 0 to 1 */
+    NEBEL_VOXEL_UINT16 /* 0 to 65535 stand for 0 to 1 */
+} nebel_voxel_type;
+
+typedef enum nebel_filter {
+    NEBEL_FILTER_LINEAR = 0, /* trilinear between the middles of voxels; level from the outermost middles outwards */
+    NEBEL_FILTER_NEAREST     /* each voxel is of one density */
+} nebel_filter;
+
+#define NEBEL_MAX_GRID_SIZE 4096         /* voxels along an axis */
+#define NEBEL_MAX_GRID_VOXELS 1073741824 /* voxels in all */
+
+/* A grid of n voxels along an axis cuts the box of its volume into n equal parts, the first one at the box's `min`: the
+ * value of a voxel is that of the middle of its part. A voxel of the index i of OpenVDB, whose value is at i, goes from
+ * i - 1/2 to i + 1/2 in index space; that of a 3D texture of size n from i / n to (i + 1) / n. */
+typedef struct nebel_grid_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    size_t size[3]; /* voxels along x, y and z of the box, 1 to NEBEL_MAX_GRID_SIZE */
+    nebel_voxel_type type;
+    const void *voxels; /* size[0] * size[1] * size[2] of them, x fastest, then y; copied */
+    double scale;       /* density = offset + scale * voxel, 0 to 1e9 for every voxel; scale 0: 1 */
+    double offset;
+    nebel_filter filter;
+} nebel_grid_desc;
+
+/* Makes a grid in *grid, with one owner; on an error *grid is NULL. The allocator must be usable as long as the grid
+ * lives. Memory: the voxels and 16 bytes for each block of 8 x 8 x 8. Cost: linear in the voxels. Any thread.
+ * Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
+nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
+
+/* One more owner of the grid; any thread. Returns its argument. */
+nebel_grid *nebel_retain_grid(nebel_grid *grid);
+
+/* One owner less; the last one frees it. Any thread. NULL is fine. */
+void nebel_release_grid(nebel_grid *grid);
+
+/* What fraction of the stated extinction a place has. Height, linear and gaussian are in world coordinates; radial,
+ * soft edge and grid follow the shape and its transform. */
 typedef enum nebel_density_type {
     NEBEL_DENSITY_CONSTANT = 0,
     NEBEL_DENSITY_HEIGHT,    /* exp(-(y - base) / scale_height); `below` says what holds under the base. At most 1e18,
@@ -184,6 +226,7 @@ typedef enum nebel_density_type {
     NEBEL_DENSITY_RADIAL,    /* (1 - r^2)^power, r = 1 on the surface; sphere and ellipsoid only */
     NEBEL_DENSITY_GAUSSIAN,  /* exp(-r^2 / (2 sigma^2)) around center */
     NEBEL_DENSITY_SOFT_EDGE, /* 0 on the surface, 1 from `distance` within: see below; not world or groups */
+    NEBEL_DENSITY_GRID,      /* voxels that fill a box: see nebel_grid_desc; boxes only */
     NEBEL_DENSITY_COUNT
 } nebel_density_type;
 
@@ -220,6 +263,7 @@ typedef struct nebel_density {
     double center[3];      /* gaussian: m */
     double sigma;          /* gaussian: m, > 0 */
     double distance;       /* soft edge: m in the shape's own coordinates, > 0 */
+    nebel_grid *grid;      /* grid: not NULL; a volume becomes one more owner of it */
 } nebel_density;
 
 /* What part of the light that fog scatters goes into which direction. The cosine of the angle by which light is turned

@@ -618,6 +618,7 @@ static nebel_result add_part(nb_fog_bound *bound, const mixture *m, size_t leave
 static int is_known_density(const nb_volume *body)
 {
     const nb_leaf *const leaf = &body->leaves[0];
+    if (body->density.type == NEBEL_DENSITY_GRID) return 0;
     if (body->density.type != NEBEL_DENSITY_SOFT_EDGE) return 1;
     return leaf->type == NB_LEAF_BALL || leaf->type == NB_LEAF_BOX ||
            (leaf->type == NB_LEAF_PLANES && leaf->face_count <= MOST_SOFT_PLANES);

@@ -1,6 +1,7 @@
 #include "snapshot.h"
 
 #include "fog.h"
+#include "media/grid.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -20,6 +21,11 @@ static double proportion_of(const nb_volume *v)
     return most;
 }
 
+static double densest_of(const nebel_density *density)
+{
+    return density->type == NEBEL_DENSITY_GRID ? nb_grid_peak(density->grid) : 1;
+}
+
 static void light_medium(nb_medium *medium, const double ambient[3], const nebel_sun *sun)
 {
     const nb_volume *v = &medium->body;
@@ -32,6 +38,8 @@ static void light_medium(nb_medium *medium, const double ambient[3], const nebel
         medium->shine[c] = v->albedo[c] * sun->irradiance[c];
         medium->is_sunlit = medium->is_sunlit || medium->shine[c] * v->extinction[c] > 0;
     }
+    medium->densest *= densest_of(&v->density);
+    medium->brightest *= densest_of(&v->density);
     medium->proportion = proportion_of(v);
 }
 

@@ -12,8 +12,8 @@ typedef struct nb_medium {
     nb_volume body;
     double radiance[3]; /* of opaque fog: source, or albedo times ambient */
     double light[3];    /* radiance * extinction + emission: radiance per metre at density 1 */
-    double densest;     /* largest channel of the extinction */
-    double brightest;   /* largest channel of light */
+    double densest;     /* largest extinction of any channel anywhere */
+    double brightest;   /* the same of light */
     double proportion;  /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
                            for margins */
     int emits;

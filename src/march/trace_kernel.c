@@ -12,6 +12,8 @@
 
 #include "trace_kernel.h"
 
+#include "media/grid.h"
+
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"

@@ -21,6 +21,8 @@ static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
         return nb_min(nb_radial_density(k->level, nearest, density->power) + k->noise, NB_F(1.0));
     case NEBEL_DENSITY_SOFT_EDGE:
         return nb_min(soft_edge_density(k, t) + soft_edge_rise(k, slack) + soft_edge_noise(k, t), NB_F(1.0));
+    case NEBEL_DENSITY_GRID:
+        return REAL(nb_grid_peak(density->grid));
     default:
         return NB_F(1.0);
     }

@@ -114,6 +114,20 @@ static nb_wide soft_edge_ceiling(const contact *k, nb_wide middle, nb_wide along
     return is_round(leaf) ? round_edge_ceiling(k, middle, along) : box_edge_ceiling(k, middle, along);
 }
 
+static nb_real grid_ceiling(const contact *k, nb_wide middle, nb_real along)
+{
+    const grid_lines lines = lines_from(k, middle);
+    nb_scalar value[NB_WIDTH], width[NB_WIDTH];
+    nb_store_lanes(width, along);
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        const nb_grid_line line = line_of_lane(&lines, i);
+        double reach[3];
+        for (int c = 0; c < 3; c++) reach[c] = fabs(line.slope[c]) * (double)width[i];
+        value[i] = (nb_scalar)fmin(nb_grid_ceiling(k->medium->body.density.grid, line.from, reach), 1e30);
+    }
+    return nb_load_lanes(value);
+}
+
 /* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that
  * stays level is the same number on all of it. */
 static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, nb_real across)
@@ -143,6 +157,8 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
     }
     case NEBEL_DENSITY_SOFT_EDGE:
         return nb_narrow(soft_edge_ceiling(k, middle, nb_widen(along)));
+    case NEBEL_DENSITY_GRID:
+        return grid_ceiling(k, middle, along);
     default:
         return NB_F(1.0);
     }
@@ -274,6 +290,7 @@ static int is_polynomial(const nebel_density *density)
     case NEBEL_DENSITY_CONSTANT:
     case NEBEL_DENSITY_LINEAR:
     case NEBEL_DENSITY_SOFT_EDGE:
+    case NEBEL_DENSITY_GRID:
         return 1;
     case NEBEL_DENSITY_RADIAL:
         return density->power <= 2;

@@ -363,6 +363,20 @@ static void soft_edge_contact(contact *k, const packet *rays, const nb_leaf *lea
         round_edge_contact(k, rays, leaf);
 }
 
+/* The ray in cells of the grid. */
+static void grid_contact(contact *k, const packet *rays, const nb_leaf *leaf)
+{
+    double rate[3];
+    const nebel_grid *grid = k->medium->body.density.grid;
+    const local_ray local = localize(rays, leaf);
+    const nb_wide margin = WIDE(nb_grid_margin(grid));
+    nb_grid_rate(grid, leaf->low, leaf->high, rate);
+    const nb_wvec3 p = nb_wsub3(local.p, wide_vector(leaf->low));
+    k->offset = nb_wvec3(margin + p.x * WIDE(rate[0]), margin + p.y * WIDE(rate[1]), margin + p.z * WIDE(rate[2]));
+    k->slope = nb_wvec3(local.d.x * WIDE(rate[0]), local.d.y * WIDE(rate[1]), local.d.z * WIDE(rate[2]));
+    k->noise = nb_narrow(local.reach * WIDE(fmin(fmax(fmax(rate[0], rate[1]), rate[2]), 1e18)));
+}
+
 static void profile_contact(contact *k, const packet *rays)
 {
     const nb_volume *body = &k->medium->body;
@@ -381,6 +395,9 @@ static void profile_contact(contact *k, const packet *rays)
         break;
     case NEBEL_DENSITY_SOFT_EDGE:
         soft_edge_contact(k, rays, &body->leaves[0], body->density.distance);
+        break;
+    case NEBEL_DENSITY_GRID:
+        grid_contact(k, rays, &body->leaves[0]);
         break;
     default:
         break;
@@ -495,6 +512,76 @@ static nb_estimate planes_edge_integral(const contact *k, nb_wide start, nb_real
     return nb_estimate_of(value, error + value * (NB_F(16.0) * NB_EPSILON));
 }
 
+/* ---- grids: one lane after the other, in double, so that lanes agree with rays alone --------- */
+
+/* The ray from t on, in cells, of all lanes. */
+typedef struct grid_lines {
+    double from[3][NB_WIDTH], slope[3][NB_WIDTH];
+} grid_lines;
+
+static grid_lines lines_from(const contact *k, nb_wide t)
+{
+    grid_lines lines;
+    nb_wstore_lanes(lines.from[0], k->offset.x + k->slope.x * t);
+    nb_wstore_lanes(lines.from[1], k->offset.y + k->slope.y * t);
+    nb_wstore_lanes(lines.from[2], k->offset.z + k->slope.z * t);
+    nb_wstore_lanes(lines.slope[0], k->slope.x);
+    nb_wstore_lanes(lines.slope[1], k->slope.y);
+    nb_wstore_lanes(lines.slope[2], k->slope.z);
+    return lines;
+}
+
+static nb_grid_line line_of_lane(const grid_lines *lines, size_t i)
+{
+    return (nb_grid_line){{lines->from[0][i], lines->from[1][i], lines->from[2][i]},
+                          {lines->slope[0][i], lines->slope[1][i], lines->slope[2][i]}};
+}
+
+static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end)
+{
+    const grid_lines lines = lines_from(k, start);
+    double length[NB_WIDTH];
+    nb_scalar value[NB_WIDTH], error[NB_WIDTH], noise[NB_WIDTH];
+    nb_wstore_lanes(length, end - start);
+    nb_store_lanes(noise, k->noise);
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        value[i] = error[i] = 0;
+        if (!nb_lane(k->inside, i)) continue;
+        const nb_grid_line line = line_of_lane(&lines, i);
+        const nb_grid_sum sum = nb_grid_integral(k->medium->body.density.grid, &line, length[i], (double)noise[i]);
+        value[i] = (nb_scalar)sum.value;
+        error[i] = (nb_scalar)sum.error;
+    }
+    const nb_real rounded = nb_load_lanes(value);
+    return nb_estimate_of(rounded, nb_load_lanes(error) + rounded * (NB_F(4.0) * NB_EPSILON));
+}
+
+static nb_real grid_density(const contact *k, nb_wide t)
+{
+    const grid_lines lines = lines_from(k, t);
+    nb_scalar value[NB_WIDTH];
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        const nb_grid_line line = line_of_lane(&lines, i);
+        value[i] = (nb_scalar)nb_grid_density(k->medium->body.density.grid, line.from);
+    }
+    return nb_load_lanes(value);
+}
+
+static nb_wide grid_kink(const contact *k, nb_wide t)
+{
+    const grid_lines lines = lines_from(k, t);
+    double distance[NB_WIDTH], place[NB_WIDTH];
+    nb_wstore_lanes(place, t);
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        distance[i] = 1e18;
+        if (!nb_lane(k->inside, i)) continue;
+        const nb_grid_line line = line_of_lane(&lines, i);
+        const double least = fabs(place[i]) * (16 * DBL_EPSILON);
+        distance[i] = fmin(nb_grid_kink(k->medium->body.density.grid, &line, least), 1e18);
+    }
+    return t + nb_wload_lanes(distance);
+}
+
 /* ---- any profile ---------------------------------------------------------------------------- */
 
 static nb_real soft_edge_density(const contact *k, nb_wide t)
@@ -557,6 +644,8 @@ static nb_real contact_density(const contact *k, nb_wide t)
         return nb_radial_density(k->level, coordinate(k, t), density->power);
     case NEBEL_DENSITY_SOFT_EDGE:
         return soft_edge_density(k, t);
+    case NEBEL_DENSITY_GRID:
+        return grid_density(k, t);
     default:
         return NB_F(1.0);
     }
@@ -630,6 +719,8 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end
         return linear_integral(k, start, end, h);
     case NEBEL_DENSITY_SOFT_EDGE:
         return soft_edge_integral(k, start, h);
+    case NEBEL_DENSITY_GRID:
+        return grid_integral(k, start, end);
     default:
         return blur(nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON)), k->noise, h);
     }
@@ -640,6 +731,7 @@ static nb_wide contact_kink(const contact *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_SOFT_EDGE) return soft_edge_kink(k, t);
+    if (density->type == NEBEL_DENSITY_GRID) return grid_kink(k, t);
     const int linear = density->type == NEBEL_DENSITY_LINEAR;
     if (!linear && !(density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)) return NB_WFAR;
     const nb_wide inverse = nb_wrcp_bounded(k->slope.x);

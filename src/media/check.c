@@ -202,6 +202,9 @@ static nebel_result check_density(const nebel_log *log, const nebel_density *den
             shape->type == NEBEL_SHAPE_INTERSECTION)
             return bad(log, "soft edge", "needs a shape with a surface that is no union or intersection");
         return is_extent(density->distance) ? NEBEL_OK : bad(log, "soft edge distance", EXTENT_RULE);
+    case NEBEL_DENSITY_GRID:
+        if (density->grid == NULL) return nb_fail(log, NEBEL_ERROR_ARGUMENT, "grid density: grid must not be NULL");
+        return shape->type == NEBEL_SHAPE_BOX ? NEBEL_OK : bad(log, "grid density", "needs a box");
     default:
         return nb_fail(log, NEBEL_ERROR_ARGUMENT, "density: type %d is unknown", (int)density->type);
     }

@@ -1,5 +1,7 @@
 #include "density.h"
 
+#include "grid.h"
+
 #include <math.h>
 
 #define NB_DOUBLE
@@ -164,6 +166,18 @@ static double gaussian_density(const nebel_density *density, const double place[
     return nb_gaussian_density(square_distance(place, density->center) / (2 * density->sigma * density->sigma), 0);
 }
 
+static double grid_density(const nb_volume *volume, const double place[3])
+{
+    double rate[3], cells[3];
+    const nebel_grid *grid = volume->density.grid;
+    const nb_leaf *box = &volume->leaves[0];
+    const nb_wvec3 p = to_leaf(box, place);
+    const double at[3] = {(double)p.x, (double)p.y, (double)p.z};
+    nb_grid_rate(grid, box->low, box->high, rate);
+    for (int i = 0; i < 3; i++) cells[i] = nb_grid_margin(grid) + (at[i] - box->low[i]) * rate[i];
+    return nb_grid_density(grid, cells);
+}
+
 double nb_density_within(const nb_volume *volume, const double place[3])
 {
     const nebel_density *density = &volume->density;
@@ -178,6 +192,8 @@ double nb_density_within(const nb_volume *volume, const double place[3])
         return gaussian_density(density, place);
     case NEBEL_DENSITY_SOFT_EDGE:
         return edge_density(volume, place);
+    case NEBEL_DENSITY_GRID:
+        return grid_density(volume, place);
     default:
         return 1;
     }
@@ -228,6 +244,8 @@ double nb_density_most(const nb_volume *volume, const nb_line *line, double from
     case NEBEL_DENSITY_GAUSSIAN:
         place_at(line, fmin(fmax(along_line(line, density->center), from), to), place);
         return gaussian_density(density, place);
+    case NEBEL_DENSITY_GRID:
+        return nb_grid_peak(density->grid);
     default:
         return 1;
     }

@@ -3,6 +3,7 @@
 #include "affine.h"
 #include "base/precision.h"
 #include "check.h"
+#include "grid.h"
 #include "leaf.h"
 
 #include <math.h>
@@ -122,6 +123,9 @@ static nebel_density resolve_density(const nebel_density *from)
     case NEBEL_DENSITY_SOFT_EDGE:
         to.distance = from->distance;
         break;
+    case NEBEL_DENSITY_GRID:
+        to.grid = nebel_retain_grid(from->grid);
+        break;
     default:
         break;
     }
@@ -203,6 +207,7 @@ int nb_volume_copy(const nebel_allocator *allocator, const nb_volume *from, nb_v
 {
     *to = *from;
     if (!allocate_arrays(allocator, to)) return 0;
+    nebel_retain_grid(to->density.grid);
     memcpy(to->leaves, from->leaves, from->leaf_count * sizeof *from->leaves);
     if (from->face_count > 0) memcpy(to->faces, from->faces, from->face_count * sizeof *from->faces);
     memcpy(to->steps, from->steps, from->step_count * sizeof *from->steps);
@@ -212,6 +217,8 @@ int nb_volume_copy(const nebel_allocator *allocator, const nb_volume *from, nb_v
 void nb_volume_free(const nebel_allocator *allocator, nb_volume *volume)
 {
     nb_release(allocator, volume->leaves);
+    nebel_release_grid(volume->density.grid);
+    volume->density.grid = NULL;
     volume->leaves = NULL;
     volume->faces = NULL;
     volume->steps = NULL;
@@ -237,7 +244,8 @@ static int compare_density(const nebel_density *a, const nebel_density *b)
     const double y[] = {(double)b->type, (double)b->below, b->base,  b->scale_height, b->from[0], b->from[1],
                         b->from[2],      b->to[0],         b->to[1], b->to[2],        b->power,   b->center[0],
                         b->center[1],    b->center[2],     b->sigma, b->distance};
-    return compare_numbers(x, y, sizeof x / sizeof *x);
+    const int order = compare_numbers(x, y, sizeof x / sizeof *x);
+    return order == 0 ? nb_grid_compare(a->grid, b->grid) : order;
 }
 
 static int compare_quads(const nb_quad *a, const nb_quad *b, size_t n)

@@ -19,7 +19,7 @@ enum { TYPE_COUNT = sizeof type_names / sizeof *type_names };
     }
 
 /* In the order of nebel_density_type. */
-static const nb_keys density_keys[NEBEL_DENSITY_COUNT] = {
+static const nb_keys density_keys[NEBEL_DENSITY_GRID] = {
     DENSITY_KEYS(0, 0, "a constant density"),
     DENSITY_KEYS(NB_BIT(SCALE_HEIGHT), NB_BIT(BASE) | NB_BIT(BELOW), "a height density"),
     DENSITY_KEYS(NB_BIT(FROM) | NB_BIT(TO), 0, "a linear density"),
@@ -36,7 +36,7 @@ static bool fail_shape(nb_json *json, const nb_json_node *node, const char *want
 
 static bool check_type(nb_json *json, const nb_json_node *node, int type, nebel_shape_type shape)
 {
-    if (type >= NEBEL_DENSITY_COUNT)
+    if (type >= NEBEL_DENSITY_GRID)
         return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node,
                             "this version has no \"%s\" densities; use one of the others", type_names[type]);
     if (type == NEBEL_DENSITY_RADIAL && shape != NEBEL_SHAPE_SPHERE && shape != NEBEL_SHAPE_ELLIPSOID)

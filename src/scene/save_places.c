@@ -94,8 +94,8 @@ const nb_place nb_height_field_places[] = {
 const char *const nb_shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_space", "box",         "sphere",
                                                        "ellipsoid", "cylinder",   "capsule",     "cone",
                                                        "convex",    "union",      "intersection"};
-const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",   "linear",
-                                                           "radial",   "gaussian", "soft_edge"};
+const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",    "linear", "radial",
+                                                           "gaussian", "soft_edge", "grid"};
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
 const char *const nb_profile_names[NEBEL_PARTICLE_COUNT] = {"soft", "gaussian", "ball"};

@@ -260,6 +260,13 @@ static size_t count_words(const nebel_snapshot *snapshot)
     return count;
 }
 
+static int has_grid(const nebel_snapshot *snapshot)
+{
+    for (size_t i = 0; i < snapshot->medium_count; i++)
+        if (snapshot->media[i].body.density.type == NEBEL_DENSITY_GRID) return 1;
+    return 0;
+}
+
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
                             size_t *count)
 {
@@ -273,6 +280,9 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     if (snapshot->is_sunlit)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
                        "pack: shaders cannot light fog with the sun yet; give volumes a source instead of an albedo");
+    if (has_grid(snapshot))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot read grids yet; use nebel_trace, or a density of another type");
     *count = count_words(snapshot);
     if (*count > MOST_WORDS)
         return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,

@@ -42,7 +42,7 @@ static nebel_volume_desc make_volume(int number)
                                               NEBEL_SHAPE_HALF_SPACE};
     nebel_volume_desc v = {
         .shape = {.type = shapes[number % 7]},
-        .density = {.type = (nebel_density_type)(number / 7 % NEBEL_DENSITY_COUNT), .power = 1 + number % 3}};
+        .density = {.type = (nebel_density_type)(number / 7 % NEBEL_DENSITY_GRID), .power = 1 + number % 3}};
     v.shape.radius = uniform(1, 3);
     v.density.scale_height = uniform(.5, 3);
     v.density.sigma = uniform(1, 2);

@@ -333,7 +333,7 @@ static int is_same_density(const nebel_density *a, const nebel_density *b)
 {
     return a->type == b->type && a->below == b->below && a->power == b->power &&
            HAS_SAME(a, b, nebel_density, base, power) && HAS_SAME(a, b, nebel_density, center, distance) &&
-           a->distance == b->distance;
+           a->distance == b->distance && a->grid == b->grid;
 }
 
 static int is_same_phase(const nebel_phase *a, const nebel_phase *b)

@@ -118,6 +118,7 @@ void fit_density(nebel_volume_desc *volume)
     const bool is_round = shape == NEBEL_SHAPE_SPHERE || shape == NEBEL_SHAPE_ELLIPSOID;
     const bool has_edge = shape != NEBEL_SHAPE_WORLD && shape != NEBEL_SHAPE_UNION && shape != NEBEL_SHAPE_INTERSECTION;
     if ((volume->density.type == NEBEL_DENSITY_RADIAL && !is_round) ||
+        (volume->density.type == NEBEL_DENSITY_GRID && shape != NEBEL_SHAPE_BOX) ||
         (volume->density.type == NEBEL_DENSITY_SOFT_EDGE && !has_edge))
         volume->density.type = NEBEL_DENSITY_CONSTANT;
 }

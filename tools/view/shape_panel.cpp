@@ -265,7 +265,8 @@ bool draw_density(nebel_density *density, const double place[3], double reach)
 {
     static const char *const names[] = {"constant", "height", "linear", "radial", "gaussian", "soft edge"};
     int type = density->type;
-    bool changed = choose("density", &type, names, NEBEL_DENSITY_COUNT,
+    if (type == NEBEL_DENSITY_GRID) return false; // its voxels are those of a file
+    bool changed = choose("density", &type, names, NEBEL_DENSITY_GRID,
                           "How thick the fog is from place to place. Radial is for spheres and ellipsoids; a soft edge "
                           "is not for the world, unions and intersections.");
     if (changed) {

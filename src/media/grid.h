@@ -1,0 +1,50 @@
+/* Voxels as the core keeps them, and what a ray meets in them.
+ *
+ * A ray is seen in cells: places where the density is one polynomial. With nearest voxels these are the voxels, n
+ * along an axis; with linear ones the cubes between the middles of eight voxels, n + 1, of which the outermost are
+ * half outside. A box of fog has its low corner at `margin` and its high one at n + margin. Everything here is
+ * computed one ray after the other in double, so that no instruction set can differ. */
+#ifndef NB_MEDIA_GRID_H
+#define NB_MEDIA_GRID_H
+
+#include <nebel/nebel.h>
+
+#include <stdint.h>
+
+/* Where the box begins, in cells. */
+double nb_grid_margin(const nebel_grid *grid);
+
+/* Cells per unit of a box's coordinates along each axis, finite for the thinnest box. */
+void nb_grid_rate(const nebel_grid *grid, const double low[3], const double high[3], double rate[3]);
+
+/* The largest density anywhere. */
+double nb_grid_peak(const nebel_grid *grid);
+
+/* A total order on what grids are, whatever their addresses. NULL is the least. */
+int nb_grid_compare(const nebel_grid *a, const nebel_grid *b);
+
+/* A ray in cells: from + slope t, t in metres. */
+typedef struct nb_grid_line {
+    double from[3], slope[3];
+} nb_grid_line;
+
+typedef struct nb_grid_sum {
+    double value; /* the integral of the density [m] */
+    double error; /* by how much it may be off */
+} nb_grid_sum;
+
+/* The density integrated from 0 to `length` metres. `noise`: by how many cells each coordinate may be off. */
+nb_grid_sum nb_grid_integral(const nebel_grid *grid, const nb_grid_line *line, double length, double noise);
+
+/* The density at a place. */
+double nb_grid_density(const nebel_grid *grid, const double place[3]);
+
+/* How far it is to where the ray enters a cell of another polynomial, at least `least`; HUGE_VAL where it never does.
+ * Whole bricks of one density are one cell. */
+double nb_grid_kink(const nebel_grid *grid, const nb_grid_line *line, double least);
+
+/* A bound of |density| where each coordinate is a complex number within `reach` of the place, with the polynomial that
+ * holds at the place. */
+double nb_grid_ceiling(const nebel_grid *grid, const double place[3], const double reach[3]);
+
+#endif
