@@ -21,6 +21,10 @@ BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [],
        '{"nebel": 1, "fog": [{"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 0}, "extinction": 1}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "operation": "exclude", "extinction": 1}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "contrast": 0.1}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "preset": "fog"}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "preset": "mist", "contrast": 0.1}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "preset": "mist", "extinction": 1, "visibility": 2}]}',
+       '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "preset": "mist", "source": 1, "phase": {"type": "rayleigh"}}]}',
        '{"nebel": 1, "fog": [], "camera": {"vertical_fov": 180}}',
        '{"nebel": 1, "fog": [], "models": [{"file": "a", "scale": 0}]}',
        '{"nebel": 1, "fog": [], "models": [{}]}',
@@ -49,7 +53,8 @@ def reader_names():
     for name in READERS:
         for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
             found |= set(re.findall(r'"([A-Za-z_3]+)"', table))
-    return found - REFUSED
+    presets = (ROOT / "src/media/presets.c").read_text()
+    return found - REFUSED | set(re.findall(r'\.name = "(\w+)"', presets))
 
 
 def schema_names(node):

@@ -496,21 +496,22 @@ static void test_good_scenes(void **state)
 {
     (void)state;
     static const char *const names[] = {
-        "examples/scenes/cells-grouped",  "examples/scenes/cells-portals", "examples/scenes/cells-printed",
-        "examples/scenes/cells-seam",     "examples/scenes/clearing",      "examples/scenes/forty-volumes",
-        "examples/scenes/glowing-sphere", "examples/scenes/ground-fog",    "examples/scenes/linear-plane",
-        "examples/scenes/linear-radial",  "examples/scenes/morning-mist",  "examples/scenes/nebula",
-        "examples/scenes/soft-edges",     "examples/scenes/vertex-coarse", "examples/scenes/vertex-sphere",
-        "examples/engines/bevy",          "examples/engines/godot",        "examples/engines/hdrp",
-        "examples/engines/unreal",        "fuzz/corpus/scene/camera_keys", "fuzz/corpus/scene/capsule",
-        "fuzz/corpus/scene/cells",        "fuzz/corpus/scene/classic",     "fuzz/corpus/scene/colors",
-        "fuzz/corpus/scene/cone",         "fuzz/corpus/scene/contract",    "fuzz/corpus/scene/convex",
-        "fuzz/corpus/scene/cylinder",     "fuzz/corpus/scene/ellipsoid",   "fuzz/corpus/scene/every_import",
-        "fuzz/corpus/scene/every_key",    "fuzz/corpus/scene/fog_keys",    "fuzz/corpus/scene/half_space",
-        "fuzz/corpus/scene/heightfield",  "fuzz/corpus/scene/import",      "fuzz/corpus/scene/linear",
-        "fuzz/corpus/scene/minimal",      "fuzz/corpus/scene/nebula",      "fuzz/corpus/scene/numbers",
-        "fuzz/corpus/scene/soft_edge",    "fuzz/corpus/scene/space",       "fuzz/corpus/scene/sphere_radial",
-        "fuzz/corpus/scene/text",         "fuzz/corpus/scene/turntable",   "fuzz/corpus/scene/union",
+        "examples/scenes/cells-grouped",   "examples/scenes/cells-portals", "examples/scenes/cells-printed",
+        "examples/scenes/cells-seam",      "examples/scenes/clearing",      "examples/scenes/forty-volumes",
+        "examples/scenes/glowing-sphere",  "examples/scenes/ground-fog",    "examples/scenes/linear-plane",
+        "examples/scenes/linear-radial",   "examples/scenes/morning-mist",  "examples/scenes/nebula",
+        "examples/scenes/soft-edges",      "examples/scenes/vertex-coarse", "examples/scenes/vertex-sphere",
+        "examples/engines/bevy",           "examples/engines/godot",        "examples/engines/hdrp",
+        "examples/engines/unreal",         "fuzz/corpus/scene/camera_keys", "fuzz/corpus/scene/capsule",
+        "fuzz/corpus/scene/cells",         "fuzz/corpus/scene/classic",     "fuzz/corpus/scene/colors",
+        "fuzz/corpus/scene/cone",          "fuzz/corpus/scene/contract",    "fuzz/corpus/scene/convex",
+        "fuzz/corpus/scene/presets",       "fuzz/corpus/scene/cylinder",    "fuzz/corpus/scene/ellipsoid",
+        "fuzz/corpus/scene/every_import",  "fuzz/corpus/scene/every_key",   "fuzz/corpus/scene/fog_keys",
+        "fuzz/corpus/scene/half_space",    "fuzz/corpus/scene/heightfield", "fuzz/corpus/scene/import",
+        "fuzz/corpus/scene/linear",        "fuzz/corpus/scene/minimal",     "fuzz/corpus/scene/nebula",
+        "fuzz/corpus/scene/numbers",       "fuzz/corpus/scene/soft_edge",   "fuzz/corpus/scene/space",
+        "fuzz/corpus/scene/sphere_radial", "fuzz/corpus/scene/text",        "fuzz/corpus/scene/turntable",
+        "fuzz/corpus/scene/union",
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[512];

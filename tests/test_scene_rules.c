@@ -273,7 +273,7 @@ static void test_what_no_volume_has(void **state)
         {FORMAT, "{\"nebel\": 1, \"fog\": [`{\"extinction\": 1}]}",
          "fog[0]: the key \"shape\" is missing; a volume needs it"},
         {FORMAT, "{\"nebel\": 1, \"fog\": [{" WORLD ", \"extinction\": 1}, `{" WORLD "}]}",
-         "fog[1]: the amount is missing; give one of extinction, mean_free_path, visibility"},
+         "fog[1]: the amount is missing; give one of extinction, mean_free_path, visibility, or a preset"},
         {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"visibility\": 2"), "fog[0].visibility: the amount is given twice"},
         {FORMAT, FOG(WORLD ", \"extinction\": [1, 1, `-1]"),
          "fog[0].extinction[2]: is -1; must be an amount from 0 to 1e9 per metre"},
@@ -294,6 +294,20 @@ static void test_what_no_volume_has(void **state)
         {FORMAT, LIT("\"emission\": `-1"), "fog[0].emission: is -1; must be an amount from 0 to 1e9 per metre"},
         {FORMAT, LIT("\"albedo\": [0, `1.1, 0]"), "fog[0].albedo[1]: is 1.1; must be a number from 0 to 1"},
         {FORMAT, LIT("`\"phase\": {\"type\": \"rayleigh\"}"), "fog[0].phase: belongs to \"albedo\""},
+        {FORMAT, LIT("\"preset\": `\"fog\""),
+         "fog[0].preset: unknown; must be one of: heavy_advection, moderate_advection, heavy_radiation, "
+         "moderate_radiation, mist, haze, smoke, black_smoke"},
+        {FORMAT, LIT("\"preset\": `\"heavy_radiaton\""),
+         "fog[0].preset: unknown; must be one of: heavy_advection, moderate_advection, heavy_radiation, "
+         "moderate_radiation, mist, haze, smoke, black_smoke; did you mean \"heavy_radiation\"?"},
+        {FORMAT, LIT("\"preset\": `1"), "fog[0].preset: is a number; must be a string"},
+        {FORMAT, LIT("\"preset\": \"mist\", \"source\": 1, `\"phase\": {\"type\": \"rayleigh\"}"),
+         "fog[0].phase: belongs to \"albedo\""},
+        {FORMAT, FOG(WORLD ", \"preset\": \"mist\", `\"contrast\": 0.1"), "fog[0].contrast: belongs to \"visibility\""},
+        {FORMAT, FOG(WORLD ", \"preset\": \"mist\", \"keys\": [{\"frame\": 0, `\"preset\": \"haze\"}]"),
+         "fog[0].keys[0].preset: unknown key"},
+        {FORMAT, FOG(WORLD ", \"preset\": \"mist\", \"keys\": [{\"frame\": 0, `\"source\": 1}]"),
+         "fog[0].keys[0].source: does not go with the volume's \"albedo\""},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": `\"mie\"}"),
          "fog[0].phase.type: unknown; must be one of: isotropic, "
          "henyey_greenstein, rayleigh, cornette_shanks, droplets"},
@@ -317,8 +331,9 @@ static void test_what_no_volume_has(void **state)
          "fog[0].extinction: unknown key; a volume with \"operation\": \"exclude\" has: name, shape, operation, "
          "priority, start, cutoff, keys"},
         {FORMAT, LIT("`\"albdo\": 1"),
-         "fog[0].albdo: unknown key; a volume has: name, shape, operation, priority, density, extinction, "
-         "mean_free_path, visibility, contrast, source, albedo, phase, emission, start, cutoff, keys; did you mean "
+         "fog[0].albdo: unknown key; a volume has: name, shape, operation, priority, density, preset, "
+         "extinction, mean_free_path, visibility, contrast, source, albedo, phase, emission, start, cutoff, keys; did "
+         "you mean "
          "\"albedo\"?"},
         {FORMAT, FOG(WORLD ", \"extinction\": 1, `\"name\": 1"),
          "fog[0].name: the key appears twice, first at line 2, column 3; remove one"},

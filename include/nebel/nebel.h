@@ -314,11 +314,6 @@ typedef struct nebel_volume_desc {
                              operation; cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
 } nebel_volume_desc;
 
-/* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) /
- * visibility. contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when
- * visibility is not > 0 or contrast not within (0, 1). Any thread. */
-double nebel_extinction_from_visibility(double visibility, double contrast);
-
 /* What part of the light goes into a direction, per steradian; over the sphere it is 1. `cosine` as above, -1 to 1.
  * NaN when the phase function or the cosine is out of range. Any thread. Sources: Henyey and Greenstein 1941; Cornette
  * and Shanks 1992; Draine 2003; droplets: Jendersie and d'Eon 2023, a fit of Mie's theory for 5 to 50 micrometres with
@@ -331,6 +326,63 @@ double nebel_phase_mean_cosine(const nebel_phase *phase);
 /* Sampling: the cosine below which `part`, 0 to 1, of the light is scattered; random parts give random cosines as the
  * phase function has them. NaN when something is out of range. Any thread. */
 double nebel_phase_sample(const nebel_phase *phase, double part);
+
+/* ---- fog as it is measured ------------------------------------------------------------------- */
+
+/* Extinction [1/m] of fog through which contrast falls to `contrast` over `visibility` metres: -ln(contrast) /
+ * visibility. contrast 0 means 0.05, the meteorological optical range of the WMO; 0.02 gives Koschmieder's. NaN when
+ * visibility is not > 0 or contrast not within (0, 1). Any thread. */
+double nebel_extinction_from_visibility(double visibility, double contrast);
+
+/* The other way round: how far one sees [m] in fog of an extinction [1/m]. NaN when the extinction is not > 0 or the
+ * contrast not within (0, 1). Any thread. */
+double nebel_visibility_from_extinction(double extinction, double contrast);
+
+/* Extinction [1/m] of fog that holds so much liquid water [g/m^3], where nothing is known of its droplets, and the other
+ * way round: 0.1447 water^0.88. Measured fogs differ from that by a factor of two. NaN when the number is not >= 0. Any
+ * thread. Source: Kunkel 1984. */
+double nebel_extinction_from_water(double water);
+double nebel_water_from_extinction(double extinction);
+
+/* The same where the effective radius of the droplets [micrometres] is known: twice their area, 3 water / (2 rho
+ * radius). Mie's theory has 3 to 10 % more for droplets of 20 to 3 micrometres. NaN when the water is not >= 0 or the radius not > 0. Any thread. */
+double nebel_extinction_from_droplets(double water, double radius);
+
+/* The radius [micrometres] of `number` droplets to the cm^3 that hold so much water [g/m^3], all of one size. NaN when
+ * either is not > 0. Any thread. */
+double nebel_droplet_radius(double water, double number);
+
+/* How many droplets of which size: scale r^power exp(-rate r^exponent) to the cm^3 and micrometre of radius r, a
+ * modified gamma distribution (Deirmendjian 1969). */
+typedef struct nebel_droplet_sizes {
+    double scale, power, rate, exponent; /* > 0, > -1, > 0, > 0 */
+} nebel_droplet_sizes;
+
+typedef struct nebel_droplet_sums {
+    double number;           /* to the cm^3 */
+    double effective_radius; /* micrometres: the third moment over the second */
+    double water;            /* g/m^3 */
+    double extinction;       /* 1/m: twice the area of the droplets */
+} nebel_droplet_sums;
+
+/* What all droplets together are, in closed form. Any thread. Errors: ARGUMENT (NULL), VALUE (a number out of range, or
+ * sums that are not finite); *sums stays as it is then. */
+nebel_result nebel_sum_droplets(const nebel_droplet_sizes *sizes, nebel_droplet_sums *sums);
+
+/* Fog with a name: what a volume takes of it, and its droplets where they are known (else all 0). */
+typedef struct nebel_preset {
+    const char *name;
+    const char *source; /* where the numbers come from */
+    nebel_droplet_sizes sizes;
+    double extinction[3]; /* 1/m at 0.65, 0.55 and 0.45 micrometres */
+    double albedo[3];
+    nebel_phase phase;
+} nebel_preset;
+
+/* heavy_advection, moderate_advection, heavy_radiation, moderate_radiation, mist, haze, smoke, black_smoke: all of them
+ * in this order, and one by its name; NULL where there is none. They live as long as the program. Any thread. */
+const nebel_preset *nebel_list_presets(size_t *count);
+const nebel_preset *nebel_find_preset(const char *name);
 
 /* ---- fog that can be edited ------------------------------------------------------------------ */
 

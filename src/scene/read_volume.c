@@ -11,6 +11,7 @@ enum {
     OPERATION,
     PRIORITY,
     DENSITY,
+    PRESET,
     EXTINCTION,
     MEAN_FREE_PATH,
     VISIBILITY,
@@ -26,14 +27,14 @@ enum {
     VOLUME_KEY_COUNT
 };
 
-static const char *const key_names[] = {
-    "name",   "shape",  "operation", "priority", "density", "extinction", "mean_free_path", "visibility", "contrast",
-    "source", "albedo", "phase",     "emission", "start",   "cutoff",     "keys",           "frame"};
+static const char *const key_names[] = {"name",       "shape",          "operation",  "priority", "density", "preset",
+                                        "extinction", "mean_free_path", "visibility", "contrast", "source",  "albedo",
+                                        "phase",      "emission",       "start",      "cutoff",   "keys",    "frame"};
 
 #define PLACE_KEYS (NB_BIT(NAME) | NB_BIT(OPERATION) | NB_BIT(PRIORITY) | NB_BIT(START) | NB_BIT(CUTOFF))
 #define EXCLUDE_KEYS (PLACE_KEYS | NB_BIT(SHAPE) | NB_BIT(KEYS))
 #define FOG_KEYS (NB_BIT(VOLUME_KEY_COUNT) - 1 - NB_BIT(FRAME))
-#define STILL_KEYS (PLACE_KEYS | NB_BIT(PHASE) | NB_BIT(KEYS))
+#define STILL_KEYS (PLACE_KEYS | NB_BIT(PRESET) | NB_BIT(PHASE) | NB_BIT(KEYS))
 #define MOVING_KEYS (FOG_KEYS - STILL_KEYS + NB_BIT(FRAME))
 
 /* In the order of nebel_operation. */
@@ -86,9 +87,11 @@ static bool check_amount_count(nb_json *json, const nb_json_node *const *found)
 
 static bool check_amount_given(nb_json *json, const nb_json_node *volume, const nb_json_node *const *found)
 {
-    if (found[EXTINCTION] != NULL || found[MEAN_FREE_PATH] != NULL || found[VISIBILITY] != NULL) return true;
+    if (found[EXTINCTION] != NULL || found[MEAN_FREE_PATH] != NULL || found[VISIBILITY] != NULL ||
+        found[PRESET] != NULL)
+        return true;
     return nb_json_fail(json, NEBEL_ERROR_FORMAT, volume,
-                        "the amount is missing; give one of extinction, mean_free_path, visibility");
+                        "the amount is missing; give one of extinction, mean_free_path, visibility, or a preset");
 }
 
 /* An amount that is not given leaves `extinction` as it is, as a contrast does. */
@@ -106,7 +109,35 @@ static bool read_amount(nb_json *json, const nb_json_node *const *found, double 
     return found[MEAN_FREE_PATH] == NULL || read_length(json, found[MEAN_FREE_PATH], 1, extinction);
 }
 
+/* ---- presets --------------------------------------------------------------------------------- */
+
+/* What other keys may replace: a source stands for the light. */
+static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_volume_desc *volume)
+{
+    enum { MOST_PRESETS = 16 };
+    const char *names[MOST_PRESETS];
+    size_t count;
+    const nebel_preset *const presets = nebel_list_presets(&count);
+    if (found[PRESET] == NULL) return true;
+    if (count > MOST_PRESETS) count = MOST_PRESETS;
+    for (size_t i = 0; i < count; i++) names[i] = presets[i].name;
+    const int choice = nb_value_choice(json, found[PRESET], names, (int)count);
+    if (choice < 0) return false;
+    const nebel_preset *const preset = &presets[choice];
+    for (int i = 0; i < 3; i++) volume->extinction[i] = preset->extinction[i] * json->unit;
+    if (found[SOURCE] != NULL) return true;
+    memcpy(volume->albedo, preset->albedo, sizeof volume->albedo);
+    volume->phase = preset->phase;
+    return true;
+}
+
 /* ---- light ----------------------------------------------------------------------------------- */
+
+/* Whether a volume has an albedo, be it 0. */
+static bool is_lit(const nb_json_node *const *found)
+{
+    return found[ALBEDO] != NULL || (found[PRESET] != NULL && found[SOURCE] == NULL);
+}
 
 static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, nebel_volume_desc *volume)
 {
@@ -114,7 +145,7 @@ static bool read_light(nb_scene_reader *in, const nb_json_node *const *found, ne
     if (found[SOURCE] != NULL && found[ALBEDO] != NULL)
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[ALBEDO],
                                 "a volume has \"source\" or \"albedo\", not both; remove one");
-    if (found[PHASE] != NULL && found[ALBEDO] == NULL)
+    if (found[PHASE] != NULL && !is_lit(found))
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[PHASE], "belongs to \"albedo\", which is absent");
     if (!nb_value_color(json, found[SOURCE], &nb_range_light, volume->source) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
@@ -180,10 +211,10 @@ static bool keep_volume(nb_scene_reader *in, const nb_json_node *node, const neb
 /* A volume is lit in one way at all frames, so that it is in between, too. */
 static bool check_light_key(nb_json *json, const nb_json_node *const *entry, const nb_json_node *const *found)
 {
-    if (found[SOURCE] != NULL && entry[ALBEDO] != NULL)
+    if (found[SOURCE] != NULL && is_lit(entry))
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[SOURCE],
                                 "does not go with the volume's \"albedo\"; a volume has one of them at all frames");
-    if (found[ALBEDO] == NULL || entry[ALBEDO] != NULL) return true;
+    if (found[ALBEDO] == NULL || is_lit(entry)) return true;
     return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[ALBEDO],
                             "moves only where the volume itself has an \"albedo\"; give it one, 0 perhaps");
 }
@@ -391,8 +422,8 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node)
     if (!read_name(in, found[NAME], &name)) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     if (volume.operation != NEBEL_OPERATION_EXCLUDE &&
         (!nb_read_density(in, found[DENSITY], volume.shape.type, &volume.density) ||
-         !check_amount_given(json, node, found) || !read_amount(json, found, volume.extinction, &entry.contrast) ||
-         !read_light(in, found, &volume)))
+         !check_amount_given(json, node, found) || !read_preset(json, found, &volume) ||
+         !read_amount(json, found, volume.extinction, &entry.contrast) || !read_light(in, found, &volume)))
         return false;
     return finish_volume(in, node, found, &volume, &entry, name);
 }

@@ -44,6 +44,21 @@ static void save_visibility(nb_save *save, const nb_json *json, const nb_edit_ob
     nb_edit_numbers(&save->edit, json, volume, "contrast", 1, &was->entry.contrast, &now->entry.contrast, NB_EDIT_EACH);
 }
 
+/* Where the file leaves the amount to a preset. */
+static void add_amount(nb_save *save, const nb_edit_object *volume, const nb_written_volume *now)
+{
+    const double *extinction = now->volume.extinction;
+    const bool is_plain = now->entry.contrast == nb_volume_entry_default().contrast || is_clear(extinction);
+    double visibility[3];
+    char words[NB_EDIT_NUMBERS];
+    find_lengths(-log(now->entry.contrast), extinction, visibility);
+    nb_edit_write_numbers(3, is_plain ? extinction : visibility, NB_EDIT_AMOUNT, words);
+    nb_edit_add(&save->edit, volume, is_plain ? "extinction" : "visibility", words);
+    if (is_plain) return;
+    nb_edit_write_numbers(1, &now->entry.contrast, NB_EDIT_EACH, words);
+    nb_edit_add(&save->edit, volume, "contrast", words);
+}
+
 /* The file's own word for the amount stays, unless it has none for an extinction of 0 or for a contrast. */
 static void save_amount(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_written_volume *was,
                         const nb_written_volume *now)
@@ -56,7 +71,10 @@ static void save_amount(nb_save *save, const nb_json *json, const nb_edit_object
     const bool has_other_contrast = was->entry.contrast != now->entry.contrast && !is_clear(to);
     double lengths_was[3], lengths_now[3];
     if (memcmp(from, to, sizeof lengths_was) == 0 && !has_other_contrast) return;
-    if (word == NULL) return;
+    if (word == NULL) {
+        add_amount(save, volume, now);
+        return;
+    }
     if (!is_clear(to) && (visibility != NULL || has_other_contrast)) {
         save_visibility(save, json, volume, word, was, now);
     } else if (word == extinction) {
@@ -112,9 +130,12 @@ static void save_phase(nb_save *save, const nb_json *json, const nb_edit_object 
 {
     const nebel_phase *from = &was->volume.phase, *to = &now->volume.phase;
     const nb_json_node *node = nb_edit_member(json, volume->node, "phase");
+    /* A preset's own comes to light when its source goes. */
+    const bool has_hidden =
+        nb_edit_member(json, volume->node, "preset") != NULL && nb_edit_member(json, volume->node, "source") != NULL;
     char words[NB_EDIT_NUMBERS];
     if (is_zero(now->volume.albedo)) return;
-    if (from->type == to->type && from->g == to->g && from->diameter == to->diameter) return;
+    if (!has_hidden && from->type == to->type && from->g == to->g && from->diameter == to->diameter) return;
     nb_save_write_phase(to, words);
     if (node != NULL)
         nb_edit_replace(&save->edit, node, words);
