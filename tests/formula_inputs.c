@@ -430,6 +430,29 @@ static void draw_phase(nb_formula_dice *dice, long double *in)
     for (int i = 0; i < 3; ++i) in[9 + i] /= length;
 }
 
+/* ---- lamps ----------------------------------------------------------------------------------- */
+
+/* Distances whose differences are exact. */
+static void draw_lamp(nb_formula_dice *dice, nb_formula formula, long double *in)
+{
+    if (formula == NB_FORMULA_lamp_fluence) {
+        in[0] = decade(dice, -8, 12);
+        in[1] = decade(dice, -6, 2);
+        return;
+    }
+    if (formula == NB_FORMULA_lamp_cone) {
+        in[1] = between(dice, -1, 0.9L);
+        in[2] = decade(dice, 0, 2);
+        in[0] = between(dice, in[1], 1);
+        return;
+    }
+    in[0] = floorl(between(dice, -4096, 4096)) / 64;
+    in[1] = between(dice, 4, 50);
+    in[2] = floorl(between(dice, 0, 4096)) / 64;
+    in[3] = in[2] + floorl(between(dice, 1, 4096)) / 64;
+    in[4] = between(dice, 0, 1);
+}
+
 /* ---- values ---------------------------------------------------------------------------------- */
 
 static void draw_value(nb_formula_dice *dice, nb_formula formula, long double *in)
@@ -463,6 +486,8 @@ void nb_formula_draw(nb_formula_dice *dice, nb_formula formula, nb_formula_digit
         draw_integral(dice, formula, digits, in);
     } else if (formula >= NB_FORMULA_phase_lobe && formula <= NB_FORMULA_turn_ahead) {
         draw_phase(dice, in);
+    } else if (formula >= NB_FORMULA_lamp_fluence && formula <= NB_FORMULA_swing_rate) {
+        draw_lamp(dice, formula, in);
     } else {
         draw_value(dice, formula, in);
     }

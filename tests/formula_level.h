@@ -53,7 +53,12 @@ enum { NB_FORMULA_INPUTS = 16, NB_FORMULA_OUTPUTS = 4 };
     X(fog_exp2, of_real(nb_fog_exp2(r0, r1)))                                                                          \
     X(phase_lobe, of_real(nb_phase_lobe(r0, r1, r2, r3, nb_turn_between(v6, v9))))                                     \
     X(turn_cosine, of_real(nb_turn_between(v6, v9).cosine))                                                            \
-    X(turn_ahead, of_real(nb_turn_between(v6, v9).ahead))
+    X(turn_ahead, of_real(nb_turn_between(v6, v9).ahead))                                                              \
+    X(lamp_fluence, of_wide(nb_lamp_fluence(a0, a1)))                                                                  \
+    X(lamp_cone, of_real(nb_lamp_cone(r0, r1, r2)))                                                                    \
+    X(swing_end, of_wide(nb_swing_between(a0, a1, a2, a3).end))                                                        \
+    X(swing_place, of_wide(nb_swing_place(nb_swing_between(a0, a1, a2, a3), a4)))                                      \
+    X(swing_rate, of_wide(nb_swing_rate(nb_swing_between(a0, a1, a2, a3), a4)))
 
 #define NB_FORMULAS(X) NB_FORMULA_INTERVALS(X) NB_FORMULA_INTEGRALS(X) NB_FORMULA_VALUES(X)
 

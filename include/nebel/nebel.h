@@ -397,6 +397,24 @@ typedef struct nebel_sun {
     double irradiance[3]; /* 0 to 1e9, on a surface that faces it; all zero: no sun */
 } nebel_sun;
 
+typedef enum nebel_lamp_type {
+    NEBEL_LAMP_POINT = 0, /* shines alike in all directions */
+    NEBEL_LAMP_SPOT       /* shines into a cone */
+} nebel_lamp_type;
+
+/* A ball that shines. Its light reaches a place through all fog on the straight way there, scattered once, as the
+ * sun's. What it brings is the irradiance from all sides of a ball that is equally bright everywhere; phase functions
+ * take it for light from the ball's centre. */
+typedef struct nebel_lamp {
+    nebel_lamp_type type;
+    double position[3];  /* m */
+    double intensity[3]; /* W/sr, 0 to 1e9, seen from far away; of a spot along its axis */
+    double radius;       /* m, 1e-3 to 1e6; 0: 1e-3. Rays that pass nearer see no more than at its surface */
+    double direction[3]; /* spot: where it shines to, any length but 0 */
+    double inner_angle, outer_angle; /* spot: degrees from the axis, 0 <= inner <= outer, 0 < outer <= 180: full light
+                                        within the inner one, none beyond the outer one, smooth between */
+} nebel_lamp;
+
 typedef struct nebel_fog_desc {
     nebel_allocator allocator;
     nebel_log log;
@@ -429,6 +447,11 @@ nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
 
 /* Sets the sun. Cost O(1). Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun);
+
+/* Sets the lamps, `count` of them, in place of those before; they are copied. They light volumes with an albedo. A query
+ * asks for each lamp as it does for the sun, except for lamps too weak or too far away to matter: their light is left
+ * out, and counted in `error`. Cost O(count). Errors: ARGUMENT, VALUE, MEMORY; the lamps are then as they were. */
+nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_lamp *lamps);
 
 /* Sets the most that all fog together hides, 0 to 1; 0: no limit, as 1. Where transmittance T of a channel is less than
  * 1 - max_opacity it becomes that, and in-scattering is weakened by as much as opacity is: S max_opacity / (1 - T).
@@ -504,9 +527,10 @@ typedef struct nebel_trace_desc {
                              transmittance. */
     int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
                              those to a   light, since `start` and `cutoff` of a volume count from where a ray starts. */
-    const nebel_lit_pieces *sunlit; /* of the rays of the call: where the sun reaches them past surfaces. NULL:
+    const nebel_lit_pieces *sunlit;  /* of the rays of the call: where the sun reaches them past surfaces. NULL:
                              everywhere. Fog in shadow scatters no sunlight; transmittance stays as it is, to the bit.
                              The ends of pieces are taken as exact: `error` says nothing of them */
+    const nebel_lit_pieces *lamplit; /* the same of the lamps, one for each lamp of the snapshot, in their order */
 } nebel_trace_desc;
 
 #define NEBEL_DEFAULT_TOLERANCE 0.002
@@ -626,7 +650,7 @@ typedef struct nebel_light_planes {
 
 /* What the fog does along each of n rays, as nebel_trace in float does: the same rays give the same bits of
  * transmittance and in-scattering, and with in-scattering wanted the same error. Of desc (NULL: the same as all zero)
- * `isa`, `tolerance`, `failed_ray`, `ignore_distances` and `sunlit` are read. rays and lights must not overlap. Same
+ * `isa`, `tolerance`, `failed_ray`, `ignore_distances`, `sunlit` and `lamplit` are read. rays and lights must not overlap. Same
  * bits for every isa and for every way of splitting the rays into calls; a few hundred rays are enough for a call to be
  * worth it. Any thread. Errors as nebel_trace. */
 nebel_result nebel_trace_planes(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n,

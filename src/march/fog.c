@@ -54,6 +54,7 @@ void nebel_destroy_fog(nebel_fog *fog)
     const nebel_allocator allocator = fog->allocator;
     for (size_t i = 0; i < fog->slot_count; i++)
         if (fog->slots[i].used) nb_volume_free(&allocator, &fog->slots[i].volume);
+    nb_release(&allocator, fog->lamps);
     nb_release(&allocator, fog->slots);
     nb_release(&allocator, fog);
 }
@@ -152,6 +153,28 @@ nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)
     const nebel_result result = nb_check_sun(&fog->log, sun);
     if (result == NEBEL_OK) fog->sun = *sun;
     return result;
+}
+
+static nb_lamp *resolve_lamps(const nebel_allocator *allocator, size_t count, const nebel_lamp *lamps)
+{
+    nb_lamp *made = nb_allocate(allocator, count, sizeof *made);
+    for (size_t i = 0; i < count && made != NULL; i++) made[i] = nb_lamp_resolve(&lamps[i]);
+    return made;
+}
+
+nebel_result nebel_set_lamps(nebel_fog *fog, size_t count, const nebel_lamp *lamps)
+{
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (count > 0 && lamps == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "lamps: must not be NULL");
+    const nebel_result result = nb_check_lamps(&fog->log, count, lamps);
+    if (result != NEBEL_OK) return result;
+    nb_lamp *made = count > 0 ? resolve_lamps(&fog->allocator, count, lamps) : NULL;
+    if (count > 0 && made == NULL)
+        return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "lamps: out of memory for %zu of them", count);
+    nb_release(&fog->allocator, fog->lamps);
+    fog->lamps = made;
+    fog->lamp_count = count;
+    return NEBEL_OK;
 }
 
 nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity)

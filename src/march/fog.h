@@ -2,6 +2,7 @@
 #ifndef NB_MARCH_FOG_H
 #define NB_MARCH_FOG_H
 
+#include "media/lamp.h"
 #include "media/volume.h"
 
 typedef struct nb_slot {
@@ -16,6 +17,8 @@ struct nebel_fog {
     nebel_log log;
     double ambient[3];
     nebel_sun sun;
+    size_t lamp_count;
+    nb_lamp *lamps;
     double max_opacity;
     nb_slot *slots;
     size_t slot_count, slot_capacity, first_free, free_count;

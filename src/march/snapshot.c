@@ -26,17 +26,18 @@ static double densest_of(const nebel_density *density)
     return density->type == NEBEL_DENSITY_GRID ? nb_grid_peak(density->grid) : 1;
 }
 
-static void light_medium(nb_medium *medium, const double ambient[3], const nebel_sun *sun)
+static void light_medium(nb_medium *medium, const nebel_fog *fog)
 {
     const nb_volume *v = &medium->body;
     for (int c = 0; c < 3; c++) {
-        medium->radiance[c] = v->lit ? v->albedo[c] * ambient[c] : v->source[c];
+        medium->radiance[c] = v->lit ? v->albedo[c] * fog->ambient[c] : v->source[c];
         medium->light[c] = medium->radiance[c] * v->extinction[c] + v->emission[c];
         medium->densest = fmax(medium->densest, v->extinction[c]);
         medium->brightest = fmax(medium->brightest, medium->light[c]);
         medium->emits = medium->emits || v->emission[c] > 0;
-        medium->shine[c] = v->albedo[c] * sun->irradiance[c];
+        medium->shine[c] = v->albedo[c] * fog->sun.irradiance[c];
         medium->is_sunlit = medium->is_sunlit || medium->shine[c] * v->extinction[c] > 0;
+        medium->is_lamplit = medium->is_lamplit || (fog->lamp_count > 0 && v->albedo[c] * v->extinction[c] > 0);
     }
     medium->densest *= densest_of(&v->density);
     medium->brightest *= densest_of(&v->density);
@@ -49,6 +50,7 @@ static void free_snapshot(nebel_snapshot *s)
     for (size_t i = 0; i < s->medium_count; i++) nb_volume_free(&allocator, &s->media[i].body);
     nb_bvh_free(&allocator, &s->bvh);
     nb_release(&allocator, s->media);
+    nb_release(&allocator, s->lamps);
     nb_release(&allocator, s->endless);
     nb_release(&allocator, s->bounded);
     nb_release(&allocator, s);
@@ -58,7 +60,7 @@ static int may_join(const nb_medium *medium)
 {
     const nb_volume *v = &medium->body;
     return v->operation == NEBEL_OPERATION_ADD && v->density.type == NEBEL_DENSITY_CONSTANT && v->leaf_count == 1 &&
-           !medium->emits && !medium->is_sunlit;
+           !medium->emits && !medium->is_sunlit && !medium->is_lamplit;
 }
 
 /* Of the media that may join, those of the rank that has most of them do. */
@@ -94,12 +96,23 @@ static int copy_media(const nebel_fog *fog, nebel_snapshot *s)
         nb_medium *medium = &s->media[s->medium_count];
         if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
         s->medium_count++;
-        light_medium(medium, fog->ambient, &fog->sun);
+        light_medium(medium, fog);
         s->is_sunlit = s->is_sunlit || medium->is_sunlit;
         s->covering_count += nb_volume_covers(&medium->body) ? 1 : 0;
+        s->is_lamplit = s->is_lamplit || medium->is_lamplit;
         for (int c = 0; c < 3; c++) s->largest_radiance = fmax(s->largest_radiance, medium->radiance[c]);
     }
     return 1;
+}
+
+/* 0 when memory is out. */
+static int copy_lamps(const nebel_fog *fog, nebel_snapshot *s)
+{
+    s->lamp_count = fog->lamp_count;
+    if (s->lamp_count == 0) return 1;
+    s->lamps = nb_allocate(&s->allocator, s->lamp_count, sizeof *s->lamps);
+    if (s->lamps != NULL) memcpy(s->lamps, fog->lamps, s->lamp_count * sizeof *s->lamps);
+    return s->lamps != NULL;
 }
 
 static int is_bounded(const nb_volume *volume)
@@ -158,7 +171,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     atomic_init(&s->owners, 1);
     point_to_sun(s, &fog->sun);
     nebel_result result = NEBEL_ERROR_MEMORY;
-    if (copy_media(fog, s)) {
+    if (copy_media(fog, s) && copy_lamps(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
         result = index_media(s);

@@ -3,6 +3,7 @@
 #define NB_MARCH_SNAPSHOT_H
 
 #include "bvh.h"
+#include "media/lamp.h"
 #include "media/volume.h"
 
 #include <stdatomic.h>
@@ -18,6 +19,7 @@ typedef struct nb_medium {
                            for margins */
     int emits;
     int is_sunlit;
+    int is_lamplit;
     double shine[3]; /* albedo times the sun's irradiance: of opaque fog, if the phase function were 1 */
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium;
@@ -30,11 +32,14 @@ struct nebel_snapshot {
     nebel_log log;
     atomic_size_t owners;
     size_t medium_count;
-    nb_medium *media;         /* in the order of nb_volume_compare: ranks ascend */
-    double largest_radiance;  /* of all volumes and channels */
-    double max_opacity;       /* 1 where there is no limit */
-    int is_sunlit;            /* whether any medium is */
-    double to_sun[3];         /* of length 1; not read where nothing is sunlit */
+    nb_medium *media;        /* in the order of nb_volume_compare: ranks ascend */
+    double largest_radiance; /* of all volumes and channels */
+    double max_opacity;      /* 1 where there is no limit */
+    int is_sunlit;           /* whether any medium is */
+    double to_sun[3];        /* of length 1; not read where nothing is sunlit */
+    int is_lamplit;          /* whether any medium is */
+    size_t lamp_count;
+    nb_lamp *lamps;
     const nb_medium *joining; /* one that joins; NULL where none does */
     size_t joining_count;     /* how many do; they are of one rank */
     size_t covering_count;    /* media that cover others */

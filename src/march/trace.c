@@ -133,19 +133,29 @@ static const char *fault_of_pieces(const nebel_lit_pieces *pieces, size_t i)
     return NULL;
 }
 
-/* Where light reaches the rays of a call. */
-static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n)
+/* `what` names the light. */
+static nebel_result check_pieces(const nebel_snapshot *snapshot, const nebel_lit_pieces *pieces, const char *what,
+                                 size_t n, size_t *failed)
 {
-    const nebel_lit_pieces *pieces = desc->sunlit;
-    if (pieces == NULL) return NEBEL_OK;
-    if (pieces->first == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "sunlit: `first` must not be NULL");
+    if (pieces->first == NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "%s: `first` must not be NULL", what);
     for (size_t i = 0; i < n; i++) {
         const char *fault = fault_of_pieces(pieces, i);
         if (fault == NULL) continue;
-        if (desc->failed_ray != NULL) *desc->failed_ray = i;
-        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "sunlit: ray %zu: %s", i, fault);
+        if (failed != NULL) *failed = i;
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "%s: ray %zu: %s", what, i, fault);
     }
     return NEBEL_OK;
+}
+
+/* Where lights reach the rays of a call. */
+static nebel_result check_shadows(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n)
+{
+    nebel_result result = NEBEL_OK;
+    if (desc->sunlit != NULL) result = check_pieces(snapshot, desc->sunlit, "sunlit", n, desc->failed_ray);
+    for (size_t i = 0; i < snapshot->lamp_count && desc->lamplit != NULL && result == NEBEL_OK; i++)
+        result = check_pieces(snapshot, &desc->lamplit[i], "lamplit", n, desc->failed_ray);
+    return result;
 }
 
 /* What the error may be beyond the tolerance. */
@@ -162,12 +172,13 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     if (kernel == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED, "instruction set %s: not available here",
                        nebel_isa_name(desc->isa));
-    const nebel_result pieces = check_pieces(snapshot, desc, n);
-    if (pieces != NEBEL_OK) return pieces;
+    const nebel_result shadows = check_shadows(snapshot, desc, n);
+    if (shadows != NEBEL_OK) return shadows;
     if (desc->sunlit != NULL) {
         job->first_toggle = desc->sunlit->first;
         job->toggles = desc->sunlit->toggles;
     }
+    job->lamplit = desc->lamplit;
     job->snapshot = snapshot;
     job->budget = tolerance * fmax(1, snapshot->largest_radiance);
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);

@@ -21,6 +21,7 @@
 #include "formulas/profiles.inc"
 #include "formulas/medium.inc"
 #include "formulas/phase.inc"
+#include "formulas/lamp.inc"
 
 #include <float.h>
 #include <math.h>
@@ -224,6 +225,8 @@ static void note_clear(const march *m, const piece *p, gathered *g)
 
 #include "trace_sun.h"
 
+#include "trace_lamp.h"
+
 static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
 {
     const piece_sum sum = sum_piece(m, p);
@@ -233,7 +236,7 @@ static void gather_piece(const march *m, const piece *p, const allowance *may, g
         return;
     }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
-    if (m->sun != NULL) gather_sunlight(m->sun, m, p, g);
+    if (m->sun != NULL) gather_lights(m->sun, m, p, g);
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);
@@ -341,7 +344,8 @@ static nb_real most_radiance(const march *m, int c)
         const contact *k = &m->contacts[i];
         const nb_mask met = nb_narrow_mask(k->hull_enter < k->hull_leave);
         const nb_real radiance = k->radiance[c] + k->glow[c] / nb_max(k->extinction[c], NB_TINY);
-        most = nb_max(most, nb_select(met, k->medium->emits ? NB_HUGE : radiance, NB_F(0.0)));
+        const int has_limit = !k->medium->emits && !k->medium->is_lamplit;
+        most = nb_max(most, nb_select(met, has_limit ? radiance : NB_HUGE, NB_F(0.0)));
     }
     return most;
 }
@@ -534,7 +538,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     share.last_share = share.last_share / pieces;
     share.length_share = share.length_share / pieces;
     nb_mask unbounded;
-    if (w->m.sun != NULL) begin_sun(w->m.sun, job, first, count);
+    if (w->m.sun != NULL) begin_lights(w->m.sun, job, first, count);
     *g = gather_light(&w->m, &share, &unbounded);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
@@ -585,6 +589,8 @@ static double settle_lane(const nb_trace_job *job, size_t i, const nebel_ray *ra
                         .wants_error = 1,
                         .first_toggle = toggles_of(job, i),
                         .toggles = job->toggles,
+                        .lamplit = job->lamplit,
+                        .first_lamplit = job->first_lamplit + i,
                         .count = 1,
                         .rays = ray,
                         .ray_stride = sizeof *ray,
@@ -635,6 +641,7 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
     nb_trace_job one = *job;
     one.count = 1;
     one.first_toggle = toggles_of(job, i);
+    one.first_lamplit = job->first_lamplit + i;
     one.rays = ray_at(job->rays, job->ray_stride, i);
     one.lights = light_at(job->lights, job->light_stride, i);
     job->failed = i;
@@ -712,23 +719,25 @@ static nebel_result trace_job(nb_trace_job *job, workspace *w)
 #endif
 }
 
-/* With a second march, to the sun. */
-static nebel_result trace_sunlit(nb_trace_job *job, workspace *w)
+/* With a second march, to the lights. */
+static nebel_result trace_lit(nb_trace_job *job, workspace *w)
 {
-    const nebel_allocator *allocator = &job->snapshot->allocator;
+    const nebel_snapshot *snapshot = job->snapshot;
     workspace way;
     nb_wide turns[STACK_TURNS];
-    open_workspace(&way);
-    sunlight sun = {.snapshot = job->snapshot,
-                    .direction = unit_vector(wide_vector(job->snapshot->to_sun)),
+    sunlight sun = {.snapshot = snapshot,
+                    .direction = unit_vector(wide_vector(snapshot->to_sun)),
                     .way = &way,
                     .turns = turns,
                     .turn_capacity = STACK_TURNS,
-                    .share = 0.3 * job->budget};
+                    .share = 0.3 * job->budget / (double)(snapshot->is_sunlit + snapshot->is_lamplit)};
+    if (!open_lamp_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
+    open_workspace(&way);
     w->m.sun = &sun;
     const nebel_result result = trace_job(job, w);
-    nb_release(allocator, sun.turn_memory);
-    close_workspace(&way, allocator);
+    nb_release(&snapshot->allocator, sun.turn_memory);
+    nb_release(&snapshot->allocator, sun.shade_memory);
+    close_workspace(&way, &snapshot->allocator);
     return result;
 }
 
@@ -739,8 +748,8 @@ nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
 #endif
     workspace w;
     open_workspace(&w);
-    const int wants_sun = job->snapshot->is_sunlit && !job->transmittance_only;
-    const nebel_result result = wants_sun ? trace_sunlit(job, &w) : trace_job(job, &w);
+    const int is_lit = (job->snapshot->is_sunlit || job->snapshot->is_lamplit) && !job->transmittance_only;
+    const nebel_result result = is_lit ? trace_lit(job, &w) : trace_job(job, &w);
     close_workspace(&w, &job->snapshot->allocator);
     return result;
 }

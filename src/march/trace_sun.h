@@ -43,182 +43,47 @@ typedef struct sunlight {
     workspace *way;     /* from places on the rays to the sun */
     nb_wide *turns;     /* of all media in all lanes, in any order; NB_WFAR and more: none */
     size_t turn_count, turn_capacity;
-    int has_turns; /* of the packet at hand */
+    int has_turns;          /* of the packet at hand */
+    const nb_lamp *turning; /* they are this lamp's; NULL: the sun's */
     void *turn_memory;
     shade shade;
-    double share; /* what steps may add to the error of radiance, all together */
+    shade *lamp_shades; /* of each lamp; NULL: surfaces keep none away */
+    void *shade_memory;
+    double share; /* what steps may add to the error of radiance, all together: of the sun, of all lamps */
     int out_of_memory;
 } sunlight;
+
+/* What a phase function makes of light that turns so, per steradian. */
+static nb_real scattered(const nb_phase *phase, nb_turn turn)
+{
+    nb_real value = NB_F(0.0);
+    for (int i = 0; i < phase->lobe_count; i++) {
+        const nb_lobe *lobe = &phase->lobes[i];
+        value = value + nb_phase_lobe(REAL(lobe->factor), REAL(lobe->alpha), REAL(lobe->peak), REAL(lobe->slope), turn);
+    }
+    return value;
+}
 
 static void set_glow(contact *k, const packet *rays, const sunlight *sun)
 {
     const nb_medium *medium = k->medium;
-    const nb_turn turn = nb_turn_between(rays->direction, sun->direction);
-    nb_real value = NB_F(0.0);
-    for (int i = 0; i < medium->body.phase.lobe_count; i++) {
-        const nb_lobe *lobe = &medium->body.phase.lobes[i];
-        value = value + nb_phase_lobe(REAL(lobe->factor), REAL(lobe->alpha), REAL(lobe->peak), REAL(lobe->slope), turn);
-    }
+    const nb_real value = scattered(&medium->body.phase, nb_turn_between(rays->direction, sun->direction));
     for (int c = 0; c < 3; c++) k->glow[c] = REAL(medium->shine[c] * medium->body.extinction[c]) * value;
 }
 
+#include "trace_turns.h"
+
 /* ---- turns ----------------------------------------------------------------------------------- */
 
-static void note_turn(sunlight *sun, nb_wide t, nb_wmask real)
+/* Those of the lamp, or of the sun where it is NULL. Returns whether they were not there yet. */
+static int find_turns(sunlight *sun, const packet *rays, const nb_lamp *lamp)
 {
-    if (!nb_wany(real)) return;
-    if (sun->turn_count == sun->turn_capacity) {
-        void *grown = grow_aligned(&sun->snapshot->allocator, sun->turns, sun->turn_count, sizeof *sun->turns,
-                                   &sun->turn_capacity, sun->turn_count + 1, &sun->turn_memory);
-        sun->out_of_memory = sun->out_of_memory || grown == NULL;
-        if (grown == NULL) return;
-        sun->turns = grown;
-    }
-    sun->turns[sun->turn_count++] = nb_wselect(real, t, NB_W(2.0) * NB_WFAR);
-}
-
-/* a t^2 + 2 b t + c = 0 */
-static void note_roots(sunlight *sun, nb_wide a, nb_wide b, nb_wide c)
-{
-    const nb_wide square = b * b - a * c;
-    const nb_wmask real = square >= NB_W(0.0);
-    const nb_wide root = nb_wsqrt(nb_wmax(square, NB_W(0.0)));
-    const nb_wide sum = -(b + nb_wselect(b < NB_W(0.0), -root, root));
-    note_turn(sun, sum * nb_wrcp_bounded(a), real);
-    note_turn(sun, c * nb_wrcp_bounded(sum), real);
-}
-
-/* A ray and the way to the sun in a leaf's frame: places p + t d + u l. */
-typedef struct sun_plane {
-    nb_wvec3 p, d, l;
-} sun_plane;
-
-/* Where the way to the sun touches the ball of a radius about `center`: |(p + t d - center) x l| = radius |l|. */
-static void note_ball(sunlight *sun, const sun_plane *s, nb_wvec3 center, nb_wide radius)
-{
-    const nb_wvec3 p = nb_wcross3(nb_wsub3(s->p, center), s->l), d = nb_wcross3(s->d, s->l);
-    const nb_wide across = radius * radius * nb_wdot3(s->l, s->l);
-    note_roots(sun, nb_wdot3(d, d), nb_wdot3(p, d), nb_wdot3(p, p) - across);
-}
-
-/* The mantle x^2 + y^2 = (radius + slope z)^2 without end: where the quadratic in u has a double root. */
-static void note_mantle(sunlight *sun, const sun_plane *s, nb_wide radius, nb_wide slope)
-{
-    const nb_wide w = radius + slope * s->p.z, wd = slope * s->d.z, wl = slope * s->l.z;
-    const nb_wide ll = s->l.x * s->l.x + s->l.y * s->l.y - wl * wl;
-    const nb_wide lp = s->l.x * s->p.x + s->l.y * s->p.y - wl * w, ld = s->l.x * s->d.x + s->l.y * s->d.y - wl * wd;
-    const nb_wide pp = s->p.x * s->p.x + s->p.y * s->p.y - w * w, pd = s->p.x * s->d.x + s->p.y * s->d.y - w * wd;
-    const nb_wide dd = s->d.x * s->d.x + s->d.y * s->d.y - wd * wd;
-    note_roots(sun, ld * ld - ll * dd, lp * ld - ll * pd, lp * lp - ll * pp);
-}
-
-/* The rim where the mantle ends at this z: on the way to the sun u = (z - p.z - t d.z) / l.z. */
-static void note_rim(sunlight *sun, const sun_plane *s, nb_wide z, nb_wide radius)
-{
-    const nb_wide up = (z - s->p.z) * nb_wrcp_bounded(s->l.z), slant = s->d.z * nb_wrcp_bounded(s->l.z);
-    const nb_wide px = s->p.x + up * s->l.x, py = s->p.y + up * s->l.y;
-    const nb_wide dx = s->d.x - slant * s->l.x, dy = s->d.y - slant * s->l.y;
-    note_roots(sun, dx * dx + dy * dy, px * dx + py * dy, px * px + py * py - radius * radius);
-}
-
-/* n.x = distance: along + t slope + u rise = 0 */
-typedef struct sun_line {
-    nb_wide along, slope, rise;
-} sun_line;
-
-static sun_line line_of(const sun_plane *s, nb_wvec3 n, nb_wide distance)
-{
-    return (sun_line){nb_wdot3(n, s->p) - distance, nb_wdot3(n, s->d), nb_wdot3(n, s->l)};
-}
-
-/* An edge: where the way to the sun meets both faces at once. */
-static void note_edge(sunlight *sun, const sun_line *a, const sun_line *b)
-{
-    const nb_wide across = a->slope * b->rise - b->slope * a->rise;
-    const nb_wide t = (b->along * a->rise - a->along * b->rise) * nb_wrcp_bounded(across);
-    note_turn(sun, t, nb_wabs(across) > NB_W(1e-30));
-}
-
-static void note_box(sunlight *sun, const nb_leaf *leaf, const sun_plane *s)
-{
-    sun_line faces[3][2];
-    for (int i = 0; i < 3; i++) {
-        const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
-        faces[i][0] = line_of(s, n, WIDE(leaf->low[i]));
-        faces[i][1] = line_of(s, n, WIDE(leaf->high[i]));
-    }
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 4; k++) note_edge(sun, &faces[i][k & 1], &faces[(i + 1) % 3][k >> 1]);
-}
-
-/* Bodies of very many faces have many edges, and nearly smooth shadows. */
-enum { MOST_EDGED_FACES = 16 };
-
-static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *leaf, const sun_plane *s)
-{
-    sun_line lines[MOST_EDGED_FACES];
-    if (leaf->face_count > MOST_EDGED_FACES) return;
-    for (size_t i = 0; i < leaf->face_count; i++) {
-        const nb_face *face = &body->faces[leaf->first_face + i];
-        lines[i] = line_of(s, wide_vector(face->normal), WIDE(face->distance));
-        for (size_t k = 0; k < i; k++) note_edge(sun, &lines[i], &lines[k]);
-    }
-}
-
-static void note_round(sunlight *sun, const nb_leaf *leaf, const sun_plane *s)
-{
-    const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
-    const nb_wide one = NB_W(1.0);
-    if (leaf->type == NB_LEAF_BALL) {
-        note_ball(sun, s, zero, WIDE(FRAME(leaf, radius)));
-    } else if (leaf->type == NB_LEAF_CAPSULE) {
-        note_mantle(sun, s, one, NB_W(0.0));
-        note_ball(sun, s, zero, one);
-        note_ball(sun, s, nb_wvec3(NB_W(0.0), NB_W(0.0), WIDE(FRAME(leaf, length))), one);
-    } else {
-        const int cone = leaf->type == NB_LEAF_CONE;
-        const nb_wide radius = cone ? WIDE(FRAME(leaf, radius)) : one;
-        const nb_wide slope = cone ? WIDE(FRAME(leaf, slope)) : NB_W(0.0);
-        note_mantle(sun, s, radius, slope);
-        note_rim(sun, s, NB_W(0.0), radius);
-        note_rim(sun, s, one, radius + slope);
-    }
-}
-
-/* The shadow of a gaussian has no edge: its steep parts and its middle. */
-static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density *density)
-{
-    const sun_plane s = {rays->origin, rays->direction, sun->direction};
-    const nb_wvec3 center = wide_vector(density->center);
-    note_ball(sun, &s, center, WIDE(density->sigma));
-    note_ball(sun, &s, center, WIDE(4 * density->sigma));
-}
-
-static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, const nb_leaf *leaf)
-{
-    if (leaf->type == NB_LEAF_WORLD) return;
-    const local_ray local = localize(rays, leaf);
-    const sun_plane s = {local.p, local.d, in_frame(leaf, sun->direction)};
-    if (leaf->type == NB_LEAF_BOX)
-        note_box(sun, leaf, &s);
-    else if (leaf->type == NB_LEAF_PLANES)
-        note_planes(sun, body, leaf, &s);
-    else
-        note_round(sun, leaf, &s);
-}
-
-/* Of all media, whether the rays meet them or not: their shadows may. */
-static void find_turns(sunlight *sun, const packet *rays)
-{
-    const nebel_snapshot *snapshot = sun->snapshot;
+    if (sun->has_turns && sun->turning == lamp) return 0;
     sun->turn_count = 0;
     sun->has_turns = 1;
-    if (snapshot->medium_count > MOST_TURNING_MEDIA) return;
-    for (size_t i = 0; i < snapshot->medium_count; i++) {
-        const nb_volume *body = &snapshot->media[i].body;
-        for (size_t k = 0; k < body->leaf_count; k++) note_leaf(sun, rays, body, &body->leaves[k]);
-        if (body->density.type == NEBEL_DENSITY_GAUSSIAN) note_gaussian(sun, rays, &body->density);
-    }
+    sun->turning = lamp;
+    note_media(sun, rays, lamp);
+    return 1;
 }
 
 /* The first turn after t and before `end`, or `end`. */
@@ -242,24 +107,17 @@ static void look_ahead(shade *s)
     s->is_dark = nb_widen_mask(nb_load_lanes(s->dark) > NB_F(0.0));
 }
 
-/* Of `count` rays, the first of them by the number `first`. */
-static void begin_shade(shade *s, const nb_trace_job *job, size_t first, size_t count)
+/* Of `count` rays, of which `first` are the toggles' first; NULL: light reaches all. */
+static void begin_shade(shade *s, const uint32_t *first, const float *toggles, size_t count)
 {
     for (size_t i = 0; i < NB_WIDTH; i++) {
-        const int counts = job->first_toggle != NULL && i < count;
-        s->next[i] = counts ? job->first_toggle[first + i] : 0;
-        s->end[i] = counts ? job->first_toggle[first + i + 1] : 0;
+        const int counts = first != NULL && i < count;
+        s->next[i] = counts ? first[i] : 0;
+        s->end[i] = counts ? first[i + 1] : 0;
         s->dark[i] = 0;
     }
-    s->toggles = job->toggles;
+    s->toggles = toggles;
     look_ahead(s);
-}
-
-/* Turns are found where they are asked for. */
-static void begin_sun(sunlight *sun, const nb_trace_job *job, size_t first, size_t count)
-{
-    sun->has_turns = 0;
-    begin_shade(&sun->shade, job, first, count);
 }
 
 /* Passes the toggles up to t. */
@@ -276,45 +134,50 @@ static void pass_toggles(shade *s, nb_wide t, nb_wmask lanes)
     look_ahead(s);
 }
 
-/* ---- the way to the sun ---------------------------------------------------------------------- */
+/* ---- the way to a light ---------------------------------------------------------------------- */
 
 static int meet_fog(workspace *w, const nebel_snapshot *snapshot);
 static gathered gather_light(march *m, const allowance *may, nb_mask *unbounded);
 
-/* Optical depth from a place on each ray to the sun, and by how much it may be off. */
-typedef struct sun_depth {
+/* Optical depth from a place on each ray to a light, and by how much it may be off. */
+typedef struct light_depth {
     nb_real depth[3], error[3];
-} sun_depth;
+} light_depth;
 
-static sun_depth depth_to_sun(sunlight *sun, const march *m, nb_wide t, nb_wmask lanes)
+/* As far as `reach` into the direction. */
+static light_depth depth_to_light(sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
 {
     const allowance may = {.transmittance_only = 1};
     march *way = &sun->way->m;
     nb_mask unbounded;
     way->rays.origin = nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t));
-    way->rays.direction = sun->direction;
-    way->rays.t_max = nb_wselect(lanes, NB_WFAR, NB_W(0.0));
+    way->rays.direction = direction;
+    way->rays.t_max = reach;
     way->wants_error = m->wants_error;
     way->ignores_distances = 1;
-    sun_depth to_sun = {{NB_F(0.0), NB_F(0.0), NB_F(0.0)}, {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
+    light_depth to_light = {{NB_F(0.0), NB_F(0.0), NB_F(0.0)}, {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
     if (!meet_fog(sun->way, sun->snapshot)) {
         sun->out_of_memory = 1;
-        return to_sun;
+        return to_light;
     }
     const gathered g = gather_light(way, &may, &unbounded);
     const nb_mask watched = ends_matter(way);
     for (int c = 0; c < 3; c++) {
-        to_sun.depth[c] = g.depth[c];
-        to_sun.error[c] = g.depth_error[c] + nb_select(watched, way->grazing_ends.depth[c], way->all_ends.depth[c]);
+        to_light.depth[c] = g.depth[c];
+        to_light.error[c] = g.depth_error[c] + nb_select(watched, way->grazing_ends.depth[c], way->all_ends.depth[c]);
     }
-    return to_sun;
+    return to_light;
 }
 
 /* ---- steps ----------------------------------------------------------------------------------- */
 
+struct lamp_pass;
+
 typedef struct sun_step {
+    const struct lamp_pass *lamp; /* NULL: of the sun */
     nb_wide start;
-    nb_real length;
+    nb_swing swing;    /* of a lamp alone */
+    nb_real length;    /* m; of a lamp in the counting of its swing */
     nb_real scale[3];  /* of the step: x = s (scale[0] + s (scale[1] + s scale[2])) */
     nb_real behind[3]; /* transmittance at its end */
     nb_real light[3];
@@ -365,14 +228,27 @@ typedef struct sun_node {
     nb_real light[3], doubt[3], taken[3];
 } sun_node;
 
-static sun_node light_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
-                           nb_wmask lanes, double place)
+static sun_node lamp_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
+                          nb_wmask lanes, double place);
+
+static nb_real scaled_place(const sun_step *s, nb_real at)
+{
+    return at * (s->scale[0] + at * (s->scale[1] + at * s->scale[2]));
+}
+
+static nb_real scaled_speed(const sun_step *s, nb_real at)
+{
+    return s->scale[0] + at * (NB_F(2.0) * s->scale[1] + NB_F(3.0) * at * s->scale[2]);
+}
+
+static sun_node sunlit_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
+                            nb_wmask lanes, double place)
 {
     const nb_real at = REAL(place), zero = NB_F(0.0);
-    const nb_real share = at * (s->scale[0] + at * (s->scale[1] + at * s->scale[2]));
-    const nb_real speed = s->scale[0] + at * (NB_F(2.0) * s->scale[1] + NB_F(3.0) * at * s->scale[2]);
-    const nb_wide t = s->start + nb_widen(s->length * share);
-    const sun_depth to_sun = depth_to_sun(sun, m, t, lanes);
+    const nb_real speed = scaled_speed(s, at);
+    const nb_wide t = s->start + nb_widen(s->length * scaled_place(s, at));
+    const nb_wide reach = nb_wselect(lanes, NB_WFAR, NB_W(0.0));
+    const light_depth to_sun = depth_to_light(sun, m, t, sun->direction, reach);
     nb_real depth[3], error[3], glow[3] = {zero, zero, zero}, extinction[3] = {zero, zero, zero};
     depth_until(m, p, g, t, depth, error);
     for (size_t i = m->present_first; i < m->present_end; i++) {
@@ -393,12 +269,14 @@ static sun_node light_node(sunlight *sun, const march *m, const piece *p, const 
     return sum;
 }
 
-static void sum_sun_nodes(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes, sun_step *s)
+static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes,
+                            sun_step *s)
 {
     nb_real three[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, rounding[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (int c = 0; c < 3; c++) s->light[c] = s->taken[c] = NB_F(0.0);
     for (int n = 0; n < SUN_NODES; n++) {
-        const sun_node at = light_node(sun, m, p, g, s, lanes, sun_nodes[n]);
+        const sun_node at = s->lamp != NULL ? lamp_node(sun, m, p, g, s, lanes, sun_nodes[n])
+                                            : sunlit_node(sun, m, p, g, s, lanes, sun_nodes[n]);
         for (int c = 0; c < 3; c++) {
             const nb_real light = REAL(sun_weights[n]) * at.light[c];
             s->light[c] = s->light[c] + light;
@@ -453,7 +331,7 @@ static sun_step try_step(sunlight *sun, const march *m, const piece *p, const ga
     sun_step s = {.start = w->t, .length = length};
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
     transmittance_until(m, p, g, end, s.behind);
-    sum_sun_nodes(sun, m, p, g, w->lanes, &s);
+    sum_light_nodes(sun, m, p, g, w->lanes, &s);
     limit_step(m, w->before, &s);
     return s;
 }
@@ -522,9 +400,9 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
 }
 
 /* To where the sun comes back. */
-static void pass_shadow(const sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, nb_wmask dark)
+static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s, sun_walk *w, nb_wmask dark)
 {
-    const nb_wide end = nb_wmin(sun->shade.toggle, s->p->end);
+    const nb_wide end = nb_wmin(shadow->toggle, s->p->end);
     const nb_mask lanes = nb_narrow_mask(dark);
     nb_real before[3];
     transmittance_until(m, s->p, &s->before, end, before);
@@ -539,14 +417,14 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathe
 {
     const nb_mask lit = sunlit_lanes(m, p);
     if (!nb_any(lit)) return;
-    if (!sun->has_turns) find_turns(sun, &m->rays);
+    (void)find_turns(sun, &m->rays, NULL);
     const sun_piece s = {p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0)};
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
         pass_toggles(&sun->shade, w.t, w.lanes);
         const nb_wmask dark = nb_wand(w.lanes, sun->shade.is_dark);
         if (nb_wany(dark))
-            pass_shadow(sun, m, &s, &w, dark);
+            pass_shadow(&sun->shade, m, &s, &w, dark);
         else
             step_along(sun, m, &s, &w, g);
         w.lanes = nb_wand(w.lanes, w.t < p->end);

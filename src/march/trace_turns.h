@@ -1,0 +1,193 @@
+/* Where the way from a ray to a light begins or ends to meet a body, or passes one of its edges: its *turns*. Over the
+ * ray the ways are the lines b + t b' + u (v + t v'): to the sun from a place that moves, v' = 0; to a lamp from the
+ * lamp, b' = 0. Turns are then roots of polynomials of the second degree. Included by trace_sun.h. */
+
+static void note_turn(sunlight *sun, nb_wide t, nb_wmask real)
+{
+    if (!nb_wany(real)) return;
+    if (sun->turn_count == sun->turn_capacity) {
+        void *grown = grow_aligned(&sun->snapshot->allocator, sun->turns, sun->turn_count, sizeof *sun->turns,
+                                   &sun->turn_capacity, sun->turn_count + 1, &sun->turn_memory);
+        sun->out_of_memory = sun->out_of_memory || grown == NULL;
+        if (grown == NULL) return;
+        sun->turns = grown;
+    }
+    sun->turns[sun->turn_count++] = nb_wselect(real, t, NB_W(2.0) * NB_WFAR);
+}
+
+/* a t^2 + 2 b t + c = 0, t from `start` on. */
+static void note_roots(sunlight *sun, nb_wide start, nb_wide a, nb_wide b, nb_wide c)
+{
+    const nb_wide square = b * b - a * c;
+    const nb_wmask real = square >= NB_W(0.0);
+    const nb_wide root = nb_wsqrt(nb_wmax(square, NB_W(0.0)));
+    const nb_wide sum = -(b + nb_wselect(b < NB_W(0.0), -root, root));
+    note_turn(sun, start + sum * nb_wrcp_bounded(a), real);
+    note_turn(sun, start + c * nb_wrcp_bounded(sum), real);
+}
+
+/* ---- ways ------------------------------------------------------------------------------------ */
+
+/* In a leaf's frame. */
+typedef struct ways {
+    nb_wvec3 base, base_rate;   /* b, b' */
+    nb_wvec3 along, along_rate; /* v, v' */
+} ways;
+
+/* Where the ways touch the ball of a radius about `center`: |(b - center) x v| = radius |v|. */
+static void note_ball(sunlight *sun, const ways *s, nb_wvec3 center, nb_wide radius)
+{
+    const nb_wvec3 apart = nb_wsub3(s->base, center), moment = nb_wcross3(apart, s->along);
+    const nb_wvec3 rate = nb_wadd3(nb_wcross3(s->base_rate, s->along), nb_wcross3(apart, s->along_rate));
+    const nb_wide r2 = radius * radius;
+    note_roots(sun, NB_W(0.0), nb_wdot3(rate, rate) - r2 * nb_wdot3(s->along_rate, s->along_rate),
+               nb_wdot3(moment, rate) - r2 * nb_wdot3(s->along, s->along_rate),
+               nb_wdot3(moment, moment) - r2 * nb_wdot3(s->along, s->along));
+}
+
+/* x x + y y - w w, w the radius of the mantle. */
+static nb_wide mantle_form(nb_wvec3 a, nb_wide wa, nb_wvec3 b, nb_wide wb)
+{
+    return a.x * b.x + a.y * b.y - wa * wb;
+}
+
+/* The mantle x^2 + y^2 = (radius + slope z)^2 without end: where the quadratic in u has a double root. */
+static void note_mantle(sunlight *sun, const ways *s, nb_wide radius, nb_wide slope)
+{
+    const nb_wvec3 b = s->base, db = s->base_rate, v = s->along, dv = s->along_rate;
+    const nb_wide wb = radius + slope * b.z, wdb = slope * db.z, wv = slope * v.z, wdv = slope * dv.z;
+    const nb_wide bv = mantle_form(b, wb, v, wv), rate = mantle_form(db, wdb, v, wv) + mantle_form(b, wb, dv, wdv);
+    const nb_wide vv = mantle_form(v, wv, v, wv), vdv = mantle_form(v, wv, dv, wdv), bb = mantle_form(b, wb, b, wb);
+    const nb_wide bdb = mantle_form(b, wb, db, wdb), dbdb = mantle_form(db, wdb, db, wdb);
+    const nb_wide dvdv = mantle_form(dv, wdv, dv, wdv);
+    note_roots(sun, NB_W(0.0), rate * rate - vv * dbdb - dvdv * bb, bv * rate - vv * bdb - vdv * bb, bv * bv - vv * bb);
+}
+
+/* The rim where the mantle ends at this z, which ways meet at u = (z - b.z) / v.z: multiplied by v.z. */
+static void note_rim(sunlight *sun, const ways *s, nb_wide z, nb_wide radius)
+{
+    const nb_wvec3 b = s->base, db = s->base_rate, v = s->along, dv = s->along_rate;
+    const nb_wide up = z - b.z;
+    const nb_wide x = b.x * v.z + up * v.x, dx = db.x * v.z + b.x * dv.z - db.z * v.x + up * dv.x;
+    const nb_wide y = b.y * v.z + up * v.y, dy = db.y * v.z + b.y * dv.z - db.z * v.y + up * dv.y;
+    const nb_wide r2 = radius * radius;
+    note_roots(sun, NB_W(0.0), dx * dx + dy * dy - r2 * dv.z * dv.z, x * dx + y * dy - r2 * v.z * dv.z,
+               x * x + y * y - r2 * v.z * v.z);
+}
+
+/* A face n.x = distance: off + t off_rate + u (rise + t rise_rate) = 0 */
+typedef struct face_ways {
+    nb_wide off, off_rate, rise, rise_rate;
+} face_ways;
+
+static face_ways ways_to_face(const ways *s, nb_wvec3 n, nb_wide distance)
+{
+    return (face_ways){nb_wdot3(n, s->base) - distance, nb_wdot3(n, s->base_rate), nb_wdot3(n, s->along),
+                       nb_wdot3(n, s->along_rate)};
+}
+
+/* An edge: where ways meet both faces at once. */
+static void note_edge(sunlight *sun, const face_ways *a, const face_ways *b)
+{
+    const nb_wide value = a->off * b->rise - b->off * a->rise;
+    const nb_wide rate =
+        a->off_rate * b->rise - b->off_rate * a->rise + (a->off * b->rise_rate - b->off * a->rise_rate);
+    note_turn(sun, -value * nb_wrcp_bounded(rate), nb_wabs(rate) > NB_W(1e-30));
+}
+
+/* ---- bodies ---------------------------------------------------------------------------------- */
+
+static void note_box(sunlight *sun, const nb_leaf *leaf, const ways *s)
+{
+    face_ways faces[3][2];
+    for (int i = 0; i < 3; i++) {
+        const nb_wvec3 n = nb_wvec3(WIDE(i == 0), WIDE(i == 1), WIDE(i == 2));
+        faces[i][0] = ways_to_face(s, n, WIDE(leaf->low[i]));
+        faces[i][1] = ways_to_face(s, n, WIDE(leaf->high[i]));
+    }
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 4; k++) note_edge(sun, &faces[i][k & 1], &faces[(i + 1) % 3][k >> 1]);
+}
+
+/* Bodies of very many faces have many edges, and nearly smooth shadows. */
+enum { MOST_EDGED_FACES = 16 };
+
+static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *leaf, const ways *s)
+{
+    face_ways faces[MOST_EDGED_FACES];
+    if (leaf->face_count > MOST_EDGED_FACES) return;
+    for (size_t i = 0; i < leaf->face_count; i++) {
+        const nb_face *face = &body->faces[leaf->first_face + i];
+        faces[i] = ways_to_face(s, wide_vector(face->normal), WIDE(face->distance));
+        for (size_t k = 0; k < i; k++) note_edge(sun, &faces[i], &faces[k]);
+    }
+}
+
+static void note_round(sunlight *sun, const nb_leaf *leaf, const ways *s)
+{
+    const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
+    const nb_wide one = NB_W(1.0);
+    if (leaf->type == NB_LEAF_BALL) {
+        note_ball(sun, s, zero, WIDE(FRAME(leaf, radius)));
+    } else if (leaf->type == NB_LEAF_CAPSULE) {
+        note_mantle(sun, s, one, NB_W(0.0));
+        note_ball(sun, s, zero, one);
+        note_ball(sun, s, nb_wvec3(NB_W(0.0), NB_W(0.0), WIDE(FRAME(leaf, length))), one);
+    } else {
+        const int cone = leaf->type == NB_LEAF_CONE;
+        const nb_wide radius = cone ? WIDE(FRAME(leaf, radius)) : one;
+        const nb_wide slope = cone ? WIDE(FRAME(leaf, slope)) : NB_W(0.0);
+        note_mantle(sun, s, radius, slope);
+        note_rim(sun, s, NB_W(0.0), radius);
+        note_rim(sun, s, one, radius + slope);
+    }
+}
+
+/* ---- all of them ----------------------------------------------------------------------------- */
+
+/* Of a ray p + t d to a light in the direction `towards`, or as far from p; all in one frame. */
+static ways make_ways(nb_wvec3 p, nb_wvec3 d, nb_wvec3 towards, int is_lamp)
+{
+    const nb_wvec3 zero = nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0));
+    if (!is_lamp) return (ways){p, d, towards, zero};
+    return (ways){nb_wadd3(p, towards), zero, nb_wsub3(zero, towards), d};
+}
+
+/* The shadow of a gaussian has no edge: its steep parts and its middle. */
+static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density *density, nb_wvec3 towards,
+                          int is_lamp)
+{
+    const ways s = make_ways(rays->origin, rays->direction, towards, is_lamp);
+    const nb_wvec3 center = wide_vector(density->center);
+    note_ball(sun, &s, center, WIDE(density->sigma));
+    note_ball(sun, &s, center, WIDE(4 * density->sigma));
+}
+
+static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, const nb_leaf *leaf, nb_wvec3 towards,
+                      int is_lamp)
+{
+    if (leaf->type == NB_LEAF_WORLD) return;
+    const local_ray local = localize(rays, leaf);
+    const ways s = make_ways(local.p, local.d, in_frame(leaf, towards), is_lamp);
+    if (leaf->type == NB_LEAF_BOX)
+        note_box(sun, leaf, &s);
+    else if (leaf->type == NB_LEAF_PLANES)
+        note_planes(sun, body, leaf, &s);
+    else
+        note_round(sun, leaf, &s);
+}
+
+/* Of all media, whether the rays meet them or not: their shadows may. `lamp` NULL: in the light of the sun. */
+static void note_media(sunlight *sun, const packet *rays, const nb_lamp *lamp)
+{
+    const nebel_snapshot *snapshot = sun->snapshot;
+    const nb_wvec3 towards = lamp != NULL ? nb_wsub3(wide_vector(lamp->place), rays->origin) : sun->direction;
+    if (snapshot->medium_count > MOST_TURNING_MEDIA) return;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *body = &snapshot->media[i].body;
+        for (size_t k = 0; k < body->leaf_count; k++)
+            note_leaf(sun, rays, body, &body->leaves[k], towards, lamp != NULL);
+        if (body->density.type == NEBEL_DENSITY_GAUSSIAN)
+            note_gaussian(sun, rays, &body->density, towards, lamp != NULL);
+    }
+}

@@ -1,0 +1,24 @@
+/* Lamps as the core keeps them, see formulas/lamp.inc. */
+#ifndef NB_MEDIA_LAMP_H
+#define NB_MEDIA_LAMP_H
+
+#include "base/base.h"
+
+#include <nebel/nebel.h>
+
+typedef struct nb_lamp {
+    double place[3], intensity[3];
+    double radius2; /* > 0 */
+    double clear;   /* m from its centre that light does not pass through fog; 0 where no radius was given */
+    int is_spot;
+    double axis[3];           /* of length 1 */
+    double edge, inner, rise; /* cosines of the outer and the inner angle; what nb_lamp_cone takes */
+} nb_lamp;
+
+/* Says through the log which of the lamps is not in order, and why. */
+nebel_result nb_check_lamps(const nebel_log *log, size_t count, const nebel_lamp *lamps);
+
+/* Of a lamp that is in order. */
+nb_lamp nb_lamp_resolve(const nebel_lamp *lamp);
+
+#endif

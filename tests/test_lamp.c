@@ -1,0 +1,466 @@
+/* Light of lamps in fog: airlight and spots of the collected physics (T17, T19), brute force, the contracts of every
+ * query, and the error that is told. */
+#include "unit.h"
+
+#include "fog_help.h"
+#include "random_fog.h"
+
+#include <math.h>
+
+static nebel_snapshot *commit(const nebel_fog_desc *desc, const nebel_volume_desc *volumes, size_t n,
+                              const nebel_lamp *lamps, size_t lamp_count)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < n; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, lamp_count, lamps), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static nebel_light ask(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray ray)
+{
+    nebel_light light;
+    assert_int_equal(nebel_trace(snapshot, desc, 1, &ray, 0, &light, 0), NEBEL_OK);
+    return light;
+}
+
+/* ---- even fog -------------------------------------------------------------------------------- */
+
+static nebel_snapshot *make_airlight(double extinction, const nebel_lamp *lamp)
+{
+    const nebel_volume_desc volume = {.extinction = {extinction, extinction, extinction}, .albedo = {1, 1, 1}};
+    return commit(&(nebel_fog_desc){0}, &volume, 1, lamp, 1);
+}
+
+/* Both precisions, and the error that they tell. */
+static void expect_light(const nebel_snapshot *snapshot, nebel_ray ray, double wanted)
+{
+    for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+        const double tolerance = precision == NEBEL_PRECISION_DOUBLE ? 1e-9 : 1e-6;
+        const nebel_trace_desc desc = {.precision = (nebel_precision)precision, .tolerance = tolerance};
+        const nebel_light light = ask(snapshot, &desc, ray);
+        for (int c = 0; c < 3; c++) {
+            const double off = fabs(light.in_scattering[c] - wanted), rounding = 1e-6 * wanted;
+            assert_true(off <= tolerance + rounding);
+            assert_true(off <= light.error + rounding); /* of the wanted number: it is that of a lamp without size */
+        }
+    }
+}
+
+static void airlight_is_that_of_T17(void **state)
+{
+    static const struct {
+        double extinction, distance, angle, length, light;
+    } cases[] = {{0.02, 20, 15, 60, 0.04807873504574867}, {0.02, 20, 15, 1000, 0.04823971552254724},
+                 {0.1, 10, 90, 50, 0.01538266635057253},  {0.005, 50, 2, 200, 0.05355965729017184},
+                 {0.1, 10, 150, 30, 0.00866229562076126}, {1e-6, 20, 15, 60, 4.232468970711786e-06}};
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const double angle = cases[i].angle * 3.14159265358979323846 / 180;
+        const nebel_lamp lamp = {.position = {cases[i].distance * cos(angle), 0, cases[i].distance * sin(angle)},
+                                 .intensity = {100, 100, 100}};
+        nebel_snapshot *snapshot = make_airlight(cases[i].extinction, &lamp);
+        expect_light(snapshot, (nebel_ray){{0, 0, 0}, {1, 0, 0}, cases[i].length}, cases[i].light);
+        nebel_release_snapshot(snapshot);
+    }
+}
+
+static void spots_are_those_of_T19(void **state)
+{
+    nebel_lamp lamp = {.type = NEBEL_LAMP_SPOT,
+                       .position = {10, 5, 0},
+                       .intensity = {100, 100, 100},
+                       .direction = {0, -2, 0},
+                       .inner_angle = 30,
+                       .outer_angle = 30};
+    const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, HUGE_VAL};
+    (void)state;
+    nebel_snapshot *snapshot = make_airlight(0.02, &lamp);
+    expect_light(snapshot, ray, 0.02458581030636606);
+    expect_light(snapshot, (nebel_ray){{0, 0, 0}, {1, 0, 0}, 7.1132}, 0);
+    nebel_release_snapshot(snapshot);
+    lamp.inner_angle = lamp.outer_angle = 180; /* a point */
+    snapshot = make_airlight(0.02, &lamp);
+    const nebel_trace_desc fine = {.tolerance = 1e-9};
+    const nebel_light spot = ask(snapshot, &fine, ray);
+    nebel_release_snapshot(snapshot);
+    lamp.type = NEBEL_LAMP_POINT;
+    snapshot = make_airlight(0.02, &lamp);
+    const nebel_light point = ask(snapshot, &fine, ray);
+    assert_true(fog_difference(&spot, &point) < 2e-9);
+    nebel_release_snapshot(snapshot);
+}
+
+/* ---- brute force ----------------------------------------------------------------------------- */
+
+static double square_to(const double a[3], const double b[3])
+{
+    return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
+}
+
+/* Smooth from the inner angle to the outer one, by cosines. */
+static double cone_of(const nebel_lamp *lamp, const double towards[3])
+{
+    if (lamp->type != NEBEL_LAMP_SPOT) return 1;
+    const double degree = 3.14159265358979323846 / 180;
+    const double inner = cos(lamp->inner_angle * degree), outer = cos(lamp->outer_angle * degree);
+    double dot = 0, square = 0;
+    for (int i = 0; i < 3; i++) {
+        dot -= towards[i] * lamp->direction[i];
+        square += lamp->direction[i] * lamp->direction[i];
+    }
+    const double s = fmin(fmax((dot / sqrt(square) - outer) / (inner - outer), 0), 1);
+    return s * s * (3 - 2 * s);
+}
+
+/* What balls of fog give there per metre towards -view, in red. */
+static double glow_at(const nebel_volume_desc *balls, size_t count, const nebel_lamp *lamp, const double view[3],
+                      const double place[3], double *reach, double towards[3])
+{
+    const double square = square_to(place, lamp->position), distance = sqrt(square), r2 = lamp->radius * lamp->radius;
+    double cosine = 0, glow = 0;
+    for (int i = 0; i < 3; i++) {
+        towards[i] = (lamp->position[i] - place[i]) / distance;
+        cosine += towards[i] * view[i];
+    }
+    *reach = fmax(distance - lamp->radius, 0);
+    const double seen = 2 * 3.14159265358979323846 * (1 - sqrt(1 - r2 / fmax(square, r2)));
+    const double irradiance = lamp->intensity[0] / (3.14159265358979323846 * r2) * seen * cone_of(lamp, towards);
+    for (size_t k = 0; k < count; k++)
+        if (square_to(place, balls[k].shape.center) < balls[k].shape.radius * balls[k].shape.radius)
+            glow += balls[k].extinction[0] * balls[k].albedo[0] * nebel_phase_value(&balls[k].phase, cosine);
+    return glow * irradiance;
+}
+
+enum { STEPS = 40000 };
+
+static double brute_force(const nebel_snapshot *snapshot, const nebel_volume_desc *balls, size_t count,
+                          const nebel_lamp *lamp, const nebel_ray *ray)
+{
+    static nebel_ray rays[2 * STEPS];
+    static nebel_light lights[2 * STEPS];
+    static double glow[STEPS];
+    const double h = ray->t_max / STEPS;
+    for (int i = 0; i < STEPS; i++) {
+        const double t = (i + 0.5) * h;
+        double place[3], towards[3], reach;
+        for (int k = 0; k < 3; k++) place[k] = ray->origin[k] + t * ray->direction[k];
+        glow[i] = glow_at(balls, count, lamp, ray->direction, place, &reach, towards);
+        rays[2 * i] = *ray;
+        rays[2 * i].t_max = t;
+        rays[2 * i + 1] = (nebel_ray){{place[0], place[1], place[2]}, {towards[0], towards[1], towards[2]}, reach};
+    }
+    const nebel_trace_desc desc = {.transmittance_only = 1};
+    assert_int_equal(nebel_trace(snapshot, &desc, 2 * (size_t)STEPS, rays, sizeof *rays, lights, sizeof *lights),
+                     NEBEL_OK);
+    double sum = 0;
+    for (int i = 0; i < STEPS; i++)
+        sum += glow[i] * h * lights[2 * i].transmittance[0] * lights[2 * i + 1].transmittance[0];
+    return sum;
+}
+
+/* Two balls that overlap, of different light; lamps outside, within, in both, and a ray through the lamp. */
+static void light_is_that_of_brute_force(void **state)
+{
+    const nebel_volume_desc balls[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 0, 0}, .radius = 2},
+                                        .extinction = {0.5, 0.5, 0.5},
+                                        .albedo = {0.9, 0.9, 0.9},
+                                        .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.7}},
+                                       {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1.5, 0.3, 0}, .radius = 1},
+                                        .extinction = {1, 1, 1},
+                                        .albedo = {0.4, 0.4, 0.4},
+                                        .phase = {.type = NEBEL_PHASE_RAYLEIGH}}};
+    const nebel_lamp lamps[] = {{.position = {0, 3, 1}, .intensity = {10, 10, 10}, .radius = 0.1},
+                                {.position = {1.2, 0.2, 0.1}, .intensity = {1, 1, 1}, .radius = 0.25},
+                                {.position = {-0.5, 0.1, 0.5}, .intensity = {3, 3, 3}, .radius = 0.01},
+                                {.type = NEBEL_LAMP_SPOT,
+                                 .position = {0, 2.5, 0},
+                                 .intensity = {9, 9, 9},
+                                 .radius = 0.05,
+                                 .direction = {0.1, -1, 0.05},
+                                 .inner_angle = 5,
+                                 .outer_angle = 20}};
+    const nebel_ray rays[] = {
+        {{-4, 0.1, 0.2}, {1, 0, 0}, 9}, {{-4, 0.2, 0.1}, {1, 0, 0}, 9}, {{0, 0, 0}, {0, 0.6, 0.8}, 1}};
+    (void)state;
+    double worst = 0;
+    for (size_t l = 0; l < sizeof lamps / sizeof lamps[0]; l++) {
+        nebel_snapshot *snapshot = commit(&(nebel_fog_desc){0}, balls, 2, &lamps[l], 1);
+        for (size_t r = 0; r < sizeof rays / sizeof rays[0]; r++) {
+            const nebel_light light = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-6}, rays[r]);
+            const double sum = brute_force(snapshot, balls, 2, &lamps[l], &rays[r]);
+            worst = fmax(worst, fabs(light.in_scattering[0] - sum) / sum);
+            assert_true(light.error <= 1.1e-6);
+        }
+        nebel_release_snapshot(snapshot);
+    }
+    print_message("off by at most %.1e\n", worst);
+    assert_true(worst < 3e-4); /* steps that an edge falls into */
+}
+
+/* ---- random fog ------------------------------------------------------------------------------ */
+
+enum { RAYS = 16, SEEDS = 3, LAMPS = 3 };
+
+static random_fog fog;
+static nebel_fog_desc sky;
+static nebel_lamp lamps[LAMPS];
+
+/* Random fog, most of it lit, under a sun and lamps within and beside it. */
+static void make_lit(random_fog_kind kind, uint64_t seed)
+{
+    uint64_t numbers = seed * 1481 + (uint64_t)kind;
+    random_fog_make(&fog, kind, seed);
+    for (size_t i = 0; i < fog.count; i++) {
+        nebel_volume_desc *volume = &fog.volumes[i];
+        const double peak = dice(&numbers, -0.7, 0.9);
+        if (volume->operation == NEBEL_OPERATION_EXCLUDE || i % 3 == 2) continue;
+        for (int c = 0; c < 3; c++) {
+            volume->source[c] = 0;
+            volume->albedo[c] = dice(&numbers, 0.3, 1);
+        }
+        volume->phase = (nebel_phase){.type = (nebel_phase_type)(i % NEBEL_PHASE_DROPLETS), .g = peak, .alpha = 3};
+    }
+    for (int i = 0; i < LAMPS; i++) {
+        nebel_lamp *lamp = &lamps[i];
+        *lamp = (nebel_lamp){.type = i == 1 ? NEBEL_LAMP_SPOT : NEBEL_LAMP_POINT,
+                             .direction = {dice(&numbers, -1, 1), -1, dice(&numbers, -1, 1)},
+                             .inner_angle = 10,
+                             .outer_angle = dice(&numbers, 15, 100),
+                             .radius = i == 2 ? dice(&numbers, 0.01, 0.5) : 0};
+        for (int c = 0; c < 3; c++) {
+            lamp->position[c] = dice(&numbers, -4, 4);
+            lamp->intensity[c] = dice(&numbers, 0, 20);
+        }
+    }
+    sky = (nebel_fog_desc){.sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}}};
+    if (seed % 2 == 0) sky.sun.irradiance[0] = sky.sun.irradiance[1] = sky.sun.irradiance[2] = 4;
+    memcpy(sky.ambient, fog.ambient, sizeof sky.ambient);
+}
+
+static nebel_snapshot *commit_lit(void)
+{
+    return commit(&sky, fog.volumes, fog.count, lamps, LAMPS);
+}
+
+static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray rays[RAYS],
+                  nebel_light lights[RAYS])
+{
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
+static void draw_rays(nebel_ray rays[RAYS])
+{
+    for (uint64_t i = 0; i < RAYS; i++) rays[i] = random_fog_ray(&fog, i);
+}
+
+/* Against the same light within a hundredth of the tolerance. */
+static void errors_are_told(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
+        double worst = 0, slack = 0;
+        for (uint64_t seed = 0; seed < SEEDS; seed++) {
+            nebel_ray rays[RAYS];
+            nebel_light fine[RAYS], light[RAYS];
+            make_lit((random_fog_kind)kind, seed);
+            nebel_snapshot *snapshot = commit_lit();
+            draw_rays(rays);
+            trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-5}, rays, fine);
+            for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+                trace(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, rays, light);
+                for (int i = 0; i < RAYS; i++) {
+                    const double off = fog_difference(&light[i], &fine[i]);
+                    worst = fmax(worst, (off - fine[i].error) / light[i].error);
+                    slack = fmax(slack, light[i].error);
+                }
+            }
+            nebel_release_snapshot(snapshot);
+        }
+        print_message("kind %d: off by at most %.3f of the error told; at most %.1e told\n", kind, worst, slack);
+        assert_true(worst <= 1);
+    }
+}
+
+/* Random pieces of random fog: every set and split gives the same bits, transmittance those without. */
+static void light_is_the_same_in_any_set_and_split(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
+        static float toggles[RAYS * 8];
+        uint32_t first[RAYS + 1] = {0};
+        uint64_t numbers = (uint64_t)kind + 5;
+        nebel_ray rays[RAYS];
+        nebel_light all[RAYS], expected[RAYS], other[RAYS];
+        make_lit((random_fog_kind)kind, 4);
+        nebel_snapshot *snapshot = commit_lit();
+        draw_rays(rays);
+        for (uint32_t i = 0; i < RAYS; i++) {
+            const uint32_t count = (uint32_t)dice(&numbers, 0, 8);
+            double t = 0;
+            for (uint32_t k = 0; k < count; k++) toggles[first[i] + k] = (float)(t += dice(&numbers, 0, 4));
+            first[i + 1] = first[i] + count;
+        }
+        const nebel_lit_pieces none = {(const uint32_t[RAYS + 1]){0}, NULL}, some = {first, toggles};
+        const nebel_lit_pieces pieces[LAMPS] = {some, none, some};
+        nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR};
+        trace(snapshot, &desc, rays, all);
+        desc.lamplit = pieces;
+        trace(snapshot, &desc, rays, expected);
+        for (int i = 0; i < RAYS; i++)
+            assert_memory_equal(all[i].transmittance, expected[i].transmittance, sizeof all[i].transmittance);
+        for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
+            if (!nebel_isa_available(desc.isa)) continue;
+            desc.lamplit = pieces;
+            trace(snapshot, &desc, rays, other);
+            assert_memory_equal(expected, other, sizeof expected);
+            for (int i = 0; i < RAYS; i++) {
+                const nebel_lit_pieces one[LAMPS] = {{first + i, toggles}, none, {first + i, toggles}};
+                desc.lamplit = one;
+                assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+            }
+            assert_memory_equal(expected, other, sizeof expected);
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
+/* The pieces of one lamp in even fog add up to all of its light. */
+static void pieces_add_up(void **state)
+{
+    static const float odd[] = {2, 5, 9.5f, 10.25f, 31}, even[] = {0, 2, 5, 9.5f, 10.25f, 31};
+    static const uint32_t odd_first[] = {0, 5}, even_first[] = {0, 6};
+    const nebel_lit_pieces pieces[] = {{odd_first, odd}, {even_first, even}};
+    const nebel_lamp lamp = {.position = {10, 1, 2}, .intensity = {100, 50, 20}};
+    const nebel_ray ray = {{0, 0, 0}, {1, 0, 0}, 60};
+    nebel_snapshot *snapshot = make_airlight(0.03, &lamp);
+    (void)state;
+    nebel_light light[3];
+    for (int i = 0; i < 3; i++)
+        light[i] = ask(snapshot, &(nebel_trace_desc){.tolerance = 1e-8, .lamplit = i < 2 ? &pieces[i] : NULL}, ray);
+    for (int c = 0; c < 3; c++) {
+        const double both = light[0].in_scattering[c] + light[1].in_scattering[c];
+        assert_true(light[1].in_scattering[c] > 0.05 * light[2].in_scattering[c]);
+        assert_true(fabs(both - light[2].in_scattering[c]) < 3e-8);
+    }
+    nebel_release_snapshot(snapshot);
+}
+
+/* ---- hard cases ------------------------------------------------------------------------------ */
+
+/* Through the lamp, from it, along its axis; lamps far away, and far from the origin. */
+static void hard_rays_are_answered(void **state)
+{
+    const double far = 1e7;
+    const nebel_lamp lamp = {.position = {far, 5, 0}, .intensity = {100, 100, 100}};
+    const nebel_ray rays[] = {{{far - 10, 5, 0}, {1, 0, 0}, HUGE_VAL},
+                              {{far, 5, 0}, {1, 0, 0}, HUGE_VAL},
+                              {{far, 5, 0}, {1, 0, 0}, 0},
+                              {{far - 10, 5, 0}, {1, 0, 0}, 10},
+                              {{far + 1e-4, 5, 0}, {0, 1, 0}, 1e-6},
+                              {{0, 5, 0}, {0, 1, 0}, HUGE_VAL},
+                              {{far - 20, 5, 0}, {0, 1, 0}, HUGE_VAL}};
+    nebel_snapshot *snapshot = make_airlight(0.02, &lamp), *near;
+    (void)state;
+    for (size_t i = 0; i < sizeof rays / sizeof rays[0]; i++)
+        for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+            const nebel_light light =
+                ask(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, rays[i]);
+            for (int c = 0; c < 3; c++) assert_true(light.in_scattering[c] >= 0 && light.in_scattering[c] < 1e4);
+            assert_true(light.error >= 0 && light.error < 0.01);
+        }
+    const nebel_light away = ask(snapshot, NULL, rays[6]);
+    near = make_airlight(0.02, &(nebel_lamp){.position = {0, 5, 0}, .intensity = {100, 100, 100}});
+    const nebel_light here = ask(near, NULL, (nebel_ray){{-20, 5, 0}, {0, 1, 0}, HUGE_VAL});
+    assert_true(fog_difference(&away, &here) < 1e-9);
+    nebel_release_snapshot(snapshot);
+    nebel_release_snapshot(near);
+}
+
+static void lamps_are_checked(void **state)
+{
+    const double nan = (double)NAN;
+    const nebel_lamp right = {.type = NEBEL_LAMP_SPOT, .direction = {0, -1, 0}, .outer_angle = 40};
+    nebel_lamp wrong[12];
+    for (int i = 0; i < 12; i++) wrong[i] = right;
+    wrong[0].type = (nebel_lamp_type)7;
+    wrong[1].position[1] = nan;
+    wrong[2].position[2] = 1e16;
+    wrong[3].intensity[0] = -1;
+    wrong[4].intensity[1] = nan;
+    wrong[5].intensity[1] = 1e10;
+    wrong[6].radius = -1;
+    wrong[7].radius = 1e-9;
+    wrong[8].direction[1] = 0;
+    wrong[9].outer_angle = 0;
+    wrong[10].inner_angle = 41;
+    wrong[11].outer_angle = 181;
+    nebel_fog *made = NULL;
+    (void)state;
+    fog_messages messages = {0};
+    const nebel_fog_desc desc = {.log = fog_messages_log(&messages)};
+    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
+    for (int i = 0; i < 12; i++) {
+        const nebel_lamp both[] = {right, wrong[i]};
+        assert_int_equal(nebel_set_lamps(made, 2, both), NEBEL_ERROR_VALUE);
+        assert_non_null(strstr(messages.text, "lamp 1: "));
+    }
+    assert_int_equal(nebel_set_lamps(made, 1, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_lamps(NULL, 1, &right), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_lamps(made, 1, &right), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(made, 0, NULL), NEBEL_OK);
+    nebel_destroy_fog(made);
+}
+
+static void lost_memory_is_survived(void **state)
+{
+    const nebel_volume_desc volume = {.extinction = {0.1, 0.1, 0.1}, .albedo = {1, 1, 1}};
+    const nebel_lamp lamp = {.position = {1, 2, 3}, .intensity = {1, 1, 1}};
+    static const uint32_t first[] = {0, 0};
+    const nebel_lit_pieces pieces = {first, NULL};
+    const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
+    fog_memory memory = {0};
+    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory)};
+    nebel_fog *made = NULL;
+    nebel_snapshot *snapshot = NULL;
+    (void)state;
+    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(made, &volume, NULL), NEBEL_OK);
+    memory.fail_first = memory.fail_count = 1;
+    assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_ERROR_MEMORY);
+    assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_OK);
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
+        memory.fail_first = k;
+        memory.fail_count = 1;
+        result = nebel_commit_fog(made, &snapshot);
+    }
+    assert_int_equal(result, NEBEL_OK);
+    memory.fail_first = memory.fail_count = 1;
+    nebel_light light;
+    const nebel_trace_desc asked = {.lamplit = &pieces};
+    assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0), NEBEL_ERROR_MEMORY);
+    assert_int_equal(nebel_trace(snapshot, &asked, 1, &ray, 0, &light, 0), NEBEL_OK);
+    nebel_destroy_fog(made);
+    nebel_release_snapshot(snapshot);
+    assert_int_equal(memory.live, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(airlight_is_that_of_T17),
+        cmocka_unit_test(spots_are_those_of_T19),
+        cmocka_unit_test(light_is_that_of_brute_force),
+        cmocka_unit_test(errors_are_told),
+        cmocka_unit_test(light_is_the_same_in_any_set_and_split),
+        cmocka_unit_test(pieces_add_up),
+        cmocka_unit_test(hard_rays_are_answered),
+        cmocka_unit_test(lamps_are_checked),
+        cmocka_unit_test(lost_memory_is_survived),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
