@@ -200,7 +200,7 @@ static void draw_surfaces(const frame *f)
     const unsigned program = f->panorama ? r->shading.round_surface : r->shading.surface;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.surface_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
-    for (int i = 0; i < 3; i++) glClearBufferfv(GL_COLOR, i, zeros);
+    glClearBufferfv(GL_COLOR, 0, zeros); /* the distance; no other is read where that is 0 */
     glClearBufferfv(GL_DEPTH, 0, zeros);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER);
@@ -361,24 +361,6 @@ static void set_taps(const frame *f, unsigned program)
     glUniform1f(glGetUniformLocation(program, "scene_brightness"), (float)taps.brightness);
 }
 
-/* Grey particles at once; of others each color by itself, because blending has room for one factor. */
-static void draw_channels(const frame *f, unsigned program)
-{
-    const nebel_gl_renderer *const r = f->renderer;
-    const int strip = f->panorama ? NB_PANORAMA_STRIP : 4;
-    const GLint channel = glGetUniformLocation(program, "scene_channel");
-    if (r->particles.is_grey) {
-        glUniform3f(channel, 1, 0, 0);
-        nb_particles_draw(&r->particles, strip);
-        return;
-    }
-    for (int c = 0; c < 3; c++) {
-        glUniform3f(channel, c == 0, c == 1, c == 2);
-        glColorMask(c == 0, c == 1, c == 2, GL_FALSE);
-        nb_particles_draw(&r->particles, strip);
-    }
-}
-
 static void set_face_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
     const nebel_gl *const gl = f->renderer->eye_fog;
@@ -425,23 +407,33 @@ static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_
     return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
 
-/* The light that comes through the fog of a sample, and what it adds, pass through each particle. */
+/* Blending has room for one factor a target: grey particles are drawn into one, others into one for each colour. */
+static int count_veil_layers(const frame *f)
+{
+    return !has_particles(f) ? 0 : f->renderer->particles.is_grey ? 1 : 3;
+}
+
+/* Whatever comes to the farthest particle, and what it adds, passes through each. */
 static nebel_result draw_particles(const frame *f)
 {
+    static const GLfloat clear[2][4] = {{0, 0, 0, 1}, {0, 1, 0, 0}};
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    if (!has_particles(f)) return NEBEL_OK;
+    const int layers = count_veil_layers(f);
+    if (layers == 0) return NEBEL_OK;
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
     const nb_light_kind kind = {.of_particles = r->particles.profiles,
-                                .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP};
+                                .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
+                                .veil_layers = layers};
     const nebel_result result = find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.veil_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
-    nb_state_layer(&r->context);
+    for (int i = 0; i < layers; i++) glClearBufferfv(GL_COLOR, i, clear[layers == 3]);
+    nb_state_layer(&r->context, layers);
     set_particles(f, &fog, program);
-    draw_channels(f, program);
+    nb_particles_draw(&r->particles, f->panorama ? NB_PANORAMA_STRIP : 4);
     return NEBEL_OK;
 }
 
@@ -583,18 +575,17 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
     bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
     if (f->dims) bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
+    if (has_particles(f)) bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
     bind_fog(f, fog, program);
 }
 
 /* The first sample replaces what was there. */
 static void start_picture(const frame *f, uint32_t sample)
 {
-    static const GLfloat zeros[4] = {0, 0, 0, 0};
     const nebel_gl_renderer *const r = f->renderer;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.picture_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
-    for (int i = 0; i < 4 && sample == 0; i++) glClearBufferfv(GL_COLOR, i, zeros);
-    if (f->samples > 1) nb_state_add(&r->context);
+    if (sample > 0) nb_state_add(&r->context);
 }
 
 static nebel_result draw_light(const frame *f, uint32_t sample)
@@ -603,7 +594,8 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_gl_fog fog;
     unsigned program = 0;
     const nebel_gl *const passes = f->casts && r->fog != NULL && !f->has_factor ? r->sun_fog : NULL;
-    const nebel_result result = find_light(f, passes, (nb_light_kind){.dimmed = f->dims}, &fog, &program);
+    const nb_light_kind kind = {.sunlit = f->casts, .dimmed = f->dims, .veil_layers = count_veil_layers(f)};
+    const nebel_result result = find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
     set_light(f, &fog, program);
@@ -647,12 +639,15 @@ static nebel_result report(const frame *f, uint32_t done)
     return nb_fail(&f->renderer->log, NEBEL_ERROR_LIMIT, "frame: stopped");
 }
 
-static nebel_result sort_particles(const frame *f)
+static nebel_result prepare_particles(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const double *const eye = f->view.eye_from_world, forward[3] = {-eye[2], -eye[6], -eye[10]};
     const int parallel = f->view.clip_from_eye[15] != 0;
-    return nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL);
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_VEIL);
+    const nebel_result result = nb_targets_fit_veil(&r->targets, &r->log, count_veil_layers(f));
+    glActiveTexture(GL_TEXTURE0);
+    return result == NEBEL_OK ? nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL) : result;
 }
 
 static int has_vertex_fog(const frame *f)
@@ -683,7 +678,7 @@ static nebel_result draw_samples(frame *f)
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
-    if (result == NEBEL_OK && r->particles.count > 0) result = sort_particles(f);
+    if (result == NEBEL_OK && has_particles(f)) result = prepare_particles(f);
     if (result == NEBEL_OK) result = prepare_vertices(f);
     if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {

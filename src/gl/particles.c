@@ -2,32 +2,37 @@
 
 #include <epoxy/gl.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
+
+void nb_particles_release(const nebel_allocator *allocator, const nb_particles *particles)
+{
+    nb_release(allocator, particles->list);
+    nb_release(allocator, particles->balls);
+    for (int i = 0; i < 2; i++) nb_release(allocator, particles->order[i]);
+}
 
 nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
                               const nebel_particle *list, size_t count)
 {
-    nebel_particle *const copy = nb_allocate(allocator, count, sizeof *copy);
-    nb_ball *const balls = nb_allocate(allocator, count, sizeof *balls);
-    if (copy == NULL || balls == NULL || count > INT32_MAX) {
-        nb_release(allocator, copy);
-        nb_release(allocator, balls);
+    nb_particles made = {.count = count, .is_grey = 1};
+    made.list = nb_allocate(allocator, count, sizeof *made.list);
+    made.balls = nb_allocate(allocator, count, sizeof *made.balls);
+    for (int i = 0; i < 2; i++) made.order[i] = nb_allocate(allocator, count, sizeof *made.order[i]);
+    if (made.list == NULL || made.balls == NULL || made.order[0] == NULL || made.order[1] == NULL ||
+        count > INT32_MAX) {
+        nb_particles_release(allocator, &made);
         return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory for %zu particles", count);
     }
-    if (count > 0) memcpy(copy, list, count * sizeof *copy);
-    nb_release(allocator, particles->list);
-    nb_release(allocator, particles->balls);
-    particles->list = copy;
-    particles->balls = balls;
-    particles->count = count;
-    particles->is_grey = 1;
-    particles->profiles = 0;
+    if (count > 0) memcpy(made.list, list, count * sizeof *made.list);
     for (size_t i = 0; i < count; i++) {
         const double *const e = list[i].extinction;
-        particles->is_grey &= e[0] == e[1] && e[1] == e[2];
-        particles->profiles |= 1 << (int)list[i].profile;
+        made.is_grey &= e[0] == e[1] && e[1] == e[2];
+        made.profiles |= 1 << (int)list[i].profile;
     }
+    made.vertex_array = particles->vertex_array;
+    made.buffer = particles->buffer;
+    nb_particles_release(allocator, particles);
+    *particles = made;
     return NEBEL_OK;
 }
 
@@ -46,26 +51,62 @@ nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allo
     return result;
 }
 
-static nb_ball ball_of(const nebel_particle *p, const double eye[3], const double *forward)
+static nb_ball ball_of(const nebel_particle *p, const double eye[3])
 {
     nb_ball ball = {.radius = (float)p->radius, .profile = (float)p->profile};
+    for (int i = 0; i < 3; i++) {
+        ball.center[i] = (float)(p->center[i] - eye[i]);
+        ball.extinction[i] = (float)p->extinction[i];
+        ball.emission[i] = (float)p->emission[i];
+    }
+    return ball;
+}
+
+static float distance_of(const nebel_particle *p, const double eye[3], const double *forward)
+{
     double square = 0, along = 0;
     for (int i = 0; i < 3; i++) {
         const double way = p->center[i] - eye[i];
         square += way * way;
         if (forward != NULL) along += way * forward[i];
-        ball.center[i] = (float)way;
-        ball.extinction[i] = (float)p->extinction[i];
-        ball.emission[i] = (float)p->emission[i];
     }
-    ball.distance = (float)(forward != NULL ? along : sqrt(square));
-    return ball;
+    return (float)(forward != NULL ? along : sqrt(square));
 }
 
-static int compare_distances(const void *a, const void *b)
+/* The bits of a float count up with it where it is positive, and down where it is not. */
+static uint32_t nearness_of(float distance)
 {
-    const float x = ((const nb_ball *)a)->distance, y = ((const nb_ball *)b)->distance;
-    return (x < y) - (x > y);
+    uint32_t bits = 0;
+    memcpy(&bits, &distance, sizeof bits);
+    return bits >> 31 != 0 ? bits : ~bits & 0x7fffffff;
+}
+
+/* Counts what there is of each digit, then puts all in place: stable. */
+static void sort_by_digit(const nb_far *from, nb_far *to, size_t count, int shift)
+{
+    enum { DIGITS = 2048 };
+    uint32_t next[DIGITS] = {0}, sum = 0;
+    for (size_t i = 0; i < count; i++) next[from[i].nearness >> shift & (DIGITS - 1)]++;
+    for (int i = 0; i < DIGITS; i++) {
+        const uint32_t here = next[i];
+        next[i] = sum;
+        sum += here;
+    }
+    for (size_t i = 0; i < count; i++) to[next[from[i].nearness >> shift & (DIGITS - 1)]++] = from[i];
+}
+
+/* From the farthest to the nearest. */
+static void sort_balls(nb_particles *particles, const double eye[3], const double *forward)
+{
+    nb_far *const first = particles->order[0], *const second = particles->order[1];
+    for (size_t i = 0; i < particles->count; i++) {
+        const float distance = distance_of(&particles->list[i], eye, forward);
+        first[i] = (nb_far){nearness_of(distance), (uint32_t)i};
+    }
+    sort_by_digit(first, second, particles->count, 0);
+    sort_by_digit(second, first, particles->count, 11);
+    sort_by_digit(first, second, particles->count, 22);
+    for (size_t i = 0; i < particles->count; i++) particles->balls[i] = ball_of(&particles->list[second[i].index], eye);
 }
 
 /* Attributes of an instance: three vectors of four. */
@@ -85,8 +126,7 @@ static void make_objects(nb_particles *particles)
 nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, const double eye[3],
                                const double *forward)
 {
-    for (size_t i = 0; i < particles->count; i++) particles->balls[i] = ball_of(&particles->list[i], eye, forward);
-    qsort(particles->balls, particles->count, sizeof *particles->balls, compare_distances);
+    sort_balls(particles, eye, forward);
     if (particles->buffer == 0) make_objects(particles);
     glBindBuffer(GL_ARRAY_BUFFER, particles->buffer);
     glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(particles->count * sizeof *particles->balls), particles->balls,

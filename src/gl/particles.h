@@ -10,12 +10,18 @@
 typedef struct nb_ball {
     float center[3], radius; /* relative to the eye */
     float extinction[3], profile;
-    float emission[3], distance;
+    float emission[3], rest;
 } nb_ball;
+
+/* How far one is, as bits that count down with the distance. */
+typedef struct nb_far {
+    uint32_t nearness, index;
+} nb_far;
 
 typedef struct nb_particles {
     nebel_particle *list; /* in the world */
-    nb_ball *balls;
+    nb_ball *balls;       /* as they are drawn */
+    nb_far *order[2];     /* with one to sort into */
     size_t count;
     int is_grey;  /* every one takes all colours alike */
     int profiles; /* 2 to the number of each that occurs */
@@ -36,6 +42,9 @@ nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, co
 
 /* Each a strip of so many vertices. */
 void nb_particles_draw(const nb_particles *particles, int vertices);
+
+/* What was allocated. */
+void nb_particles_release(const nebel_allocator *allocator, const nb_particles *particles);
 
 /* In OpenGL. */
 void nb_particles_delete(const nb_particles *particles);

@@ -105,8 +105,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nebel_release_snapshot(r->fog);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
-    nb_release(&r->allocator, r->particles.list);
-    nb_release(&r->allocator, r->particles.balls);
+    nb_particles_release(&r->allocator, &r->particles);
     const nebel_allocator allocator = r->allocator;
     nb_release(&allocator, r);
 }

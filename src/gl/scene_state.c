@@ -11,7 +11,9 @@ static const struct {
     {GL_DEPTH_CLAMP, DESKTOP},
     {GL_PRIMITIVE_RESTART_FIXED_INDEX, FIXED_INDEX},
 };
-enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS, ARRAY_UNIT = 7 };
+enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS };
+
+static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE7, GL_TEXTURE9};
 
 /* The last two are of OpenGL alone. */
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,
@@ -67,8 +69,10 @@ static void save_units(nb_scene_state *s)
         glGetIntegerv(GL_TEXTURE_BINDING_2D, &s->textures[i]);
         glGetIntegerv(GL_SAMPLER_BINDING, &s->samplers[i]);
     }
-    glActiveTexture(GL_TEXTURE0 + ARRAY_UNIT);
-    glGetIntegerv(GL_TEXTURE_BINDING_2D_ARRAY, &s->array_texture);
+    for (int i = 0; i < NB_SCENE_ARRAYS; i++) {
+        glActiveTexture(array_units[i]);
+        glGetIntegerv(GL_TEXTURE_BINDING_2D_ARRAY, &s->array_textures[i]);
+    }
 }
 
 static void save_buffers(const nb_context *c, nb_scene_state *s)
@@ -141,8 +145,10 @@ static void restore_units(const nb_scene_state *s)
         glBindTexture(GL_TEXTURE_2D, (GLuint)s->textures[i]);
         glBindSampler((GLuint)(FIRST_UNIT + i), (GLuint)s->samplers[i]);
     }
-    glActiveTexture(GL_TEXTURE0 + ARRAY_UNIT);
-    glBindTexture(GL_TEXTURE_2D_ARRAY, (GLuint)s->array_texture);
+    for (int i = 0; i < NB_SCENE_ARRAYS; i++) {
+        glActiveTexture(array_units[i]);
+        glBindTexture(GL_TEXTURE_2D_ARRAY, (GLuint)s->array_textures[i]);
+    }
 }
 
 static void restore_buffers(const nb_context *c, const nb_scene_state *s)

@@ -2,6 +2,7 @@
 
 #include "corners.h"
 #include "panorama.h"
+#include "particle_text.h"
 #include "targets.h"
 
 #include <epoxy/gl.h>
@@ -358,6 +359,7 @@ static const char light_text[] =
     "#ifdef SCENE_DIMMED\n"
     "uniform highp sampler2D scene_dimming;\n"
     "#endif\n"
+    "uniform highp sampler2DArray scene_veil;\n"
     "uniform vec3 scene_background;\n"
     "uniform vec3 scene_ambient;\n"
     "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun */
@@ -370,6 +372,9 @@ static const char light_text[] =
        the normals stand for is looked up in their place. */
     "vec3 sunlight(vec3 place, vec3 normal, float rise, vec3 side, float t)\n"
     "{\n"
+    "#ifndef SCENE_SUNLIT\n"
+    "    return vec3(0.0);\n"
+    "#else\n"
     "    float cosine = dot(normal, scene_sun);\n"
     "    if (!(cosine > 0.0)) return vec3(0.0);\n"
     "    bool away = !(dot(side, scene_sun) > 0.0);\n"
@@ -381,6 +386,24 @@ static const char light_text[] =
     "    light *= texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).rgb;\n"
     "#endif\n"
     "    return light;\n"
+    "#endif\n"
+    "}\n"
+    /* Particles are blended as if fog and surface behind them were black and transparent. */
+    "void see_through_veil(ivec2 texel, inout vec3 transmittance, inout vec3 in_scattering)\n"
+    "{\n"
+    "#if SCENE_VEIL_LAYERS == 3\n"
+    "    vec2 red = texelFetch(scene_veil, ivec3(texel, 0), 0).xy, green = texelFetch(scene_veil, ivec3(texel, 1), "
+    "0).xy;\n"
+    "    vec2 blue = texelFetch(scene_veil, ivec3(texel, 2), 0).xy;\n"
+    "    vec3 light = vec3(red.x, green.x, blue.x), left = vec3(red.y, green.y, blue.y);\n"
+    "#elif SCENE_VEIL_LAYERS == 1\n"
+    "    vec4 veil = texelFetch(scene_veil, ivec3(texel, 0), 0);\n"
+    "    vec3 light = veil.rgb, left = veil.aaa;\n"
+    "#else\n"
+    "    vec3 light = vec3(0.0), left = vec3(1.0);\n"
+    "#endif\n"
+    "    transmittance *= left;\n"
+    "    in_scattering = light + left * in_scattering;\n"
     "}\n"
     "void main()\n"
     "{\n"
@@ -388,6 +411,7 @@ static const char light_text[] =
     "    vec4 place = texelFetch(scene_place, texel, 0);\n"
     "    vec3 transmittance = texelFetch(scene_transmittance, texel, 0).rgb;\n"
     "    vec3 in_scattering = texelFetch(scene_in_scattering, texel, 0).rgb;\n"
+    "    see_through_veil(texel, transmittance, in_scattering);\n"
     "    vec4 normal = texelFetch(scene_normal, texel, 0);\n"
     "    vec3 surface = scene_background;\n"
     "    if (place.x > 0.0) {\n"
@@ -399,169 +423,8 @@ static const char light_text[] =
     "    out_color = vec4(scene_share * (transmittance * surface + in_scattering), hit);\n"
     "    out_transmittance = vec4(scene_share * transmittance, scene_share);\n"
     "    out_in_scattering = vec4(scene_share * in_scattering, scene_share);\n"
-    "    out_surface = hit * vec4(normal.xyz, place.x);\n"
+    "    out_surface = place.x > 0.0 ? hit * vec4(normal.xyz, place.x) : vec4(0.0);\n"
     "}\n";
-
-/* ---- particles ------------------------------------------------------------------------------- */
-
-/* A square across the way to the ball that hides it: its silhouette is a circle d / sqrt(d^2 - r^2) times as wide as
- * the ball. All the picture where the eye is inside, or nearly. */
-static const char particle_vertex_text[] =
-    "layout(location = 0) in vec4 ball_place;\n"      /* center, radius */
-    "layout(location = 1) in vec4 ball_extinction;\n" /* and profile */
-    "layout(location = 2) in vec4 ball_emission;\n"   /* and distance */
-    "uniform mat4 scene_clip;\n"
-    "uniform vec3 scene_forward;\n" /* 0 where rays meet in the eye */
-    "uniform vec3 scene_rays[6];\n"
-    "flat out vec3 pass_rays[6];\n"
-    "flat out vec4 place;\n"
-    "flat out vec4 extinction;\n"
-    "flat out vec4 emission;\n"
-    "void main()\n"
-    "{\n"
-    "    vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
-    "    bool parallel = dot(scene_forward, scene_forward) > 0.0;\n"
-    "    float d = length(ball_place.xyz), r = ball_place.w;\n"
-    "    vec3 way = parallel ? scene_forward : ball_place.xyz / max(d, 1e-30);\n"
-    "    vec3 axis = abs(way.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);\n"
-    "    vec3 right = normalize(cross(way, axis)), up = cross(right, way);\n"
-    "    float size = parallel ? r : r * d * inversesqrt(max((d - r) * (d + r), 1e-30));\n"
-    "    vec3 at = ball_place.xyz + 1.001 * size * (corner.x * right + corner.y * up);\n"
-    "    pass_rays = scene_rays;\n"
-    "    place = ball_place;\n"
-    "    extinction = ball_extinction;\n"
-    "    emission = ball_emission;\n"
-    "    gl_Position = !parallel && d < 1.05 * r ? vec4(corner, 0.0, 1.0) : scene_clip * vec4(at, 1.0);\n"
-    "}\n";
-
-static const char round_particle_vertex_text[] =
-    "layout(location = 0) in vec4 ball_place;\n"
-    "layout(location = 1) in vec4 ball_extinction;\n"
-    "layout(location = 2) in vec4 ball_emission;\n"
-    "flat out vec4 place;\n"
-    "flat out vec4 extinction;\n"
-    "flat out vec4 emission;\n"
-    "void main()\n"
-    "{\n"
-    "    float d = length(ball_place.xyz), r = ball_place.w;\n"
-    "    place = ball_place;\n"
-    "    extinction = ball_extinction;\n"
-    "    emission = ball_emission;\n"
-    "    vec4 box = d < 1.05 * r ? box_around() : box_of_cone(ball_place.xyz / d, asin(r / d) / box_quarter);\n"
-    "    gl_Position = box_corner(box, gl_VertexID);\n"
-    "}\n";
-
-/* Each color by itself where they are dimmed by different factors: blending has room for one. */
-static const char particle_text[] =
-    "flat in vec4 place;\n"
-    "flat in vec4 extinction;\n"
-    "flat in vec4 emission;\n"
-    "#ifndef SCENE_FIVE_TAPS\n"
-    "uniform highp sampler2D scene_place;\n"
-    "#else\n"
-    "uniform vec3 scene_axis;\n"
-    "uniform vec4 scene_taps;\n" /* offset, nothing, edge, margin */
-    "uniform float scene_brightness;\n"
-    "#endif\n"
-    "uniform vec3 scene_channel;\n"
-    "#if defined(NEBEL_TILES) && !defined(SCENE_PANORAMA)\n"
-    "uniform ivec2 tile_grid;\n" /* pixels in a tile, tiles in a row */
-    "#endif\n"
-    "layout(location = 0) out highp vec4 out_in_scattering;\n"
-    "layout(location = 1) out highp vec4 out_transmittance;\n"
-    "nebel_light fog_before(vec3 origin, vec3 direction, float t)\n"
-    "{\n"
-    "#if !defined(SCENE_FOG)\n"
-    "    nebel_light clear;\n"
-    "    clear.transmittance = vec3(1.0);\n"
-    "    clear.in_scattering = vec3(0.0);\n"
-    "    return clear;\n"
-    "#elif defined(NEBEL_TILES)\n"
-    "#ifdef SCENE_PANORAMA\n"
-    "    int entry = face_entry(direction);\n"
-    "#else\n"
-    "    ivec2 tile = ivec2(gl_FragCoord.xy) / tile_grid.x;\n"
-    "    int entry = 2 * (tile.x + tile.y * tile_grid.y);\n"
-    "#endif\n"
-    "    return nebel_trace_list(origin, direction, t, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
-    "#else\n"
-    "    return nebel_trace(origin, direction, t);\n"
-    "#endif\n"
-    "}\n"
-    "#ifdef SCENE_FIVE_TAPS\n"
-    "#ifdef SCENE_PANORAMA\n" /* each ray is its own axis */
-    "float axis_depth(vec3 at) { return length(at); }\n"
-    "#else\n"
-    "float axis_depth(vec3 at) { return dot(at, scene_axis); }\n"
-    "#endif\n"
-    "float opaque_depth(vec2 place)\n"
-    "{\n"
-    "    ivec2 size = textureSize(scene_place, 0), texel = clamp(ivec2(floor(place * vec2(size))), ivec2(0), size - "
-    "1);\n"
-    "    vec2 pixel = vec2(texel) + 0.5;\n"
-    "    float t = texelFetch(scene_place, texel, 0).x;\n"
-    "    return t > 0.0 ? axis_depth(ray_origin(pixel) + t * ray_direction(pixel)) : -1.0;\n"
-    "}\n"
-    "float brightness()\n"
-    "{\n"
-    "    nebel_tap_constants taps;\n"
-    "    taps.offset = scene_taps.x;\n"
-    "    taps.nothing = scene_taps.y;\n"
-    "    taps.edge = scene_taps.z;\n"
-    "    taps.margin = scene_taps.w;\n"
-    "    taps.brightness = 1.0;\n"
-    "    vec2 at = gl_FragCoord.xy / vec2(textureSize(scene_place, 0));\n"
-    "    if (!(nebel_five_taps(at, axis_depth(place.xyz), taps) > 0.0)) discard;\n"
-    "    return scene_brightness;\n"
-    "}\n"
-    "float ray_end() { return 1e18; }\n"
-    "#else\n"
-    "float brightness() { return 1.0; }\n"
-    "float ray_end()\n"
-    "{\n"
-    "    float surface = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
-    "    return surface > 0.0 ? surface : 1e18;\n"
-    "}\n"
-    "#endif\n"
-    "float ball_length(vec3 origin, vec3 direction, float end, int power)\n"
-    "{\n"
-    "    return nebel_ball_length(origin, direction, end, place.xyz, place.w, power);\n"
-    "}\n"
-    "float gaussian_length(vec3 origin, vec3 direction, float end)\n"
-    "{\n"
-    "    return nebel_gaussian_length(origin, direction, end, place.xyz, place.w, place.w / 3.0);\n"
-    "}\n"
-    "float particle_length(vec3 origin, vec3 direction, float end)\n"
-    "{\n"
-    "#if SCENE_PARTICLES == 1\n" /* branches are no jumps in software: one profile alone has none */
-    "    return ball_length(origin, direction, end, 2);\n"
-    "#elif SCENE_PARTICLES == 2\n"
-    "    return gaussian_length(origin, direction, end);\n"
-    "#else\n"
-    "    int profile = int(extinction.w);\n"
-    "    return profile == 1 ? gaussian_length(origin, direction, end)\n"
-    "                        : ball_length(origin, direction, end, profile == 0 ? 2 : 0);\n"
-    "#endif\n"
-    "}\n"
-    "void main()\n"
-    "{\n"
-    "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
-    "    float end = ray_end();\n"
-    "    float depth = particle_length(origin, direction, end);\n"
-    "    if (!(depth > 0.0)) discard;\n"
-    "    float middle = clamp(dot(place.xyz - origin, direction), 0.0, end);\n"
-    "    nebel_blend blend = nebel_blend_medium(nebel_medium_light(depth, extinction.xyz, emission.xyz),\n"
-    "                                           fog_before(origin, direction, middle));\n"
-    "    float factor = dot(blend.factor, scene_channel);\n"
-    "    out_in_scattering = vec4(brightness() * blend.source, factor);\n"
-    "    out_transmittance = vec4(0.0, 0.0, 0.0, factor);\n"
-    "}\n";
-
-/* The comparison asks this of the host: it stands before the fog's text. */
-static const char five_tap_text[] = "#define SCENE_FIVE_TAPS\n"
-                                    "#define NEBEL_OPAQUE_DEPTH(at) opaque_depth(at)\n"
-                                    "uniform highp sampler2D scene_place;\n"
-                                    "float opaque_depth(vec2 place);\n";
 
 /* ---- the survey ------------------------------------------------------------------------------ */
 
@@ -678,13 +541,15 @@ nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *contex
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
     char limits[128];
-    (void)snprintf(
-        text, size, "%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define NB_CASCADES %d\n#define NEBEL_FEATURES %u\n%s",
-        nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
-        kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
-        kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
-        kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-        kind->of_particles, NB_CASCADES, (unsigned)kind->features, precision_of(context));
+    (void)snprintf(text, size,
+                   "%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
+                   "%d\n#define NEBEL_FEATURES %u\n%s",
+                   nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
+                   kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
+                   kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->panorama ? "#define SCENE_PANORAMA\n" : "",
+                   kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
+                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+                   kind->of_particles, kind->veil_layers, NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -701,14 +566,15 @@ static void set_units(unsigned program)
     set_unit(program, "scene_transmittance", NB_UNIT_TRANSMITTANCE);
     set_unit(program, "scene_shadows", NB_UNIT_SHADOWS);
     set_unit(program, "scene_dimming", NB_UNIT_DIMMING);
+    set_unit(program, "scene_veil", NB_UNIT_VEIL);
 }
 
 static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kind)
 {
     const char *const version = nb_program_version(context);
     if (!kind->of_particles) return (nb_texts){{version, light_vertex_text}, 2};
-    if (!kind->panorama) return (nb_texts){{version, particle_vertex_text}, 2};
-    return (nb_texts){{version, words_text, nb_panorama_box_text, round_particle_vertex_text}, 4};
+    if (!kind->panorama) return (nb_texts){{version, nb_particle_vertex_text}, 2};
+    return (nb_texts){{version, words_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
 }
 
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
@@ -721,8 +587,8 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text, light_text}, 7};
     const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
-    const nb_texts particle = {{head, kind->five_taps ? five_tap_text : "", fog,
-                                kind->panorama ? words_text : passed_words_text, ray, tile, particle_text},
+    const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", fog,
+                                kind->panorama ? words_text : passed_words_text, ray, tile, nb_particle_text},
                                7};
     const nb_texts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
@@ -737,8 +603,9 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
-           a->five_taps == b->five_taps && a->panorama == b->panorama && a->has_fog == b->has_fog &&
-           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
+           a->sunlit == b->sunlit && a->five_taps == b->five_taps && a->veil_layers == b->veil_layers &&
+           a->panorama == b->panorama && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
+           a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

@@ -13,7 +13,8 @@ enum {
     NB_UNIT_IN_SCATTERING,
     NB_UNIT_TRANSMITTANCE,
     NB_UNIT_SHADOWS,
-    NB_UNIT_DIMMING
+    NB_UNIT_DIMMING,
+    NB_UNIT_VEIL
 };
 
 enum { NB_CASCADES = 4 };
@@ -24,7 +25,9 @@ typedef struct nb_light_kind {
                          fog between them and the sun */
     int of_dimming;   /* of the sun by particles, for `dimmed` ones */
     int dimmed;       /* that counts, too */
+    int sunlit;       /* surfaces are */
     int five_taps;    /* particles are discs, which are there or not */
+    int veil_layers;  /* that particles are drawn into, or surfaces are seen through; 0: there are none */
     int panorama;
     int has_fog;
     int in_texture, tiled;

@@ -280,11 +280,11 @@ void nb_state_blend(const nb_context *c, GLenum source_factor, GLenum target_fac
     set_blending(c, 0, blending);
 }
 
-void nb_state_layer(const nb_context *c)
+void nb_state_layer(const nb_context *c, int buffers)
 {
-    const GLint blending[NB_STATE_BLENDING] = {GL_ONE, GL_SRC_ALPHA, GL_ZERO, GL_ONE, GL_FUNC_ADD, GL_FUNC_ADD};
-    for (GLuint i = 0; i < 2; i++) set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, 1);
-    for (GLuint i = 0; i < (c->blending_by_buffer ? 2 : 1); i++) set_blending(c, i, blending);
+    const GLint blending[NB_STATE_BLENDING] = {GL_ONE, GL_SRC_ALPHA, GL_ZERO, GL_SRC_ALPHA, GL_FUNC_ADD, GL_FUNC_ADD};
+    for (GLuint i = 0; i < (GLuint)buffers; i++) set_indexed_switch(c->switches_by_buffer, GL_BLEND, i, 1);
+    for (GLuint i = 0; i < (c->blending_by_buffer ? (GLuint)buffers : 1); i++) set_blending(c, i, blending);
 }
 
 void nb_state_add(const nb_context *c)

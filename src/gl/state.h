@@ -52,8 +52,8 @@ void nb_blending_restore(const nb_context *context, const nb_blending *blending)
 /* Blending of draw buffer 0: source * factor + target * factor, alpha of the target as it is. */
 void nb_state_blend(const nb_context *context, GLenum source_factor, GLenum target_factor);
 
-/* Blending of draw buffers 0 and 1: source + target * source's alpha. */
-void nb_state_layer(const nb_context *context);
+/* Blending of draw buffers: source + target * source's alpha; alpha: target * source. */
+void nb_state_layer(const nb_context *context, int buffers);
 
 /* Fragments go to one sample of each pixel alone. OpenGL only. */
 void nb_state_choose_sample(uint32_t sample);

@@ -43,6 +43,12 @@ static int make_buffers(nb_targets *t)
            make_buffer(&t->dimming_buffer, &t->dimming, 1, 0);
 }
 
+static nebel_result refuse_floats(const nebel_log *log)
+{
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED, "OpenGL: the driver (%s) does not draw into textures of floats",
+                   (const char *)glGetString(GL_RENDERER));
+}
+
 nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width, uint32_t height)
 {
     if (t->width == width && t->height == height) return NEBEL_OK;
@@ -62,15 +68,60 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
     t->survey = make_texture(t->survey_width, t->survey_height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
     nebel_result result = nb_context_check_memory(log, "the picture; ask for fewer pixels");
     if (result == NEBEL_OK && !make_buffers(t)) {
-        result = nb_fail(log, NEBEL_ERROR_UNSUPPORTED, "OpenGL: the driver (%s) does not draw into textures of floats",
-                         (const char *)glGetString(GL_RENDERER));
+        result = refuse_floats(log);
     }
     if (result != NEBEL_OK) nb_targets_delete(t);
     return result;
 }
 
+static void delete_veil(nb_targets *t)
+{
+    glDeleteFramebuffers(1, &t->veil_buffer);
+    glDeleteTextures(1, &t->veil);
+    t->veil = t->veil_buffer = 0;
+    t->veil_layers = 0;
+}
+
+/* A layer for a colour: blending takes its factor from the fragment's alpha also where the target has none. */
+static void make_veil(nb_targets *t, int layers)
+{
+    glGenTextures(1, &t->veil);
+    glBindTexture(GL_TEXTURE_2D_ARRAY, t->veil);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, layers == 1 ? GL_RGBA32F : GL_RG32F, (GLsizei)t->width, (GLsizei)t->height,
+                 layers, 0, layers == 1 ? GL_RGBA : GL_RG, GL_FLOAT, NULL);
+    t->veil_layers = layers;
+}
+
+static int make_veil_buffer(nb_targets *t)
+{
+    GLenum all[3];
+    glGenFramebuffers(1, &t->veil_buffer);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, t->veil_buffer);
+    for (int i = 0; i < t->veil_layers; i++) {
+        all[i] = (GLenum)(GL_COLOR_ATTACHMENT0 + i);
+        glFramebufferTextureLayer(GL_DRAW_FRAMEBUFFER, all[i], t->veil, 0, i);
+    }
+    glDrawBuffers(t->veil_layers, all);
+    return glCheckFramebufferStatus(GL_DRAW_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+}
+
+nebel_result nb_targets_fit_veil(nb_targets *t, const nebel_log *log, int layers)
+{
+    if (t->veil_layers == layers) return NEBEL_OK;
+    delete_veil(t);
+    make_veil(t, layers);
+    nebel_result result = nb_context_check_memory(log, "the light of particles; ask for fewer pixels");
+    if (result == NEBEL_OK && !make_veil_buffer(t)) result = refuse_floats(log);
+    if (result != NEBEL_OK) delete_veil(t);
+    return result;
+}
+
 void nb_targets_delete(nb_targets *t)
 {
+    delete_veil(t);
     const GLuint textures[] = {t->depth,         t->place,         t->normal, t->reflectance,
                                t->in_scattering, t->transmittance, t->survey, t->dimming};
     const GLuint buffers[] = {t->surface_buffer, t->fog_buffer, t->picture_buffer, t->survey_buffer, t->dimming_buffer};

@@ -18,12 +18,20 @@ typedef struct nb_targets {
     unsigned picture[4];                   /* color, transmittance, in-scattering, surface: see nebel_gl_textures */
     unsigned survey;                       /* a texel for each block: distances of the nearest and the farthest */
     uint32_t survey_width, survey_height;
-    unsigned surface_buffer, fog_buffer, picture_buffer, survey_buffer, dimming_buffer;
+    unsigned
+        veil; /* array, what particles make of the light behind them: one layer of light and transmittance, or one of
+                      these two for each colour; 0: never asked for */
+    int veil_layers;
+    unsigned surface_buffer, fog_buffer, picture_buffer, survey_buffer, dimming_buffer, veil_buffer;
 } nb_targets;
 
 /* Makes them for a size; those of another size go. Changes the bindings of TEXTURE_2D on the active unit and of the
  * draw framebuffer. MEMORY, UNSUPPORTED. */
 nebel_result nb_targets_fit(nb_targets *targets, const nebel_log *log, uint32_t width, uint32_t height);
+
+/* Makes the veil of 1 or 3 layers where it is another. Changes the bindings of
+ * TEXTURE_2D_ARRAY on the active unit and of the draw framebuffer. MEMORY, UNSUPPORTED. */
+nebel_result nb_targets_fit_veil(nb_targets *targets, const nebel_log *log, int layers);
 
 void nb_targets_delete(nb_targets *targets);
 
