@@ -92,6 +92,26 @@ static void test_is_strewn_as_its_density_says(void **unused)
     assert_true(fabs(within_half - COUNT * share) < 5 * sqrt(COUNT * share * (1 - share)));
 }
 
+/* Half by number and half by amount: (1 - r^2)^2 is 1 - r^2 twice. */
+static void test_fades_as_its_density_says(void **unused)
+{
+    (void)unused;
+    nebel_nebula_desc desc = a_nebula();
+    desc.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1};
+    assert_int_equal(nebel_scatter_nebula(&desc, particles), NEBEL_OK);
+    desc.density.power = 2;
+    desc.fade = .5;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_OK);
+    for (int i = 0; i < COUNT; i++) {
+        const double r = distance(&again[i], desc.shape.center) / 10, share = 1 - r * r;
+        assert_true(distance(&again[i], particles[i].center) < 1e-9);
+        assert_true(fabs(again[i].extinction[1] - share * desc.absorption[1]) < 1e-9);
+        for (int c = 0; c < 3; c++) assert_true(fabs(again[i].emission[c] - share * particles[i].emission[c]) < 1e-9);
+    }
+    desc.fade = 1.5;
+    assert_int_equal(nebel_scatter_nebula(&desc, again), NEBEL_ERROR_VALUE);
+}
+
 static void test_every_shape_holds_its_particles(void **unused)
 {
     (void)unused;
@@ -332,6 +352,7 @@ int main(void)
         cmocka_unit_test(test_fills_its_shape_evenly),
         cmocka_unit_test(test_starts_at_points),
         cmocka_unit_test(test_is_strewn_as_its_density_says),
+        cmocka_unit_test(test_fades_as_its_density_says),
         cmocka_unit_test(test_every_shape_holds_its_particles),
         cmocka_unit_test(test_the_same_seed_gives_the_same_particles),
         cmocka_unit_test(test_eddies_carry_no_farther_than_told),

@@ -136,6 +136,7 @@ static void change_nebulae(change *c)
         nebula->shape = copy_shape(&nebula->shape);
         nb_space_convert_nebula(&half, nebula);
         nebula->seed++;
+        if (nebula->points == NULL) nebula->fade = nebula->fade > .5 ? .25 : .75;
         nebula->count++;
         nebula->profile = (nebel_particle_profile)((nebula->profile + 1) % NEBEL_PARTICLE_COUNT);
         c->nebula_names[i] = name_anew(c, "nebula");
@@ -360,6 +361,7 @@ static void same_nebulae(const nebel_scene_data *a, const nebel_scene_data *b)
         SAME(&x->size, &y->size);
         SAME(&x->absorption, &y->absorption);
         SAME(&x->emission, &y->emission);
+        SAME(&x->fade, &y->fade);
         SAME(&x->turbulence, &y->turbulence);
         SAME(&x->turbulence_size, &y->turbulence_size);
         WHOLE(x->color_count, y->color_count);

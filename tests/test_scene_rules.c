@@ -434,6 +434,7 @@ static void test_what_no_nebula_has(void **state)
         {FORMAT, NEBULA("\"colors\": [`\"#ff\"]"), "nebula[0].colors[0]: is no color"},
         {FORMAT, NEBULA("\"colors\": `[]"), "nebula[0].colors: has 0 colors; 1 to 64 are possible"},
         {FORMAT, NEBULA("\"colors\": [1, `-1]"), "nebula[0].colors[1]: is -1; must be"},
+        {FORMAT, NEBULA("\"fade\": `2"), "nebula[0].fade: is 2; must be a number from 0 to 1"},
         {FORMAT, NEBULA("\"turbulence\": `-1"), "nebula[0].turbulence: is -1; must be"},
         {FORMAT, NEBULA("\"turbulence_size\": `0"), "nebula[0].turbulence_size: is 0; must be"},
         {FORMAT, NEBULA("`\"place\": 3"), "nebula[0].place: unknown key; a nebula has: name, shape, points"},

@@ -44,6 +44,9 @@ typedef struct nebel_nebula_desc {
     nebel_log log;
     nebel_shape shape;     /* particles start inside of it; bounded */
     nebel_density density; /* how thickly they are strewn there */
+    /* 0: the density thins particles out; 1: it dims them, and they are equally many everywhere; between 0 and 1
+     * density^(1 - fade) thins them out and density^fade dims them. Where few are left single ones show. Not of points. */
+    double fade;
     size_t count;
     const double (*points)[3]; /* m, `count` of them: where particles start, in place of shape and density, which are
                                   not read; NULL: those */

@@ -80,6 +80,8 @@ static nebel_result check_lengths(const nebel_nebula_desc *desc)
     if (!(desc->size[0] <= desc->size[1]))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: sizes are %g to %g m; the smaller must come first",
                        desc->size[0], desc->size[1]);
+    if (!(desc->fade >= 0 && desc->fade <= 1))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: fade is %g; it must be from 0 to 1", desc->fade);
     if (!(desc->turbulence >= 0 && desc->turbulence <= NEBEL_MAX_LENGTH))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "nebula: turbulence is %g m; it must be from 0 to %g",
                        desc->turbulence, NEBEL_MAX_LENGTH);
@@ -157,19 +159,29 @@ static double chance(const cloud *from, int stream, size_t particle, uint64_t i)
     return nb_chance(seed, (uint64_t)particle * (MOST_TRIES * 4) + i);
 }
 
+/* 0 of no density, whatever the exponent. */
+static double power(double density, double exponent)
+{
+    if (!(density > 0)) return 0;
+    return exponent == 1 ? density : nb_exp(exponent * nb_log(density));
+}
+
 /* A point of the caller's; or tries places in the bounding box, each taken with the chance that the density there says.
- */
-static int find_place(const cloud *from, size_t particle, double place[3])
+ * *share: what the particle has of its amounts. */
+static int find_place(const cloud *from, size_t particle, double place[3], double *share)
 {
     const double *low = from->volume.low, *high = from->volume.high;
     if (from->desc->points != NULL) {
         memcpy(place, from->desc->points[particle], 3 * sizeof *place);
+        *share = 1;
         return 1;
     }
     for (uint64_t n = 0; n < MOST_TRIES; n++) {
         for (uint64_t i = 0; i < 3; i++)
             place[i] = low[i] + (high[i] - low[i]) * chance(from, STREAM_PLACE, particle, 4 * n + i);
-        if (chance(from, STREAM_PLACE, particle, 4 * n + 3) < nb_density_at(&from->volume, place)) return 1;
+        const double density = nb_density_at(&from->volume, place);
+        *share = power(density, from->desc->fade);
+        if (chance(from, STREAM_PLACE, particle, 4 * n + 3) < power(density, 1 - from->desc->fade)) return 1;
     }
     return 0;
 }
@@ -209,14 +221,14 @@ static void pick_color(const cloud *from, size_t particle, const double place[3]
 
 static int make_particle(const cloud *from, size_t number, nebel_particle *particle)
 {
-    double place[3], color[3];
-    if (!find_place(from, number, place)) return 0;
+    double place[3], color[3], share;
+    if (!find_place(from, number, place, &share)) return 0;
     *particle = (nebel_particle){.radius = pick_size(from, number), .profile = from->desc->profile};
     pick_color(from, number, place, color);
     stir(from, place, particle->center);
     for (int c = 0; c < 3; c++) {
-        particle->extinction[c] = from->desc->absorption[c];
-        particle->emission[c] = from->desc->emission[c] * color[c];
+        particle->extinction[c] = share * from->desc->absorption[c];
+        particle->emission[c] = share * from->desc->emission[c] * color[c];
     }
     return 1;
 }

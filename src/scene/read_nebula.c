@@ -10,6 +10,7 @@ enum {
     POINTS,
     DENSITY,
     COUNT,
+    FADE,
     SEED,
     PROFILE,
     SIZE,
@@ -21,9 +22,9 @@ enum {
     NEBULA_KEY_COUNT
 };
 
-static const char *const key_names[] = {"name",   "shape",      "points",         "density",    "count",
-                                        "seed",   "profile",    "size",           "absorption", "emission",
-                                        "colors", "turbulence", "turbulence_size"};
+static const char *const key_names[] = {"name",     "shape",  "points",     "density",        "count",
+                                        "fade",     "seed",   "profile",    "size",           "absorption",
+                                        "emission", "colors", "turbulence", "turbulence_size"};
 
 static const nb_keys nebula_keys = {key_names, NEBULA_KEY_COUNT, NB_BIT(NEBULA_KEY_COUNT) - 1, 0, "a nebula"};
 
@@ -34,6 +35,7 @@ static bool read_counts(nb_json *json, const nb_json_node *const *found, nebel_n
 {
     int count = 10000, seed = 0;
     if (!nb_value_integer(json, found[COUNT], 1, MOST_PARTICLES, &count) ||
+        !nb_value_number(json, found[FADE], &nb_range_fraction, &nebula->fade) ||
         !nb_value_integer(json, found[SEED], 0, INT32_MAX, &seed))
         return false;
     nebula->count = (size_t)count;
@@ -123,7 +125,7 @@ static bool keep_nebula(nb_scene_reader *in, const nb_json_node *node, const neb
 
 static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_node *const *found)
 {
-    static const int strewn[] = {SHAPE, DENSITY, COUNT};
+    static const int strewn[] = {SHAPE, DENSITY, COUNT, FADE};
     if (found[POINTS] == NULL && found[SHAPE] == NULL)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is nowhere; a nebula has \"shape\" or \"points\"");
     for (size_t i = 0; i < sizeof strewn / sizeof *strewn && found[POINTS] != NULL; i++)

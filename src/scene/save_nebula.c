@@ -77,7 +77,10 @@ static void change_nebula(nb_save *save, const nb_scene_reader *in, const nb_jso
     if (loses_size) was.turbulence_size = 0;
     nb_save_density(save, json, node, &was.density, &now.density);
     nb_save_places(save, json, &nebula, nb_nebula_places, NB_ALL_PLACES, &was, &now);
-    if (now.points == NULL) nb_save_integer(save, json, &nebula, "count", (double)was.count, (double)now.count);
+    if (now.points == NULL) {
+        nb_save_integer(save, json, &nebula, "count", (double)was.count, (double)now.count);
+        nb_save_places(save, json, &nebula, nb_strewn_places, NB_ALL_PLACES, &was, &now);
+    }
     nb_save_integer(save, json, &nebula, "seed", (double)was.seed, (double)now.seed);
     if (strcmp(save->before->nebula_names[index], save->changed->nebula_names[index]) != 0)
         nb_edit_word(&save->edit, json, &nebula, "name", save->changed->nebula_names[index]);

@@ -71,6 +71,11 @@ const nb_place nb_nebula_places[] = {
     END,
 };
 
+const nb_place nb_strewn_places[] = {
+    PLACE(nebel_nebula_desc, fade, 1, NB_EDIT_EACH),
+    END,
+};
+
 const nb_place nb_cell_places[] = {
     PLACE(nebel_cell, density, 1, NB_EDIT_EACH),
     PLACE(nebel_cell, color, 3, NB_EDIT_AMOUNT),

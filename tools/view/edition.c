@@ -374,7 +374,7 @@ static int has_same_colors(const nebel_nebula_desc *a, const nebel_nebula_desc *
 static int is_same_nebula(const nebel_nebula_desc *a, const nebel_nebula_desc *b)
 {
     return nb_shape_is_same(&a->shape, &b->shape) && is_same_density(&a->density, &b->density) &&
-           a->count == b->count && a->seed == b->seed && a->profile == b->profile &&
+           a->count == b->count && a->fade == b->fade && a->seed == b->seed && a->profile == b->profile &&
            HAS_SAME(a, b, nebel_nebula_desc, size, colors) && has_same_colors(a, b) && a->turbulence == b->turbulence &&
            a->turbulence_size == b->turbulence_size;
 }

@@ -298,6 +298,8 @@ bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *
     if (nebula->points == nullptr) {
         changed |= slide_whole("particles", &count, 1, MOST_PARTICLES, true, "How many there are.");
         changed |= draw_density(&nebula->density, panel->data->camera.look_at, reach);
+        changed |= slide("fade", &nebula->fade, 0, 1, "%.2f", false,
+                         "How much the density dims particles, in place of thinning them out.");
         changed |= draw_shape(panel, &nebula->shape, reach, true);
     } else {
         ImGui::TextDisabled("%u points of a model", unsigned(nebula->count));
