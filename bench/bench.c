@@ -15,13 +15,14 @@ typedef struct nb_group {
 } nb_group;
 
 /* The process first: see bench/process.c. */
-const char *const nb_bench_groups[] = {"process", "segments",  "vertices", "frame",
+const char *const nb_bench_groups[] = {"process", "segments",  "vertices", "frame", "sunlight",
                                        "pass",    "particles", "overlap",  NULL};
 
 static const nb_group groups[] = {{nb_bench_process, NULL},
                                   {nb_bench_segments, NULL},
                                   {nb_bench_vertices, NULL},
                                   {nb_bench_frame, NULL},
+                                  {nb_bench_sunlight, NULL},
                                   {nb_bench_pass, IN_OPENGL(nb_bench_opengl_pass)},
                                   {nb_bench_particles, IN_OPENGL(nb_bench_opengl_particles)},
                                   {nb_bench_overlap, NULL}};

@@ -102,7 +102,7 @@ enum { SETUPS = 4 };
 
 static int prepare(nb_studio *studio, nb_bench_fog fog, double density, nb_setup *setup)
 {
-    *setup = (nb_setup){.studio = studio, .fog = nb_bench_fog_commit(fog), .density = density};
+    *setup = (nb_setup){.studio = studio, .fog = nb_bench_fog_commit(fog, &studio->scene.data), .density = density};
     if (fog != NB_FOG_NONE && setup->fog == NULL) return -1;
     const nebel_renderer_desc desc = {.threads = 1};
     return nebel_create_renderer(&studio->scene.data, setup->fog, &desc, &setup->renderer) == NEBEL_OK ? 0 : -1;

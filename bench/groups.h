@@ -13,6 +13,7 @@ const char *nb_bench_particles(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_pass(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_process(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_sunlight(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_tessellation(const nb_bench_desc *desc, nb_figures *figures); /* of the group vertices */
 const char *nb_bench_vertices(const nb_bench_desc *desc, nb_figures *figures);
 

@@ -205,7 +205,7 @@ static int set_up(const nb_bench_desc *desc, nb_gallery *gallery)
     gallery->height = desc->quick ? 180 : 1080;
     const double aspect = (double)gallery->width / gallery->height;
     if (nb_bench_scene_make(desc->quick ? 64 : 512, aspect, &gallery->scene) != 0) return -1;
-    gallery->fog = nb_bench_fog_commit(NB_FOG_BOX);
+    gallery->fog = nb_bench_fog_commit(NB_FOG_BOX, &(nebel_scene_data){.has_sun = 0});
     gallery->memory = malloc(3 * sizeof *gallery->memory * FRAMES * gallery->width * gallery->height);
     return gallery->fog != NULL && gallery->memory != NULL ? 0 : -1;
 }

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double horizontal_fov = 50; /* degrees */
@@ -25,7 +26,22 @@ static const nebel_volume_desc fogs[] = {
                     .extinction = {.05, .05, .05}},
     [NB_FOG_SPHERE] = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 4, 0}, .radius = 18},
                        .extinction = {.08, .08, .08}},
+    [NB_FOG_HEIGHT] = {.density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 8}, .extinction = {.05, .05, .05}},
 };
+
+/* That is lit where its source is not. */
+static nebel_volume_desc volume_of(nb_bench_fog kind)
+{
+    const int is_lit = kind >= NB_FOG_LIT_BOX;
+    nebel_volume_desc volume = fogs[kind == NB_FOG_LIT_BOX      ? NB_FOG_BOX
+                                    : kind == NB_FOG_LIT_SPHERE ? NB_FOG_SPHERE
+                                                                : kind];
+    for (int c = 0; c < 3; c++) {
+        volume.source[c] = is_lit ? 0 : fog_source[c];
+        volume.albedo[c] = is_lit ? 1 : 0;
+    }
+    return volume;
+}
 
 int nb_bench_scene_make(uint32_t quads, double aspect, nb_bench_scene *scene)
 {
@@ -57,13 +73,61 @@ void nb_bench_scene_free(nb_bench_scene *scene)
     nb_terrain_free(&scene->terrain);
 }
 
-nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind)
+/* ---- pillars --------------------------------------------------------------------------------- */
+
+enum { PILLARS = 10, CORNERS = 8, SIDES = 12 };
+
+static const double low_sun[3] = {-.55, .28, -.79};
+
+/* 2 wide and 18 high, from below the ground. */
+static void set_pillar(int number, float *positions, uint32_t first, uint32_t *indices)
+{
+    static const uint32_t sides[3 * SIDES] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                              2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    const float x = (float)(number % 5 * 9 - 18), z = (float)(number / 5 * 22 - 6 + number % 2 * 5);
+    for (int i = 0; i < CORNERS; i++) {
+        positions[3 * i] = x + (i & 1 ? 1 : -1);
+        positions[3 * i + 1] = i & 2 ? 18 : 0;
+        positions[3 * i + 2] = z + (i & 4 ? 1 : -1);
+    }
+    for (int i = 0; i < 3 * SIDES; i++) indices[i] = first + sides[i];
+}
+
+int nb_bench_scene_add_pillars(nb_bench_scene *scene)
+{
+    nb_terrain *const terrain = &scene->terrain;
+    const uint32_t vertices = terrain->vertex_count + PILLARS * CORNERS;
+    const uint32_t triangles = terrain->triangle_count + PILLARS * SIDES;
+    float *const positions = realloc(terrain->positions, 3 * sizeof(float) * vertices);
+    if (positions != NULL) terrain->positions = positions;
+    uint32_t *const indices = realloc(terrain->indices, 3 * sizeof(uint32_t) * triangles);
+    if (indices != NULL) terrain->indices = indices;
+    if (positions == NULL || indices == NULL) return -1;
+    for (uint32_t i = 0; i < PILLARS; i++) {
+        const uint32_t first = terrain->vertex_count + i * CORNERS;
+        set_pillar((int)i, positions + 3 * (size_t)first, first,
+                   indices + 3 * (size_t)(terrain->triangle_count + i * SIDES));
+    }
+    terrain->vertex_count = scene->mesh.vertex_count = vertices;
+    terrain->triangle_count = scene->mesh.triangle_count = triangles;
+    scene->mesh.positions = positions;
+    scene->mesh.indices = indices;
+    memcpy(scene->data.sun_direction, low_sun, sizeof low_sun);
+    return 0;
+}
+
+/* ---- fog ------------------------------------------------------------------------------------- */
+
+nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *scene)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    if (kind == NB_FOG_NONE || nebel_create_fog(&(nebel_fog_desc){0}, &fog) != NEBEL_OK) return NULL;
-    nebel_volume_desc volume = fogs[kind];
-    memcpy(volume.source, fog_source, sizeof fog_source);
+    nebel_fog_desc desc = {.log = {NULL}};
+    memcpy(desc.ambient, scene->ambient, sizeof desc.ambient);
+    memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
+    memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);
+    if (kind == NB_FOG_NONE || nebel_create_fog(&desc, &fog) != NEBEL_OK) return NULL;
+    const nebel_volume_desc volume = volume_of(kind);
     if (nebel_add_volume(fog, &volume, NULL) == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
     nebel_destroy_fog(fog);
     return snapshot;

@@ -9,8 +9,11 @@
 
 typedef enum nb_bench_fog {
     NB_FOG_NONE = 0,
-    NB_FOG_BOX,   /* scene A1 */
-    NB_FOG_SPHERE /* scene B1 */
+    NB_FOG_BOX,        /* scene A1 */
+    NB_FOG_SPHERE,     /* scene B1 */
+    NB_FOG_LIT_BOX,    /* A2, lit by the scene's sun and ambient light */
+    NB_FOG_LIT_SPHERE, /* B2 */
+    NB_FOG_HEIGHT      /* C */
 } nb_bench_fog;
 
 enum { NB_BENCH_WIDTH = 1280, NB_BENCH_HEIGHT = 720 };
@@ -26,8 +29,11 @@ typedef struct nb_bench_scene {
 int nb_bench_scene_make(uint32_t quads, double aspect, nb_bench_scene *scene);
 void nb_bench_scene_free(nb_bench_scene *scene);
 
-/* NULL for no fog and on an error. */
-nebel_snapshot *nb_bench_fog_commit(nb_bench_fog fog);
+/* Makes scene C of the landscape: ten square pillars, and a low sun. Returns 0, or -1 without memory. */
+int nb_bench_scene_add_pillars(nb_bench_scene *scene);
+
+/* The fog in the light of the scene. NULL for no fog and on an error. */
+nebel_snapshot *nb_bench_fog_commit(nb_bench_fog fog, const nebel_scene_data *scene);
 
 /* Writes the scene with the fog of A1 into a folder: mesh.json takes the terrain as a PLY model, map.json as a height
  * map. Returns 0 or -1. */
