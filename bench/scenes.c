@@ -122,7 +122,7 @@ nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *s
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.log = {NULL}};
+    nebel_fog_desc desc = {.max_opacity = 1};
     memcpy(desc.ambient, scene->ambient, sizeof desc.ambient);
     memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
     memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);

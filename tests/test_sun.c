@@ -307,6 +307,87 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
     }
 }
 
+/* ---- closed forms ---------------------------------------------------------------------------- */
+
+enum { BODIES = 5 };
+
+/* Few bodies whose way to the sun is had in closed form: boxes (one turned), planes and the world; with balls and
+ * capsules; or height fog. A body that takes away fog where there is none makes the same fog ask by marches. */
+static size_t make_bodies(uint64_t *numbers, int kind, nebel_volume_desc volumes[BODIES + 1])
+{
+    static const nebel_plane planes[] = {{{1, 1, 0.2}, 3}, {{-1, 0.4, 1}, 2}, {{0, 1, -1}, 3}, {{0, -1, 0.1}, 2}};
+    const nebel_shape box = {.type = NEBEL_SHAPE_BOX, .min = {-3, -2, -4}, .max = {2, 3, 4}};
+    nebel_shape turned = {.type = NEBEL_SHAPE_BOX, .min = {-2, -2, -2}, .max = {3, 1, 2}};
+    turned.transform.rotation[0] = 0.3;
+    turned.transform.rotation[1] = 0.5;
+    turned.transform.rotation[3] = 0.8;
+    const nebel_shape shapes[BODIES] = {
+        box,
+        {.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 4},
+        kind == 1 ? (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {1, 1, 0}, .radius = 3} : turned,
+        kind == 1 ? (nebel_shape){.type = NEBEL_SHAPE_CAPSULE, .from = {-3, 0, 0}, .to = {2, 2, 1}, .radius = 1} : box,
+        turned};
+    const size_t count = kind == 2 ? 1 : 1 + (size_t)dice(numbers, 0, BODIES);
+    for (size_t i = 0; i < count; i++) {
+        nebel_volume_desc *v = &volumes[i];
+        *v = (nebel_volume_desc){.shape = shapes[(i + (size_t)dice(numbers, 0, BODIES)) % BODIES],
+                                 .albedo = {0.9, 0.8, 1},
+                                 .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.3}};
+        for (int c = 0; c < 3; c++) v->extinction[c] = dice(numbers, 0.02, 0.4);
+        if (kind != 2) continue;
+        v->shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
+        v->density = (nebel_density){
+            .type = NEBEL_DENSITY_HEIGHT, .base = dice(numbers, -2, 2), .scale_height = dice(numbers, 0.5, 20)};
+    }
+    volumes[count] = (nebel_volume_desc){.operation = NEBEL_OPERATION_EXCLUDE,
+                                         .priority = -1,
+                                         .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, -9e4, 0}, .radius = 1}};
+    return count;
+}
+
+/* Rays up, down, level, through, beside and within, some partly in shadow. */
+static void closed_forms_are_what_marches_find(void **state)
+{
+    static const float toggles[] = {1, 2.5f, 3, 6};
+    uint32_t first[RAYS + 1];
+    (void)state;
+    for (uint32_t i = 0; i <= RAYS; i++) first[i] = i <= RAYS / 2 ? 0 : 4;
+    const nebel_lit_pieces pieces = {first, toggles};
+    for (uint64_t seed = 0; seed < 30; seed++) {
+        uint64_t numbers = 77 * seed + 1;
+        nebel_volume_desc volumes[BODIES + 1];
+        nebel_ray rays[RAYS];
+        nebel_light closed[RAYS], marched[RAYS];
+        const int kind = (int)(seed % 3);
+        const size_t count = make_bodies(&numbers, kind, volumes);
+        const nebel_fog_desc desc = {
+            .sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.1, 1), dice(&numbers, -1, 1)},
+                    .irradiance = {5, 4, 3}}};
+        nebel_snapshot *simple = fog_commit(&desc, volumes, count), *other = fog_commit(&desc, volumes, count + 1);
+        for (int i = 0; i < RAYS; i++) {
+            rays[i].t_max = i % 3 ? HUGE_VAL : dice(&numbers, 1, 20);
+            for (int c = 0; c < 3; c++) {
+                rays[i].origin[c] = dice(&numbers, -6, 6);
+                rays[i].direction[c] = i % 7 == c ? 0 : dice(&numbers, -1, 1);
+            }
+            if (i % 5 == 0) memcpy(rays[i].direction, desc.sun.direction, sizeof desc.sun.direction);
+        }
+        for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+            nebel_trace_desc asked = {.tolerance = 1e-7, .sunlit = &pieces};
+            trace(other, &asked, rays, marched);
+            asked.precision = (nebel_precision)precision;
+            trace(simple, &asked, rays, closed);
+            for (int i = 0; i < RAYS; i++) {
+                const double off = apart(&closed[i], &marched[i]);
+                assert_true(off <= closed[i].error + marched[i].error);
+                assert_true(off < (precision == NEBEL_PRECISION_DOUBLE ? 1e-6 : 2e-5));
+            }
+        }
+        nebel_release_snapshot(simple);
+        nebel_release_snapshot(other);
+    }
+}
+
 /* ---- rules ----------------------------------------------------------------------------------- */
 
 static void suns_are_checked(void **state)
@@ -432,6 +513,7 @@ int main(void)
         cmocka_unit_test(pieces_are_those_of_the_closed_form),
         cmocka_unit_test(pieces_that_are_none_are_refused),
         cmocka_unit_test(pieces_are_the_same_in_any_set_and_split),
+        cmocka_unit_test(closed_forms_are_what_marches_find),
         cmocka_unit_test(suns_are_checked),
         cmocka_unit_test(sunlit_fog_is_bounded),
         cmocka_unit_test(endless_fog_is_answered),

@@ -157,6 +157,33 @@ static void point_to_sun(nebel_snapshot *s, const nebel_sun *sun)
     s->to_sun[2] = z / length + 0;
 }
 
+/* More bodies than these are found by a tree. */
+#define MOST_ADDED 8
+
+static int is_flat(const nb_volume *body)
+{
+    const nb_leaf *leaf = &body->leaves[0];
+    return leaf->type == NB_LEAF_WORLD || leaf->type == NB_LEAF_BOX ||
+           (leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MOST_EDGED_FACES);
+}
+
+static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
+{
+    if (!s->is_sunlit || s->medium_count > MOST_ADDED) return NB_WAY_MARCHED;
+    int flat = 1, even = 1;
+    for (size_t i = 0; i < s->medium_count; i++) {
+        const nb_volume *body = &s->media[i].body;
+        if (nb_volume_covers(body) || body->leaf_count != 1) return NB_WAY_MARCHED;
+        even = even && body->density.type == NEBEL_DENSITY_CONSTANT;
+        flat = flat && is_flat(body);
+    }
+    if (even) return flat ? NB_WAY_FLAT : NB_WAY_ADDED;
+    const nb_volume *body = &s->media[0].body;
+    const int is_height = s->medium_count == 1 && body->leaves[0].type == NB_LEAF_WORLD &&
+                          body->density.type == NEBEL_DENSITY_HEIGHT && body->density.below == NEBEL_BELOW_GROW;
+    return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;
+}
+
 nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
 {
     if (snapshot != NULL) *snapshot = NULL;
@@ -174,6 +201,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     if (copy_media(fog, s) && copy_lamps(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
+        s->way_to_sun = find_way_to_sun(s);
         result = index_media(s);
     }
     if (result != NEBEL_OK) {

@@ -24,6 +24,17 @@ typedef struct nb_medium {
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium;
 
+/* How the optical depth from a place to the sun is had. */
+typedef enum nb_way_to_sun {
+    NB_WAY_MARCHED = 0, /* by a march of its own */
+    NB_WAY_ADDED,       /* few convex bodies of constant density that add: what they cut out of the way, summed */
+    NB_WAY_FLAT,        /* the same where all faces are flat: along any ray it is linear between turns */
+    NB_WAY_HEIGHT       /* one height fog without an end, and a sun above: a multiple of the density */
+} nb_way_to_sun;
+
+/* Bodies of more faces have very many edges, and nearly smooth shadows: their turns are not looked for. */
+#define NB_MOST_EDGED_FACES 16
+
 /* From so many such media on one ray on, they are summed in a tree. */
 #define NB_LEAST_CROWD 64
 
@@ -32,12 +43,13 @@ struct nebel_snapshot {
     nebel_log log;
     atomic_size_t owners;
     size_t medium_count;
-    nb_medium *media;        /* in the order of nb_volume_compare: ranks ascend */
-    double largest_radiance; /* of all volumes and channels */
-    double max_opacity;      /* 1 where there is no limit */
-    int is_sunlit;           /* whether any medium is */
-    double to_sun[3];        /* of length 1; not read where nothing is sunlit */
-    int is_lamplit;          /* whether any medium is */
+    nb_medium *media;         /* in the order of nb_volume_compare: ranks ascend */
+    double largest_radiance;  /* of all volumes and channels */
+    double max_opacity;       /* 1 where there is no limit */
+    int is_sunlit;            /* whether any medium is */
+    double to_sun[3];         /* of length 1; not read where nothing is sunlit */
+    nb_way_to_sun way_to_sun; /* the same */
+    int is_lamplit;           /* whether any medium is */
     size_t lamp_count;
     nb_lamp *lamps;
     const nb_medium *joining; /* one that joins; NULL where none does */

@@ -7,7 +7,8 @@
  * body, or passes one of its edges. At the silhouette of a round body it has the steepness of a root there. So steps go
  * from turn to turn, on a scale that flattens roots at their ends, and Kronrod's seven nodes are compared with the
  * three of Gauss's rule among them: a step is halved until they differ by less than the budget. The error that is told
- * is that of the three. Included by trace_kernel.c, which makes packets and workspaces. */
+ * is that of the three. Where the whole depth is linear in that along the ray from turn to turn, a step has a closed
+ * form instead. Included by trace_kernel.c, which makes packets and workspaces. */
 
 #define SUN_NODES 7
 #define MOST_SUN_STEPS 4096
@@ -144,6 +145,12 @@ typedef struct light_depth {
     nb_real depth[3], error[3];
 } light_depth;
 
+static light_depth no_depth(void)
+{
+    const nb_real zero = NB_F(0.0);
+    return (light_depth){{zero, zero, zero}, {zero, zero, zero}};
+}
+
 /* As far as `reach` into the direction. */
 static light_depth depth_to_light(sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
 {
@@ -155,7 +162,7 @@ static light_depth depth_to_light(sunlight *sun, const march *m, nb_wide t, nb_w
     way->rays.t_max = reach;
     way->wants_error = m->wants_error;
     way->ignores_distances = 1;
-    light_depth to_light = {{NB_F(0.0), NB_F(0.0), NB_F(0.0)}, {NB_F(0.0), NB_F(0.0), NB_F(0.0)}};
+    light_depth to_light = no_depth();
     if (!meet_fog(sun->way, sun->snapshot)) {
         sun->out_of_memory = 1;
         return to_light;
@@ -167,6 +174,63 @@ static light_depth depth_to_light(sunlight *sun, const march *m, nb_wide t, nb_w
         to_light.error[c] = g.depth_error[c] + nb_select(watched, way->grazing_ends.depth[c], way->all_ends.depth[c]);
     }
     return to_light;
+}
+
+/* The integral of the density from y up is that at y times the scale height. */
+static light_depth depth_of_height(const sunlight *sun, const march *m, nb_wide t)
+{
+    const contact *k = present(m, m->present_first);
+    const nb_real rise = nb_narrow(WIDE(k->medium->body.density.scale_height) / sun->direction.y);
+    const nb_real length = contact_density(k, t) * rise;
+    light_depth to_sun = no_depth();
+    for (int c = 0; c < 3; c++) {
+        to_sun.depth[c] = k->extinction[c] * length;
+        to_sun.error[c] = to_sun.depth[c] * (nb_min(k->noise, NB_F(4.0)) + NB_F(8.0) * NB_EPSILON);
+    }
+    return to_sun;
+}
+
+/* No body of finite bounds is longer than they are. */
+static nb_real longest_way(const nb_volume *body)
+{
+    double most = 0;
+    for (int c = 0; c < 3; c++) most += body->high[c] - body->low[c];
+    return REAL(fmin(most, 1e18));
+}
+
+/* Convex bodies that add: each cuts one stretch out of the way. */
+static light_depth depth_of_bodies(const sunlight *sun, const march *m, nb_wide t)
+{
+    const nebel_snapshot *snapshot = sun->snapshot;
+    const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), sun->direction, NB_WFAR};
+    light_depth to_sun = no_depth();
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *body = &snapshot->media[i].body;
+        const nb_interval raw = leaf_interval(&way, body, &body->leaves[0]);
+        const nb_wide enter = nb_wmax(raw.enter, NB_W(0.0)), leave = nb_wmin(raw.leave, NB_WFAR);
+        const nb_real length = nb_narrow(nb_wmax(leave - enter, NB_W(0.0)));
+        const nb_wmask near = raw.leave + raw.leave_slack >= NB_W(0.0);
+        const nb_real slack = nb_min(nb_narrow(raw.enter_slack + raw.leave_slack), longest_way(body));
+        const nb_real error = nb_select(nb_narrow_mask(near), slack, NB_F(0.0)) + length * (NB_F(4.0) * NB_EPSILON);
+        for (int c = 0; c < 3; c++) {
+            to_sun.depth[c] = to_sun.depth[c] + REAL(body->extinction[c]) * length;
+            to_sun.error[c] = to_sun.error[c] + REAL(body->extinction[c]) * error;
+        }
+    }
+    return to_sun;
+}
+
+static light_depth depth_to_sun(sunlight *sun, const march *m, nb_wide t, nb_wmask lanes)
+{
+    switch (sun->snapshot->way_to_sun) {
+    case NB_WAY_HEIGHT:
+        return depth_of_height(sun, m, t);
+    case NB_WAY_ADDED:
+    case NB_WAY_FLAT:
+        return depth_of_bodies(sun, m, t);
+    default:
+        return depth_to_light(sun, m, t, sun->direction, nb_wselect(lanes, NB_WFAR, NB_W(0.0)));
+    }
 }
 
 /* ---- steps ----------------------------------------------------------------------------------- */
@@ -247,8 +311,7 @@ static sun_node sunlit_node(sunlight *sun, const march *m, const piece *p, const
     const nb_real at = REAL(place), zero = NB_F(0.0);
     const nb_real speed = scaled_speed(s, at);
     const nb_wide t = s->start + nb_widen(s->length * scaled_place(s, at));
-    const nb_wide reach = nb_wselect(lanes, NB_WFAR, NB_W(0.0));
-    const light_depth to_sun = depth_to_light(sun, m, t, sun->direction, reach);
+    const light_depth to_sun = depth_to_sun(sun, m, t, lanes);
     nb_real depth[3], error[3], glow[3] = {zero, zero, zero}, extinction[3] = {zero, zero, zero};
     depth_until(m, p, g, t, depth, error);
     for (size_t i = m->present_first; i < m->present_end; i++) {
@@ -372,12 +435,82 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     w->guess = nb_select(taken, nb_max(w->guess, s->length + s->length), NB_F(0.5) * s->length);
 }
 
+/* ---- steps in closed form -------------------------------------------------------------------- */
+
+/* Where the whole depth, that up to t and that from there to the sun, is linear in the optical depth along the ray:
+ * between the flat faces of constant densities, and in height fog, where both are multiples of differences of
+ * densities (T16 of the collected physics is the layer). */
+static int has_closed_steps(const sunlight *sun)
+{
+    return sun->snapshot->way_to_sun == NB_WAY_FLAT || sun->snapshot->way_to_sun == NB_WAY_HEIGHT;
+}
+
+/* By how much the whole depth changes over a length of `length` at density 1. In height fog that is known without the
+ * difference, also where its densities are beyond all numbers: the way to the sun loses direction.y / sun.y of what
+ * the ray gains. */
+static nb_real change_of_depth(const sunlight *sun, const march *m, const contact *k, int c, nb_real length,
+                               nb_real difference)
+{
+    if (sun->snapshot->way_to_sun != NB_WAY_HEIGHT) return nb_abs(difference);
+    const nb_real kept = NB_F(1.0) - nb_narrow(m->rays.direction.y / sun->direction.y);
+    return nb_abs(k->extinction[c] * kept) * length;
+}
+
+/* What an error of the depth at one end does to the light, relative to it: less where the depth rises by `rise`
+ * towards that end, so that most light comes from elsewhere. */
+static nb_real doubt_of_end(nb_real error, nb_real rise)
+{
+    return nb_min(error * nb_min(NB_F(2.0) / nb_max(rise, NB_TINY), NB_F(1.0)), NB_F(1.0));
+}
+
+static sun_step closed_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
+                            nb_wide end)
+{
+    const nb_real zero = NB_F(0.0), h = nb_narrow(end - w->t);
+    nb_real before[3], error[3], behind[3], last_error[3], light[3] = {zero, zero, zero},
+                                                           light_error[3] = {zero, zero, zero};
+    nb_real length = zero;
+    depth_until(m, p, g, w->t, before, error);
+    depth_until(m, p, g, end, behind, last_error);
+    const light_depth from = depth_to_sun(sun, m, w->t, w->lanes), to = depth_to_sun(sun, m, end, w->lanes);
+    for (size_t i = m->present_first; i < m->present_end; i++) {
+        const contact *k = present(m, i);
+        const nb_estimate along = contact_integral(k, w->t, end, h);
+        length = nb_max(length, nb_select(k->inside, along.value, zero));
+        for (int c = 0; c < 3; c++) {
+            light[c] = light[c] + nb_select(k->inside, k->glow[c] * along.value, zero);
+            light_error[c] = light_error[c] + nb_select(k->inside, k->glow[c] * along.error, zero);
+        }
+    }
+    sun_step s = {.start = w->t, .length = h, .error = zero, .rounding = zero};
+    for (int c = 0; c < 3; c++) {
+        const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c], least = nb_min(first, last);
+        const nb_real change = change_of_depth(sun, m, present(m, m->present_first), c, length, last - first);
+        const nb_real seen = nb_exp(-least) * nb_exp_ratio(change);
+        const nb_real doubt = doubt_of_end(error[c] + from.error[c], first - last) +
+                              doubt_of_end(last_error[c] + to.error[c], last - first);
+        s.behind[c] = nb_exp(-behind[c]);
+        s.light[c] = light[c] * seen;
+        const nb_real rounding = doubt + (least + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
+        s.rounding = nb_max(s.rounding, s.light[c] * rounding + light_error[c] * seen);
+    }
+    return s;
+}
+
 /* What steps of a piece share. */
 typedef struct sun_piece {
     const piece *p;
     gathered before;       /* what was gathered before it */
     nb_real whole, pieces; /* its length; how many there may be */
 } sun_piece;
+
+static void step_in_closed_form(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
+{
+    const nb_wide bright = nb_wmin(sun->shade.toggle, s->p->end);
+    const nb_wide end = nb_wmin(next_turn(sun, w->t, bright), nearest_kink(m, w->t, bright));
+    const sun_step taken = closed_step(sun, m, s->p, &s->before, w, end);
+    take_sun_step(g, w, &taken, end, nb_wmask_false, nb_narrow_mask(w->lanes));
+}
 
 static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
 {
@@ -425,6 +558,8 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathe
         const nb_wmask dark = nb_wand(w.lanes, sun->shade.is_dark);
         if (nb_wany(dark))
             pass_shadow(&sun->shade, m, &s, &w, dark);
+        else if (has_closed_steps(sun))
+            step_in_closed_form(sun, m, &s, &w, g);
         else
             step_along(sun, m, &s, &w, g);
         w.lanes = nb_wand(w.lanes, w.t < p->end);

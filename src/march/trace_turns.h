@@ -109,13 +109,10 @@ static void note_box(sunlight *sun, const nb_leaf *leaf, const ways *s)
         for (int k = 0; k < 4; k++) note_edge(sun, &faces[i][k & 1], &faces[(i + 1) % 3][k >> 1]);
 }
 
-/* Bodies of very many faces have many edges, and nearly smooth shadows. */
-enum { MOST_EDGED_FACES = 16 };
-
 static void note_planes(sunlight *sun, const nb_volume *body, const nb_leaf *leaf, const ways *s)
 {
-    face_ways faces[MOST_EDGED_FACES];
-    if (leaf->face_count > MOST_EDGED_FACES) return;
+    face_ways faces[NB_MOST_EDGED_FACES];
+    if (leaf->face_count > NB_MOST_EDGED_FACES) return;
     for (size_t i = 0; i < leaf->face_count; i++) {
         const nb_face *face = &body->faces[leaf->first_face + i];
         faces[i] = ways_to_face(s, wide_vector(face->normal), WIDE(face->distance));
