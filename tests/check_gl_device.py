@@ -109,7 +109,32 @@ class GlDeviceTest(PictureCase):
                     for method in ("linear", "exp", "exp2"):
                         self.assert_same_as_cpu(method)
         self.scene = self.write_scene("bare.json", [FOG])
-        self.assert_failed(self.draw("a.png", "--method", "exp"), "classic", "--method exp")
+        for device in ("cpu", "gl"):
+            for method in ("exp", "fog-coord", "alpha"):
+                self.assert_failed(self.render("a.png", "--method", method, "--device", device), "classic", f"--method {method}")
+            self.assert_failed(self.render("a.png", "--method", "d3d9", "--device", device), '"d3d9"', "--method d3d9")
+
+    def test_what_hardware_is_given(self):
+        curves = ({}, {"curve": "linear"}, {"curve": "exp2"}, {"table": [0, 0.1, 0.6, 1]})
+        for projection in ({}, {"projection": "panorama"}, {"projection": "orthographic", "view_height": 3}):
+            for curve in curves if not projection else curves[:2]:
+                self.write_classic({"color": [0.9, 0.5, 0.1], **curve}, **projection)
+                for method in ("fog-coord", "two-pass", "alpha"):
+                    self.assert_same_as_cpu(method)
+            for stage in ("vertex", "pixel"):
+                self.write_classic({"color": [0.9, 0.5, 0.1], "coordinate": "user", "start": 10, "end": 90, "density": 0.04,
+                                    "stage": stage}, **projection)
+                for method in ("linear", "exp", "exp2"):
+                    self.assert_same_as_cpu(method)
+
+    def test_direct3d_states(self):
+        numbers = {"fog_start": 2.5, "fog_end": 4, "fog_density": 0.2, "fog_color": [0.9, 0.5, 0.1]}
+        states = ({}, {"fog_table_mode": "linear"}, {"fog_table_mode": "exp2"}, {"fog_vertex_mode": "exp"},
+                  {"fog_vertex_mode": "linear", "range_fog_enable": True}, {"fog_vertex_mode": "exp", "fog_table_mode": "exp"})
+        for projection in ({}, {"projection": "panorama"}, {"projection": "orthographic", "view_height": 3}):
+            for state in states if not projection else states[:4]:
+                self.write_classic({"d3d9": {**numbers, **state}}, **projection)
+                self.assert_same_as_cpu("d3d9")
 
     def test_tessellation(self):
         box = {"shape": {"type": "box", "min": [-9, -0.5, -9], "max": [9, 0.5, 9]}, "extinction": 0.3, "source": 1}

@@ -32,7 +32,13 @@ BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [],
        '{"nebel": 1, "fog": [], "cells": {"cells": []}}',
        '{"nebel": 1, "fog": [], "cells": {"cells": [{"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}}]}}',
        '{"nebel": 1, "fog": [], "classic": {"density": 0}}',
-       '{"nebel": 1, "fog": [], "classic": {"coordinate": "user"}}',
+       '{"nebel": 1, "fog": [], "classic": {"coordinate": "up"}}',
+       '{"nebel": 1, "fog": [], "classic": {"curve": "table"}}',
+       '{"nebel": 1, "fog": [], "classic": {"table": [1]}}',
+       '{"nebel": 1, "fog": [], "classic": {"table": [0, 2]}}',
+       '{"nebel": 1, "fog": [], "classic": {"curve": "exp", "table": [0, 1]}}',
+       '{"nebel": 1, "fog": [], "classic": {"d3d9": {"fog_color": 2}}}',
+       '{"nebel": 1, "fog": [], "classic": {"d3d9": {"fog_vertex_mode": "exp3"}}}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": []}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": [{"extinction": 1}]}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "keys": [{"frame": 1, "name": "a"}]}]}',
@@ -52,7 +58,7 @@ def reader_names():
     found = set()
     for name in READERS:
         for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
-            found |= set(re.findall(r'"([A-Za-z_3]+)"', table))
+            found |= set(re.findall(r'"([A-Za-z_0-9]+)"', table))
     presets = (ROOT / "src/media/presets.c").read_text()
     return found - REFUSED | set(re.findall(r'\.name = "(\w+)"', presets))
 
@@ -95,12 +101,12 @@ def judge(schema, faults):
 def main():
     schema = json.loads((ROOT / "docs/scene.schema.json").read_text())
     pages = "".join((ROOT / "docs" / page).read_text() for page in ("scene-file.md", "engines.md"))
-    manual = set(re.findall(r"`([A-Za-z_3]+)`", pages))
+    manual = set(re.findall(r"`([A-Za-z_0-9]+)`", pages))
     names = reader_names()
     faults = [f"not in docs/scene.schema.json: {name}" for name in sorted(names - schema_names(schema))]
     faults += [f"not read by src/scene: {name}" for name in sorted(schema_names(schema) - names)]
     faults += [f"in no manual: {name}" for name in sorted(names - manual)]
-    words = set(re.findall(r'^"\\"([A-Za-z_3]+)\\""$', (ROOT / "fuzz/scene.dict").read_text(), re.M))
+    words = set(re.findall(r'^"\\"([A-Za-z_0-9]+)\\""$', (ROOT / "fuzz/scene.dict").read_text(), re.M))
     faults += [f"not in fuzz/scene.dict: {name}" for name in sorted(names - words)]
     if len(names) < 50:
         faults.append(f"only {len(names)} keys found in src/scene: this check needs mending")

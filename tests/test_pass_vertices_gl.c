@@ -470,7 +470,7 @@ static void test_factors(void **state)
     nb_gl context;
     nebel_snapshot *const fog = commit_mist(); /* is not drawn */
     const nebel_camera camera = camera_at(1, 1.5, 5);
-    const nebel_factor_desc user = {.coordinate = NEBEL_COORDINATE_USER}, bad = {.density = -1};
+    const nebel_factor_desc bad = {.density = -1};
     make_triangle(&f);
     for (int language = 0; language < 2; language++) {
         pass_open(&context, language == 0 ? NB_GL_330 : NB_GL_300ES);
@@ -486,7 +486,10 @@ static void test_factors(void **state)
             check_factor(renderer, &f, &camera, (nebel_gl_method)(NEBEL_GL_METHOD_LINEAR + way / 4), &factor);
         }
         assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_EXP, NULL, &p), NEBEL_ERROR_ARGUMENT);
-        assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_EXP, &user, &p), NEBEL_ERROR_ARGUMENT);
+        for (int i = NEBEL_GL_METHOD_FOG_COORD; i <= NEBEL_GL_METHOD_D3D9; i++) {
+            const nebel_result wanted = i == NEBEL_GL_METHOD_TWO_PASS ? NEBEL_OK : NEBEL_ERROR_ARGUMENT;
+            assert_int_equal(draw_factor(renderer, &camera, (nebel_gl_method)i, NULL, &p), wanted);
+        }
         assert_int_equal(draw_factor(renderer, &camera, NEBEL_GL_METHOD_EXP, &bad, &p), NEBEL_ERROR_VALUE);
         nebel_destroy_gl_renderer(renderer);
         assert_int_equal(pass_count_objects(), objects);

@@ -9,19 +9,26 @@ static const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min =
                                        .extinction = {.1, .2, .3},
                                        .source = {1, .5, .25}};
 
-static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, nebel_method method,
-                           const nebel_factor_desc *factor, int threads, const nebel_camera *camera,
-                           test_picture *picture)
+static nebel_result render_by(const nebel_scene_data *scene, nebel_snapshot *fog, nebel_method method,
+                              const nebel_method_desc *numbers, int threads, const nebel_camera *camera,
+                              test_picture *picture)
 {
     nebel_renderer *renderer = NULL;
     const nebel_renderer_desc desc = {.threads = threads};
     const nebel_frame_desc frame = {
         .camera = *camera, .width = picture->width, .height = picture->height, .samples = 1};
     assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
-    assert_int_equal(nebel_set_renderer_method(renderer, method, factor), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, method, numbers), NEBEL_OK);
     const nebel_result result = nebel_render_frame(renderer, &frame, &picture->planes);
     nebel_destroy_renderer(renderer);
     return result;
+}
+
+static nebel_result render(const nebel_scene_data *scene, nebel_snapshot *fog, nebel_method method,
+                           const nebel_factor_desc *factor, int threads, const nebel_camera *camera,
+                           test_picture *picture)
+{
+    return render_by(scene, fog, method, &(nebel_method_desc){.factor = factor}, threads, camera, picture);
 }
 
 /* The exact fog of the way to a corner. */
@@ -200,6 +207,171 @@ static void test_factors(void **state)
     test_picture_free(&picture);
 }
 
+/* ---- what hardware is given ------------------------------------------------------------------ */
+
+static const double pale[3] = {.9, .6, .3};
+
+/* How far the ground is seen from factors that are linear between its corners, with that colour. */
+static double find_difference(const nebel_camera *camera, const test_picture *picture, const double factors[4],
+                              const double color[3])
+{
+    double largest = 0;
+    int met = 0;
+    for (uint32_t y = 0; y < picture->height; y++)
+        for (uint32_t x = 0; x < picture->width; x++) {
+            double place[3];
+            if (!test_find_ground(camera, picture, x, y, place)) continue;
+            const double f = test_interpolate_ground(factors, place);
+            met++;
+            for (int c = 0; c < 3; c++) {
+                const double through = (double)test_transmittance(picture, x, y)[c];
+                largest = fmax(largest, fabs(through - f));
+                largest = fmax(largest, fabs((double)test_in_scattering(picture, x, y)[c] - (1 - f) * color[c]));
+            }
+        }
+    assert_true(met > 300);
+    return largest;
+}
+
+static double curve_at(nebel_curve_type curve, double depth)
+{
+    switch (curve) {
+    case NEBEL_CURVE_LINEAR:
+        return fmin(depth, 1);
+    case NEBEL_CURVE_EXP:
+        return fmin(exp(depth) - 1, 1);
+    case NEBEL_CURVE_EXP2:
+        return fmin(exp(depth * depth) - 1, 1);
+    case NEBEL_CURVE_TABLE:
+        return depth < .5 ? 0 : 1;
+    default:
+        return 1 - exp(-depth);
+    }
+}
+
+/* A coordinate is a float, alpha a byte; two passes carry light of any colour. */
+static void test_streams_of_hardware(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = test_ground();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = test_camera_down();
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture picture = test_picture_make(40, 30);
+    float table[NEBEL_CURVE_ENTRIES];
+    for (int i = 0; i < NEBEL_CURVE_ENTRIES; i++) table[i] = i < 128 ? 0 : 1;
+    for (int curve = 0; curve < NEBEL_CURVE_COUNT; curve++) {
+        const nebel_vertex_desc look = {.curve = (nebel_curve_type)curve, .table = table, .color = pale};
+        const nebel_method_desc numbers = {.vertex = &look};
+        double factors[4], bytes[4], rounded[3];
+        for (int c = 0; c < 3; c++) rounded[c] = floor(255 * pale[c] + .5) / 255;
+        for (size_t v = 0; v < 4; v++) {
+            const double depth = -log((double)trace_corner(fog, &camera, v).transmittance[0]);
+            factors[v] = 1 - curve_at((nebel_curve_type)curve, depth);
+            bytes[v] = 1 - floor(255 * (1 - factors[v]) + .5) / 255;
+        }
+        assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_FOG_COORD, &numbers, 2, &camera, &picture), NEBEL_OK);
+        assert_true(find_difference(&camera, &picture, factors, pale) < 1e-5);
+        assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_TWO_PASS, &numbers, 2, &camera, &picture), NEBEL_OK);
+        assert_true(find_difference(&camera, &picture, factors, pale) < 1e-5);
+        assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_ALPHA, &numbers, 2, &camera, &picture), NEBEL_OK);
+        assert_true(find_difference(&camera, &picture, bytes, rounded) < 1e-5);
+    }
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+static void test_two_passes_are_fog_at_vertices(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = test_ground();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
+    const nebel_camera camera = test_camera_down();
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture one = test_picture_make(40, 30), two = test_picture_make(40, 30);
+    assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &one), NEBEL_OK);
+    assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_TWO_PASS, NULL, 2, &camera, &two), NEBEL_OK);
+    assert_memory_equal(one.planes.color, two.planes.color, sizeof(float) * 3 * 40 * 30);
+    assert_int_equal(render_by(&scene, NULL, NEBEL_METHOD_TWO_PASS, NULL, 2, &camera, &two), NEBEL_OK);
+    for (int i = 0; i < 3 * 40 * 30; i++) assert_near((double)two.planes.transmittance[i], 1, 0);
+    nebel_release_snapshot(fog);
+    test_picture_free(&one);
+    test_picture_free(&two);
+}
+
+/* 100 times the amount at vertices, linear in between; the factor there, or at pixels. */
+static void test_own_coordinates(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = test_ground();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = test_camera_down();
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture picture = test_picture_make(40, 30);
+    double coordinates[4], corners[4], largest = 0;
+    nebel_factor_desc factor = {.coordinate = NEBEL_COORDINATE_USER, .density = .03, .color = {.9, .6, .3}};
+    for (size_t v = 0; v < 4; v++) {
+        coordinates[v] = 100 * (1 - (double)trace_corner(fog, &camera, v).transmittance[0]);
+        corners[v] = exp(-.03 * coordinates[v]);
+    }
+    assert_int_equal(render(&scene, fog, NEBEL_METHOD_EXP, &factor, 2, &camera, &picture), NEBEL_OK);
+    assert_true(find_difference(&camera, &picture, corners, pale) < 1e-5);
+    factor.stage = NEBEL_STAGE_PIXEL;
+    assert_int_equal(render(&scene, fog, NEBEL_METHOD_EXP, &factor, 2, &camera, &picture), NEBEL_OK);
+    for (uint32_t y = 0; y < 30; y++)
+        for (uint32_t x = 0; x < 40; x++) {
+            double place[3];
+            if (!test_find_ground(&camera, &picture, x, y, place)) continue;
+            const double f = exp(-.03 * test_interpolate_ground(coordinates, place));
+            assert_near((double)test_transmittance(&picture, x, y)[0], f, 1e-5);
+            assert_near((double)test_in_scattering(&picture, x, y)[1], (1 - f) * .6, 1e-5);
+            largest = fmax(largest, fabs(f - test_interpolate_ground(corners, place)));
+        }
+    assert_true(largest > .01);
+    /* Without fog c is 0. */
+    assert_int_equal(render(&scene, NULL, NEBEL_METHOD_EXP, &factor, 2, &camera, &picture), NEBEL_OK);
+    assert_near((double)test_transmittance(&picture, 20, 15)[0], 1, 0);
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+static void test_devices(void **state)
+{
+    (void)state;
+    static const double orange[3] = {1, .2, 0};
+    const nebel_mesh mesh = test_ground();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = test_camera_down();
+    nebel_snapshot *fog = test_fog(1, &bank);
+    test_picture picture = test_picture_make(40, 30);
+    nebel_d3d9_fog d3d9 = {
+        .fog_color = 0x12ff3300, .fog_vertex_mode = NEBEL_D3DFOG_LINEAR, .fog_start = 6, .fog_end = 15};
+    const nebel_method_desc numbers = {.d3d9 = &d3d9};
+    double by_depth[4], by_range[4], by_alpha[4], by_table[4];
+    for (size_t v = 0; v < 4; v++) {
+        const float *p = test_ground_positions + 3 * v;
+        const double radius = hypot(hypot((double)p[0] - 1, 7), (double)p[2] - 2);
+        by_depth[v] = 8. / 9;
+        by_range[v] = (15 - radius) / 9;
+        by_alpha[v] = floor(255 * (double)trace_corner(fog, &camera, v).transmittance[0] + .5) / 255;
+        by_table[v] = exp(-.7);
+    }
+    assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    assert_true(find_difference(&camera, &picture, by_depth, orange) < 1e-5);
+    d3d9.range_fog_enable = 1;
+    assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    assert_true(find_difference(&camera, &picture, by_range, orange) < 1e-5);
+    d3d9.fog_table_mode = NEBEL_D3DFOG_EXP;
+    d3d9.fog_density = .1f;
+    assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    assert_true(find_difference(&camera, &picture, by_table, orange) < 1e-5);
+    d3d9.fog_table_mode = d3d9.fog_vertex_mode = NEBEL_D3DFOG_NONE;
+    assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    assert_true(find_difference(&camera, &picture, by_alpha, orange) < 1e-5);
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
 /* ---- methods --------------------------------------------------------------------------------- */
 
 static void test_methods_come_and_go(void **state)
@@ -215,10 +387,17 @@ static void test_methods_come_and_go(void **state)
     assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &before.planes), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_VERTEX, NULL), NEBEL_OK);
-    const nebel_factor_desc user = {.coordinate = NEBEL_COORDINATE_USER}, bad = {.density = -1};
+    const nebel_factor_desc bad = {.density = -1};
+    const nebel_vertex_desc colorless = {.curve = NEBEL_CURVE_LINEAR};
+    const nebel_d3d9_fog unknown = {.fog_table_mode = 4};
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, NULL), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, &user), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, &bad), NEBEL_ERROR_VALUE);
+    const nebel_method_desc wrong = {.factor = &bad, .vertex = &colorless, .d3d9 = &unknown};
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_EXP, &wrong), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_FOG_COORD, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_ALPHA, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_TWO_PASS, &wrong), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_D3D9, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_D3D9, &wrong), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_CELLS, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_FIVE_TAP, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_COUNT, NULL), NEBEL_ERROR_ARGUMENT);
@@ -255,6 +434,10 @@ int main(void)
         cmocka_unit_test(test_orthographic_rays_begin_beside_the_camera),
         cmocka_unit_test(test_added_fog_hides_nothing),
         cmocka_unit_test(test_factors),
+        cmocka_unit_test(test_streams_of_hardware),
+        cmocka_unit_test(test_two_passes_are_fog_at_vertices),
+        cmocka_unit_test(test_own_coordinates),
+        cmocka_unit_test(test_devices),
         cmocka_unit_test(test_methods_come_and_go),
         cmocka_unit_test(test_words),
     };

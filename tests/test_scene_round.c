@@ -29,6 +29,8 @@ typedef struct change {
     nebel_portal portals[MOST];
     double (*vertices[MOST])[3];
     nebel_factor_desc classic;
+    nebel_d3d9_fog device;
+    float table[NEBEL_CURVE_ENTRIES];
     nebel_model models[MOST];
     nebel_camera_key camera_keys[MOST];
     char names[3 * MOST][32];
@@ -181,9 +183,33 @@ static void change_cells(change *c)
     c->data.cell_names = c->cell_names;
 }
 
+static void change_device(change *c)
+{
+    c->device = *c->data.classic_d3d9;
+    c->device.fog_color ^= 0x10203;
+    c->device.fog_table_mode = (c->device.fog_table_mode + 1) % 4;
+    c->device.fog_vertex_mode = (c->device.fog_vertex_mode + 1) % 4;
+    c->device.fog_start -= 1;
+    c->device.fog_end /= 2;
+    c->device.fog_density *= 2;
+    c->device.range_fog_enable = !c->device.range_fog_enable;
+    c->data.classic_d3d9 = &c->device;
+}
+
+/* A curve becomes a table, and a table another. */
+static void change_curve(change *c)
+{
+    for (int i = 0; i < NEBEL_CURVE_ENTRIES; i++)
+        c->table[i] = c->data.classic_curve == NEBEL_CURVE_TABLE ? c->data.classic_table[i] / 2 : (float)i / 256;
+    c->data.classic_curve = NEBEL_CURVE_TABLE;
+    c->data.classic_table = c->table;
+}
+
 static void change_classic(change *c)
 {
     if (c->data.classic == NULL) return;
+    if (c->data.classic_d3d9 != NULL) change_device(c);
+    change_curve(c);
     c->classic = *c->data.classic;
     c->classic.start /= 2;
     c->classic.end /= 2;
@@ -452,6 +478,11 @@ static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
     SAME(&a->classic->color, &b->classic->color);
     WHOLE(a->classic->coordinate, b->classic->coordinate);
     WHOLE(a->classic->stage, b->classic->stage);
+    WHOLE(a->classic_curve, b->classic_curve);
+    if (a->classic_curve == NEBEL_CURVE_TABLE)
+        assert_memory_equal(a->classic_table, b->classic_table, NEBEL_CURVE_ENTRIES * sizeof(float));
+    WHOLE(a->classic_d3d9 == NULL, b->classic_d3d9 == NULL);
+    if (a->classic_d3d9 != NULL) assert_memory_equal(a->classic_d3d9, b->classic_d3d9, sizeof *a->classic_d3d9);
 }
 
 /* ---- files ----------------------------------------------------------------------------------- */
@@ -505,15 +536,15 @@ static void test_good_scenes(void **state)
         "examples/scenes/soft-edges",      "examples/scenes/vertex-coarse", "examples/scenes/vertex-sphere",
         "examples/engines/bevy",           "examples/engines/godot",        "examples/engines/hdrp",
         "examples/engines/unreal",         "fuzz/corpus/scene/camera_keys", "fuzz/corpus/scene/capsule",
-        "fuzz/corpus/scene/cells",         "fuzz/corpus/scene/classic",     "fuzz/corpus/scene/colors",
-        "fuzz/corpus/scene/cone",          "fuzz/corpus/scene/contract",    "fuzz/corpus/scene/convex",
-        "fuzz/corpus/scene/presets",       "fuzz/corpus/scene/cylinder",    "fuzz/corpus/scene/ellipsoid",
-        "fuzz/corpus/scene/every_import",  "fuzz/corpus/scene/every_key",   "fuzz/corpus/scene/fog_keys",
-        "fuzz/corpus/scene/half_space",    "fuzz/corpus/scene/heightfield", "fuzz/corpus/scene/import",
-        "fuzz/corpus/scene/linear",        "fuzz/corpus/scene/minimal",     "fuzz/corpus/scene/nebula",
-        "fuzz/corpus/scene/numbers",       "fuzz/corpus/scene/soft_edge",   "fuzz/corpus/scene/space",
-        "fuzz/corpus/scene/sphere_radial", "fuzz/corpus/scene/text",        "fuzz/corpus/scene/turntable",
-        "fuzz/corpus/scene/union",
+        "fuzz/corpus/scene/cells",         "fuzz/corpus/scene/classic",     "fuzz/corpus/scene/classic_device",
+        "fuzz/corpus/scene/classic_table", "fuzz/corpus/scene/colors",      "fuzz/corpus/scene/cone",
+        "fuzz/corpus/scene/contract",      "fuzz/corpus/scene/convex",      "fuzz/corpus/scene/presets",
+        "fuzz/corpus/scene/cylinder",      "fuzz/corpus/scene/ellipsoid",   "fuzz/corpus/scene/every_import",
+        "fuzz/corpus/scene/every_key",     "fuzz/corpus/scene/fog_keys",    "fuzz/corpus/scene/half_space",
+        "fuzz/corpus/scene/heightfield",   "fuzz/corpus/scene/import",      "fuzz/corpus/scene/linear",
+        "fuzz/corpus/scene/minimal",       "fuzz/corpus/scene/nebula",      "fuzz/corpus/scene/numbers",
+        "fuzz/corpus/scene/soft_edge",     "fuzz/corpus/scene/space",       "fuzz/corpus/scene/sphere_radial",
+        "fuzz/corpus/scene/text",          "fuzz/corpus/scene/turntable",   "fuzz/corpus/scene/union",
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[512];

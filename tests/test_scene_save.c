@@ -215,6 +215,34 @@ static void test_classic_fog(void **state)
     check_saved(&d, SCENE("\"unit\": 0.5, \"fog\": []"));
 }
 
+#define CLASSIC(members) SCENE("\"unit\": 0.5, \"fog\": [], \"classic\": " members)
+#define DEVICE                                                                                                         \
+    "\"d3d9\": { \"fog_vertex_mode\": \"none\", \"fog_table_mode\": \"exp\", \"fog_start\": 0, \"fog_end\": 8, "       \
+    "\"fog_density\": 0.5, \"fog_color\": [1, 0.2, 0], \"range_fog_enable\": false }"
+
+static void test_curves_and_devices(void **state)
+{
+    (void)state;
+    static const nebel_d3d9_fog device = {1, 0xff3300, NEBEL_D3DFOG_EXP, NEBEL_D3DFOG_NONE, 0, 4, 1, 0};
+    draft d = open_draft(CLASSIC("{ \"color\": 1 }"));
+    d.data.classic_curve = NEBEL_CURVE_EXP;
+    d.data.classic_d3d9 = &device;
+    check_saved(&d, CLASSIC("{ \"color\": 1, \"curve\": \"exp\", " DEVICE " }"));
+    d = open_draft(CLASSIC("{ \"d3d9\": {}, \"table\": [0, 1] }"));
+    d.data.classic_curve = NEBEL_CURVE_PHYSICAL;
+    d.data.classic_d3d9 = &device;
+    check_saved(&d, CLASSIC("{ " DEVICE ", \"curve\": \"physical\" }"));
+    d = open_draft(CLASSIC("{ \"d3d9\": {}, \"curve\": \"exp\" }"));
+    d.data.classic_d3d9 = NULL;
+    check_saved(&d, CLASSIC("{ \"curve\": \"exp\" }"));
+    d = open_draft(SCENE("\"unit\": 0.5, \"fog\": []"));
+    d.data.classic = &(nebel_factor_desc){.end = 1, .density = 1};
+    d.data.classic_curve = NEBEL_CURVE_EXP2;
+    d.data.classic_d3d9 = &device;
+    check_saved(&d, CLASSIC("{ \"start\": 0, \"end\": 2, \"density\": 0.5, \"color\": 0, \"coordinate\": \"plane\", "
+                            "\"stage\": \"vertex\", \"curve\": \"exp2\", " DEVICE " }"));
+}
+
 static void test_models(void **state)
 {
     (void)state;
@@ -663,6 +691,7 @@ int main(void)
         cmocka_unit_test(test_how_the_camera_moves),
         cmocka_unit_test(test_keys_stay_where_their_camera_moves),
         cmocka_unit_test(test_classic_fog),
+        cmocka_unit_test(test_curves_and_devices),
         cmocka_unit_test(test_models),
         cmocka_unit_test(test_contrast_and_phase),
         cmocka_unit_test(test_keys_come_change_and_go),

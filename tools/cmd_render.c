@@ -65,9 +65,9 @@ static const nb_option options[] = {
     [METHOD] =
         {"method", 0, "NAME",
          "exact (default); on surfaces alone: vertex: the\nfog at vertices; additive: the same, but it only\nadds; "
-         "linear, exp, exp2: the factors of section\n\"classic\"; cells, cells-pixel: section \"cells\" at\nvertices "
-         "or "
-         "pixels. five-tap, of --device gl:\nparticles meet surfaces by five depths."},
+         "linear, exp, exp2: the factors of section\n\"classic\"; fog-coord, two-pass, alpha: the fog at\nvertices as "
+         "OpenGL 1.x takes it; d3d9: the states\nin \"classic\"; cells, cells-pixel: section \"cells\"\nat vertices or "
+         "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths."},
     [TESSELLATE] = {"tessellate", 0, "E",
                     "With --method vertex or additive: smaller triangles,\nuntil the fog's factor is within E of the "
                     "exact one\nfor the camera, 1e-6 < E <= 1."},
@@ -190,6 +190,12 @@ static void read_output(nb_arguments *arguments, settings *wanted)
 static int takes_factor(nebel_method method)
 {
     return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
+}
+
+/* What one colour is given to. */
+static int takes_color(nebel_method method)
+{
+    return takes_factor(method) || method == NEBEL_METHOD_FOG_COORD || method == NEBEL_METHOD_ALPHA;
 }
 
 static void read_tessellate(nb_arguments *arguments, settings *wanted)
@@ -428,6 +434,15 @@ static nebel_result trace_frame(studio *all)
     return result == NEBEL_OK ? nebel_render_frame(all->renderer, &desc, &frame) : result;
 }
 
+/* Two passes take the fog's own light, unless a response curve has none. */
+static nebel_vertex_desc look_of(nebel_method method, const nebel_scene_data *scene)
+{
+    nebel_vertex_desc look = {.curve = scene->classic_curve, .table = scene->classic_table};
+    if (scene->classic != NULL && (method != NEBEL_METHOD_TWO_PASS || look.curve != NEBEL_CURVE_PHYSICAL))
+        look.color = scene->classic->color;
+    return look;
+}
+
 static const nebel_scene_data *surfaces_of(const studio *all)
 {
     return all->wanted->tessellation.bound > 0 ? &all->finer.data : nebel_scene_contents(all->loaded.scene);
@@ -437,17 +452,21 @@ static const nebel_scene_data *surfaces_of(const studio *all)
 static nebel_gl_method gl_method(nebel_method method)
 {
     static const nebel_gl_method methods[NEBEL_METHOD_COUNT] = {
-        [NEBEL_METHOD_EXACT] = NEBEL_GL_METHOD_EXACT,   [NEBEL_METHOD_FIVE_TAP] = NEBEL_GL_METHOD_FIVE_TAP,
-        [NEBEL_METHOD_VERTEX] = NEBEL_GL_METHOD_VERTEX, [NEBEL_METHOD_ADDITIVE] = NEBEL_GL_METHOD_ADDITIVE,
-        [NEBEL_METHOD_CELLS] = NEBEL_GL_METHOD_CELLS,   [NEBEL_METHOD_CELLS_PIXEL] = NEBEL_GL_METHOD_CELLS_PIXEL,
-        [NEBEL_METHOD_LINEAR] = NEBEL_GL_METHOD_LINEAR, [NEBEL_METHOD_EXP] = NEBEL_GL_METHOD_EXP,
-        [NEBEL_METHOD_EXP2] = NEBEL_GL_METHOD_EXP2,
+        [NEBEL_METHOD_EXACT] = NEBEL_GL_METHOD_EXACT,       [NEBEL_METHOD_FIVE_TAP] = NEBEL_GL_METHOD_FIVE_TAP,
+        [NEBEL_METHOD_VERTEX] = NEBEL_GL_METHOD_VERTEX,     [NEBEL_METHOD_ADDITIVE] = NEBEL_GL_METHOD_ADDITIVE,
+        [NEBEL_METHOD_CELLS] = NEBEL_GL_METHOD_CELLS,       [NEBEL_METHOD_CELLS_PIXEL] = NEBEL_GL_METHOD_CELLS_PIXEL,
+        [NEBEL_METHOD_LINEAR] = NEBEL_GL_METHOD_LINEAR,     [NEBEL_METHOD_EXP] = NEBEL_GL_METHOD_EXP,
+        [NEBEL_METHOD_EXP2] = NEBEL_GL_METHOD_EXP2,         [NEBEL_METHOD_FOG_COORD] = NEBEL_GL_METHOD_FOG_COORD,
+        [NEBEL_METHOD_TWO_PASS] = NEBEL_GL_METHOD_TWO_PASS, [NEBEL_METHOD_ALPHA] = NEBEL_GL_METHOD_ALPHA,
+        [NEBEL_METHOD_D3D9] = NEBEL_GL_METHOD_D3D9,
     };
     return methods[method];
 }
 
 static nebel_result draw_frame(studio *all)
 {
+    const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
+    const nebel_vertex_desc look = look_of(all->wanted->method, scene);
     const nebel_gl_frame_desc desc = {
         .camera = nebel_scene_camera(all->loaded.scene, all->frame),
         .width = all->wanted->width,
@@ -457,7 +476,9 @@ static nebel_result draw_frame(studio *all)
         .progress_user = all,
         .method = gl_method(all->wanted->method),
         .cells = all->cells,
-        .factor = nebel_scene_contents(all->loaded.scene)->classic,
+        .factor = scene->classic,
+        .vertex = &look,
+        .d3d9 = scene->classic_d3d9,
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[COLOR],
@@ -573,6 +594,7 @@ static void note_coarseness(const nebel_scene_data *scene, const settings *wante
 {
     nebel_factor_desc factor;
     if (wanted->quiet || !takes_factor(wanted->method) || scene->classic->stage != NEBEL_STAGE_VERTEX ||
+        scene->classic->coordinate == NEBEL_COORDINATE_USER ||
         nebel_resolve_factor(scene->classic, &factor) != NEBEL_OK)
         return;
     const double longest = nb_finer_find_longest_edge(scene), reach = reach_of(wanted->method, &factor);
@@ -586,7 +608,12 @@ static int check_classic(const studio *all)
 {
     const settings *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
-    if (takes_factor(wanted->method) && scene->classic == NULL)
+    if (wanted->method == NEBEL_METHOD_D3D9 && scene->classic_d3d9 == NULL)
+        return nb_report_failure(
+            "render: %s: there is no \"d3d9\" in a section \"classic\" for --method d3d9; add it, or "
+            "say --method exact",
+            wanted->scene);
+    if (takes_color(wanted->method) && scene->classic == NULL)
         return nb_report_failure("render: %s: there is no section \"classic\" for --method %s; add one, or say "
                                  "--method exact",
                                  wanted->scene, nebel_method_word(wanted->method));
@@ -600,9 +627,11 @@ static int choose_method(studio *all)
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
+    const nebel_vertex_desc look = look_of(wanted->method, scene);
+    const nebel_method_desc desc = {.factor = scene->classic, .vertex = &look, .d3d9 = scene->classic_d3d9};
     const nebel_result result = takes_cells(wanted->method)
                                     ? nebel_set_renderer_cells(all->renderer, all->cells, stage)
-                                    : nebel_set_renderer_method(all->renderer, wanted->method, scene->classic);
+                                    : nebel_set_renderer_method(all->renderer, wanted->method, &desc);
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->scene, result);
 }
 

@@ -78,9 +78,15 @@ typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_CELLS_PIXEL, /* the same at each pixel, which the processor computes of the distances that OpenGL
                                     has drawn: some microseconds a pixel and sample. For pictures, not for films */
     NEBEL_GL_METHOD_LINEAR,      /* a fog factor, at vertices or at each pixel, in place of the renderer's fog and
-                                  particles, which do not dim the sun either */
+                               particles, which do not dim the sun either. With COORDINATE_USER c is what
+                               NEBEL_VERTEX_COORDINATE gives for the renderer's fog at the vertices, 0 to 100 */
     NEBEL_GL_METHOD_EXP,
     NEBEL_GL_METHOD_EXP2,
+    NEBEL_GL_METHOD_FOG_COORD, /* as VERTEX, but as streams of classic hardware: a coordinate and one colour */
+    NEBEL_GL_METHOD_TWO_PASS,  /* light and amount, with a response curve or a colour */
+    NEBEL_GL_METHOD_ALPHA,     /* a byte of alpha, in one colour of bytes */
+    NEBEL_GL_METHOD_D3D9, /* the fog states of a Direct3D 9 device, as those of the factors in place of fog; without
+                                  table and vertex fog specular alpha, the renderer's fog at vertices */
     NEBEL_GL_METHOD_COUNT
 } nebel_gl_method;
 
@@ -107,7 +113,9 @@ typedef struct nebel_gl_frame_desc {
     nebel_gl_method method;
     const nebel_gl_taps *taps;       /* of FIVE_TAP; NULL: nebel_gl_default_taps */
     const nebel_cells *cells;        /* of CELLS and CELLS_PIXEL */
-    const nebel_factor_desc *factor; /* of LINEAR, EXP and EXP2, but for its mode; not COORDINATE_USER */
+    const nebel_factor_desc *factor; /* of LINEAR, EXP and EXP2, but for its mode */
+    const nebel_vertex_desc *vertex; /* of FOG_COORD and ALPHA, with a color; of TWO_PASS, NULL: {0} */
+    const nebel_d3d9_fog *d3d9;      /* of D3D9; FOGENABLE counts as set, and table fog goes by metres of depth */
     int particles_leave_sun; /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
                                   some microseconds each. Not where `fog` excludes, replaces or limits what particles

@@ -64,19 +64,35 @@ typedef enum nebel_method {
     NEBEL_METHOD_LINEAR,      /* a fog factor in place of the snapshot's fog, at vertices or at each sample */
     NEBEL_METHOD_EXP,
     NEBEL_METHOD_EXP2,
-    NEBEL_METHOD_FIVE_TAP, /* of OpenGL: nebel/gl_render.h */
+    NEBEL_METHOD_FIVE_TAP,  /* of OpenGL: nebel/gl_render.h */
+    NEBEL_METHOD_FOG_COORD, /* the snapshot's fog at vertices, as what hardware takes: a coordinate, with one colour */
+    NEBEL_METHOD_TWO_PASS, /* the light that it adds and its amount: as VERTEX, but with a response curve or a colour */
+    NEBEL_METHOD_ALPHA,    /* a byte of alpha over polygons in one colour, of bytes, too */
+    NEBEL_METHOD_D3D9,     /* the fog states of a Direct3D 9 device */
     NEBEL_METHOD_COUNT
 } nebel_method;
 
 /* The word of `nebel render --method`; NULL: there is no such method. Any thread. */
 const char *nebel_method_word(nebel_method method);
 
-/* The method of the frames from now on: EXACT, VERTEX, ADDITIVE, LINEAR, EXP or EXP2; of those with a factor `factor`
- * says its numbers, and its mode is that of the method; for others it is not read. With VERTEX and ADDITIVE the sun
- * comes through the fog as with EXACT; with factors nothing dims it. Of all but EXACT the frame's `error` is 0. Of an
- * orthographic camera all rays begin in its plane; of a panorama each ray is its own axis of depth. Not while a frame
- * is rendered. Errors: ARGUMENT (another method, COORDINATE_USER), VALUE, MEMORY; the method is then as it was. */
-nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_factor_desc *factor);
+/* What methods need; what a method does not need is not read. */
+typedef struct nebel_method_desc {
+    const nebel_factor_desc *factor; /* LINEAR, EXP, EXP2; its mode is the method's. COORDINATE_USER is what
+                                        NEBEL_VERTEX_COORDINATE gives for the snapshot's fog at the vertices, 0 to 100,
+                                        linear in between */
+    const nebel_vertex_desc *vertex; /* FOG_COORD and ALPHA, with a color; TWO_PASS, NULL: {0}. Its isa and its
+                                        coordinate_end are not read */
+    const nebel_d3d9_fog *d3d9;      /* D3D9. FOGENABLE counts as set. Table fog goes by metres of depth whatever the
+                                        camera, which has no device depth. Without table and vertex fog the factor is
+                                        specular alpha, the snapshot's fog at the vertices, in bytes */
+} nebel_method_desc;
+
+/* The method of the frames from now on: all but CELLS, CELLS_PIXEL and FIVE_TAP. desc may be NULL for EXACT, VERTEX,
+ * ADDITIVE and TWO_PASS; it is copied. With the snapshot's fog at vertices the sun comes through it as with EXACT; with
+ * factors and D3D9 nothing dims it. Of all but EXACT the frame's `error` is 0. Of an orthographic camera all rays begin
+ * in its plane; of a panorama each ray is its own axis of depth. Not while a frame is rendered. Errors: ARGUMENT
+ * (another method, or without what it needs), VALUE, MEMORY; the method is then as it was. */
+nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_method_desc *desc);
 
 /* Called from one thread at a time with 0 <= done <= total; return nonzero to stop the frame. */
 typedef int (*nebel_progress_fn)(size_t done, size_t total, void *user);

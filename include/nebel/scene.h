@@ -121,7 +121,10 @@ typedef struct nebel_scene_data {
     const nebel_cells_desc *cells; /* good for nebel_create_cells; allocator and log are not set. NULL: none */
     const char *const *cell_names; /* UTF-8; "" where the file gives none */
 
-    const nebel_factor_desc *classic; /* numbers of the fog factors; the mode is the method's to set. NULL: none */
+    const nebel_factor_desc *classic;   /* numbers of the fog factors; the mode is the method's to set. NULL: none */
+    nebel_curve_type classic_curve;     /* and what the same section says of other methods */
+    const float *classic_table;         /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
+    const nebel_d3d9_fog *classic_d3d9; /* switched on. NULL: none */
 
     size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
     const char *const *files; /* as they are opened, once for each time they are named */

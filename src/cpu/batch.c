@@ -153,9 +153,18 @@ NB_CLONES static void dim(const float (*restrict transmittance)[NB_BATCH], float
 /* Methods that fog the snapshot's way to the camera leave the light of surfaces as it is. */
 static int dims_sun(const nebel_renderer *renderer)
 {
-    const nebel_method method = renderer->method;
-    return renderer->fog != NULL &&
-           (method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE);
+    if (renderer->fog == NULL) return 0;
+    switch (renderer->method) {
+    case NEBEL_METHOD_EXACT:
+    case NEBEL_METHOD_VERTEX:
+    case NEBEL_METHOD_ADDITIVE:
+    case NEBEL_METHOD_FOG_COORD:
+    case NEBEL_METHOD_TWO_PASS:
+    case NEBEL_METHOD_ALPHA:
+        return 1;
+    default:
+        return 0;
+    }
 }
 
 static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)

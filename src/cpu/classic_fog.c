@@ -5,6 +5,7 @@
 #include "base/vector.h"
 
 #include <math.h>
+#include <string.h>
 
 /* The camera as cells want it. Orthographic rays begin in the camera's plane, beside its position; a panorama has no
  * axis but each ray itself. */
@@ -50,22 +51,111 @@ static void set_eye_coordinates(const nb_view *camera, const double place[3], do
     out[2] = panorama ? nb_vector_length(way) : nb_vector_dot(way, camera->axes.forward);
 }
 
-static nb_vertex_fog fog_of_factor(const nb_frame *frame, const double place[3])
+static nb_vertex_fog fog_of_color(double amount, const double color[3])
 {
-    const nebel_factor_desc *factor = &frame->renderer->factor;
-    double seen[3];
-    set_eye_coordinates(&frame->view, place, seen);
-    const double amount = 1 - nebel_compute_fog_factor(factor, nebel_compute_fog_coordinate(factor, seen, 0));
     nb_vertex_fog fog = {{0, 0, 0}, (float)amount};
-    for (int c = 0; c < 3; c++) fog.color[c] = (float)(amount * factor->color[c]);
+    for (int c = 0; c < 3; c++) fog.color[c] = (float)(amount * color[c]);
     return fog;
+}
+
+static nb_vertex_fog fog_of_coordinate(const nebel_factor_desc *factor, double coordinate)
+{
+    return fog_of_color(1 - nebel_compute_fog_factor(factor, coordinate), factor->color);
+}
+
+/* The device's factor of a vertex, or with table fog of a pixel. */
+static nb_vertex_fog fog_of_device(const nebel_d3d9_fog *d3d9, const nebel_d3d9_vertex *vertex)
+{
+    const double of_vertex = nebel_compute_d3d9_vertex_factor(d3d9, vertex);
+    double color[3];
+    nebel_get_d3d9_color(d3d9, color);
+    return fog_of_color(1 - nebel_compute_d3d9_pixel_factor(d3d9, of_vertex, vertex->place[2]), color);
 }
 
 static nb_vertex_fog fog_at(const nb_frame *frame, const double place[3])
 {
-    const nebel_method method = frame->renderer->method;
-    return method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL ? fog_of_cells(frame, place)
-                                                                              : fog_of_factor(frame, place);
+    const nebel_renderer *renderer = frame->renderer;
+    const nebel_method method = renderer->method;
+    if (method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL) return fog_of_cells(frame, place);
+    nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_FIXED};
+    set_eye_coordinates(&frame->view, place, vertex.place);
+    if (method == NEBEL_METHOD_D3D9) return fog_of_device(&renderer->d3d9, &vertex);
+    return fog_of_coordinate(&renderer->factor, nebel_compute_fog_coordinate(&renderer->factor, vertex.place, 0));
+}
+
+/* ---- fog of the snapshot --------------------------------------------------------------------- */
+
+static int has_factor(const nebel_renderer *renderer)
+{
+    return renderer->method == NEBEL_METHOD_LINEAR || renderer->method == NEBEL_METHOD_EXP ||
+           renderer->method == NEBEL_METHOD_EXP2;
+}
+
+static int is_by_user(const nebel_renderer *renderer)
+{
+    return has_factor(renderer) && renderer->factor.coordinate == NEBEL_COORDINATE_USER;
+}
+
+/* Whether the fog at vertices is the snapshot's. */
+static int traces(const nebel_renderer *renderer)
+{
+    switch (renderer->method) {
+    case NEBEL_METHOD_VERTEX:
+    case NEBEL_METHOD_ADDITIVE:
+    case NEBEL_METHOD_FOG_COORD:
+    case NEBEL_METHOD_TWO_PASS:
+    case NEBEL_METHOD_ALPHA:
+        return 1;
+    case NEBEL_METHOD_D3D9:
+        return renderer->d3d9.fog_vertex_mode == NEBEL_D3DFOG_NONE &&
+               renderer->d3d9.fog_table_mode == NEBEL_D3DFOG_NONE;
+    default:
+        return is_by_user(renderer);
+    }
+}
+
+/* What a program hands over to the hardware. */
+static nebel_vertex_format format_of(const nebel_renderer *renderer)
+{
+    switch (renderer->method) {
+    case NEBEL_METHOD_ALPHA:
+        return NEBEL_VERTEX_ALPHA;
+    case NEBEL_METHOD_D3D9:
+        return NEBEL_VERTEX_SPECULAR_ALPHA;
+    case NEBEL_METHOD_FOG_COORD:
+        return NEBEL_VERTEX_COORDINATE;
+    default:
+        return is_by_user(renderer) ? NEBEL_VERTEX_COORDINATE : NEBEL_VERTEX_RGBA_FLOAT;
+    }
+}
+
+static nb_vertex_fog unpack_alpha(const nebel_renderer *renderer, double alpha)
+{
+    double color[3];
+    for (int c = 0; c < 3; c++) color[c] = floor(255 * fmin(renderer->look_color[c], 1) + .5) / 255;
+    return fog_of_color(alpha, color);
+}
+
+/* What the hardware makes of it. Where the factor is one of pixels that is the coordinate, in the place of alpha. */
+static nb_vertex_fog unpack(const nebel_renderer *renderer, const nb_vertex_fog *stream)
+{
+    enum { END = 100 };
+    float coordinate;
+    memcpy(&coordinate, stream, sizeof coordinate);
+    const double byte = ((const unsigned char *)stream)[3] / 255.;
+    const nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_TRANSFORMED, .specular_alpha = byte};
+    switch (format_of(renderer)) {
+    case NEBEL_VERTEX_ALPHA:
+        return unpack_alpha(renderer, byte);
+    case NEBEL_VERTEX_SPECULAR_ALPHA:
+        return fog_of_device(&renderer->d3d9, &vertex);
+    case NEBEL_VERTEX_COORDINATE:
+        if (!is_by_user(renderer)) return fog_of_color((double)coordinate / END, renderer->look_color);
+        if (renderer->factor.stage == NEBEL_STAGE_PIXEL) return (nb_vertex_fog){{0, 0, 0}, coordinate};
+        return fog_of_coordinate(&renderer->factor, (double)coordinate);
+    default:
+        return *stream;
+    }
 }
 
 /* ---- per vertex ------------------------------------------------------------------------------ */
@@ -78,28 +168,39 @@ static void find_vertex(const nebel_mesh *mesh, size_t vertex, double place[3])
 static nebel_result trace_vertices(const nb_frame *frame, const nebel_mesh *mesh, size_t first, size_t count,
                                    const double eye[3], nb_vertex_fog *fog)
 {
+    const nebel_renderer *renderer = frame->renderer;
+    const nebel_vertex_format format = format_of(renderer);
     nebel_vertices vertices = {.positions = mesh->positions + 3 * first};
     for (int i = 0; i < 3; i++) {
         vertices.origin[i] = mesh->origin[i];
         vertices.eye[i] = eye[i];
     }
-    const nebel_vertex_desc desc = {.isa = frame->renderer->fog_isa};
-    const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, fog + first, sizeof *fog};
-    return nebel_fog_vertices(frame->renderer->fog, &desc, count, &vertices, &output, 1);
+    nebel_vertex_desc desc = {.isa = NEBEL_ISA_DEFAULT};
+    if (renderer->method == NEBEL_METHOD_FOG_COORD || renderer->method == NEBEL_METHOD_TWO_PASS ||
+        renderer->method == NEBEL_METHOD_ALPHA)
+        desc = renderer->look;
+    desc.isa = renderer->fog_isa;
+    const nebel_vertex_output output = {format, fog + first, sizeof *fog};
+    nebel_result result = NEBEL_OK;
+    if (renderer->fog != NULL)
+        result = nebel_fog_vertices(renderer->fog, &desc, count, &vertices, &output, 1);
+    else
+        memset(fog + first, format == NEBEL_VERTEX_SPECULAR_ALPHA ? 0xff : 0, count * sizeof *fog);
+    for (size_t v = first; v < first + count && result == NEBEL_OK; v++) fog[v] = unpack(renderer, &fog[v]);
+    return result;
 }
 
 static nebel_result set_vertices(const nb_frame *frame, const nebel_mesh *mesh, size_t first, size_t count,
                                  nb_vertex_fog *fog)
 {
-    const nebel_method method = frame->renderer->method;
-    const int traces = method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE;
-    if (traces && frame->view.projection != NEBEL_PROJECTION_ORTHOGRAPHIC)
+    const int from_snapshot = traces(frame->renderer);
+    if (from_snapshot && frame->view.projection != NEBEL_PROJECTION_ORTHOGRAPHIC)
         return trace_vertices(frame, mesh, first, count, frame->view.position, fog);
     nebel_result result = NEBEL_OK;
     for (size_t v = first; v < first + count && result == NEBEL_OK; v++) {
         double place[3];
         find_vertex(mesh, v, place);
-        if (traces)
+        if (from_snapshot)
             result = trace_vertices(frame, mesh, v, 1, view_towards(&frame->view, place).eye, fog);
         else
             fog[v] = fog_at(frame, place);
@@ -127,19 +228,9 @@ static nebel_result set_surface(const nb_frame *frame, const nb_surface *surface
 /* Of the factors each pixel may have its own. */
 static int is_per_vertex(const nebel_renderer *renderer)
 {
-    switch (renderer->method) {
-    case NEBEL_METHOD_CELLS:
-        return 1;
-    case NEBEL_METHOD_VERTEX:
-    case NEBEL_METHOD_ADDITIVE:
-        return renderer->fog != NULL;
-    case NEBEL_METHOD_LINEAR:
-    case NEBEL_METHOD_EXP:
-    case NEBEL_METHOD_EXP2:
-        return renderer->factor.stage == NEBEL_STAGE_VERTEX;
-    default:
-        return 0;
-    }
+    if (traces(renderer) || renderer->method == NEBEL_METHOD_CELLS) return 1;
+    if (renderer->method == NEBEL_METHOD_D3D9) return renderer->d3d9.fog_table_mode == NEBEL_D3DFOG_NONE;
+    return has_factor(renderer) && renderer->factor.stage == NEBEL_STAGE_VERTEX;
 }
 
 nebel_result nb_classic_fog_set_vertices(const nb_frame *frame)
@@ -180,22 +271,22 @@ static nb_vertex_fog fog_of_pixel(const nb_frame *frame, const nb_rays *rays, co
 
 /* ---- both ------------------------------------------------------------------------------------ */
 
-static int is_clear(const nebel_renderer *renderer)
+static nb_vertex_fog fog_of_lane(const nb_frame *frame, const nb_scratch *scratch, int lane)
 {
-    return (renderer->method == NEBEL_METHOD_VERTEX || renderer->method == NEBEL_METHOD_ADDITIVE) &&
-           renderer->fog == NULL;
+    const nebel_renderer *renderer = frame->renderer;
+    if (!is_per_vertex(renderer)) return fog_of_pixel(frame, &scratch->rays, &scratch->hits, lane);
+    const nb_vertex_fog fog = interpolate(frame, &scratch->hits, lane);
+    const int is_coordinate = is_by_user(renderer) && renderer->factor.stage == NEBEL_STAGE_PIXEL;
+    return is_coordinate ? fog_of_coordinate(&renderer->factor, (double)fog.alpha) : fog;
 }
 
 void nb_classic_fog_trace(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_light_samples *samples = &scratch->samples;
-    const nb_hits *hits = &scratch->hits;
-    const nebel_renderer *renderer = frame->renderer;
-    const int per_vertex = is_per_vertex(renderer), adds = renderer->method == NEBEL_METHOD_ADDITIVE;
+    const int adds = frame->renderer->method == NEBEL_METHOD_ADDITIVE;
     for (int i = 0; i < NB_BATCH; i++) {
         nb_vertex_fog fog = {{0, 0, 0}, 0};
-        if (scratch->inside[i] && hits->surface[i] != NB_NONE && !is_clear(renderer))
-            fog = per_vertex ? interpolate(frame, hits, i) : fog_of_pixel(frame, &scratch->rays, hits, i);
+        if (scratch->inside[i] && scratch->hits.surface[i] != NB_NONE) fog = fog_of_lane(frame, scratch, i);
         for (int c = 0; c < 3; c++) {
             samples->transmittance[c][i] = adds ? 1 : 1 - fog.alpha;
             samples->in_scattering[c][i] = fog.color[c];

@@ -110,6 +110,10 @@ const char *nebel_method_word(nebel_method method)
         [NEBEL_METHOD_EXP] = "exp",
         [NEBEL_METHOD_EXP2] = "exp2",
         [NEBEL_METHOD_FIVE_TAP] = "five-tap",
+        [NEBEL_METHOD_FOG_COORD] = "fog-coord",
+        [NEBEL_METHOD_TWO_PASS] = "two-pass",
+        [NEBEL_METHOD_ALPHA] = "alpha",
+        [NEBEL_METHOD_D3D9] = "d3d9",
     };
     _Static_assert(sizeof words / sizeof *words == NEBEL_METHOD_COUNT, "each method has its word");
     return (unsigned)method < NEBEL_METHOD_COUNT ? words[method] : NULL;
@@ -138,40 +142,82 @@ nebel_result nebel_set_renderer_cells(nebel_renderer *renderer, const nebel_cell
     return NEBEL_OK;
 }
 
-/* Surfaces have no numbers of the program's own. */
-static nebel_result resolve_factor(nebel_method method, const nebel_factor_desc *factor, nebel_factor_desc *resolved)
+static nebel_result set_factor(nebel_renderer *renderer, nebel_method method, const nebel_factor_desc *factor)
 {
-    if (factor == NULL || factor->coordinate == NEBEL_COORDINATE_USER) return NEBEL_ERROR_ARGUMENT;
+    if (factor == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_factor_desc desc = *factor;
     desc.mode = method == NEBEL_METHOD_LINEAR ? NEBEL_FACTOR_LINEAR
                 : method == NEBEL_METHOD_EXP  ? NEBEL_FACTOR_EXP
                                               : NEBEL_FACTOR_EXP2;
-    return nebel_resolve_factor(&desc, resolved);
+    return nebel_resolve_factor(&desc, &renderer->factor);
 }
 
-nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_factor_desc *factor)
+static nebel_result set_look(nebel_renderer *renderer, nebel_method method, const nebel_vertex_desc *vertex)
 {
-    if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_factor_desc resolved = renderer->factor;
-    nebel_result result = NEBEL_OK;
+    nebel_vertex_desc look = {.curve = NEBEL_CURVE_PHYSICAL};
+    if (vertex != NULL)
+        look = (nebel_vertex_desc){
+            .curve = vertex->curve, .table = vertex->table, .color = vertex->color, .channel = vertex->channel};
+    if (method != NEBEL_METHOD_TWO_PASS && look.color == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (look.curve != NEBEL_CURVE_PHYSICAL && look.color == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result result = nebel_resolve_vertex_desc(&look, &look);
+    if (result != NEBEL_OK) return result;
+    if (look.color != NULL) {
+        memcpy(renderer->look_color, look.color, sizeof renderer->look_color);
+        look.color = renderer->look_color;
+    }
+    if (look.curve == NEBEL_CURVE_TABLE) {
+        memcpy(renderer->look_table, look.table, sizeof renderer->look_table);
+        look.table = renderer->look_table;
+    }
+    renderer->look = look;
+    return NEBEL_OK;
+}
+
+static nebel_result set_d3d9(nebel_renderer *renderer, const nebel_d3d9_fog *d3d9)
+{
+    if (d3d9 == NULL || d3d9->fog_table_mode > NEBEL_D3DFOG_LINEAR || d3d9->fog_vertex_mode > NEBEL_D3DFOG_LINEAR)
+        return NEBEL_ERROR_ARGUMENT;
+    renderer->d3d9 = *d3d9;
+    renderer->d3d9.fog_enable = 1;
+    return NEBEL_OK;
+}
+
+static nebel_result set_numbers(nebel_renderer *renderer, nebel_method method, const nebel_method_desc *desc)
+{
     switch (method) {
     case NEBEL_METHOD_LINEAR:
     case NEBEL_METHOD_EXP:
     case NEBEL_METHOD_EXP2:
-        result = resolve_factor(method, factor, &resolved);
-        if (result != NEBEL_OK) return nb_fail(&renderer->log, result, "renderer: the fog factor is not valid");
-        break;
+        return set_factor(renderer, method, desc->factor);
+    case NEBEL_METHOD_FOG_COORD:
+    case NEBEL_METHOD_TWO_PASS:
+    case NEBEL_METHOD_ALPHA:
+        return set_look(renderer, method, desc->vertex);
+    case NEBEL_METHOD_D3D9:
+        return set_d3d9(renderer, desc->d3d9);
     case NEBEL_METHOD_EXACT:
     case NEBEL_METHOD_VERTEX:
     case NEBEL_METHOD_ADDITIVE:
-        break;
+        return NEBEL_OK;
     default:
-        return nb_fail(&renderer->log, NEBEL_ERROR_ARGUMENT, "renderer: there is no such method here");
+        return NEBEL_ERROR_ARGUMENT;
     }
-    if (method != NEBEL_METHOD_EXACT) result = make_room_at_vertices(renderer);
-    if (result != NEBEL_OK) return result;
+}
+
+nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_method_desc *desc)
+{
+    static const nebel_method_desc nothing = {NULL, NULL, NULL};
+    if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (method != NEBEL_METHOD_EXACT) {
+        const nebel_result result = make_room_at_vertices(renderer);
+        if (result != NEBEL_OK) return result;
+    }
+    const nebel_result result = set_numbers(renderer, method, desc != NULL ? desc : &nothing);
+    if (result != NEBEL_OK)
+        return nb_fail(&renderer->log, result,
+                       "renderer: there is no such method here, or what it needs is missing or not valid");
     renderer->method = method;
-    renderer->factor = resolved;
     return NEBEL_OK;
 }
 

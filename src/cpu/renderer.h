@@ -50,8 +50,12 @@ struct nebel_renderer {
     const nebel_scene_data *scene;
     nebel_snapshot *fog; /* NULL: none */
     nebel_method method;
-    const nebel_cells *cells;  /* of the methods CELLS and CELLS_PIXEL */
-    nebel_factor_desc factor;  /* of the methods LINEAR, EXP, EXP2; resolved */
+    const nebel_cells *cells; /* of the methods CELLS and CELLS_PIXEL */
+    nebel_factor_desc factor; /* of the methods LINEAR, EXP, EXP2; resolved */
+    nebel_vertex_desc look;   /* of FOG_COORD, TWO_PASS, ALPHA; resolved, of color and table below */
+    double look_color[3];
+    float look_table[NEBEL_CURVE_ENTRIES];
+    nebel_d3d9_fog d3d9;       /* of D3D9, switched on */
     nb_vertex_fog *vertex_fog; /* of all surfaces, for the frame that is rendered; NULL until a method asks for it */
     nebel_isa fog_isa;
     int threads;

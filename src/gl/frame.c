@@ -3,6 +3,7 @@
  */
 #include "corners.h"
 #include "gl.h"
+#include "method.h"
 #include "panorama.h"
 #include "pixel_fog.h"
 #include "renderer.h"
@@ -21,14 +22,13 @@ typedef struct frame {
     nb_lighting light;
     double eye[3];
     int panorama;
-    int has_factor;
-    nebel_factor_desc factor; /* of the methods that have one; resolved */
-    nebel_view view;          /* through the pixels' centres; of a panorama without clip_from_eye */
-    nebel_view sample_view;   /* through the places of the present sample */
-    nebel_rays rays;          /* of sample_view, or of the panorama */
-    nebel_view sun_view;      /* of all that is seen, against the sun's light */
-    int casts;                /* the sun shines, and there is something to cast shadows */
-    int dims;                 /* particles dim the sun */
+    nb_method method;
+    nebel_view view;        /* through the pixels' centres; of a panorama without clip_from_eye */
+    nebel_view sample_view; /* through the places of the present sample */
+    nebel_rays rays;        /* of sample_view, or of the panorama */
+    nebel_view sun_view;    /* of all that is seen, against the sun's light */
+    int casts;              /* the sun shines, and there is something to cast shadows */
+    int dims;               /* particles dim the sun */
 } frame;
 
 /* ---- checks ---------------------------------------------------------------------------------- */
@@ -65,17 +65,12 @@ static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
     return NEBEL_OK;
 }
 
-static int takes_cells(nebel_gl_method method)
-{
-    return method == NEBEL_GL_METHOD_CELLS || method == NEBEL_GL_METHOD_CELLS_PIXEL;
-}
-
 static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     if ((unsigned)desc->method >= NEBEL_GL_METHOD_COUNT) {
         return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: there is no method %d", (int)desc->method);
     }
-    if (takes_cells(desc->method) && desc->cells == NULL)
+    if (nb_method_takes_cells(desc->method) && desc->cells == NULL)
         return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: this method needs cells; they are NULL");
     const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
     if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
@@ -86,31 +81,11 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
                    "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
 }
 
-static int takes_factor(nebel_gl_method method)
+static nebel_result set_method(frame *f)
 {
-    return method == NEBEL_GL_METHOD_LINEAR || method == NEBEL_GL_METHOD_EXP || method == NEBEL_GL_METHOD_EXP2;
-}
-
-static int is_by_vertex(const frame *f)
-{
-    return f->desc->method == NEBEL_GL_METHOD_VERTEX || f->desc->method == NEBEL_GL_METHOD_ADDITIVE ||
-           f->desc->method == NEBEL_GL_METHOD_CELLS || (f->has_factor && f->factor.stage == NEBEL_STAGE_VERTEX);
-}
-
-static nebel_result set_factor(frame *f)
-{
-    const nebel_log *const log = &f->renderer->log;
-    const nebel_gl_method method = f->desc->method;
-    f->has_factor = takes_factor(method);
-    if (!f->has_factor) return NEBEL_OK;
-    if (f->desc->factor == NULL || f->desc->factor->coordinate == NEBEL_COORDINATE_USER)
-        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "frame: this method needs a factor, of depth or of distance");
-    f->factor = *f->desc->factor;
-    f->factor.mode = method == NEBEL_GL_METHOD_LINEAR ? NEBEL_FACTOR_LINEAR
-                     : method == NEBEL_GL_METHOD_EXP  ? NEBEL_FACTOR_EXP
-                                                      : NEBEL_FACTOR_EXP2;
-    const nebel_result result = nebel_resolve_factor(&f->factor, &f->factor);
-    return result == NEBEL_OK ? result : nb_fail(log, result, "frame: the fog factor is not valid");
+    const nebel_result result = nb_method_set(&f->method, f->desc);
+    if (result == NEBEL_OK) return result;
+    return nb_fail(&f->renderer->log, result, "frame: what this method needs is missing or not valid");
 }
 
 static nebel_result set_frame(frame *f)
@@ -121,7 +96,7 @@ static nebel_result set_frame(frame *f)
     nebel_result result = check_size(r, desc);
     if (result == NEBEL_OK) result = check_samples(r, f->samples);
     if (result == NEBEL_OK) result = check_method(r, desc);
-    if (result == NEBEL_OK) result = set_factor(f);
+    if (result == NEBEL_OK) result = set_method(f);
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
@@ -227,6 +202,16 @@ static nebel_result set_eye_fog(const frame *f)
                        : nebel_gl_set_fog(r->eye_fog, r->fog, &f->view);
 }
 
+static void set_factor_numbers(const frame *f, unsigned program)
+{
+    float color[3];
+    for (int i = 0; i < 3; i++) color[i] = (float)f->method.factor.color[i];
+    glUniform1i(glGetUniformLocation(program, "factor_mode"), (GLint)f->method.factor.mode);
+    glUniform3f(glGetUniformLocation(program, "factor_range"), (float)f->method.factor.start,
+                (float)f->method.factor.end, (float)f->method.factor.density);
+    set_vector(program, "factor_color", color);
+}
+
 /* The fog that vertices bring. */
 static void draw_vertex_fog(const frame *f)
 {
@@ -237,6 +222,8 @@ static void draw_vertex_fog(const frame *f)
     set_rays(f, program);
     set_clip(f, program);
     glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method != NEBEL_GL_METHOD_ADDITIVE);
+    glUniform1i(glGetUniformLocation(program, "factor_mode"), -1);
+    if (nb_method_is_by_user(&f->method) && f->method.factor.stage == NEBEL_STAGE_PIXEL) set_factor_numbers(f, program);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_meshes(f, program);
 }
@@ -246,7 +233,7 @@ static void set_axis(const frame *f, unsigned program)
 {
     const double *const eye = f->view.eye_from_world;
     const int parallel = f->view.clip_from_eye[15] != 0;
-    const int has_axis = !f->panorama && (parallel || f->factor.coordinate == NEBEL_COORDINATE_PLANE);
+    const int has_axis = !f->panorama && (parallel || f->method.factor.coordinate == NEBEL_COORDINATE_PLANE);
     float axis[3];
     for (int i = 0; i < 3; i++) axis[i] = has_axis ? (float)-eye[4 * i + 2] : 0;
     set_vector(program, "scene_axis", axis);
@@ -258,16 +245,11 @@ static nebel_result draw_factor(const frame *f)
     const nebel_result result = nb_shading_make_factor(&r->shading, &r->context, &r->log, f->panorama);
     if (result != NEBEL_OK) return result;
     const unsigned program = f->panorama ? r->shading.round_factor : r->shading.factor;
-    float color[3];
-    for (int i = 0; i < 3; i++) color[i] = (float)f->factor.color[i];
     clear_fog();
     glUseProgram(program);
     set_rays(f, program);
     set_axis(f, program);
-    glUniform1i(glGetUniformLocation(program, "factor_mode"), (GLint)f->factor.mode);
-    glUniform3f(glGetUniformLocation(program, "factor_range"), (float)f->factor.start, (float)f->factor.end,
-                (float)f->factor.density);
-    set_vector(program, "factor_color", color);
+    set_factor_numbers(f, program);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -291,7 +273,7 @@ static nebel_result draw_exact_fog(const frame *f)
 /* Cells and factors have no need of the renderer's fog. */
 static int has_fog(const frame *f)
 {
-    return f->renderer->fog != NULL || takes_cells(f->desc->method) || f->has_factor;
+    return f->renderer->fog != NULL || nb_method_takes_cells(f->desc->method) || f->method.replaces_fog;
 }
 
 /* A wall may hide a vertex whose triangle is seen beside it. */
@@ -299,8 +281,11 @@ static nb_vertex_source find_source(const frame *f)
 {
     const nebel_gl_method method = f->desc->method;
     nb_vertex_source source = {.fog = f->renderer->fog,
-                               .cells = takes_cells(method) ? f->desc->cells : NULL,
-                               .factor = f->has_factor ? &f->factor : NULL,
+                               .cells = nb_method_takes_cells(method) ? f->desc->cells : NULL,
+                               .factor = f->method.has_factor ? &f->method.factor : NULL,
+                               .d3d9 = f->method.kind == NEBEL_GL_METHOD_D3D9 ? &f->method.d3d9 : NULL,
+                               .look = &f->method.look,
+                               .format = nb_method_format(&f->method),
                                .view = {.ignore_walls = method != NEBEL_GL_METHOD_CELLS_PIXEL},
                                .projection = f->desc->camera.projection};
     for (int i = 0; i < 3; i++) {
@@ -319,7 +304,7 @@ static nebel_result draw_pixel_fog(const frame *f)
 
 static int has_particles(const frame *f)
 {
-    return f->renderer->particles.count > 0 && !f->has_factor;
+    return f->renderer->particles.count > 0 && !f->method.replaces_fog;
 }
 
 /* Particles ask for the renderer's fog before them whatever is on surfaces. */
@@ -333,13 +318,14 @@ static nebel_result draw_fog(const frame *f)
         return NEBEL_OK;
     }
     nebel_result result = NEBEL_OK;
-    if (is_by_vertex(f))
+    if (nb_method_is_by_vertex(&f->method))
         draw_vertex_fog(f);
-    else if (f->has_factor)
+    else if (f->method.has_factor)
         result = draw_factor(f);
-    else if (takes_cells(f->desc->method))
+    else if (nb_method_takes_cells(f->desc->method))
         result = draw_pixel_fog(f);
-    const int is_exact = !is_by_vertex(f) && !f->has_factor && !takes_cells(f->desc->method);
+    const int is_exact =
+        !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
     if (result == NEBEL_OK && r->fog != NULL && (is_exact || has_particles(f))) result = set_eye_fog(f);
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
@@ -469,7 +455,8 @@ static void set_sun_view(frame *f)
 static nebel_result set_sun_fog(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    if (r->fog == NULL || f->has_factor || !(r->shadows.seen_low[0] < r->shadows.seen_high[0])) return NEBEL_OK;
+    if (r->fog == NULL || f->method.replaces_fog || !(r->shadows.seen_low[0] < r->shadows.seen_high[0]))
+        return NEBEL_OK;
     set_sun_view(f);
     return nebel_gl_set_fog(r->sun_fog, r->fog, &f->sun_view);
 }
@@ -593,7 +580,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    const nebel_gl *const passes = f->casts && r->fog != NULL && !f->has_factor ? r->sun_fog : NULL;
+    const nebel_gl *const passes = f->casts && r->fog != NULL && !f->method.replaces_fog ? r->sun_fog : NULL;
     const nb_light_kind kind = {.sunlit = f->casts, .dimmed = f->dims, .veil_layers = count_veil_layers(f)};
     const nebel_result result = find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
@@ -652,7 +639,7 @@ static nebel_result prepare_particles(const frame *f)
 
 static int has_vertex_fog(const frame *f)
 {
-    return is_by_vertex(f) && has_fog(f);
+    return nb_method_is_by_vertex(&f->method) && has_fog(f);
 }
 
 static nebel_result prepare_vertices(const frame *f)
@@ -668,7 +655,7 @@ static nebel_result prepare_vertices(const frame *f)
 static nebel_result prepare_panorama(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_result result = nb_shading_make_round(&r->shading, &r->context, &r->log, is_by_vertex(f));
+    nebel_result result = nb_shading_make_round(&r->shading, &r->context, &r->log, nb_method_is_by_vertex(&f->method));
     if (result == NEBEL_OK) result = nb_corners_make(&r->meshes);
     return result == NEBEL_OK && has_vertex_fog(f) ? nb_corners_set_fog(&r->meshes) : result;
 }

@@ -102,6 +102,38 @@ static const char surface_fragment_text[] =
     "    gl_FragDepth = 1.0 / (1.0 + t);\n"
     "}\n";
 
+/* ---- fog factors ----------------------------------------------------------------------------- */
+
+/* As src/classic/factors.c has them for the stage of pixels. */
+static const char factor_text[] =
+    "uniform int factor_mode;\n"   /* nebel_factor_mode; below 0: none */
+    "uniform vec3 factor_range;\n" /* start, end, density */
+    "uniform vec3 factor_color;\n"
+    "float fog_factor(float c)\n"
+    "{\n"
+    "    float x = factor_range.z * c;\n"
+    "    if (factor_mode == 0) return exp(-x);\n"
+    "    if (factor_mode == 1) return exp(-x * x);\n"
+    "    if (factor_range.x == factor_range.y) return c < factor_range.x ? 1.0 : 0.0;\n"
+    "    return clamp((factor_range.y - c) / (factor_range.y - factor_range.x), 0.0, 1.0);\n"
+    "}\n";
+
+/* Depth is along the camera's axis; the axis is 0 where the distance counts. */
+static const char pixel_factor_text[] =
+    "uniform highp sampler2D scene_place;\n"
+    "uniform vec3 scene_axis;\n"
+    "layout(location = 0) out highp vec4 out_in_scattering;\n"
+    "layout(location = 1) out highp vec4 out_transmittance;\n"
+    "void main()\n"
+    "{\n"
+    "    float t = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
+    "    if (!(t > 0.0)) discard;\n"
+    "    vec3 at = ray_origin(gl_FragCoord.xy) + t * ray_direction(gl_FragCoord.xy);\n"
+    "    float f = fog_factor(scene_axis == vec3(0.0) ? length(at) : abs(dot(at, scene_axis)));\n"
+    "    out_in_scattering = vec4((1.0 - f) * factor_color, 1.0);\n"
+    "    out_transmittance = vec4(vec3(f), 1.0);\n"
+    "}\n";
+
 /* ---- fog at vertices ------------------------------------------------------------------------- */
 
 static const char vertex_fog_vertex_text[] = "layout(location = 0) in vec3 mesh_position;\n"
@@ -136,38 +168,10 @@ static const char vertex_fog_fragment_text[] =
     "    if (!surface_is_met(direction)) discard;\n"
     "    float t = surface_distance(ray_origin(gl_FragCoord.xy), direction);\n"
     "    if (!(t > 0.0 && t <= 1.0001 * texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x)) discard;\n"
-    "    out_in_scattering = vec4(surface_fog.rgb, 1.0);\n"
-    "    out_transmittance = vec4(vec3(1.0 - scene_weakening * surface_fog.a), 1.0);\n"
-    "}\n";
-
-/* ---- fog factors ----------------------------------------------------------------------------- */
-
-/* As src/classic/factors.c has them for the stage of pixels. Depth is along the camera's axis; the axis is 0 where the
- * distance counts. */
-static const char factor_text[] =
-    "uniform highp sampler2D scene_place;\n"
-    "uniform vec3 scene_axis;\n"
-    "uniform int factor_mode;\n"   /* nebel_factor_mode */
-    "uniform vec3 factor_range;\n" /* start, end, density */
-    "uniform vec3 factor_color;\n"
-    "layout(location = 0) out highp vec4 out_in_scattering;\n"
-    "layout(location = 1) out highp vec4 out_transmittance;\n"
-    "float fog_factor(float c)\n"
-    "{\n"
-    "    float x = factor_range.z * c;\n"
-    "    if (factor_mode == 0) return exp(-x);\n"
-    "    if (factor_mode == 1) return exp(-x * x);\n"
-    "    if (factor_range.x == factor_range.y) return c < factor_range.x ? 1.0 : 0.0;\n"
-    "    return clamp((factor_range.y - c) / (factor_range.y - factor_range.x), 0.0, 1.0);\n"
-    "}\n"
-    "void main()\n"
-    "{\n"
-    "    float t = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
-    "    if (!(t > 0.0)) discard;\n"
-    "    vec3 at = ray_origin(gl_FragCoord.xy) + t * ray_direction(gl_FragCoord.xy);\n"
-    "    float f = fog_factor(scene_axis == vec3(0.0) ? length(at) : abs(dot(at, scene_axis)));\n"
-    "    out_in_scattering = vec4((1.0 - f) * factor_color, 1.0);\n"
-    "    out_transmittance = vec4(vec3(f), 1.0);\n"
+    "    vec4 fog = surface_fog;\n"
+    "    if (factor_mode >= 0) fog = (1.0 - fog_factor(fog.a)) * vec4(factor_color, 1.0);\n"
+    "    out_in_scattering = vec4(fog.rgb, 1.0);\n"
+    "    out_transmittance = vec4(vec3(1.0 - scene_weakening * fog.a), 1.0);\n"
     "}\n";
 
 /* ---- surfaces of panoramas
@@ -488,8 +492,8 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
     const nb_texts fragment = {{version, precision_of(context), words_text, ray_text, interpolated_text,
-                                fog_attribute_text, distance_text, vertex_fog_fragment_text},
-                               8};
+                                fog_attribute_text, distance_text, factor_text, vertex_fog_fragment_text},
+                               9};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
     if (result != NEBEL_OK) return result;
@@ -502,7 +506,7 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
 {
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : ray_text;
     const nb_texts vertex = {{version, light_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), words_text, ray, factor_text}, 5};
+    const nb_texts fragment = {{version, precision_of(context), words_text, ray, factor_text, pixel_factor_text}, 6};
     unsigned *const name = panorama ? &shading->round_factor : &shading->factor;
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
@@ -519,8 +523,8 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts vertex = {{version, option, words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
     const nb_texts fragment = {{version, option, precision, words_text, nb_panorama_ray_text, round_surface_text,
-                                distance_text, fragment_text},
-                               8};
+                                distance_text, factor_text, fragment_text},
+                               9};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;

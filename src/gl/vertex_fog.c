@@ -4,6 +4,7 @@
 
 #include <epoxy/gl.h>
 #include <math.h>
+#include <string.h>
 
 enum { FOG_SIZE = 4 * sizeof(float) };
 
@@ -63,56 +64,139 @@ static nebel_result fog_by_cells(const nb_vertex_source *source, size_t count, c
     return result;
 }
 
+/* ---- factors --------------------------------------------------------------------------------- */
+
 /* What counts of a place in eye coordinates is its depth and its distance. */
-static void fog_by_factor(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices, float (*out)[4])
+static void find_seen(const nb_vertex_source *source, const double place[3], double seen[3])
 {
-    const nebel_factor_desc *const factor = source->factor;
+    const nebel_cell_view view = view_towards(source, place);
+    double length2 = 0, depth = 0;
+    for (int i = 0; i < 3; i++) {
+        const double way = place[i] - view.eye[i];
+        length2 += way * way;
+        depth += way * source->view.forward[i];
+    }
+    if (source->projection == NEBEL_PROJECTION_PANORAMA) depth = sqrt(length2);
+    seen[0] = sqrt(fmax(length2 - depth * depth, 0));
+    seen[1] = 0;
+    seen[2] = depth;
+}
+
+static void set_color(double amount, const double color[3], float out[4])
+{
+    for (int i = 0; i < 3; i++) out[i] = (float)(amount * color[i]);
+    out[3] = (float)amount;
+}
+
+static void set_factor(const nebel_factor_desc *factor, double coordinate, float out[4])
+{
+    set_color(1 - nebel_compute_fog_factor(factor, coordinate), factor->color, out);
+}
+
+static void set_device(const nebel_d3d9_fog *d3d9, const nebel_d3d9_vertex *vertex, float out[4])
+{
+    double color[3];
+    nebel_get_d3d9_color(d3d9, color);
+    set_color(1 - nebel_compute_d3d9_vertex_factor(d3d9, vertex), color, out);
+}
+
+static int is_by_place(const nb_vertex_source *source)
+{
+    if (source->d3d9 != NULL) return source->d3d9->fog_vertex_mode != NEBEL_D3DFOG_NONE;
+    return source->factor != NULL && source->factor->coordinate != NEBEL_COORDINATE_USER;
+}
+
+static void fog_by_place(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices, float (*out)[4])
+{
     for (size_t v = 0; v < count; v++) {
-        double place[3], length2 = 0, depth = 0;
+        nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_FIXED};
+        double place[3];
         find_place(vertices, v, place);
-        const nebel_cell_view view = view_towards(source, place);
-        for (int i = 0; i < 3; i++) {
-            const double way = place[i] - view.eye[i];
-            length2 += way * way;
-            depth += way * source->view.forward[i];
-        }
-        if (source->projection == NEBEL_PROJECTION_PANORAMA) depth = sqrt(length2);
-        const double seen[3] = {sqrt(fmax(length2 - depth * depth, 0)), 0, depth};
-        const double amount = 1 - nebel_compute_fog_factor(factor, nebel_compute_fog_coordinate(factor, seen, 0));
-        for (int i = 0; i < 3; i++) out[v][i] = (float)(amount * factor->color[i]);
-        out[v][3] = (float)amount;
+        find_seen(source, place, vertex.place);
+        if (source->d3d9 != NULL)
+            set_device(source->d3d9, &vertex, out[v]);
+        else
+            set_factor(source->factor, nebel_compute_fog_coordinate(source->factor, vertex.place, 0), out[v]);
     }
 }
 
-static nebel_result fog_by_parallel_rays(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
-                                         float (*out)[4])
+/* ---- volumes --------------------------------------------------------------------------------- */
+
+static nebel_result trace(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices, float (*out)[4])
+{
+    const nebel_vertex_output output = {source->format, out, sizeof *out};
+    if (source->fog != NULL) return nebel_fog_vertices(source->fog, source->look, count, vertices, &output, 1);
+    memset(out, source->format == NEBEL_VERTEX_SPECULAR_ALPHA ? 0xff : 0, count * sizeof *out);
+    return NEBEL_OK;
+}
+
+static nebel_result trace_parallel(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
+                                   float (*out)[4])
 {
     nebel_result result = NEBEL_OK;
     for (size_t v = 0; v < count && result == NEBEL_OK; v++) {
-        const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out[v], 0};
         nebel_vertices one = *vertices;
         double place[3];
         one.positions = (const char *)vertices->positions + v * vertices->position_stride;
         find_place(vertices, v, place);
         const nebel_cell_view view = view_towards(source, place);
         for (int i = 0; i < 3; i++) one.eye[i] = view.eye[i];
-        result = nebel_fog_vertices(source->fog, NULL, 1, &one, &output, 1);
+        result = trace(source, 1, &one, &out[v]);
     }
     return result;
+}
+
+static void unpack_coordinate(const nb_vertex_source *source, float out[4])
+{
+    enum { END = 100 };
+    const double coordinate = (double)out[0];
+    if (source->factor == NULL)
+        set_color(coordinate / END, source->look->color, out);
+    else if (source->factor->stage == NEBEL_STAGE_VERTEX)
+        set_factor(source->factor, coordinate, out);
+    else
+        out[3] = (float)coordinate;
+}
+
+/* What hardware makes of what it is given. Where the factor is one of pixels that is the coordinate, in the place of
+ * the amount. */
+static void unpack(const nb_vertex_source *source, float out[4])
+{
+    const double byte = ((const unsigned char *)out)[3] / 255.;
+    const nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_TRANSFORMED, .specular_alpha = byte};
+    double color[3];
+    switch (source->format) {
+    case NEBEL_VERTEX_COORDINATE:
+        unpack_coordinate(source, out);
+        break;
+    case NEBEL_VERTEX_SPECULAR_ALPHA:
+        set_device(source->d3d9, &vertex, out);
+        break;
+    case NEBEL_VERTEX_ALPHA:
+        for (int i = 0; i < 3; i++) color[i] = floor(255 * fmin(source->look->color[i], 1) + .5) / 255;
+        set_color(byte, color, out);
+        break;
+    default:
+        break;
+    }
 }
 
 nebel_result nb_vertex_fog_find(const nb_vertex_source *source, size_t count, const nebel_vertices *vertices,
                                 float (*out)[4])
 {
-    const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out, 0};
     if (source->cells != NULL) return fog_by_cells(source, count, vertices, out);
-    if (source->factor != NULL) {
-        fog_by_factor(source, count, vertices, out);
+    if (is_by_place(source)) {
+        fog_by_place(source, count, vertices, out);
         return NEBEL_OK;
     }
-    if (source->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) return fog_by_parallel_rays(source, count, vertices, out);
-    return nebel_fog_vertices(source->fog, NULL, count, vertices, &output, 1);
+    const int parallel = source->projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    const nebel_result result =
+        parallel ? trace_parallel(source, count, vertices, out) : trace(source, count, vertices, out);
+    for (size_t v = 0; v < count && result == NEBEL_OK; v++) unpack(source, out[v]);
+    return result;
 }
+
+/* ---- attributes ------------------------------------------------------------------------------ */
 
 /* Positions are where OpenGL has them, and nowhere else. */
 static nebel_result fill(const nb_meshes *meshes, const nb_mesh *mesh, const nb_vertex_source *source)

@@ -1,19 +1,112 @@
-/* The section "classic": the numbers of the fog factors. */
+/* The section "classic": what the methods of old hardware need. */
 #include "scene/scene_internal.h"
 
-const char *const nb_coordinate_names[2] = {"plane", "radial"};
-const char *const nb_stage_names[2] = {"vertex", "pixel"};
+#include <math.h>
 
-static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int *choice)
+const char *const nb_coordinate_names[NEBEL_COORDINATE_COUNT] = {"plane", "radial", "user"};
+const char *const nb_stage_names[NEBEL_STAGE_COUNT] = {"vertex", "pixel"};
+const char *const nb_curve_names[NEBEL_CURVE_TABLE] = {"physical", "linear", "exp", "exp2"};
+const char *const nb_d3d9_mode_names[4] = {"none", "exp", "exp2", "linear"};
+
+static bool read_choice(nb_json *json, const nb_json_node *node, const char *const *names, int count, int *choice)
 {
-    if (node != NULL) *choice = nb_value_choice(json, node, names, 2);
+    if (node != NULL) *choice = nb_value_choice(json, node, names, count);
     return *choice >= 0;
 }
 
-/* Absent numbers are those of a new OpenGL context, in metres whatever the file's unit. */
+/* ---- response curves ------------------------------------------------------------------------- */
+
+/* Weights at even distances become all entries, by lines between them. */
+static float find_entry(const double *weights, size_t count, size_t entry)
+{
+    const double at = (double)(entry * (count - 1)) / (NEBEL_CURVE_ENTRIES - 1);
+    const size_t first = (size_t)at < count - 1 ? (size_t)at : count - 2;
+    const double part = at - (double)first;
+    return (float)((1 - part) * weights[first] + part * weights[first + 1]);
+}
+
+static bool read_table(nb_scene_reader *in, const nb_json_node *node)
+{
+    nb_json *json = in->json;
+    double weights[NEBEL_CURVE_ENTRIES];
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of 2 to 256 numbers")) return false;
+    if (node->count < 2 || node->count > NEBEL_CURVE_ENTRIES)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "has %u weights; 2 to %d are possible",
+                            (unsigned)node->count, NEBEL_CURVE_ENTRIES);
+    if (!nb_value_numbers(json, node, &nb_range_fraction, node->count, weights)) return false;
+    float *table = nb_arena_allocate(&in->scene->arena, NEBEL_CURVE_ENTRIES, sizeof *table);
+    if (table == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    for (size_t i = 0; i < NEBEL_CURVE_ENTRIES; i++) table[i] = find_entry(weights, node->count, i);
+    in->scene->data.classic_table = table;
+    in->scene->data.classic_curve = NEBEL_CURVE_TABLE;
+    return true;
+}
+
+static bool read_curve(nb_scene_reader *in, const nb_json_node *curve, const nb_json_node *table)
+{
+    int chosen = NEBEL_CURVE_PHYSICAL;
+    if (!read_choice(in->json, curve, nb_curve_names, NEBEL_CURVE_TABLE, &chosen)) return false;
+    if (curve != NULL && table != NULL)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, table, "there is a \"curve\", too; leave one of them out");
+    in->scene->data.classic_curve = (nebel_curve_type)chosen;
+    return read_table(in, table);
+}
+
+/* ---- Direct3D 9 ------------------------------------------------------------------------------ */
+
+static uint32_t pack_color(const double color[3])
+{
+    uint32_t packed = 0;
+    for (int c = 0; c < 3; c++) packed = packed << 8 | (uint32_t)floor(255 * color[c] + .5);
+    return packed;
+}
+
+/* Absent numbers are those of a new device, in metres whatever the file's unit. */
+static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
+{
+    enum { VERTEX_MODE, TABLE_MODE, START, END, DENSITY, COLOR, RANGE, COUNT };
+    static const char *const d3d9_names[] = {"fog_vertex_mode", "fog_table_mode", "fog_start",       "fog_end",
+                                             "fog_density",     "fog_color",      "range_fog_enable"};
+    static const nb_keys keys = {d3d9_names, COUNT, NB_BIT(COUNT) - 1, 0, "\"d3d9\""};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    const double unit = in->space.unit;
+    int vertex_mode = NEBEL_D3DFOG_NONE, table_mode = NEBEL_D3DFOG_NONE;
+    double start = 0, end = 1 / unit, density = unit, color[3] = {0, 0, 0};
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {\"fog_vertex_mode\": ...}") ||
+        !nb_value_members(json, node, &keys, found) ||
+        !read_choice(json, found[VERTEX_MODE], nb_d3d9_mode_names, 4, &vertex_mode) ||
+        !read_choice(json, found[TABLE_MODE], nb_d3d9_mode_names, 4, &table_mode) ||
+        !nb_value_number(json, found[START], &nb_range_place, &start) ||
+        !nb_value_number(json, found[END], &nb_range_place, &end) ||
+        !nb_value_number(json, found[DENSITY], &nb_range_density, &density) ||
+        !nb_value_color(json, found[COLOR], &nb_range_fraction, color) ||
+        (found[RANGE] != NULL && !nb_value_is(json, found[RANGE], NB_JSON_BOOLEAN, "true or false")))
+        return false;
+    nebel_d3d9_fog *d3d9 = nb_arena_allocate(&in->scene->arena, 1, sizeof *d3d9);
+    if (d3d9 == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    *d3d9 = (nebel_d3d9_fog){.fog_enable = 1,
+                             .fog_color = pack_color(color),
+                             .fog_table_mode = (uint32_t)table_mode,
+                             .fog_vertex_mode = (uint32_t)vertex_mode,
+                             .fog_start = (float)(start * unit),
+                             .fog_end = (float)(end * unit),
+                             .fog_density = (float)(density / unit),
+                             .range_fog_enable = found[RANGE] != NULL && found[RANGE]->number != 0};
+    in->scene->data.classic_d3d9 = d3d9;
+    return true;
+}
+
+/* ---- fog factors ----------------------------------------------------------------------------- */
+
+/* Absent numbers are those of a new OpenGL context, in metres whatever the file's unit. A program's own coordinates have
+ * no unit. */
 static void convert(const nb_space *space, const nb_json_node *end, const nb_json_node *density,
                     nebel_factor_desc *factor)
 {
+    if (factor->coordinate == NEBEL_COORDINATE_USER) return;
     factor->start *= space->unit;
     if (end != NULL) factor->end *= space->unit;
     if (density != NULL) factor->density /= space->unit;
@@ -21,8 +114,9 @@ static void convert(const nb_space *space, const nb_json_node *end, const nb_jso
 
 bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
 {
-    enum { START, END, DENSITY, COLOR, COORDINATE, STAGE, COUNT };
-    static const char *const section_names[] = {"start", "end", "density", "color", "coordinate", "stage"};
+    enum { START, END, DENSITY, COLOR, COORDINATE, STAGE, CURVE, TABLE, D3D9, COUNT };
+    static const char *const section_names[] = {"start", "end",   "density", "color", "coordinate",
+                                                "stage", "curve", "table",   "d3d9"};
     static const nb_keys keys = {section_names, COUNT, NB_BIT(COUNT) - 1, 0, "the section \"classic\""};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -36,12 +130,13 @@ bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node)
         !nb_value_number(json, found[END], &nb_range_place, &factor->end) ||
         !nb_value_number(json, found[DENSITY], &nb_range_density, &factor->density) ||
         !nb_value_color(json, found[COLOR], &nb_range_light, factor->color) ||
-        !read_choice(json, found[COORDINATE], nb_coordinate_names, &coordinate) ||
-        !read_choice(json, found[STAGE], nb_stage_names, &stage))
+        !read_choice(json, found[COORDINATE], nb_coordinate_names, NEBEL_COORDINATE_COUNT, &coordinate) ||
+        !read_choice(json, found[STAGE], nb_stage_names, NEBEL_STAGE_COUNT, &stage) ||
+        !read_curve(in, found[CURVE], found[TABLE]) || !read_d3d9(in, found[D3D9]))
         return false;
-    convert(&in->space, found[END], found[DENSITY], factor);
     factor->coordinate = (nebel_factor_coordinate)coordinate;
     factor->stage = (nebel_factor_stage)stage;
+    convert(&in->space, found[END], found[DENSITY], factor);
     in->scene->data.classic = factor;
     return true;
 }

@@ -77,6 +77,10 @@ bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node
 bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
 
+/* The section "classic", in the file or not yet. */
+void nb_save_classic(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
+void nb_save_add_classic(nb_save *save, const nb_space *space);
+
 /* The camera, in the file or not. */
 void nb_save_camera(nb_save *save, const nb_scene_reader *in);
 

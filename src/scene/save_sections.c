@@ -1,4 +1,4 @@
-/* Changed light, classic fog and models, back into the file that the scene came from. */
+/* Changed light and models, back into the file that the scene came from. */
 #include "scene/save.h"
 
 #include <math.h>
@@ -34,65 +34,6 @@ static void add_sun(nb_save *save, const nb_space *space)
     nb_edit_write_numbers(3, save->changed->sun_irradiance, NB_EDIT_AMOUNT, irradiance);
     snprintf(words, sizeof words, "{ \"direction\": %s, \"irradiance\": %s }", direction, irradiance);
     nb_edit_add(&save->edit, &save->root, "sun", words);
-}
-
-/* ---- classic fog ----------------------------------------------------------------------------- */
-
-#define FACTOR_PLACE(member, count, style)                                                                             \
-    {                                                                                                                  \
-#member, offsetof(nebel_factor_desc, member), count, style                                                     \
-    }
-
-static const nb_place factor_places[] = {
-    FACTOR_PLACE(start, 1, NB_EDIT_EACH),   FACTOR_PLACE(end, 1, NB_EDIT_EACH), FACTOR_PLACE(density, 1, NB_EDIT_EACH),
-    FACTOR_PLACE(color, 3, NB_EDIT_AMOUNT), {NULL, 0, 0, NB_EDIT_EACH},
-};
-
-static nebel_factor_desc restore_factor(const nb_space *space, const nebel_factor_desc *factor)
-{
-    nebel_factor_desc own = *factor;
-    own.start /= space->unit;
-    own.end /= space->unit;
-    own.density *= space->unit;
-    return own;
-}
-
-static void write_factor(const nebel_factor_desc *own, char *words, size_t size)
-{
-    size_t used = (size_t)snprintf(words, size, "{ ");
-    for (size_t i = 0; factor_places[i].key != NULL; i++) {
-        char numbers[NB_EDIT_NUMBERS];
-        nb_edit_write_numbers(factor_places[i].count, nb_place_numbers(own, &factor_places[i]), factor_places[i].style,
-                              numbers);
-        used += (size_t)snprintf(words + used, size - used, "\"%s\": %s, ", factor_places[i].key, numbers);
-    }
-    snprintf(words + used, size - used, "\"coordinate\": \"%s\", \"stage\": \"%s\" }",
-             nb_coordinate_names[own->coordinate], nb_stage_names[own->stage]);
-}
-
-static void save_factor(nb_save *save, const nb_scene_reader *in, const nb_json_node *node)
-{
-    const nebel_factor_desc was = restore_factor(&in->space, save->before->classic);
-    const nebel_factor_desc now = restore_factor(&in->space, save->changed->classic);
-    const nb_edit_object factor = nb_edit_find(in->json, node);
-    char words[8 * NB_EDIT_NUMBERS];
-    if (factor.last_end == 0) {
-        write_factor(&now, words, sizeof words);
-        nb_edit_replace(&save->edit, node, words);
-        return;
-    }
-    nb_save_places(save, in->json, &factor, factor_places, NB_ALL_PLACES, &was, &now);
-    if (was.coordinate != now.coordinate)
-        nb_edit_word(&save->edit, in->json, &factor, "coordinate", nb_coordinate_names[now.coordinate]);
-    if (was.stage != now.stage) nb_edit_word(&save->edit, in->json, &factor, "stage", nb_stage_names[now.stage]);
-}
-
-static void add_factor(nb_save *save, const nb_space *space)
-{
-    const nebel_factor_desc own = restore_factor(space, save->changed->classic);
-    char words[8 * NB_EDIT_NUMBERS];
-    write_factor(&own, words, sizeof words);
-    nb_edit_add(&save->edit, &save->root, "classic", words);
 }
 
 /* ---- models ---------------------------------------------------------------------------------- */
@@ -179,7 +120,7 @@ static void save_section(nb_save *save, const nb_scene_reader *in, const nb_json
         save_sun(save, in, node);
         break;
     case CLASSIC:
-        save_factor(save, in, node);
+        nb_save_classic(save, in, node);
         break;
     case FOG:
         nb_save_entries(save, in, node);
@@ -216,7 +157,7 @@ static void add_section(nb_save *save, const nb_scene_reader *in, int section)
     else if (section == SUN && save->changed->has_sun)
         add_sun(save, &in->space);
     else if (section == CLASSIC && save->changed->classic != NULL)
-        add_factor(save, &in->space);
+        nb_save_add_classic(save, &in->space);
 }
 
 static bool check_counts(const nb_scene_reader *in, const nebel_scene_data *before, const nb_json_node *root)

@@ -134,7 +134,10 @@ bool nb_read_try(nb_scene_reader *in, const nb_json_node *node, const char *subj
 void nb_read_keep_message(nebel_result result, const char *message, void *user);
 
 /* Words of the file, in the order of their enumerations. */
-extern const char *const nb_projection_names[3], *const nb_coordinate_names[2], *const nb_stage_names[2];
+extern const char *const nb_projection_names[3], *const nb_coordinate_names[NEBEL_COORDINATE_COUNT],
+                                                     *const nb_stage_names[NEBEL_STAGE_COUNT],
+                                                         *const nb_curve_names[NEBEL_CURVE_TABLE],
+                                                             *const nb_d3d9_mode_names[4];
 
 /* What an entry says that says nothing. */
 nebel_volume_entry nb_volume_entry_default(void);

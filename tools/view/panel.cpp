@@ -85,7 +85,7 @@ bool is_offered(const nb_panel *panel, nebel_method method)
     case NEBEL_METHOD_EXP2:
         return panel->now->has_classic != 0;
     default:
-        return method != NEBEL_METHOD_FIVE_TAP;
+        return method == NEBEL_METHOD_EXACT || method == NEBEL_METHOD_VERTEX || method == NEBEL_METHOD_ADDITIVE;
     }
 }
 

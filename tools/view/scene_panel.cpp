@@ -130,15 +130,15 @@ bool draw_model_header(nb_panel *panel, size_t index, double reach, bool *goes)
 
 bool draw_factor(nebel_factor_desc *factor, double reach)
 {
-    static const char *const coordinates[] = {"depth", "distance"}, *const stages[] = {"vertex", "pixel"};
+    static const char *const coordinates[] = {"depth", "distance", "amount"}, *const stages[] = {"vertex", "pixel"};
     int coordinate = factor->coordinate, stage = factor->stage;
     bool changed = drag("start", &factor->start, 1, reach / 10, -DBL_MAX, "%.4g m", "Linear: where fog begins.");
     changed |= drag("end", &factor->end, 1, reach / 10, -DBL_MAX, "%.4g m", "Linear: where nothing but fog is seen.");
     changed |= slide("density", &factor->density, 1e-4, 10, "%.4g / m", true, "Exp and exp2: how thick the fog is.");
     changed |= pick("colour", factor->color, false, "Of opaque fog.");
-    changed |= choose("coordinate", &coordinate, coordinates, 2,
-                      "What counts as far: the depth along the camera's axis, which changes when the camera turns, or "
-                      "the distance to the camera.");
+    changed |= choose("coordinate", &coordinate, coordinates, 3,
+                      "What counts as far: the depth along the camera's axis, which changes when the camera turns, the "
+                      "distance to the camera, or the amount of the scene's fog at vertices, 0 to 100.");
     changed |= choose("stage", &stage, stages, 2, "Computed at each vertex and linear in between, or at each pixel.");
     factor->coordinate = nebel_factor_coordinate(coordinate);
     factor->stage = nebel_factor_stage(stage);

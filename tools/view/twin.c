@@ -117,7 +117,7 @@ static nebel_result set_method(work *w)
     const nebel_cell_stage stage = wish->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
     const nebel_result result = nebel_set_renderer_cells(w->renderer, wish->cells, stage);
     if (result != NEBEL_OK || wish->cells != NULL) return result;
-    return nebel_set_renderer_method(w->renderer, wish->method, &wish->factor);
+    return nebel_set_renderer_method(w->renderer, wish->method, &(nebel_method_desc){.factor = &wish->factor});
 }
 
 static nebel_result prepare(work *w)
