@@ -4,9 +4,15 @@ all of them are there."""
 
 import pathlib
 import re
+import sys
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+sys.dont_write_bytecode = True
+
+import draw_classic  # noqa: E402
+
 TECHNIQUES = [f"A{i}" for i in (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)] + [f"C{i}" for i in range(1, 5)] + [f"D{i}" for i in range(1, 6)]
 
 
@@ -51,12 +57,30 @@ class ClassicPage(unittest.TestCase):
             for file in files:
                 self.assertTrue(any((ROOT / "tests" / folder / file).exists() for folder in (".", "d3d9")), f"{name}: {file}")
 
+    def test_one_command_draws_the_pictures(self):
+        page = set(re.findall(r"pictures/([\w.-]+)", (ROOT / "docs/classic.md").read_text(encoding="utf-8")))
+        self.assertEqual(page - set(draw_classic.names()) - set(draw_classic.ELSEWHERE), set())
+        self.assertEqual(set(draw_classic.names()) - page, set())
+        for scene, *_ in draw_classic.DRAWN.values():
+            self.assertTrue((ROOT / f"examples/scenes/{scene}.json").exists(), scene)
+
+    def test_methods_stand_beside_the_exact_one(self):
+        """A picture of a method has a line of a table with the exact picture, and one with its difference."""
+        lines = (ROOT / "docs/classic.md").read_text(encoding="utf-8").splitlines()
+        differing = {picture: exact for picture, exact, _ in draw_classic.DIFFERENCES.values()}
+        for name, (scene, size, *options) in draw_classic.DRAWN.items():
+            if "--method" not in options:
+                continue
+            beside = [line for line in lines if f"]({'pictures/' + name}.png) " in line and line.startswith("| ![")]
+            self.assertTrue(any("exact" in line and "-difference.png" in line for line in beside), name)
+            self.assertIn(name, differing)
+
     def test_pictures_are_there(self):
         for name, (_, _, picture) in self.rows.items():
             files = re.findall(r"\]\((pictures/[\w.-]+)\)", picture)
             self.assertTrue(files, name)
             for file in files:
-                self.assertGreater((ROOT / "docs" / file).stat().st_size, 1000, f"{name}: {file}")
+                self.assertGreater((ROOT / "docs" / file).stat().st_size, 500, f"{name}: {file}")
 
 
 if __name__ == "__main__":

@@ -624,8 +624,11 @@ static int is_known_density(const nb_volume *body)
            (leaf->type == NB_LEAF_PLANES && leaf->face_count <= MOST_SOFT_PLANES);
 }
 
-static nebel_result refuse_edge(const nebel_log *log, const nb_volume *body)
+static nebel_result refuse_density(const nebel_log *log, const nb_volume *body)
 {
+    if (body->density.type == NEBEL_DENSITY_GRID)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "tessellation: nothing is proven of a grid; give the volume another density");
     const nb_leaf_type type = body->leaves[0].type;
     const char *const name = type == NB_LEAF_TUBE      ? "cylinder"
                              : type == NB_LEAF_CONE    ? "cone"
@@ -648,7 +651,7 @@ static nebel_result add_body(nb_fog_bound *bound, const nebel_snapshot *snapshot
 {
     mixture m = {.body_count = 0};
     nebel_result result = NEBEL_OK;
-    if (!is_known_density(body)) return refuse_edge(&snapshot->log, body);
+    if (!is_known_density(body)) return refuse_density(&snapshot->log, body);
     if (!mix(&m, body, bound->eye)) return refuse_parts(&snapshot->log);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *const other = &snapshot->media[i].body;

@@ -10,7 +10,7 @@
 typedef struct nb_fog_bound nb_fog_bound;
 
 /* What nb_bound_fog wants to know of the fog of a channel as seen from an eye. The snapshot must outlive it.
- * UNSUPPORTED, after a message: soft edges of a cylinder, a cone, a capsule or a body of more than 32 planes; a body
+ * UNSUPPORTED, after a message: grids; soft edges of a cylinder, a cone, a capsule or a body of more than 32 planes; a body
  * that is, with those that take its fog away, of more than 8 leaves. */
 nebel_result nb_make_fog_bound(const nebel_allocator *allocator, const nebel_snapshot *snapshot, const double eye[3],
                                int channel, nb_fog_bound **bound);
