@@ -48,7 +48,7 @@ nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
     nebel_install_library(nebel_scene scene.h)
     nebel_write_pkgconfig(nebel_scene "Scene files, models and pictures for nebel" nebel
-        "assimp libpng libjpeg yajl OpenEXR" "-lm")
+        "assimp libpng libjpeg yajl zlib blosc OpenEXR" "-lm")
 endif()
 if(TARGET nebel_cpu)
     nebel_install_library(nebel_cpu render.h)

@@ -8,10 +8,10 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_cells", "read_classic", "read_density", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
+READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_cells", "read_classic", "read_density", "read_grid", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
 TABLE = re.compile(r"^ *(?:static )?const char \*const (?:\w+_)?(?:names|types)\[\w*\] = \{(.*?)\}", re.S | re.M)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
-REFUSED = {"grid", "noise"}  # known to the reader only to be refused
+REFUSED = {"noise"}  # known to the reader only to be refused
 
 BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}}]}',

@@ -493,6 +493,36 @@ static void distances_are_found(void **test)
     nebel_release_snapshot(fog);
 }
 
+/* Extinction at places is that of the truth, and no more than the bound of a ray that starts there. */
+static void places_are_sampled_and_bounded(void **test)
+{
+    (void)test;
+    for (uint64_t seed = 0; seed < 40; seed++) {
+        uint64_t state = seed;
+        block b;
+        fill_block(&state, &b, seed % 2 == 0 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        const nebel_volume_desc v = volume_of(&b, .5, 1);
+        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+        nebel_release_grid(b.grid);
+        for (int i = 0; i < 30; i++) {
+            long double at[3];
+            nebel_place place = {.distance = -1};
+            nebel_ray ray = random_ray(&state);
+            nebel_matter matter;
+            nebel_bound bound;
+            for (int c = 0; c < 3; c++) {
+                ray.origin[c] = place.position[c] = dice(&state, b.low[c], b.high[c]);
+                at[c] = (long double)place.position[c];
+            }
+            assert_int_equal(nebel_sample_fog(fog, 1, &place, sizeof place, &matter, sizeof matter), NEBEL_OK);
+            assert_near(matter.extinction[1], .5 * (double)density_of_block(&b, at), 1e-12);
+            assert_int_equal(nebel_bound_fog(fog, &ray, 0, 0, &bound), NEBEL_OK);
+            assert_true(matter.extinction[1] <= bound.extinction[1]);
+        }
+        nebel_release_snapshot(fog);
+    }
+}
+
 typedef struct bad_grid {
     nebel_grid_desc desc;
     nebel_result result;
@@ -624,6 +654,7 @@ int main(void)
         cmocka_unit_test(equal_voxels_are_constant_density),
         cmocka_unit_test(types_agree),
         cmocka_unit_test(distances_are_found),
+        cmocka_unit_test(places_are_sampled_and_bounded),
         cmocka_unit_test(bad_grids_are_refused),
         cmocka_unit_test(volumes_need_a_box_and_a_grid),
         cmocka_unit_test(memory_may_run_out),

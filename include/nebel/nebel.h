@@ -203,12 +203,16 @@ typedef struct nebel_grid_desc {
     double scale;       /* density = offset + scale * voxel, 0 to 1e9 for every voxel; scale 0: 1 */
     double offset;
     nebel_filter filter;
+    const char *name; /* what it is called; NULL: nothing; copied. Means nothing to nebel but in nebel/scene.h */
 } nebel_grid_desc;
 
 /* Makes a grid in *grid, with one owner; on an error *grid is NULL. The allocator must be usable as long as the grid
  * lives. Memory: the voxels and 16 bytes for each block of 8 x 8 x 8. Cost: linear in the voxels. Any thread.
  * Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
 nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
+
+/* The grid's name, "" where it has none; lives as long as the grid. Any thread. */
+const char *nebel_grid_name(const nebel_grid *grid);
 
 /* One more owner of the grid; any thread. Returns its argument. */
 nebel_grid *nebel_retain_grid(nebel_grid *grid);

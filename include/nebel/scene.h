@@ -267,6 +267,31 @@ nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, c
  * does not change. Thread safe. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc);
 
+/* ---- grids ----------------------------------------------------------------------------------- */
+
+/* Voxels in files. Which kind a file is says its name: .nvdb NanoVDB, .png one picture for each slice, anything else
+ * numbers one after the other. */
+typedef struct nebel_grid_file {
+    const char *file; /* PNG: with a run of # in its name, in whose place the number of a slice stands, from 0, as wide
+                         as the run */
+    nebel_filter filter;
+    const char *grid;      /* NanoVDB: the name of the grid among those in the file; NULL: the first */
+    size_t slices;         /* PNG: how many, 1 to NEBEL_MAX_GRID_SIZE; slice k is the k-th layer along z */
+    size_t size[3];        /* numbers: voxels along x, y and z; x fastest, least significant byte first */
+    nebel_voxel_type type; /* numbers */
+    const char *name;      /* nebel_grid_name of the grid; NULL: none */
+} nebel_grid_file;
+
+/* Reads a grid; release it with nebel_release_grid. On an error *grid is NULL.
+ *
+ * NanoVDB: grids of version 32 of float, double, Fp4, Fp8, Fp16 and FpN, without compression, by zip or by Blosc; the
+ * box of all active voxels with its inactive ones, of value as stored (the file's own transform is left out). Level
+ * sets are refused. PNG: grey, 8 or 16 bits, 0 to 1 as stored, the top row at the largest y.
+ *
+ * Any thread. Errors: ARGUMENT, FILE, FORMAT (among them a file that is cut off, or damaged where it shows), VALUE
+ * (NaN, infinite or negative voxels), LIMIT, UNSUPPORTED, MEMORY. */
+nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc *desc, nebel_grid **grid);
+
 /* What this build of libnebel_scene has: "Assimp 5.2.5, libpng 1.6.39, OpenEXR 3.1.5, yajl 2.1.0". Never NULL. */
 const char *nebel_scene_libraries(void);
 

@@ -28,6 +28,7 @@ struct nebel_grid {
     size_t bytes;
     void *voxels;
     brick *brick;
+    char *name;
 };
 
 /* In line into one loop for each type of voxels. */
@@ -232,12 +233,17 @@ static void free_grid(nebel_grid *grid)
     const nebel_allocator allocator = grid->allocator;
     nb_release(&allocator, grid->voxels);
     nb_release(&allocator, grid->brick);
+    nb_release(&allocator, grid->name);
     nb_release(&allocator, grid);
 }
 
 static nebel_result fill_grid(const nebel_grid_desc *desc, nebel_grid *grid, size_t count)
 {
-    if (!allocate_grid(grid, count)) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "grid: out of memory");
+    const char *name = desc->name != NULL ? desc->name : "";
+    grid->name = nb_allocate(&grid->allocator, strlen(name) + 1, 1);
+    if (grid->name == NULL || !allocate_grid(grid, count))
+        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "grid: out of memory");
+    memcpy(grid->name, name, strlen(name) + 1);
     memcpy(grid->voxels, desc->voxels, grid->bytes);
     const nebel_result result = check_voxels(&desc->log, grid, count);
     if (result != NEBEL_OK) return result;
@@ -270,6 +276,11 @@ nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid)
     else
         *grid = made;
     return result;
+}
+
+const char *nebel_grid_name(const nebel_grid *grid)
+{
+    return grid->name;
 }
 
 nebel_grid *nebel_retain_grid(nebel_grid *grid)

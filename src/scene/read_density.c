@@ -19,13 +19,14 @@ enum { TYPE_COUNT = sizeof type_names / sizeof *type_names };
     }
 
 /* In the order of nebel_density_type. */
-static const nb_keys density_keys[NEBEL_DENSITY_GRID] = {
+static const nb_keys density_keys[NEBEL_DENSITY_COUNT] = {
     DENSITY_KEYS(0, 0, "a constant density"),
     DENSITY_KEYS(NB_BIT(SCALE_HEIGHT), NB_BIT(BASE) | NB_BIT(BELOW), "a height density"),
     DENSITY_KEYS(NB_BIT(FROM) | NB_BIT(TO), 0, "a linear density"),
     DENSITY_KEYS(0, NB_BIT(POWER), "a radial density"),
     DENSITY_KEYS(NB_BIT(CENTER) | NB_BIT(SIGMA), 0, "a gaussian density"),
     DENSITY_KEYS(NB_BIT(DISTANCE), 0, "a soft edge"),
+    DENSITY_KEYS(0, 0, "a grid"),
 };
 
 static bool fail_shape(nb_json *json, const nb_json_node *node, const char *wanted)
@@ -36,13 +37,14 @@ static bool fail_shape(nb_json *json, const nb_json_node *node, const char *want
 
 static bool check_type(nb_json *json, const nb_json_node *node, int type, nebel_shape_type shape)
 {
-    if (type >= NEBEL_DENSITY_GRID)
+    if (type >= NEBEL_DENSITY_COUNT)
         return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node,
                             "this version has no \"%s\" densities; use one of the others", type_names[type]);
     if (type == NEBEL_DENSITY_RADIAL && shape != NEBEL_SHAPE_SPHERE && shape != NEBEL_SHAPE_ELLIPSOID)
         return fail_shape(json, node, "a sphere or an ellipsoid");
     if (type == NEBEL_DENSITY_SOFT_EDGE && (shape == NEBEL_SHAPE_WORLD || shape >= NEBEL_SHAPE_UNION))
         return fail_shape(json, node, "a shape with a surface that is no union or intersection");
+    if (type == NEBEL_DENSITY_GRID && shape != NEBEL_SHAPE_BOX) return fail_shape(json, node, "a box");
     return true;
 }
 
@@ -111,9 +113,9 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
     if (node == NULL) return true;
     if (in->node != NULL && node->type == NB_JSON_STRING) return read_named(json, node, shape, density);
     const int type = nb_value_type(json, node, type_names, TYPE_COUNT);
-    if (type < 0 || !check_type(json, find_type(json, node), type, shape) ||
-        !nb_value_members(json, node, &density_keys[type], found))
-        return false;
+    if (type < 0 || !check_type(json, find_type(json, node), type, shape)) return false;
+    if (type == NEBEL_DENSITY_GRID) return nb_read_grid(in, node, density);
+    if (!nb_value_members(json, node, &density_keys[type], found)) return false;
     *density = (nebel_density){.type = (nebel_density_type)type, .power = type == NEBEL_DENSITY_RADIAL ? 1 : 0};
     return read_members(json, found, density);
 }

@@ -25,7 +25,7 @@ static const char *describe_place(nb_scene_reader *in, const nb_json_node *node)
     return tail != NULL ? nb_path_join(&in->scene->arena, in->json->desc.name, tail) : NULL;
 }
 
-static bool keep_file(nebel_scene *scene, const char *file)
+bool nb_scene_keep_file(nebel_scene *scene, const char *file)
 {
     void *files = (void *)scene->files;
     const size_t count = scene->data.file_count;
@@ -45,7 +45,7 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_so
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; must be the path of a file");
     model->file = nb_path_join(arena, in->scene->folder, file);
     model->where = describe_place(in, node);
-    if (model->file != NULL && model->where != NULL && keep_file(in->scene, model->file)) return true;
+    if (model->file != NULL && model->where != NULL && nb_scene_keep_file(in->scene, model->file)) return true;
     return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
 }
 

@@ -128,6 +128,11 @@ static void put_shape(writer *out, const nebel_shape *shape)
 static void put_density(writer *out, const nebel_density *density)
 {
     if (density->type == NEBEL_DENSITY_CONSTANT) return;
+    if (density->type == NEBEL_DENSITY_GRID) { /* its name is what the file said of it */
+        put_key(out, "density");
+        put(out, nebel_grid_name(density->grid)[0] != '\0' ? nebel_grid_name(density->grid) : "{ \"file\": \"\" }");
+        return;
+    }
     open_object(out, "density");
     put_text(out, "type", nb_density_names[density->type]);
     put_places(out, nb_density_places, nb_density_masks[density->type], density, NULL);

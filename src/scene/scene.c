@@ -375,5 +375,7 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, scene->models);
     nb_release(&allocator, scene->placements);
     nb_release(&allocator, (void *)scene->files);
+    for (size_t i = 0; i < scene->grid_count; i++) nebel_release_grid(scene->grids[i]);
+    nb_release(&allocator, (void *)scene->grids);
     nb_release(&allocator, scene);
 }

@@ -51,6 +51,9 @@ struct nebel_scene {
     const char **files;
     size_t file_capacity;
 
+    nebel_grid **grids;
+    size_t grid_count, grid_capacity;
+
     nb_model_source *models;
     nebel_model *placements; /* of the models, in the words of the public face */
     size_t model_count, model_capacity, placement_capacity;
@@ -119,6 +122,11 @@ bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_sha
 
 /* Takes a volume from its node's coordinates to the world's. */
 bool nb_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume);
+/* Adds to the files that the scene names; false when memory is out. */
+bool nb_scene_keep_file(nebel_scene *scene, const char *file);
+
+/* The voxels of a density of the type "grid". */
+bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
 bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_type shape, nebel_density *density);
 
 /* The numbers that a key of fog gives anew. Numbers it leaves out stay, as do type, planes and parts. */

@@ -106,6 +106,7 @@ static int add(nb_edition *edition, const nebel_volume_desc *volume, const nebel
         free(own_name);
         return -1;
     }
+    nebel_retain_grid(own.density.grid);
     edition->volumes[edition->count] = own;
     edition->entries[edition->count] = own_keys;
     edition->names[edition->count] = own_name;
@@ -132,6 +133,7 @@ void nb_edition_remove(nb_edition *edition, size_t index)
 {
     const size_t behind = --edition->count - index;
     nb_shape_free(&edition->volumes[index].shape);
+    nebel_release_grid(edition->volumes[index].density.grid);
     free_entry(&edition->entries[index]);
     free(edition->names[index]);
     memmove(edition->volumes + index, edition->volumes + index + 1, behind * sizeof *edition->volumes);
@@ -147,6 +149,7 @@ void nb_edition_remove(nb_edition *edition, size_t index)
 static int own_nebula(nebel_nebula_desc *nebula)
 {
     const double(*const given)[3] = nebula->colors;
+    nebel_retain_grid(nebula->density.grid);
     nebula->colors = NULL;
     if (nebula->color_count > 0) nebula->colors = copy_array(given, nebula->color_count, sizeof *given);
     const int has_failed = nebula->color_count > 0 && nebula->colors == NULL;
@@ -253,11 +256,13 @@ void nb_edition_free(nb_edition *edition)
 {
     for (size_t i = 0; i < edition->count; i++) {
         nb_shape_free(&edition->volumes[i].shape);
+        nebel_release_grid(edition->volumes[i].density.grid);
         free_entry(&edition->entries[i]);
         free(edition->names[i]);
     }
     for (size_t i = 0; i < edition->nebula_count; i++) {
         nb_shape_free(&edition->nebulae[i].shape);
+        nebel_release_grid(edition->nebulae[i].density.grid);
         free((void *)edition->nebulae[i].colors);
     }
     for (size_t i = 0; i < edition->cells_desc.cell_count; i++) nb_shape_free(&edition->cells[i].shape);

@@ -1,0 +1,103 @@
+/* A density whose voxels are in files, which are read at once. */
+#include "scene/model.h"
+#include "scene/path.h"
+#include "scene/voxels.h"
+
+#include <string.h>
+
+enum { TYPE, FILE_KEY, FILTER, GRID, SLICES, SIZE, VOXELS, GRID_KEY_COUNT };
+
+static const char *const key_names[] = {"type", "file", "filter", "grid", "slices", "size", "voxels"};
+static const char *const filter_names[] = {"linear", "nearest"};
+static const char *const voxel_names[] = {"float", "uint8", "uint16"};
+
+#define ANY_FILE (NB_BIT(TYPE) | NB_BIT(FILE_KEY) | NB_BIT(FILTER))
+
+/* In the order of nb_voxel_file. */
+static const nb_keys grid_keys[] = {
+    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SIZE) | NB_BIT(VOXELS),
+     NB_BIT(FILE_KEY) | NB_BIT(SIZE) | NB_BIT(VOXELS), "a grid of numbers"},
+    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID), NB_BIT(FILE_KEY), "a grid of NanoVDB"},
+    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SLICES), NB_BIT(FILE_KEY) | NB_BIT(SLICES), "a grid of pictures"}};
+
+static nb_voxel_file kind_of(const nb_json *json, const nb_json_node *object)
+{
+    for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node))
+        if (nb_json_has_key(node, "file") && node->type == NB_JSON_STRING)
+            return nb_voxel_file_kind(node->string, node->string_size);
+    return NB_VOXELS_NUMBERS;
+}
+
+static bool read_choices(nb_json *json, const nb_json_node *const *found, nebel_grid_file *file)
+{
+    int filter = 0, type = 0;
+    if (found[FILTER] != NULL) filter = nb_value_choice(json, found[FILTER], filter_names, 2);
+    if (found[VOXELS] != NULL) type = nb_value_choice(json, found[VOXELS], voxel_names, 3);
+    file->filter = (nebel_filter)filter;
+    file->type = (nebel_voxel_type)type;
+    return filter >= 0 && type >= 0;
+}
+
+static bool read_size(nb_json *json, const nb_json_node *node, size_t size[3])
+{
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of three numbers of voxels")) return false;
+    if (node->count != 3)
+        return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "holds %u numbers; must be an array of three",
+                            (unsigned)node->count);
+    int i = 0;
+    for (const nb_json_node *at = nb_json_first(json, node); at != NULL; at = nb_json_next(json, at), i++) {
+        int count = 0;
+        if (!nb_value_integer(json, at, 1, NEBEL_MAX_GRID_SIZE, &count)) return false;
+        size[i] = (size_t)count;
+    }
+    return true;
+}
+
+static bool read_file(nb_scene_reader *in, const nb_json_node *const *found, nebel_grid_file *file)
+{
+    nb_arena *arena = &in->scene->arena;
+    const char *path = "";
+    int slices = 0;
+    if (!nb_value_text(in->json, found[FILE_KEY], arena, &path) ||
+        (found[GRID] != NULL && !nb_value_text(in->json, found[GRID], arena, &file->grid)) ||
+        !nb_value_integer(in->json, found[SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
+        !read_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
+        return false;
+    if (path[0] == '\0')
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[FILE_KEY], "is empty; must be the path of a file");
+    file->slices = (size_t)slices;
+    file->file = nb_path_join(arena, in->scene->folder, path);
+    return file->file != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, found[FILE_KEY], "out of memory");
+}
+
+/* The scene is one of its owners. */
+static bool keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid)
+{
+    nebel_scene *scene = in->scene;
+    void *grids = (void *)scene->grids;
+    const size_t count = scene->grid_count;
+    const bool room = nb_grow(&scene->allocator, &grids, sizeof grid, count, &scene->grid_capacity, count + 1);
+    scene->grids = grids;
+    if (room) scene->grids[scene->grid_count++] = grid;
+    if (!room) nebel_release_grid(grid);
+    return room || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+}
+
+bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
+{
+    const nb_json_node *found[GRID_KEY_COUNT];
+    nb_json *json = in->json;
+    nebel_grid_file file = {.filter = NEBEL_FILTER_LINEAR};
+    nb_note note = {""};
+    const nebel_scene_desc desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)};
+    if (!nb_value_members(json, node, &grid_keys[kind_of(json, node)], found) || !read_file(in, found, &file))
+        return false;
+    file.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);
+    if (file.name == NULL || !nb_scene_keep_file(in->scene, file.file))
+        return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
+    const nebel_result result = nebel_load_grid(&file, &desc, &density->grid);
+    if (result != NEBEL_OK) return nb_json_fail(json, result, found[FILE_KEY], "%s", note.text);
+    return keep_grid(in, node, density->grid);
+}

@@ -1,0 +1,26 @@
+/* Voxels on their way from a file to the core. */
+#ifndef NB_SCENE_VOXELS_H
+#define NB_SCENE_VOXELS_H
+
+#include "scene/codec.h"
+
+/* As nebel_grid_desc takes them. */
+typedef struct nb_voxels {
+    size_t size[3];
+    nebel_voxel_type type;
+    void *data; /* free with nb_release */
+} nb_voxels;
+
+/* Which kind of file has a name. */
+typedef enum nb_voxel_file { NB_VOXELS_NUMBERS, NB_VOXELS_NANOVDB, NB_VOXELS_SLICES } nb_voxel_file;
+
+nb_voxel_file nb_voxel_file_kind(const char *path, size_t size);
+
+/* Checks the limits and asks for memory, cleared. Errors: LIMIT, MEMORY. */
+nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels);
+
+/* The grid named `name`, NULL: the first, of a NanoVDB file. On an error voxels->data is NULL. Errors: FORMAT, LIMIT,
+ * UNSUPPORTED, MEMORY. */
+nebel_result nb_nanovdb_read(const nb_codec *codec, const nb_bytes *bytes, const char *name, nb_voxels *voxels);
+
+#endif
