@@ -530,7 +530,8 @@ static void test_good_scenes(void **state)
     (void)state;
     static const char *const names[] = {
         "examples/scenes/cells-grouped",   "examples/scenes/cells-portals", "examples/scenes/cells-printed",
-        "examples/scenes/cells-seam",      "examples/scenes/clearing",      "examples/scenes/forty-volumes",
+        "examples/scenes/cells-seam",      "examples/scenes/clearing",      "examples/scenes/curve-table",
+        "examples/scenes/device-depth",    "examples/scenes/device-range",  "examples/scenes/forty-volumes",
         "examples/scenes/glowing-sphere",  "examples/scenes/ground-fog",    "examples/scenes/linear-plane",
         "examples/scenes/linear-radial",   "examples/scenes/morning-mist",  "examples/scenes/nebula",
         "examples/scenes/soft-edges",      "examples/scenes/vertex-coarse", "examples/scenes/vertex-sphere",
