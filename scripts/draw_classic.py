@@ -37,6 +37,7 @@ DRAWN = {
     "exp2-radial": ("linear-radial", SMALL, "--method", "exp2"),
     "curve-exact": ("curve-table", SMALL),
     "curve-table": ("curve-table", SMALL, "--method", "fog-coord"),
+    "device-exact": ("device-range", SMALL),
     "device-depth": ("device-depth", SMALL, "--method", "d3d9"),
     "device-range": ("device-range", SMALL, "--method", "d3d9"),
     "coarse-exact": ("vertex-coarse", SMALL),
@@ -65,7 +66,8 @@ DIFFERENCES = {
     "exp-radial-difference": ("exp-radial", "linear-exact-0", 255),
     "exp2-radial-difference": ("exp2-radial", "linear-exact-0", 4),
     "curve-table-difference": ("curve-table", "curve-exact", 4),
-    "device-range-difference": ("device-range", "device-depth", 4),
+    "device-depth-difference": ("device-depth", "device-exact", 4),
+    "device-range-difference": ("device-range", "device-exact", 4),
     **{f"{name}-difference": (name, f"{name.rsplit('-', 1)[0]}-exact", 4)
        for name in ("coarse-vertex", "fog-sphere-vertex", "fog-sphere-tessellated", "ground-fog-vertex")},
     "coarse-tessellated-difference": ("coarse-tessellated", "coarse-exact", 128),
