@@ -96,7 +96,7 @@ class CallingTest(Case):
 
     def test_every_option_of_the_contract_is_on_the_help_page(self):
         contract = {
-            "render": "output size device method tolerance samples exposure threads isa frames frame aov quiet",
+            "render": "output size device method tolerance samples exposure threads isa frames frame aov bounces seed quiet",
             "trace": "precision isa tolerance threads", "compare": "output amplify channel fail-above", "info": ""}
         for command, names in contract.items():
             page = nebel(command, "--help").out
@@ -444,6 +444,19 @@ class RenderTest(PictureCase):
         self.assert_done(self.render("a.exr"))
         self.assertIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "b.exr").out)
 
+    def test_the_reference_tells_its_standard_error(self):
+        paths = ("--method", "reference", "--samples", "8")
+        done = self.render("a.exr", *paths, "--aov")
+        self.assert_done(done)
+        self.assertRegex(done.err, r"note: standard error [\d.e-]+ of a pixel, [\d.e-]+ of the mean of all")
+        picture = (self.folder / "a.exr").read_bytes()
+        self.assertIn(b"standard_error.G\0", picture)
+        self.assertNotIn(b"\0error\0", picture)
+        self.assert_done(self.render("b.exr", *paths, "--aov", "--threads", "1", "--seed", "0"))
+        self.assertEqual((self.folder / "b.exr").read_bytes(), picture)
+        self.assertNotIn("note", self.render("c.exr", *paths, "--seed", "1", "--bounces", "1", "--quiet").err)
+        self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "c.exr").out)
+
     def test_fog_in_cells(self):
         self.assert_failed(self.render("a.exr", "--method", "cells"), "scene.json", 'no section "cells"')
         room = {"shape": {"type": "box", "min": [-9, -9, 1], "max": [9, 9, 4]}, "density": 0.1, "color": 0.5}
@@ -559,7 +572,9 @@ class RenderTest(PictureCase):
         for samples in ("0", "4097", "2.5", "-1"):
             self.assert_misused(self.render("a.png", "--samples", samples), "--samples")
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
-        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9")
+        self.assert_misused(self.render("a.png", "--bounces", "2"), "--bounces", "--method reference")
+        self.assert_misused(self.render("a.png", "--method", "reference", "--bounces", "0"), "--bounces", "1 to 10000")
+        self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9, reference")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")
         self.assertEqual(self.files(), self.given)

@@ -266,13 +266,16 @@ static void scatterers_are_chosen_by_what_they_scatter(void **state)
     double sums[3] = {0}, often[2] = {0};
     for (int i = 0; i < CHANCES; i++) {
         nebel_scatterer one;
-        assert_int_equal(nebel_choose_scatterer(snapshot, &place, (i + .5) / CHANCES, &one), NEBEL_OK);
+        assert_int_equal(nebel_choose_scatterer(snapshot, &place, -1, (i + .5) / CHANCES, &one), NEBEL_OK);
         const int is_second = one.phase.type == NEBEL_PHASE_HENYEY_GREENSTEIN;
         assert_true(is_second ? one.phase.g == .5 : one.phase.type == NEBEL_PHASE_RAYLEIGH);
         assert_true(fabs(one.scattering[1] - (is_second ? 1.2 * exp(-1) : 1)) < 1e-12);
         often[is_second] += 1.0 / CHANCES;
         for (int c = 0; c < 3; c++) sums[c] += one.scattering[c] / one.probability / CHANCES;
     }
+    nebel_scatterer blue;
+    assert_int_equal(nebel_choose_scatterer(snapshot, &place, 2, 0, &blue), NEBEL_OK);
+    assert_true(is_near(blue.scattering[2] / blue.probability, matter.scattering[2]));
     const double second = 3.6 * exp(-1);
     assert_true(fabs(often[1] - second / (second + 3)) < 1e-3);
     for (int c = 0; c < 3; c++) assert_true(is_near(sums[c], matter.scattering[c]));
@@ -286,7 +289,7 @@ static void where_nothing_scatters_nothing_is_chosen(void **state)
     const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .source = {1, 1, 1}};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &volume, 1);
     nebel_scatterer none;
-    assert_int_equal(nebel_choose_scatterer(snapshot, &(nebel_place){{0, 0, 0}, 0}, 0.5, &none), NEBEL_OK);
+    assert_int_equal(nebel_choose_scatterer(snapshot, &(nebel_place){{0, 0, 0}, 0}, -1, 0.5, &none), NEBEL_OK);
     assert_true(none.probability == 0);
     nebel_release_snapshot(snapshot);
 }
@@ -318,18 +321,20 @@ static void bad_calls_are_refused(void **state)
     size_t refused = 0;
     for (int i = 0; i < 3; i++) {
         refused += nebel_sample_fog(snapshot, 1, &bad[i], sizeof *bad, &matter, sizeof matter) == NEBEL_ERROR_ARGUMENT;
-        refused += nebel_choose_scatterer(snapshot, &bad[i], 0, &one) == NEBEL_ERROR_ARGUMENT;
+        refused += nebel_choose_scatterer(snapshot, &bad[i], -1, 0, &one) == NEBEL_ERROR_ARGUMENT;
     }
     refused += nebel_sample_fog(snapshot, 1, NULL, 0, &matter, 0) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_sample_fog(snapshot, 1, &good, 0, NULL, 0) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, 1, &one) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, (double)NAN, &one) == NEBEL_ERROR_ARGUMENT;
-    refused += nebel_choose_scatterer(snapshot, &good, 0, NULL) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_choose_scatterer(snapshot, &good, -1, 1, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_choose_scatterer(snapshot, &good, -1, (double)NAN, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_choose_scatterer(snapshot, &good, -1, 0, NULL) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_choose_scatterer(snapshot, &good, 3, 0, &one) == NEBEL_ERROR_ARGUMENT;
+    refused += nebel_choose_scatterer(snapshot, &good, -2, 0, &one) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &ray, 0, -1, &bound) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &ray, 0, HUGE_VAL, &bound) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &still, 0, 0, &bound) == NEBEL_ERROR_ARGUMENT;
     refused += nebel_bound_fog(snapshot, &ray, 0, 0, NULL) == NEBEL_ERROR_ARGUMENT;
-    assert_int_equal(refused, 15);
+    assert_int_equal(refused, 17);
     assert_int_equal(messages.count, refused);
     assert_int_equal(nebel_sample_fog(NULL, 0, NULL, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_sample_fog(snapshot, 0, NULL, 0, NULL, 0), NEBEL_OK);

@@ -6,10 +6,12 @@
 #include "finer.h"
 #include "interrupt.h"
 #include "isa.h"
+#include "layers.h"
 #include "load.h"
 #include "meter.h"
 #include "pattern.h"
 #include "report.h"
+#include "spread.h"
 #include "target.h"
 #include "workers.h"
 
@@ -43,6 +45,8 @@ enum {
     DEVICE,
     ISA,
     THREADS,
+    BOUNCES,
+    SEED,
     QUIET
 };
 
@@ -58,7 +62,7 @@ static const nb_option options[] = {
                 "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %)."},
     [AOV] = {"aov", 0, NULL,
              "EXR only: adds transmittance.{R,G,B},\nin_scattering.{R,G,B}, depth.Z (m, inf: nothing\n"
-             "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound)."},
+             "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound) or, of reference, standard_error.{R,G,B}."},
     [TOLERANCE] = {"tolerance", 0, "E",
                    "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
                    "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
@@ -67,7 +71,8 @@ static const nb_option options[] = {
          "exact (default); on surfaces alone: vertex: the\nfog at vertices; additive: the same, but it only\nadds; "
          "linear, exp, exp2: the factors of section\n\"classic\"; fog-coord, two-pass, alpha: the fog at\nvertices as "
          "OpenGL 1.x takes it; d3d9: the states\nin \"classic\"; cells, cells-pixel: section \"cells\"\nat vertices or "
-         "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths."},
+         "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths; reference,\nof the CPU: paths of "
+         "light, by chance and without\nbias, slow."},
     [TESSELLATE] = {"tessellate", 0, "E",
                     "With --method vertex or additive: smaller triangles,\nuntil the fog's factor is within E of the "
                     "exact one\nfor the camera, 1e-6 < E <= 1."},
@@ -82,6 +87,11 @@ static const nb_option options[] = {
     [ISA] = {"isa", 0, "NAME",
              "Instruction set: scalar, sse2, avx2, avx512 or neon.\nDefault: the best of this processor."},
     [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},
+    [BOUNCES] = {"bounces", 0, "N",
+                 "With --method reference: how often light is\nscattered or reflected at most, 1 to 10000. 1 is what\n"
+                 "exact shows. Default: as often as it happens."},
+    [SEED] = {"seed", 0, "N",
+              "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
     [QUIET] = {"quiet", 'q', NULL, "No progress bar and no summary; errors are still\nreported."},
 };
 
@@ -114,6 +124,7 @@ typedef struct settings {
     const char *scene, *output;
     nebel_image_format format;
     uint32_t width, height, samples;
+    uint32_t bounces, seed; /* of the reference; 0 bounces: no limit */
     double exposure, tolerance;
     nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
     uint32_t first_frame, last_frame;
@@ -219,6 +230,18 @@ static void read_tessellate(nb_arguments *arguments, settings *wanted)
         nb_options_refuse(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
 }
 
+static void read_reference(nb_arguments *arguments, settings *wanted)
+{
+    static const int of_reference[] = {BOUNCES, SEED};
+    wanted->bounces = nb_options_whole(arguments, BOUNCES, 1, 10000, 0);
+    wanted->seed = nb_options_whole(arguments, SEED, 0, UINT32_MAX, 0);
+    for (size_t i = 0; i < sizeof of_reference / sizeof *of_reference; i++)
+        if (arguments->values[of_reference[i]] != NULL && wanted->method != NEBEL_METHOD_REFERENCE)
+            nb_options_refuse(arguments, of_reference[i], "needs --method reference; say so, or leave it out");
+    if (wanted->method == NEBEL_METHOD_REFERENCE && wanted->gl)
+        nb_options_reject(arguments, METHOD, "is for --device cpu; leave out --device gl");
+}
+
 static void read_device(nb_arguments *arguments, settings *wanted)
 {
     static const char *const devices[] = {"cpu", "gl", NULL};
@@ -254,6 +277,7 @@ static int read_settings(nb_arguments *arguments, settings *wanted)
     read_frames(arguments, wanted);
     read_output(arguments, wanted);
     read_device(arguments, wanted);
+    read_reference(arguments, wanted);
     read_tessellate(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
     return -1;
@@ -282,25 +306,6 @@ static int check_targets(const settings *wanted)
 
 /* ---- the pictures ---------------------------------------------------------------------------- */
 
-/* The planes of a frame in the order of an EXR's channels. */
-typedef struct plane {
-    const char *names[3];
-    uint32_t channels;
-} plane;
-
-enum { COLOR, TRANSMITTANCE, IN_SCATTERING, DEPTH, NORMAL, ERROR, PLANES };
-
-static const plane planes[PLANES] = {
-    [COLOR] = {{"R", "G", "B"}, 3},
-    [TRANSMITTANCE] = {{"transmittance.R", "transmittance.G", "transmittance.B"}, 3},
-    [IN_SCATTERING] = {{"in_scattering.R", "in_scattering.G", "in_scattering.B"}, 3},
-    [DEPTH] = {{"depth.Z"}, 1},
-    [NORMAL] = {{"normal.X", "normal.Y", "normal.Z"}, 3},
-    [ERROR] = {{"error"}, 1},
-};
-
-enum { CHANNELS_AOV = 14 };
-
 /* What lives as long as all frames. */
 typedef struct studio {
     const settings *wanted;
@@ -312,8 +317,8 @@ typedef struct studio {
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter painter; /* of OpenGL */
 #endif
-    float *samples[PLANES]; /* NULL: not wanted */
-    float *interleaved;     /* all planes pixel by pixel; NULL where there is only one */
+    float *samples[NB_LAYER_COUNT]; /* NULL: not wanted */
+    float *interleaved;             /* all planes pixel by pixel; NULL where there is only one */
     nb_meter meter;
     uint32_t frame;
 } studio;
@@ -325,28 +330,32 @@ static float *allocate_pixels(const settings *wanted, uint32_t channels)
     return malloc((size_t)wanted->width * wanted->height * channels * sizeof(float));
 }
 
-/* Neither OpenGL nor classic fog knows a bound of its error. */
-static int has_error(const settings *wanted)
+static int writes_plane(const settings *wanted, int which)
 {
-    return !wanted->gl && wanted->method == NEBEL_METHOD_EXACT;
+    return which == NB_LAYER_COLOR || (wanted->aov && nb_layer_is_known((nb_layer)which, wanted->gl, wanted->method));
 }
 
-static int count_planes(const settings *wanted)
+static uint32_t count_channels(const settings *wanted)
 {
-    if (!wanted->aov) return 1;
-    return has_error(wanted) ? PLANES : ERROR;
+    uint32_t count = 0;
+    for (int i = 0; i < NB_LAYER_COUNT; i++) count += writes_plane(wanted, i) ? nb_layer_kinds[i].channels : 0;
+    return count;
 }
 
+/* The standard error is told whether it is written or not. */
 static int allocate_planes(studio *all)
 {
-    const int count = count_planes(all->wanted);
+    const settings *const wanted = all->wanted;
     int good = 1;
-    for (int i = 0; i < count && good; i++) {
-        all->samples[i] = allocate_pixels(all->wanted, planes[i].channels);
+    for (int i = 0; i < NB_LAYER_COUNT && good; i++) {
+        if (!writes_plane(wanted, i) &&
+            (i != NB_LAYER_STANDARD_ERROR || !nb_layer_is_known((nb_layer)i, wanted->gl, wanted->method)))
+            continue;
+        all->samples[i] = allocate_pixels(wanted, nb_layer_kinds[i].channels);
         good = all->samples[i] != NULL;
     }
-    if (good && count > 1) {
-        all->interleaved = allocate_pixels(all->wanted, CHANNELS_AOV);
+    if (good && wanted->aov) {
+        all->interleaved = allocate_pixels(wanted, count_channels(wanted));
         good = all->interleaved != NULL;
     }
     if (good) return NB_DONE;
@@ -356,7 +365,7 @@ static int allocate_planes(studio *all)
 
 static void free_studio(studio *all)
 {
-    for (int i = 0; i < PLANES; i++) free(all->samples[i]);
+    for (int i = 0; i < NB_LAYER_COUNT; i++) free(all->samples[i]);
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
     nebel_destroy_cells(all->cells);
@@ -367,28 +376,21 @@ static void free_studio(studio *all)
     nb_load_free(&all->loaded);
 }
 
-/* Puts the plane's channels into every pixel of so many channels, from channel `first` on. */
-static void interleave(const studio *all, int which, uint32_t first, uint32_t of)
-{
-    const size_t pixels = (size_t)all->wanted->width * all->wanted->height;
-    const uint32_t channels = planes[which].channels;
-    for (size_t i = 0; i < pixels; i++) {
-        memcpy(all->interleaved + i * of + first, all->samples[which] + i * channels, channels * sizeof(float));
-    }
-}
-
 static int write_picture(studio *all, const char *name)
 {
     const settings *const wanted = all->wanted;
     const size_t pixels = (size_t)wanted->width * wanted->height;
-    const char *names[CHANNELS_AOV];
+    const char *names[NB_LAYERS_MOST_CHANNELS];
     nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
-    const uint32_t of = has_error(wanted) ? CHANNELS_AOV : CHANNELS_AOV - 1;
-    for (int i = 0; i < PLANES && all->samples[i] != NULL; i++) {
-        if (all->interleaved != NULL) interleave(all, i, image.channel_count, of);
-        for (uint32_t c = 0; c < planes[i].channels; c++) names[image.channel_count++] = planes[i].names[c];
+    const uint32_t of = count_channels(wanted);
+    for (int i = 0; i < NB_LAYER_COUNT; i++) {
+        if (!writes_plane(wanted, i)) continue;
+        if (all->interleaved != NULL)
+            nb_layer_interleave((nb_layer)i, all->samples[i], pixels, image.channel_count, of, all->interleaved);
+        for (uint32_t c = 0; c < nb_layer_kinds[i].channels; c++)
+            names[image.channel_count++] = nb_layer_kinds[i].names[c];
     }
-    image.samples = all->interleaved != NULL ? all->interleaved : all->samples[COLOR];
+    image.samples = all->interleaved != NULL ? all->interleaved : all->samples[NB_LAYER_COLOR];
     if (wanted->format == NEBEL_IMAGE_PNG) nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
     const nebel_scene_desc desc = {.log = nb_report_log(&all->listener)};
     nb_interrupt_hold();
@@ -421,14 +423,17 @@ static nebel_result trace_frame(studio *all)
         .tolerance = wanted->tolerance,
         .progress = show_progress,
         .progress_user = all,
+        .bounces = wanted->bounces,
+        .seed = wanted->seed,
     };
     const nebel_frame frame = {
-        .color = all->samples[COLOR],
-        .transmittance = all->samples[TRANSMITTANCE],
-        .in_scattering = all->samples[IN_SCATTERING],
-        .depth = all->samples[DEPTH],
-        .normal = all->samples[NORMAL],
-        .error = all->samples[ERROR],
+        .color = all->samples[NB_LAYER_COLOR],
+        .transmittance = all->samples[NB_LAYER_TRANSMITTANCE],
+        .in_scattering = all->samples[NB_LAYER_IN_SCATTERING],
+        .depth = all->samples[NB_LAYER_DEPTH],
+        .normal = all->samples[NB_LAYER_NORMAL],
+        .error = all->samples[NB_LAYER_ERROR],
+        .standard_error = all->samples[NB_LAYER_STANDARD_ERROR],
     };
     const nebel_result result = nebel_set_renderer_fog(all->renderer, all->loaded.fog);
     return result == NEBEL_OK ? nebel_render_frame(all->renderer, &desc, &frame) : result;
@@ -481,11 +486,11 @@ static nebel_result draw_frame(studio *all)
         .d3d9 = scene->classic_d3d9,
     };
     const nebel_gl_planes wanted = {
-        .color = all->samples[COLOR],
-        .transmittance = all->samples[TRANSMITTANCE],
-        .in_scattering = all->samples[IN_SCATTERING],
-        .depth = all->samples[DEPTH],
-        .normal = all->samples[NORMAL],
+        .color = all->samples[NB_LAYER_COLOR],
+        .transmittance = all->samples[NB_LAYER_TRANSMITTANCE],
+        .in_scattering = all->samples[NB_LAYER_IN_SCATTERING],
+        .depth = all->samples[NB_LAYER_DEPTH],
+        .normal = all->samples[NB_LAYER_NORMAL],
     };
     return nb_gl_painter_draw(&all->painter, all->frame, &desc, &wanted);
 }
@@ -527,6 +532,14 @@ static int render_frame(studio *all)
                              all->listener.kept[0] != '\0' ? all->listener.kept : nebel_result_text(result));
 }
 
+static void note_spread(const studio *all)
+{
+    const settings *const wanted = all->wanted;
+    const size_t pixels = (size_t)wanted->width * wanted->height;
+    if (all->samples[NB_LAYER_STANDARD_ERROR] != NULL && !wanted->quiet)
+        nb_spread_report(all->samples[NB_LAYER_STANDARD_ERROR], 3 * pixels, wanted->samples);
+}
+
 static int move_fog(studio *all)
 {
     const nebel_result result = nb_load_move_fog(&all->loaded, all->frame);
@@ -542,6 +555,7 @@ static int make_picture(studio *all)
     char *const name = name_picture(all->wanted, all->frame);
     status = name != NULL ? write_picture(all, name) : NB_FAILED;
     free(name);
+    if (status == NB_DONE) note_spread(all);
     return status;
 }
 

@@ -592,11 +592,12 @@ typedef struct nebel_scatterer {
     double probability;   /* of its choice, 0 to 1; 0: nothing scatters there, and the rest means nothing */
 } nebel_scatterer;
 
-/* Chooses a volume by a random number, 0 <= chance < 1, the more often the more it scatters (in all channels together),
- * so that the mean over all chances of phase value * scattering / probability is what all volumes scatter. Any thread.
- * Errors: ARGUMENT, as nebel_sample_fog; a chance out of range. */
-nebel_result nebel_choose_scatterer(const nebel_snapshot *snapshot, const nebel_place *place, double chance,
-                                    nebel_scatterer *scatterer);
+/* Chooses a volume by a random number, 0 <= chance < 1, the more often the more it scatters of `channel` (0 red, 1 green,
+ * 2 blue; -1: of all together), so that the mean over all chances of phase value * scattering / probability is what all
+ * volumes scatter of that channel, or of each. Any thread. Errors: ARGUMENT, as nebel_sample_fog; a chance or a channel
+ * out of range. */
+nebel_result nebel_choose_scatterer(const nebel_snapshot *snapshot, const nebel_place *place, int channel,
+                                    double chance, nebel_scatterer *scatterer);
 
 /* A piece of a ray on which fog is bounded. */
 typedef struct nebel_bound {

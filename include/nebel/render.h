@@ -69,6 +69,8 @@ typedef enum nebel_method {
     NEBEL_METHOD_TWO_PASS, /* the light that it adds and its amount: as VERTEX, but with a response curve or a colour */
     NEBEL_METHOD_ALPHA,    /* a byte of alpha over polygons in one colour, of bytes, too */
     NEBEL_METHOD_D3D9,     /* the fog states of a Direct3D 9 device */
+    NEBEL_METHOD_REFERENCE, /* paths of light, by chance and without bias: docs/reference.md. Fog and surfaces are lit by
+                               each other too; slow */
     NEBEL_METHOD_COUNT
 } nebel_method;
 
@@ -105,6 +107,9 @@ typedef struct nebel_frame_desc {
     double tolerance;       /* as in nebel_trace_desc */
     nebel_progress_fn progress;
     void *progress_user;
+    /* Of REFERENCE: how often light is scattered or reflected at most. 1 is what EXACT shows; 0: until paths end by
+     * themselves, at most 10000 times. Other seeds give independent pictures. */
+    uint32_t bounces, seed;
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not
@@ -116,6 +121,9 @@ typedef struct nebel_frame {
     float *depth;         /* 1: distance from the camera [m], mean over the samples that hit; INFINITY where none did */
     float *normal;        /* 3: mean of the world-space shading normals; 0 where nothing is hit */
     float *error;         /* 1: largest error bound of the samples */
+    /* 3: of color, with REFERENCE and 2 samples or more. What differs within a pixel counts as chance, though samples
+     * are spread evenly there. Other methods leave it as it is. */
+    float *standard_error;
 } nebel_frame;
 
 /* Renders. Uses OpenMP with the renderer's number of threads. One frame at a time per renderer.

@@ -231,6 +231,7 @@ nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint3
 {
     set_inside(frame, place, scratch->inside);
     find_hits(frame, place, sample, scratch);
+    if (frame->renderer->method == NEBEL_METHOD_REFERENCE) return nb_reference_trace(frame, place, scratch);
     nebel_result result = trace_camera_fog(frame, scratch);
     if (result == NEBEL_OK && meets_surface(&scratch->hits)) result = light_surfaces(frame, scratch);
     if (result == NEBEL_OK) set_colors(&frame->lighting, scratch);

@@ -7,8 +7,8 @@
 /* What the threads of a frame share. */
 typedef struct nb_state {
     const nebel_frame_desc *desc;
-    size_t total, done;  /* regions */
-    size_t step;         /* regions between two calls of progress */
+    size_t total, done;  /* parts: a few samples of a region */
+    size_t step;         /* parts between two calls of progress */
     int stop;            /* a thread failed or the caller had enough */
     nebel_result result; /* of the first that failed */
 } nb_state;
@@ -74,7 +74,8 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     result = nb_classic_fog_set_vertices(frame);
     if (result != NEBEL_OK)
         return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
-    return set_shafts(frame);
+    result = nb_reference_set(frame, desc);
+    return result == NEBEL_OK ? set_shafts(frame) : result;
 }
 
 /* ---- regions --------------------------------------------------------------------------------- */
@@ -82,10 +83,12 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
 static nebel_result render_batch(const nb_frame *frame, const nb_place *place, uint32_t first, uint32_t count,
                                  nb_scratch *scratch)
 {
+    nb_place now = *place;
     for (uint32_t s = 0; s < count; s++) {
-        const nebel_result result = nb_batch_render(frame, place, s, scratch);
+        now.sample = first + s;
+        const nebel_result result = nb_batch_render(frame, &now, s, scratch);
         if (result != NEBEL_OK) return result;
-        nb_planes_add(frame, place, first + s == 0, scratch);
+        nb_planes_add(frame, &now, now.sample == 0, scratch);
     }
     return NEBEL_OK;
 }
@@ -100,7 +103,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
     if (frame->rasters) {
         nb_raster_region(&frame->raster, left, top, count, scratch->points_of_region, scratch->seen);
     }
-    nb_place place = {left, top, 0};
+    nb_place place = {left, top, 0, 0};
     for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
         const nebel_result result = render_batch(frame, &place, first, count, scratch);
         if (result != NEBEL_OK) return result;
@@ -108,24 +111,8 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
     return NEBEL_OK;
 }
 
-static nebel_result render_region(const nb_frame *frame, size_t number, nb_scratch *scratch)
-{
-    const uint32_t columns = (frame->width + NB_REGION - 1) / NB_REGION;
-    const uint32_t left = (uint32_t)(number % columns) * NB_REGION, top = (uint32_t)(number / columns) * NB_REGION;
-    for (uint32_t first = 0; first < frame->samples; first += NB_TOGETHER) {
-        const uint32_t count = frame->samples - first < NB_TOGETHER ? frame->samples - first : NB_TOGETHER;
-        const nebel_result result = render_samples(frame, left, top, first, count, scratch);
-        if (result != NEBEL_OK) return result;
-    }
-    nb_place place = {left, top, 0};
-    for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
-        nb_planes_finish(frame, &place, scratch);
-    }
-    return NEBEL_OK;
-}
-
 /* One thread at a time. */
-static void count_region(nb_state *state, nebel_result result)
+static void add_part(nb_state *state, nebel_result result)
 {
     state->done++;
     if (result == NEBEL_OK && state->result == NEBEL_OK && state->desc->progress != NULL &&
@@ -139,17 +126,47 @@ static void count_region(nb_state *state, nebel_result result)
     state->stop = 1;
 }
 
-static void render_regions(const nb_frame *frame, nb_state *state)
+/* Returns whether that was the last one to be done. */
+static int count_part(nb_state *state, nebel_result result)
+{
+    int stop;
+#pragma omp critical(nb_count_part)
+    add_part(state, result);
+#pragma omp atomic read
+    stop = state->stop;
+    return stop;
+}
+
+static uint32_t count_groups(const nb_frame *frame)
+{
+    return (frame->samples + NB_TOGETHER - 1) / NB_TOGETHER;
+}
+
+static void render_region(const nb_frame *frame, size_t number, nb_state *state, nb_scratch *scratch)
+{
+    const uint32_t columns = (frame->width + NB_REGION - 1) / NB_REGION;
+    const uint32_t left = (uint32_t)(number % columns) * NB_REGION, top = (uint32_t)(number / columns) * NB_REGION;
+    for (uint32_t first = 0; first < frame->samples; first += NB_TOGETHER) {
+        const uint32_t count = frame->samples - first < NB_TOGETHER ? frame->samples - first : NB_TOGETHER;
+        const nebel_result result = render_samples(frame, left, top, first, count, scratch);
+        if (count_part(state, result)) return;
+    }
+    nb_place place = {left, top, 0, 0};
+    for (; place.first < NB_PIXELS && top + nb_lane_y(place.first) < frame->height; place.first += NB_BATCH) {
+        nb_planes_finish(frame, &place, scratch);
+        if (frame->renderer->method == NEBEL_METHOD_REFERENCE) nb_reference_finish(frame, &place, scratch);
+    }
+}
+
+static void render_regions(const nb_frame *frame, size_t regions, nb_state *state)
 {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(frame->renderer->threads)
-    for (size_t i = 0; i < state->total; i++) {
+    for (size_t i = 0; i < regions; i++) {
         int stop;
 #pragma omp atomic read
         stop = state->stop;
         if (stop) continue;
-        const nebel_result result = render_region(frame, i, &frame->renderer->scratch[omp_get_thread_num()]);
-#pragma omp critical(nb_count_region)
-        count_region(state, result);
+        render_region(frame, i, state, &frame->renderer->scratch[omp_get_thread_num()]);
     }
 }
 
@@ -160,8 +177,9 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
     const nebel_result result = set_frame(&made, desc);
     if (result != NEBEL_OK) return result;
     const size_t columns = (made.width + NB_REGION - 1) / NB_REGION, rows = (made.height + NB_REGION - 1) / NB_REGION;
-    nb_state state = {.desc = desc, .total = columns * rows, .step = (columns * rows + 99) / 100};
-    render_regions(&made, &state);
+    const size_t parts = columns * rows * count_groups(&made);
+    nb_state state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
+    render_regions(&made, columns * rows, &state);
     if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");
     if (state.result != NEBEL_OK) {
         return nb_fail(&renderer->log, state.result, "frame: fog along a ray: %s", nebel_result_text(state.result));

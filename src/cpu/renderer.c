@@ -114,6 +114,7 @@ const char *nebel_method_word(nebel_method method)
         [NEBEL_METHOD_TWO_PASS] = "two-pass",
         [NEBEL_METHOD_ALPHA] = "alpha",
         [NEBEL_METHOD_D3D9] = "d3d9",
+        [NEBEL_METHOD_REFERENCE] = "reference",
     };
     _Static_assert(sizeof words / sizeof *words == NEBEL_METHOD_COUNT, "each method has its word");
     return (unsigned)method < NEBEL_METHOD_COUNT ? words[method] : NULL;
@@ -197,6 +198,7 @@ static nebel_result set_numbers(nebel_renderer *renderer, nebel_method method, c
     case NEBEL_METHOD_D3D9:
         return set_d3d9(renderer, desc->d3d9);
     case NEBEL_METHOD_EXACT:
+    case NEBEL_METHOD_REFERENCE:
     case NEBEL_METHOD_VERTEX:
     case NEBEL_METHOD_ADDITIVE:
         return NEBEL_OK;
@@ -209,7 +211,7 @@ nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method me
 {
     static const nebel_method_desc nothing = {NULL, NULL, NULL};
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (method != NEBEL_METHOD_EXACT) {
+    if (method != NEBEL_METHOD_EXACT && method != NEBEL_METHOD_REFERENCE) {
         const nebel_result result = make_room_at_vertices(renderer);
         if (result != NEBEL_OK) return result;
     }

@@ -4,6 +4,7 @@
 
 #include "geometry.h"
 #include "hits.h"
+#include "path.h"
 #include "raster.h"
 #include "sampling.h"
 #include "shafts.h"
@@ -22,6 +23,11 @@ typedef struct nb_light_samples {
     float color[3][NB_BATCH];
 } nb_light_samples;
 
+/* Of the samples of the pixels of a region, for the reference. */
+typedef struct nb_sums {
+    double light[3][NB_PIXELS], square[3][NB_PIXELS];
+} nb_sums;
+
 /* What a thread works in: allocated once, aligned to 64 bytes. */
 typedef struct nb_scratch {
     nb_packets packets;
@@ -37,6 +43,8 @@ typedef struct nb_scratch {
     float sun_transmittance[3][NB_BATCH]; /* of the way to the sun */
     uint32_t hit_counts[NB_PIXELS];       /* samples of a pixel that met a surface */
     nb_shafts shafts;
+    nb_lone_ray lone; /* of a path behind its first surface */
+    nb_sums sums;
 } nb_scratch;
 
 /* What fog does to a vertex: the light that it adds, and what it hides. */
@@ -77,17 +85,27 @@ typedef struct nb_frame {
     int has_shafts; /* surfaces cast shadows into fog that the sun lights, which is in */
     nb_sunlit_box sunlit_box;
     uint32_t width, height, samples;
+    nb_path_world world; /* of the method REFERENCE */
+    uint32_t seed;
 } nb_frame;
 
 /* A batch of a region. */
 typedef struct nb_place {
     uint32_t left, top; /* first pixel of the region */
     uint32_t first;     /* lane of the region in which the batch begins */
+    uint32_t sample;    /* of its pixels, counted from 0 */
 } nb_place;
 
 /* Renders a sample of a batch into scratch->samples. The members `sample` of scratch->points_of_region and, where the
  * frame is rasterized, of scratch->seen belong to its region. */
 nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch);
+
+/* The reference in nb_batch_render's place: after first hits are found. Errors: VALUE, UNSUPPORTED; UNBOUNDED. */
+nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc);
+nebel_result nb_reference_trace(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
+
+/* Colours in the precision that they were summed in, and the standard errors. */
+void nb_reference_finish(const nb_frame *frame, const nb_place *place, const nb_scratch *scratch);
 
 /* Adds the sample of a batch to the planes: the first sample replaces what is there. */
 void nb_planes_add(const nb_frame *frame, const nb_place *place, int is_first, nb_scratch *scratch);

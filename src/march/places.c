@@ -119,17 +119,17 @@ nebel_result nebel_sample_fog(const nebel_snapshot *snapshot, size_t n, const ne
 
 /* ---- what scatters --------------------------------------------------------------------------- */
 
-/* In all channels together. */
-static double scattering_at(const nb_volume *body, const double position[3], double scattering[3])
+/* Of a channel, or of all together. */
+static double scattering_at(const nb_volume *body, const double position[3], int channel, double scattering[3])
 {
     const double density = nb_density_within(body, position);
     for (int c = 0; c < 3; c++) scattering[c] = density * body->extinction[c] * body->albedo[c];
-    return scattering[0] + scattering[1] + scattering[2];
+    return channel >= 0 ? scattering[channel] : scattering[0] + scattering[1] + scattering[2];
 }
 
 /* Takes the first volume with which the sum exceeds `wanted`; rounding may leave it to the last. Returns the sum. */
-static double choose(const nebel_snapshot *snapshot, const nebel_place *place, int64_t cover, double wanted,
-                     nebel_scatterer *scatterer)
+static double choose(const nebel_snapshot *snapshot, const nebel_place *place, int channel, int64_t cover,
+                     double wanted, nebel_scatterer *scatterer)
 {
     double sum = 0;
     walk w;
@@ -137,7 +137,7 @@ static double choose(const nebel_snapshot *snapshot, const nebel_place *place, i
     for (const nb_medium *medium; (medium = walk_on(&w)) != NULL && sum <= wanted;) {
         double scattering[3];
         if (!medium->body.lit || !shows_at(medium, place, cover)) continue;
-        const double part = scattering_at(&medium->body, place->position, scattering);
+        const double part = scattering_at(&medium->body, place->position, channel, scattering);
         if (!(part > 0)) continue;
         sum += part;
         *scatterer =
@@ -146,21 +146,23 @@ static double choose(const nebel_snapshot *snapshot, const nebel_place *place, i
     return sum;
 }
 
-nebel_result nebel_choose_scatterer(const nebel_snapshot *snapshot, const nebel_place *place, double chance,
-                                    nebel_scatterer *scatterer)
+nebel_result nebel_choose_scatterer(const nebel_snapshot *snapshot, const nebel_place *place, int channel,
+                                    double chance, nebel_scatterer *scatterer)
 {
     if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     if (place == NULL || scatterer == NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "place and scatterer: must not be NULL");
     const char *fault = fault_of_place(place);
     if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "place: %s", fault);
+    if (channel < -1 || channel > 2)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "channel: must be 0, 1, 2 or, for all, -1");
     if (!(chance >= 0 && chance < 1))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "chance: is %g; must be at least 0 and below 1", chance);
     const int64_t cover = find_cover(snapshot, place);
     *scatterer = (nebel_scatterer){.probability = 0};
-    const double all = choose(snapshot, place, cover, HUGE_VAL, scatterer);
+    const double all = choose(snapshot, place, channel, cover, HUGE_VAL, scatterer);
     if (!(all > 0)) return NEBEL_OK;
-    choose(snapshot, place, cover, chance * all, scatterer);
+    choose(snapshot, place, channel, cover, chance * all, scatterer);
     scatterer->probability /= all;
     return NEBEL_OK;
 }

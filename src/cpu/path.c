@@ -1,0 +1,267 @@
+#include "path.h"
+
+#include "base/vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* Paths that carry less are left to roulette. */
+#define SMALL_THROUGHPUT 0.125
+
+/* A path at work. */
+typedef struct path {
+    const nb_path_world *world;
+    nb_lone_ray *lone;
+    nb_chance chance;
+    int channel;
+    nebel_ray ray;
+    int is_first;         /* the ray is the camera's */
+    double throughput[3]; /* what light from here on counts */
+    double radiance[3];
+} path;
+
+/* ---- rays against surfaces ------------------------------------------------------------------- */
+
+void nb_lone_ray_clear(nb_lone_ray *lone)
+{
+    memset(lone, 0, sizeof *lone);
+    for (int i = 0; i < NB_BATCH; i++) lone->hits.surface[i] = NB_NONE;
+}
+
+nb_meeting nb_meeting_of(const nb_hits *hits, const nb_points *points, int i)
+{
+    nb_meeting meeting = {.t = HUGE_VAL};
+    if (hits->surface[i] == NB_NONE) return meeting;
+    meeting.t = (double)hits->t[i];
+    meeting.cosine = points->cosine[i];
+    meeting.lit = points->lit[i] != 0;
+    for (int c = 0; c < 3; c++) {
+        meeting.reflectance[c] = points->reflectance[c][i];
+        meeting.normal[c] = points->normal[c][i];
+        meeting.side[c] = points->side[c][i];
+        meeting.start[c] = points->start[c][i];
+    }
+    return meeting;
+}
+
+static void set_ray(const nb_geometry *geometry, const double origin[3], const double direction[3], struct RTCRay *ray)
+{
+    memset(ray, 0, sizeof *ray);
+    ray->org_x = nb_clamp_coordinate((float)(origin[0] - geometry->origin[0]));
+    ray->org_y = nb_clamp_coordinate((float)(origin[1] - geometry->origin[1]));
+    ray->org_z = nb_clamp_coordinate((float)(origin[2] - geometry->origin[2]));
+    ray->dir_x = (float)direction[0];
+    ray->dir_y = (float)direction[1];
+    ray->dir_z = (float)direction[2];
+    ray->tfar = HUGE_VALF;
+    ray->mask = UINT32_MAX;
+}
+
+static int is_shadowed(const nb_geometry *geometry, const double origin[3], const double direction[3])
+{
+    struct RTCRay ray;
+    struct RTCIntersectContext context;
+    if (geometry->scene == NULL) return 0;
+    rtcInitIntersectContext(&context);
+    set_ray(geometry, origin, direction, &ray);
+    rtcOccluded1(geometry->scene, &context, &ray);
+    return ray.tfar < 0;
+}
+
+static void take_hit(const struct RTCRayHit *found, nb_rays *rays, nb_hits *hits)
+{
+    const struct RTCRay *ray = &found->ray;
+    const float start[3] = {ray->org_x, ray->org_y, ray->org_z}, unit[3] = {ray->dir_x, ray->dir_y, ray->dir_z};
+    const float normal[3] = {found->hit.Ng_x, found->hit.Ng_y, found->hit.Ng_z};
+    for (int k = 0; k < 3; k++) {
+        rays->start[k][0] = start[k];
+        rays->unit[k][0] = unit[k];
+        hits->normal[k][0] = normal[k];
+    }
+    hits->surface[0] = found->hit.geomID;
+    hits->triangle[0] = found->hit.primID;
+    hits->t[0] = ray->tfar;
+    hits->u[0] = found->hit.u;
+    hits->v[0] = found->hit.v;
+}
+
+static nb_meeting find_meeting(path *p)
+{
+    const nb_path_world *world = p->world;
+    nb_lone_ray *lone = p->lone;
+    struct RTCRayHit found;
+    struct RTCIntersectContext context;
+    const float sun[3] = {(float)world->to_sun[0], (float)world->to_sun[1], (float)world->to_sun[2]};
+    if (world->geometry->scene == NULL) return (nb_meeting){.t = HUGE_VAL};
+    rtcInitIntersectContext(&context);
+    set_ray(world->geometry, p->ray.origin, p->ray.direction, &found.ray);
+    found.hit.geomID = found.hit.primID = found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(world->geometry->scene, &context, &found);
+    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return (nb_meeting){.t = HUGE_VAL};
+    take_hit(&found, &lone->rays, &lone->hits);
+    nb_surface_points(world->geometry, world->scene, world->table, &lone->rays, &lone->hits, sun, &lone->points);
+    return nb_meeting_of(&lone->hits, &lone->points, 0);
+}
+
+/* ---- directions ------------------------------------------------------------------------------ */
+
+/* The direction at an angle to the axis, by chance around it. */
+static void turn_about(const double axis[3], double cosine, nb_chance *chance, double direction[3])
+{
+    const double angle = 2 * PI * nb_chance_next(chance), sine = sqrt(fmax(0, 1 - cosine * cosine));
+    double across[3] = {0, 0, 0}, third[3];
+    int least = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(axis[i]) < fabs(axis[least])) least = i;
+    double helper[3] = {0, 0, 0};
+    helper[least] = 1;
+    nb_vector_cross(axis, helper, across);
+    (void)nb_vector_make_unit(across);
+    nb_vector_cross(axis, across, third);
+    for (int i = 0; i < 3; i++)
+        direction[i] = cosine * axis[i] + sine * (cos(angle) * across[i] + sin(angle) * third[i]);
+    (void)nb_vector_make_unit(direction);
+}
+
+/* Lambert: as often as the cosine. What points below the triangle, where shading normals lean, is mirrored up. */
+static void reflect_diffusely(const nb_meeting *at, nb_chance *chance, double direction[3])
+{
+    double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
+    const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
+    (void)nb_vector_make_unit(normal);
+    turn_about(normal, sqrt(1 - nb_chance_next(chance)), chance, direction);
+    const double below = nb_vector_dot(direction, side);
+    for (int i = 0; i < 3 && below < 0; i++) direction[i] -= 2 * below * side[i];
+}
+
+/* ---- light ----------------------------------------------------------------------------------- */
+
+static void add(path *p, const double light[3], double share)
+{
+    for (int c = 0; c < 3; c++) p->radiance[c] += p->throughput[c] * light[c] * share;
+}
+
+/* Sunlight that reaches a place, `share` of which goes on along the path. */
+static nebel_result add_sunlight(path *p, const double origin[3], double share)
+{
+    const nb_path_world *world = p->world;
+    if (!world->has_sun || !(share > 0) || is_shadowed(world->geometry, origin, world->to_sun)) return NEBEL_OK;
+    nb_track way = {.fog = world->fog, .ray.t_max = HUGE_VAL, .ignore_distances = 1, .channel = p->channel};
+    memcpy(way.ray.origin, origin, sizeof way.ray.origin);
+    memcpy(way.ray.direction, world->to_sun, sizeof way.ray.direction);
+    double transmittance = 1;
+    nebel_result result = NEBEL_OK;
+    if (world->fog != NULL) result = nb_track_transmittance(&way, &p->chance, &transmittance);
+    if (result == NEBEL_OK) add(p, world->sun, share * transmittance);
+    return result;
+}
+
+/* Scatters at a collision. The throughput is 0 where the light is absorbed. */
+static nebel_result scatter(path *p, const nb_flight *flight)
+{
+    const nb_path_world *world = p->world;
+    nebel_scatterer scatterer;
+    const double chance = nb_chance_next(&p->chance);
+    const int channel = world->is_grey ? -1 : p->channel;
+    nebel_result result = nebel_choose_scatterer(world->fog, &flight->place, channel, chance, &scatterer);
+    if (result != NEBEL_OK) return result;
+    for (int c = 0; c < 3; c++) {
+        const double scattered = scatterer.probability > 0 ? scatterer.scattering[c] / scatterer.probability : 0;
+        p->throughput[c] *= scattered / flight->matter.extinction[p->channel];
+    }
+    if (scatterer.probability == 0) return NEBEL_OK;
+    const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, world->to_sun), -1), 1);
+    result = add_sunlight(p, flight->place.position, nebel_phase_value(&scatterer.phase, cosine));
+    double direction[3];
+    turn_about(p->ray.direction, nebel_phase_sample(&scatterer.phase, nb_chance_next(&p->chance)), &p->chance,
+               direction);
+    memcpy(p->ray.origin, flight->place.position, sizeof p->ray.origin);
+    memcpy(p->ray.direction, direction, sizeof direction);
+    return result;
+}
+
+static nebel_result reflect(path *p, const nb_meeting *at)
+{
+    const double *origin = p->world->geometry->origin;
+    for (int c = 0; c < 3; c++) {
+        p->throughput[c] *= (double)at->reflectance[c];
+        p->ray.origin[c] = origin[c] + (double)at->start[c];
+    }
+    reflect_diffusely(at, &p->chance, p->ray.direction);
+    return at->lit ? add_sunlight(p, p->ray.origin, (double)at->cosine / PI) : NEBEL_OK;
+}
+
+/* ---- paths ----------------------------------------------------------------------------------- */
+
+/* 0: the path ends, and others carry its light. */
+static int survives(path *p)
+{
+    const double most = fmax(p->throughput[0], fmax(p->throughput[1], p->throughput[2]));
+    if (most >= SMALL_THROUGHPUT) return 1;
+    if (nb_chance_next(&p->chance) * SMALL_THROUGHPUT >= most) return 0;
+    for (int c = 0; c < 3; c++) p->throughput[c] *= SMALL_THROUGHPUT / most;
+    return 1;
+}
+
+/* One ray of the path, to its next bounce. *ended: nothing more comes. */
+static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int *ended)
+{
+    const nb_path_world *world = p->world;
+    const nb_track track = {world->fog, p->ray, !p->is_first, p->channel};
+    nebel_result result = nb_track_fly(&track, &p->chance, flight);
+    if (result != NEBEL_OK) return result;
+    add(p, flight->shone, 1);
+    *ended = !flight->collided && at->t == HUGE_VAL;
+    if (*ended)
+        add(p, p->is_first ? world->background : world->ambient, 1);
+    else
+        result = flight->collided ? scatter(p, flight) : reflect(p, at);
+    p->ray.t_max = HUGE_VAL;
+    return result;
+}
+
+/* Follows the path of one channel, or of all where they are alike. *came_through: no fog stopped its first ray. */
+static nebel_result follow(path *p, const nb_meeting *first, double shone[3], int *came_through)
+{
+    const nb_path_world *world = p->world;
+    nb_meeting at = *first;
+    for (uint32_t bounce = 1;; bounce++) {
+        nb_flight flight;
+        int ended;
+        const nebel_result result = go_on(p, &at, &flight, &ended);
+        if (result != NEBEL_OK) return result;
+        if (bounce == 1) {
+            *came_through = !flight.collided;
+            memcpy(shone, flight.shone, sizeof flight.shone);
+        }
+        p->is_first = 0;
+        if (!ended && bounce == world->bounces) add(p, world->ambient, 1);
+        if (ended || bounce == world->bounces || !survives(p)) return NEBEL_OK;
+        at = find_meeting(p);
+        p->ray.t_max = at.t;
+    }
+}
+
+nebel_result nb_path_trace(const nb_path_world *world, const nebel_ray *eye, const nb_meeting *first,
+                           const uint32_t number[4], nb_lone_ray *lone, nb_path_light *light)
+{
+    const nb_chance stream = nb_chance_of(number[0], number[1], number[2], number[3]);
+    for (int c = 0; c < 3; c++) {
+        path p = {.world = world, .lone = lone, .chance = stream, .channel = c, .ray = *eye, .is_first = 1};
+        for (int k = 0; k < 3; k++) p.throughput[k] = world->is_grey || k == c ? 1 : 0;
+        p.chance.state += (uint64_t)c << 62;
+        double shone[3] = {0, 0, 0};
+        int came_through = 0;
+        const nebel_result result = follow(&p, first, shone, &came_through);
+        if (result != NEBEL_OK) return result;
+        for (int k = c; k < (world->is_grey ? 3 : c + 1); k++) {
+            light->color[k] = p.radiance[k];
+            light->transmittance[k] = came_through;
+            light->in_scattering[k] = came_through ? shone[k] : p.radiance[k];
+        }
+        if (world->is_grey) break;
+    }
+    return NEBEL_OK;
+}

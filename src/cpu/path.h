@@ -1,0 +1,54 @@
+/* Paths of light, back from the camera: the reference renderer. docs/reference.md says what it models. */
+#ifndef NB_CPU_PATH_H
+#define NB_CPU_PATH_H
+
+#include "geometry.h"
+#include "hits.h"
+#include "surface.h"
+#include "track.h"
+
+/* Where a path meets a surface, in the geometry's coordinates. */
+typedef struct nb_meeting {
+    double t; /* m; HUGE_VAL: nothing is met, and the rest means nothing */
+    float reflectance[3];
+    float normal[3], side[3]; /* of shading and of the triangle, towards where the path came from */
+    float start[3];           /* of the rays that go on */
+    float cosine;             /* of the angle between shading normal and sun */
+    int lit;                  /* whether the surface faces the sun */
+} nb_meeting;
+
+/* Room for what one ray meets, shaded as all rays of the renderer are: a batch of one. */
+typedef struct nb_lone_ray {
+    nb_rays rays;
+    nb_hits hits;
+    nb_points points;
+} nb_lone_ray;
+
+/* All that is the same for all paths of a frame. */
+typedef struct nb_path_world {
+    const nebel_snapshot *fog; /* NULL: none */
+    const nebel_scene_data *scene;
+    const nb_geometry *geometry;
+    const nb_srgb_table *table;
+    double to_sun[3], sun[3]; /* unit direction; irradiance, 0 without sun */
+    double ambient[3], background[3];
+    int has_sun, is_grey;
+    uint32_t bounces; /* after so many no light is looked for but the sun's and the ambient light of the place */
+} nb_path_world;
+
+typedef struct nb_path_light {
+    double color[3], in_scattering[3];
+    double transmittance[3]; /* 1 where the path came through to what is behind the fog */
+} nb_path_light;
+
+void nb_lone_ray_clear(nb_lone_ray *lone);
+
+/* What lane i of a batch met. */
+nb_meeting nb_meeting_of(const nb_hits *hits, const nb_points *points, int i);
+
+/* The light of one path that begins along `eye`, with t_max where it meets `first` or HUGE_VAL. `number` are those of
+ * column, row, sample and seed. Errors: UNBOUNDED. */
+nebel_result nb_path_trace(const nb_path_world *world, const nebel_ray *eye, const nb_meeting *first,
+                           const uint32_t number[4], nb_lone_ray *lone, nb_path_light *light);
+
+#endif
