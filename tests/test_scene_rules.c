@@ -11,7 +11,6 @@
 #define NEBULA(members)                                                                                                \
     SCENE("\"nebula\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 5}, " members "}]")
 #define POINTS(rest) SCENE("\"nebula\": [{\"points\": {\"file\": " rest "}]")
-#define LIGHT(members) SCENE("\"lights\": [`{" members "}]")
 #define BAD_LIGHT(members) SCENE("\"lights\": [{" members "}]")
 
 static void test_what_no_scene_has(void **state)
@@ -120,13 +119,11 @@ static void test_what_no_camera_has(void **state)
 #define POINT "\"type\": \"point\", \"position\": [0, 3, 0], \"intensity\": [5, 4, 3]"
 #define SPOT "\"type\": \"spot\", \"position\": [0, 3, 0], \"intensity\": 5, \"direction\": [0, -1, 0], "
 
-static void test_lights_are_checked_and_then_refused(void **state)
+static void test_lights_are_checked(void **state)
 {
     (void)state;
     const rule rules[] = {
-        {UNSUPPORTED, LIGHT(POINT), "lights[0]: this version cannot light with point lights; remove \"lights\""},
-        {UNSUPPORTED, LIGHT(SPOT "\"inner_angle\": 20, \"outer_angle\": 30"),
-         "lights[0]: this version cannot light with spot"},
+        {FORMAT, BAD_LIGHT(POINT ", \"radius\": `1e-4"), "lights[0].radius: is 0.0001; must be a length from 0.001 to"},
         {FORMAT, BAD_LIGHT(SPOT "\"inner_angle\": `31, \"outer_angle\": 30"), "lights[0].inner_angle: is 31; must be"},
         {FORMAT, BAD_LIGHT(SPOT "\"outer_angle\": `180"), "lights[0].outer_angle: is 180; must be"},
         {FORMAT, BAD_LIGHT(POINT ", `\"direction\": [1, 0, 0]"), "lights[0].direction: unknown key; a point light has"},
@@ -480,7 +477,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_what_no_scene_has),
         cmocka_unit_test(test_what_no_camera_has),
-        cmocka_unit_test(test_lights_are_checked_and_then_refused),
+        cmocka_unit_test(test_lights_are_checked),
         cmocka_unit_test(test_what_no_model_has),
         cmocka_unit_test(test_what_no_shape_has),
         cmocka_unit_test(test_what_no_density_has),

@@ -464,24 +464,18 @@ static void endless_fog_is_answered(void **state)
     nebel_release_snapshot(height);
 }
 
-/* Boxes on a line, all with edges that the way to the sun passes: more of them than the stack has room for. */
-static void lost_memory_is_survived(void **state)
+/* More volumes than the stack has room for. */
+enum { CROWD = 40 };
+
+static void expect_no_loss(const nebel_volume_desc volumes[CROWD])
 {
-    enum { BOXES = 40 };
-    static nebel_volume_desc boxes[BOXES];
     const nebel_ray ray = {{0, 0.2, -1}, {0, 0, 1}, HUGE_VAL};
     fog_memory memory = {0};
     fog_messages messages = {0};
-    (void)state;
-    for (int i = 0; i < BOXES; i++)
-        boxes[i] =
-            (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, 2 * i}, .max = {1, 1, 2 * i + 1}},
-                                .extinction = {0.01, 0.01, 0.01},
-                                .albedo = {1, 1, 1}};
     const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory),
                                  .log = fog_messages_log(&messages),
                                  .sun = {.direction = {0.3, 1, 0.2}, .irradiance = {1, 1, 1}}};
-    nebel_snapshot *snapshot = fog_commit(&desc, boxes, BOXES);
+    nebel_snapshot *snapshot = fog_commit(&desc, volumes, CROWD);
     const size_t live = memory.live;
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision};
@@ -502,6 +496,23 @@ static void lost_memory_is_survived(void **state)
     }
     nebel_release_snapshot(snapshot);
     assert_int_equal(memory.live, 0);
+}
+
+/* Boxes on a line, all with edges that the way to the sun passes; balls over each other, all on that way. */
+static void lost_memory_is_survived(void **state)
+{
+    static nebel_volume_desc boxes[CROWD], balls[CROWD];
+    (void)state;
+    for (int i = 0; i < CROWD; i++) {
+        boxes[i] =
+            (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-1, -1, 2 * i}, .max = {1, 1, 2 * i + 1}},
+                                .extinction = {0.01, 0.01, 0.01},
+                                .albedo = {1, 1, 1}};
+        balls[i] = boxes[i];
+        balls[i].shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {0, 0.1 * i, 5}, .radius = 4.5 + 0.05 * i};
+    }
+    expect_no_loss(boxes);
+    expect_no_loss(balls);
 }
 
 int main(void)

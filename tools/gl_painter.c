@@ -17,6 +17,9 @@ int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_r
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
     *painter = (nb_gl_painter){.loaded = loaded};
+    if (scene->lamp_count > 0) {
+        return nb_report_failure("render: %s: OpenGL does not light with lamps yet; say --device cpu", name);
+    }
     if (nb_gl_context_open_any(&painter->context) != 0) {
         return nb_report_failure("render: --device gl: %s; or say --device cpu", painter->context.fault);
     }

@@ -54,6 +54,7 @@ static void print_light(const nebel_scene_data *scene)
         print_triple("sun: irradiance ", scene->sun_irradiance);
         (void)printf(", %.3g degrees above the horizon\n", asin(fmin(fmax(scene->sun_direction[Y], -1), 1)) * degrees);
     }
+    if (scene->lamp_count > 0) (void)printf("lamps: %zu\n", scene->lamp_count);
     print_triple("ambient: ", scene->ambient);
     print_triple("\nbackground: ", scene->background);
     (void)printf("\n");
@@ -180,13 +181,18 @@ static int is_black(const double *color)
     return color[0] == 0 && color[1] == 0 && color[2] == 0;
 }
 
+static int is_lit(const nebel_scene_data *scene)
+{
+    return (scene->has_sun && !is_black(scene->sun_irradiance)) || !is_black(scene->ambient) || scene->lamp_count > 0;
+}
+
 static const char *find_mistake(const nebel_scene_data *scene, const nebel_volume_desc *volume)
 {
     if (volume->operation == NEBEL_OPERATION_EXCLUDE) return NULL;
     const int glows = !is_black(volume->emission);
     if (is_black(volume->extinction) && !glows) return "has no extinction and no emission: it cannot be seen";
     const int scatters = !is_black(volume->albedo);
-    if (scatters && is_black(scene->ambient)) return "scatters light, but 'ambient' is black: it only absorbs";
+    if (scatters && !is_lit(scene)) return "scatters light, but there is none: it only absorbs";
     if (!scatters && !glows && is_black(volume->source)) {
         return "has neither source nor albedo nor emission: it only absorbs";
     }
@@ -210,8 +216,8 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
     for (size_t i = 0; i < scene->volume_count; i++) volumes += scene->volumes[i].operation != NEBEL_OPERATION_EXCLUDE;
     if (volumes == 0 && scene->nebula_count == 0 && scene->cells == NULL) (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
-    const int lit = (scene->has_sun && !is_black(scene->sun_irradiance)) || !is_black(scene->ambient);
-    if (scene->mesh_count > 0 && !lit) (void)printf("warning: no sun and no ambient light: the models are black\n");
+    if (scene->mesh_count > 0 && !is_lit(scene))
+        (void)printf("warning: no sun, no lamps and no ambient light: the models are black\n");
 }
 
 int nb_info_print_scene(const char *path)

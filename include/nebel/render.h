@@ -4,8 +4,8 @@
  *     nebel_create_renderer(scene_data, fog, &(nebel_renderer_desc){0}, &renderer);
  *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
  *
- * Lambert surfaces lit by the sun (ray-traced shadows; the sunlight is attenuated by all fog on its way) and by the
- * ambient radiance; transmittance and in-scattering from nebel_trace in float. The same picture, bit for bit, for every
+ * Lambert surfaces lit by the sun and the scene's lamps (ray-traced shadows; their light is attenuated by all fog on
+ * its way) and by the ambient radiance; transmittance and in-scattering from nebel_trace in float. The same picture, bit for bit, for every
  * thread count. Link with libnebel_cpu and libnebel.
  */
 #ifndef NEBEL_RENDER_H

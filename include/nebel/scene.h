@@ -102,7 +102,10 @@ typedef struct nebel_scene_data {
     double sun_direction[3];  /* towards the sun, unit length */
     double sun_irradiance[3]; /* on a surface that faces it, before any fog */
     double ambient[3];        /* radiance */
-    double max_opacity;       /* of all fog; 0: no limit */
+    size_t lamp_count;        /* the section "lights" */
+    const nebel_lamp *lamps;
+    const char *const *lamp_names; /* UTF-8; "" where the file gives none */
+    double max_opacity;            /* of all fog; 0: no limit */
 
     size_t volume_count; /* the fog, in the order of the file; what moves stands as it is at frame 0 */
     const nebel_volume_desc *volumes;

@@ -27,6 +27,13 @@ static inline nebel_result nb_lighting_set(nb_lighting *lighting, const nebel_sc
         (scene->has_sun && !nb_lighting_is_light(scene->sun_irradiance))) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: background, ambient and sun must be finite and not negative");
     }
+    for (size_t i = 0; i < scene->lamp_count; i++) {
+        const nebel_lamp *lamp = &scene->lamps[i];
+        if (!nb_lighting_is_light(lamp->intensity) ||
+            !isfinite(lamp->position[0] + lamp->position[1] + lamp->position[2]))
+            return nb_fail(log, NEBEL_ERROR_VALUE,
+                           "scene: lamp %zu: place and intensity must be finite, intensity not negative", i);
+    }
     lighting->has_sun = scene->has_sun != 0;
     if (lighting->has_sun && !nb_vector_make_unit(direction)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");

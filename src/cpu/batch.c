@@ -171,8 +171,66 @@ static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
     set_clear_sunlight(frame->lighting.sunlight, scratch);
     if (!dims_sun(frame->renderer) || !frame->lighting.has_sun) return NEBEL_OK;
-    const nebel_result result = trace_sun_fog(frame, scratch, scratch->sun_transmittance);
-    if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->sun_transmittance, scratch->samples.color);
+    const nebel_result result = trace_sun_fog(frame, scratch, scratch->light_transmittance);
+    if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->light_transmittance, scratch->samples.color);
+    return result;
+}
+
+/* What fog leaves of a lamp's light where it is lit at all. */
+static nebel_result trace_lamp_fog(const nb_frame *frame, nb_scratch *scratch)
+{
+    nb_lamp_ways *ways = &scratch->lamp;
+    nebel_ray_planes rays = {.t_max = ways->reach};
+    nebel_light_planes lights = {.error = NULL};
+    for (int c = 0; c < 3; c++) {
+        rays.origin[c] = frame->renderer->geometry.origin[c];
+        rays.offset[c] = scratch->points.start[c];
+        rays.direction_float[c] = ways->direction[c];
+        lights.transmittance[c] = scratch->light_transmittance[c];
+    }
+    for (int i = 0; i < NB_BATCH; i++) ways->reach[i] = ways->lit[i] ? ways->reach[i] : 0;
+    nebel_trace_desc trace = frame->trace;
+    trace.ignore_distances = 1;
+    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+}
+
+static void add_lamp(const nebel_lamp *lamp, int is_dimmed, nb_scratch *scratch)
+{
+    const nb_lamp_ways *ways = &scratch->lamp;
+    for (int c = 0; c < 3; c++) {
+        const float intensity = (float)lamp->intensity[c];
+        for (int i = 0; i < NB_BATCH; i++) {
+            if (!ways->lit[i]) continue;
+            const float left = is_dimmed ? scratch->light_transmittance[c][i] : 1;
+            scratch->samples.color[c][i] += intensity * ways->strength[i] * left;
+        }
+    }
+}
+
+static int is_lit_anywhere(const nb_lamp_ways *ways)
+{
+    int lit = 0;
+    for (int i = 0; i < NB_BATCH; i++) lit |= ways->lit[i];
+    return lit;
+}
+
+/* Lamp by lamp, to samples->color. */
+static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
+{
+    const nebel_renderer *renderer = frame->renderer;
+    const nb_geometry *geometry = &renderer->geometry;
+    const int is_dimmed = dims_sun(renderer);
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < renderer->scene->lamp_count && result == NEBEL_OK; i++) {
+        const nebel_lamp *lamp = &renderer->scene->lamps[i];
+        float place[3];
+        for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - geometry->origin[c]);
+        nb_lamp_ways_set(lamp, place, &scratch->hits, &scratch->points, &scratch->lamp);
+        nb_lamp_ways_shadow(geometry->scene, &scratch->points, &scratch->lamp, &scratch->packets);
+        if (!is_lit_anywhere(&scratch->lamp)) continue;
+        if (is_dimmed) result = trace_lamp_fog(frame, scratch);
+        add_lamp(lamp, is_dimmed, scratch);
+    }
     return result;
 }
 
@@ -224,7 +282,8 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     if (lighting->has_sun) {
         nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
     }
-    return set_sunlight(frame, scratch);
+    const nebel_result result = set_sunlight(frame, scratch);
+    return result == NEBEL_OK ? add_lamplight(frame, scratch) : result;
 }
 
 nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)

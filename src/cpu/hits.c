@@ -96,3 +96,26 @@ void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direct
         }
     }
 }
+
+void nb_hits_between(RTCScene scene, float (*start)[NB_BATCH], float (*direction)[NB_BATCH], const float *reach,
+                     int *active, nb_packets *packets)
+{
+    struct RTCIntersectContext context = coherent_context();
+    struct RTCRay16 *ray = &packets->rays[0].ray;
+    set_constants(ray);
+    for (int p = 0; p < NB_PACKETS; p++) {
+        const int first = p * NB_PACKET;
+        if (!any(active + first)) continue;
+        memcpy(ray->org_x, start[0] + first, ROW);
+        memcpy(ray->org_y, start[1] + first, ROW);
+        memcpy(ray->org_z, start[2] + first, ROW);
+        memcpy(ray->dir_x, direction[0] + first, ROW);
+        memcpy(ray->dir_y, direction[1] + first, ROW);
+        memcpy(ray->dir_z, direction[2] + first, ROW);
+        for (int i = 0; i < NB_PACKET; i++) ray->tfar[i] = active[first + i] ? reach[first + i] : -1;
+        rtcOccluded16(active + first, scene, &context, ray);
+        for (int i = 0; i < NB_PACKET; i++) {
+            if (ray->tfar[i] < 0) active[first + i] = 0;
+        }
+    }
+}

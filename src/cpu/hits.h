@@ -25,4 +25,8 @@ void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_pa
 void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active,
                     nb_packets *packets);
 
+/* The same between start i and start i + reach[i] direction[i]. */
+void nb_hits_between(RTCScene scene, float (*start)[NB_BATCH], float (*direction)[NB_BATCH], const float *reach,
+                     int *active, nb_packets *packets);
+
 #endif

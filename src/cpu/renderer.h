@@ -4,6 +4,7 @@
 
 #include "geometry.h"
 #include "hits.h"
+#include "lamplight.h"
 #include "path.h"
 #include "raster.h"
 #include "sampling.h"
@@ -38,11 +39,12 @@ typedef struct nb_scratch {
     nb_hits hits;
     nb_points points;
     nb_light_samples samples;
-    float distance[NB_BATCH];             /* m, over which fog is asked for */
-    float offset[3][NB_BATCH];            /* of the rays' starts from the camera's position; orthographic only */
-    float sun_transmittance[3][NB_BATCH]; /* of the way to the sun */
-    uint32_t hit_counts[NB_PIXELS];       /* samples of a pixel that met a surface */
+    float distance[NB_BATCH];               /* m, over which fog is asked for */
+    float offset[3][NB_BATCH];              /* of the rays' starts from the camera's position; orthographic only */
+    float light_transmittance[3][NB_BATCH]; /* of the way to a light */
+    uint32_t hit_counts[NB_PIXELS];         /* samples of a pixel that met a surface */
     nb_shafts shafts;
+    nb_lamp_ways lamp;
     nb_lone_ray lone; /* of a path behind its first surface */
     nb_sums sums;
 } nb_scratch;

@@ -151,7 +151,8 @@ static light_depth no_depth(void)
     return (light_depth){{zero, zero, zero}, {zero, zero, zero}};
 }
 
-/* As far as `reach` into the direction. */
+/* As far as `reach` into the direction. A march that has run out of memory is not to be used again; the walk of the rays
+ * ends in its own time. */
 static light_depth depth_to_light(sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction, nb_wide reach)
 {
     const allowance may = {.transmittance_only = 1};
@@ -163,10 +164,8 @@ static light_depth depth_to_light(sunlight *sun, const march *m, nb_wide t, nb_w
     way->wants_error = m->wants_error;
     way->ignores_distances = 1;
     light_depth to_light = no_depth();
-    if (!meet_fog(sun->way, sun->snapshot)) {
-        sun->out_of_memory = 1;
-        return to_light;
-    }
+    sun->out_of_memory = sun->out_of_memory || !meet_fog(sun->way, sun->snapshot);
+    if (sun->out_of_memory) return to_light;
     const gathered g = gather_light(way, &may, &unbounded);
     const nb_mask watched = ends_matter(way);
     for (int c = 0; c < 3; c++) {

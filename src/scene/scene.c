@@ -177,6 +177,8 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
     scene->data.volume_entries = scene->volume_entries;
+    scene->data.lamps = scene->lamps;
+    scene->data.lamp_names = scene->lamp_names;
     scene->data.nebulae = scene->nebulae;
     scene->data.nebula_names = scene->nebula_names;
     scene->data.nebula_places = scene->nebula_places;
@@ -336,6 +338,7 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     memcpy(desc.sun.irradiance, scene->data.sun_irradiance, sizeof desc.sun.irradiance);
     desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
+    if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
     if (result == NEBEL_OK) result = add_cells(fog, scene->data.cells);
     if (result == NEBEL_OK && with_particles) result = add_particles(fog, scene);
@@ -369,6 +372,8 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, (void *)scene->volume_names);
     nb_release(&allocator, scene->volume_origins);
     nb_release(&allocator, scene->volume_entries);
+    nb_release(&allocator, scene->lamps);
+    nb_release(&allocator, (void *)scene->lamp_names);
     nb_release(&allocator, scene->nebulae);
     nb_release(&allocator, (void *)scene->nebula_names);
     nb_release(&allocator, scene->nebula_places);

@@ -48,6 +48,10 @@ struct nebel_scene {
     nebel_transform *nebula_places;
     size_t nebula_capacity, nebula_name_capacity, nebula_place_capacity;
 
+    nebel_lamp *lamps;
+    const char **lamp_names;
+    size_t lamp_capacity, lamp_name_capacity;
+
     const char **files;
     size_t file_capacity;
 

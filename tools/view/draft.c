@@ -32,7 +32,11 @@ static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition,
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
     memcpy(desc.ambient, edition->ambient, sizeof desc.ambient);
     desc.sun = sun_of(edition);
-    return nebel_create_fog(&desc, fog);
+    nebel_result result = nebel_create_fog(&desc, fog);
+    const nebel_scene_data *const file = nebel_scene_contents(draft->file);
+    if (result == NEBEL_OK) result = nebel_set_lamps(*fog, file->lamp_count, file->lamps);
+    if (result != NEBEL_OK) nebel_destroy_fog(*fog);
+    return result;
 }
 
 static nebel_result commit_fog(nb_draft *draft)
@@ -445,9 +449,10 @@ static int is_black(const double rgb[3])
     return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
 }
 
-int nb_draft_is_sunlit(const nb_draft *draft)
+int nb_draft_is_for_cpu(const nb_draft *draft)
 {
     const nb_edition *const good = &draft->good;
+    if (nebel_scene_contents(draft->file)->lamp_count > 0) return 1;
     if (!good->has_sun || is_black(good->sun_irradiance)) return 0;
     for (size_t i = 0; i < good->count; i++)
         if (!is_black(good->volumes[i].albedo)) return 1;

@@ -111,7 +111,7 @@ static nebel_result set_fog(viewer *all)
     const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
     nebel_result result = is_whole ? nb_draft_whole(draft, &fog) : NEBEL_OK;
     /* Behind the CPU's picture. */
-    if (nb_draft_is_sunlit(draft)) fog = NULL;
+    if (nb_draft_is_for_cpu(draft)) fog = NULL;
     if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(all->stage.renderer, fog);
     if (result != NEBEL_OK) return result;
     return nebel_set_gl_renderer_particles(all->stage.renderer, draft->particles, is_whole ? 0 : draft->particle_count);
@@ -201,7 +201,7 @@ static void check_method(viewer *all)
 static const char *explain_method(const viewer *all)
 {
     if (all->look.method == NEBEL_METHOD_CELLS_PIXEL) return "drawn by the CPU alone";
-    return nb_draft_is_sunlit(&all->draft) ? "drawn by the CPU alone: sunlit fog" : "";
+    return nb_draft_is_for_cpu(&all->draft) ? "drawn by the CPU alone: lamps, or sunlit fog" : "";
 }
 
 /* What can be shown of what is wished for. */

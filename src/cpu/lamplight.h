@@ -1,0 +1,23 @@
+/* Lamps on surfaces: which points they reach, and how much of their light. */
+#ifndef NB_CPU_LAMPLIGHT_H
+#define NB_CPU_LAMPLIGHT_H
+
+#include "surface.h"
+
+/* From the points of a batch to a lamp; what lanes that are not lit hold means nothing but reach 0. */
+typedef struct nb_lamp_ways {
+    float direction[3][NB_BATCH]; /* unit length */
+    float reach[NB_BATCH];        /* m, to the surface of the lamp */
+    float strength[NB_BATCH];     /* irradiance over pi, of a lamp of 1 W/sr, before any fog */
+    _Alignas(64) int lit[NB_BATCH];
+} nb_lamp_ways;
+
+/* Lanes are lit where they are hits, the lamp is above shading normal and triangle, and within the lamp's cone. `place`
+ * is the lamp's, relative to the origin of the geometry. */
+void nb_lamp_ways_set(const nebel_lamp *lamp, const float place[3], const nb_hits *hits, const nb_points *points,
+                      nb_lamp_ways *ways);
+
+/* Lanes behind a surface are no longer lit. */
+void nb_lamp_ways_shadow(RTCScene scene, nb_points *points, nb_lamp_ways *ways, nb_packets *packets);
+
+#endif

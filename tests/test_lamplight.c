@@ -1,0 +1,122 @@
+/* Lamps on surfaces: a floor under a lamp, its cone, its shadow, and the fog between, against closed forms. */
+#include "test_render_scene.h"
+
+enum { SIZE = 33 };
+
+static const float floor_positions[] = {-50, 0, -50, 50, 0, -50, 50, 0, 50, -50, 0, 50};
+static const float lid_positions[] = {-1, 2, -1, 1, 2, -1, 1, 2, 1, -1, 2, 1};
+static const uint32_t square[] = {0, 2, 1, 0, 3, 2};
+
+static nebel_mesh make_square(const float *positions)
+{
+    return (nebel_mesh){.positions = positions,
+                        .indices = square,
+                        .vertex_count = 4,
+                        .triangle_count = 2,
+                        .base_color = {.5f, .25f, 1},
+                        .texture = -1};
+}
+
+/* Straight down on the floor, 1 m to 8 pixels. */
+static void render(const nebel_lamp *lamp, int has_lid, double extinction, test_picture *picture)
+{
+    const nebel_mesh meshes[] = {make_square(floor_positions), make_square(lid_positions)};
+    const nebel_scene_data scene = {.mesh_count = has_lid ? 2 : 1, .meshes = meshes, .lamp_count = 1, .lamps = lamp};
+    nebel_camera camera = test_camera(0, 1, 0, 0, 0, 0);
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    camera.view_height = SIZE / 8.0;
+    nebel_snapshot *fog = test_world_fog(extinction, 0);
+    nebel_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    const nebel_frame_desc desc = {.camera = camera, .width = SIZE, .height = SIZE, .samples = 1};
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture->planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+}
+
+/* Of the pixel: metres from the middle, to the right and down. */
+static double at(uint32_t pixel)
+{
+    return ((double)pixel - SIZE / 2) / 8;
+}
+
+/* Shadow rays start 1e-4 m above so large a floor. */
+static void a_floor_is_lit(void **state)
+{
+    const nebel_lamp lamp = {.position = {0.5, 3, 0.25}, .intensity = {10, 20, 5}};
+    test_picture picture = test_picture_make(SIZE, SIZE);
+    (void)state;
+    for (int foggy = 0; foggy < 2; foggy++) {
+        const double extinction = foggy ? 0.1 : 0;
+        render(&lamp, 0, extinction, &picture);
+        for (uint32_t y = 0; y < SIZE; y++)
+            for (uint32_t x = 0; x < SIZE; x++) {
+                const double dx = at(x) - 0.5, dz = at(y) - 0.25, d2 = dx * dx + dz * dz + 9, d = sqrt(d2);
+                for (int c = 0; c < 3; c++) {
+                    static const double share[] = {1, 2, .5}, color[] = {.5, .25, 1};
+                    const double left = exp(-extinction * share[c] * (d + 1)); /* and to the camera */
+                    const double wanted = lamp.intensity[c] * 3 / (d2 * d) / test_pi * color[c] * left;
+                    assert_true(fabs((double)test_color(&picture, x, y)[c] - wanted) < 1e-4 * wanted + 1e-6);
+                }
+            }
+    }
+    test_picture_free(&picture);
+}
+
+/* The lid, 2 m wide at 2 m, shades 6 m of the floor about the middle; no lamp shines beyond its cone. */
+static void shadows_and_cones_have_edges(void **state)
+{
+    nebel_lamp lamp = {.position = {0, 3, 0}, .intensity = {10, 10, 10}};
+    test_picture picture = test_picture_make(SIZE, SIZE);
+    (void)state;
+    render(&lamp, 1, 0, &picture);
+    for (uint32_t x = 0; x < SIZE; x++) assert_true(test_color(&picture, x, SIZE / 2)[0] == 0);
+    lamp.type = NEBEL_LAMP_SPOT;
+    lamp.direction[1] = -3;
+    lamp.inner_angle = lamp.outer_angle = 22.5; /* of 3 m: 1.2426 m */
+    render(&lamp, 0, 0, &picture);
+    for (uint32_t x = 0; x < SIZE; x++) {
+        const double away = fabs(at(x));
+        assert_true((test_color(&picture, x, SIZE / 2)[0] > 0) == (away < 1.2426));
+    }
+    test_picture_free(&picture);
+}
+
+/* A lamp on the floor, below it, in a surface's own place, and one that is none. */
+static void odd_lamps_are_answered(void **state)
+{
+    const nebel_lamp lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
+                                {.position = {0, -1, 0}, .intensity = {10, 10, 10}},
+                                {.position = {0, 0.5, 0}, .intensity = {10, 10, 10}, .radius = 1}};
+    test_picture picture = test_picture_make(SIZE, SIZE);
+    (void)state;
+    for (size_t i = 0; i < sizeof lamps / sizeof lamps[0]; i++) {
+        render(&lamps[i], 0, 0.1, &picture);
+        for (uint32_t p = 0; p < 3 * SIZE * SIZE; p++) {
+            const float light = picture.planes.color[p];
+            assert_true(light >= 0 && light < (i == 0 ? HUGE_VALF : 10));
+            if (i == 1) assert_true(light == 0);
+        }
+    }
+    const nebel_lamp wrong = {.position = {(double)NAN, 0, 0}, .intensity = {1, 1, 1}};
+    const nebel_scene_data scene = {.lamp_count = 1, .lamps = &wrong};
+    nebel_renderer *renderer = NULL;
+    nebel_result result = nebel_create_renderer(&scene, NULL, &(nebel_renderer_desc){0}, &renderer);
+    const nebel_frame_desc desc = {.camera = test_camera(0, 1, 0, 0, 0, 0), .width = SIZE, .height = SIZE};
+    if (result == NEBEL_OK) result = nebel_render_frame(renderer, &desc, &picture.planes);
+    assert_int_equal(result, NEBEL_ERROR_VALUE);
+    nebel_destroy_renderer(renderer);
+    test_picture_free(&picture);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_floor_is_lit),
+        cmocka_unit_test(shadows_and_cones_have_edges),
+        cmocka_unit_test(odd_lamps_are_answered),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
