@@ -500,7 +500,8 @@ typedef struct nebel_light {
     double in_scattering[3]; /* RGB radiance, >= 0 */
     double error; /* bound of the absolute error of the six numbers. In double never more than the tolerance and 1e-8,
                      in float than the tolerance and 1e-4 but for one of a thousand rays of the hardest kind, which
-                     touch a surface or run level with one to the last bits. Transmittance below the smallest normal
+                     touch a surface or run level with one to the last bits; at the silhouette of a body whose optical
+                     depth is in the thousands one of fourteen has up to 3e-3. Transmittance below the smallest normal
                      number of the precision is 0, and the error that number at least. 1e30: nothing is known of
                      light from height fog that grows beyond 1e18 times its extinction and lets light through */
 } nebel_light;
