@@ -16,6 +16,7 @@ typedef struct nb_sun_rays {
     float start[3][NB_PACKET], way[3][NB_PACKET], inverse[3][NB_PACKET];
     float from[NB_PACKET], to[NB_PACKET];     /* what of them is in fog that the sun lights; from >= to: nothing */
     float enter[NB_PACKET], leave[NB_PACKET]; /* the shadow that was found last; enter > leave: none yet */
+    size_t kept[NB_PACKET];                   /* the number of the one that was kept before, and 1; 0: none yet */
 } nb_sun_rays;
 
 /* ---- rays ------------------------------------------------------------------------------------ */
@@ -67,71 +68,98 @@ NB_CLONES static void turn(const nb_sun_tree *tree, const nb_rays *rays, int fir
 
 /* ---- shadows --------------------------------------------------------------------------------- */
 
-static int keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, float enter, float leave)
+static int touch(float enter, float leave, float other_enter, float other_leave)
 {
-    void *shadows = shafts->shadows;
-    if (!nb_grow(allocator, &shadows, sizeof *shafts->shadows, shafts->shadow_count, &shafts->shadow_capacity,
-                 shafts->shadow_count + 1))
-        return 0;
-    shafts->shadows = shadows;
+    const float gap = closeness * fabsf(leave);
+    return (enter <= other_leave + gap) & (leave >= other_enter - gap);
+}
+
+/* Keeps the last shadow of a lane, as a part of the one that was kept before where it touches that. */
+static int keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_sun_rays *rays)
+{
+    const float enter = rays->enter[lane], leave = rays->leave[lane];
+    if (!(enter <= leave)) return 1;
+    nb_shadow *before = rays->kept[lane] > 0 ? &shafts->shadows[rays->kept[lane] - 1] : NULL;
+    if (before != NULL && touch(enter, leave, before->enter, before->leave)) {
+        before->enter = fminf(enter, before->enter);
+        before->leave = fmaxf(leave, before->leave);
+        return 1;
+    }
+    if (shafts->shadow_count == shafts->shadow_capacity) {
+        void *shadows = shafts->shadows;
+        if (!nb_grow(allocator, &shadows, sizeof *shafts->shadows, shafts->shadow_count, &shafts->shadow_capacity,
+                     shafts->shadow_count + 1))
+            return 0;
+        shafts->shadows = shadows;
+    }
     shafts->shadows[shafts->shadow_count++] = (nb_shadow){lane, enter, leave};
+    rays->kept[lane] = shafts->shadow_count;
     return 1;
 }
 
-/* What a prism or a box leaves of each ray, and in which lanes that is anything. */
+/* What a prism leaves of each ray. */
 typedef struct nb_stretch {
     float enter[NB_PACKET], leave[NB_PACKET];
-    int some[NB_PACKET];
 } nb_stretch;
 
-/* Shadows that touch the last one make it longer; others take its place. */
-static int add_shadows(nb_shafts *shafts, const nebel_allocator *allocator, const nb_stretch *found, nb_sun_rays *rays)
-{
-    for (uint32_t i = 0; i < NB_PACKET; i++) {
-        if (!found->some[i]) continue;
-        const float enter = found->enter[i], leave = found->leave[i], gap = closeness * fabsf(leave);
-        if (enter <= rays->leave[i] + gap && leave >= rays->enter[i] - gap) {
-            rays->enter[i] = fminf(enter, rays->enter[i]);
-            rays->leave[i] = fmaxf(leave, rays->leave[i]);
-            continue;
-        }
-        if (rays->enter[i] <= rays->leave[i] && !keep(shafts, allocator, i, rays->enter[i], rays->leave[i])) return 0;
-        rays->enter[i] = enter;
-        rays->leave[i] = leave;
-    }
-    return 1;
-}
-
-/* One side of a prism: where at + t rise >= 0. */
-ALWAYS_INLINE void cut(float at, float rise, float *enter, float *leave)
-{
-    const float t = -at / rise;
-    const float first = rise > 0 ? t : -INFINITY, level = at < 0 ? -INFINITY : INFINITY;
-    const float last = rise < 0 ? t : rise > 0 ? INFINITY : level;
-    *enter = first > *enter ? first : *enter;
-    *leave = last < *leave ? last : *leave;
-}
-
-ALWAYS_INLINE int cross_prism(const nb_prism *prism, const nb_sun_rays *rays, nb_stretch *found)
+/* Shadows that touch the last one make it longer; others take its place. Returns in which lanes there was one that is
+ * to be kept; what takes its place is in `found` still. */
+ALWAYS_INLINE int extend(const nb_stretch *found, nb_sun_rays *rays, int *restrict fresh)
 {
     int any = 0;
     NB_SIMD
     for (int i = 0; i < NB_PACKET; i++) {
-        const float x = rays->start[0][i], y = rays->start[1][i], z = rays->start[2][i];
-        const float dx = rays->way[0][i], dy = rays->way[1][i], dz = rays->way[2][i];
-        const float *cap = prism->cap;
-        float enter = rays->from[i], leave = rays->to[i];
-        for (int k = 0; k < 3; k++) {
-            const float *edge = prism->edge[k];
-            cut(edge[0] * x + edge[1] * y + edge[2], edge[0] * dx + edge[1] * dy, &enter, &leave);
-        }
-        cut(cap[0] * x + cap[1] * y + cap[2] * z + cap[3], cap[0] * dx + cap[1] * dy + cap[2] * dz, &enter, &leave);
-        found->enter[i] = enter;
-        found->leave[i] = leave;
-        found->some[i] = enter < leave;
+        const float enter = found->enter[i], leave = found->leave[i], first = rays->enter[i], last = rays->leave[i];
+        const float gap = closeness * (leave < 0 ? -leave : leave);
+        const int some = enter < leave, touches = (enter <= last + gap) & (leave >= first - gap);
+        const float least = enter < first ? enter : first, most = leave > last ? leave : last;
+        const int longer = some & touches;
+        rays->enter[i] = longer ? least : first;
+        rays->leave[i] = longer ? most : last;
+        fresh[i] = some & !touches;
     }
-    for (int i = 0; i < NB_PACKET; i++) any |= found->some[i];
+    for (int i = 0; i < NB_PACKET; i++) any |= fresh[i];
     return any;
+}
+
+static int replace(nb_shafts *shafts, const nebel_allocator *allocator, const nb_stretch *found, const int *fresh,
+                   nb_sun_rays *rays)
+{
+    for (uint32_t i = 0; i < NB_PACKET; i++) {
+        if (!fresh[i]) continue;
+        if (!keep(shafts, allocator, i, rays)) return 0;
+        rays->enter[i] = found->enter[i];
+        rays->leave[i] = found->leave[i];
+    }
+    return 1;
+}
+
+/* One side of a prism. */
+ALWAYS_INLINE void cut(const float *plane, const nb_sun_rays *rays, nb_stretch *stretch)
+{
+    const float a = plane[0], b = plane[1], c = plane[2], d = plane[3];
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const float at = a * rays->start[0][i] + b * rays->start[1][i] + c * rays->start[2][i] + d;
+        const float rise = a * rays->way[0][i] + b * rays->way[1][i] + c * rays->way[2][i];
+        const float t = -at / rise, enter = stretch->enter[i], leave = stretch->leave[i];
+        const float first = rise > 0 ? t : -INFINITY, level = at < 0 ? -INFINITY : INFINITY;
+        const float falling = rise < 0 ? t : INFINITY, last = (rise < 0) | (rise > 0) ? falling : level;
+        stretch->enter[i] = first > enter ? first : enter;
+        stretch->leave[i] = last < leave ? last : leave;
+    }
+}
+
+ALWAYS_INLINE void cross_prism(const nb_prism *prism, const nb_sun_rays *rays, nb_stretch *found)
+{
+    for (int i = 0; i < NB_PACKET; i++) {
+        found->enter[i] = rays->from[i];
+        found->leave[i] = rays->to[i];
+    }
+    cut(prism->planes[0], rays, found);
+    cut(prism->planes[1], rays, found);
+    cut(prism->planes[2], rays, found);
+    cut(prism->planes[3], rays, found);
 }
 
 /* Whether any ray may meet a shadow of this child where it is not known to be in shadow. */
@@ -176,10 +204,33 @@ ALWAYS_INLINE int visit_leaf(nb_shafts *shafts, const nebel_allocator *allocator
     const size_t count = left < NB_SUN_FAN ? left : NB_SUN_FAN;
     for (size_t i = 0; i < count; i++) {
         nb_stretch found;
-        if (cross_prism(&tree->prisms[first + i], rays, &found) && !add_shadows(shafts, allocator, &found, rays))
-            return 0;
+        int fresh[NB_PACKET];
+        cross_prism(&tree->prisms[first + i], rays, &found);
+        if (extend(&found, rays, fresh) && !replace(shafts, allocator, &found, fresh, rays)) return 0;
     }
     return 1;
+}
+
+/* The children that the rays enter, the farthest along them first, as the middle of the packet goes: what is found next
+ * mostly touches what was found last. Returns how many. */
+ALWAYS_INLINE int list_children(const nb_sun_node *node, const nb_visit *visit, const nb_sun_rays *rays,
+                                nb_visit *children)
+{
+    const float x = rays->way[0][NB_PACKET / 2 + 1], y = rays->way[1][NB_PACKET / 2 + 1];
+    float ways[NB_SUN_FAN];
+    int count = 0;
+    for (int k = 0; k < NB_SUN_FAN; k++) {
+        if (!enters(node, k, rays)) continue;
+        const float way = x * (node->low[0][k] + node->high[0][k]) + y * (node->low[1][k] + node->high[1][k]);
+        int i = count++;
+        for (; i > 0 && ways[i - 1] < way; i--) {
+            ways[i] = ways[i - 1];
+            children[i] = children[i - 1];
+        }
+        ways[i] = way;
+        children[i] = (nb_visit){visit->level - 1, visit->number * NB_SUN_FAN + (size_t)k};
+    }
+    return count;
 }
 
 /* Returns 0 when memory is out. */
@@ -191,14 +242,10 @@ NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, c
     visits[0] = (nb_visit){tree->level_count - 1, 0};
     while (count > 0) {
         const nb_visit visit = visits[--count];
-        if (visit.level < 0) {
-            if (!visit_leaf(shafts, allocator, tree, visit.number, rays)) return 0;
-            continue;
-        }
-        const nb_sun_node *node = &tree->levels[visit.level][visit.number];
-        for (int k = 0; k < NB_SUN_FAN; k++)
-            if (enters(node, k, rays))
-                visits[count++] = (nb_visit){visit.level - 1, visit.number * NB_SUN_FAN + (size_t)k};
+        if (visit.level >= 0)
+            count += list_children(&tree->levels[visit.level][visit.number], &visit, rays, visits + count);
+        else if (!visit_leaf(shafts, allocator, tree, visit.number, rays))
+            return 0;
     }
     return 1;
 }
@@ -208,8 +255,35 @@ NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, c
 static int compare_shadows(const void *a, const void *b)
 {
     const nb_shadow *x = a, *y = b;
-    if (x->lane != y->lane) return x->lane < y->lane ? -1 : 1;
     return (x->enter > y->enter) - (x->enter < y->enter);
+}
+
+/* Of one lane: few are sorted in place. */
+static void sort_shadows(nb_shadow *shadows, size_t count)
+{
+    enum { FEW = 48 };
+    if (count > FEW) {
+        qsort(shadows, count, sizeof *shadows, compare_shadows);
+        return;
+    }
+    for (size_t i = 1; i < count; i++) {
+        const nb_shadow moved = shadows[i];
+        size_t k = i;
+        for (; k > 0 && shadows[k - 1].enter > moved.enter; k--) shadows[k] = shadows[k - 1];
+        shadows[k] = moved;
+    }
+}
+
+/* Writes the shadows in `sorted`, lane after lane; ends[i] is where those of lane i end. */
+static void sort_by_lane(nb_shafts *shafts, size_t ends[NB_PACKET])
+{
+    size_t places[NB_PACKET + 1] = {0};
+    for (size_t i = 0; i < shafts->shadow_count; i++) places[shafts->shadows[i].lane + 1]++;
+    for (size_t i = 0; i < NB_PACKET; i++) places[i + 1] += places[i];
+    for (size_t i = 0; i < NB_PACKET; i++) ends[i] = places[i];
+    for (size_t i = 0; i < shafts->shadow_count; i++)
+        shafts->sorted[ends[shafts->shadows[i].lane]++] = shafts->shadows[i];
+    for (size_t i = 0; i < NB_PACKET; i++) sort_shadows(shafts->sorted + places[i], ends[i] - places[i]);
 }
 
 /* From where fog begins to count, in which a shadow that begins with it begins at 0. */
@@ -218,44 +292,49 @@ static void toggle(nb_shafts *shafts, float t)
     shafts->toggles[shafts->toggle_count++] = fmaxf(t, 0);
 }
 
-/* The shadows of one lane, sorted, as toggles. Returns the first shadow of the next lane. */
-static size_t join(nb_shafts *shafts, size_t i, float skipped)
+/* The shadows of one lane, sorted, as toggles. */
+static void join(nb_shafts *shafts, const nb_shadow *shadows, size_t count, float skipped)
 {
-    const uint32_t lane = shafts->shadows[i].lane;
-    float enter = shafts->shadows[i].enter, leave = shafts->shadows[i].leave;
-    for (i++; i < shafts->shadow_count && shafts->shadows[i].lane == lane; i++) {
-        const nb_shadow *next = &shafts->shadows[i];
-        if (next->enter > leave + closeness * fabsf(leave)) {
+    float enter = shadows[0].enter, leave = shadows[0].leave;
+    for (size_t i = 1; i < count; i++) {
+        if (shadows[i].enter > leave + closeness * fabsf(leave)) {
             toggle(shafts, enter + skipped);
             toggle(shafts, leave + skipped);
-            enter = next->enter;
-            leave = next->leave;
+            enter = shadows[i].enter;
+            leave = shadows[i].leave;
         }
-        leave = fmaxf(leave, next->leave);
+        leave = fmaxf(leave, shadows[i].leave);
     }
     toggle(shafts, enter + skipped);
     toggle(shafts, leave + skipped);
-    return i;
+}
+
+static int make_room(nb_shafts *shafts, const nebel_allocator *allocator)
+{
+    void *toggles = shafts->toggles, *sorted = shafts->sorted;
+    const int grown =
+        nb_grow(allocator, &toggles, sizeof *shafts->toggles, shafts->toggle_count, &shafts->toggle_capacity,
+                shafts->toggle_count + 2 * shafts->shadow_count) &&
+        nb_grow(allocator, &sorted, sizeof *shafts->sorted, 0, &shafts->sorted_capacity, shafts->shadow_count);
+    shafts->toggles = toggles;
+    shafts->sorted = sorted;
+    return grown;
 }
 
 /* The toggles of a packet, of the shadows that were kept and the last one of each ray. */
-static int finish(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_rays *rays, const float *length,
+static int finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_sun_rays *rays, const float *length,
                   double advance, uint32_t *first)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++)
-        if (rays->enter[i] < rays->leave[i] && !keep(shafts, allocator, i, rays->enter[i], rays->leave[i])) return 0;
-    void *toggles = shafts->toggles;
-    if (!nb_grow(allocator, &toggles, sizeof *shafts->toggles, shafts->toggle_count, &shafts->toggle_capacity,
-                 shafts->toggle_count + 2 * shafts->shadow_count))
-        return 0;
-    shafts->toggles = toggles;
-    if (shafts->shadow_count > 1)
-        qsort(shafts->shadows, shafts->shadow_count, sizeof *shafts->shadows, compare_shadows);
-    size_t k = 0;
+        if (!keep(shafts, allocator, i, rays)) return 0;
+    size_t ends[NB_PACKET], begin = 0;
+    if (shafts->shadow_count > 0 && !make_room(shafts, allocator)) return 0;
+    if (shafts->shadow_count > 0) sort_by_lane(shafts, ends);
     for (uint32_t i = 0; i < NB_PACKET; i++) {
         first[i] = (uint32_t)shafts->toggle_count;
-        if (k < shafts->shadow_count && shafts->shadows[k].lane == i)
-            k = join(shafts, k, (float)(advance * (double)length[i]));
+        if (shafts->shadow_count == 0 || ends[i] == begin) continue;
+        join(shafts, shafts->sorted + begin, ends[i] - begin, (float)(advance * (double)length[i]));
+        begin = ends[i];
     }
     return 1;
 }
@@ -273,6 +352,7 @@ static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, cons
     for (int i = 0; i < NB_PACKET; i++) {
         packet->enter[i] = INFINITY;
         packet->leave[i] = -INFINITY;
+        packet->kept[i] = 0;
     }
     turn(tree, rays, first, packet);
     shafts->shadow_count = 0;
@@ -303,5 +383,6 @@ nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator,
 void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator)
 {
     nb_release(allocator, shafts->shadows);
+    nb_release(allocator, shafts->sorted);
     nb_release(allocator, shafts->toggles);
 }

@@ -18,8 +18,10 @@ typedef struct nb_shadow {
 
 /* What a thread works in; all zero at first. */
 typedef struct nb_shafts {
-    nb_shadow *shadows;
+    nb_shadow *shadows; /* of a packet, as they were found */
     size_t shadow_count, shadow_capacity;
+    nb_shadow *sorted; /* the same by lane, as many as there is room for the others */
+    size_t sorted_capacity;
     float *toggles; /* m from where fog begins to count, which is before a ray is advanced */
     size_t toggle_count, toggle_capacity;
     uint32_t first[NB_BATCH + 1]; /* see nebel_lit_pieces */

@@ -133,17 +133,16 @@ static void sort_triangles(nb_making *making)
 
 /* ---- prisms ---------------------------------------------------------------------------------- */
 
-/* n . p + n[3], scaled so that products with coordinates stay numbers. */
-static void store_plane(const double *n, int count, const float *point, float *plane)
+/* Through the point; scaled so that products with coordinates stay numbers. */
+static void store_plane(const double n[3], const float *point, float *plane)
 {
-    double largest = 0, offset = 0;
-    for (int i = 0; i < count; i++) largest = fmax(largest, fabs(n[i]));
-    const double scale = largest > 0 ? 1 / largest : 0;
-    for (int i = 0; i < count; i++) {
+    const double largest = fmax(fmax(fabs(n[0]), fabs(n[1])), fabs(n[2])), scale = largest > 0 ? 1 / largest : 0;
+    double offset = 0;
+    for (int i = 0; i < 3; i++) {
         plane[i] = (float)(n[i] * scale);
         offset += n[i] * scale * (double)point[i];
     }
-    plane[count] = (float)-offset;
+    plane[3] = (float)-offset;
 }
 
 static void make_prism(const nb_facing *t, nb_prism *prism)
@@ -153,13 +152,13 @@ static void make_prism(const nb_facing *t, nb_prism *prism)
     for (int k = 0; k < 3; k++) {
         const float *a = t->corner[k], *b = t->corner[(k + 1) % 3];
         for (int i = 0; i < 3; i++) way[k][i] = (double)b[i] - (double)a[i];
-        const double n[2] = {-way[k][1] * side, way[k][0] * side};
-        store_plane(n, 2, a, prism->edge[k]);
+        const double n[3] = {-way[k][1] * side, way[k][0] * side, 0};
+        store_plane(n, a, prism->planes[k]);
     }
     double normal[3];
     nb_vector_cross(way[0], way[1], normal);
     for (int i = 0; i < 3; i++) normal[i] *= side;
-    store_plane(normal, 3, t->corner[0], prism->cap);
+    store_plane(normal, t->corner[0], prism->planes[3]);
 }
 
 static void enlarge(nb_sun_node *node, int child, const float low[3], const float high[2])

@@ -14,10 +14,9 @@ enum {
     NB_SUN_LEVELS = 16 /* at most */
 };
 
-/* A place p is in shadow where each edge[0] p.x + edge[1] p.y + edge[2] >= 0 and cap[0..2] . p + cap[3] >= 0. */
+/* A place p is in shadow where plane[0..2] . p + plane[3] >= 0 for each: those of the edges, and that of the triangle. */
 typedef struct nb_prism {
-    float edge[3][3];
-    float cap[4]; /* cap[2] > 0 */
+    float planes[4][4];
 } nb_prism;
 
 /* Boxes around the shadows below each child: without an end away from the sun. Missing children begin at 1e30. */
