@@ -144,7 +144,7 @@ ALWAYS_INLINE void cut(const float *plane, const nb_sun_rays *rays, nb_stretch *
         const float rise = a * rays->way[0][i] + b * rays->way[1][i] + c * rays->way[2][i];
         const float t = -at / rise, enter = stretch->enter[i], leave = stretch->leave[i];
         const float first = rise > 0 ? t : -INFINITY, level = at < 0 ? -INFINITY : INFINITY;
-        const float falling = rise < 0 ? t : INFINITY, last = (rise < 0) | (rise > 0) ? falling : level;
+        const float falling = rise < 0 ? t : INFINITY, last = rise != 0 ? falling : level;
         stretch->enter[i] = first > enter ? first : enter;
         stretch->leave[i] = last < leave ? last : leave;
     }
@@ -261,7 +261,7 @@ static int compare_shadows(const void *a, const void *b)
 /* Of one lane: few are sorted in place. */
 static void sort_shadows(nb_shadow *shadows, size_t count)
 {
-    enum { FEW = 48 };
+    enum { FEW = 128 };
     if (count > FEW) {
         qsort(shadows, count, sizeof *shadows, compare_shadows);
         return;

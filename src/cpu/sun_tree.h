@@ -14,7 +14,8 @@ enum {
     NB_SUN_LEVELS = 16 /* at most */
 };
 
-/* A place p is in shadow where plane[0..2] . p + plane[3] >= 0 for each: those of the edges, and that of the triangle. */
+/* A place p is in shadow where plane[0..2] . p + plane[3] >= 0 for each: those of the edges, and that of the triangle.
+ */
 typedef struct nb_prism {
     float planes[4][4];
 } nb_prism;

@@ -157,6 +157,15 @@ static void point_to_sun(nebel_snapshot *s, const nebel_sun *sun)
     s->to_sun[2] = z / length + 0;
 }
 
+static int is_gray(const nebel_snapshot *s)
+{
+    for (size_t i = 0; i < s->medium_count; i++) {
+        const double *extinction = s->media[i].body.extinction;
+        if (extinction[0] != extinction[1] || extinction[1] != extinction[2]) return 0;
+    }
+    return 1;
+}
+
 /* More bodies than these are found by a tree. */
 #define MOST_ADDED 8
 
@@ -201,6 +210,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
     if (copy_media(fog, s) && copy_lamps(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
+        s->is_gray = is_gray(s);
         s->way_to_sun = find_way_to_sun(s);
         result = index_media(s);
     }

@@ -269,11 +269,26 @@ static void depth_until(const march *m, const piece *p, const gathered *g, nb_wi
     }
 }
 
+typedef nb_real real_fn(nb_real x);
+
+static inline nb_real transmitted(nb_real depth)
+{
+    return nb_exp(-depth);
+}
+
+/* Of each channel; once where all have the same depth to the bit. */
+static inline __attribute__((always_inline)) void map_channels(const nebel_snapshot *snapshot, real_fn *f,
+                                                               const nb_real x[3], nb_real out[3])
+{
+    out[0] = out[1] = out[2] = f(x[0]);
+    for (int c = 1; c < 3 && !snapshot->is_gray; c++) out[c] = f(x[c]);
+}
+
 static void transmittance_until(const march *m, const piece *p, const gathered *g, nb_wide end, nb_real behind[3])
 {
     nb_real depth[3], error[3];
     depth_until(m, p, g, end, depth, error);
-    for (int c = 0; c < 3; c++) behind[c] = nb_exp(-depth[c]);
+    map_channels(m->sun->snapshot, transmitted, depth, behind);
 }
 
 /* Flat where the step begins or ends at a turn. */
@@ -321,12 +336,16 @@ static sun_node sunlit_node(sunlight *sun, const march *m, const piece *p, const
             extinction[c] = extinction[c] + k->extinction[c] * density;
         }
     }
+    const nb_real length = s->length * speed;
+    nb_real all[3], seen[3], behind[3];
+    for (int c = 0; c < 3; c++) all[c] = depth[c] + to_sun.depth[c];
+    map_channels(sun->snapshot, transmitted, all, seen);
+    map_channels(sun->snapshot, transmitted, depth, behind);
     sun_node sum;
     for (int c = 0; c < 3; c++) {
-        const nb_real all = depth[c] + to_sun.depth[c], length = s->length * speed;
-        sum.light[c] = glow[c] * length * nb_exp(-all);
-        sum.doubt[c] = nb_min(error[c] + to_sun.error[c], NB_F(1.0)) + (all + NB_F(16.0)) * (NB_F(2.0) * NB_EPSILON);
-        sum.taken[c] = extinction[c] * length * nb_exp(-depth[c]);
+        sum.light[c] = glow[c] * length * seen[c];
+        sum.doubt[c] = nb_min(error[c] + to_sun.error[c], NB_F(1.0)) + (all[c] + NB_F(16.0)) * (NB_F(2.0) * NB_EPSILON);
+        sum.taken[c] = extinction[c] * length * behind[c];
     }
     return sum;
 }
@@ -482,15 +501,22 @@ static sun_step closed_step(sunlight *sun, const march *m, const piece *p, const
         }
     }
     sun_step s = {.start = w->t, .length = h, .error = zero, .rounding = zero};
+    nb_real least[3], change[3], most_seen[3], ratio[3];
     for (int c = 0; c < 3; c++) {
-        const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c], least = nb_min(first, last);
-        const nb_real change = change_of_depth(sun, m, present(m, m->present_first), c, length, last - first);
-        const nb_real seen = nb_exp(-least) * nb_exp_ratio(change);
+        const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c];
+        least[c] = nb_min(first, last);
+        change[c] = change_of_depth(sun, m, present(m, m->present_first), c, length, last - first);
+    }
+    map_channels(sun->snapshot, transmitted, least, most_seen);
+    map_channels(sun->snapshot, nb_exp_ratio, change, ratio);
+    map_channels(sun->snapshot, transmitted, behind, s.behind);
+    for (int c = 0; c < 3; c++) {
+        const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c];
+        const nb_real seen = most_seen[c] * ratio[c];
         const nb_real doubt = doubt_of_end(error[c] + from.error[c], first - last) +
                               doubt_of_end(last_error[c] + to.error[c], last - first);
-        s.behind[c] = nb_exp(-behind[c]);
         s.light[c] = light[c] * seen;
-        const nb_real rounding = doubt + (least + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
+        const nb_real rounding = doubt + (least[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
         s.rounding = nb_max(s.rounding, s.light[c] * rounding + light_error[c] * seen);
     }
     return s;
