@@ -50,6 +50,31 @@ class FogTest(ViewTest):
         self.assertEqual(viewer.process.wait(60), 0)
         self.assertEqual(self.scene.read_text(), before)
 
+    def test_messages_hide_no_controls(self):
+        viewer = Viewer(self, "--size", "480x420")
+        viewer.say("scene.json:1:", lambda: self.scene.write_text("{"))
+        top = viewer.place("OK")[1]
+        viewer.settle()
+        others = []
+
+        def find_others():  # the list may be read while it is written
+            lines = [line.split(" ", 4) for line in viewer.controls.read_text().splitlines()]
+            others[:] = [int(line[1]) + int(line[3]) for line in lines if line[4:] != ["OK"]]
+            return len(others) > 9
+
+        viewer.wait(find_others, "the controls")
+        self.assertLess(max(others), top)
+        viewer.press("OK")
+        viewer.end()
+
+    def test_what_has_not_changed_is_not_written(self):
+        viewer = Viewer(self)
+        before = self.scene.stat().st_mtime_ns
+        viewer.say("view: nothing to save", lambda: viewer.key("ctrl+s"))
+        self.assertEqual(self.scene.stat().st_mtime_ns, before)
+        self.assertEqual(viewer.said("view: saved"), 0)
+        viewer.end()
+
     def test_the_file_changes(self):
         viewer = Viewer(self)
         first = viewer.take_picture()

@@ -181,7 +181,7 @@ void draw_commands(nb_panel *panel)
     ImGui::TextDisabled("drag orbits, right drag looks, wheel nears");
 }
 
-/* ---- messages, which stand beside the controls: nothing moves when they come and go
+/* ---- messages, which stand beside the controls or, where the window is narrow, below: nothing moves when they come and go
  * ---------------------------------
  */
 
@@ -272,12 +272,15 @@ double find_reach(const nebel_camera &camera)
     return sqrt(sum);
 }
 
+// After the notice: where that reaches over the controls they end above it.
 void draw_window(nb_panel *panel)
 {
-    const ImGuiIO &io = ImGui::GetIO();
-    const float width = fminf(330 * scale, io.DisplaySize.x);
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const area &notice = areas[NOTICE];
+    const float width = fminf(330 * scale, size.x);
+    const bool is_narrow = notice.low.x < notice.high.x && notice.low.x < width;
     ImGui::SetNextWindowPos(ImVec2(0, 0));
-    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, io.DisplaySize.y));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, is_narrow ? fmaxf(notice.low.y, 0) : size.y));
     ImGui::SetNextWindowBgAlpha(0.85f);
     ImGui::Begin("nebel", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoTitleBar |
@@ -370,8 +373,8 @@ extern "C" void nb_panel_draw(nb_panel *panel, const char *controls)
     ImGui::NewFrame();
     if (places != nullptr && ImGui::GetIO().WantTextInput) fprintf(places, "0 0 0 0 (typing)\n");
     for (area &taken : areas) taken = area{ImVec2(0, 0), ImVec2(0, 0)};
-    if (panel->shown) draw_window(panel);
     draw_notice(panel);
+    if (panel->shown) draw_window(panel);
     if (panel->help_shown) draw_help(panel);
     release_keys();
     panel->is_held = ImGui::IsAnyItemActive();

@@ -360,6 +360,11 @@ static nebel_result save(viewer *all)
         all->panel.file_is_newer = 1;
         return NEBEL_OK;
     }
+    if (!was_newer && !must_read && !all->panel.saves_camera && !nb_draft_is_changed(&all->draft)) {
+        say(all, "Nothing to save: the file has it all.");
+        nb_report_message("view: nothing to save");
+        return NEBEL_OK;
+    }
     const nebel_result result = nb_draft_save(&all->draft, path, all->panel.saves_camera);
     if (result != NEBEL_OK) return forgive(result);
     nb_report_message("view: saved %s", path);
