@@ -34,9 +34,10 @@ static void test_what_no_scene_has(void **state)
          "mean "
          "\"ambient\"?"},
         {FORMAT, SCENE("`\"planet\": {}"), "planet: unknown key"},
-        {FORMAT, SCENE("`\"up\": \"z\""),
-         "up: comes after \"fog\", whose numbers it explains; move it to the top of the file"},
-        {FORMAT, "{\"nebel\": 1, \"camera\": {}, `\"unit\": 1, \"fog\": []}", "unit: comes after \"camera\", whose"},
+        {FORMAT, "{\"camera\": {\"position\": [0, `-1.1e-3, 0]}, \"unit\": 1e18}",
+         "camera.position[1]: is -0.0011; must be"},
+        {FORMAT, "{\"camera\": {}, \"unit\": `0}", "unit: is 0; must be a number of metres from 1e-9 to 1e18"},
+        {FORMAT, "{\"camera\": {}, \"unit\": 2, `\"unit\": 3}", "unit: the key appears twice"},
         {FORMAT, "{\"up\": `\"x\"}", "up: unknown; must be one of: y, z"},
         {FORMAT, "{\"up\": \"y\", `\"up\": \"y\"}", "up: the key appears twice"},
         {FORMAT, "{\"unit\": `0}", "unit: is 0; must be a number of metres from 1e-9 to 1e18"},

@@ -7,6 +7,7 @@
 typedef struct convention {
     bool z_up;
     double unit;
+    bool late; /* said at the end of the file, as programs do that sort keys */
 } convention;
 
 /* ---- the same text in a convention ----------------------------------------------------------- */
@@ -47,10 +48,19 @@ static size_t write_mark(char *at, const convention *in, char mark, const double
     return size;
 }
 
+static size_t write_space(char *at, const convention *in)
+{
+    return (size_t)sprintf(at, "\"unit\": %.17g, \"up\": \"%s\"", in->unit, in->z_up ? "z" : "y");
+}
+
 static char *expand(const char *template, const convention *in)
 {
     char *text = malloc(4 * strlen(template) + 4000), *at = text;
-    at += sprintf(at, "{\"nebel\": 1, \"up\": \"%s\", \"unit\": %.17g, ", in->z_up ? "z" : "y", in->unit);
+    at += sprintf(at, "{\"nebel\": 1, ");
+    if (!in->late) {
+        at += write_space(at, in);
+        at += sprintf(at, ", ");
+    }
     while (*template != '\0') {
         const bool is_mark = strchr("PDQSELKBC", template[0]) != NULL && template[1] == '(';
         if (!is_mark) {
@@ -68,12 +78,22 @@ static char *expand(const char *template, const convention *in)
         template ++;
         at += write_mark(at, in, mark, numbers);
     }
+    if (in->late) {
+        while (*--at != '}') {
+        }
+        at += sprintf(at, ", ");
+        at += write_space(at, in);
+        *at++ = '}';
+    }
     *at = '\0';
     return text;
 }
 
-static const convention ours = {false, 1};
-static const convention others[] = {{true, 1}, {false, .01}, {true, .01}, {true, 9.4607e15}, {false, .3048}};
+static const convention ours = {.unit = 1};
+static const convention others[] = {
+    {.z_up = true, .unit = 1},         {.unit = .01},   {.z_up = true, .unit = .01},
+    {.z_up = true, .unit = 9.4607e15}, {.unit = .3048}, {.z_up = true, .unit = .01, .late = true},
+    {.unit = 9.4607e15, .late = true}};
 
 static nebel_scene *parse_in(const char *template, const convention *in)
 {

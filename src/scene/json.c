@@ -289,7 +289,7 @@ static void read_text(nb_json *json)
 
 nebel_result nb_json_read(nb_json *json, const nb_json_desc *desc)
 {
-    *json = (nb_json){.desc = *desc, .place = NB_TEXT_START, .unit = 1};
+    *json = (nb_json){.desc = *desc, .place = NB_TEXT_START, .unit = desc->unit > 0 ? desc->unit : 1};
     json->strings.allocator = json->section_keys.allocator = desc->allocator;
     if (nb_json_check_text(json)) read_text(json);
     nb_arena_release(&json->strings);

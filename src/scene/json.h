@@ -53,6 +53,7 @@ typedef struct nb_json_desc {
     size_t size;
     size_t lead;      /* bytes before what the user wrote, without a line's end: places count from behind them */
     const char *name; /* of the file, in messages */
+    double unit;      /* m: that of the text's lengths, on which their limits depend; 0: 1 */
     nebel_allocator allocator;
     nebel_log log;
     const char *const *streamed; /* names, NULL ends them */
@@ -64,7 +65,7 @@ struct nb_json {
     nb_json_desc desc;
     nebel_result result; /* of the first error */
     nb_text_place place;
-    double unit; /* m: that of the text's lengths, on which their limits depend. 1 unless the reader says otherwise */
+    double unit; /* as the description's */
 
     nb_json_node *nodes;
     size_t node_count, node_capacity;

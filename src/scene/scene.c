@@ -25,11 +25,6 @@ enum {
     SECTION_COUNT = NB_SCENE_SECTIONS
 };
 
-/* Their numbers are in the units of the file. */
-#define PLACED_SECTIONS                                                                                                \
-    (NB_BIT(CAMERA) | NB_BIT(SUN) | NB_BIT(LIGHTS) | NB_BIT(MODELS) | NB_BIT(FOG) | NB_BIT(NEBULA) | NB_BIT(CELLS) |   \
-     NB_BIT(CLASSIC))
-
 static const char *const section_names[] = {"nebel", "up",      "unit",        "camera", "background",
                                             "sun",   "ambient", "max_opacity", "lights", "models",
                                             "fog",   "nebula",  "cells",       "classic"};
@@ -47,25 +42,10 @@ static bool read_version(nb_json *json, const nb_json_node *node)
     return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node, "is %.15g; this program reads version 1", version);
 }
 
-static int find_section(uint32_t mask)
-{
-    int section = 0;
-    while ((mask & NB_BIT(section)) == 0) section++;
-    return section;
-}
-
-/* Elements are gone once they are read, so what explains their numbers stands before them. */
+/* Known since find_space, unless it is wrong. */
 static bool read_space(nb_scene_reader *in, const nb_json_node *node, int section)
 {
-    const uint32_t before = in->seen & PLACED_SECTIONS;
-    if (before != 0)
-        return nb_json_fail_key(in->json, NEBEL_ERROR_FORMAT, node,
-                                "comes after \"%s\", whose numbers it explains; move it to the top of the file",
-                                section_names[find_section(before)]);
-    if (section == UP) return nb_read_up(in->json, node, &in->space);
-    if (!nb_read_unit(in->json, node, &in->space)) return false;
-    in->json->unit = in->space.unit;
-    return true;
+    return section == UP ? nb_read_up(in->json, node, &in->space) : nb_read_unit(in->json, node, &in->space);
 }
 
 static bool read_section(nb_scene_reader *in, const nb_json_node *node)
@@ -156,23 +136,50 @@ void nb_read_keep_message(nebel_result result, const char *message, void *user)
     snprintf(in->core_message, sizeof in->core_message, "%s", message);
 }
 
+/* What a file's numbers mean may stand behind them, and those are gone once they are read: a first reading looks for
+ * that alone. What is wrong is left for the second one to say. */
+static bool take_space(nb_json *json, const nb_json_node *value, void *user)
+{
+    nb_space *space = user, wanted = *space;
+    const nb_json_node *parent = nb_json_parent(json, value);
+    if (parent == NULL || nb_json_parent(json, parent) != NULL) return true;
+    if (nb_json_has_key(value, "up") && nb_read_up(json, value, &wanted)) space->z_up = wanted.z_up;
+    if (nb_json_has_key(value, "unit") && nb_read_unit(json, value, &wanted)) space->unit = wanted.unit;
+    return json->result == NEBEL_OK;
+}
+
+static nebel_result find_space(const nb_json_desc *whole, nb_space *space)
+{
+    nb_json json;
+    nb_json_desc desc = *whole;
+    desc.log = (nebel_log){NULL, NULL};
+    desc.take = take_space;
+    desc.user = space;
+    return nb_json_read(&json, &desc) == NEBEL_ERROR_MEMORY ? NEBEL_ERROR_MEMORY : NEBEL_OK;
+}
+
 static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name, nb_save *save)
 {
     nb_json json;
     nb_scene_reader in = {.json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS};
     const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_read_keep_message, &in}};
-    const nb_json_desc desc = {.text = text,
-                               .size = size,
-                               .name = name,
-                               .allocator = scene->allocator,
-                               .log = scene->log,
-                               .streamed = streamed_names,
-                               .take = take,
-                               .user = &in};
+    nb_json_desc desc = {.text = text,
+                         .size = size,
+                         .name = name,
+                         .allocator = scene->allocator,
+                         .log = scene->log,
+                         .streamed = streamed_names,
+                         .take = take,
+                         .user = &in};
     scene->folder = nb_path_folder(&scene->arena, name);
     nebel_result result = scene->folder != NULL ? nebel_create_fog(&fog, &in.trial) : NEBEL_ERROR_MEMORY;
     if (result != NEBEL_OK) return nb_fail(&scene->log, result, "%s: %s", name, nebel_result_text(result));
-    result = nb_json_read(&json, &desc);
+    result = find_space(&desc, &in.space);
+    desc.unit = in.space.unit;
+    if (result == NEBEL_OK)
+        result = nb_json_read(&json, &desc);
+    else
+        nb_fail(&scene->log, result, "%s: out of memory", name);
     nebel_destroy_fog(in.trial);
     scene->data.volumes = scene->volumes;
     scene->data.volume_names = scene->volume_names;
