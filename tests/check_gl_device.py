@@ -2,6 +2,7 @@
 """Checks `nebel render --device gl`: the call, its messages, and its pictures beside those of the CPU."""
 
 import os
+import re
 import unittest
 
 from check_cli import FOG, PictureCase, nebel
@@ -89,11 +90,13 @@ class GlDeviceTest(PictureCase):
         self.assertEqual(nebel("compare", "vertex.exr", "gl.exr", "-c", "transmittance.G", "--fail-above", 1e-2, cwd=self.folder).returncode, 1)
 
     # Reflectances are halves in OpenGL.
-    def assert_same_as_cpu(self, method, *words):
+    def assert_same_as_cpu(self, method, *words, **more):
         self.assert_done(self.render("cpu.exr", "--aov", "--samples", 1, "--method", method, *words))
-        self.assert_done(self.draw("gl.exr", "--aov", "--samples", 1, "--method", method, *words))
+        drawn = self.draw("gl.exr", "--aov", "--samples", 1, "--method", method, *words, **more)
+        self.assert_done(drawn)
         for channel, most in (("R", 2e-4), ("transmittance.G", 1e-5), ("in_scattering.B", 1e-5)):
             self.assert_done(nebel("compare", "cpu.exr", "gl.exr", "-c", channel, "--fail-above", most, cwd=self.folder))
+        return drawn.err
 
     def write_classic(self, classic, **more):
         camera = {"position": [0.4, 0.3, 3], "look_at": [0, 0, 0], **more}
@@ -126,6 +129,32 @@ class GlDeviceTest(PictureCase):
                                     "stage": stage}, **projection)
                 for method in ("linear", "exp", "exp2"):
                     self.assert_same_as_cpu(method)
+
+    def test_the_fixed_pipeline_or_shaders(self):
+        """Both draw the same; which one it is is said."""
+        core = {"MESA_GL_VERSION_OVERRIDE": "3.3FC"}
+        for curve in ({}, {"curve": "exp2"}):
+            self.write_classic({"color": [0.9, 0.5, 0.1], **curve})
+            for method in ("fog-coord", "two-pass", "alpha"):
+                said = self.assert_same_as_cpu(method)
+                self.assertIn("Compatibility Profile", said)
+                self.assertNotIn("shaders", said)
+                said = self.assert_same_as_cpu(method, env=core)
+                self.assertNotIn("Compatibility Profile", said)
+                self.assertIn(f"--method {method} is drawn by shaders, not by the fixed pipeline, because the driver has no", said)
+        self.write_classic({"color": 1}, projection="panorama")
+        self.assertIn("drawn by shaders", self.draw("a.png", "--method", "alpha").err)
+
+    def test_samples_of_the_fixed_pipeline(self):
+        self.write_classic({"color": [0.9, 0.5, 0.1]})
+        self.assert_done(self.draw("four.exr", "--aov", "--samples", 3, "--method", "fog-coord"))
+        self.assert_done(self.render("cpu.exr", "--aov", "--samples", 4, "--method", "fog-coord"))
+        self.assert_done(self.draw("one.exr", "--aov", "--samples", 1, "--method", "fog-coord"))
+        # Edges are smooth; the places of samples are others than the CPU's.
+        for channel in ("G", "transmittance.G", "normal.Z"):
+            far = [float(re.search(r"RMSE: (\S+)", nebel("compare", "cpu.exr", f"{name}.exr", "-c", channel, cwd=self.folder).out)[1])
+                   for name in ("one", "four")]
+            self.assertLess(far[1], 0.6 * far[0], channel)
 
     def test_direct3d_states(self):
         numbers = {"fog_start": 2.5, "fog_end": 4, "fog_density": 0.2, "fog_color": [0.9, 0.5, 0.1]}

@@ -498,9 +498,9 @@ static nebel_result draw_frame(studio *all)
 static int open_gl(studio *all)
 {
     const settings *const wanted = all->wanted;
-    const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, surfaces_of(all), &all->listener);
+    const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, surfaces_of(all), wanted->method,
+                                          &all->listener);
     if (status != NB_DONE || wanted->quiet) return status;
-    nb_report_message("note: --device gl: %s", all->painter.context.renderer);
     if (wanted->aov) nb_report_message("note: --device gl: there is no channel error; OpenGL knows no bound of it");
     return NB_DONE;
 }

@@ -58,11 +58,20 @@ static int list_displays(EGLDisplay displays[DEVICES_MOST + 2])
 
 static EGLContext make_context(EGLDisplay display, EGLConfig config, nb_gl_api api)
 {
+    const EGLint profile =
+        api == NB_GL_API_FIXED ? EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT : EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT;
     const EGLint desktop[] = {
-        EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+        EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK, profile, EGL_NONE};
     const EGLint embedded[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 0, EGL_NONE};
     return eglCreateContext(display, config, EGL_NO_CONTEXT, api == NB_GL_API_ES ? embedded : desktop);
+}
+
+/* A driver may give another profile than it was asked for. */
+static int has_fixed_pipeline(void)
+{
+    GLint profile = 0;
+    glGetIntegerv(GL_CONTEXT_PROFILE_MASK, &profile);
+    return (profile & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT) != 0;
 }
 
 /* A surface of one pixel, because not every driver makes a context current without one. */
@@ -84,9 +93,15 @@ static int open_on(nb_gl_context *gl, EGLDisplay display, nb_gl_api api)
     gl->surface = eglCreatePbufferSurface(display, config, pixel);
     if (gl->surface == EGL_NO_SURFACE) return fail(gl, STAGE_SURFACE, "EGL makes no surface off the screen");
     gl->context = make_context(display, config, api);
-    if (gl->context != EGL_NO_CONTEXT && eglMakeCurrent(display, gl->surface, gl->surface, gl->context)) return 0;
+    if (gl->context != EGL_NO_CONTEXT && eglMakeCurrent(display, gl->surface, gl->surface, gl->context) &&
+        (api != NB_GL_API_FIXED || has_fixed_pipeline())) {
+        return 0;
+    }
     (void)fail(gl, STAGE_CONTEXT,
-               api == NB_GL_API_ES ? "the driver has no OpenGL ES 3.0" : "the driver has no OpenGL 3.3 core");
+               api == NB_GL_API_ES      ? "the driver has no OpenGL ES 3.0"
+               : api == NB_GL_API_FIXED ? "the driver has no compatibility profile of OpenGL 3.3"
+                                        : "the driver has no OpenGL 3.3 core");
+    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (gl->context != EGL_NO_CONTEXT) eglDestroyContext(display, gl->context);
     eglDestroySurface(display, gl->surface);
     return -1;

@@ -2,7 +2,11 @@
 #ifndef NB_GL_CONTEXT_TOOL_H
 #define NB_GL_CONTEXT_TOOL_H
 
-typedef enum nb_gl_api { NB_GL_API_DESKTOP, NB_GL_API_ES } nb_gl_api;
+typedef enum nb_gl_api {
+    NB_GL_API_DESKTOP,
+    NB_GL_API_ES,
+    NB_GL_API_FIXED /* OpenGL with the fixed pipeline, too: a compatibility profile */
+} nb_gl_api;
 
 typedef struct nb_gl_context {
     void *display, *context, *surface; /* of EGL */
@@ -11,7 +15,7 @@ typedef struct nb_gl_context {
     char renderer[256];                /* GL_RENDERER and GL_VERSION */
 } nb_gl_context;
 
-/* Makes a context of OpenGL 3.3 core, or OpenGL ES 3.0, current in this thread. Its framebuffer is one pixel: draw into
+/* Makes a context of OpenGL 3.3, or OpenGL ES 3.0, current in this thread. Its framebuffer is one pixel: draw into
  * your own. Returns 0, or -1 with the reason, and what to do, in `fault`. */
 int nb_gl_context_open(nb_gl_context *gl, nb_gl_api api);
 

@@ -1,5 +1,7 @@
 #include "gl_painter.h"
 
+#include "gl_fixed.h"
+
 static nebel_result set_particles(const nb_gl_painter *painter)
 {
     const nebel_scene *const scene = painter->loaded->scene;
@@ -12,19 +14,43 @@ static nebel_result set_particles(const nb_gl_painter *painter)
     return result;
 }
 
+static int is_of_fixed(nebel_method method)
+{
+    return method == NEBEL_METHOD_FOG_COORD || method == NEBEL_METHOD_TWO_PASS || method == NEBEL_METHOD_ALPHA;
+}
+
+/* It has neither particles nor rays that no matrix makes, and parallel ones have no eye. */
+static int suits_fixed(const nebel_scene_data *scene)
+{
+    return scene->particle_count == 0 && scene->camera.projection == NEBEL_PROJECTION_PERSPECTIVE;
+}
+
+static void note_driver(const nb_gl_painter *painter, nebel_method method)
+{
+    nb_report_message("note: --device gl: %s", painter->context.renderer);
+    if (painter->is_fixed || !is_of_fixed(method)) return;
+    nb_report_message("note: --device gl: --method %s is drawn by shaders, not by the fixed pipeline, because %s",
+                      nebel_method_word(method),
+                      suits_fixed(painter->scene) ? "the driver has no compatibility profile"
+                                                  : "that has neither particles nor this projection");
+}
+
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
-                       const nebel_scene_data *scene, nb_report_listener *listener)
+                       const nebel_scene_data *scene, nebel_method method, nb_report_listener *listener)
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
-    *painter = (nb_gl_painter){.loaded = loaded};
+    *painter = (nb_gl_painter){.loaded = loaded, .scene = scene, .log = desc.log};
     if (scene->lamp_count > 0) {
         return nb_report_failure("render: %s: OpenGL does not light with lamps yet; say --device cpu", name);
     }
-    if (nb_gl_context_open_any(&painter->context) != 0) {
+    const int fixed = is_of_fixed(method) && suits_fixed(scene);
+    painter->is_fixed = fixed && nb_gl_context_open(&painter->context, NB_GL_API_FIXED) == 0;
+    if (!painter->is_fixed && nb_gl_context_open_any(&painter->context) != 0) {
         return nb_report_failure("render: --device gl: %s; or say --device cpu", painter->context.fault);
     }
     nebel_result result = nebel_create_gl_renderer(scene, NULL, &desc, &painter->renderer);
     if (result == NEBEL_OK) result = set_particles(painter);
+    if (result == NEBEL_OK && !listener->quiet) note_driver(painter, method);
     if (result == NEBEL_OK) return NB_DONE;
     nebel_destroy_gl_renderer(painter->renderer);
     painter->renderer = NULL;
@@ -57,6 +83,10 @@ nebel_result nb_gl_painter_draw(nb_gl_painter *painter, double frame, const nebe
 {
     const int by_cells = desc->method == NEBEL_GL_METHOD_CELLS || desc->method == NEBEL_GL_METHOD_CELLS_PIXEL;
     nebel_result result = by_cells ? clear_fog(painter) : set_fog(painter, frame);
+    if (result == NEBEL_OK && painter->is_fixed) {
+        const nb_gl_fixed by = {painter->renderer, painter->scene, painter->loaded->fog, painter->log};
+        return nb_gl_fixed_draw(&by, desc, planes);
+    }
     if (result == NEBEL_OK) result = nebel_gl_render_frame(painter->renderer, desc);
     return result == NEBEL_OK ? nebel_gl_read_planes(painter->renderer, planes) : result;
 }
