@@ -321,6 +321,23 @@ class SceneTest(ViewTest):
         self.assertTrue(self.same(drawn, self.draw_like("linear.png", "--method", "linear"), ROUNDING_TOGETHER))
         viewer.end()
 
+    def test_a_preset_fills_in_what_a_fog_is(self):
+        self.scene = self.write_scene("scene.json", [{**FOG, "source": 0.5}], ambient=1)
+        viewer = Viewer(self, "--size", "400x900")
+        viewer.type("samples", "1")
+        before = viewer.take_picture()
+        viewer.choose("fog[0].preset", "heavy_advection")
+        fog = viewer.save()["fog"][0]
+        self.assertEqual(fog["albedo"], [0.9999942, 0.9999992, 0.9999995])
+        self.assertEqual(fog["phase"], {"type": "droplets", "diameter": 40})
+        self.assertEqual(fog["extinction"], 0.0287482)
+        self.assertNotIn("source", fog)
+        drawn = viewer.take_picture()
+        self.scene.write_text(json.dumps({"nebel": 1, "fog": [{"shape": FOG["shape"], "preset": "heavy_advection"}], "ambient": 1}))
+        self.assertTrue(self.same(drawn, self.draw_like("preset.png"), ROUNDING_TOGETHER))
+        self.assertFalse(self.same(drawn, before, ROUNDING_TOGETHER))
+        viewer.end()
+
     def test_contrast_phase_and_colours(self):
         nebula = {"shape": {"type": "sphere", "center": [0, 0, -3], "radius": 2}, "count": 3, "emission": 5, "size": [0.8, 1]}
         self.scene = self.write_scene("scene.json", [{**FOG, "albedo": 0.5, "source": None}], nebula=[nebula], ambient=1)

@@ -100,6 +100,44 @@ bool draw_light(nebel_volume_desc *volume, const nebel_volume_entry *entry)
     return pick("emission [1/m]", volume->emission, false, "What it shines by itself, radiance per metre.") || changed;
 }
 
+// The unit of a file costs a few last digits.
+bool is_of(const nebel_volume_desc *volume, const nebel_preset *preset)
+{
+    for (int c = 0; c < 3; c++)
+        if (!(fabs(volume->extinction[c] / preset->extinction[c] - 1) < 1e-12) ||
+            volume->albedo[c] != preset->albedo[c])
+            return false;
+    return volume->phase.type == preset->phase.type && volume->phase.g == preset->phase.g &&
+           volume->phase.diameter == preset->phase.diameter;
+}
+
+// Measured fog, by its name where the numbers are still its own.
+bool draw_preset(nebel_volume_desc *volume)
+{
+    enum { MOST = 16 };
+    size_t count;
+    const nebel_preset *presets = nebel_list_presets(&count);
+    const char *names[1 + MOST] = {"its own"};
+    int chosen = 0;
+    if (count > MOST) count = MOST;
+    for (size_t i = 0; i < count; i++) {
+        names[1 + i] = presets[i].name;
+        if (is_of(volume, &presets[i])) chosen = int(i) + 1;
+    }
+    if (!choose("preset", &chosen, names, int(count) + 1,
+                "Fog as it was measured: extinction, albedo and phase. Change them afterwards as you like."))
+        return false;
+    if (chosen == 0) return false;
+    const nebel_preset *preset = &presets[chosen - 1];
+    for (int c = 0; c < 3; c++) {
+        volume->extinction[c] = preset->extinction[c];
+        volume->albedo[c] = preset->albedo[c];
+        volume->source[c] = 0;
+    }
+    volume->phase = preset->phase;
+    return true;
+}
+
 bool draw_distances(nebel_volume_desc *volume)
 {
     bool changed = ImGui::DragInt("priority", &volume->priority, 0.05f);
@@ -133,6 +171,7 @@ bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry
                           "Replaces: this fog in the place of all of a lower priority.");
     volume->operation = nebel_operation(operation);
     if (volume->operation != NEBEL_OPERATION_EXCLUDE) {
+        if (entry->key_count == 0) changed |= draw_preset(volume);
         changed |= draw_amount(volume->extinction, entry);
         changed |= draw_light(volume, entry);
         changed |= draw_density(&volume->density, panel->data->camera.look_at, reach);
