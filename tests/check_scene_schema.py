@@ -8,11 +8,9 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_cells", "read_classic", "read_density", "read_grid", "read_light", "read_model", "read_nebula", "read_shape", "read_volume"]
+READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_camera", "read_cells", "read_classic", "read_density", "read_grid", "read_light", "read_model", "read_nebula", "read_noise", "read_shape", "read_volume"]
 TABLE = re.compile(r"^ *(?:static )?const char \*const (?:\w+_)?(?:names|types)\[\w*\] = \{(.*?)\}", re.S | re.M)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
-REFUSED = {"noise"}  # known to the reader only to be refused
-
 BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}}]}',
        '{"nebel": 1, "fog": [{"shape": {"type": "world"}, "extinction": 1, "visibility": 2}]}',
@@ -60,7 +58,7 @@ def reader_names():
         for table in TABLE.findall((ROOT / "src/scene" / f"{name}.c").read_text()):
             found |= set(re.findall(r'"([A-Za-z_0-9]+)"', table))
     presets = (ROOT / "src/media/presets.c").read_text()
-    return found - REFUSED | set(re.findall(r'\.name = "(\w+)"', presets))
+    return found | set(re.findall(r'\.name = "(\w+)"', presets))
 
 
 def schema_names(node):

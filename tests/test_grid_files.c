@@ -327,6 +327,51 @@ static void scenes_give_back_all_memory(void **state)
     parse_without_memory(WEDGE);
 }
 
+/* ---- noise ----------------------------------------------------------------------------------- */
+
+#define NOISE                                                                                                          \
+    "{\"nebel\": 1, \"fog\": [{\"shape\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}, "               \
+    "\"extinction\": 1, \"density\": {\"type\": \"noise\", \"size\": [12, 12, 12], \"cells\": [2, 3, 2], "             \
+    "\"octaves\": 2, \"gain\": 0.6, \"coverage\": 0.8, \"edge\": [0.1, 0, 0], \"seed\": 4, \"drift\": [0.5, 0, 0], "   \
+    "\"change\": 0.25}}]}"
+
+static double light_at_frame(const nebel_scene *scene, double frame)
+{
+    nebel_snapshot *fog = NULL;
+    nebel_light light;
+    const nebel_ray ray = {.origin = {-1, .4, .6}, .direction = {1, 0, 0}, .t_max = 3};
+    assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    nebel_release_snapshot(fog);
+    return light.transmittance[0];
+}
+
+/* The noise of a frame is that which the core makes with what has drifted and passed until then. */
+static void noise_moves_from_frame_to_frame(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(NOISE);
+    nebel_noise_desc desc = {.size = {12, 12, 12},
+                             .cells = {2, 3, 2},
+                             .octaves = 2,
+                             .gain = .6,
+                             .coverage = .8,
+                             .edge = {.1, 0, 0},
+                             .seed = 4};
+    assert_int_equal(nebel_scene_contents(scene)->moving_volume_count, 1);
+    for (int frame = 0; frame < 8; frame += 3) {
+        nebel_grid *grid = NULL;
+        desc.offset[0] = .5 * frame;
+        desc.time = .25 * frame;
+        assert_int_equal(nebel_create_noise(&desc, &grid), NEBEL_OK);
+        assert_true(light_at_frame(scene, frame) == through(grid, 0, .4, .6));
+        nebel_release_grid(grid);
+    }
+    assert_true(fabs(light_at_frame(scene, 0) - light_at_frame(scene, 3)) > 1e-4);
+    nebel_destroy_scene(scene);
+    parse_without_memory(NOISE);
+}
+
 /* A copy of the volume, moved, has the file of the first. */
 static void copies_are_saved(void **state)
 {
@@ -389,6 +434,7 @@ int main(void)
         cmocka_unit_test(scenes_say_what_is_wrong),
         cmocka_unit_test(scenes_give_back_all_memory),
         cmocka_unit_test(copies_are_saved),
+        cmocka_unit_test(noise_moves_from_frame_to_frame),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -237,7 +237,8 @@ static void test_what_no_density_has(void **state)
     const rule rules[] = {
         {FORMAT, DENSITY("\"type\": `\"grid\""),
          "fog[0].density.type: \"grid\" does not fit this shape; it needs a box"},
-        {UNSUPPORTED, DENSITY("\"type\": `\"noise\""), "fog[0].density.type: this version has no \"noise\" densities"},
+        {FORMAT, DENSITY("\"type\": `\"noise\""),
+         "fog[0].density.type: \"noise\" does not fit this shape; it needs a box"},
         {FORMAT, DENSITY("\"type\": `\"radial\""),
          "fog[0].density.type: \"radial\" does not fit this shape; it needs a sphere"},
         {FORMAT, DENSITY("\"type\": `\"soft_edge\", \"distance\": 1"),

@@ -211,6 +211,32 @@ typedef struct nebel_grid_desc {
  * Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
 nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
 
+/* Noise: a grid that is made, for wisps and clouds. Value noise on a lattice of `cells` across the box, in `octaves` each
+ * of half the size and `gain` times the weight of the one before; octaves whose cells would be smaller than two voxels
+ * are left out, so that voxels have all there is of it. Of the sum, 0 to 1, what is above 1 - coverage is density, again
+ * 0 to 1 and in steps of 1 / 65535. The same everywhere for the same numbers. */
+typedef struct nebel_noise_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    size_t size[3];   /* voxels, as in nebel_grid_desc */
+    double cells[3];  /* of the first octave along each axis of the box, > 0, of two voxels each at least */
+    int octaves;      /* 1 to 16; 0: 1 */
+    double gain;      /* 0 to 1; 0: 0.5 */
+    double coverage;  /* 0 to 1; 0: 1. The less, the more apart are the wisps */
+    double edge[3];   /* 0 to 0.5: over this part of the box the density rises from 0 on its faces, along each axis */
+    double offset[3]; /* in cells of the first octave, within NEBEL_MAX_NOISE_OFFSET: how far the noise has drifted */
+    double time;      /* the same: in 1 it has become another; smaller octaves change sooner */
+    uint32_t seed;    /* any */
+    const char *name; /* as in nebel_grid_desc */
+} nebel_noise_desc;
+
+#define NEBEL_MAX_NOISE_OFFSET 1e9
+#define NEBEL_MAX_NOISE_VOXELS 8388608 /* in all */
+
+/* Makes a grid of noise in *grid, with one owner; on an error *grid is NULL. Cost: voxels times octaves. Any thread.
+ * Errors: ARGUMENT, VALUE, LIMIT, MEMORY. */
+nebel_result nebel_create_noise(const nebel_noise_desc *desc, nebel_grid **grid);
+
 /* The grid's name, "" where it has none; lives as long as the grid. Any thread. */
 const char *nebel_grid_name(const nebel_grid *grid);
 

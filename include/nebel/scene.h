@@ -113,7 +113,7 @@ typedef struct nebel_scene_data {
 
     const nebel_volume_entry *volume_entries; /* of the same volumes */
 
-    size_t moving_volume_count; /* how many volumes have keys: 0 means that the fog is the same at every frame */
+    size_t moving_volume_count; /* that have keys, or noise that moves; 0: the fog is the same at every frame */
 
     size_t nebula_count; /* strewn by nebel_make_scene_particles; allocator and log are not set */
     const nebel_nebula_desc *nebulae;
@@ -180,7 +180,7 @@ nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle
 void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles); /* NULL is fine */
 
 /* A volume at a frame: at its first key before, at its last after, between them on a cubic through the keys on which no
- * number leaves its range. Its arrays are the scene's. index < contents->volume_count. */
+ * number leaves its range. Noise is that of frame 0. Its arrays are the scene's. index < contents->volume_count. */
 nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame);
 
 /* The same of any 1 or more keys of one volume. */

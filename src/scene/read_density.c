@@ -11,7 +11,8 @@ static const char *const key_names[] = {"type", "base",  "scale_height", "below"
 static const char *const type_names[] = {"constant", "height",    "linear", "radial",
                                          "gaussian", "soft_edge", "grid",   "noise"};
 
-enum { TYPE_COUNT = sizeof type_names / sizeof *type_names };
+/* Noise is a grid to the core. */
+enum { TYPE_COUNT = sizeof type_names / sizeof *type_names, NOISE = NEBEL_DENSITY_COUNT };
 
 #define DENSITY_KEYS(required, optional, owner)                                                                        \
     {                                                                                                                  \
@@ -37,14 +38,11 @@ static bool fail_shape(nb_json *json, const nb_json_node *node, const char *want
 
 static bool check_type(nb_json *json, const nb_json_node *node, int type, nebel_shape_type shape)
 {
-    if (type >= NEBEL_DENSITY_COUNT)
-        return nb_json_fail(json, NEBEL_ERROR_UNSUPPORTED, node,
-                            "this version has no \"%s\" densities; use one of the others", type_names[type]);
     if (type == NEBEL_DENSITY_RADIAL && shape != NEBEL_SHAPE_SPHERE && shape != NEBEL_SHAPE_ELLIPSOID)
         return fail_shape(json, node, "a sphere or an ellipsoid");
     if (type == NEBEL_DENSITY_SOFT_EDGE && (shape == NEBEL_SHAPE_WORLD || shape >= NEBEL_SHAPE_UNION))
         return fail_shape(json, node, "a shape with a surface that is no union or intersection");
-    if (type == NEBEL_DENSITY_GRID && shape != NEBEL_SHAPE_BOX) return fail_shape(json, node, "a box");
+    if (type >= NEBEL_DENSITY_GRID && shape != NEBEL_SHAPE_BOX) return fail_shape(json, node, "a box");
     return true;
 }
 
@@ -115,6 +113,7 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
     const int type = nb_value_type(json, node, type_names, TYPE_COUNT);
     if (type < 0 || !check_type(json, find_type(json, node), type, shape)) return false;
     if (type == NEBEL_DENSITY_GRID) return nb_read_grid(in, node, density);
+    if (type == NOISE) return nb_read_noise(in, node, density);
     if (!nb_value_members(json, node, &density_keys[type], found)) return false;
     *density = (nebel_density){.type = (nebel_density_type)type, .power = type == NEBEL_DENSITY_RADIAL ? 1 : 0};
     return read_members(json, found, density);

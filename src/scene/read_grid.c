@@ -38,7 +38,7 @@ static bool read_choices(nb_json *json, const nb_json_node *const *found, nebel_
     return filter >= 0 && type >= 0;
 }
 
-static bool read_size(nb_json *json, const nb_json_node *node, size_t size[3])
+bool nb_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3])
 {
     if (node == NULL) return true;
     if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of three numbers of voxels")) return false;
@@ -62,7 +62,7 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *const *found, neb
     if (!nb_value_text(in->json, found[FILE_KEY], arena, &path) ||
         (found[GRID] != NULL && !nb_value_text(in->json, found[GRID], arena, &file->grid)) ||
         !nb_value_integer(in->json, found[SLICES], 1, NEBEL_MAX_GRID_SIZE, &slices) ||
-        !read_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
+        !nb_read_grid_size(in->json, found[SIZE], file->size) || !read_choices(in->json, found, file))
         return false;
     if (path[0] == '\0')
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[FILE_KEY], "is empty; must be the path of a file");
@@ -71,8 +71,7 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *const *found, neb
     return file->file != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, found[FILE_KEY], "out of memory");
 }
 
-/* The scene is one of its owners. */
-static bool keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid)
+bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid)
 {
     nebel_scene *scene = in->scene;
     void *grids = (void *)scene->grids;
@@ -99,5 +98,5 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
     const nebel_result result = nebel_load_grid(&file, &desc, &density->grid);
     if (result != NEBEL_OK) return nb_json_fail(json, result, found[FILE_KEY], "%s", note.text);
-    return keep_grid(in, node, density->grid);
+    return nb_scene_keep_grid(in, node, density->grid);
 }

@@ -318,8 +318,12 @@ static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double
     const nebel_scene_data *data = &scene->data;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++) {
-        const nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
-        result = nebel_add_volume(fog, &volume, NULL);
+        nebel_grid *noise;
+        nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
+        result = nb_scene_noise_at(scene, volume.density.grid, frame, &noise);
+        if (noise != NULL) volume.density.grid = noise;
+        if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
+        nebel_release_grid(noise);
     }
     return result;
 }
@@ -389,5 +393,6 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, (void *)scene->files);
     for (size_t i = 0; i < scene->grid_count; i++) nebel_release_grid(scene->grids[i]);
     nb_release(&allocator, (void *)scene->grids);
+    nb_release(&allocator, scene->noises);
     nb_release(&allocator, scene);
 }

@@ -30,6 +30,13 @@ typedef struct nb_model_set {
     uint64_t triangle_count;
 } nb_model_set;
 
+/* Noise that moves, as it is at frame 0. */
+typedef struct nb_noise {
+    const nebel_grid *grid;
+    nebel_noise_desc desc;
+    double drift[3], change; /* of its offset and its time, per frame */
+} nb_noise;
+
 struct nebel_scene {
     nebel_allocator allocator;
     nebel_log log;
@@ -57,6 +64,9 @@ struct nebel_scene {
 
     nebel_grid **grids;
     size_t grid_count, grid_capacity;
+
+    nb_noise *noises;
+    size_t noise_count, noise_capacity;
 
     nb_model_source *models;
     nebel_model *placements; /* of the models, in the words of the public face */
@@ -128,6 +138,19 @@ bool nb_read_node_shape(nb_scene_reader *in, const nb_json_node *node, nebel_sha
 bool nb_read_place_volume(nb_scene_reader *in, const nb_json_node *node, nebel_volume_desc *volume);
 /* Adds to the files that the scene names; false when memory is out. */
 bool nb_scene_keep_file(nebel_scene *scene, const char *file);
+
+/* Three numbers of voxels. */
+bool nb_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3]);
+
+/* The scene becomes the grid's owner, also where it fails. */
+bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid);
+
+/* The voxels of a density of the type "noise". */
+bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
+
+/* What noise that moves has become at a frame, in *made, with one owner; NULL where the grid is none, or the same.
+ * Errors: LIMIT, VALUE (drifted too far), MEMORY. */
+nebel_result nb_scene_noise_at(const nebel_scene *scene, const nebel_grid *grid, double frame, nebel_grid **made);
 
 /* The voxels of a density of the type "grid". */
 bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
