@@ -311,12 +311,9 @@ static int has_particles(const frame *f)
 static nebel_result draw_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
+    if (!has_fog(f)) return NEBEL_OK;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
-    if (!has_fog(f)) {
-        clear_fog();
-        return NEBEL_OK;
-    }
     nebel_result result = NEBEL_OK;
     if (nb_method_is_by_vertex(&f->method))
         draw_vertex_fog(f);
@@ -364,8 +361,10 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     set_clip(f, program);
     glUniform3f(glGetUniformLocation(program, "scene_forward"), parallel ? (float)-eye[2] : 0,
                 parallel ? (float)-eye[6] : 0, parallel ? (float)-eye[10] : 0);
-    if (f->desc->method == NEBEL_GL_METHOD_FIVE_TAP) set_taps(f, program);
-    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, f->renderer->targets.place);
+    glUniform2f(glGetUniformLocation(program, "scene_size"), (float)f->desc->width, (float)f->desc->height);
+    const int five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP;
+    if (five_taps) set_taps(f, program);
+    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, five_taps ? f->renderer->targets.place : f->renderer->targets.depth);
     if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
     if (fog->tiles == 0) return;
@@ -386,6 +385,7 @@ static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_
     const nebel_result result = passes != NULL ? nebel_gl_get_fog(passes, fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     kind.panorama = f->panorama;
+    kind.has_surfaces = r->meshes.count > 0;
     kind.has_fog = passes != NULL;
     kind.in_texture = fog->texture != 0;
     kind.tiled = fog->tiles != 0;
@@ -581,7 +581,8 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_gl_fog fog;
     unsigned program = 0;
     const nebel_gl *const passes = f->casts && r->fog != NULL && !f->method.replaces_fog ? r->sun_fog : NULL;
-    const nb_light_kind kind = {.sunlit = f->casts, .dimmed = f->dims, .veil_layers = count_veil_layers(f)};
+    const nb_light_kind kind = {
+        .sunlit = f->casts, .dimmed = f->dims, .in_fog = has_fog(f), .veil_layers = count_veil_layers(f)};
     const nebel_result result = find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);

@@ -1,33 +1,47 @@
 #include "particle_text.h"
 
 /* A square across the way to the ball that hides it: its silhouette is a circle d / sqrt(d^2 - r^2) times as wide as
- * the ball. All the picture where the eye is inside, or nearly. */
+ * the ball. All the picture where the eye is inside, or nearly. Rays come with the
+ * corners, in the ball's own frame: aside, and towards its middle. So a fragment has what it needs of its ray without
+ * loss, at the price of few operations: with s the square of what is aside, f what is towards, d the distance of the
+ * middle, the ray is nearest to the middle after d f / sqrt(s + f^2), and d^2 s / (s + f^2) is the square of how far
+ * it is from it there. Of parallel rays that is d and s. */
 const char nb_particle_vertex_text[] =
     "layout(location = 0) in vec4 ball_place;\n"      /* center, radius */
     "layout(location = 1) in vec4 ball_extinction;\n" /* and profile */
-    "layout(location = 2) in vec4 ball_emission;\n"   /* and distance */
+    "layout(location = 2) in vec4 ball_emission;\n"
     "uniform mat4 scene_clip;\n"
     "uniform vec3 scene_forward;\n" /* 0 where rays meet in the eye */
     "uniform vec3 scene_rays[6];\n"
-    "flat out vec3 pass_rays[6];\n"
+    "uniform vec2 scene_size;\n" /* pixels */
+    "out vec3 pass_ray;\n"
+    "flat out vec3 sight;\n" /* d, and what s counts for: outside, and beside f^2 */
     "flat out vec4 place;\n"
     "flat out vec4 extinction;\n"
-    "flat out vec4 emission;\n"
+    "flat out vec3 saturation;\n"
     "void main()\n"
     "{\n"
     "    vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;\n"
     "    bool parallel = dot(scene_forward, scene_forward) > 0.0;\n"
     "    float d = length(ball_place.xyz), r = ball_place.w;\n"
-    "    vec3 way = parallel ? scene_forward : ball_place.xyz / max(d, 1e-30);\n"
+    "    vec3 way = parallel ? scene_forward : d > 0.0 ? ball_place.xyz / d : vec3(0.0, 0.0, 1.0);\n"
     "    vec3 axis = abs(way.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);\n"
     "    vec3 right = normalize(cross(way, axis)), up = cross(right, way);\n"
     "    float size = parallel ? r : r * d * inversesqrt(max((d - r) * (d + r), 1e-30));\n"
     "    vec3 at = ball_place.xyz + 1.001 * size * (corner.x * right + corner.y * up);\n"
-    "    pass_rays = scene_rays;\n"
+    "    bool around = !parallel && !(d > 1.05 * r);\n"
+    "    if (around) {\n"
+    "        vec2 pixel = max(corner, 0.0) * scene_size;\n"
+    "        vec3 ray = scene_rays[3] + pixel.x * scene_rays[4] + pixel.y * scene_rays[5];\n"
+    "        pass_ray = vec3(dot(ray, right), dot(ray, up), dot(ray, way));\n"
+    "    } else {\n"
+    "        pass_ray = vec3(1.001 * size / (parallel ? 1.0 : d) * corner, 1.0);\n"
+    "    }\n"
+    "    sight = parallel ? vec3(dot(ball_place.xyz - scene_rays[0], way), 1.0, 0.0) : vec3(d, d * d, 1.0);\n"
     "    place = ball_place;\n"
-    "    extinction = ball_extinction;\n"
-    "    emission = ball_emission;\n"
-    "    gl_Position = !parallel && d < 1.05 * r ? vec4(corner, 0.0, 1.0) : scene_clip * vec4(at, 1.0);\n"
+    "    extinction = vec4(max(ball_extinction.xyz, 1e-24), ball_extinction.w);\n" /* a light by itself has one, too */
+    "    saturation = ball_emission.xyz / extinction.xyz;\n"
+    "    gl_Position = around ? vec4(corner, 0.0, 1.0) : scene_clip * vec4(at, 1.0);\n"
     "}\n";
 
 const char nb_round_particle_vertex_text[] =
@@ -36,24 +50,29 @@ const char nb_round_particle_vertex_text[] =
     "layout(location = 2) in vec4 ball_emission;\n"
     "flat out vec4 place;\n"
     "flat out vec4 extinction;\n"
-    "flat out vec4 emission;\n"
+    "flat out vec3 saturation;\n"
     "void main()\n"
     "{\n"
     "    float d = length(ball_place.xyz), r = ball_place.w;\n"
     "    place = ball_place;\n"
-    "    extinction = ball_extinction;\n"
-    "    emission = ball_emission;\n"
+    "    extinction = vec4(max(ball_extinction.xyz, 1e-24), ball_extinction.w);\n" /* a light by itself has one, too */
+    "    saturation = ball_emission.xyz / extinction.xyz;\n"
     "    vec4 box = d < 1.05 * r ? box_around() : box_of_cone(ball_place.xyz / d, asin(r / d) / box_quarter);\n"
     "    gl_Position = box_corner(box, gl_VertexID);\n"
     "}\n";
 
 /* A target for each colour where they are dimmed by different factors: blending has room for one in each. */
-const char nb_particle_text[] =
+const char nb_particle_start_text[] =
     "flat in vec4 place;\n"
     "flat in vec4 extinction;\n"
-    "flat in vec4 emission;\n"
+    "flat in vec3 saturation;\n"
+    "#ifndef SCENE_PANORAMA\n"
+    "in vec3 pass_ray;\n"
+    "flat in vec3 sight;\n"
+    "#endif\n"
     "#ifndef SCENE_FIVE_TAPS\n"
-    "uniform highp sampler2D scene_place;\n"
+    "uniform highp sampler2D scene_depth;\n"
+    "uniform vec2 scene_size;\n"
     "#else\n"
     "uniform vec3 scene_axis;\n"
     "uniform vec4 scene_taps;\n" /* offset, nothing, edge, margin */
@@ -77,8 +96,11 @@ const char nb_particle_text[] =
     "    out_first = vec4(source, factor.x);\n"
     "#endif\n"
     "}\n"
-    "nebel_light fog_before(vec3 origin, vec3 direction, float t)\n"
+    "nebel_light fog_before(float t)\n"
     "{\n"
+    "#ifdef SCENE_FOG\n"
+    "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
+    "#endif\n"
     "#if !defined(SCENE_FOG)\n"
     "    nebel_light clear;\n"
     "    clear.transmittance = vec3(1.0);\n"
@@ -127,39 +149,59 @@ const char nb_particle_text[] =
     "float brightness() { return 1.0; }\n"
     "float ray_end()\n"
     "{\n"
-    "    float surface = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
-    "    return surface > 0.0 ? surface : 1e18;\n"
-    "}\n"
+    "#ifndef SCENE_SURFACES\n"
+    "    return 1e18;\n"
+    "#else\n"
+    "    float depth = textureLod(scene_depth, gl_FragCoord.xy / scene_size, 0.0).x;\n"
+    "    return depth > 0.0 ? 1.0 / depth - 1.0 : 1e18;\n"
     "#endif\n"
-    "float ball_length(vec3 origin, vec3 direction, float end, int power)\n"
-    "{\n"
-    "    return nebel_ball_length(origin, direction, end, place.xyz, place.w, power);\n"
     "}\n"
-    "float gaussian_length(vec3 origin, vec3 direction, float end)\n"
+    "#endif\n";
+
+const char nb_particle_text[] =
+    "nb_approach particle_approach(float end)\n"
     "{\n"
-    "    return nebel_gaussian_length(origin, direction, end, place.xyz, place.w, place.w / 3.0);\n"
+    "#ifdef SCENE_PANORAMA\n"
+    "    return nb_approach_of(-place.xyz, ray_direction(gl_FragCoord.xy), end, place.w);\n"
+    "#else\n"
+    "    float aside = dot(pass_ray.xy, pass_ray.xy);\n"
+    "    float inverse = 1.0 / (sight.z * aside + pass_ray.z * pass_ray.z);\n"
+    "    return nb_approach_at(sight.x * pass_ray.z * sqrt(inverse), sight.y * aside * inverse, 1.0, end, place.w);\n"
+    "#endif\n"
     "}\n"
-    "float particle_length(vec3 origin, vec3 direction, float end)\n"
+    "float particle_length(nb_approach approach)\n"
     "{\n"
     "#if SCENE_PARTICLES == 1\n" /* branches are no jumps in software: one profile alone has none */
-    "    return ball_length(origin, direction, end, 2);\n"
+    "    return nb_ball_piece(approach, place.w, 2);\n"
     "#elif SCENE_PARTICLES == 2\n"
-    "    return gaussian_length(origin, direction, end);\n"
+    "    return nb_gaussian_piece(approach, place.w / 3.0);\n"
     "#else\n"
     "    int profile = int(extinction.w);\n"
-    "    return profile == 1 ? gaussian_length(origin, direction, end)\n"
-    "                        : ball_length(origin, direction, end, profile == 0 ? 2 : 0);\n"
+    "    return profile == 1 ? nb_gaussian_piece(approach, place.w / 3.0)\n"
+    "                        : nb_ball_piece(approach, place.w, profile == 0 ? 2 : 0);\n"
     "#endif\n"
+    "}\n"
+    /* nebel_medium_light with the light at infinite depth, emission / extinction, which needs no mean. */
+    "nebel_light particle_light(float depth)\n"
+    "{\n"
+    "    vec2 x = nb_lose(extinction.x * depth);\n"
+    "#if SCENE_VEIL_LAYERS == 3\n"
+    "    vec2 y = nb_lose(extinction.y * depth), z = nb_lose(extinction.z * depth);\n"
+    "#else\n"
+    "    vec2 y = x, z = x;\n"
+    "#endif\n"
+    "    nebel_light light;\n"
+    "    light.transmittance = vec3(x.x, y.x, z.x);\n"
+    "    light.in_scattering = min(saturation * vec3(x.y, y.y, z.y), NEBEL_MOST_LIGHT);\n"
+    "    return light;\n"
     "}\n"
     "void main()\n"
     "{\n"
-    "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
     "    float end = ray_end();\n"
-    "    float depth = particle_length(origin, direction, end);\n"
-    "    if (!(depth > 0.0)) discard;\n"
-    "    float middle = clamp(dot(place.xyz - origin, direction), 0.0, end);\n"
-    "    nebel_blend blend = nebel_blend_medium(nebel_medium_light(depth, extinction.xyz, emission.xyz),\n"
-    "                                           fog_before(origin, direction, middle));\n"
+    "    nb_approach approach = particle_approach(end);\n"
+    "    float depth = particle_length(approach);\n"
+    "    nebel_blend blend = nebel_blend_medium(particle_light(depth), fog_before(clamp(approach.closest, 0.0, "
+    "end)));\n"
     "    write_veil(brightness() * blend.source, blend.factor);\n"
     "}\n";
 

@@ -3,7 +3,10 @@
 #ifndef NB_GL_PARTICLE_TEXT_H
 #define NB_GL_PARTICLE_TEXT_H
 
-extern const char nb_particle_vertex_text[], nb_round_particle_vertex_text[], nb_particle_text[];
+extern const char nb_particle_vertex_text[], nb_round_particle_vertex_text[];
+
+/* Of fragments: both, one after the other. */
+extern const char nb_particle_start_text[], nb_particle_text[];
 
 /* The comparison of depth at five places asks this of the host: it stands before the fog's text. */
 extern const char nb_five_tap_text[];

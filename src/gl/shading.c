@@ -39,10 +39,6 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
 static const char words_text[] = "uniform vec3 scene_rays[6];\n"
                                  "#define RAY_WORD(i) scene_rays[i]\n";
 
-/* By way of the vertices, the same for all fragments: see vertex_text of program.c. */
-static const char passed_words_text[] = "flat in vec3 pass_rays[6];\n"
-                                        "#define RAY_WORD(i) pass_rays[i]\n";
-
 static const char ray_text[] = "vec3 ray_origin(vec2 pixel)\n"
                                "{\n"
                                "    return RAY_WORD(0) + pixel.x * RAY_WORD(1) + pixel.y * RAY_WORD(2);\n"
@@ -412,9 +408,17 @@ static const char light_text[] =
     "void main()\n"
     "{\n"
     "    ivec2 texel = ivec2(gl_FragCoord.xy);\n"
+    "#ifdef SCENE_SURFACES\n"
     "    vec4 place = texelFetch(scene_place, texel, 0);\n"
+    "#else\n"
+    "    vec4 place = vec4(0.0);\n"
+    "#endif\n"
+    "#ifdef SCENE_IN_FOG\n"
     "    vec3 transmittance = texelFetch(scene_transmittance, texel, 0).rgb;\n"
     "    vec3 in_scattering = texelFetch(scene_in_scattering, texel, 0).rgb;\n"
+    "#else\n"
+    "    vec3 transmittance = vec3(1.0), in_scattering = vec3(0.0);\n"
+    "#endif\n"
     "    see_through_veil(texel, transmittance, in_scattering);\n"
     "    vec4 normal = texelFetch(scene_normal, texel, 0);\n"
     "    vec3 surface = scene_background;\n"
@@ -545,15 +549,17 @@ nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *contex
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
     char limits[128];
-    (void)snprintf(text, size,
-                   "%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
-                   "%d\n#define NEBEL_FEATURES %u\n%s",
-                   nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
-                   kind->has_fog ? "#define SCENE_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
-                   kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->panorama ? "#define SCENE_PANORAMA\n" : "",
-                   kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
-                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-                   kind->of_particles, kind->veil_layers, NB_CASCADES, (unsigned)kind->features, precision_of(context));
+    (void)snprintf(
+        text, size,
+        "%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
+        "%d\n#define NEBEL_FEATURES %u\n%s",
+        nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
+        kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
+        kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
+        kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->panorama ? "#define SCENE_PANORAMA\n" : "",
+        kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "", kind->in_texture ? "#define NEBEL_TEXTURE\n" : "",
+        kind->tiled ? "#define NEBEL_TILES\n" : "", kind->of_particles, kind->veil_layers, NB_CASCADES,
+        (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -564,6 +570,7 @@ static void set_units(unsigned program)
     set_unit(program, "nebel_fog_texture", NB_UNIT_FOG);
     set_unit(program, "nebel_tile_texture", NB_UNIT_TILES);
     set_unit(program, "scene_place", NB_UNIT_PLACE);
+    set_unit(program, "scene_depth", NB_UNIT_PLACE);
     set_unit(program, "scene_normal", NB_UNIT_NORMAL);
     set_unit(program, "scene_reflectance", NB_UNIT_REFLECTANCE);
     set_unit(program, "scene_in_scattering", NB_UNIT_IN_SCATTERING);
@@ -584,16 +591,16 @@ static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kin
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
                                unsigned *name)
 {
-    char head[512];
+    char head[768];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text, light_text}, 7};
     const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
-    const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", fog,
-                                kind->panorama ? words_text : passed_words_text, ray, tile, nb_particle_text},
-                               7};
+    const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", fog, words_text, ray, tile,
+                                nb_particle_start_text, nb_particle_text},
+                               8};
     const nb_texts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
                                                  kind->of_particles ? &particle
@@ -608,8 +615,9 @@ static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
            a->sunlit == b->sunlit && a->five_taps == b->five_taps && a->veil_layers == b->veil_layers &&
-           a->panorama == b->panorama && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
-           a->tiled == b->tiled && a->features == b->features;
+           a->panorama == b->panorama && a->has_surfaces == b->has_surfaces && a->in_fog == b->in_fog &&
+           a->has_fog == b->has_fog && a->in_texture == b->in_texture && a->tiled == b->tiled &&
+           a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

@@ -29,6 +29,8 @@ typedef struct nb_light_kind {
     int five_taps;    /* particles are discs, which are there or not */
     int veil_layers;  /* that particles are drawn into, or surfaces are seen through; 0: there are none */
     int panorama;
+    int has_surfaces; /* there are meshes */
+    int in_fog;       /* that the pass, or vertices, made for all pixels */
     int has_fog;
     int in_texture, tiled;
     uint32_t features;

@@ -35,21 +35,28 @@ struct nb_attenuation {
     nb_vec3 mean;
 };
 
-nb_vec3 nb_attenuate1(float x)
+/* e^-x and 1 - e^-x, which keeps its digits where x is small. */
+nb_vec2 nb_lose(float x)
 {
     float y = max(-x, NB_EXP_MIN);
     float n = nb_exp_steps(y);
     float r = nb_exp_rest(y, n);
     float s = nb_scale_pow2(1.0, n);
     float q = r + (r * r) * nb_exp_tail(r);
-    return nb_vec3(s + s * q, x > NB_TINY ? ((1.0 - s) - s * q) / x : 1.0, 0.0);
+    return nb_vec2(s + s * q, (1.0 - s) - s * q);
+}
+
+nb_vec2 nb_attenuate1(float x)
+{
+    nb_vec2 lost = nb_lose(x);
+    return nb_vec2(lost.x, x > NB_TINY ? lost.y / x : 1.0);
 }
 
 nb_attenuation nb_attenuate(nb_vec3 depth)
 {
-    nb_vec3 x = nb_attenuate1(depth.x);
-    nb_vec3 y = nb_attenuate1(depth.y);
-    nb_vec3 z = nb_attenuate1(depth.z);
+    nb_vec2 x = nb_attenuate1(depth.x);
+    nb_vec2 y = nb_attenuate1(depth.y);
+    nb_vec2 z = nb_attenuate1(depth.z);
     nb_attenuation a;
     a.left = nb_vec3(x.x, y.x, z.x);
     a.mean = nb_vec3(x.y, y.y, z.y);

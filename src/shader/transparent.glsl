@@ -79,23 +79,28 @@ struct nb_approach {
     float leave;
 };
 
-nb_approach nb_approach_of(nb_vec3 p, nb_vec3 direction, float t_max, float radius)
+nb_approach nb_approach_at(float closest, float square, float speed, float t_max, float radius)
 {
     nb_approach approach;
-    float inverse = 1.0 / max(dot(direction, direction), NB_TINY);
-    approach.closest = -dot(p, direction) * inverse;
-    nb_vec3 q = p + direction * approach.closest;
-    approach.square = dot(q, q);
-    approach.speed = sqrt(dot(direction, direction));
-    float half_chord = sqrt(max(radius * radius - approach.square, 0.0) * inverse);
-    approach.enter = clamp(approach.closest - half_chord, 0.0, max(t_max, 0.0));
-    approach.leave = clamp(approach.closest + half_chord, 0.0, max(t_max, 0.0));
+    approach.closest = closest;
+    approach.square = square;
+    approach.speed = speed;
+    float half_chord = sqrt(max(radius * radius - square, 0.0)) / max(speed, NB_TINY);
+    approach.enter = clamp(closest - half_chord, 0.0, max(t_max, 0.0));
+    approach.leave = clamp(closest + half_chord, 0.0, max(t_max, 0.0));
     return approach;
 }
 
-float nebel_ball_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, int power)
+nb_approach nb_approach_of(nb_vec3 p, nb_vec3 direction, float t_max, float radius)
 {
-    nb_approach a = nb_approach_of(origin - center, direction, t_max, radius);
+    float square = dot(direction, direction);
+    float closest = -dot(p, direction) / max(square, NB_TINY);
+    nb_vec3 q = p + direction * closest;
+    return nb_approach_at(closest, dot(q, q), sqrt(square), t_max, radius);
+}
+
+float nb_ball_piece(nb_approach a, float radius, int power)
+{
     float h = a.leave - a.enter;
     float k = a.speed / radius;
     float c = 1.0 - a.square / (radius * radius);
@@ -103,15 +108,24 @@ float nebel_ball_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 
     return h > 0.0 ? (power > 0 ? uneven : h) : 0.0;
 }
 
-float nebel_gaussian_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, float sigma)
+float nebel_ball_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, int power)
 {
-    nb_approach a = nb_approach_of(origin - center, direction, t_max, min(radius, NB_FAR));
+    return nb_ball_piece(nb_approach_of(origin - center, direction, t_max, radius), radius, power);
+}
+
+float nb_gaussian_piece(nb_approach a, float sigma)
+{
     float scale = 0.70710678118654752440 / sigma;
     float k = a.speed * scale;
     float m = min(a.square * (scale * scale), 1e9);
     float from = (a.enter - a.closest) * k;
     float to = (a.leave - a.closest) * k;
     return a.leave > a.enter ? nb_gaussian_integral(m, from, to, k).value : 0.0;
+}
+
+float nebel_gaussian_length(nb_vec3 origin, nb_vec3 direction, float t_max, nb_vec3 center, float radius, float sigma)
+{
+    return nb_gaussian_piece(nb_approach_of(origin - center, direction, t_max, min(radius, NB_FAR)), sigma);
 }
 
 nebel_light nebel_medium_light(float length, nb_vec3 extinction, nb_vec3 light)
