@@ -265,13 +265,6 @@ static void find_hits(const nb_frame *frame, const nb_place *place, uint32_t sam
     }
 }
 
-static int meets_surface(const nb_hits *hits)
-{
-    uint32_t met = NB_NONE;
-    for (int i = 0; i < NB_BATCH; i++) met &= hits->surface[i];
-    return met != NB_NONE;
-}
-
 static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
@@ -292,7 +285,7 @@ nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint3
     find_hits(frame, place, sample, scratch);
     if (frame->renderer->method == NEBEL_METHOD_REFERENCE) return nb_reference_trace(frame, place, scratch);
     nebel_result result = trace_camera_fog(frame, scratch);
-    if (result == NEBEL_OK && meets_surface(&scratch->hits)) result = light_surfaces(frame, scratch);
+    if (result == NEBEL_OK && nb_hits_any(&scratch->hits)) result = light_surfaces(frame, scratch);
     if (result == NEBEL_OK) set_colors(&frame->lighting, scratch);
     return result;
 }

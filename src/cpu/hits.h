@@ -13,6 +13,14 @@ typedef struct nb_hits {
     float normal[3][NB_BATCH];      /* of the triangle, not of unit length, either side */
 } nb_hits;
 
+/* Whether any ray meets something. */
+static inline int nb_hits_any(const nb_hits *hits)
+{
+    uint32_t met = NB_NONE;
+    for (int i = 0; i < NB_BATCH; i++) met &= hits->surface[i];
+    return met != NB_NONE;
+}
+
 /* Memory for the packets of a batch, aligned as Embree wants it. */
 typedef struct nb_packets {
     struct RTCRayHit16 rays[NB_PACKETS];

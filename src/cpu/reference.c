@@ -78,8 +78,9 @@ static void clear_sums(uint32_t first, nb_sums *sums)
 nebel_result nb_reference_trace(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
-    nb_surface_points(&renderer->geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits,
-                      frame->lighting.sun, &scratch->points);
+    if (nb_hits_any(&scratch->hits))
+        nb_surface_points(&renderer->geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits,
+                          frame->lighting.sun, &scratch->points);
     nb_lone_ray_clear(&scratch->lone);
     if (place->sample == 0) clear_sums(place->first, &scratch->sums);
     for (int i = 0; i < NB_BATCH; i++) {
