@@ -76,7 +76,7 @@ typedef enum nebel_gl_method {
     NEBEL_GL_METHOD_CELLS,     /* the same by nebel_fog_cells, in place of the renderer's fog, which still dims the sun:
                                   give it none where cells are all. Each ray of a panorama is its own axis of depth */
     NEBEL_GL_METHOD_CELLS_PIXEL, /* the same at each pixel, which the processor computes of the distances that OpenGL
-                                    has drawn: some microseconds a pixel and sample. For pictures, not for films */
+                                    has drawn: half a microsecond for each, of few cells. For pictures, not for films */
     NEBEL_GL_METHOD_LINEAR,      /* a fog factor, at vertices or at each pixel, in place of the renderer's fog and
                                particles, which do not dim the sun either. With COORDINATE_USER c is what
                                NEBEL_VERTEX_COORDINATE gives for the renderer's fog at the vertices, 0 to 100 */
