@@ -215,39 +215,54 @@ static double stepped_light(const nb_geometry *geometry, const float from[3], co
     return sum;
 }
 
-static void shafts_are_those_of_small_steps(void **state)
-{
-    enum { PILLARS = 5 };
+enum { PILLARS = 5 };
+
+/* Points into itself. */
+typedef struct pillars {
     nebel_mesh meshes[PILLARS + 1];
+    nebel_scene_data scene;
+    nebel_snapshot *fog;
+    nebel_camera camera;
+    double sun[3];
+} pillars;
+
+static void set_pillars(pillars *p)
+{
+    static const float floor[] = {-60, 0, -60, -60, 0, 60, 60, 0, 60, 60, 0, -60};
     const nebel_volume_desc volume = {.density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 8},
                                       .extinction = {.05, .05, .05},
                                       .albedo = {1, 1, 1}};
-    double sun[3] = {-0.8, 0.35, -0.3};
-    nb_vector_make_unit(sun);
-    const nebel_fog_desc desc = {.sun = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {20, 10, 5}}};
-    const nebel_camera camera = test_camera(6, 3, 24, 0, 4, 0);
-    nebel_snapshot *fog = fog_commit(&desc, &volume, 1);
+    *p = (pillars){.camera = test_camera(6, 3, 24, 0, 4, 0), .sun = {-0.8, 0.35, -0.3}};
+    nb_vector_make_unit(p->sun);
+    const nebel_fog_desc desc = {.sun = {.direction = {p->sun[0], p->sun[1], p->sun[2]}, .irradiance = {20, 10, 5}}};
+    p->fog = fog_commit(&desc, &volume, 1);
+    for (int i = 0; i < PILLARS; i++) {
+        p->meshes[i] = box_mesh();
+        p->meshes[i].origin[0] = 5 * i - 12;
+        p->meshes[i].origin[1] = -5;
+        p->meshes[i].origin[2] = i % 2 ? 4 : -3;
+    }
+    p->meshes[PILLARS] = test_square();
+    p->meshes[PILLARS].positions = floor;
+    p->scene = (nebel_scene_data){.mesh_count = PILLARS + 1, .meshes = p->meshes};
+}
+
+static void shafts_are_those_of_small_steps(void **state)
+{
+    pillars p;
     test_picture picture = test_picture_make(SIDE, SIDE);
     nebel_renderer *renderer = NULL;
     (void)state;
-    for (int i = 0; i < PILLARS; i++) {
-        meshes[i] = box_mesh();
-        meshes[i].origin[0] = 5 * i - 12;
-        meshes[i].origin[1] = -5;
-        meshes[i].origin[2] = i % 2 ? 4 : -3;
-    }
-    meshes[PILLARS] = test_square();
-    meshes[PILLARS].positions = (const float[]){-60, 0, -60, -60, 0, 60, 60, 0, 60, 60, 0, -60};
-    const nebel_scene_data scene = {.mesh_count = PILLARS + 1, .meshes = meshes};
-    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
-    const nebel_frame_desc frame = {.camera = camera, .width = SIDE, .height = SIDE, .samples = 1};
+    set_pillars(&p);
+    assert_int_equal(nebel_create_renderer(&p.scene, p.fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
     double worst = 0, square = 0;
     static nb_rays rays;
     nb_view view;
     nb_region_points points;
     nb_sample_region(0, 1, &points);
-    assert_int_equal(nb_view_set(&view, &camera, SIDE, SIDE, &(nebel_log){0}), NEBEL_OK);
+    assert_int_equal(nb_view_set(&view, &p.camera, SIDE, SIDE, &(nebel_log){0}), NEBEL_OK);
     nb_view_place(&view, renderer->geometry.origin, renderer->geometry.bounds_min, renderer->geometry.bounds_max);
     assert_true(view.advance <= 0);
     for (uint32_t first = 0; first < NB_PIXELS; first += NB_BATCH) {
@@ -262,8 +277,8 @@ static void shafts_are_those_of_small_steps(void **state)
             }
             /* finer where shadows are */
             const double length = fmin((double)test_depth(&picture, x, y), 5000), near = fmin(length, 100);
-            const double light = (stepped_light(&renderer->geometry, from, way, 0, near, sun) +
-                                  stepped_light(&renderer->geometry, from, way, near, length, sun)) *
+            const double light = (stepped_light(&renderer->geometry, from, way, 0, near, p.sun) +
+                                  stepped_light(&renderer->geometry, from, way, near, length, p.sun)) *
                                  10 / (4 * test_pi);
             const double off = fabs((double)test_in_scattering(&picture, x, y)[1] - light);
             worst = fmax(worst, off);
@@ -273,7 +288,53 @@ static void shafts_are_those_of_small_steps(void **state)
     print_message("off by at most %.5f, %.6f in the root mean square\n", worst, sqrt(square / SIDE / SIDE));
     assert_true(worst < 0.002);
     nebel_destroy_renderer(renderer);
-    nebel_release_snapshot(fog);
+    nebel_release_snapshot(p.fog);
+    test_picture_free(&picture);
+}
+
+/* Whoever renders which region. */
+static void threads_give_the_same_shafts(void **state)
+{
+    pillars p;
+    test_picture one = test_picture_make(2 * NB_REGION + 5, NB_REGION + 3),
+                 three = test_picture_make(one.width, one.height);
+    (void)state;
+    set_pillars(&p);
+    test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 1}, &p.camera, 2, &one);
+    test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 3}, &p.camera, 2, &three);
+    assert_memory_equal(one.planes.color, three.planes.color, sizeof(float) * 3 * one.width * one.height);
+    nebel_release_snapshot(p.fog);
+    test_picture_free(&one);
+    test_picture_free(&three);
+}
+
+static void lost_memory_is_told(void **state)
+{
+    pillars p;
+    test_picture picture = test_picture_make(SIDE, SIDE);
+    fog_memory memory = {0};
+    fog_messages messages = {0};
+    size_t failed = 0;
+    (void)state;
+    set_pillars(&p);
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
+        const nebel_renderer_desc desc = {
+            .allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages), .threads = 1};
+        nebel_renderer *renderer = NULL;
+        memory.fail_first = 0;
+        assert_int_equal(nebel_create_renderer(&p.scene, p.fog, &desc, &renderer), NEBEL_OK);
+        memory.fail_first = k;
+        memory.fail_count = 1;
+        const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
+        result = nebel_render_frame(renderer, &frame, &picture.planes);
+        failed += result == NEBEL_ERROR_MEMORY;
+        nebel_destroy_renderer(renderer);
+        assert_int_equal(memory.live, 0);
+    }
+    assert_int_equal(result, NEBEL_OK);
+    assert_true(failed >= 7); /* the tree's five, shadows, and what toggles are made in */
+    nebel_release_snapshot(p.fog);
     test_picture_free(&picture);
 }
 
@@ -283,6 +344,8 @@ int main(void)
         cmocka_unit_test(ends_are_those_of_visibility),
         cmocka_unit_test(the_shadow_of_a_box_is_cut_out),
         cmocka_unit_test(shafts_are_those_of_small_steps),
+        cmocka_unit_test(threads_give_the_same_shafts),
+        cmocka_unit_test(lost_memory_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
