@@ -287,6 +287,47 @@ static void test_state_neither_changes_nor_matters(void **state)
     }
 }
 
+/* Grey particles, coloured ones and none have other targets and programs: what one renderer draws by turns is what
+ * renderers of their own draw. A light without absorption among them, before a surface and before nothing. */
+static void test_particles_of_other_colors_take_turns(void **state)
+{
+    (void)state;
+    static test_stage s;
+    static float lone[3][WIDTH * HEIGHT * 3], shared[WIDTH * HEIGHT * 3];
+    nebel_particle particles[2][2] = {
+        {{.radius = .5, .extinction = {1, 1, 1}, .emission = {.2, .4, .6}}, {.radius = .7, .emission = {.1, .1, .1}}}};
+    set_stage(&s, (double[3]){0, 0, 0});
+    for (int i = 0; i < 3; i++) {
+        particles[0][0].center[i] = (3 * s.camera.look_at[i] + s.camera.position[i]) / 4;
+        particles[0][1].center[i] = (s.camera.look_at[i] + s.camera.position[i]) / 2;
+    }
+    memcpy(particles[1], particles[0], sizeof particles[0]);
+    particles[1][0].extinction[2] = 3;
+    for (int l = 0; l < 2; l++) {
+        nb_gl context;
+        pass_open(&context, languages[l]);
+        for (int kind = 0; kind < 3; kind++) {
+            nebel_gl_renderer *const own = make_renderer(&s);
+            assert_int_equal(nebel_set_gl_renderer_particles(own, particles[kind % 2], kind < 2 ? 2 : 0), NEBEL_OK);
+            draw(own, &s, 1, lone[kind]);
+            nebel_destroy_gl_renderer(own);
+        }
+        assert_memory_not_equal(lone[0], lone[1], sizeof shared);
+        assert_memory_not_equal(lone[0], lone[2], sizeof shared);
+        nebel_gl_renderer *const renderer = make_renderer(&s);
+        for (int turn = 0; turn < 7; turn++) {
+            const int kind = (int[]){0, 1, 0, 2, 1, 2, 0}[turn];
+            assert_int_equal(nebel_set_gl_renderer_particles(renderer, particles[kind % 2], kind < 2 ? 2 : 0),
+                             NEBEL_OK);
+            draw(renderer, &s, 1, shared);
+            assert_memory_equal(shared, lone[kind], sizeof shared);
+        }
+        nebel_destroy_gl_renderer(renderer);
+        pass_close(&context);
+    }
+    nebel_release_snapshot(s.fog);
+}
+
 static int stop(size_t done, size_t total, void *user)
 {
     size_t *const calls = user;
@@ -362,6 +403,7 @@ int main(void)
         cmocka_unit_test(test_light_fades_evenly_on_a_coarse_column),
         cmocka_unit_test(test_particles_are_fog),
         cmocka_unit_test(test_particles_dim_the_sun),
+        cmocka_unit_test(test_particles_of_other_colors_take_turns),
         cmocka_unit_test(test_samples_smooth_edges),
         cmocka_unit_test(test_outlines_agree_sample_by_sample),
         cmocka_unit_test(test_state_neither_changes_nor_matters),
