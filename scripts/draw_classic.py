@@ -54,6 +54,8 @@ DRAWN = {
     "cells-printed": ("cells-printed", LARGE, "--method", "cells"),
     "cells-portals-exact": ("cells-portals", LARGE),
     "cells-portals": ("cells-portals", LARGE, "--method", "cells"),
+    "cells-walls-exact": ("cells-walls", LARGE),
+    "cells-walls": ("cells-walls", LARGE, "--method", "cells-pixel"),
 }
 
 # Difference: the picture, that from which it differs, how many times as bright.
@@ -73,6 +75,7 @@ DIFFERENCES = {
     "coarse-tessellated-difference": ("coarse-tessellated", "coarse-exact", 128),
     **{f"cells-{name}-difference": (f"cells-{name}", "cells-exact", 4) for name in ("grouped", "seam", "printed")},
     "cells-portals-difference": ("cells-portals", "cells-portals-exact", 16),
+    "cells-walls-difference": ("cells-walls", "cells-walls-exact", 4),
 }
 
 CURVES, WINDOWS = "curves.svg", "d3d9-specular.png"
