@@ -2,18 +2,16 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "commands.h"
-#include "decimal.h"
 #include "finer.h"
 #include "interrupt.h"
-#include "isa.h"
 #include "layers.h"
 #include "load.h"
 #include "meter.h"
 #include "pattern.h"
+#include "render_call.h"
 #include "report.h"
 #include "spread.h"
 #include "target.h"
-#include "workers.h"
 
 #include <nebel/render.h>
 #include <nebel/shader.h>
@@ -29,73 +27,8 @@
 #include <string.h>
 #include <unistd.h>
 
-enum {
-    OUTPUT,
-    SIZE,
-    SAMPLES,
-    EXPOSURE,
-    FRAME,
-    FRAMES,
-    AOV,
-    TOLERANCE,
-    METHOD,
-    TESSELLATE,
-    TESSELLATE_TRIANGLES,
-    TESSELLATE_DEPTH,
-    DEVICE,
-    ISA,
-    THREADS,
-    BOUNCES,
-    SEED,
-    QUIET
-};
-
-static const nb_option options[] = {
-    [OUTPUT] = {"output", 'o', "FILE",
-                "The picture: .png (tone mapped, sRGB, 8 bit) or .exr\n(linear light, float); -: PNG to standard "
-                "output.\nNeeded."},
-    [SIZE] = {"size", 's', "WxH", "Pixels, each side 1 to 32768, 2^28 in all (--aov:\n2^26). Default: 1280x720."},
-    [SAMPLES] = {"samples", 0, "N", "Samples for each pixel, 1 to 4096. Default: 4."},
-    [EXPOSURE] = {"exposure", 'e', "EV", "Stops, -20 to 20: 1 doubles the light. PNG only.\nDefault: 0."},
-    [FRAME] = {"frame", 0, "N", "The frame of a moving camera, 0 to 1000000.\nDefault: 0."},
-    [FRAMES] = {"frames", 0, "A-B",
-                "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %)."},
-    [AOV] = {"aov", 0, NULL,
-             "EXR only: adds transmittance.{R,G,B},\nin_scattering.{R,G,B}, depth.Z (m, inf: nothing\n"
-             "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound) or, of reference, standard_error.{R,G,B}."},
-    [TOLERANCE] = {"tolerance", 0, "E",
-                   "How far off the fog may be where it is integrated:\nabsolute on transmittance, relative to max(1,\n"
-                   "largest source radiance) on in-scattering.\n0 < E <= 1. Default: 0.002."},
-    [METHOD] =
-        {"method", 0, "NAME",
-         "exact (default); on surfaces alone: vertex: the\nfog at vertices; additive: the same, but it only\nadds; "
-         "linear, exp, exp2: the factors of section\n\"classic\"; fog-coord, two-pass, alpha: the fog at\nvertices as "
-         "OpenGL 1.x takes it; d3d9: the states\nin \"classic\"; cells, cells-pixel: section \"cells\"\nat vertices or "
-         "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths; reference,\nof the CPU: paths of "
-         "light, by chance and without\nbias, slow."},
-    [TESSELLATE] = {"tessellate", 0, "E",
-                    "With --method vertex or additive: smaller triangles,\nuntil the fog's factor is within E of the "
-                    "exact one\nfor the camera, 1e-6 < E <= 1."},
-    [TESSELLATE_TRIANGLES] = {"tessellate-triangles", 0, "N",
-                              "No triangle of a model that has come to so many is\nhalved for its error, up to 10^9. "
-                              "Default: 262144."},
-    [TESSELLATE_DEPTH] = {"tessellate-depth", 0, "N",
-                          "How often a triangle may be halved for its error, 1\nto 48. Default: 20."},
-    [DEVICE] =
-        {"device", 0, "NAME",
-         "cpu (default): ray tracing; gl: OpenGL, with shadow\nmaps. No --tolerance, --isa and --threads with gl."},
-    [ISA] = {"isa", 0, "NAME",
-             "Instruction set: scalar, sse2, avx2, avx512 or neon.\nDefault: the best of this processor."},
-    [THREADS] = {"threads", 't', "N", "Threads, 0 for all (default). Any number gives the\nsame picture."},
-    [BOUNCES] = {"bounces", 0, "N",
-                 "With --method reference: how often light is\nscattered or reflected at most, 1 to 10000. 1 is what\n"
-                 "exact shows. Default: as often as it happens."},
-    [SEED] = {"seed", 0, "N",
-              "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
-    [QUIET] = {"quiet", 'q', NULL, "No progress bar and no summary; errors are still\nreported."},
-};
-
-static const char about[] = "Renders SCENE (JSON): models lit by the sun and the ambient light, in exact fog.\n"
+static const char about[] = "Renders SCENE (JSON): models lit by the sun, lamps and the ambient light, in\n"
+                            "exact fog.\n"
                             "\n"
                             "A picture appears under its name when it is complete: it is written beside its\n"
                             "place and renamed. Devices and pipes are written to directly. Ctrl-C ends the\n"
@@ -114,177 +47,8 @@ static const char examples[] = "Examples:\n"
                                "\n"
                                "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
 
-/* What nebel_tessellate counts for rounding. */
-#define LEAST_TESSELLATION 1e-6
-
-/* Pictures of more samples are not written. */
-enum { LARGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, MOST_PIXELS_AOV = 1 << 26, LAST_FRAME = 1000000 };
-
-typedef struct settings {
-    const char *scene, *output;
-    nebel_image_format format;
-    uint32_t width, height, samples;
-    uint32_t bounces, seed; /* of the reference; 0 bounces: no limit */
-    double exposure, tolerance;
-    nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
-    uint32_t first_frame, last_frame;
-    int many_frames, aov, quiet, gl;
-    nebel_method method;
-    nebel_renderer_desc renderer;
-} settings;
-
-/* ---- the call -------------------------------------------------------------------------------- */
-
-/* "A<separator>B", two whole numbers up to `most`. */
-static int read_pair(const char *text, char separator, uint32_t most, uint32_t *a, uint32_t *b)
-{
-    const char *const middle = strchr(text, separator);
-    if (middle == NULL) return 0;
-    const int good = nb_decimal_read_whole(text, (size_t)(middle - text), a) == NB_DECIMAL_GOOD &&
-                     nb_decimal_read_whole(middle + 1, strlen(middle + 1), b) == NB_DECIMAL_GOOD;
-    return good && *a <= most && *b <= most;
-}
-
-static void read_size(nb_arguments *arguments, settings *wanted)
-{
-    wanted->width = 1280;
-    wanted->height = 720;
-    const char *const text = arguments->values[SIZE];
-    if (text == NULL) return;
-    const int good = read_pair(text, 'x', LARGEST_SIDE, &wanted->width, &wanted->height);
-    const uint64_t pixels = (uint64_t)wanted->width * wanted->height;
-    if (!good || pixels == 0) {
-        nb_options_reject(arguments, SIZE, "is no size such as 1280x720, each side from 1 to 32768");
-    } else if (pixels > (wanted->aov ? MOST_PIXELS_AOV : MOST_PIXELS)) {
-        nb_options_reject(arguments, SIZE, "is too large; 2^28 pixels are possible, 2^26 with --aov");
-    }
-}
-
-static void read_frames(nb_arguments *arguments, settings *wanted)
-{
-    wanted->first_frame = nb_options_whole(arguments, FRAME, 0, LAST_FRAME, 0);
-    wanted->last_frame = wanted->first_frame;
-    const char *const text = arguments->values[FRAMES];
-    wanted->many_frames = text != NULL;
-    if (text == NULL) return;
-    if (arguments->values[FRAME] != NULL) nb_options_reject(arguments, FRAMES, "contradicts --frame; leave one out");
-    const int good = read_pair(text, '-', LAST_FRAME, &wanted->first_frame, &wanted->last_frame);
-    if (good && wanted->first_frame <= wanted->last_frame) return;
-    nb_options_reject(arguments, FRAMES, "is no range such as 0-95, of frames up to 1000000");
-}
-
-static const char standard_output[] = "/dev/stdout";
-
-static void read_output(nb_arguments *arguments, settings *wanted)
-{
-    wanted->output = arguments->values[OUTPUT];
-    if (wanted->output == NULL) {
-        nb_report_message("render: where to? add -o FILE.png or -o FILE.exr");
-        arguments->misused = 1;
-        return;
-    }
-    if (strcmp(wanted->output, "-") == 0) wanted->output = standard_output;
-    if (strcmp(wanted->output, standard_output) == 0 && isatty(STDOUT_FILENO))
-        nb_options_reject(arguments, OUTPUT, "is a terminal; send the picture to a file or to a program");
-    wanted->format = nebel_find_image_format(wanted->output);
-    if (wanted->format == NEBEL_IMAGE_NONE)
-        nb_options_reject(arguments, OUTPUT, "is no name that ends in .png or .exr");
-    const char *const fault = wanted->many_frames ? nb_pattern_find_fault(wanted->output) : NULL;
-    if (fault != NULL) nb_options_reject(arguments, OUTPUT, fault);
-    if (wanted->format == NEBEL_IMAGE_PNG && wanted->aov)
-        nb_options_reject(arguments, OUTPUT, "is no .exr; --aov needs one");
-    if (wanted->format == NEBEL_IMAGE_EXR && arguments->values[EXPOSURE] != NULL) {
-        nb_options_reject(arguments, EXPOSURE, "is for PNG; an EXR keeps the light as it is");
-    }
-}
-
-static int takes_factor(nebel_method method)
-{
-    return method == NEBEL_METHOD_LINEAR || method == NEBEL_METHOD_EXP || method == NEBEL_METHOD_EXP2;
-}
-
-/* What one colour is given to. */
-static int takes_color(nebel_method method)
-{
-    return takes_factor(method) || method == NEBEL_METHOD_FOG_COORD || method == NEBEL_METHOD_ALPHA;
-}
-
-static void read_tessellate(nb_arguments *arguments, settings *wanted)
-{
-    nebel_tessellation_desc *const desc = &wanted->tessellation;
-    desc->most_triangles = nb_options_whole(arguments, TESSELLATE_TRIANGLES, 1, 1000000000, 1 << 18);
-    desc->deepest = nb_options_whole(arguments, TESSELLATE_DEPTH, 1, 48, 20);
-    if (arguments->values[TESSELLATE] == NULL) {
-        static const int limits[] = {TESSELLATE_TRIANGLES, TESSELLATE_DEPTH};
-        for (size_t i = 0; i < sizeof limits / sizeof *limits; i++)
-            if (arguments->values[limits[i]] != NULL)
-                nb_options_refuse(arguments, limits[i], "does nothing without --tessellate; add that, or leave it out");
-        return;
-    }
-    desc->bound = nb_options_number(arguments, TESSELLATE, 0, 1, 1);
-    if (desc->bound <= LEAST_TESSELLATION)
-        nb_options_reject(arguments, TESSELLATE, "is not more than 1e-6, which rounding may take");
-    if (wanted->method != NEBEL_METHOD_VERTEX && wanted->method != NEBEL_METHOD_ADDITIVE)
-        nb_options_refuse(arguments, TESSELLATE, "needs --method vertex or additive; say so, or leave it out");
-    if (wanted->many_frames)
-        nb_options_refuse(arguments, TESSELLATE, "is for one frame: another camera needs other triangles");
-}
-
-static void read_reference(nb_arguments *arguments, settings *wanted)
-{
-    static const int of_reference[] = {BOUNCES, SEED};
-    wanted->bounces = nb_options_whole(arguments, BOUNCES, 1, 10000, 0);
-    wanted->seed = nb_options_whole(arguments, SEED, 0, UINT32_MAX, 0);
-    for (size_t i = 0; i < sizeof of_reference / sizeof *of_reference; i++)
-        if (arguments->values[of_reference[i]] != NULL && wanted->method != NEBEL_METHOD_REFERENCE)
-            nb_options_refuse(arguments, of_reference[i], "needs --method reference; say so, or leave it out");
-    if (wanted->method == NEBEL_METHOD_REFERENCE && wanted->gl)
-        nb_options_reject(arguments, METHOD, "is for --device cpu; leave out --device gl");
-}
-
-static void read_device(nb_arguments *arguments, settings *wanted)
-{
-    static const char *const devices[] = {"cpu", "gl", NULL};
-    static const int of_cpu[] = {TOLERANCE, ISA, THREADS};
-    const char *methods[NEBEL_METHOD_COUNT + 1] = {NULL};
-    for (int i = 0; i < NEBEL_METHOD_COUNT; i++) methods[i] = nebel_method_word((nebel_method)i);
-    wanted->method = (nebel_method)nb_options_choice(arguments, METHOD, methods, NEBEL_METHOD_EXACT);
-    wanted->gl = nb_options_choice(arguments, DEVICE, devices, 0);
-    for (size_t i = 0; i < sizeof of_cpu / sizeof *of_cpu && wanted->gl; i++) {
-        if (arguments->values[of_cpu[i]] != NULL) {
-            nb_options_refuse(arguments, of_cpu[i], "is for --device cpu; leave it out with gl");
-        }
-    }
-    if (!wanted->gl && wanted->method == NEBEL_METHOD_FIVE_TAP)
-        nb_options_reject(arguments, METHOD, "is for --device gl; the CPU traces particles exactly");
-    if (wanted->method != NEBEL_METHOD_EXACT && arguments->values[TOLERANCE] != NULL)
-        nb_options_refuse(arguments, TOLERANCE, "is for --method exact; leave it out with another");
-}
-
-/* -1 to go on, or the exit status. */
-static int read_settings(nb_arguments *arguments, settings *wanted)
-{
-    wanted->scene = arguments->operands[0];
-    wanted->aov = arguments->values[AOV] != NULL;
-    wanted->quiet = arguments->values[QUIET] != NULL;
-    wanted->samples = nb_options_whole(arguments, SAMPLES, 1, 4096, 4);
-    wanted->exposure = nb_options_number(arguments, EXPOSURE, -20, 20, 0);
-    wanted->tolerance = nb_options_number(arguments, TOLERANCE, 0, 1, NEBEL_DEFAULT_TOLERANCE);
-    if (wanted->tolerance == 0) nb_options_reject(arguments, TOLERANCE, "is not more than 0");
-    wanted->renderer.threads = (int)nb_options_whole(arguments, THREADS, 0, NB_WORKERS_MOST, 0);
-    wanted->renderer.isa = nb_isa_choose(arguments, ISA);
-    read_size(arguments, wanted);
-    read_frames(arguments, wanted);
-    read_output(arguments, wanted);
-    read_device(arguments, wanted);
-    read_reference(arguments, wanted);
-    read_tessellate(arguments, wanted);
-    if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
-    return -1;
-}
-
 /* The file name of a frame; free it. NULL after a message. */
-static char *name_picture(const settings *wanted, uint32_t frame)
+static char *name_picture(const nb_render_call *wanted, uint32_t frame)
 {
     char *const name = wanted->many_frames ? nb_pattern_expand(wanted->output, frame) : strdup(wanted->output);
     if (name == NULL) (void)nb_report_failure("render: %s: memory is out", wanted->output);
@@ -292,7 +56,7 @@ static char *name_picture(const settings *wanted, uint32_t frame)
 }
 
 /* Before minutes of work: every picture has a place to go to. */
-static int check_targets(const settings *wanted)
+static int check_targets(const nb_render_call *wanted)
 {
     for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
         if (nb_interrupt_is_requested()) break;
@@ -308,7 +72,7 @@ static int check_targets(const settings *wanted)
 
 /* What lives as long as all frames. */
 typedef struct studio {
-    const settings *wanted;
+    const nb_render_call *wanted;
     nb_report_listener listener;
     nb_load_result loaded;
     nebel_renderer *renderer; /* of the CPU */
@@ -323,19 +87,19 @@ typedef struct studio {
     uint32_t frame;
 } studio;
 
-static float *allocate_pixels(const settings *wanted, uint32_t channels)
+static float *allocate_pixels(const nb_render_call *wanted, uint32_t channels)
 {
     const size_t most = SIZE_MAX / sizeof(float) / channels;
     if (wanted->width > most / wanted->height) return NULL;
     return malloc((size_t)wanted->width * wanted->height * channels * sizeof(float));
 }
 
-static int writes_plane(const settings *wanted, int which)
+static int writes_plane(const nb_render_call *wanted, int which)
 {
     return which == NB_LAYER_COLOR || (wanted->aov && nb_layer_is_known((nb_layer)which, wanted->gl, wanted->method));
 }
 
-static uint32_t count_channels(const settings *wanted)
+static uint32_t count_channels(const nb_render_call *wanted)
 {
     uint32_t count = 0;
     for (int i = 0; i < NB_LAYER_COUNT; i++) count += writes_plane(wanted, i) ? nb_layer_kinds[i].channels : 0;
@@ -345,7 +109,7 @@ static uint32_t count_channels(const settings *wanted)
 /* The standard error is told whether it is written or not. */
 static int allocate_planes(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     int good = 1;
     for (int i = 0; i < NB_LAYER_COUNT && good; i++) {
         if (!writes_plane(wanted, i) &&
@@ -378,7 +142,7 @@ static void free_studio(studio *all)
 
 static int write_picture(studio *all, const char *name)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const size_t pixels = (size_t)wanted->width * wanted->height;
     const char *names[NB_LAYERS_MOST_CHANNELS];
     nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
@@ -402,7 +166,7 @@ static int write_picture(studio *all, const char *name)
 static int show_progress(size_t done, size_t total, void *user)
 {
     studio *const all = user;
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const uint32_t frames = wanted->last_frame - wanted->first_frame + 1;
     const uint32_t before = all->frame - wanted->first_frame;
     char label[64] = "";
@@ -414,7 +178,7 @@ static int show_progress(size_t done, size_t total, void *user)
 
 static nebel_result trace_frame(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const nebel_frame_desc desc = {
         .camera = nebel_scene_camera(all->loaded.scene, all->frame),
         .width = wanted->width,
@@ -497,7 +261,7 @@ static nebel_result draw_frame(studio *all)
 
 static int open_gl(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const int status = nb_gl_painter_open(&all->painter, wanted->scene, &all->loaded, surfaces_of(all), wanted->method,
                                           &all->listener);
     if (status != NB_DONE || wanted->quiet) return status;
@@ -522,7 +286,7 @@ static int open_gl(studio *all)
 
 static int render_frame(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     (void)show_progress(0, 1, all);
     all->listener.mode = NB_REPORT_KEEP; /* that the frame was stopped is no news */
     const nebel_result result = wanted->gl ? draw_frame(all) : trace_frame(all);
@@ -534,7 +298,7 @@ static int render_frame(studio *all)
 
 static void note_spread(const studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const size_t pixels = (size_t)wanted->width * wanted->height;
     if (all->samples[NB_LAYER_STANDARD_ERROR] != NULL && !wanted->quiet)
         nb_spread_report(all->samples[NB_LAYER_STANDARD_ERROR], 3 * pixels, wanted->samples);
@@ -559,7 +323,7 @@ static int make_picture(studio *all)
     return status;
 }
 
-static void note_stillness(const nebel_scene *scene, const settings *wanted)
+static void note_stillness(const nebel_scene *scene, const nb_render_call *wanted)
 {
     const nebel_scene_data *const data = nebel_scene_contents(scene);
     if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->moving_volume_count > 0) return;
@@ -569,7 +333,7 @@ static void note_stillness(const nebel_scene *scene, const settings *wanted)
 }
 
 /* What the scene has beside its cells is not drawn. */
-static void note_other_fog(const nebel_scene_data *scene, const settings *wanted)
+static void note_other_fog(const nebel_scene_data *scene, const nb_render_call *wanted)
 {
     if (wanted->quiet || (scene->volume_count == 0 && scene->nebula_count == 0)) return;
     nb_report_message("note: %s: --method cells draws the section \"cells\" alone; \"fog\" and \"nebula\" are left out",
@@ -583,7 +347,7 @@ static int takes_cells(nebel_method method)
 
 static int make_cells(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
     if (!takes_cells(wanted->method)) return NB_DONE;
     if (scene->cells == NULL)
@@ -604,10 +368,10 @@ static double reach_of(nebel_method method, const nebel_factor_desc *factor)
     return factor->start < factor->end ? factor->end - factor->start : (double)INFINITY;
 }
 
-static void note_coarseness(const nebel_scene_data *scene, const settings *wanted)
+static void note_coarseness(const nebel_scene_data *scene, const nb_render_call *wanted)
 {
     nebel_factor_desc factor;
-    if (wanted->quiet || !takes_factor(wanted->method) || scene->classic->stage != NEBEL_STAGE_VERTEX ||
+    if (wanted->quiet || !nb_render_takes_factor(wanted->method) || scene->classic->stage != NEBEL_STAGE_VERTEX ||
         scene->classic->coordinate == NEBEL_COORDINATE_USER ||
         nebel_resolve_factor(scene->classic, &factor) != NEBEL_OK)
         return;
@@ -620,14 +384,14 @@ static void note_coarseness(const nebel_scene_data *scene, const settings *wante
 
 static int check_classic(const studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
     if (wanted->method == NEBEL_METHOD_D3D9 && scene->classic_d3d9 == NULL)
         return nb_report_failure(
             "render: %s: there is no \"d3d9\" in a section \"classic\" for --method d3d9; add it, or "
             "say --method exact",
             wanted->scene);
-    if (takes_color(wanted->method) && scene->classic == NULL)
+    if (nb_render_takes_color(wanted->method) && scene->classic == NULL)
         return nb_report_failure("render: %s: there is no section \"classic\" for --method %s; add one, or say "
                                  "--method exact",
                                  wanted->scene, nebel_method_word(wanted->method));
@@ -637,7 +401,7 @@ static int check_classic(const studio *all)
 
 static int choose_method(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     const nebel_scene_data *const scene = nebel_scene_contents(all->loaded.scene);
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
@@ -657,7 +421,7 @@ static const char *name_limit(const nb_finer *finer)
                                                      : "--tessellate-triangles and --tessellate-depth";
 }
 
-static void note_tessellation(const settings *wanted, const nb_finer *finer)
+static void note_tessellation(const nb_render_call *wanted, const nb_finer *finer)
 {
     if (wanted->quiet) return;
     nb_report_message("note: %s: %zu triangles became %zu; the fog's factor is within %.3g of the exact one",
@@ -680,7 +444,7 @@ static int refuse_tessellation(const studio *all)
 
 static int tessellate(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     if (wanted->tessellation.bound == 0) return NB_DONE;
     const nebel_camera camera = nebel_scene_camera(all->loaded.scene, wanted->first_frame);
     nebel_tessellation_desc desc = wanted->tessellation;
@@ -717,7 +481,7 @@ static int check_count(const studio *all)
 
 static int load(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
     if (status == NB_DONE) status = check_count(all);
     return status == NB_DONE ? nb_load_fog(wanted->scene, wanted->first_frame, &all->listener, &all->loaded) : status;
@@ -725,7 +489,7 @@ static int load(studio *all)
 
 static int set_up(studio *all)
 {
-    const settings *const wanted = all->wanted;
+    const nb_render_call *const wanted = all->wanted;
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
@@ -737,7 +501,7 @@ static int set_up(studio *all)
     return wanted->gl ? open_gl(all) : open_renderer(all);
 }
 
-static void summarize(const settings *wanted, double seconds)
+static void summarize(const nb_render_call *wanted, double seconds)
 {
     char span[32], count[32] = "";
     nb_meter_write_span(seconds, span, sizeof span);
@@ -747,7 +511,7 @@ static void summarize(const settings *wanted, double seconds)
                       (unsigned)wanted->height, (unsigned)wanted->samples, wanted->samples > 1 ? "s" : "", span);
 }
 
-static int render(const settings *wanted)
+static int render(const nb_render_call *wanted)
 {
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     int status = set_up(&all);
@@ -769,9 +533,9 @@ static int render(const settings *wanted)
 static int run(int count, char **words)
 {
     nb_arguments arguments;
-    settings wanted = {0};
+    nb_render_call wanted = {0};
     int status = nb_options_parse(&nb_commands_render, count, words, &arguments);
-    if (status < 0) status = read_settings(&arguments, &wanted);
+    if (status < 0) status = nb_render_call_read(&arguments, &wanted);
     if (status >= 0) return status;
     nb_interrupt_listen();
     status = check_targets(&wanted);
@@ -785,8 +549,8 @@ const nb_command nb_commands_render = {
     .summary = "a scene to a picture, or to many",
     .synopsis = "SCENE -o FILE [options]",
     .about = about,
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
+    .options = nb_render_options,
+    .option_count = NB_RENDER_OPTIONS,
     .operands = "one scene file",
     .fewest_operands = 1,
     .most_operands = 1,

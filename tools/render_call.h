@@ -1,0 +1,33 @@
+/* What `nebel render` is told on the command line. */
+#ifndef NB_RENDER_CALL_H
+#define NB_RENDER_CALL_H
+
+#include "options.h"
+
+#include <nebel/render.h>
+
+typedef struct nb_render_call {
+    const char *scene, *output;
+    nebel_image_format format;
+    uint32_t width, height, samples;
+    uint32_t bounces, seed; /* of the reference; 0 bounces: no limit */
+    double exposure, tolerance;
+    nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
+    uint32_t first_frame, last_frame;
+    int many_frames, aov, quiet, gl;
+    nebel_method method;
+    nebel_renderer_desc renderer;
+} nb_render_call;
+
+enum { NB_RENDER_OPTIONS = 18 };
+
+extern const nb_option nb_render_options[NB_RENDER_OPTIONS];
+
+/* Whether a method takes a fog factor; whether it gives one colour to fog. */
+int nb_render_takes_factor(nebel_method method);
+int nb_render_takes_color(nebel_method method);
+
+/* -1 to go on, or the exit status after messages. */
+int nb_render_call_read(nb_arguments *arguments, nb_render_call *call);
+
+#endif
