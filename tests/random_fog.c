@@ -251,6 +251,20 @@ void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed)
     if (seed % 4 == 3) fog->max_opacity = dice(&state, .05, 1);
 }
 
+void random_fog_light(random_fog *fog, uint64_t *numbers)
+{
+    for (size_t i = 0; i < fog->count; i++) {
+        nebel_volume_desc *volume = &fog->volumes[i];
+        const double peak = dice(numbers, -0.7, 0.9);
+        if (volume->operation == NEBEL_OPERATION_EXCLUDE || i % 3 == 2) continue;
+        for (int c = 0; c < 3; c++) {
+            volume->source[c] = 0;
+            volume->albedo[c] = dice(numbers, 0.3, 1);
+        }
+        volume->phase = (nebel_phase){.type = (nebel_phase_type)(i % NEBEL_PHASE_DROPLETS), .g = peak, .alpha = 3};
+    }
+}
+
 nebel_fog_desc random_fog_desc(const random_fog *fog)
 {
     return (nebel_fog_desc){.ambient = {fog->ambient[0], fog->ambient[1], fog->ambient[2]},

@@ -37,6 +37,9 @@ typedef struct random_fog {
 
 void random_fog_make(random_fog *fog, random_fog_kind kind, uint64_t seed);
 
+/* Two of three volumes scatter light in place of their source. Goes on in `numbers`. */
+void random_fog_light(random_fog *fog, uint64_t *numbers);
+
 /* Its ambient light and its limit. */
 nebel_fog_desc random_fog_desc(const random_fog *fog);
 

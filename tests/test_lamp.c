@@ -209,21 +209,12 @@ static random_fog fog;
 static nebel_fog_desc sky;
 static nebel_lamp lamps[LAMPS];
 
-/* Random fog, most of it lit, under a sun and lamps within and beside it. */
+/* Random fog under a sun and lamps within and beside it. */
 static void make_lit(random_fog_kind kind, uint64_t seed)
 {
     uint64_t numbers = seed * 1481 + (uint64_t)kind;
     random_fog_make(&fog, kind, seed);
-    for (size_t i = 0; i < fog.count; i++) {
-        nebel_volume_desc *volume = &fog.volumes[i];
-        const double peak = dice(&numbers, -0.7, 0.9);
-        if (volume->operation == NEBEL_OPERATION_EXCLUDE || i % 3 == 2) continue;
-        for (int c = 0; c < 3; c++) {
-            volume->source[c] = 0;
-            volume->albedo[c] = dice(&numbers, 0.3, 1);
-        }
-        volume->phase = (nebel_phase){.type = (nebel_phase_type)(i % NEBEL_PHASE_DROPLETS), .g = peak, .alpha = 3};
-    }
+    random_fog_light(&fog, &numbers);
     for (int i = 0; i < LAMPS; i++) {
         nebel_lamp *lamp = &lamps[i];
         *lamp = (nebel_lamp){.type = i == 1 ? NEBEL_LAMP_SPOT : NEBEL_LAMP_POINT,

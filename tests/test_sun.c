@@ -67,21 +67,12 @@ enum { RAYS = 24, SEEDS = 6 };
 static random_fog fog;
 static nebel_fog_desc sky;
 
-/* Random fog, with every second volume that has a source lit instead. */
+/* Random fog under a sun. */
 static void make_sunlit(random_fog_kind kind, uint64_t seed)
 {
     uint64_t numbers = seed * 977 + (uint64_t)kind;
     random_fog_make(&fog, kind, seed);
-    for (size_t i = 0; i < fog.count; i++) {
-        nebel_volume_desc *volume = &fog.volumes[i];
-        const double peak = dice(&numbers, -0.7, 0.9);
-        if (volume->operation == NEBEL_OPERATION_EXCLUDE || i % 3 == 2) continue;
-        for (int c = 0; c < 3; c++) {
-            volume->source[c] = 0;
-            volume->albedo[c] = dice(&numbers, 0.3, 1);
-        }
-        volume->phase = (nebel_phase){.type = (nebel_phase_type)(i % NEBEL_PHASE_DROPLETS), .g = peak, .alpha = 3};
-    }
+    random_fog_light(&fog, &numbers);
     sky = (nebel_fog_desc){
         .sun = {.direction = {dice(&numbers, -1, 1), dice(&numbers, 0.2, 1), 0.3}, .irradiance = {5, 4, 3}}};
     memcpy(sky.ambient, fog.ambient, sizeof sky.ambient);

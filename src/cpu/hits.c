@@ -74,48 +74,51 @@ void nb_hits_trace(RTCScene scene, const nb_rays *rays, const int *active, nb_pa
     }
 }
 
+static void set_starts(struct RTCRay16 *ray, float (*start)[NB_BATCH], int first)
+{
+    memcpy(ray->org_x, start[0] + first, ROW);
+    memcpy(ray->org_y, start[1] + first, ROW);
+    memcpy(ray->org_z, start[2] + first, ROW);
+}
+
+/* Clears active[i] where something lies on the way, whose end is in ray->tfar. */
+static void find_shadows(RTCScene scene, struct RTCRay16 *ray, int *active)
+{
+    struct RTCIntersectContext context = coherent_context();
+    for (int i = 0; i < NB_PACKET; i++) ray->tfar[i] = active[i] ? ray->tfar[i] : -1;
+    rtcOccluded16(active, scene, &context, ray);
+    for (int i = 0; i < NB_PACKET; i++)
+        if (ray->tfar[i] < 0) active[i] = 0;
+}
+
 void nb_hits_shadow(RTCScene scene, float (*start)[NB_BATCH], const float direction[3], int *active,
                     nb_packets *packets)
 {
-    struct RTCIntersectContext context = coherent_context();
     struct RTCRay16 *ray = &packets->rays[0].ray;
     set_constants(ray);
     fill(ray->dir_x, direction[0]);
     fill(ray->dir_y, direction[1]);
     fill(ray->dir_z, direction[2]);
-    for (int p = 0; p < NB_PACKETS; p++) {
-        const int first = p * NB_PACKET;
+    for (int first = 0; first < NB_BATCH; first += NB_PACKET) {
         if (!any(active + first)) continue;
-        memcpy(ray->org_x, start[0] + first, ROW);
-        memcpy(ray->org_y, start[1] + first, ROW);
-        memcpy(ray->org_z, start[2] + first, ROW);
-        for (int i = 0; i < NB_PACKET; i++) ray->tfar[i] = active[first + i] ? INFINITY : -1;
-        rtcOccluded16(active + first, scene, &context, ray);
-        for (int i = 0; i < NB_PACKET; i++) {
-            if (ray->tfar[i] < 0) active[first + i] = 0;
-        }
+        set_starts(ray, start, first);
+        fill(ray->tfar, INFINITY);
+        find_shadows(scene, ray, active + first);
     }
 }
 
 void nb_hits_between(RTCScene scene, float (*start)[NB_BATCH], float (*direction)[NB_BATCH], const float *reach,
                      int *active, nb_packets *packets)
 {
-    struct RTCIntersectContext context = coherent_context();
     struct RTCRay16 *ray = &packets->rays[0].ray;
     set_constants(ray);
-    for (int p = 0; p < NB_PACKETS; p++) {
-        const int first = p * NB_PACKET;
+    for (int first = 0; first < NB_BATCH; first += NB_PACKET) {
         if (!any(active + first)) continue;
-        memcpy(ray->org_x, start[0] + first, ROW);
-        memcpy(ray->org_y, start[1] + first, ROW);
-        memcpy(ray->org_z, start[2] + first, ROW);
+        set_starts(ray, start, first);
         memcpy(ray->dir_x, direction[0] + first, ROW);
         memcpy(ray->dir_y, direction[1] + first, ROW);
         memcpy(ray->dir_z, direction[2] + first, ROW);
-        for (int i = 0; i < NB_PACKET; i++) ray->tfar[i] = active[first + i] ? reach[first + i] : -1;
-        rtcOccluded16(active + first, scene, &context, ray);
-        for (int i = 0; i < NB_PACKET; i++) {
-            if (ray->tfar[i] < 0) active[first + i] = 0;
-        }
+        memcpy(ray->tfar, reach + first, ROW);
+        find_shadows(scene, ray, active + first);
     }
 }
