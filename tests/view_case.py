@@ -120,10 +120,11 @@ class Viewer:
         return self.log.read_text().count(text)
 
     def say(self, text, act):
-        """Does something, and waits until the viewer says so."""
+        """Does something, and waits until the viewer says so, which may move what lies below."""
         before = self.said(text)
         act()
         self.wait(lambda: self.said(text) > before, f"'{text}'")
+        self.settle()
 
     def take_picture(self, key="F12"):
         """Once it is complete."""
@@ -138,7 +139,14 @@ class Viewer:
             self.wait(lambda: self.controls.stat().st_mtime_ns != before, "another frame")
 
     def place(self, name):
-        """Where a control is: x, y, width, height."""
+        """Where a control is and stays: x, y, width, height. Messages come and go, and what lies below moves."""
+        before, now = None, self.find(name)
+        while now != before:
+            self.settle()
+            before, now = now, self.find(name)
+        return now
+
+    def find(self, name):
         found = []
 
         def find():
