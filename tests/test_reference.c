@@ -302,7 +302,9 @@ static estimate measure_flux(const layer *l, int above, uint32_t paths)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.max_opacity = 0}, &fog, 1);
     static nb_lone_ray lone;
     static const nb_geometry nothing;
+    static const nebel_scene_data no_lamps;
     const nb_path_world world = {.fog = snapshot,
+                                 .scene = &no_lamps,
                                  .geometry = &nothing,
                                  .to_sun = {sqrt(1 - l->sun * l->sun), l->sun, 0},
                                  .sun = {1 / l->sun, 0, 0},

@@ -2,7 +2,15 @@
  * argument says how many times more samples than in passing, at most 4096 in all. */
 #include "test_render_scene.h"
 
-enum { WIDTH = 32, HEIGHT = 16, BLOCK = 16, PIXELS = WIDTH * HEIGHT, MOST_VOLUMES = 4, MOST_MESHES = 3 };
+enum {
+    WIDTH = 32,
+    HEIGHT = 16,
+    BLOCK = 16,
+    PIXELS = WIDTH * HEIGHT,
+    MOST_VOLUMES = 4,
+    MOST_MESHES = 3,
+    MOST_LAMPS = 2
+};
 
 static uint32_t samples = 128;
 
@@ -13,6 +21,7 @@ typedef struct trial {
     size_t volume_count;
     nebel_volume_desc volumes[MOST_VOLUMES];
     nebel_mesh meshes[MOST_MESHES];
+    nebel_lamp lamps[MOST_LAMPS];
 } trial;
 
 static void set_rgb(double rgb[3], double r, double g, double b)
@@ -182,7 +191,61 @@ static trial cloud_of_voxels(void)
     return t;
 }
 
+static void add_lamps(trial *t)
+{
+    t->scene.lamp_count = 2;
+    t->lamps[0] = (nebel_lamp){.position = {-1, 1.5, 1}, .intensity = {4, 3, 2}, .radius = .05};
+    t->lamps[1] = (nebel_lamp){.type = NEBEL_LAMP_SPOT,
+                               .position = {2, 4, 0},
+                               .intensity = {5, 10, 15},
+                               .direction = {-1, -3, .5},
+                               .inner_angle = 15,
+                               .outer_angle = 40};
+}
+
+/* Two fogs through each other, one of them with a lamp within. No surface is in a lamp's way. */
+static trial lamps_in_fog(void)
+{
+    trial t = start("lamps");
+    add_lamps(&t);
+    t.scene.has_sun = 0;
+    set_rgb(t.scene.sun_irradiance, 0, 0, 0);
+    add_mesh(&t, test_ground());
+    add(&t, .06, .9)->density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 2};
+    t.volumes[0].shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .normal = {0, -1, 0}};
+    nebel_volume_desc *ball = add(&t, .4, 1);
+    ball->shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1, 0}, .radius = 2};
+    ball->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .6};
+    return t;
+}
+
+/* Fog takes its colour, and the surfaces their shadows. */
+static trial lamps_on_surfaces(void)
+{
+    trial t = start("shadows");
+    add_lamps(&t);
+    t.lamps[0].position[0] = -3;
+    add_mesh(&t, test_ground());
+    add_mesh(&t, barrel.mesh);
+    add(&t, .05, 0)->shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .radius = 6};
+    set_rgb(t.volumes[0].extinction, .02, .05, .1);
+    return t;
+}
+
 /* ---- pictures -------------------------------------------------------------------------------- */
+
+static nebel_snapshot *commit(const nebel_fog_desc *sky, const trial *t)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(sky, &fog), NEBEL_OK);
+    for (size_t i = 0; i < t->volume_count; i++)
+        assert_int_equal(nebel_add_volume(fog, &t->volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, t->scene.lamp_count, t->lamps), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
 
 static void take(const trial *t, nebel_method method, double tolerance, float *color, float *error)
 {
@@ -190,9 +253,10 @@ static void take(const trial *t, nebel_method method, double tolerance, float *c
         .sun.direction = {t->scene.sun_direction[0], t->scene.sun_direction[1], t->scene.sun_direction[2]}};
     memcpy(sky.sun.irradiance, t->scene.sun_irradiance, sizeof sky.sun.irradiance);
     memcpy(sky.ambient, t->scene.ambient, sizeof sky.ambient);
-    nebel_snapshot *fog = fog_commit(&sky, t->volumes, t->volume_count);
+    nebel_snapshot *fog = commit(&sky, t);
     nebel_scene_data scene = t->scene;
     scene.meshes = t->meshes;
+    scene.lamps = t->lamps;
     nebel_renderer *renderer = NULL;
     assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){.threads = 0}, &renderer), NEBEL_OK);
     assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
@@ -256,6 +320,8 @@ TRIAL(distances)
 TRIAL(against_the_sun)
 TRIAL(panorama)
 TRIAL(cloud_of_voxels)
+TRIAL(lamps_in_fog)
+TRIAL(lamps_on_surfaces)
 
 int main(int count, char **words)
 {
@@ -271,6 +337,8 @@ int main(int count, char **words)
         cmocka_unit_test(against_the_sun_agrees),
         cmocka_unit_test(panorama_agrees),
         cmocka_unit_test(cloud_of_voxels_agrees),
+        cmocka_unit_test(lamps_in_fog_agrees),
+        cmocka_unit_test(lamps_on_surfaces_agrees),
     };
     if (count > 1) samples *= (uint32_t)strtoul(words[1], NULL, 10);
     test_barrel_make(&barrel);

@@ -1,6 +1,7 @@
 #include "path.h"
 
 #include "base/vector.h"
+#include "lampchance.h"
 
 #include <math.h>
 #include <string.h>
@@ -20,6 +21,7 @@ typedef struct path {
     int is_first;         /* the ray is the camera's */
     double throughput[3]; /* what light from here on counts */
     double radiance[3];
+    double shone[3]; /* what it had when its first ray ended */
 } path;
 
 /* ---- rays against surfaces ------------------------------------------------------------------- */
@@ -59,13 +61,14 @@ static void set_ray(const nb_geometry *geometry, const double origin[3], const d
     ray->mask = UINT32_MAX;
 }
 
-static int is_shadowed(const nb_geometry *geometry, const double origin[3], const double direction[3])
+static int is_shadowed(const nb_geometry *geometry, const double origin[3], const double direction[3], double reach)
 {
     struct RTCRay ray;
     struct RTCIntersectContext context;
-    if (geometry->scene == NULL) return 0;
+    if (geometry->scene == NULL || reach == 0) return 0;
     rtcInitIntersectContext(&context);
     set_ray(geometry, origin, direction, &ray);
+    ray.tfar = (float)reach;
     rtcOccluded1(geometry->scene, &context, &ray);
     return ray.tfar < 0;
 }
@@ -143,29 +146,148 @@ static void add(path *p, const double light[3], double share)
     for (int c = 0; c < 3; c++) p->radiance[c] += p->throughput[c] * light[c] * share;
 }
 
+/* Adds `share` of the light that comes to a place from a direction, from `reach` away, and gets there. */
+static nebel_result add_arriving(path *p, const double origin[3], const double direction[3], double reach,
+                                 const double light[3], double share)
+{
+    const nb_path_world *world = p->world;
+    if (!(share > 0) || is_shadowed(world->geometry, origin, direction, reach)) return NEBEL_OK;
+    nb_track way = {.fog = world->fog, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
+    memcpy(way.ray.origin, origin, sizeof way.ray.origin);
+    memcpy(way.ray.direction, direction, sizeof way.ray.direction);
+    double transmittance = 1;
+    nebel_result result = NEBEL_OK;
+    if (world->fog != NULL) result = nb_track_transmittance(&way, &p->chance, &transmittance);
+    if (result == NEBEL_OK) add(p, light, share * transmittance);
+    return result;
+}
+
 /* Sunlight that reaches a place, `share` of which goes on along the path. */
 static nebel_result add_sunlight(path *p, const double origin[3], double share)
 {
     const nb_path_world *world = p->world;
-    if (!world->has_sun || !(share > 0) || is_shadowed(world->geometry, origin, world->to_sun)) return NEBEL_OK;
-    nb_track way = {.fog = world->fog, .ray.t_max = HUGE_VAL, .ignore_distances = 1, .channel = p->channel};
-    memcpy(way.ray.origin, origin, sizeof way.ray.origin);
-    memcpy(way.ray.direction, world->to_sun, sizeof way.ray.direction);
-    double transmittance = 1;
-    nebel_result result = NEBEL_OK;
-    if (world->fog != NULL) result = nb_track_transmittance(&way, &p->chance, &transmittance);
-    if (result == NEBEL_OK) add(p, world->sun, share * transmittance);
-    return result;
+    return world->has_sun ? add_arriving(p, origin, world->to_sun, HUGE_VAL, world->sun, share) : NEBEL_OK;
 }
 
+/* ---- lamps ----------------------------------------------------------------------------------- */
+
+/* A ray along which fog may be lit by lamps. */
+typedef struct lit_ray {
+    nb_track track; /* as far as there may be fog */
+    double sum;     /* what all lamps weigh along it; 0: none lights it */
+} lit_ray;
+
+/* A lamp that was chosen for a place, as often as its probability says. */
+typedef struct chosen_lamp {
+    const nebel_lamp *lamp; /* NULL: none shines there */
+    nb_lamp_sight sight;
+    double probability;
+} chosen_lamp;
+
+static lit_ray light_ray(const nb_path_world *world, const nb_track *track)
+{
+    lit_ray lit = {.track = *track, .sum = 0};
+    if (world->fog == NULL || world->scene->lamp_count == 0) return lit;
+    lit.track.ray.t_max = nb_track_reach(&track->ray);
+    lit.sum = nb_lamps_sum(world->scene, nb_lamp_weight_along, &lit.track.ray);
+    return lit;
+}
+
+static chosen_lamp choose_lamp(path *p, const double place[3])
+{
+    const nebel_scene_data *scene = p->world->scene;
+    const nebel_ray here = {.origin = {place[0], place[1], place[2]}};
+    const double sum = nb_lamps_sum(scene, nb_lamp_weight_at, &here);
+    if (!(sum > 0)) return (chosen_lamp){.lamp = NULL};
+    const nebel_lamp *lamp = nb_lamps_choose(scene, nb_lamp_weight_at, &here, sum, nb_chance_next(&p->chance));
+    return (chosen_lamp){lamp, nb_lamp_sight_from(lamp, place), nb_lamp_weight_at(lamp, &here) / sum};
+}
+
+/* `share` of the light of lamps that comes to a place in fog, times what the phase function sends along the path. */
+static nebel_result add_scattered(path *p, const double place[3], const nebel_phase *phase, const double share[3])
+{
+    const chosen_lamp chosen = choose_lamp(p, place);
+    if (chosen.lamp == NULL) return NEBEL_OK;
+    const nb_lamp_sight *sight = &chosen.sight;
+    const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, sight->direction), -1), 1);
+    const double value = nebel_phase_value(phase, cosine) * sight->fluence / chosen.probability;
+    double light[3];
+    for (int c = 0; c < 3; c++) light[c] = chosen.lamp->intensity[c] * share[c];
+    return add_arriving(p, place, sight->direction, sight->reach, light, value);
+}
+
+/* A volume that scatters at a place, by chance. */
+static nebel_result choose_scatterer(path *p, const nebel_place *place, nebel_scatterer *scatterer)
+{
+    const nb_path_world *world = p->world;
+    const int channel = world->is_grey ? -1 : p->channel;
+    return nebel_choose_scatterer(world->fog, place, channel, nb_chance_next(&p->chance), scatterer);
+}
+
+/* Places in light are found in two ways: where a flight collides, and as lamps see the ray pass. This is how many there
+ * are per metre by both, as if no fog were before them: the balance heuristic of Veach and Guibas, "Optimally Combining
+ * Sampling Techniques for Monte Carlo Rendering", 1995, but for that fog, whose transmittance is known by chance alone.
+ * Any weights that add up to 1 are right in the mean. */
+static double density_of(const path *p, const lit_ray *lit, double extinction, double t)
+{
+    return extinction + nb_lamps_density(p->world->scene, &lit->track.ray, lit->sum, t);
+}
+
+/* Where a flight collides, once the throughput is that of what is scattered there. */
+static nebel_result add_colliding_light(path *p, const lit_ray *lit, const nb_flight *flight, const nebel_phase *phase)
+{
+    if (!(lit->sum > 0)) return NEBEL_OK;
+    const double extinction = flight->matter.extinction[p->channel];
+    const double share = extinction / density_of(p, lit, extinction, flight->t);
+    return add_scattered(p, flight->place.position, phase, (const double[3]){share, share, share});
+}
+
+/* Where a lamp sees the ray pass. */
+static nebel_result add_passing_light(path *p, const lit_ray *lit)
+{
+    const nb_path_world *world = p->world;
+    if (!(lit->sum > 0)) return NEBEL_OK;
+    const nebel_ray *ray = &lit->track.ray;
+    const nebel_lamp *lamp =
+        nb_lamps_choose(world->scene, nb_lamp_weight_along, ray, lit->sum, nb_chance_next(&p->chance));
+    const nb_passing passing = nb_passing_of(lamp, ray);
+    nb_track way = lit->track;
+    way.ray.t_max = nb_passing_draw(&passing, nb_chance_next(&p->chance));
+    nebel_place place;
+    nebel_matter matter;
+    nebel_scatterer scatterer;
+    double transmittance, share[3];
+    nebel_result result = nb_track_look(&way, way.ray.t_max, &place, &matter);
+    if (result == NEBEL_OK) result = choose_scatterer(p, &place, &scatterer);
+    if (result != NEBEL_OK || scatterer.probability == 0) return result;
+    result = nb_track_transmittance(&way, &p->chance, &transmittance);
+    if (result != NEBEL_OK || transmittance == 0) return result;
+    const double density = density_of(p, lit, matter.extinction[p->channel], way.ray.t_max);
+    for (int c = 0; c < 3; c++) share[c] = transmittance * scatterer.scattering[c] / scatterer.probability / density;
+    return add_scattered(p, place.position, &scatterer.phase, share);
+}
+
+/* At a surface. */
+static nebel_result add_reflected(path *p, const nb_meeting *at)
+{
+    const double normal[3] = {(double)at->normal[0], (double)at->normal[1], (double)at->normal[2]};
+    const double side[3] = {(double)at->side[0], (double)at->side[1], (double)at->side[2]};
+    if (p->world->scene->lamp_count == 0) return NEBEL_OK;
+    const chosen_lamp chosen = choose_lamp(p, p->ray.origin);
+    const nb_lamp_sight *sight = &chosen.sight;
+    if (chosen.lamp == NULL || nb_vector_dot(side, sight->direction) <= 0) return NEBEL_OK;
+    const double share = nb_vector_dot(normal, sight->direction) * sight->beam / (PI * chosen.probability);
+    return add_arriving(p, p->ray.origin, sight->direction, sight->reach, chosen.lamp->intensity, share);
+}
+
+/* ---- bounces --------------------------------------------------------------------------------- */
+
 /* Scatters at a collision. The throughput is 0 where the light is absorbed. */
-static nebel_result scatter(path *p, const nb_flight *flight)
+static nebel_result scatter(path *p, const lit_ray *lit, const nb_flight *flight)
 {
     const nb_path_world *world = p->world;
     nebel_scatterer scatterer;
-    const double chance = nb_chance_next(&p->chance);
-    const int channel = world->is_grey ? -1 : p->channel;
-    nebel_result result = nebel_choose_scatterer(world->fog, &flight->place, channel, chance, &scatterer);
+    nebel_result result = choose_scatterer(p, &flight->place, &scatterer);
     if (result != NEBEL_OK) return result;
     for (int c = 0; c < 3; c++) {
         const double scattered = scatterer.probability > 0 ? scatterer.scattering[c] / scatterer.probability : 0;
@@ -174,6 +296,7 @@ static nebel_result scatter(path *p, const nb_flight *flight)
     if (scatterer.probability == 0) return NEBEL_OK;
     const double cosine = fmin(fmax(nb_vector_dot(p->ray.direction, world->to_sun), -1), 1);
     result = add_sunlight(p, flight->place.position, nebel_phase_value(&scatterer.phase, cosine));
+    if (result == NEBEL_OK) result = add_colliding_light(p, lit, flight, &scatterer.phase);
     double direction[3];
     turn_about(p->ray.direction, nebel_phase_sample(&scatterer.phase, nb_chance_next(&p->chance)), &p->chance,
                direction);
@@ -190,7 +313,9 @@ static nebel_result reflect(path *p, const nb_meeting *at)
         p->ray.origin[c] = origin[c] + (double)at->start[c];
     }
     reflect_diffusely(at, &p->chance, p->ray.direction);
-    return at->lit ? add_sunlight(p, p->ray.origin, (double)at->cosine / PI) : NEBEL_OK;
+    nebel_result result = add_reflected(p, at);
+    if (result == NEBEL_OK && at->lit) result = add_sunlight(p, p->ray.origin, (double)at->cosine / PI);
+    return result;
 }
 
 /* ---- paths ----------------------------------------------------------------------------------- */
@@ -210,20 +335,23 @@ static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int 
 {
     const nb_path_world *world = p->world;
     const nb_track track = {world->fog, p->ray, !p->is_first, p->channel};
-    nebel_result result = nb_track_fly(&track, &p->chance, flight);
+    const lit_ray lit = light_ray(world, &track);
+    nebel_result result = add_passing_light(p, &lit);
+    if (result == NEBEL_OK) result = nb_track_fly(&track, &p->chance, flight);
     if (result != NEBEL_OK) return result;
     add(p, flight->shone, 1);
+    if (p->is_first) memcpy(p->shone, p->radiance, sizeof p->shone);
     *ended = !flight->collided && at->t == HUGE_VAL;
     if (*ended)
         add(p, p->is_first ? world->background : world->ambient, 1);
     else
-        result = flight->collided ? scatter(p, flight) : reflect(p, at);
+        result = flight->collided ? scatter(p, &lit, flight) : reflect(p, at);
     p->ray.t_max = HUGE_VAL;
     return result;
 }
 
 /* Follows the path of one channel, or of all where they are alike. *came_through: no fog stopped its first ray. */
-static nebel_result follow(path *p, const nb_meeting *first, double shone[3], int *came_through)
+static nebel_result follow(path *p, const nb_meeting *first, int *came_through)
 {
     const nb_path_world *world = p->world;
     nb_meeting at = *first;
@@ -232,10 +360,7 @@ static nebel_result follow(path *p, const nb_meeting *first, double shone[3], in
         int ended;
         const nebel_result result = go_on(p, &at, &flight, &ended);
         if (result != NEBEL_OK) return result;
-        if (bounce == 1) {
-            *came_through = !flight.collided;
-            memcpy(shone, flight.shone, sizeof flight.shone);
-        }
+        if (bounce == 1) *came_through = !flight.collided;
         p->is_first = 0;
         if (!ended && bounce == world->bounces) add(p, world->ambient, 1);
         if (ended || bounce == world->bounces || !survives(p)) return NEBEL_OK;
@@ -252,14 +377,13 @@ nebel_result nb_path_trace(const nb_path_world *world, const nebel_ray *eye, con
         path p = {.world = world, .lone = lone, .chance = stream, .channel = c, .ray = *eye, .is_first = 1};
         for (int k = 0; k < 3; k++) p.throughput[k] = world->is_grey || k == c ? 1 : 0;
         p.chance.state += (uint64_t)c << 62;
-        double shone[3] = {0, 0, 0};
         int came_through = 0;
-        const nebel_result result = follow(&p, first, shone, &came_through);
+        const nebel_result result = follow(&p, first, &came_through);
         if (result != NEBEL_OK) return result;
         for (int k = c; k < (world->is_grey ? 3 : c + 1); k++) {
             light->color[k] = p.radiance[k];
             light->transmittance[k] = came_through;
-            light->in_scattering[k] = came_through ? shone[k] : p.radiance[k];
+            light->in_scattering[k] = came_through ? p.shone[k] : p.radiance[k];
         }
         if (world->is_grey) break;
     }

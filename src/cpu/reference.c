@@ -18,9 +18,6 @@ nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_scene_data *scene = renderer->scene;
     nb_path_world *world = &frame->world;
     if (renderer->method != NEBEL_METHOD_REFERENCE) return NEBEL_OK;
-    if (scene->lamp_count > 0)
-        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: the reference does not follow the light of lamps yet; use the method exact");
     if (scene->max_opacity > 0 && scene->max_opacity < 1)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: max_opacity is a look that no light has; the reference cannot show it");

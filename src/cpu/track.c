@@ -14,8 +14,7 @@ typedef struct piece {
     double end, rate; /* m, 1/m */
 } piece;
 
-/* Fog that is farther than places may be counts as none. */
-static double reach_of(const nebel_ray *ray)
+double nb_track_reach(const nebel_ray *ray)
 {
     double reach = ray->t_max;
     for (int i = 0; i < 3; i++) {
@@ -44,7 +43,7 @@ static nebel_result next_piece(const nb_track *track, double t, double reach, in
     return NEBEL_OK;
 }
 
-static nebel_result look(const nb_track *track, double t, nebel_place *place, nebel_matter *matter)
+nebel_result nb_track_look(const nb_track *track, double t, nebel_place *place, nebel_matter *matter)
 {
     const nebel_ray *ray = &track->ray;
     for (int i = 0; i < 3; i++) place->position[i] = ray->origin[i] + t * ray->direction[i];
@@ -60,17 +59,18 @@ static double draw_way(double rate, nb_chance *chance)
 
 nebel_result nb_track_fly(const nb_track *track, nb_chance *chance, nb_flight *flight)
 {
-    const double reach = track->fog != NULL ? reach_of(&track->ray) : 0;
+    const double reach = track->fog != NULL ? nb_track_reach(&track->ray) : 0;
     memset(flight, 0, sizeof *flight);
     for (double t = 0; t < reach;) {
         piece p;
         nebel_result result = next_piece(track, t, reach, 1, &p);
         if (result != NEBEL_OK) return result;
         while ((t += draw_way(p.rate, chance)) < p.end) {
-            result = look(track, t, &flight->place, &flight->matter);
+            result = nb_track_look(track, t, &flight->place, &flight->matter);
             if (result != NEBEL_OK) return result;
             for (int c = 0; c < 3; c++) flight->shone[c] += flight->matter.emission[c] / p.rate;
             flight->collided = nb_chance_next(chance) * p.rate < flight->matter.extinction[track->channel];
+            flight->t = t;
             if (flight->collided) return NEBEL_OK;
         }
         t = p.end;
@@ -88,7 +88,7 @@ static int survives(double *weight, nb_chance *chance)
 
 nebel_result nb_track_transmittance(const nb_track *track, nb_chance *chance, double *transmittance)
 {
-    const double reach = track->fog != NULL ? reach_of(&track->ray) : 0;
+    const double reach = track->fog != NULL ? nb_track_reach(&track->ray) : 0;
     double weight = 1;
     *transmittance = 0;
     for (double t = 0; t < reach;) {
@@ -98,7 +98,7 @@ nebel_result nb_track_transmittance(const nb_track *track, nb_chance *chance, do
         while ((t += draw_way(p.rate, chance)) < p.end) {
             nebel_place place;
             nebel_matter matter;
-            result = look(track, t, &place, &matter);
+            result = nb_track_look(track, t, &place, &matter);
             if (result != NEBEL_OK) return result;
             weight *= fmax(1 - matter.extinction[track->channel] / p.rate, 0);
             if (!survives(&weight, chance)) return NEBEL_OK;

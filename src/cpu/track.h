@@ -16,10 +16,17 @@ typedef struct nb_track {
 
 typedef struct nb_flight {
     int collided; /* else t_max was reached */
+    double t;     /* m; there */
     nebel_place place;
     nebel_matter matter; /* there */
     double shone[3];     /* what the fog on the way emits towards the start, dimmed */
 } nb_flight;
+
+/* How far along the ray there may be fog, m: what is farther than places may be counts as none. */
+double nb_track_reach(const nebel_ray *ray);
+
+/* The fog at t. */
+nebel_result nb_track_look(const nb_track *track, double t, nebel_place *place, nebel_matter *matter);
 
 /* Delta tracking: Woodcock et al., "Techniques used in the GEM code", 1965. The mean of `collided` is the opacity; that
  * of `shone` the integral of emission times transmittance, which is gathered wherever the bound's rate stops the flight.

@@ -1,0 +1,117 @@
+#include "lampchance.h"
+
+#include "base/vector.h"
+
+#define PI 3.14159265358979323846
+
+static const double least_radius = 1e-3;
+
+static double radius_of(const nebel_lamp *lamp)
+{
+    return fmax(lamp->radius, least_radius);
+}
+
+static double largest(const double rgb[3])
+{
+    return fmax(rgb[0], fmax(rgb[1], rgb[2]));
+}
+
+/* ---- places ---------------------------------------------------------------------------------- */
+
+/* The part of its light that a spot sends off its axis. */
+static double cone_of(const nebel_lamp *lamp, const double direction[3])
+{
+    if (lamp->type != NEBEL_LAMP_SPOT) return 1;
+    const double outer = cos(lamp->outer_angle * (PI / 180)), inner = cos(lamp->inner_angle * (PI / 180));
+    double axis[3] = {lamp->direction[0], lamp->direction[1], lamp->direction[2]};
+    (void)nb_vector_make_unit(axis);
+    const double cosine = -nb_vector_dot(axis, direction);
+    if (cosine >= inner) return 1;
+    if (cosine <= outer) return 0;
+    const double s = (cosine - outer) / (inner - outer);
+    return s * s * (3 - 2 * s);
+}
+
+nb_lamp_sight nb_lamp_sight_from(const nebel_lamp *lamp, const double place[3])
+{
+    nb_lamp_sight sight;
+    for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
+    const double distance = nb_vector_length(sight.direction), radius = radius_of(lamp);
+    for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
+    const double nearest = fmax(distance, radius), part = radius / nearest;
+    sight.reach = fmax(distance - lamp->radius, 0);
+    sight.beam = cone_of(lamp, sight.direction) / (nearest * nearest);
+    sight.fluence = sight.beam * 2 / (1 + sqrt(1 - part * part));
+    return sight;
+}
+
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+nb_passing nb_passing_of(const nebel_lamp *lamp, const nebel_ray *ray)
+{
+    double to_lamp[3], aside[3];
+    for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
+    nb_passing p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
+    for (int i = 0; i < 3; i++) aside[i] = to_lamp[i] + p.start * ray->direction[i];
+    p.aside = fmax(nb_vector_length(aside), radius_of(lamp));
+    /* One angle between two places; as the difference of two it would be lost to rounding far from the lamp. */
+    p.angle = atan2(p.aside * p.t_max, p.aside * p.aside + p.start * (p.start + p.t_max));
+    return p;
+}
+
+double nb_passing_draw(const nb_passing *p, double chance)
+{
+    const double angle = chance * p->angle, square = p->start * p->start + p->aside * p->aside;
+    const double down = p->aside * cos(angle) - p->start * sin(angle);
+    return down > 0 ? fmin(square * sin(angle) / down, p->t_max) : p->t_max;
+}
+
+double nb_passing_density(const nb_passing *p, double t)
+{
+    const double from = p->start + t;
+    return p->aside / (p->angle * (p->aside * p->aside + from * from));
+}
+
+/* ---- one of many ----------------------------------------------------------------------------- */
+
+double nb_lamp_weight_at(const nebel_lamp *lamp, const nebel_ray *ray)
+{
+    return largest(lamp->intensity) * nb_lamp_sight_from(lamp, ray->origin).fluence;
+}
+
+double nb_lamp_weight_along(const nebel_lamp *lamp, const nebel_ray *ray)
+{
+    const nb_passing passing = nb_passing_of(lamp, ray);
+    return largest(lamp->intensity) * passing.angle / passing.aside;
+}
+
+double nb_lamps_sum(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray)
+{
+    double sum = 0;
+    for (size_t i = 0; i < scene->lamp_count; i++) sum += weigh(&scene->lamps[i], ray);
+    return sum;
+}
+
+const nebel_lamp *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray, double sum,
+                                  double chance)
+{
+    const nebel_lamp *chosen = NULL;
+    double left = chance * sum;
+    for (size_t i = 0; i < scene->lamp_count && (chosen == NULL || left >= 0); i++) {
+        const double weight = weigh(&scene->lamps[i], ray);
+        if (weight > 0) chosen = &scene->lamps[i]; /* the last one, where rounding leaves some */
+        left -= weight;
+    }
+    return chosen;
+}
+
+double nb_lamps_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t)
+{
+    double density = 0;
+    for (size_t i = 0; i < scene->lamp_count; i++) {
+        const nb_passing passing = nb_passing_of(&scene->lamps[i], ray);
+        const double part = nb_lamp_weight_along(&scene->lamps[i], ray) / sum;
+        if (part > 0) density += part * nb_passing_density(&passing, t);
+    }
+    return density;
+}

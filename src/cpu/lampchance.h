@@ -1,0 +1,49 @@
+/* Lamps by chance, as the reference renderer finds them: one of many, and places along a ray that it lights. */
+#ifndef NB_CPU_LAMPCHANCE_H
+#define NB_CPU_LAMPCHANCE_H
+
+#include <nebel/scene.h>
+
+/* A lamp as a place sees it. */
+typedef struct nb_lamp_sight {
+    double direction[3]; /* towards the lamp, of length 1; 0 in its very place */
+    double reach;        /* m, to its surface */
+    double beam;         /* 1/m^2: irradiance of what faces a lamp of 1 W/sr, within its cone */
+    double fluence;      /* 1/m^2: the same from all sides, for fog */
+} nb_lamp_sight;
+
+/* Before anything that is in the way. Of a lamp without a radius, and nearer than 1 mm, as everywhere. */
+nb_lamp_sight nb_lamp_sight_from(const nebel_lamp *lamp, const double place[3]);
+
+/* What a lamp weighs among others where one of them is chosen: at the ray's origin, by the light that it brings there;
+ * along the ray up to t_max, by what its light would add up to, were there no cone and the fog thin and even. */
+typedef double nb_lamp_weigh(const nebel_lamp *lamp, const nebel_ray *ray);
+double nb_lamp_weight_at(const nebel_lamp *lamp, const nebel_ray *ray);
+double nb_lamp_weight_along(const nebel_lamp *lamp, const nebel_ray *ray);
+
+/* Of all lamps together. */
+double nb_lamps_sum(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray);
+
+/* The lamp that 0 <= chance < 1 falls to, each as often as its part of `sum`, which is more than 0. */
+const nebel_lamp *nb_lamps_choose(const nebel_scene_data *scene, nb_lamp_weigh *weigh, const nebel_ray *ray, double sum,
+                                  double chance);
+
+/* A ray from its origin to t_max, which is finite, as a lamp sees it pass. */
+typedef struct nb_passing {
+    double start; /* m along the ray: of its origin, from the place closest to the lamp */
+    double aside; /* m: how far that is from the lamp, no less than the lamp's radius */
+    double angle; /* that the lamp sees it go */
+    double t_max;
+} nb_passing;
+
+nb_passing nb_passing_of(const nebel_lamp *lamp, const nebel_ray *ray);
+
+/* Equiangular sampling: Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media",
+ * 2012, section 4. A place from 0 <= chance < 1, m along the ray, and the density of such places, 1/m. */
+double nb_passing_draw(const nb_passing *passing, double chance);
+double nb_passing_density(const nb_passing *passing, double t);
+
+/* Of places by such chances, for lamps that are chosen by what they weigh along the ray; `sum` is that of all. 1/m */
+double nb_lamps_density(const nebel_scene_data *scene, const nebel_ray *ray, double sum, double t);
+
+#endif
