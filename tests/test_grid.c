@@ -334,6 +334,115 @@ static void errors_admit_the_truth(void **state)
     }
 }
 
+/* ---- sunlight in voxels alone ---------------------------------------------------------------- */
+
+static const double lone_extinction = 1.5, lone_glow = .8; /* the second: of opaque fog, were it lit from all around */
+
+/* Sunlight that the block scatters along the line: between cuts `parts` pieces with two points each. */
+static long double sunlight_of(const block *b, const long double to_sun[3], const line *l, int parts)
+{
+    const cuts c = cut_all(l, &b, 1);
+    const long double k = (long double)lone_extinction;
+    long double depth = 0, sum = 0;
+    for (size_t i = 1; i < c.count; i++)
+        for (int part = 0; part < parts; part++) {
+            const long double h = (c.t[i] - c.t[i - 1]) / parts, start = c.t[i - 1] + h * part;
+            for (int side = -1; side <= 1; side += 2) {
+                const long double t = start + h * (.5L + (long double)side / sqrtl(12));
+                const long double density = density_on(b, l, t);
+                if (density <= 0) continue;
+                line up = {.length = 20};
+                for (int a = 0; a < 3; a++) {
+                    up.o[a] = l->o[a] + l->d[a] * t;
+                    up.d[a] = to_sun[a];
+                }
+                sum += h / 2 * density * expl(-k * (depth + integral_on(b, l, start, t) + depth_of(b, &up)));
+            }
+            depth += integral_on(b, l, start, start + h);
+        }
+    return sum * k * (long double)lone_glow;
+}
+
+/* One block alone, in some seeds with a sun level with its faces. */
+static nebel_snapshot *lone_fog(uint64_t *state, block *b, nebel_filter filter, double sun[3])
+{
+    fill_block(state, b, filter);
+    const int level = dice_below(state, 5);
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        sun[i] = level == i ? 0 : dice(state, -1, 1);
+        square += sun[i] * sun[i];
+    }
+    for (int i = 0; i < 3; i++) sun[i] /= sqrt(square);
+    nebel_volume_desc v = volume_of(b, lone_extinction, 0);
+    nebel_fog_desc desc = {.sun = {.direction = {sun[0], sun[1], sun[2]}}};
+    for (int c = 0; c < 3; c++) {
+        v.albedo[c] = lone_glow;
+        desc.sun.irradiance[c] = 4 * acos(-1);
+    }
+    nebel_snapshot *fog = fog_commit(&desc, &v, 1);
+    nebel_release_grid(b->grid);
+    return fog;
+}
+
+static void check_sunlight(uint64_t seed, nebel_filter filter, double tolerance)
+{
+    static block b;
+    uint64_t state = 977 * seed + 5;
+    double sun[3];
+    nebel_snapshot *fog = lone_fog(&state, &b, filter, sun);
+    const long double to_sun[3] = {(long double)sun[0], (long double)sun[1], (long double)sun[2]};
+    for (int i = 0; i < 4; i++) {
+        const nebel_ray ray = random_ray(&state);
+        const line l = line_of_ray(&ray);
+        const long double truth = sunlight_of(&b, to_sun, &l, 12), rough = sunlight_of(&b, to_sun, &l, 5);
+        const double doubt = fabs((double)(truth - rough)) + 2e-6; /* the edges of shadows lie anywhere */
+        assert_true(doubt < 1e-3);
+        for (int p = 0; p < 2; p++) {
+            const nebel_light light = trace(fog, (nebel_precision)p, tolerance, &ray);
+            const double off = fabs((double)((long double)light.in_scattering[0] - truth));
+            assert_true(light.error <= tolerance + (p == 0 ? 1e-8 : 1e-4));
+            if (!(off <= light.error + doubt))
+                fail_msg("seed %d ray %d precision %d: off by %g, said %g", (int)seed, i, p, off, light.error);
+        }
+    }
+    nebel_release_snapshot(fog);
+}
+
+static void errors_of_sunlight_admit_the_truth(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 0; seed < 24; seed++) {
+        check_sunlight(seed, NEBEL_FILTER_LINEAR, seed % 2 == 0 ? 2e-3 : 1e-4);
+        check_sunlight(seed, NEBEL_FILTER_NEAREST, seed % 2 == 0 ? 2e-3 : 1e-4);
+    }
+}
+
+/* What the sun lights and what surfaces keep from it is all that it would light. */
+static void shadows_of_surfaces_part_the_sunlight(void **test)
+{
+    static const float toggles[] = {0, .7F, 1.9F, 2.5F, 3.25F, .7F, 1.9F, 2.5F, 3.25F};
+    static const uint32_t lit[] = {0, 5}, dark[] = {5, 9};
+    static block b;
+    (void)test;
+    for (uint64_t seed = 0; seed < 40; seed++) {
+        uint64_t state = seed;
+        double sun[3];
+        nebel_snapshot *fog = lone_fog(&state, &b, (nebel_filter)(seed % 2), sun);
+        const nebel_ray ray = random_ray(&state);
+        const nebel_lit_pieces pieces[2] = {{lit, toggles}, {dark, toggles}};
+        nebel_light part[2];
+        const nebel_light all = trace(fog, NEBEL_PRECISION_FLOAT, 1e-4, &ray);
+        for (int i = 0; i < 2; i++) {
+            const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4, .sunlit = &pieces[i]};
+            assert_int_equal(nebel_trace(fog, &desc, 1, &ray, sizeof ray, &part[i], sizeof part[i]), NEBEL_OK);
+        }
+        const double sum = part[0].in_scattering[0] + part[1].in_scattering[0];
+        assert_true(fabs(sum - all.in_scattering[0]) <= part[0].error + part[1].error + all.error);
+        nebel_release_snapshot(fog);
+    }
+}
+
 static void trace_at(const nebel_snapshot *fog, nebel_isa isa, size_t n, const nebel_ray *rays, nebel_light *lights)
 {
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = isa, .tolerance = 1e-5};
@@ -367,9 +476,12 @@ static void bits_do_not_depend_on_company(void **test)
 {
     (void)test;
     enum { RAYS = 37 };
-    for (uint64_t seed = 0; seed < 12; seed++) {
+    for (uint64_t seed = 0; seed < 16; seed++) {
+        static block lone;
+        double sun[3];
         uint64_t state = seed;
-        nebel_snapshot *fog = mixed_fog(&state, seed % 3 == 2 ? .5 : 0);
+        nebel_snapshot *fog = seed < 12 ? mixed_fog(&state, seed % 3 == 2 ? .5 : 0)
+                                        : lone_fog(&state, &lone, (nebel_filter)(seed % 2), sun);
         nebel_ray rays[RAYS];
         nebel_light alone[RAYS], together[RAYS];
         for (int i = 0; i < RAYS; i++) rays[i] = random_ray(&state);
@@ -649,6 +761,8 @@ int main(void)
         cmocka_unit_test(depth_is_the_sum_over_cells),
         cmocka_unit_test(depth_is_the_sum_over_voxels),
         cmocka_unit_test(errors_admit_the_truth),
+        cmocka_unit_test(errors_of_sunlight_admit_the_truth),
+        cmocka_unit_test(shadows_of_surfaces_part_the_sunlight),
         cmocka_unit_test(bits_do_not_depend_on_company),
         cmocka_unit_test(float_is_near_double),
         cmocka_unit_test(equal_voxels_are_constant_density),

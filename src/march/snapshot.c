@@ -188,6 +188,7 @@ static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
     }
     if (even) return flat ? NB_WAY_FLAT : NB_WAY_ADDED;
     const nb_volume *body = &s->media[0].body;
+    if (s->medium_count == 1 && body->density.type == NEBEL_DENSITY_GRID) return NB_WAY_GRID;
     const int is_height = s->medium_count == 1 && body->leaves[0].type == NB_LEAF_WORLD &&
                           body->density.type == NEBEL_DENSITY_HEIGHT && body->density.below == NEBEL_BELOW_GROW;
     return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;

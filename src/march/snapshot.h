@@ -29,7 +29,8 @@ typedef enum nb_way_to_sun {
     NB_WAY_MARCHED = 0, /* by a march of its own */
     NB_WAY_ADDED,       /* few convex bodies of constant density that add: what they cut out of the way, summed */
     NB_WAY_FLAT,        /* the same where all faces are flat: along any ray it is linear between turns */
-    NB_WAY_HEIGHT       /* one height fog without an end, and a sun above: a multiple of the density */
+    NB_WAY_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
+    NB_WAY_GRID         /* one box of voxels: they are walked through from the place on */
 } nb_way_to_sun;
 
 /* Bodies of more faces have very many edges, and nearly smooth shadows: their turns are not looked for. */

@@ -537,18 +537,21 @@ static nb_grid_line line_of_lane(const grid_lines *lines, size_t i)
                           {lines->slope[0][i], lines->slope[1][i], lines->slope[2][i]}};
 }
 
-static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end)
+/* Up to `enough` [m]: see nb_grid_integral. */
+static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
 {
     const grid_lines lines = lines_from(k, start);
     double length[NB_WIDTH];
-    nb_scalar value[NB_WIDTH], error[NB_WIDTH], noise[NB_WIDTH];
+    nb_scalar value[NB_WIDTH], error[NB_WIDTH], noise[NB_WIDTH], most[NB_WIDTH];
     nb_wstore_lanes(length, end - start);
     nb_store_lanes(noise, k->noise);
+    nb_store_lanes(most, enough);
     for (size_t i = 0; i < NB_WIDTH; i++) {
         value[i] = error[i] = 0;
         if (!nb_lane(k->inside, i)) continue;
         const nb_grid_line line = line_of_lane(&lines, i);
-        const nb_grid_sum sum = nb_grid_integral(k->medium->body.density.grid, &line, length[i], (double)noise[i]);
+        const nb_grid_sum sum =
+            nb_grid_integral(k->medium->body.density.grid, &line, length[i], (double)noise[i], (double)most[i]);
         value[i] = (nb_scalar)sum.value;
         error[i] = (nb_scalar)sum.error;
     }
@@ -567,7 +570,10 @@ static nb_real grid_density(const contact *k, nb_wide t)
     return nb_load_lanes(value);
 }
 
-static nb_wide grid_kink(const contact *k, nb_wide t)
+typedef double grid_distance(const nebel_grid *grid, const nb_grid_line *line, double least);
+
+/* The next place after t that a distance says. */
+static nb_wide next_in_grid(const contact *k, nb_wide t, grid_distance *next)
 {
     const grid_lines lines = lines_from(k, t);
     double distance[NB_WIDTH], place[NB_WIDTH];
@@ -577,7 +583,7 @@ static nb_wide grid_kink(const contact *k, nb_wide t)
         if (!nb_lane(k->inside, i)) continue;
         const nb_grid_line line = line_of_lane(&lines, i);
         const double least = fabs(place[i]) * (16 * DBL_EPSILON);
-        distance[i] = fmin(nb_grid_kink(k->medium->body.density.grid, &line, least), 1e18);
+        distance[i] = fmin(next(k->medium->body.density.grid, &line, least), 1e18);
     }
     return t + nb_wload_lanes(distance);
 }
@@ -720,7 +726,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end
     case NEBEL_DENSITY_SOFT_EDGE:
         return soft_edge_integral(k, start, h);
     case NEBEL_DENSITY_GRID:
-        return grid_integral(k, start, end);
+        return grid_integral(k, start, end, NB_HUGE);
     default:
         return blur(nb_estimate_of(h, h * (NB_F(2.0) * NB_EPSILON)), k->noise, h);
     }
@@ -731,7 +737,7 @@ static nb_wide contact_kink(const contact *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_SOFT_EDGE) return soft_edge_kink(k, t);
-    if (density->type == NEBEL_DENSITY_GRID) return grid_kink(k, t);
+    if (density->type == NEBEL_DENSITY_GRID) return next_in_grid(k, t, nb_grid_kink);
     const int linear = density->type == NEBEL_DENSITY_LINEAR;
     if (!linear && !(density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)) return NB_WFAR;
     const nb_wide inverse = nb_wrcp_bounded(k->slope.x);

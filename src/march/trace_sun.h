@@ -197,6 +197,21 @@ static nb_real longest_way(const nb_volume *body)
     return REAL(fmin(most, 1e18));
 }
 
+/* What of a leaf's interval is ahead, and by how much that may be longer or shorter. */
+typedef struct stretch_ahead {
+    nb_wide enter, leave;
+    nb_real error;
+} stretch_ahead;
+
+static stretch_ahead ahead_in(const packet *way, const nb_volume *body)
+{
+    const nb_interval raw = leaf_interval(way, body, &body->leaves[0]);
+    const nb_wmask near = raw.leave + raw.leave_slack >= NB_W(0.0);
+    const nb_real slack = nb_min(nb_narrow(raw.enter_slack + raw.leave_slack), longest_way(body));
+    return (stretch_ahead){nb_wmax(raw.enter, NB_W(0.0)), nb_wmin(raw.leave, NB_WFAR),
+                           nb_select(nb_narrow_mask(near), slack, NB_F(0.0))};
+}
+
 /* Convex bodies that add: each cuts one stretch out of the way. */
 static light_depth depth_of_bodies(const sunlight *sun, const march *m, nb_wide t)
 {
@@ -205,16 +220,32 @@ static light_depth depth_of_bodies(const sunlight *sun, const march *m, nb_wide 
     light_depth to_sun = no_depth();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
-        const nb_interval raw = leaf_interval(&way, body, &body->leaves[0]);
-        const nb_wide enter = nb_wmax(raw.enter, NB_W(0.0)), leave = nb_wmin(raw.leave, NB_WFAR);
-        const nb_real length = nb_narrow(nb_wmax(leave - enter, NB_W(0.0)));
-        const nb_wmask near = raw.leave + raw.leave_slack >= NB_W(0.0);
-        const nb_real slack = nb_min(nb_narrow(raw.enter_slack + raw.leave_slack), longest_way(body));
-        const nb_real error = nb_select(nb_narrow_mask(near), slack, NB_F(0.0)) + length * (NB_F(4.0) * NB_EPSILON);
+        const stretch_ahead s = ahead_in(&way, body);
+        const nb_real length = nb_narrow(nb_wmax(s.leave - s.enter, NB_W(0.0)));
+        const nb_real error = s.error + length * (NB_F(4.0) * NB_EPSILON);
         for (int c = 0; c < 3; c++) {
             to_sun.depth[c] = to_sun.depth[c] + REAL(body->extinction[c]) * length;
             to_sun.error[c] = to_sun.error[c] + REAL(body->extinction[c]) * error;
         }
+    }
+    return to_sun;
+}
+
+/* Voxels of one box alone, up to where the integral of their density is `enough`. */
+static light_depth depth_of_grid(const sunlight *sun, const march *m, nb_wide t, nb_mask lanes, nb_real enough)
+{
+    const nb_medium *medium = &sun->snapshot->media[0];
+    const nb_volume *body = &medium->body;
+    const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), sun->direction, NB_WFAR};
+    const stretch_ahead s = ahead_in(&way, body);
+    contact k = {.medium = medium, .inside = nb_and(lanes, nb_narrow_mask(s.enter < s.leave))};
+    grid_contact(&k, &way, &body->leaves[0]);
+    const nb_estimate along = grid_integral(&k, s.enter, s.leave, enough);
+    const nb_real error = along.error + s.error * REAL(nb_grid_peak(body->density.grid));
+    light_depth to_sun = no_depth();
+    for (int c = 0; c < 3; c++) {
+        to_sun.depth[c] = REAL(body->extinction[c]) * along.value;
+        to_sun.error[c] = REAL(body->extinction[c]) * error;
     }
     return to_sun;
 }
@@ -227,6 +258,8 @@ static light_depth depth_to_sun(sunlight *sun, const march *m, nb_wide t, nb_wma
     case NB_WAY_ADDED:
     case NB_WAY_FLAT:
         return depth_of_bodies(sun, m, t);
+    case NB_WAY_GRID:
+        return depth_of_grid(sun, m, t, nb_narrow_mask(lanes), NB_HUGE);
     default:
         return depth_to_light(sun, m, t, sun->direction, nb_wselect(lanes, NB_WFAR, NB_W(0.0)));
     }
@@ -248,6 +281,8 @@ typedef struct sun_step {
     nb_real error;    /* of the rule, worst channel */
     nb_real rounding; /* of its terms */
     nb_real drop;     /* largest loss of transmittance over it */
+    nb_wide amount;   /* of a grid alone: the density's integral over it, which may be off by so much */
+    nb_real amount_error;
 } sun_step;
 
 /* From where the ray meets the piece to `end`, of all media there: optical depth and its error. */
@@ -350,27 +385,49 @@ static sun_node sunlit_node(sunlight *sun, const march *m, const piece *p, const
     return sum;
 }
 
+/* What both rules make of the nodes so far. */
+typedef struct rule_sum {
+    nb_real light[3], three[3], taken[3], rounding[3];
+} rule_sum;
+
+static rule_sum no_rule_sum(void)
+{
+    const nb_real zero = NB_F(0.0);
+    return (rule_sum){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+}
+
+static void add_node(rule_sum *sum, const sun_node *at, int n)
+{
+    for (int c = 0; c < 3; c++) {
+        const nb_real light = REAL(sun_weights[n]) * at->light[c];
+        sum->light[c] = sum->light[c] + light;
+        sum->taken[c] = sum->taken[c] + REAL(sun_weights[n]) * at->taken[c];
+        sum->three[c] = sum->three[c] + REAL(sun_weights_of_three[n]) * at->light[c];
+        sum->rounding[c] = sum->rounding[c] + light * at->doubt[c];
+    }
+}
+
+static void finish_rule(const rule_sum *sum, sun_step *s)
+{
+    s->error = s->rounding = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        s->light[c] = sum->light[c];
+        s->taken[c] = sum->taken[c];
+        s->error = nb_max(s->error, nb_abs(sum->light[c] - sum->three[c]));
+        s->rounding = nb_max(s->rounding, sum->rounding[c]);
+    }
+}
+
 static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes,
                             sun_step *s)
 {
-    nb_real three[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)}, rounding[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
-    for (int c = 0; c < 3; c++) s->light[c] = s->taken[c] = NB_F(0.0);
+    rule_sum sum = no_rule_sum();
     for (int n = 0; n < SUN_NODES; n++) {
         const sun_node at = s->lamp != NULL ? lamp_node(sun, m, p, g, s, lanes, sun_nodes[n])
                                             : sunlit_node(sun, m, p, g, s, lanes, sun_nodes[n]);
-        for (int c = 0; c < 3; c++) {
-            const nb_real light = REAL(sun_weights[n]) * at.light[c];
-            s->light[c] = s->light[c] + light;
-            s->taken[c] = s->taken[c] + REAL(sun_weights[n]) * at.taken[c];
-            three[c] = three[c] + REAL(sun_weights_of_three[n]) * at.light[c];
-            rounding[c] = rounding[c] + light * at.doubt[c];
-        }
+        add_node(&sum, &at, n);
     }
-    s->error = s->rounding = NB_F(0.0);
-    for (int c = 0; c < 3; c++) {
-        s->error = nb_max(s->error, nb_abs(s->light[c] - three[c]));
-        s->rounding = nb_max(s->rounding, rounding[c]);
-    }
+    finish_rule(&sum, s);
 }
 
 /* Sunlight is never more than full sunlight gives: the most radiant medium's times the loss of transmittance. A better
@@ -402,14 +459,18 @@ static void limit_step(const march *m, const nb_real before[3], sun_step *s)
 typedef struct sun_walk {
     nb_wide t;
     nb_wmask lanes, at_turn;
-    nb_real left;             /* steps that the lane may still try before its next toggle */
-    nb_real guess, before[3]; /* length of the next step; transmittance up to here */
+    nb_real left;               /* steps that the lane may still try before its next toggle */
+    nb_real guess, before[3];   /* length of the next step; transmittance up to here */
+    nb_wide along, along_error; /* of a grid: the integral of its density from the start of the piece up to here */
 } sun_walk;
+
+#include "trace_sun_grid.h"
 
 static sun_step try_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
                          nb_real length, nb_wide end, nb_wmask turns)
 {
-    sun_step s = {.start = w->t, .length = length};
+    if (is_grid_alone(sun)) return try_grid_step(sun, m, g, w, length, end);
+    sun_step s = {.start = w->t, .length = length, .amount = NB_W(0.0), .amount_error = NB_F(0.0)};
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
     transmittance_until(m, p, g, end, s.behind);
     sum_light_nodes(sun, m, p, g, w->lanes, &s);
@@ -429,8 +490,12 @@ static nb_mask sunlit_lanes(const march *m, const piece *p)
 /* A first step of a few optical depths: endless pieces would be halved for ever. */
 static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb_mask lanes)
 {
-    sun_walk w = {
-        .t = p->start, .lanes = nb_widen_mask(lanes), .at_turn = nb_wmask_false, .left = NB_F(1.0) * MOST_SUN_STEPS};
+    sun_walk w = {.t = p->start,
+                  .lanes = nb_widen_mask(lanes),
+                  .at_turn = nb_wmask_false,
+                  .left = NB_F(1.0) * MOST_SUN_STEPS,
+                  .along = NB_W(0.0),
+                  .along_error = NB_W(0.0)};
     nb_real depth[3], error[3];
     depth_until(m, p, g, p->end, depth, error);
     const nb_real within = nb_max(largest(depth) - largest(g->depth), NB_F(4.0));
@@ -448,6 +513,9 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     const nb_real sum = largest(g->radiance) * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(taken, s->error + s->rounding + sum, NB_F(0.0));
     const nb_wmask moved = nb_widen_mask(taken);
+    const nb_wide along = w->along + s->amount;
+    w->along = nb_wselect(moved, along, w->along);
+    w->along_error = nb_wselect(moved, w->along_error + nb_widen(s->amount_error), w->along_error);
     w->t = nb_wselect(moved, end, w->t);
     w->at_turn = nb_wor(nb_wand(moved, turns), nb_wand(nb_wnot(moved), w->at_turn));
     w->guess = nb_select(taken, nb_max(w->guess, s->length + s->length), NB_F(0.5) * s->length);
@@ -500,7 +568,8 @@ static sun_step closed_step(sunlight *sun, const march *m, const piece *p, const
             light_error[c] = light_error[c] + nb_select(k->inside, k->glow[c] * along.error, zero);
         }
     }
-    sun_step s = {.start = w->t, .length = h, .error = zero, .rounding = zero};
+    sun_step s = {
+        .start = w->t, .length = h, .error = zero, .rounding = zero, .amount = NB_W(0.0), .amount_error = zero};
     nb_real least[3], change[3], most_seen[3], ratio[3];
     for (int c = 0; c < 3; c++) {
         const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c];
@@ -541,7 +610,8 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
 {
     const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
     const nb_wide bright = nb_wmin(sun->shade.toggle, s->p->end);
-    const nb_wide next = nb_wmin(next_turn(sun, w->t, bright), nearest_kink(m, w->t, bright));
+    const nb_wide kink = is_grid_alone(sun) ? nearest_border(m, w->t, bright) : nearest_kink(m, w->t, bright);
+    const nb_wide next = nb_wmin(next_turn(sun, w->t, bright), kink);
     const nb_wide stop = nb_wselect(nb_widen_mask(last), bright, next);
     const nb_real rest = nb_narrow(stop - w->t), length = nb_select(last, rest, nb_min(w->guess, rest));
     const nb_wmask to_stop = nb_widen_mask(length >= rest);
@@ -549,9 +619,9 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
     const nb_wmask turns = nb_wand(to_stop, stop < bright);
     const sun_step tried = try_step(sun, m, s->p, &s->before, w, length, end, turns);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(tried.light); /* what no halving makes less */
-    const nb_real allowed =
-        least + REAL(sun->share) *
-                    (NB_F(0.5) * tried.drop + NB_F(0.25) * (length / s->whole) / s->pieces + NB_F(0.001) / s->pieces);
+    const nb_real share = is_grid_alone(sun) ? GRID_SHARE * REAL(sun->share) : REAL(sun->share);
+    const nb_real allowed = least + share * (NB_F(0.5) * tried.drop + NB_F(0.25) * (length / s->whole) / s->pieces +
+                                             NB_F(0.001) / s->pieces);
     const nb_mask fits = nb_or(last, tried.error <= allowed);
     take_sun_step(g, w, &tried, end, turns, nb_and(fits, nb_narrow_mask(w->lanes)));
     w->left = w->left - NB_F(1.0);
@@ -581,6 +651,7 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathe
     while (nb_wany(w.lanes)) {
         pass_toggles(&sun->shade, w.t, w.lanes);
         const nb_wmask dark = nb_wand(w.lanes, sun->shade.is_dark);
+        if (nb_wany(dark) && is_grid_alone(sun)) pass_voxels(&sun->shade, m, p, &w, dark);
         if (nb_wany(dark))
             pass_shadow(&sun->shade, m, &s, &w, dark);
         else if (has_closed_steps(sun))

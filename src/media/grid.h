@@ -33,8 +33,18 @@ typedef struct nb_grid_sum {
     double error; /* by how much it may be off */
 } nb_grid_sum;
 
-/* The density integrated from 0 to `length` metres. `noise`: by how many cells each coordinate may be off. */
-nb_grid_sum nb_grid_integral(const nebel_grid *grid, const nb_grid_line *line, double length, double noise);
+/* What may be more by any amount. */
+#define NB_GRID_ENDLESS 1e18
+
+/* The density integrated from 0 to `length` metres. `noise`: by how many cells each coordinate may be off. Where it
+ * comes to `enough` the rest may be left out, and the error is NB_GRID_ENDLESS. */
+nb_grid_sum nb_grid_integral(const nebel_grid *grid, const nb_grid_line *line, double length, double noise,
+                             double enough);
+
+/* How far along the line the integral from 0 reaches each of `count` ascending shares of `amount`, which is what it
+ * comes to at `length`. */
+void nb_grid_places(const nebel_grid *grid, const nb_grid_line *line, double length, double amount, int count,
+                    const double *share, double *place);
 
 /* The density at a place. */
 double nb_grid_density(const nebel_grid *grid, const double place[3]);
@@ -42,6 +52,10 @@ double nb_grid_density(const nebel_grid *grid, const double place[3]);
 /* How far it is to where the ray enters a cell of another polynomial, at least `least`; HUGE_VAL where it never does.
  * Whole bricks of one density are one cell. */
 double nb_grid_kink(const nebel_grid *grid, const nb_grid_line *line, double least);
+
+/* The same to where rules for light that comes from elsewhere, to whose depth all cells add, had better begin anew:
+ * the faces of bricks, and of nearest voxels. */
+double nb_grid_border(const nebel_grid *grid, const nb_grid_line *line, double least);
 
 /* A bound of |density| where each coordinate is a complex number within `reach` of the place, with the polynomial that
  * holds at the place. */

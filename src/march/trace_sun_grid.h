@@ -1,0 +1,152 @@
+/* Sunlight in voxels of one box alone. Along a ray the light is
+ *
+ *     (glow / density) times the integral of e^-(depth + depth to the sun) over the integral of the density,
+ *
+ * where depth is a multiple of that integral. So the rule's nodes lie at shares of the density's integral over a step:
+ * what is rough along the ray, at the faces of cells, is in no node, and what is left for the rule to see is the depth
+ * to the sun, which is an integral itself. Only faces of bricks, and of nearest voxels, end steps. Included by
+ * trace_sun.h. */
+
+static int is_grid_alone(const sunlight *sun)
+{
+    return sun->snapshot->way_to_sun == NB_WAY_GRID;
+}
+
+/* Where in a step the nodes are, as parts of the whole density. */
+typedef struct grid_nodes {
+    nb_wide place[SUN_NODES];
+    nb_real amount, error; /* the density's integral over the step */
+} grid_nodes;
+
+static grid_nodes place_nodes(const contact *k, nb_wide start, nb_wide end, nb_mask lanes)
+{
+    const nebel_grid *grid = k->medium->body.density.grid;
+    const grid_lines lines = lines_from(k, start);
+    double length[NB_WIDTH], place[SUN_NODES][NB_WIDTH] = {{0}};
+    nb_scalar amount[NB_WIDTH] = {0}, error[NB_WIDTH] = {0}, noise[NB_WIDTH];
+    nb_wstore_lanes(length, end - start);
+    nb_store_lanes(noise, k->noise);
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        if (!nb_lane(lanes, i)) continue;
+        const nb_grid_line line = line_of_lane(&lines, i);
+        const nb_grid_sum sum = nb_grid_integral(grid, &line, length[i], (double)noise[i], HUGE_VAL);
+        amount[i] = (nb_scalar)sum.value;
+        error[i] = (nb_scalar)sum.error;
+        double at[SUN_NODES] = {0};
+        if (sum.value > 0) nb_grid_places(grid, &line, length[i], sum.value, SUN_NODES, sun_nodes, at);
+        for (int n = 0; n < SUN_NODES; n++) place[n][i] = at[n];
+    }
+    const nb_real value = nb_load_lanes(amount);
+    grid_nodes nodes = {.amount = value, .error = nb_load_lanes(error) + value * (NB_F(4.0) * NB_EPSILON)};
+    for (int n = 0; n < SUN_NODES; n++) nodes.place[n] = start + nb_wload_lanes(place[n]);
+    return nodes;
+}
+
+/* Optical depth of the ray up to a place, where the density's integral over the piece has come to `along`. */
+static void depth_after(const contact *k, const gathered *g, nb_wide along, nb_real depth[3])
+{
+    for (int c = 0; c < 3; c++) depth[c] = g->depth[c] + k->extinction[c] * nb_narrow(along);
+}
+
+/* The integral of the density behind which no sunlight matters, in any channel: less than a hundredth of what steps may
+ * add to the error, which the node then tells. */
+static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb_real depth[3])
+{
+    const nb_real dark = -nb_log(nb_max(REAL(0.01 * sun->share), NB_TINY));
+    nb_real most = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        const nb_real amount = (dark - depth[c]) / nb_max(k->extinction[c], NB_TINY);
+        most = nb_select(k->extinction[c] > NB_F(0.0), nb_max(most, amount), most);
+    }
+    return nb_min(most, NB_HUGE);
+}
+
+static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, const grid_nodes *nodes,
+                          nb_mask lanes, int n)
+{
+    const contact *k = present(m, m->present_first);
+    nb_real depth[3], all[3], seen[3], behind[3];
+    depth_after(k, g, w->along + nb_widen(nodes->amount * REAL(sun_nodes[n])), depth);
+    const light_depth to_sun = depth_of_grid(sun, m, nodes->place[n], lanes, amount_that_hides(sun, k, depth));
+    for (int c = 0; c < 3; c++) all[c] = depth[c] + to_sun.depth[c];
+    map_channels(sun->snapshot, transmitted, all, seen);
+    map_channels(sun->snapshot, transmitted, depth, behind);
+    const nb_real own = nb_narrow(w->along_error) + nodes->error;
+    sun_node sum;
+    for (int c = 0; c < 3; c++) {
+        const nb_real error = g->depth_error[c] + k->extinction[c] * own + to_sun.error[c];
+        sum.light[c] = k->glow[c] * nodes->amount * seen[c];
+        sum.doubt[c] = nb_min(error, NB_F(1.0)) + (all[c] + NB_F(16.0)) * (NB_F(2.0) * NB_EPSILON);
+        sum.taken[c] = k->extinction[c] * nodes->amount * behind[c];
+    }
+    return sum;
+}
+
+/* The error that is told, as a multiple of what the nodes are off a parabola: light from voxels is not as smooth as
+ * rules want it. */
+#define GRID_CAUTION NB_F(2.0)
+
+/* Nothing but lights spends the budget in fog of one medium. */
+#define GRID_SHARE NB_F(3.0)
+
+/* Through Gauss's three nodes goes a parabola, whose integral is their sum. By how much the other nodes are off it adds
+ * up to Kronrod's sum less Gauss's. Without signs it cannot vanish by chance, which that does on one ray of a hundred.
+ */
+static nb_real off_parabola(const nb_real light[SUN_NODES])
+{
+    const double square = 3.0 / 20; /* of how far the outer nodes are from the middle */
+    const double root = sun_nodes[5] - 0.5;
+    nb_real off = NB_F(0.0);
+    for (int n = 0; n < SUN_NODES; n += 2) {
+        const double at = sun_nodes[n] - 0.5;
+        const nb_real between = REAL(at * (at - root) / (2 * square)) * light[1] +
+                                REAL(1 - at * at / square) * light[3] +
+                                REAL(at * (at + root) / (2 * square)) * light[5];
+        off = off + REAL(sun_weights[n]) * nb_abs(light[n] - between);
+    }
+    return off;
+}
+
+/* Empty steps have no nodes. */
+static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, nb_real length,
+                              nb_wide end)
+{
+    const contact *k = present(m, m->present_first);
+    const nb_mask lanes = nb_and(nb_narrow_mask(w->lanes), k->inside);
+    const grid_nodes nodes = place_nodes(k, w->t, end, lanes);
+    const nb_mask filled = nb_and(lanes, nodes.amount > NB_F(0.0));
+    sun_step s = {.start = w->t, .length = length, .amount = nb_widen(nodes.amount), .amount_error = nodes.error};
+    nb_real depth[3];
+    depth_after(k, g, w->along + s.amount, depth);
+    map_channels(sun->snapshot, transmitted, depth, s.behind);
+    rule_sum sum = no_rule_sum();
+    nb_real light[3][SUN_NODES] = {{NB_F(0.0)}};
+    for (int n = 0; n < SUN_NODES && nb_any(filled); n++) {
+        const sun_node at = grid_node(sun, m, g, w, &nodes, filled, n);
+        add_node(&sum, &at, n);
+        for (int c = 0; c < 3; c++) light[c][n] = at.light[c];
+    }
+    finish_rule(&sum, &s);
+    const nb_real at_nodes = s.rounding;
+    for (int c = 0; c < 3 && nb_any(filled); c++) s.error = nb_max(s.error, GRID_CAUTION * off_parabola(light[c]));
+    limit_step(m, w->before, &s);
+    const nb_real off = nb_min(nodes.error, NB_HUGE);
+    for (int c = 0; c < 3; c++) s.rounding = nb_max(s.rounding, at_nodes + w->before[c] * off * k->glow[c]);
+    return s;
+}
+
+/* The voxels in the shadow of a surface. */
+static void pass_voxels(const shade *shadow, const march *m, const piece *p, sun_walk *w, nb_wmask dark)
+{
+    const nb_estimate along =
+        grid_integral(present(m, m->present_first), p->start, nb_wmin(shadow->toggle, p->end), NB_HUGE);
+    w->along = nb_wselect(dark, nb_widen(along.value), w->along);
+    w->along_error = nb_wselect(dark, nb_widen(along.error), w->along_error);
+}
+
+/* The end of the longest step from t on. */
+static nb_wide nearest_border(const march *m, nb_wide t, nb_wide end)
+{
+    const contact *k = present(m, m->present_first);
+    return nb_wselect(nb_widen_mask(k->inside), nb_wmin(next_in_grid(k, t, nb_grid_border), end), end);
+}
