@@ -440,6 +440,32 @@ static void lost_memory_is_survived(void **state)
     assert_int_equal(memory.live, 0);
 }
 
+/* What a renderer asks that casts shadows into fog. */
+static void a_snapshot_tells_of_its_lamps(void **state)
+{
+    const nebel_volume_desc volumes[] = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 2, 3}, .radius = 2},
+                                          .extinction = {1, 1, 1},
+                                          .albedo = {0, 1, 0}},
+                                         {.extinction = {1, 1, 1}, .source = {1, 1, 1}}};
+    const nebel_lamp given[] = {{.position = {7, 8, 9}, .intensity = {1, 1, 1}, .radius = 0.5},
+                                {.position = {-1, 0, 1}, .intensity = {1, 1, 1}}};
+    double min[3], max[3], position[3], radius;
+    (void)state;
+    nebel_snapshot *snapshot = commit(&(nebel_fog_desc){0}, volumes, 2, given, 2);
+    assert_int_equal(nebel_snapshot_lamplit_fog(snapshot, min, max), 1);
+    for (int c = 0; c < 3; c++) assert_true(fabs(min[c] - (c - 1)) < 1e-6 && fabs(max[c] - (c + 3)) < 1e-6);
+    assert_int_equal(nebel_snapshot_lamp_count(snapshot), 2);
+    for (size_t i = 0; i < 2; i++) {
+        nebel_snapshot_lamp(snapshot, i, position, &radius);
+        assert_memory_equal(position, given[i].position, sizeof position);
+        assert_true(radius == given[i].radius);
+    }
+    nebel_release_snapshot(snapshot);
+    snapshot = commit(&(nebel_fog_desc){0}, &volumes[1], 1, given, 2);
+    assert_int_equal(nebel_snapshot_lamplit_fog(snapshot, min, max), 0);
+    nebel_release_snapshot(snapshot);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -452,6 +478,7 @@ int main(void)
         cmocka_unit_test(hard_rays_are_answered),
         cmocka_unit_test(lamps_are_checked),
         cmocka_unit_test(lost_memory_is_survived),
+        cmocka_unit_test(a_snapshot_tells_of_its_lamps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -203,7 +203,7 @@ static void add_lamps(trial *t)
                                .outer_angle = 40};
 }
 
-/* Two fogs through each other, one of them with a lamp within. No surface is in a lamp's way. */
+/* Two fogs through each other, one of them with a lamp within. */
 static trial lamps_in_fog(void)
 {
     trial t = start("lamps");
@@ -216,6 +216,16 @@ static trial lamps_in_fog(void)
     nebel_volume_desc *ball = add(&t, .4, 1);
     ball->shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1, 0}, .radius = 2};
     ball->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .6};
+    return t;
+}
+
+/* The column's shadows are in fog. */
+static trial lamps_behind_a_column(void)
+{
+    trial t = lamps_in_fog();
+    t.name = "column";
+    t.lamps[0].position[0] = -2;
+    add_mesh(&t, barrel.mesh);
     return t;
 }
 
@@ -321,6 +331,7 @@ TRIAL(against_the_sun)
 TRIAL(panorama)
 TRIAL(cloud_of_voxels)
 TRIAL(lamps_in_fog)
+TRIAL(lamps_behind_a_column)
 TRIAL(lamps_on_surfaces)
 
 int main(int count, char **words)
@@ -338,6 +349,7 @@ int main(int count, char **words)
         cmocka_unit_test(panorama_agrees),
         cmocka_unit_test(cloud_of_voxels_agrees),
         cmocka_unit_test(lamps_in_fog_agrees),
+        cmocka_unit_test(lamps_behind_a_column_agrees),
         cmocka_unit_test(lamps_on_surfaces_agrees),
     };
     if (count > 1) samples *= (uint32_t)strtoul(words[1], NULL, 10);

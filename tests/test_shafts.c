@@ -1,5 +1,5 @@
-/* Shadows of surfaces in fog that the sun lights: ends against Embree's visibility, light against closed forms and fine
- * steps. */
+/* Shadows of surfaces in fog that the sun or lamps light: ends against Embree's visibility, light against closed forms
+ * and fine steps. */
 #include "test_render_scene.h"
 
 #include "cpu/renderer.h"
@@ -9,20 +9,42 @@
 
 enum { TRIANGLES = 700, PLACES = 40 };
 
-static int is_in_shadow(const nb_geometry *geometry, const float place[3], const double sun[3])
+/* Whether something is between the place and `reach` m from it in this direction. */
+static int is_hidden(const nb_geometry *geometry, const float place[3], const double way[3], float reach)
 {
     struct RTCIntersectContext context;
     struct RTCRay ray = {.org_x = place[0],
                          .org_y = place[1],
                          .org_z = place[2],
-                         .dir_x = (float)sun[0],
-                         .dir_y = (float)sun[1],
-                         .dir_z = (float)sun[2],
-                         .tfar = INFINITY,
+                         .dir_x = (float)way[0],
+                         .dir_y = (float)way[1],
+                         .dir_z = (float)way[2],
+                         .tfar = reach,
                          .mask = UINT32_MAX};
     rtcInitIntersectContext(&context);
     rtcOccluded1(geometry->scene, &context, &ray);
     return ray.tfar < 0;
+}
+
+static int is_in_shadow(const nb_geometry *geometry, const float place[3], const double sun[3])
+{
+    return is_hidden(geometry, place, sun, INFINITY);
+}
+
+/* Of the lamp, relative to the place; its length. */
+static double way_to_lamp(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp, double way[3])
+{
+    for (int i = 0; i < 3; i++) way[i] = lamp->position[i] - geometry->origin[i] - (double)place[i];
+    const double distance = nb_vector_length(way);
+    nb_vector_make_unit(way);
+    return distance;
+}
+
+static int is_in_shadow_of_lamp(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp)
+{
+    double way[3];
+    const double distance = way_to_lamp(geometry, place, lamp, way);
+    return distance > lamp->radius && is_hidden(geometry, place, way, (float)(distance - lamp->radius));
 }
 
 /* Triangles of all sizes, long ones and needles among them. */
@@ -38,7 +60,7 @@ static void draw_triangles(uint64_t *numbers, float (*positions)[3])
 }
 
 typedef struct trial {
-    nb_sun_tree tree;
+    nb_shadow_tree tree;
     nb_shafts shafts;
     nb_rays rays;
     nb_view view;
@@ -47,36 +69,71 @@ typedef struct trial {
 } trial;
 
 /* Whether a place t m from the fog's start is in shadow; NAN where an end is too near to say. */
-static float shadow_at(const trial *run, int ray, float t)
+static float shadow_at(const nebel_lit_pieces *lit, int ray, float t)
 {
-    const uint32_t first = run->shafts.first[ray], end = run->shafts.first[ray + 1];
     float dark = 0;
-    for (uint32_t i = first; i < end; i++) {
-        if (fabsf(run->shafts.toggles[i] - t) < 2e-4f + 1e-5f * t) return NAN;
-        if (run->shafts.toggles[i] <= t) dark = 1 - dark;
+    for (uint32_t i = lit->first[ray]; i < lit->first[ray + 1]; i++) {
+        if (fabsf(lit->toggles[i] - t) < 2e-4f + 1e-5f * t) return NAN;
+        if (lit->toggles[i] <= t) dark = 1 - dark;
     }
     return dark;
 }
 
-static void compare_places(trial *run, const nb_geometry *geometry, const double sun[3], int ray, uint64_t *numbers)
+/* `lamp` NULL: the sun. */
+static void compare_places(trial *run, const nb_geometry *geometry, const nebel_lit_pieces *lit, const double sun[3],
+                           const nebel_lamp *lamp, int ray, uint64_t *numbers)
 {
     const float skipped = (float)run->view.advance * run->rays.length[ray], far = fminf(run->distance[ray], 60);
     for (int k = 0; k < PLACES; k++) {
-        const float t = (float)dice(numbers, 0, (double)far), expected = shadow_at(run, ray, t);
+        const float t = (float)dice(numbers, 0, (double)far), expected = shadow_at(lit, ray, t);
         float place[3];
         if (isnan(expected)) continue;
         for (int i = 0; i < 3; i++) place[i] = run->rays.start[i][ray] + (t - skipped) * run->rays.unit[i][ray];
-        const int dark = is_in_shadow(geometry, place, sun);
+        const int dark =
+            lamp != NULL ? is_in_shadow_of_lamp(geometry, place, lamp) : is_in_shadow(geometry, place, sun);
         run->shadows += (size_t)dark;
         run->wrong += dark != (expected > 0);
     }
 }
 
-/* One in 10,000 places may be within rounding of a needle. */
-static void ends_are_those_of_visibility(void **state)
+static void expect_rising(const nebel_lit_pieces *lit, int ray)
+{
+    for (uint32_t k = lit->first[ray] + 1; k < lit->first[ray + 1]; k++)
+        assert_true(lit->toggles[k] >= lit->toggles[k - 1]);
+}
+
+static nb_geometry place_triangles(const nebel_scene_data *scene, const nebel_camera *camera, nb_view *view)
+{
+    nb_geometry geometry = {.allocator = nb_resolve_allocator(&(nebel_allocator){0})};
+    assert_int_equal(nb_geometry_make(&geometry, scene, NEBEL_ISA_DEFAULT, 1), NEBEL_OK);
+    assert_int_equal(nb_geometry_place(&geometry, camera->position), NEBEL_OK);
+    assert_int_equal(nb_view_set(view, camera, 64, 64, &(nebel_log){0}), NEBEL_OK);
+    nb_view_place(view, geometry.origin, geometry.bounds_min, geometry.bounds_max);
+    return geometry;
+}
+
+/* From all sides, from near and far. */
+static nebel_camera trial_camera(uint64_t seed)
 {
     static const nebel_projection projections[] = {NEBEL_PROJECTION_PERSPECTIVE, NEBEL_PROJECTION_ORTHOGRAPHIC,
                                                    NEBEL_PROJECTION_PANORAMA};
+    nebel_camera camera = test_camera(3, 2, seed % 4 == 3 ? 900 : 22, 0, 0, 0);
+    camera.projection = projections[seed % 3];
+    camera.vertical_fov = seed % 4 == 3 ? 2 : 50;
+    camera.view_height = 25;
+    return camera;
+}
+
+static void report_trial(const trial *run)
+{
+    print_message("%zu ends, %zu places in shadow, %zu wrong\n", run->toggles, run->shadows, run->wrong);
+    assert_true(run->toggles > 10000 && run->shadows > 10000);
+    assert_true(run->wrong <= run->shadows / 10000);
+}
+
+/* One in 10,000 places may be within rounding of a needle. */
+static void ends_are_those_of_visibility(void **state)
+{
     static float positions[3 * TRIANGLES][3];
     static uint32_t indices[3 * TRIANGLES];
     static trial run;
@@ -92,45 +149,109 @@ static void ends_are_those_of_visibility(void **state)
                                  .triangle_count = TRIANGLES,
                                  .texture = -1};
         const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
-        nb_geometry geometry = {.allocator = nb_resolve_allocator(&(nebel_allocator){0})};
         double sun[3] = {dice(&numbers, -1, 1), seed == 3 ? 0 : dice(&numbers, 0, 1), seed == 4 ? 0 : 1};
         if (seed == 5) sun[0] = sun[1] = 0;
         nb_vector_make_unit(sun);
-        assert_int_equal(nb_geometry_make(&geometry, &scene, NEBEL_ISA_DEFAULT, 1), NEBEL_OK);
-        nebel_camera camera = test_camera(3, 2, seed % 4 == 3 ? 900 : 22, 0, 0, 0);
-        camera.projection = projections[seed % 3];
-        camera.vertical_fov = seed % 4 == 3 ? 2 : 50;
-        camera.view_height = 25;
-        assert_int_equal(nb_geometry_place(&geometry, camera.position), NEBEL_OK);
-        assert_int_equal(nb_view_set(&run.view, &camera, 64, 64, &(nebel_log){0}), NEBEL_OK);
-        nb_view_place(&run.view, geometry.origin, geometry.bounds_min, geometry.bounds_max);
-        assert_int_equal(nb_sun_tree_set(&run.tree, &geometry, sun, 1), NEBEL_OK);
+        const nebel_camera camera = trial_camera(seed);
+        nb_geometry geometry = place_triangles(&scene, &camera, &run.view);
+        assert_int_equal(nb_shadow_tree_set_sun(&run.tree, &geometry, sun, 1), NEBEL_OK);
         nb_region_points points;
         nb_sample_region(0, 1, &points);
         for (int first = 0; first < NB_PIXELS; first += 4 * NB_BATCH) {
-            const nb_sunlit_box box = {{-12, -12, -12}, {12, seed == 2 ? 3 : 12, 12}};
+            const nb_lit_box box = {{-12, -12, -12}, {12, seed == 2 ? 3 : 12, 12}};
             nb_view_rays(&run.view, 0, 0, points.x + first, points.y + first, &run.rays);
             for (int i = 0; i < NB_BATCH; i++) run.distance[i] = i % 5 == 0 ? 20 : INFINITY;
-            const nb_sunlit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+            const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
             assert_int_equal(nb_shafts_find(&run.shafts, &geometry.allocator, &run.tree, seed == 2 ? &box : &all,
                                             &run.rays, run.view.advance, run.distance),
                              NEBEL_OK);
             run.toggles += run.shafts.toggle_count;
+            const nebel_lit_pieces lit = {run.shafts.first, run.shafts.toggles};
             for (int i = 0; i < NB_BATCH; i++) {
-                const uint32_t end = run.shafts.first[i + 1];
-                for (uint32_t k = run.shafts.first[i] + 1; k < end; k++)
-                    assert_true(run.shafts.toggles[k] >= run.shafts.toggles[k - 1]);
-                if (seed != 2) compare_places(&run, &geometry, sun, i, &numbers);
+                expect_rising(&lit, i);
+                if (seed != 2) compare_places(&run, &geometry, &lit, sun, NULL, i, &numbers);
             }
         }
-        nb_sun_tree_free(&run.tree, &geometry.allocator);
+        nb_shadow_tree_free(&run.tree, &geometry.allocator);
         nb_geometry_free(&geometry);
     }
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
     nb_shafts_free(&run.shafts, &allocator);
-    print_message("%zu ends, %zu places in shadow, %zu wrong\n", run.toggles, run.shadows, run.wrong);
-    assert_true(run.toggles > 10000 && run.shadows > 10000);
-    assert_true(run.wrong <= run.shadows / 10000);
+    report_trial(&run);
+}
+
+enum { LAMPS = 4 };
+
+static nebel_snapshot *lamplit_fog(const nebel_volume_desc *volume, size_t count, const nebel_lamp *lamps)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, count, lamps), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Lamps among the triangles; the larger ones have some of them within their radius, wholly or in part. */
+static void draw_lamps(uint64_t *numbers, nebel_lamp *lamps)
+{
+    for (int i = 0; i < LAMPS; i++) {
+        lamps[i] = (nebel_lamp){.intensity = {1, 1, 1}, .radius = i > 0 ? pow(10, dice(numbers, -2, 0.5)) : 0};
+        for (int c = 0; c < 3; c++) lamps[i].position[c] = dice(numbers, -10, 10);
+    }
+}
+
+static void ends_of_lamplight_are_those_of_visibility(void **state)
+{
+    static float positions[3 * TRIANGLES][3];
+    static uint32_t indices[3 * TRIANGLES];
+    static trial run;
+    static nb_lamp_shafts shafts;
+    (void)state;
+    for (uint32_t i = 0; i < 3 * TRIANGLES; i++) indices[i] = i;
+    for (uint64_t seed = 0; seed < 12; seed++) {
+        uint64_t numbers = 37 * seed + 5;
+        nebel_lamp lamps[LAMPS];
+        draw_triangles(&numbers, positions);
+        draw_lamps(&numbers, lamps);
+        positions[5][1] = NAN;
+        const nebel_mesh mesh = {.positions = positions[0],
+                                 .indices = indices,
+                                 .vertex_count = 3 * TRIANGLES,
+                                 .triangle_count = TRIANGLES,
+                                 .texture = -1};
+        const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
+        const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}};
+        nebel_snapshot *fog = lamplit_fog(&volume, LAMPS, lamps);
+        nebel_camera camera = trial_camera(seed);
+        if (seed == 4) memcpy(camera.look_at, lamps[1].position, sizeof camera.look_at);
+        nb_geometry geometry = place_triangles(&scene, &camera, &run.view);
+        assert_int_equal(nb_shadow_tree_set_lamps(&run.tree, &geometry, 1), NEBEL_OK);
+        nb_region_points points;
+        nb_sample_region(0, 1, &points);
+        for (int first = 0; first < NB_PIXELS; first += 8 * NB_BATCH) {
+            const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+            nb_view_rays(&run.view, 0, 0, points.x + first, points.y + first, &run.rays);
+            for (int i = 0; i < NB_BATCH; i++) run.distance[i] = i % 5 == 0 ? 20 : INFINITY;
+            assert_int_equal(nb_lamp_shafts_find(&shafts, &geometry.allocator, &run.tree, fog, &all, &run.rays,
+                                                 run.view.advance, run.distance),
+                             NEBEL_OK);
+            run.toggles += shafts.shafts.toggle_count;
+            for (int l = 0; l < LAMPS; l++)
+                for (int i = 0; i < NB_BATCH; i++) {
+                    expect_rising(&shafts.pieces[l], i);
+                    compare_places(&run, &geometry, &shafts.pieces[l], NULL, &lamps[l], i, &numbers);
+                }
+        }
+        nb_shadow_tree_free(&run.tree, &geometry.allocator);
+        nb_geometry_free(&geometry);
+        nebel_release_snapshot(fog);
+    }
+    const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
+    nb_lamp_shafts_free(&shafts, &allocator);
+    report_trial(&run);
 }
 
 /* ---- light ----------------------------------------------------------------------------------- */
@@ -292,58 +413,182 @@ static void shafts_are_those_of_small_steps(void **state)
     test_picture_free(&picture);
 }
 
+/* Lamps between the pillars in even fog; one has a bulb of triangles around it, one shines down. */
+static void set_lamplit_pillars(pillars *p, nebel_lamp lamps[2])
+{
+    const nebel_volume_desc volume = {.extinction = {.05, .05, .05}, .albedo = {1, 1, 1}};
+    set_pillars(p);
+    nebel_release_snapshot(p->fog);
+    lamps[0] = (nebel_lamp){.position = {0.5, 5.2, 1}, .intensity = {50, 100, 150}, .radius = 0.3};
+    lamps[1] = (nebel_lamp){.type = NEBEL_LAMP_SPOT,
+                            .position = {-7, 8, 6},
+                            .intensity = {80, 120, 20},
+                            .radius = 0.2,
+                            .direction = {0.3, -1, -0.6},
+                            .inner_angle = 30,
+                            .outer_angle = 50};
+    p->fog = lamplit_fog(&volume, 2, lamps);
+}
+
+/* What the lamp brings to a place, of intensity 1 on its axis, in even fog; see formulas/lamp.inc. */
+static double lamp_fluence(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp)
+{
+    double way[3], axis[3];
+    const double distance = way_to_lamp(geometry, place, lamp, way), outside = fmax(distance, lamp->radius);
+    const double share = lamp->radius / outside, clear = outside - lamp->radius;
+    double fluence = 2 / (outside * outside * (1 + sqrt(1 - share * share))) * exp(-.05 * clear);
+    if (lamp->type == NEBEL_LAMP_SPOT) {
+        memcpy(axis, lamp->direction, sizeof axis);
+        nb_vector_make_unit(axis);
+        const double edge = cos(lamp->outer_angle * test_pi / 180), inner = cos(lamp->inner_angle * test_pi / 180);
+        const double s = fmin(fmax((-nb_vector_dot(way, axis) - edge) / (inner - edge), 0), 1);
+        fluence *= s * s * (3 - 2 * s);
+    }
+    return is_in_shadow_of_lamp(geometry, place, lamp) ? 0 : fluence;
+}
+
+static double stepped_lamplight(const nb_geometry *geometry, const float from[3], const float way[3], double begin,
+                                double end, const nebel_lamp *lamps)
+{
+    const double s = 0.05, h = (end - begin) / STEPS;
+    double sum = 0;
+    for (int i = 0; i < STEPS; i++) {
+        const double t = begin + (i + 0.5) * h;
+        float place[3];
+        for (int c = 0; c < 3; c++) place[c] = from[c] + (float)t * way[c];
+        for (int l = 0; l < 2; l++)
+            sum += lamp_fluence(geometry, place, &lamps[l]) * lamps[l].intensity[1] * s * exp(-s * t) * h;
+    }
+    return sum / (4 * test_pi);
+}
+
+/* Also says that shadows are there: without them a tenth of the pixels is off by far more. */
+static void lamp_shafts_are_those_of_small_steps(void **state)
+{
+    pillars p;
+    nebel_lamp lamps[2];
+    test_picture picture = test_picture_make(SIDE, SIDE);
+    nebel_renderer *renderer = NULL;
+    (void)state;
+    set_lamplit_pillars(&p, lamps);
+    assert_int_equal(nebel_create_renderer(&p.scene, p.fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
+    assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
+    double worst = 0, square = 0;
+    int shaded = 0;
+    static nb_rays rays;
+    nb_view view;
+    nb_region_points points;
+    nb_sample_region(0, 1, &points);
+    assert_int_equal(nb_view_set(&view, &p.camera, SIDE, SIDE, &(nebel_log){0}), NEBEL_OK);
+    nb_view_place(&view, renderer->geometry.origin, renderer->geometry.bounds_min, renderer->geometry.bounds_max);
+    assert_true(view.advance <= 0);
+    for (uint32_t first = 0; first < NB_PIXELS; first += NB_BATCH) {
+        nb_view_rays(&view, 0, 0, points.x + first, points.y + first, &rays);
+        for (uint32_t i = 0; i < NB_BATCH; i++) {
+            const uint32_t x = nb_lane_x(first + i), y = nb_lane_y(first + i);
+            if (x >= SIDE || y >= SIDE) continue;
+            float from[3], way[3];
+            for (int c = 0; c < 3; c++) {
+                from[c] = rays.start[c][i];
+                way[c] = rays.unit[c][i];
+            }
+            const double length = fmin((double)test_depth(&picture, x, y), 200);
+            const double light = stepped_lamplight(&renderer->geometry, from, way, 0, fmin(length, 50), lamps) +
+                                 stepped_lamplight(&renderer->geometry, from, way, fmin(length, 50), length, lamps);
+            const double off = fabs((double)test_in_scattering(&picture, x, y)[1] - light);
+            worst = fmax(worst, off);
+            square += off * off;
+        }
+    }
+    const nebel_scene_data nothing = {0};
+    test_picture bare = test_picture_make(SIDE, SIDE);
+    test_render(&nothing, p.fog, &(nebel_renderer_desc){.threads = 1}, &p.camera, 1, &bare);
+    for (uint32_t i = 0; i < SIDE * SIDE; i++) {
+        const float *seen = test_in_scattering(&picture, i % SIDE, i / SIDE);
+        if (isinf(test_depth(&picture, i % SIDE, i / SIDE)))
+            shaded += seen[1] < 0.95f * test_in_scattering(&bare, i % SIDE, i / SIDE)[1];
+    }
+    print_message("off by at most %.5f, %.6f in the root mean square; %d in shade\n", worst, sqrt(square / SIDE / SIDE),
+                  shaded);
+    assert_true(worst < 0.002);
+    assert_true(shaded > SIDE);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(p.fog);
+    test_picture_free(&picture);
+    test_picture_free(&bare);
+}
+
 /* Whoever renders which region. */
 static void threads_give_the_same_shafts(void **state)
 {
     pillars p;
+    nebel_lamp lamps[2];
     test_picture one = test_picture_make(2 * NB_REGION + 5, NB_REGION + 3),
                  three = test_picture_make(one.width, one.height);
     (void)state;
-    set_pillars(&p);
-    test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 1}, &p.camera, 2, &one);
-    test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 3}, &p.camera, 2, &three);
-    assert_memory_equal(one.planes.color, three.planes.color, sizeof(float) * 3 * one.width * one.height);
-    nebel_release_snapshot(p.fog);
+    for (int lamplit = 0; lamplit < 2; lamplit++) {
+        if (lamplit)
+            set_lamplit_pillars(&p, lamps);
+        else
+            set_pillars(&p);
+        test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 1}, &p.camera, 2, &one);
+        test_render(&p.scene, p.fog, &(nebel_renderer_desc){.threads = 3}, &p.camera, 2, &three);
+        assert_memory_equal(one.planes.color, three.planes.color, sizeof(float) * 3 * one.width * one.height);
+        nebel_release_snapshot(p.fog);
+    }
     test_picture_free(&one);
     test_picture_free(&three);
 }
 
-static void lost_memory_is_told(void **state)
+/* Returns how often memory failed before a frame was made. */
+static size_t lose_memory(const pillars *p)
 {
-    pillars p;
     test_picture picture = test_picture_make(SIDE, SIDE);
     fog_memory memory = {0};
     fog_messages messages = {0};
     size_t failed = 0;
-    (void)state;
-    set_pillars(&p);
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (size_t k = 1; result == NEBEL_ERROR_MEMORY; k++) {
         const nebel_renderer_desc desc = {
             .allocator = fog_memory_allocator(&memory), .log = fog_messages_log(&messages), .threads = 1};
         nebel_renderer *renderer = NULL;
         memory.fail_first = 0;
-        assert_int_equal(nebel_create_renderer(&p.scene, p.fog, &desc, &renderer), NEBEL_OK);
+        assert_int_equal(nebel_create_renderer(&p->scene, p->fog, &desc, &renderer), NEBEL_OK);
         memory.fail_first = k;
         memory.fail_count = 1;
-        const nebel_frame_desc frame = {.camera = p.camera, .width = SIDE, .height = SIDE, .samples = 1};
+        const nebel_frame_desc frame = {.camera = p->camera, .width = SIDE, .height = SIDE, .samples = 1};
         result = nebel_render_frame(renderer, &frame, &picture.planes);
         failed += result == NEBEL_ERROR_MEMORY;
         nebel_destroy_renderer(renderer);
         assert_int_equal(memory.live, 0);
     }
     assert_int_equal(result, NEBEL_OK);
-    assert_true(failed >= 7); /* the tree's five, shadows, and what toggles are made in */
-    nebel_release_snapshot(p.fog);
     test_picture_free(&picture);
+    return failed;
+}
+
+static void lost_memory_is_told(void **state)
+{
+    pillars p;
+    nebel_lamp lamps[2];
+    (void)state;
+    set_pillars(&p);
+    assert_true(lose_memory(&p) >= 7); /* the tree's five, shadows, and what toggles are made in */
+    nebel_release_snapshot(p.fog);
+    set_lamplit_pillars(&p, lamps);
+    assert_true(lose_memory(&p) >= 9); /* and the lamps' pieces, and their numbers */
+    nebel_release_snapshot(p.fog);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ends_are_those_of_visibility),
+        cmocka_unit_test(ends_of_lamplight_are_those_of_visibility),
         cmocka_unit_test(the_shadow_of_a_box_is_cut_out),
         cmocka_unit_test(shafts_are_those_of_small_steps),
+        cmocka_unit_test(lamp_shafts_are_those_of_small_steps),
         cmocka_unit_test(threads_give_the_same_shafts),
         cmocka_unit_test(lost_memory_is_told),
     };

@@ -513,6 +513,16 @@ typedef struct nebel_sunlit_fog {
 /* Returns 1, or 0 where the sun lights no fog of the snapshot; *fog is then untouched. Cost O(n). Any thread. */
 int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *fog);
 
+/* The same of the lamps: writes the corners [m] of a box outside of which no fog is lit by them, infinite where it has
+ * no end, and returns 1; or returns 0 where they light no fog, with min and max untouched. Cost O(n). Any thread. */
+int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
+
+/* How many lamps the snapshot has. */
+size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot);
+
+/* Where lamp `number`, less than their count, is, and its radius as it was given [m]. Any thread. */
+void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double position[3], double *radius);
+
 /* ---- asking ---------------------------------------------------------------------------------- */
 
 typedef struct nebel_ray {

@@ -68,14 +68,23 @@ static nebel_light_planes light_samples(const nb_frame *frame, nb_light_samples 
     return planes;
 }
 
-static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebel_lit_pieces *pieces)
+/* Where the lights reach fog, to `trace`; `sunlit` lives as long as that. */
+static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebel_lit_pieces *sunlit,
+                                nebel_trace_desc *trace)
 {
-    if (!frame->has_shafts) return NEBEL_OK;
     const nebel_renderer *renderer = frame->renderer;
-    const nebel_result result =
-        nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_tree, &frame->sunlit_box, &scratch->rays,
-                       frame->view.advance, scratch->distance);
-    *pieces = (nebel_lit_pieces){scratch->shafts.first, scratch->shafts.toggles};
+    nebel_result result = NEBEL_OK;
+    if (frame->has_shafts) {
+        result = nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_tree, &frame->sunlit_box,
+                                &scratch->rays, frame->view.advance, scratch->distance);
+        *sunlit = (nebel_lit_pieces){scratch->shafts.first, scratch->shafts.toggles};
+        trace->sunlit = sunlit;
+    }
+    if (frame->has_lamp_shafts && result == NEBEL_OK) {
+        result = nb_lamp_shafts_find(&scratch->lamp_shafts, &renderer->allocator, &renderer->lamp_tree, renderer->fog,
+                                     &frame->lamplit_box, &scratch->rays, frame->view.advance, scratch->distance);
+        trace->lamplit = scratch->lamp_shafts.pieces;
+    }
     return result;
 }
 
@@ -95,9 +104,8 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     const nebel_light_planes lights = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
     nebel_lit_pieces pieces;
-    const nebel_result result = find_shafts(frame, scratch, &pieces);
+    const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
     if (result != NEBEL_OK) return result;
-    if (frame->has_shafts) trace.sunlit = &pieces;
     return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
 }
 

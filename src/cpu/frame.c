@@ -31,20 +31,35 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
     return NEBEL_OK;
 }
 
-/* Surfaces between the sun and fog that it lights. */
+static nb_lit_box box_of(const nb_geometry *geometry, const double min[3], const double max[3])
+{
+    nb_lit_box box;
+    for (int c = 0; c < 3; c++) {
+        box.low[c] = (float)(min[c] - geometry->origin[c]);
+        box.high[c] = (float)(max[c] - geometry->origin[c]);
+    }
+    return box;
+}
+
+/* Surfaces between the sun or lamps and fog that they light. */
 static nebel_result set_shafts(nb_frame *frame)
 {
     nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
+    const int may = renderer->fog != NULL && renderer->method == NEBEL_METHOD_EXACT && geometry->scene != NULL;
     nebel_sunlit_fog fog;
-    frame->has_shafts = renderer->fog != NULL && renderer->method == NEBEL_METHOD_EXACT && geometry->scene != NULL &&
-                        nebel_snapshot_sunlit_fog(renderer->fog, &fog);
-    if (!frame->has_shafts) return NEBEL_OK;
-    for (int c = 0; c < 3; c++) {
-        frame->sunlit_box.low[c] = (float)(fog.min[c] - geometry->origin[c]);
-        frame->sunlit_box.high[c] = (float)(fog.max[c] - geometry->origin[c]);
+    double min[3], max[3];
+    nebel_result result = NEBEL_OK;
+    frame->has_shafts = may && nebel_snapshot_sunlit_fog(renderer->fog, &fog);
+    frame->has_lamp_shafts = may && nebel_snapshot_lamplit_fog(renderer->fog, min, max);
+    if (frame->has_shafts) {
+        frame->sunlit_box = box_of(geometry, fog.min, fog.max);
+        result = nb_shadow_tree_set_sun(&renderer->sun_tree, geometry, fog.direction, renderer->threads);
     }
-    const nebel_result result = nb_sun_tree_set(&renderer->sun_tree, geometry, fog.direction, renderer->threads);
+    if (frame->has_lamp_shafts && result == NEBEL_OK) {
+        frame->lamplit_box = box_of(geometry, min, max);
+        result = nb_shadow_tree_set_lamps(&renderer->lamp_tree, geometry, renderer->threads);
+    }
     if (result == NEBEL_OK) return NEBEL_OK;
     return nb_fail(&renderer->log, result, "frame: out of memory for the shadows that surfaces cast into fog");
 }

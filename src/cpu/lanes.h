@@ -26,8 +26,8 @@ static inline float nb_clamp_coordinate(float x)
 }
 
 /* Loops over whole batches are compiled for several instruction sets; the loader takes the best one. All give the same
- * bits, because nothing is contracted or reordered. For static functions only: clang 14 gives the symbols of others a
- * wrong name. */
+ * bits, because nothing is contracted or reordered. For static functions only, each of another name in the whole room:
+ * clang 14 gives the symbols of others a wrong name, and makes public what chooses between the clones of these. */
 #if defined(__x86_64__) && defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
 #define NB_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
 #else

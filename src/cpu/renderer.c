@@ -44,7 +44,10 @@ static nebel_result allocate_scratch(nebel_renderer *renderer)
     const uintptr_t address = (uintptr_t)renderer->scratch_memory;
     const uintptr_t skip = (ALIGNMENT - address % ALIGNMENT) % ALIGNMENT;
     renderer->scratch = (nb_scratch *)((char *)renderer->scratch_memory + skip);
-    for (int i = 0; i < renderer->threads; i++) renderer->scratch[i].shafts = (nb_shafts){.shadows = NULL};
+    for (int i = 0; i < renderer->threads; i++) {
+        renderer->scratch[i].shafts = (nb_shafts){.shadows = NULL};
+        renderer->scratch[i].lamp_shafts = (nb_lamp_shafts){.numbers = NULL};
+    }
     return NEBEL_OK;
 }
 
@@ -228,9 +231,12 @@ void nebel_destroy_renderer(nebel_renderer *renderer)
     if (renderer == NULL) return;
     const nebel_allocator allocator = renderer->allocator;
     nb_geometry_free(&renderer->geometry);
-    nb_sun_tree_free(&renderer->sun_tree, &allocator);
-    for (int i = 0; i < renderer->threads && renderer->scratch != NULL; i++)
+    nb_shadow_tree_free(&renderer->sun_tree, &allocator);
+    nb_shadow_tree_free(&renderer->lamp_tree, &allocator);
+    for (int i = 0; i < renderer->threads && renderer->scratch != NULL; i++) {
         nb_shafts_free(&renderer->scratch[i].shafts, &allocator);
+        nb_lamp_shafts_free(&renderer->scratch[i].lamp_shafts, &allocator);
+    }
     if (renderer->fog != NULL) nebel_release_snapshot(renderer->fog);
     nb_release(&allocator, renderer->scratch_memory);
     nb_release(&allocator, renderer->vertex_fog);

@@ -4,6 +4,7 @@
 
 #include "geometry.h"
 #include "hits.h"
+#include "lamp_shafts.h"
 #include "lamplight.h"
 #include "path.h"
 #include "raster.h"
@@ -44,6 +45,7 @@ typedef struct nb_scratch {
     float light_transmittance[3][NB_BATCH]; /* of the way to a light */
     uint32_t hit_counts[NB_PIXELS];         /* samples of a pixel that met a surface */
     nb_shafts shafts;
+    nb_lamp_shafts lamp_shafts;
     nb_lamp_ways lamp;
     nb_lone_ray lone; /* of a path behind its first surface */
     nb_sums sums;
@@ -70,7 +72,8 @@ struct nebel_renderer {
     nebel_isa fog_isa;
     int threads;
     nb_geometry geometry;
-    nb_sun_tree sun_tree; /* for the last frame with fog that the sun lights */
+    nb_shadow_tree sun_tree;  /* for the last frame with fog that the sun lights */
+    nb_shadow_tree lamp_tree; /* the same of lamps */
     nb_srgb_table table;
     void *scratch_memory;
     nb_scratch *scratch; /* one per thread */
@@ -85,7 +88,9 @@ typedef struct nb_frame {
     nb_lighting lighting;
     nebel_trace_desc trace;
     int has_shafts; /* surfaces cast shadows into fog that the sun lights, which is in */
-    nb_sunlit_box sunlit_box;
+    nb_lit_box sunlit_box;
+    int has_lamp_shafts; /* the same of lamps */
+    nb_lit_box lamplit_box;
     uint32_t width, height, samples;
     nb_path_world world; /* of the method REFERENCE */
     uint32_t seed;

@@ -1,28 +1,14 @@
-#include "shafts.h"
+#include "shaft_rays.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#define ALWAYS_INLINE static inline __attribute__((always_inline))
-
-/* Shadows that are nearer to each other than this part of the way there are one: the triangles of a surface have
- * common edges, but their prisms meet to rounding only. */
-static const float closeness = 0x1p-18f;
-
 static const float far_away = 1e18f;
-
-/* A packet of rays in the sun's frame. */
-typedef struct nb_sun_rays {
-    float start[3][NB_PACKET], way[3][NB_PACKET], inverse[3][NB_PACKET];
-    float from[NB_PACKET], to[NB_PACKET];     /* what of them is in fog that the sun lights; from >= to: nothing */
-    float enter[NB_PACKET], leave[NB_PACKET]; /* the shadow that was found last; enter > leave: none yet */
-    size_t kept[NB_PACKET];                   /* the number of the one that was kept before, and 1; 0: none yet */
-} nb_sun_rays;
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
 /* Never 0, so that nothing is divided into NaN. */
-ALWAYS_INLINE float reciprocal(float x)
+NB_ALWAYS_INLINE float reciprocal(float x)
 {
     const float size = x < 0 ? -x : x;
     const float least = x < 0 ? -1e-30f : 1e-30f;
@@ -30,7 +16,7 @@ ALWAYS_INLINE float reciprocal(float x)
 }
 
 /* What of each ray is within the box. */
-NB_CLONES static void clip(const nb_sunlit_box *box, const nb_rays *rays, double advance, const float *distance,
+NB_CLONES static void clip(const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
                            float *restrict from, float *restrict to)
 {
     NB_SIMD
@@ -51,7 +37,13 @@ NB_CLONES static void clip(const nb_sunlit_box *box, const nb_rays *rays, double
     }
 }
 
-NB_CLONES static void turn(const nb_sun_tree *tree, const nb_rays *rays, int first, nb_sun_rays *packet)
+void nb_shafts_clip(const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance, float *from,
+                    float *to)
+{
+    clip(box, rays, advance, distance, from, to);
+}
+
+NB_CLONES static void turn(const nb_shadow_tree *tree, const nb_rays *rays, int first, nb_shaft_rays *packet)
 {
     for (int a = 0; a < 3; a++) {
         const float x = tree->axes[a][0], y = tree->axes[a][1], z = tree->axes[a][2];
@@ -70,12 +62,11 @@ NB_CLONES static void turn(const nb_sun_tree *tree, const nb_rays *rays, int fir
 
 static int touch(float enter, float leave, float other_enter, float other_leave)
 {
-    const float gap = closeness * fabsf(leave);
+    const float gap = nb_closeness * fabsf(fminf(leave, other_leave));
     return (enter <= other_leave + gap) & (leave >= other_enter - gap);
 }
 
-/* Keeps the last shadow of a lane, as a part of the one that was kept before where it touches that. */
-static int keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_sun_rays *rays)
+int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t lane, nb_shaft_rays *rays)
 {
     const float enter = rays->enter[lane], leave = rays->leave[lane];
     if (!(enter <= leave)) return 1;
@@ -97,76 +88,11 @@ static int keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t la
     return 1;
 }
 
-/* What a prism leaves of each ray. */
-typedef struct nb_stretch {
-    float enter[NB_PACKET], leave[NB_PACKET];
-} nb_stretch;
-
-/* Shadows that touch the last one make it longer; others take its place. Returns in which lanes there was one that is
- * to be kept; what takes its place is in `found` still. */
-ALWAYS_INLINE int extend(const nb_stretch *found, nb_sun_rays *rays, int *restrict fresh)
-{
-    int any = 0;
-    NB_SIMD
-    for (int i = 0; i < NB_PACKET; i++) {
-        const float enter = found->enter[i], leave = found->leave[i], first = rays->enter[i], last = rays->leave[i];
-        const float gap = closeness * (leave < 0 ? -leave : leave);
-        const int some = enter < leave, touches = (enter <= last + gap) & (leave >= first - gap);
-        const float least = enter < first ? enter : first, most = leave > last ? leave : last;
-        const int longer = some & touches;
-        rays->enter[i] = longer ? least : first;
-        rays->leave[i] = longer ? most : last;
-        fresh[i] = some & !touches;
-    }
-    for (int i = 0; i < NB_PACKET; i++) any |= fresh[i];
-    return any;
-}
-
-static int replace(nb_shafts *shafts, const nebel_allocator *allocator, const nb_stretch *found, const int *fresh,
-                   nb_sun_rays *rays)
-{
-    for (uint32_t i = 0; i < NB_PACKET; i++) {
-        if (!fresh[i]) continue;
-        if (!keep(shafts, allocator, i, rays)) return 0;
-        rays->enter[i] = found->enter[i];
-        rays->leave[i] = found->leave[i];
-    }
-    return 1;
-}
-
-/* One side of a prism. */
-ALWAYS_INLINE void cut(const float *plane, const nb_sun_rays *rays, nb_stretch *stretch)
-{
-    const float a = plane[0], b = plane[1], c = plane[2], d = plane[3];
-    NB_SIMD
-    for (int i = 0; i < NB_PACKET; i++) {
-        const float at = a * rays->start[0][i] + b * rays->start[1][i] + c * rays->start[2][i] + d;
-        const float rise = a * rays->way[0][i] + b * rays->way[1][i] + c * rays->way[2][i];
-        const float t = -at / rise, enter = stretch->enter[i], leave = stretch->leave[i];
-        const float first = rise > 0 ? t : -INFINITY, level = at < 0 ? -INFINITY : INFINITY;
-        const float falling = rise < 0 ? t : INFINITY, last = rise != 0 ? falling : level;
-        stretch->enter[i] = first > enter ? first : enter;
-        stretch->leave[i] = last < leave ? last : leave;
-    }
-}
-
-ALWAYS_INLINE void cross_prism(const nb_prism *prism, const nb_sun_rays *rays, nb_stretch *found)
-{
-    for (int i = 0; i < NB_PACKET; i++) {
-        found->enter[i] = rays->from[i];
-        found->leave[i] = rays->to[i];
-    }
-    cut(prism->planes[0], rays, found);
-    cut(prism->planes[1], rays, found);
-    cut(prism->planes[2], rays, found);
-    cut(prism->planes[3], rays, found);
-}
-
 /* Whether any ray may meet a shadow of this child where it is not known to be in shadow. */
-ALWAYS_INLINE int enters(const nb_sun_node *node, int child, const nb_sun_rays *rays)
+NB_ALWAYS_INLINE int enters(const nb_shadow_node *node, int child, const nb_shaft_rays *rays)
 {
     const float low_x = node->low[0][child], high_x = node->high[0][child];
-    const float low_y = node->low[1][child], high_y = node->high[1][child], first = node->first[child];
+    const float low_y = node->low[1][child], high_y = node->high[1][child], first = node->low[2][child];
     int some[NB_PACKET], any = 0;
     NB_SIMD
     for (int i = 0; i < NB_PACKET; i++) {
@@ -195,31 +121,31 @@ typedef struct nb_visit {
     size_t number; /* of the node; at level -1 of the leaf */
 } nb_visit;
 
-enum { VISITS = NB_SUN_LEVELS * NB_SUN_FAN };
+enum { VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
 
-ALWAYS_INLINE int visit_leaf(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_tree *tree,
-                             size_t number, nb_sun_rays *rays)
+NB_ALWAYS_INLINE int visit_leaf(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                                size_t number, nb_shaft_rays *rays)
 {
-    const size_t first = number * NB_SUN_FAN, left = tree->prism_count - first;
-    const size_t count = left < NB_SUN_FAN ? left : NB_SUN_FAN;
+    const size_t first = number * NB_SHADOW_FAN, left = tree->count - first;
+    const size_t count = left < NB_SHADOW_FAN ? left : NB_SHADOW_FAN;
     for (size_t i = 0; i < count; i++) {
         nb_stretch found;
         int fresh[NB_PACKET];
-        cross_prism(&tree->prisms[first + i], rays, &found);
-        if (extend(&found, rays, fresh) && !replace(shafts, allocator, &found, fresh, rays)) return 0;
+        nb_cross_prism(&tree->prisms[first + i], rays, &found);
+        if (nb_extend(&found, rays, fresh) && !nb_replace(shafts, allocator, &found, fresh, rays)) return 0;
     }
     return 1;
 }
 
 /* The children that the rays enter, the farthest along them first, as the middle of the packet goes: what is found next
  * mostly touches what was found last. Returns how many. */
-ALWAYS_INLINE int list_children(const nb_sun_node *node, const nb_visit *visit, const nb_sun_rays *rays,
-                                nb_visit *children)
+NB_ALWAYS_INLINE int list_children(const nb_shadow_node *node, const nb_visit *visit, const nb_shaft_rays *rays,
+                                   nb_visit *children)
 {
     const float x = rays->way[0][NB_PACKET / 2 + 1], y = rays->way[1][NB_PACKET / 2 + 1];
-    float ways[NB_SUN_FAN];
+    float ways[NB_SHADOW_FAN];
     int count = 0;
-    for (int k = 0; k < NB_SUN_FAN; k++) {
+    for (int k = 0; k < NB_SHADOW_FAN; k++) {
         if (!enters(node, k, rays)) continue;
         const float way = x * (node->low[0][k] + node->high[0][k]) + y * (node->low[1][k] + node->high[1][k]);
         int i = count++;
@@ -228,14 +154,14 @@ ALWAYS_INLINE int list_children(const nb_sun_node *node, const nb_visit *visit, 
             children[i] = children[i - 1];
         }
         ways[i] = way;
-        children[i] = (nb_visit){visit->level - 1, visit->number * NB_SUN_FAN + (size_t)k};
+        children[i] = (nb_visit){visit->level - 1, visit->number * NB_SHADOW_FAN + (size_t)k};
     }
     return count;
 }
 
 /* Returns 0 when memory is out. */
-NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_tree *tree,
-                          nb_sun_rays *rays)
+NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                          nb_shaft_rays *rays)
 {
     nb_visit visits[VISITS];
     int count = 1;
@@ -297,7 +223,7 @@ static void join(nb_shafts *shafts, const nb_shadow *shadows, size_t count, floa
 {
     float enter = shadows[0].enter, leave = shadows[0].leave;
     for (size_t i = 1; i < count; i++) {
-        if (shadows[i].enter > leave + closeness * fabsf(leave)) {
+        if (shadows[i].enter > leave + nb_closeness * fabsf(leave)) {
             toggle(shafts, enter + skipped);
             toggle(shafts, leave + skipped);
             enter = shadows[i].enter;
@@ -321,12 +247,11 @@ static int make_room(nb_shafts *shafts, const nebel_allocator *allocator)
     return grown;
 }
 
-/* The toggles of a packet, of the shadows that were kept and the last one of each ray. */
-static int finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_sun_rays *rays, const float *length,
-                  double advance, uint32_t *first)
+int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
+                     double advance, uint32_t *first)
 {
     for (uint32_t i = 0; i < NB_PACKET; i++)
-        if (!keep(shafts, allocator, i, rays)) return 0;
+        if (!nb_shafts_keep(shafts, allocator, i, rays)) return 0;
     size_t ends[NB_PACKET], begin = 0;
     if (shafts->shadow_count > 0 && !make_room(shafts, allocator)) return 0;
     if (shafts->shadow_count > 0) sort_by_lane(shafts, ends);
@@ -339,15 +264,8 @@ static int finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_sun_ra
     return 1;
 }
 
-static int is_empty(const float *from, const float *to)
-{
-    int some = 0;
-    for (int i = 0; i < NB_PACKET; i++) some |= from[i] < to[i];
-    return !some;
-}
-
-static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_tree *tree,
-                       const nb_rays *rays, double advance, int first, nb_sun_rays *packet)
+static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                       const nb_rays *rays, double advance, int first, nb_shaft_rays *packet)
 {
     for (int i = 0; i < NB_PACKET; i++) {
         packet->enter[i] = INFINITY;
@@ -357,19 +275,19 @@ static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, cons
     turn(tree, rays, first, packet);
     shafts->shadow_count = 0;
     return walk(shafts, allocator, tree, packet) &&
-           finish(shafts, allocator, packet, rays->length + first, advance, shafts->first + first);
+           nb_shafts_finish(shafts, allocator, packet, rays->length + first, advance, shafts->first + first);
 }
 
-nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_tree *tree,
-                            const nb_sunlit_box *box, const nb_rays *rays, double advance, const float *distance)
+nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance)
 {
     float from[NB_BATCH], to[NB_BATCH];
     clip(box, rays, advance, distance, from, to);
     shafts->toggle_count = 0;
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
         for (int i = 0; i < NB_PACKET; i++) shafts->first[p + i] = (uint32_t)shafts->toggle_count;
-        if (tree->prism_count == 0 || is_empty(from + p, to + p)) continue;
-        nb_sun_rays packet;
+        if (tree->count == 0 || nb_is_empty(from + p, to + p)) continue;
+        nb_shaft_rays packet;
         for (int i = 0; i < NB_PACKET; i++) {
             packet.from[i] = from[p + i];
             packet.to[i] = to[p + i];

@@ -2,13 +2,13 @@
 #ifndef NB_CPU_SHAFTS_H
 #define NB_CPU_SHAFTS_H
 
-#include "sun_tree.h"
+#include "shadow_tree.h"
 #include "view.h"
 
 /* The fog that the sun lights, relative to the origin of the geometry; infinite where it has no end. */
-typedef struct nb_sunlit_box {
+typedef struct nb_lit_box {
     float low[3], high[3];
-} nb_sunlit_box;
+} nb_lit_box;
 
 /* A stretch of a packet's ray in shadow. */
 typedef struct nb_shadow {
@@ -29,8 +29,8 @@ typedef struct nb_shafts {
 
 /* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Errors:
  * MEMORY. */
-nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_tree *tree,
-                            const nb_sunlit_box *box, const nb_rays *rays, double advance, const float *distance);
+nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance);
 
 void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator);
 

@@ -255,3 +255,30 @@ int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *
     }
     return 1;
 }
+
+int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3])
+{
+    if (!snapshot->is_lamplit) return 0;
+    for (int c = 0; c < 3; c++) {
+        min[c] = HUGE_VAL;
+        max[c] = -HUGE_VAL;
+        for (size_t i = 0; i < snapshot->medium_count; i++) {
+            if (!snapshot->media[i].is_lamplit) continue;
+            min[c] = fmin(min[c], snapshot->media[i].body.low[c]);
+            max[c] = fmax(max[c], snapshot->media[i].body.high[c]);
+        }
+    }
+    return 1;
+}
+
+size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot)
+{
+    return snapshot->lamp_count;
+}
+
+void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double position[3], double *radius)
+{
+    const nb_lamp *lamp = &snapshot->lamps[number];
+    for (int c = 0; c < 3; c++) position[c] = lamp->place[c];
+    *radius = lamp->clear;
+}

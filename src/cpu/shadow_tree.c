@@ -1,14 +1,9 @@
-#include "sun_tree.h"
+#include "shadow_tree.h"
 
 #include "base/vector.h"
 
 #include <math.h>
 #include <string.h>
-
-/* A triangle in the sun's frame. */
-typedef struct nb_facing {
-    float corner[3][3];
-} nb_facing;
 
 typedef struct nb_key {
     uint32_t code, number;
@@ -16,8 +11,9 @@ typedef struct nb_key {
 
 /* What is needed while a tree is built. */
 typedef struct nb_making {
+    int is_for_lamps;
     size_t count;
-    nb_facing *triangles;
+    nb_caster *triangles;
     nb_key *keys, *other_keys;
     float low[3], scale; /* corner of all triangles; steps of codes per metre */
 } nb_making;
@@ -41,7 +37,7 @@ static void turn(const double axes[3][3], const float *position, float corner[3]
 }
 
 /* Twice the area that the sun sees; > 0 where the corners go round to the left. */
-static double seen_area(const nb_facing *t)
+static double seen_area(const nb_caster *t)
 {
     const double bx = (double)t->corner[1][0] - (double)t->corner[0][0];
     const double by = (double)t->corner[1][1] - (double)t->corner[0][1];
@@ -50,7 +46,8 @@ static double seen_area(const nb_facing *t)
     return bx * cy - by * cx;
 }
 
-/* Triangles that cast a shadow: those that are level with the sun's way do not, nor do those without a place. */
+/* Triangles that cast a shadow: those that are level with the sun's way do not, nor do those without a place. Which are
+ * level with a lamp's way each lamp finds out. */
 static void list_triangles(const nb_geometry *geometry, const double axes[3][3], nb_making *making)
 {
     making->count = 0;
@@ -58,11 +55,11 @@ static void list_triangles(const nb_geometry *geometry, const double axes[3][3],
         const nb_surface *surface = &geometry->surfaces[s];
         for (size_t t = 0; t < surface->mesh->triangle_count; t++) {
             const uint32_t *index = surface->mesh->indices + 3 * t;
-            nb_facing *triangle = &making->triangles[making->count];
+            nb_caster *triangle = &making->triangles[making->count];
             for (int k = 0; k < 3; k++) turn(axes, surface->positions + 3 * (size_t)index[k], triangle->corner[k]);
             const double area = seen_area(triangle);
             const float depth = triangle->corner[0][2] + triangle->corner[1][2] + triangle->corner[2][2];
-            if (area != 0 && isfinite(area) && isfinite(depth)) making->count++;
+            if ((area != 0 || making->is_for_lamps) && isfinite(area) && isfinite(depth)) making->count++;
         }
     }
 }
@@ -92,7 +89,7 @@ static uint32_t spread(uint32_t x)
     return (x | x << 2) & 0x09249249u;
 }
 
-static uint32_t code_of(const nb_making *making, const nb_facing *t)
+static uint32_t code_of(const nb_making *making, const nb_caster *t)
 {
     uint32_t code = 0;
     for (int i = 0; i < 3; i++) {
@@ -133,93 +130,92 @@ static void sort_triangles(nb_making *making)
 
 /* ---- prisms ---------------------------------------------------------------------------------- */
 
-/* Through the point; scaled so that products with coordinates stay numbers. */
-static void store_plane(const double n[3], const float *point, float *plane)
+void nb_shadow_plane(const double normal[3], const double point[3], float plane[4])
 {
-    const double largest = fmax(fmax(fabs(n[0]), fabs(n[1])), fabs(n[2])), scale = largest > 0 ? 1 / largest : 0;
-    double offset = 0;
-    for (int i = 0; i < 3; i++) {
-        plane[i] = (float)(n[i] * scale);
-        offset += n[i] * scale * (double)point[i];
-    }
-    plane[3] = (float)-offset;
+    const double *n = normal, largest = fmax(fmax(fabs(n[0]), fabs(n[1])), fabs(n[2]));
+    const double scale = largest > 0 ? 1 / largest : 0;
+    for (int i = 0; i < 3; i++) plane[i] = (float)(n[i] * scale);
+    plane[3] = (float)-(nb_vector_dot(n, point) * scale);
 }
 
-static void make_prism(const nb_facing *t, nb_prism *prism)
+static void make_prism(const nb_caster *t, nb_prism *prism)
 {
     const double side = seen_area(t) < 0 ? -1 : 1;
-    double way[3][3];
+    double corner[3][3], way[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++) corner[k][i] = (double)t->corner[k][i];
     for (int k = 0; k < 3; k++) {
-        const float *a = t->corner[k], *b = t->corner[(k + 1) % 3];
-        for (int i = 0; i < 3; i++) way[k][i] = (double)b[i] - (double)a[i];
+        for (int i = 0; i < 3; i++) way[k][i] = corner[(k + 1) % 3][i] - corner[k][i];
         const double n[3] = {-way[k][1] * side, way[k][0] * side, 0};
-        store_plane(n, a, prism->planes[k]);
+        nb_shadow_plane(n, corner[k], prism->planes[k]);
     }
     double normal[3];
     nb_vector_cross(way[0], way[1], normal);
     for (int i = 0; i < 3; i++) normal[i] *= side;
-    store_plane(normal, t->corner[0], prism->planes[3]);
+    nb_shadow_plane(normal, corner[0], prism->planes[3]);
 }
 
-static void enlarge(nb_sun_node *node, int child, const float low[3], const float high[2])
+static void enlarge(nb_shadow_node *node, int child, const float low[3], const float high[3])
 {
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         node->low[i][child] = fminf(node->low[i][child], low[i]);
         node->high[i][child] = fmaxf(node->high[i][child], high[i]);
     }
-    node->first[child] = fminf(node->first[child], low[2]);
 }
 
-static void clear(nb_sun_node *node)
+static void clear(nb_shadow_node *node)
 {
-    for (int k = 0; k < NB_SUN_FAN; k++) {
-        for (int i = 0; i < 2; i++) {
+    for (int k = 0; k < NB_SHADOW_FAN; k++) {
+        for (int i = 0; i < 3; i++) {
             node->low[i][k] = INFINITY;
             node->high[i][k] = -INFINITY;
         }
-        node->first[k] = 1e30f;
+        node->low[2][k] = 1e30f;
     }
 }
 
 /* The walk divides by no sign: what nothing is below lies at a place, and begins nowhere. */
-static void finish(nb_sun_node *node)
+static void finish(nb_shadow_node *node)
 {
-    for (int k = 0; k < NB_SUN_FAN; k++)
-        for (int i = 0; i < 2 && node->first[k] >= 1e30f; i++) node->low[i][k] = node->high[i][k] = 0;
+    for (int k = 0; k < NB_SHADOW_FAN; k++)
+        for (int i = 0; i < 2 && node->low[2][k] >= 1e30f; i++) node->low[i][k] = node->high[i][k] = 0;
 }
 
 /* ---- the tree -------------------------------------------------------------------------------- */
 
-static void set_leaves(nb_sun_tree *tree, const nb_making *making, size_t number)
+static void set_leaves(nb_shadow_tree *tree, const nb_making *making, size_t number)
 {
-    nb_sun_node *node = &tree->levels[0][number];
+    nb_shadow_node *node = &tree->levels[0][number];
     clear(node);
-    for (size_t k = 0; k < NB_SUN_FAN * NB_SUN_FAN; k++) {
-        const size_t place = number * NB_SUN_FAN * NB_SUN_FAN + k;
+    for (size_t k = 0; k < NB_SHADOW_FAN * NB_SHADOW_FAN; k++) {
+        const size_t place = number * NB_SHADOW_FAN * NB_SHADOW_FAN + k;
         if (place >= making->count) break;
-        const nb_facing *t = &making->triangles[making->keys[place].number];
-        make_prism(t, &tree->prisms[place]);
-        for (int c = 0; c < 3; c++) enlarge(node, (int)(k / NB_SUN_FAN), t->corner[c], t->corner[c]);
+        const nb_caster *t = &making->triangles[making->keys[place].number];
+        if (making->is_for_lamps)
+            tree->casters[place] = *t;
+        else
+            make_prism(t, &tree->prisms[place]);
+        for (int c = 0; c < 3; c++) enlarge(node, (int)(k / NB_SHADOW_FAN), t->corner[c], t->corner[c]);
     }
 }
 
-static void set_node(nb_sun_tree *tree, int level, size_t number)
+static void set_node(nb_shadow_tree *tree, int level, size_t number)
 {
-    nb_sun_node *node = &tree->levels[level][number];
+    nb_shadow_node *node = &tree->levels[level][number];
     clear(node);
-    for (size_t k = 0; k < NB_SUN_FAN; k++) {
-        const size_t child = number * NB_SUN_FAN + k;
+    for (size_t k = 0; k < NB_SHADOW_FAN; k++) {
+        const size_t child = number * NB_SHADOW_FAN + k;
         if (child >= tree->node_counts[level - 1]) break;
-        const nb_sun_node *below = &tree->levels[level - 1][child];
-        for (int i = 0; i < NB_SUN_FAN; i++) {
-            const float low[3] = {below->low[0][i], below->low[1][i], below->first[i]};
-            const float high[2] = {below->high[0][i], below->high[1][i]};
+        const nb_shadow_node *below = &tree->levels[level - 1][child];
+        for (int i = 0; i < NB_SHADOW_FAN; i++) {
+            const float low[3] = {below->low[0][i], below->low[1][i], below->low[2][i]};
+            const float high[3] = {below->high[0][i], below->high[1][i], below->high[2][i]};
             enlarge(node, (int)k, low, high);
         }
     }
 }
 
-static void fill_tree(nb_sun_tree *tree, const nb_making *making, int threads)
+static void fill_tree(nb_shadow_tree *tree, const nb_making *making, int threads)
 {
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (size_t i = 0; i < tree->node_counts[0]; i++) set_leaves(tree, making, i);
@@ -234,21 +230,25 @@ static size_t divide_up(size_t a, size_t b)
     return (a + b - 1) / b;
 }
 
-static int allocate_tree(nb_sun_tree *tree, const nebel_allocator *allocator, size_t count)
+static int allocate_tree(nb_shadow_tree *tree, const nebel_allocator *allocator, const nb_making *making)
 {
+    const size_t count = making->count;
     size_t all = 0;
     tree->level_count = 0;
-    for (size_t nodes = divide_up(count, NB_SUN_FAN * NB_SUN_FAN);; nodes = divide_up(nodes, NB_SUN_FAN)) {
+    for (size_t nodes = divide_up(count, NB_SHADOW_FAN * NB_SHADOW_FAN);; nodes = divide_up(nodes, NB_SHADOW_FAN)) {
         tree->node_counts[tree->level_count++] = nodes;
         all += nodes;
         if (nodes <= 1) break;
     }
-    tree->prism_count = count;
+    tree->count = count;
     if (count == 0) return 1;
-    tree->prisms = nb_allocate(allocator, count, sizeof *tree->prisms);
-    tree->nodes = nb_allocate(allocator, all, sizeof(nb_sun_node));
-    if (tree->prisms == NULL || tree->nodes == NULL) return 0;
-    nb_sun_node *nodes = tree->nodes;
+    if (making->is_for_lamps)
+        tree->casters = nb_allocate(allocator, count, sizeof *tree->casters);
+    else
+        tree->prisms = nb_allocate(allocator, count, sizeof *tree->prisms);
+    tree->nodes = nb_allocate(allocator, all, sizeof(nb_shadow_node));
+    if ((tree->prisms == NULL && tree->casters == NULL) || tree->nodes == NULL) return 0;
+    nb_shadow_node *nodes = tree->nodes;
     for (int level = 0; level < tree->level_count; level++) {
         tree->levels[level] = nodes;
         nodes += tree->node_counts[level];
@@ -256,7 +256,7 @@ static int allocate_tree(nb_sun_tree *tree, const nebel_allocator *allocator, si
     return 1;
 }
 
-static nebel_result build(nb_sun_tree *tree, const nb_geometry *geometry, const double axes[3][3], nb_making *making,
+static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, const double axes[3][3], nb_making *making,
                           int threads)
 {
     size_t count = 0;
@@ -268,26 +268,25 @@ static nebel_result build(nb_sun_tree *tree, const nb_geometry *geometry, const 
     list_triangles(geometry, axes, making);
     set_scale(making);
     sort_triangles(making);
-    if (!allocate_tree(tree, &geometry->allocator, making->count)) return NEBEL_ERROR_MEMORY;
+    if (!allocate_tree(tree, &geometry->allocator, making)) return NEBEL_ERROR_MEMORY;
     if (making->count > 0) fill_tree(tree, making, threads);
     return NEBEL_OK;
 }
 
-nebel_result nb_sun_tree_set(nb_sun_tree *tree, const nb_geometry *geometry, const double sun[3], int threads)
+/* `sun` 0: for lamps. */
+static nebel_result set(nb_shadow_tree *tree, const nb_geometry *geometry, const double sun[3], const double axes[3][3],
+                        nb_making *making, int threads)
 {
     if (tree->is_built && memcmp(tree->sun, sun, sizeof tree->sun) == 0 &&
         memcmp(tree->origin, geometry->origin, sizeof tree->origin) == 0)
         return NEBEL_OK;
-    nb_sun_tree_free(tree, &geometry->allocator);
-    nb_making making = {0};
-    double axes[3][3];
-    set_axes(sun, axes);
-    const nebel_result result = build(tree, geometry, (const double(*)[3])axes, &making, threads);
-    nb_release(&geometry->allocator, making.triangles);
-    nb_release(&geometry->allocator, making.keys);
-    nb_release(&geometry->allocator, making.other_keys);
+    nb_shadow_tree_free(tree, &geometry->allocator);
+    const nebel_result result = build(tree, geometry, axes, making, threads);
+    nb_release(&geometry->allocator, making->triangles);
+    nb_release(&geometry->allocator, making->keys);
+    nb_release(&geometry->allocator, making->other_keys);
     if (result != NEBEL_OK) {
-        nb_sun_tree_free(tree, &geometry->allocator);
+        nb_shadow_tree_free(tree, &geometry->allocator);
         return result;
     }
     memcpy(tree->sun, sun, sizeof tree->sun);
@@ -298,9 +297,25 @@ nebel_result nb_sun_tree_set(nb_sun_tree *tree, const nb_geometry *geometry, con
     return NEBEL_OK;
 }
 
-void nb_sun_tree_free(nb_sun_tree *tree, const nebel_allocator *allocator)
+nebel_result nb_shadow_tree_set_sun(nb_shadow_tree *tree, const nb_geometry *geometry, const double sun[3], int threads)
+{
+    nb_making making = {.is_for_lamps = 0};
+    double axes[3][3];
+    set_axes(sun, axes);
+    return set(tree, geometry, sun, (const double(*)[3])axes, &making, threads);
+}
+
+nebel_result nb_shadow_tree_set_lamps(nb_shadow_tree *tree, const nb_geometry *geometry, int threads)
+{
+    static const double none[3] = {0, 0, 0}, axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    nb_making making = {.is_for_lamps = 1};
+    return set(tree, geometry, none, axes, &making, threads);
+}
+
+void nb_shadow_tree_free(nb_shadow_tree *tree, const nebel_allocator *allocator)
 {
     nb_release(allocator, tree->prisms);
+    nb_release(allocator, tree->casters);
     nb_release(allocator, tree->nodes);
-    *tree = (nb_sun_tree){.is_built = 0};
+    *tree = (nb_shadow_tree){.is_built = 0};
 }
