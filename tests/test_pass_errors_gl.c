@@ -287,6 +287,14 @@ static void refuse(const stage *s, nebel_gl_pass pass, nebel_result wanted, cons
     pass_expect_no_errors();
 }
 
+/* OpenGL 3.3 tells of what kind a texture is by an error alone, which does not stay. */
+static void refuse_texture(const stage *s, nebel_gl_pass pass, const char *part)
+{
+    expect_message(nebel_gl_draw_fog(s->gl, &pass), NEBEL_ERROR_ARGUMENT, part);
+    assert_int_equal(pass_take_errors(), 1);
+    pass_expect_no_errors();
+}
+
 static void test_passes_that_cannot_be_drawn(void **state)
 {
     (void)state;
@@ -315,6 +323,14 @@ static void test_passes_that_cannot_be_drawn(void **state)
     pass.output = NEBEL_GL_OUTPUT_BLEND;
     refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "the target has 0 samples, not 4");
     pass.output = NEBEL_GL_OUTPUT_COMPOSE;
+    refuse_texture(&s, pass, "is none of GL_TEXTURE_2D_MULTISAMPLE");
+    pass.samples = 0;
+    glGenTextures(1, &pass.depth_texture);
+    glBindTexture(GL_TEXTURE_CUBE_MAP, pass.depth_texture);
+    glBindTexture(GL_TEXTURE_CUBE_MAP, 0);
+    refuse_texture(&s, pass, "is none of GL_TEXTURE_2D,");
+    glDeleteTextures(1, &pass.depth_texture);
+    pass = pass_of(&s);
     pass.samples = 33;
     refuse(&s, pass, NEBEL_ERROR_LIMIT, "32 samples");
     close_stage(&s);

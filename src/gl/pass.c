@@ -75,6 +75,13 @@ static nebel_result check_size(const task *t, GLenum target, const char *name)
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_WIDTH, &s.width);
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_HEIGHT, &s.height);
     if (target == GL_TEXTURE_2D_MULTISAMPLE) glGetTexLevelParameteriv(target, 0, GL_TEXTURE_SAMPLES, &s.samples);
+    if (s.width == 0) {
+        (void)glGetError(); /* of a texture of another kind, which could not be bound */
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
+                       "nebel_gl_draw_fog: the %s texture has no pixels, or is none of %s, as %u samples ask for", name,
+                       target == GL_TEXTURE_2D ? "GL_TEXTURE_2D" : "GL_TEXTURE_2D_MULTISAMPLE",
+                       (unsigned)pass->samples);
+    }
     const uint64_t right = (uint64_t)pass->x + t->picture->width, top = (uint64_t)pass->y + t->picture->height;
     if ((uint64_t)s.width < right || (uint64_t)s.height < top) {
         return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
@@ -166,6 +173,13 @@ static void bind_texture(const nebel_gl *gl, GLuint unit, GLenum target, unsigne
     glBindSampler(unit, gl->sampler);
 }
 
+/* What cannot be bound leaves nothing, not what another has bound there. */
+static void bind_host_texture(const nebel_gl *gl, GLuint unit, GLenum target, unsigned texture)
+{
+    bind_texture(gl, unit, target, 0);
+    glBindTexture(target, texture);
+}
+
 static nebel_result bind_textures(const task *t)
 {
     const nebel_gl *const gl = t->gl;
@@ -173,10 +187,10 @@ static nebel_result bind_textures(const task *t)
     if (gl->fog.texture != 0) bind_texture(gl, NB_UNIT_FOG, GL_TEXTURE_2D, gl->fog.texture);
     if (gl->fog.block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, gl->fog.block);
     if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
-    bind_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
+    bind_host_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
     const nebel_result result = check_size(t, target, "depth");
     if (result != NEBEL_OK || t->pass->output != NEBEL_GL_OUTPUT_COMPOSE) return result;
-    bind_texture(gl, NB_UNIT_COLOR, target, t->pass->color_texture);
+    bind_host_texture(gl, NB_UNIT_COLOR, target, t->pass->color_texture);
     return check_size(t, target, "color");
 }
 

@@ -278,12 +278,15 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
     if (snapshot->is_sunlit || snapshot->is_lamplit)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot light fog with the sun or lamps yet; give volumes a source instead of an "
-                       "albedo");
+        return nb_fail(
+            &snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+            "pack: shaders cannot light fog with the sun or lamps yet; use nebel_trace or the CPU's renderer "
+            "(--device cpu), or give volumes a source instead of an albedo");
     if (has_grid(snapshot))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot read grids yet; use nebel_trace, or a density of another type");
+        return nb_fail(
+            &snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+            "pack: shaders cannot read grids yet; use nebel_trace or the CPU's renderer (--device cpu), or a "
+            "density of another type");
     *count = count_words(snapshot);
     if (*count > MOST_WORDS)
         return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,

@@ -452,11 +452,11 @@ static int is_black(const double rgb[3])
 int nb_draft_is_for_cpu(const nb_draft *draft)
 {
     const nb_edition *const good = &draft->good;
-    if (nebel_scene_contents(draft->file)->lamp_count > 0) return 1;
-    if (!good->has_sun || is_black(good->sun_irradiance)) return 0;
-    for (size_t i = 0; i < good->count; i++)
-        if (!is_black(good->volumes[i].albedo)) return 1;
-    return 0;
+    const int has_sun = good->has_sun && !is_black(good->sun_irradiance);
+    int is = nebel_scene_contents(draft->file)->lamp_count > 0;
+    for (size_t i = 0; i < good->count && !is; i++)
+        is = good->volumes[i].density.type == NEBEL_DENSITY_GRID || (has_sun && !is_black(good->volumes[i].albedo));
+    return is;
 }
 
 int nb_draft_can_save_camera(const nb_draft *draft)

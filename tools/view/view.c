@@ -201,7 +201,7 @@ static void check_method(viewer *all)
 static const char *explain_method(const viewer *all)
 {
     if (all->look.method == NEBEL_METHOD_CELLS_PIXEL) return "drawn by the CPU alone";
-    return nb_draft_is_for_cpu(&all->draft) ? "drawn by the CPU alone: lamps, or sunlit fog" : "";
+    return nb_draft_is_for_cpu(&all->draft) ? "drawn by the CPU alone" : "";
 }
 
 /* What can be shown of what is wished for. */
@@ -656,7 +656,8 @@ int nb_view_run(const nb_view_settings *settings)
     viewer all = {
         .settings = settings,
         .look = {.exposure = settings->exposure, .split = .5, .gain = 16, .range = 50, .samples = 4, .rate = 24},
-        .panel = {.shown = 1}};
+        .panel = {.shown = 1},
+        .twin_is_stale = 1};
     all.log = (nebel_log){.write = listen, .user = &all};
     nb_interrupt_listen();
     int status = open_viewer(&all);
