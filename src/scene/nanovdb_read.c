@@ -223,7 +223,17 @@ static bool is_known_type(uint32_t type)
            type == PNANOVDB_GRID_TYPE_FP8 || type == PNANOVDB_GRID_TYPE_FP16 || type == PNANOVDB_GRID_TYPE_FPN;
 }
 
-static nebel_result check_entry(const reader *in, const entry *e)
+/* Bytes that one byte of a file can become: deflate's limit; LZ4, which Blosc packs with, has 255. Memory is taken before
+ * anything is unpacked, so that what an entry says must not be more. */
+enum { MOST_EXPANSION = 1032 };
+
+static int may_hold(const reader *in, uint16_t codec, uint64_t size)
+{
+    const uint64_t left = bytes_left(in);
+    return size <= left || (codec != CODEC_NONE && size / MOST_EXPANSION <= left);
+}
+
+static nebel_result check_entry(const reader *in, uint16_t codec, const entry *e)
 {
     if (!is_known_type(e->type))
         return nb_fail(&in->codec->log, NEBEL_ERROR_UNSUPPORTED,
@@ -234,6 +244,7 @@ static nebel_result check_entry(const reader *in, const entry *e)
                     "is a level set, which holds distances; make a fog volume of it (vdb_tool -ls2fog)");
     if (e->grid_size < GRID_SIZE + TREE_SIZE || e->grid_size > SIZE_MAX / 2)
         return fail(in, NEBEL_ERROR_FORMAT, "says of its grid that it is too small or too large");
+    if (!may_hold(in, codec, e->grid_size)) return fail_short(in);
     return NEBEL_OK;
 }
 
@@ -311,7 +322,7 @@ nebel_result nb_nanovdb_read(const nb_codec *codec, const nb_bytes *bytes, const
     entry e = {0};
     voxels->data = NULL;
     nebel_result result = find_grid(&in, name, &s, &e);
-    if (result == NEBEL_OK) result = check_entry(&in, &e);
+    if (result == NEBEL_OK) result = check_entry(&in, s.codec, &e);
     if (result != NEBEL_OK) return result;
     unsigned char *memory = nb_allocate_zero(&codec->allocator, (size_t)e.grid_size, 1);
     if (memory == NULL) return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
