@@ -131,10 +131,10 @@ class Viewer:
         self.say("view: saved nebel-", lambda: self.key(key))
         return self.case.folder / re.findall(r"saved (nebel-\d+\.png)", self.log.read_text())[-1]
 
-    def settle(self):
+    def settle(self, times=5):
         """Waits until the window has been drawn five times: a press and its end take a turn each, what follows two more, and one
         may be under way. Each time the list is emptied and filled."""
-        for _ in range(10):
+        for _ in range(2 * times):
             before = self.controls.stat().st_mtime_ns
             self.wait(lambda: self.controls.stat().st_mtime_ns != before, "another frame")
 
@@ -142,7 +142,7 @@ class Viewer:
         """Where a control is and stays: x, y, width, height. Messages come and go, and what lies below moves."""
         before, now = None, self.find(name)
         while now != before:
-            self.settle()
+            self.settle(2)
             before, now = now, self.find(name)
         return now
 

@@ -567,7 +567,7 @@ static nb_mask in_doubt(const nb_trace_job *job, nb_real error)
 
 #endif
 
-#if !defined(NB_QUAD)
+#if !defined(NB_DOUBLE) || defined(ASKS_QUAD)
 
 static const uint32_t *toggles_of(const nb_trace_job *job, size_t i)
 {
