@@ -155,6 +155,7 @@ static void point_to_sun(nebel_snapshot *s, const nebel_sun *sun)
     s->to_sun[0] = x / length + 0;
     s->to_sun[1] = y / length + 0;
     s->to_sun[2] = z / length + 0;
+    memcpy(s->irradiance, sun->irradiance, sizeof s->irradiance);
 }
 
 static int is_gray(const nebel_snapshot *s)

@@ -49,6 +49,7 @@ struct nebel_snapshot {
     double max_opacity;       /* 1 where there is no limit */
     int is_sunlit;            /* whether any medium is */
     double to_sun[3];         /* of length 1; not read where nothing is sunlit */
+    double irradiance[3];     /* of the sun */
     int is_gray;              /* no fog has a colour in its extinction */
     nb_way_to_sun way_to_sun; /* the same */
     int is_lamplit;           /* whether any medium is */

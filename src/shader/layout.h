@@ -3,6 +3,8 @@
  * bits of small numbers. Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
  *
  * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, 0.
+ * Word 1: the direction towards the sun, of length 1; 1 where what the sun adds has a closed form between turns.
+ * Word 2: the sun's irradiance; 0. Words 1 and 2 are 0 where no medium is sunlit.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
@@ -15,13 +17,18 @@
  *        inner of nb_edge, one unused; of planes: unused
  *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
  *        The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does
- *        not [m].
+ *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or lamps.
  *
  * A leaf, NB_LEAF_WORDS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
  *     1  the eye in the leaf's frame; box: low
  *     2  box: high
  *     3  the matrix, row by row; where the type says that it is turned
+ * Scattering, NB_SCATTERING_WORDS words. Ambient light is not here: it is in the light per metre and the radiance.
+ *     0  albedo, lobes of the phase function
+ *     1  first lobe: factor, alpha, peak, slope of nb_phase_lobe
+ *     2  second lobe; zeros where there is none
+ *
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
  * both must hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule;
  * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's.
@@ -29,12 +36,15 @@
 #ifndef NB_SHADER_LAYOUT_H
 #define NB_SHADER_LAYOUT_H
 
-#define NB_HEADER_WORDS 1
+#define NB_HEADER_WORDS 3
+#define NB_HEADER_SUN 1
 #define NB_MEDIUM_WORDS 10
 #define NB_MEDIUM_LEAF 4
 #define NB_MEDIUM_START 5
 #define NB_MEDIUM_CUTOFF 6
+#define NB_MEDIUM_SCATTERING 7
 #define NB_LEAF_WORDS 6
+#define NB_SCATTERING_WORDS 3
 
 #define NB_KIND_CONSTANT 0
 #define NB_KIND_HEIGHT 1        /* grows below the base */
@@ -80,7 +90,8 @@
 #define NB_HAS_SEVERAL 65536 /* more than one medium */
 #define NB_HAS_SOFT_ROUND 131072
 #define NB_HAS_SOFT_PLANES 262144
-#define NB_HAS_ALL 524287
+#define NB_HAS_SUN 524288 /* which lights fog */
+#define NB_HAS_ALL 1048575
 #define NB_HAS_SOFT (NB_HAS_SOFT_EDGE | NB_HAS_SOFT_ROUND | NB_HAS_SOFT_PLANES)
 #define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL)
 

@@ -227,6 +227,37 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
     }
 }
 
+/* ---- scattering ------------------------------------------------------------------------------ */
+
+static int scatters(const nb_medium *medium)
+{
+    return medium->is_sunlit || medium->is_lamplit;
+}
+
+static void pack_scattering(packer *p, const nb_medium *medium, nebel_word *word)
+{
+    const nb_phase *phase = &medium->body.phase;
+    nebel_word *scattering = &p->words[p->used];
+    if (!scatters(medium)) return;
+    word->v[3] = (float)p->used;
+    p->used += NB_SCATTERING_WORDS;
+    memset(scattering, 0, NB_SCATTERING_WORDS * sizeof *scattering);
+    set_color(&scattering[0], medium->body.albedo, phase->lobe_count);
+    for (int i = 0; i < phase->lobe_count; i++) {
+        const nb_lobe *lobe = &phase->lobes[i];
+        scattering[1 + i] =
+            (nebel_word){{(float)lobe->factor, (float)lobe->alpha, (float)lobe->peak, (float)lobe->slope}};
+    }
+}
+
+static void pack_sun(const nebel_snapshot *snapshot, nebel_word word[2])
+{
+    memset(word, 0, 2 * sizeof *word);
+    if (!snapshot->is_sunlit) return;
+    set_color(&word[0], snapshot->to_sun, snapshot->way_to_sun == NB_WAY_FLAT || snapshot->way_to_sun == NB_WAY_HEIGHT);
+    set_color(&word[1], snapshot->irradiance, 0);
+}
+
 /* ---- fog ------------------------------------------------------------------------------------- */
 
 static double light_flags(const nb_medium *medium, size_t rank)
@@ -248,6 +279,7 @@ static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
         pack_leaf(p, body, &body->leaves[0], 1, &word[NB_MEDIUM_LEAF]);
     word[NB_MEDIUM_START].v[3] = (float)body->start;
     word[NB_MEDIUM_CUTOFF].v[3] = narrow((long double)body->cutoff);
+    pack_scattering(p, medium, &word[NB_MEDIUM_SCATTERING]);
 }
 
 static size_t count_words(const nebel_snapshot *snapshot)
@@ -256,6 +288,7 @@ static size_t count_words(const nebel_snapshot *snapshot)
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_WORDS : 0);
+        count += scatters(&snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
     }
     return count;
 }
@@ -304,6 +337,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     words[0] =
         (nebel_word){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
                       (float)snapshot->max_opacity, 0}};
+    pack_sun(snapshot, &words[NB_HEADER_SUN]);
     const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
@@ -361,7 +395,7 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
 {
     if (snapshot == NULL) return NB_HAS_ALL;
     uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
-                        (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0);
+                        (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |
