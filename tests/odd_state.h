@@ -3,7 +3,7 @@
 #ifndef ODD_STATE_H
 #define ODD_STATE_H
 
-enum { ODD_UNITS = 10, ODD_MOST = 2048 };
+enum { ODD_UNITS = 16, ODD_MOST = 2048 };
 
 typedef struct odd_snapshot {
     double values[ODD_MOST];

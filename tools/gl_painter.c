@@ -40,9 +40,6 @@ int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_r
 {
     const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
     *painter = (nb_gl_painter){.loaded = loaded, .scene = scene, .log = desc.log};
-    if (scene->lamp_count > 0) {
-        return nb_report_failure("render: %s: OpenGL does not light with lamps yet; say --device cpu", name);
-    }
     const int fixed = is_of_fixed(method) && suits_fixed(scene);
     painter->is_fixed = fixed && nb_gl_context_open(&painter->context, NB_GL_API_FIXED) == 0;
     if (!painter->is_fixed && nb_gl_context_open_any(&painter->context) != 0) {

@@ -9,14 +9,15 @@
  *
  *     nebel_destroy_gl_renderer(renderer);
  *
- * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun, which is attenuated by all fog
- * on its way, and by the ambient radiance; colour = transmittance * surface + in-scattering. Both renderers look
- * through the same points of each pixel. Shadows come from maps fitted to what is seen, so their edges are a texel of
- * the map wide. Panoramas are no resampled views: each pixel has its own ray, which meets surfaces, fog and particles
+ * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun and the scene's lamps, which are
+ * attenuated by all fog on their way, and by the ambient radiance; colour = transmittance * surface + in-scattering.
+ * Both renderers look through the same points of each pixel. The sun's shadows come from maps fitted to what is seen,
+ * those of lamps from six maps around each, so their edges are a texel of the map wide. Particles dim the sun, not lamps.
+ * Panoramas are no resampled views: each pixel has its own ray, which meets surfaces, fog and particles
  * exactly. Link with libnebel_gl and libnebel.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
- * what nebel/gl.h lists it changes, while it runs, texture units 4 to 9, and TEXTURE_2D_ARRAY of units 7 and 9; both
+ * what nebel/gl.h lists it changes, while it runs, texture units 4 to 11, and TEXTURE_2D_ARRAY of units 7, 9 and 11; both
  * framebuffers; the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth
  * function, mask and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and
  * the clip control, where they exist. Conditional rendering must not be under way: pictures would be missing within a
@@ -37,11 +38,14 @@ typedef struct nebel_gl_renderer nebel_gl_renderer;
 typedef struct nebel_gl_renderer_desc {
     nebel_allocator allocator;
     nebel_log log;
-    uint32_t shadow_size; /* texels of a side of each of the four shadow maps, 64 to 16384; 0: 2048 */
+    uint32_t shadow_size; /* texels of a side of each of the sun's four shadow maps, 64 to 16384; 0: 2048. A lamp's six
+                             have a quarter of it, less where they would take more than 128 MiB together, but 64 */
 } nebel_gl_renderer_desc;
 
-/* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, background and
- * ambient are read anew for each frame, so `scene` must outlive the renderer. The snapshot is retained; fog NULL: none.
+/* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, lamps, background and
+ * ambient are read anew for each frame, so `scene` must outlive the renderer. The maps around a lamp are drawn when it
+ * is new or has moved. Where lamps are more than there is room for, GL_MAX_ARRAY_TEXTURE_LAYERS or 1,365, those that are
+ * brightest at the eye cast shadows. The snapshot is retained; fog NULL: none.
  * On an error *renderer is NULL. O(vertices + triangles + texels). Errors: ARGUMENT and VALUE as nebel_create_renderer,
  * MEMORY, LIMIT (a texture larger than GL_MAX_TEXTURE_SIZE), UNSUPPORTED (no current context, or one that is too old or
  * cannot draw into textures of floats). */
@@ -125,7 +129,7 @@ typedef struct nebel_gl_frame_desc {
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera or light as for nebel_render_frame; taps that are not finite or negative; a factor as for
  * nebel_resolve_factor),
- * LIMIT (a picture too large for this context; stopped by progress), MEMORY, UNSUPPORTED (more than one
+ * LIMIT (a picture too large for this context; more than 4,096 lamps; stopped by progress), MEMORY, UNSUPPORTED (more than one
  * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
  * lost). The first panorama copies the triangles of all meshes: 108 bytes each, with fog per vertex 48 more. */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);

@@ -307,7 +307,12 @@ static int has_particles(const frame *f)
     return f->renderer->particles.count > 0 && !f->method.replaces_fog;
 }
 
-/* Particles ask for the renderer's fog before them whatever is on surfaces. */
+static int has_lamps(const frame *f)
+{
+    return f->renderer->scene->lamp_count > 0 && f->renderer->meshes.count > 0;
+}
+
+/* Particles ask for the renderer's fog before them whatever is on surfaces, and lamps for that before surfaces. */
 static nebel_result draw_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -323,7 +328,8 @@ static nebel_result draw_fog(const frame *f)
         result = draw_pixel_fog(f);
     const int is_exact =
         !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
-    if (result == NEBEL_OK && r->fog != NULL && (is_exact || has_particles(f))) result = set_eye_fog(f);
+    const int is_asked = is_exact || has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
+    if (result == NEBEL_OK && r->fog != NULL && is_asked) result = set_eye_fog(f);
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
 
@@ -514,13 +520,38 @@ static void set_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
                 (GLint)fog->tile_size, (GLint)fog->tile_columns);
 }
 
+/* ---- lamps ----------------------------------------------------------------------------------- */
+
+/* Of the whole frame. */
+static nebel_result prepare_lamps(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    if (!has_lamps(f)) return NEBEL_OK;
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_LAMPS);
+    nebel_result result = nb_lamps_set(&r->lamps, &r->allocator, &r->log, r->scene, f->eye);
+    if (result == NEBEL_OK) result = nb_shading_make_lamp_map(&r->shading, &r->context, &r->log);
+    if (result == NEBEL_OK) result = nb_lamps_draw(&r->lamps, &r->context, &r->log, r->shading.lamp_map, &r->meshes);
+    glActiveTexture(GL_TEXTURE0);
+    return result;
+}
+
+static void set_lamps(const frame *f, unsigned program)
+{
+    const nb_lamps *const lamps = &f->renderer->lamps;
+    bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
+    bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
+    glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->lamp_count);
+    glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
+    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face);
+}
+
 /* ---- light ----------------------------------------------------------------------------------- */
 
 static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
     if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
-    if (fog->tiles != 0) set_tiles(f, fog, program);
+    if (fog->tiles != 0 && f->casts) set_tiles(f, fog, program);
 }
 
 /* What comes through the particles of the sun's light to each surface. */
@@ -556,6 +587,7 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     set_vector(program, "scene_sunlight", f->light.sunlight);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
     if (f->casts) set_shadows(f, program);
+    if (has_lamps(f)) set_lamps(f, program);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
     bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
     bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
@@ -580,9 +612,13 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    const nebel_gl *const passes = f->casts && r->fog != NULL && !f->method.replaces_fog ? r->sun_fog : NULL;
-    const nb_light_kind kind = {
-        .sunlit = f->casts, .dimmed = f->dims, .in_fog = has_fog(f), .veil_layers = count_veil_layers(f)};
+    const int is_lit = f->casts || has_lamps(f), dims = r->fog != NULL && !f->method.replaces_fog;
+    const nebel_gl *const passes = !is_lit || !dims ? NULL : f->casts ? r->sun_fog : r->eye_fog;
+    const nb_light_kind kind = {.sunlit = f->casts,
+                                .lamplit = has_lamps(f),
+                                .dimmed = f->dims,
+                                .in_fog = has_fog(f),
+                                .veil_layers = count_veil_layers(f)};
     const nebel_result result = find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
@@ -667,6 +703,7 @@ static nebel_result draw_samples(frame *f)
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
     if (result == NEBEL_OK && has_particles(f)) result = prepare_particles(f);
+    if (result == NEBEL_OK) result = prepare_lamps(f);
     if (result == NEBEL_OK) result = prepare_vertices(f);
     if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {

@@ -13,7 +13,7 @@ enum { NB_SAMPLES_MOST = 32 };
 
 /* The texts of a shader, one after the other. */
 typedef struct nb_texts {
-    const char *list[9];
+    const char *list[12];
     int count;
 } nb_texts;
 

@@ -75,6 +75,7 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     made->context = context;
     const uint32_t size = desc->shadow_size != 0 ? desc->shadow_size : USUAL_SHADOW_SIZE;
     made->shadows.size = size < context.widest ? size : context.widest;
+    made->lamps.most_face = size / 4;
     made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
     result = make(made);
     if (result != NEBEL_OK) {
@@ -94,6 +95,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     if (in_context) {
         nb_shading_delete(&r->shading);
         nb_shadows_delete(&r->shadows);
+        nb_lamps_delete(&r->lamps);
         nb_targets_delete(&r->targets);
         nb_particles_delete(&r->particles);
         glDeleteVertexArrays(1, &r->vertex_array);
@@ -105,6 +107,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nebel_release_snapshot(r->fog);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
+    nb_lamps_release(&r->allocator, &r->lamps);
     nb_particles_release(&r->allocator, &r->particles);
     const nebel_allocator allocator = r->allocator;
     nb_release(&allocator, r);

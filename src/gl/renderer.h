@@ -3,6 +3,7 @@
 #define NB_GL_RENDERER_H
 
 #include "camera.h"
+#include "lamps.h"
 #include "meshes.h"
 #include "particles.h"
 #include "scene_state.h"
@@ -24,6 +25,7 @@ struct nebel_gl_renderer {
     nb_meshes meshes;
     nb_shading shading;
     nb_shadows shadows;
+    nb_lamps lamps;
     nb_targets targets;
     nb_particles particles;
     int has_frame;

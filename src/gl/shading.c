@@ -1,6 +1,7 @@
 #include "shading.h"
 
 #include "corners.h"
+#include "lamps.h"
 #include "panorama.h"
 #include "particle_text.h"
 #include "targets.h"
@@ -425,6 +426,9 @@ static const char light_text[] =
     "    if (place.x > 0.0) {\n"
     "        vec3 at = ray_origin(gl_FragCoord.xy) + place.x * ray_direction(gl_FragCoord.xy);\n"
     "        vec3 light = scene_ambient + sunlight(at, normal.xyz, normal.w, place.yzw, place.x);\n"
+    "#ifdef SCENE_LAMPLIT\n"
+    "        light += lamplight(at, normal.xyz, place.yzw);\n"
+    "#endif\n"
     "        surface = texelFetch(scene_reflectance, texel, 0).rgb * light;\n"
     "    }\n"
     "    float hit = place.x > 0.0 ? scene_share : 0.0;\n"
@@ -506,6 +510,15 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     return NEBEL_OK;
 }
 
+nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *context, const nebel_log *log)
+{
+    const char *const version = nb_program_version(context);
+    const nb_texts vertex = {{version, nb_lamp_map_vertex_text}, 2};
+    const nb_texts fragment = {{version, precision_of(context), nb_lamp_map_fragment_text}, 3};
+    if (shading->lamp_map != 0) return NEBEL_OK;
+    return nb_program_build(log, &vertex, &fragment, &shading->lamp_map);
+}
+
 nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
 {
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : ray_text;
@@ -551,15 +564,16 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
     char limits[128];
     (void)snprintf(
         text, size,
-        "%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
-        "%d\n#define NEBEL_FEATURES %u\n%s",
+        "%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
+        "%d\n#define NB_LAMP_TEXELS %d\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
         kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
-        kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->panorama ? "#define SCENE_PANORAMA\n" : "",
-        kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "", kind->in_texture ? "#define NEBEL_TEXTURE\n" : "",
-        kind->tiled ? "#define NEBEL_TILES\n" : "", kind->of_particles, kind->veil_layers, NB_CASCADES,
-        (unsigned)kind->features, precision_of(context));
+        kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lamplit ? "#define SCENE_LAMPLIT\n" : "",
+        kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
+        kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+        kind->of_particles, kind->veil_layers, NB_CASCADES, NB_LAMP_TEXELS, (unsigned)kind->features,
+        precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -578,6 +592,8 @@ static void set_units(unsigned program)
     set_unit(program, "scene_shadows", NB_UNIT_SHADOWS);
     set_unit(program, "scene_dimming", NB_UNIT_DIMMING);
     set_unit(program, "scene_veil", NB_UNIT_VEIL);
+    set_unit(program, "scene_lamps", NB_UNIT_LAMPS);
+    set_unit(program, "lamp_maps", NB_UNIT_LAMP_MAPS);
 }
 
 static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kind)
@@ -596,7 +612,9 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text, light_text}, 7};
+    const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text,
+                             kind->lamplit ? nb_lamp_map_text : "", kind->lamplit ? nb_lamp_text : "", light_text},
+                            9};
     const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", fog, words_text, ray, tile,
                                 nb_particle_start_text, nb_particle_text},
@@ -614,10 +632,10 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
-           a->sunlit == b->sunlit && a->five_taps == b->five_taps && a->veil_layers == b->veil_layers &&
-           a->panorama == b->panorama && a->has_surfaces == b->has_surfaces && a->in_fog == b->in_fog &&
-           a->has_fog == b->has_fog && a->in_texture == b->in_texture && a->tiled == b->tiled &&
-           a->features == b->features;
+           a->sunlit == b->sunlit && a->lamplit == b->lamplit && a->five_taps == b->five_taps &&
+           a->veil_layers == b->veil_layers && a->panorama == b->panorama && a->has_surfaces == b->has_surfaces &&
+           a->in_fog == b->in_fog && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
+           a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
@@ -648,5 +666,6 @@ void nb_shading_delete(const nb_shading *shading)
     glDeleteProgram(shading->round_vertex_fog);
     glDeleteProgram(shading->factor);
     glDeleteProgram(shading->round_factor);
+    glDeleteProgram(shading->lamp_map);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

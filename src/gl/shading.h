@@ -14,7 +14,9 @@ enum {
     NB_UNIT_TRANSMITTANCE,
     NB_UNIT_SHADOWS,
     NB_UNIT_DIMMING,
-    NB_UNIT_VEIL
+    NB_UNIT_VEIL,
+    NB_UNIT_LAMPS,
+    NB_UNIT_LAMP_MAPS
 };
 
 enum { NB_CASCADES = 4 };
@@ -26,6 +28,7 @@ typedef struct nb_light_kind {
     int of_dimming;   /* of the sun by particles, for `dimmed` ones */
     int dimmed;       /* that counts, too */
     int sunlit;       /* surfaces are */
+    int lamplit;      /* the same */
     int five_taps;    /* particles are discs, which are there or not */
     int veil_layers;  /* that particles are drawn into, or surfaces are seen through; 0: there are none */
     int panorama;
@@ -45,6 +48,7 @@ typedef struct nb_shading {
     unsigned surface, survey, shadow;
     unsigned vertex_fog, round_surface, round_vertex_fog; /* 0 until they are needed; round: of panoramas */
     unsigned factor, round_factor;
+    unsigned lamp_map;
     nb_light_program *lights;
     size_t light_count, light_capacity;
 } nb_shading;
@@ -57,6 +61,9 @@ nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *contex
 
 /* Fog that vertices bring, over the surfaces that are seen. */
 nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *context, const nebel_log *log);
+
+/* Maps around lamps. */
+nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *context, const nebel_log *log);
 
 /* Fog factors of pixels. */
 nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama);

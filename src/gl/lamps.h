@@ -1,0 +1,47 @@
+/* Lamps, and maps of how far their light goes before it meets a surface. */
+#ifndef NB_GL_LAMPS_H
+#define NB_GL_LAMPS_H
+
+#include "meshes.h"
+
+#include <nebel/scene.h>
+
+/* Lamps of a scene; texels of each among the words; texels around a face of a map that are its neighbours'. */
+enum { NB_LAMPS_MOST = 4096, NB_LAMP_TEXELS = 4, NB_LAMP_BORDER = 4 };
+
+/* What a layer of the maps shows: surfaces around a place, none nearer than the radius. */
+typedef struct nb_lamp_source {
+    double place[3], radius;
+    int is_drawn;
+} nb_lamp_source;
+
+typedef struct nb_lamps {
+    unsigned words; /* texture of NB_LAMP_TEXELS texels for each lamp, see nb_lamp_text; 0: not made yet */
+    uint32_t rows;
+    unsigned maps, buffer;    /* array of depth: a layer for each source, six faces, three by two; 0: not made yet */
+    uint32_t most_face, face; /* texels of a face's side */
+    size_t layer_count;
+    nb_lamp_source *sources; /* of the layers */
+    float *texels;           /* of the words */
+    int *layers;             /* of the lamps, -1: none */
+    size_t capacity;         /* of the two */
+} nb_lamps;
+
+/* Makes the words of a scene's lamps as seen from an eye, and chooses which of them have maps: all that shine while
+ * there is room, then those that are brightest at the eye. Changes the bindings of TEXTURE_2D on the active unit. LIMIT,
+ * MEMORY. */
+nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_log *log,
+                          const nebel_scene_data *scene, const double eye[3]);
+
+/* Draws the maps that are not there yet. `program` is nb_shading.lamp_map. Depth is tested afterwards. MEMORY. */
+nebel_result nb_lamps_draw(nb_lamps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
+                           const nb_meshes *meshes);
+
+/* In OpenGL; then in memory. */
+void nb_lamps_delete(const nb_lamps *lamps);
+void nb_lamps_release(const nebel_allocator *allocator, const nb_lamps *lamps);
+
+/* The programs that make the maps, and functions that read them and the words: lamp_visible, lamplight. */
+extern const char nb_lamp_map_vertex_text[], nb_lamp_map_fragment_text[], nb_lamp_map_text[], nb_lamp_text[];
+
+#endif
