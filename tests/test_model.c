@@ -1,65 +1,12 @@
 /* Models and height fields. Those of Debian's assimp-testmodels are looked at where they are installed. */
 #define _GNU_SOURCE
-#include "scene_help.h"
+#include "model_help.h"
 
 #include <math.h>
 #include <unistd.h>
 #include <png.h>
 
 #define MODELS "/usr/share/assimp/models/"
-
-static char folder[] = "/tmp/nebel_model_XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char path[4][200];
-    static int next;
-    next = (next + 1) % 4;
-    snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
-    return path[next];
-}
-
-static void write_text(const char *name, const char *text)
-{
-    FILE *file = fopen(in_folder(name), "w");
-    fputs(text, file);
-    fclose(file);
-}
-
-/* A scene with one model of these members, loaded; its result in *result, its last message in *kept. */
-static nebel_scene *load(const char *members, nebel_result *result, journal *kept)
-{
-    char text[1000];
-    nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {.log = {remember, kept}};
-    *kept = (journal){0};
-    snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": [], \"models\": [{%s}]}", members);
-    if (nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, &scene) != NEBEL_OK)
-        fail_msg("%s", kept->last);
-    *result = nebel_load_scene_models(scene);
-    return scene;
-}
-
-/* The scene may have something to say as long as it lives. */
-static nebel_scene *load_good(const char *members)
-{
-    static journal kept;
-    nebel_result result;
-    nebel_scene *scene = load(members, &result, &kept);
-    if (result != NEBEL_OK) fail_msg("%s", kept.last);
-    return scene;
-}
-
-static void assert_broken(const char *members, nebel_result wanted, const char *message)
-{
-    journal kept;
-    nebel_result result;
-    nebel_scene *scene = load(members, &result, &kept);
-    if (result != wanted || strstr(kept.last, message) == NULL) fail_msg("gave %d: %s", result, kept.last);
-    assert_non_null(strstr(kept.last, "scene.json:1:"));
-    assert_int_equal(nebel_scene_contents(scene)->mesh_count, 0);
-    nebel_destroy_scene(scene);
-}
 
 static void assert_near(const float *got, double x, double y, double z)
 {
@@ -85,7 +32,8 @@ static size_t check_meshes(const nebel_scene *scene)
             assert_true(fabsf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1) < 1e-4f);
         }
         assert_true(mesh->texture >= -1 && mesh->texture < (int32_t)data->texture_count);
-        assert_true((mesh->texture < 0) == (mesh->uvs == NULL));
+        assert_true((mesh->texture < 0 && mesh->mask < 0) == (mesh->uvs == NULL));
+        assert_true((mesh->mask < 0) == (mesh->alpha_cutoff == 0));
         for (int i = 0; i < 3; i++) assert_true(mesh->base_color[i] >= 0 && mesh->base_color[i] <= 1);
     }
     return count;
@@ -629,12 +577,6 @@ static void test_models_of_many_formats(void **state)
         }
         nebel_destroy_scene(scene);
     }
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) == NULL;
 }
 
 static int remove_folder(void **state)

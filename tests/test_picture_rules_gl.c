@@ -66,6 +66,42 @@ static void test_light_is_that_of_the_cpu(void **state)
     }
 }
 
+/* Holes and their shadows are the CPU's but for a texel's 256th and the texels of shadow maps. */
+static void test_holes_are_those_of_the_cpu(void **state)
+{
+    (void)state;
+    static test_card card;
+    static const nebel_projection looks[] = {NEBEL_PROJECTION_PERSPECTIVE, NEBEL_PROJECTION_PANORAMA};
+    test_card_make(&card, 1.5f);
+    for (int i = 0; i < 2; i++) {
+        nb_gl context;
+        size_t through = 0, on = 0, other = 0, dark = 0, lit = 0, shaded = 0;
+        nebel_camera camera = test_camera(1, 5, 4, 0, 1, 0);
+        picture_pair pair = picture_make(WIDTH, HEIGHT);
+        camera.projection = looks[i];
+        pass_open(&context, languages[i]);
+        picture_render(&card.scene, NULL, &camera, 1, &pair);
+        pass_close(&context);
+        for (size_t p = 0; p < (size_t)WIDTH * HEIGHT; p++) {
+            const float wanted = pair.cpu.depth[p], got = pair.gl.depth[p];
+            if (!isfinite(wanted) || !isfinite(got) || fabsf(got - wanted) > .01f * wanted) {
+                other += isfinite(wanted) != 0 || isfinite(got) != 0;
+                continue;
+            }
+            const float height = pair.cpu.normal[3 * p + 1];
+            through += wanted > 6 && height > 0;
+            on += wanted < 6 && height > 0;
+            dark += pair.cpu.color[3 * p] == 0;
+            lit += pair.cpu.color[3 * p] > 0;
+            shaded += fabsf(pair.cpu.color[3 * p] - pair.gl.color[3 * p]) > .1f;
+        }
+        print_message("%zu pixels beyond the card, %zu on it, %zu dark, %zu lit; %zu elsewhere, %zu in other light\n",
+                      through, on, dark, lit, other, shaded);
+        assert_true(dark > 20 && lit > 400 && other <= 20 && shaded < dark / 4);
+        picture_free(&pair);
+    }
+}
+
 /* Also where the sun is behind the triangle, but not behind the normal; a panorama has triangles of its own. */
 static void test_light_fades_evenly_on_a_coarse_column(void **state)
 {
@@ -403,6 +439,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_light_is_that_of_the_cpu),
+        cmocka_unit_test(test_holes_are_those_of_the_cpu),
         cmocka_unit_test(test_light_fades_evenly_on_a_coarse_column),
         cmocka_unit_test(test_particles_are_fog),
         cmocka_unit_test(test_particles_dim_the_sun),

@@ -268,6 +268,71 @@ static inline void test_ball_make(test_ball *ball, const double center[3])
                                      .meshes = ball->meshes};
 }
 
+/* ---- a card with holes over a floor ---------------------------------------------------------- */
+
+enum { TEST_CARD_WIDTH = 8, TEST_CARD_HEIGHT = 6 };
+
+/* A square of 4 m at y = 2 with a texture of random alpha, over a square of 20 m at y = 0. Points into itself. */
+typedef struct test_card {
+    float positions[2][12], uvs[8];
+    uint8_t texels[4 * TEST_CARD_WIDTH * TEST_CARD_HEIGHT];
+    nebel_texture texture;
+    nebel_mesh meshes[2];
+    nebel_scene_data scene;
+} test_card;
+
+/* The texture lies so many times on the card. */
+static inline void test_card_make(test_card *c, float times)
+{
+    memset(c, 0, sizeof *c);
+    uint32_t number = 1;
+    for (size_t i = 0; i < sizeof c->texels; i++) {
+        number = 1664525 * number + 1013904223; /* Numerical Recipes */
+        c->texels[i] = (uint8_t)(number >> 24);
+    }
+    for (int i = 0; i < 12; i++) {
+        c->positions[0][i] = i % 3 == 1 ? 2 : 2 * test_square_positions[i];
+        c->positions[1][i] = 10 * test_square_positions[i];
+    }
+    for (int i = 0; i < 8; i++) c->uvs[i] = times * test_square_uvs[i];
+    c->texture = (nebel_texture){TEST_CARD_WIDTH, TEST_CARD_HEIGHT, c->texels};
+    for (int m = 0; m < 2; m++) {
+        c->meshes[m] = test_square();
+        c->meshes[m].positions = c->positions[m];
+    }
+    c->meshes[0].uvs = c->uvs;
+    c->meshes[0].alpha_cutoff = .45f;
+    c->scene = (nebel_scene_data){.has_sun = 1,
+                                  .sun_direction = {.3, .9, .2},
+                                  .sun_irradiance = {3, 3, 3},
+                                  .mesh_count = 2,
+                                  .meshes = c->meshes,
+                                  .texture_count = 1,
+                                  .textures = &c->texture};
+}
+
+/* Bilinear alpha less the cutoff, from -1 to 1, where a line over (x, z) crosses the card; beside it -1. */
+static inline double test_card_alpha(const test_card *c, double x, double z)
+{
+    const double sizes[2] = {TEST_CARD_WIDTH, TEST_CARD_HEIGHT}, at[2] = {(x + 2) / 4, (z + 2) / 4};
+    double alpha = 0;
+    long first[2];
+    double part[2];
+    if (fabs(x) > 2 || fabs(z) > 2) return -1;
+    for (int i = 0; i < 2; i++) {
+        const double place = at[i] * (double)c->uvs[4] * sizes[i] - .5;
+        first[i] = (long)floor(place);
+        part[i] = place - floor(place);
+    }
+    for (int k = 0; k < 4; k++) {
+        const long column = (first[0] + k % 2 + TEST_CARD_WIDTH) % TEST_CARD_WIDTH;
+        const long row = (first[1] + k / 2 + TEST_CARD_HEIGHT) % TEST_CARD_HEIGHT;
+        const double weight = (k % 2 ? part[0] : 1 - part[0]) * (k / 2 ? part[1] : 1 - part[1]);
+        alpha += weight * c->texels[4 * (row * TEST_CARD_WIDTH + column) + 3] / 255;
+    }
+    return alpha - (double)c->meshes[0].alpha_cutoff;
+}
+
 /* ---- a ball over a textured floor, in fog ---------------------------------------------------- */
 
 enum { TEST_TEXELS = 16 };

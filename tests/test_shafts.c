@@ -59,6 +59,39 @@ static void draw_triangles(uint64_t *numbers, float (*positions)[3])
     }
 }
 
+enum { WIDE = 16, HIGH = 12 };
+
+/* Triangles with numbers of their own, every other time with holes: a texture of random alpha, up to four of which lie
+ * across a triangle. Points into itself. */
+typedef struct holed {
+    float uvs[3 * TRIANGLES][2];
+    uint8_t texels[HIGH * WIDE][4];
+    uint32_t indices[3 * TRIANGLES];
+    nebel_texture texture;
+    nebel_mesh mesh;
+    nebel_scene_data scene;
+} holed;
+
+static void set_holed(holed *h, uint64_t seed, float (*positions)[3])
+{
+    uint64_t numbers = 41 * seed + 3;
+    for (uint32_t i = 0; i < 3 * TRIANGLES; i++) {
+        h->indices[i] = i;
+        for (int k = 0; k < 2; k++) h->uvs[i][k] = (float)dice(&numbers, -2, 2);
+    }
+    for (int i = 0; i < HIGH * WIDE; i++) h->texels[i][3] = (uint8_t)dice(&numbers, 0, 256);
+    h->uvs[8][0] = NAN;
+    h->texture = (nebel_texture){WIDE, HIGH, h->texels[0]};
+    h->mesh = (nebel_mesh){.positions = positions[0],
+                           .uvs = h->uvs[0],
+                           .indices = h->indices,
+                           .vertex_count = 3 * TRIANGLES,
+                           .triangle_count = TRIANGLES,
+                           .texture = -1,
+                           .alpha_cutoff = seed % 2 == 1 ? 0.4f : 0};
+    h->scene = (nebel_scene_data){.mesh_count = 1, .meshes = &h->mesh, .texture_count = 1, .textures = &h->texture};
+}
+
 typedef struct trial {
     nb_shadow_tree tree;
     nb_shafts shafts;
@@ -135,25 +168,19 @@ static void report_trial(const trial *run)
 static void ends_are_those_of_visibility(void **state)
 {
     static float positions[3 * TRIANGLES][3];
-    static uint32_t indices[3 * TRIANGLES];
+    static holed h;
     static trial run;
     (void)state;
-    for (uint32_t i = 0; i < 3 * TRIANGLES; i++) indices[i] = i;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 31 * seed + 7;
         draw_triangles(&numbers, positions);
         positions[5][1] = NAN;
-        const nebel_mesh mesh = {.positions = positions[0],
-                                 .indices = indices,
-                                 .vertex_count = 3 * TRIANGLES,
-                                 .triangle_count = TRIANGLES,
-                                 .texture = -1};
-        const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
+        set_holed(&h, seed, positions);
         double sun[3] = {dice(&numbers, -1, 1), seed == 3 ? 0 : dice(&numbers, 0, 1), seed == 4 ? 0 : 1};
         if (seed == 5) sun[0] = sun[1] = 0;
         nb_vector_make_unit(sun);
         const nebel_camera camera = trial_camera(seed);
-        nb_geometry geometry = place_triangles(&scene, &camera, &run.view);
+        nb_geometry geometry = place_triangles(&h.scene, &camera, &run.view);
         assert_int_equal(nb_shadow_tree_set_sun(&run.tree, &geometry, sun, 1), NEBEL_OK);
         nb_region_points points;
         nb_sample_region(0, 1, &points);
@@ -206,28 +233,22 @@ static void draw_lamps(uint64_t *numbers, nebel_lamp *lamps)
 static void ends_of_lamplight_are_those_of_visibility(void **state)
 {
     static float positions[3 * TRIANGLES][3];
-    static uint32_t indices[3 * TRIANGLES];
+    static holed h;
     static trial run;
     static nb_lamp_shafts shafts;
     (void)state;
-    for (uint32_t i = 0; i < 3 * TRIANGLES; i++) indices[i] = i;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 37 * seed + 5;
         nebel_lamp lamps[LAMPS];
         draw_triangles(&numbers, positions);
         draw_lamps(&numbers, lamps);
         positions[5][1] = NAN;
-        const nebel_mesh mesh = {.positions = positions[0],
-                                 .indices = indices,
-                                 .vertex_count = 3 * TRIANGLES,
-                                 .triangle_count = TRIANGLES,
-                                 .texture = -1};
-        const nebel_scene_data scene = {.mesh_count = 1, .meshes = &mesh};
+        set_holed(&h, seed, positions);
         const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}};
         nebel_snapshot *fog = lamplit_fog(&volume, LAMPS, lamps);
         nebel_camera camera = trial_camera(seed);
         if (seed == 4) memcpy(camera.look_at, lamps[1].position, sizeof camera.look_at);
-        nb_geometry geometry = place_triangles(&scene, &camera, &run.view);
+        nb_geometry geometry = place_triangles(&h.scene, &camera, &run.view);
         assert_int_equal(nb_shadow_tree_set_lamps(&run.tree, &geometry, 1), NEBEL_OK);
         nb_region_points points;
         nb_sample_region(0, 1, &points);
@@ -319,7 +340,7 @@ static void the_shadow_of_a_box_is_cut_out(void **state)
 
 enum { STEPS = 8000 };
 
-/* Pillars and a floor in height fog, integrated in small steps, at each of which Embree says whether the sun shines. */
+/* Pillars, some of them with holes, and a floor in height fog, integrated in small steps, at each of which Embree says whether the sun shines. */
 static double stepped_light(const nb_geometry *geometry, const float from[3], const float way[3], double begin,
                             double end, const double sun[3])
 {
@@ -340,6 +361,8 @@ enum { PILLARS = 5 };
 
 /* Points into itself. */
 typedef struct pillars {
+    uint8_t texels[16][4];
+    nebel_texture texture;
     nebel_mesh meshes[PILLARS + 1];
     nebel_scene_data scene;
     nebel_snapshot *fog;
@@ -350,6 +373,7 @@ typedef struct pillars {
 static void set_pillars(pillars *p)
 {
     static const float floor[] = {-60, 0, -60, -60, 0, 60, 60, 0, 60, 60, 0, -60};
+    static const float corners[8][2] = {{0, 0}, {1, .2f}, {.1f, .5f}, {1, .6f}, {.9f, 1}, {2, 1}, {1, 1.5f}, {2, 1.6f}};
     const nebel_volume_desc volume = {.density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 8},
                                       .extinction = {.05, .05, .05},
                                       .albedo = {1, 1, 1}};
@@ -362,10 +386,15 @@ static void set_pillars(pillars *p)
         p->meshes[i].origin[0] = 5 * i - 12;
         p->meshes[i].origin[1] = -5;
         p->meshes[i].origin[2] = i % 2 ? 4 : -3;
+        p->meshes[i].uvs = corners[0];
+        p->meshes[i].alpha_cutoff = i % 2 ? 0.5f : 0;
     }
+    for (int i = 0; i < 16; i++) p->texels[i][3] = (uint8_t)(i * 89);
+    p->texture = (nebel_texture){4, 4, p->texels[0]};
     p->meshes[PILLARS] = test_square();
     p->meshes[PILLARS].positions = floor;
-    p->scene = (nebel_scene_data){.mesh_count = PILLARS + 1, .meshes = p->meshes};
+    p->scene =
+        (nebel_scene_data){.mesh_count = PILLARS + 1, .meshes = p->meshes, .texture_count = 1, .textures = &p->texture};
 }
 
 static void shafts_are_those_of_small_steps(void **state)
@@ -574,10 +603,10 @@ static void lost_memory_is_told(void **state)
     nebel_lamp lamps[2];
     (void)state;
     set_pillars(&p);
-    assert_true(lose_memory(&p) >= 7); /* the tree's five, shadows, and what toggles are made in */
+    assert_true(lose_memory(&p) >= 10); /* the tree's eight, shadows, and what toggles are made in */
     nebel_release_snapshot(p.fog);
     set_lamplit_pillars(&p, lamps);
-    assert_true(lose_memory(&p) >= 9); /* and the lamps' pieces, and their numbers */
+    assert_true(lose_memory(&p) >= 12); /* and the lamps' pieces, and their numbers */
     nebel_release_snapshot(p.fog);
 }
 

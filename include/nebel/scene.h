@@ -55,11 +55,16 @@ typedef struct nebel_mesh {
     uint32_t triangle_count;
     float base_color[3]; /* linear reflectance, 0..1; multiplies the texture */
     int32_t texture;     /* index into textures, or -1 */
+
+    /* Where the alpha of a texture, interpolated between the centres of four texels and from 0 to 1, is below the
+     * cutoff the mesh has holes. It takes uvs. */
+    float alpha_cutoff; /* 0: no holes; else at most 1 */
+    int32_t mask;       /* index into textures; of no meaning without a cutoff */
 } nebel_mesh;
 
 typedef struct nebel_texture {
     uint32_t width, height;
-    const uint8_t *rgba; /* sRGB, 4 bytes per texel, top row first */
+    const uint8_t *rgba; /* sRGB and linear alpha, 4 bytes per texel, top row first */
 } nebel_texture;
 
 /* What a volume is at a frame. Planes and parts are the same in all keys of a volume. */

@@ -1,5 +1,7 @@
 #include "geometry.h"
 
+#include "base/holes.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -40,7 +42,7 @@ static nebel_result check_members(const nebel_scene_data *scene, size_t number, 
     if (!has_finite_numbers(mesh)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "mesh %zu: origin and base_color must be finite numbers", number);
     }
-    return NEBEL_OK;
+    return nb_holes_check(scene, number, log);
 }
 
 static nebel_result check_indices(const nebel_mesh *mesh, size_t number, const nebel_log *log)
@@ -208,7 +210,20 @@ static nebel_result make_tree(nb_geometry *geometry)
     return NEBEL_OK;
 }
 
-static nebel_result make_surface(nb_geometry *geometry, const nebel_mesh *mesh)
+static nebel_result find_mask(nb_geometry *geometry, const nebel_scene_data *scene, const nebel_mesh *mesh,
+                              const nb_mask **found)
+{
+    if (mesh->alpha_cutoff == 0) return NEBEL_OK;
+    for (size_t i = 0; i < geometry->mask_count && *found == NULL; i++) {
+        const nb_mask *mask = &geometry->masks[i];
+        if (mask->number == mesh->mask && mask->cutoff == mesh->alpha_cutoff) *found = mask;
+    }
+    if (*found != NULL) return NEBEL_OK;
+    *found = &geometry->masks[geometry->mask_count++];
+    return nb_mask_make((nb_mask *)*found, &geometry->allocator, scene, mesh->mask, mesh->alpha_cutoff);
+}
+
+static nebel_result make_surface(nb_geometry *geometry, const nebel_scene_data *scene, const nebel_mesh *mesh)
 {
     nb_surface *surface = &geometry->surfaces[geometry->surface_count++];
     surface->mesh = mesh;
@@ -219,7 +234,7 @@ static nebel_result make_surface(nb_geometry *geometry, const nebel_mesh *mesh)
     if (surface->positions == NULL || surface->ends == NULL) return NEBEL_ERROR_MEMORY;
     memset(surface->positions + 3 * (size_t)mesh->vertex_count, 0, 3 * sizeof(float));
     measure(geometry, surface);
-    return NEBEL_OK;
+    return find_mask(geometry, scene, mesh, &surface->mask);
 }
 
 nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *scene, nebel_isa isa, int threads)
@@ -227,9 +242,10 @@ nebel_result nb_geometry_make(nb_geometry *geometry, const nebel_scene_data *sce
     nebel_result result = check_scene(scene, &geometry->log);
     if (result != NEBEL_OK) return result;
     geometry->surfaces = nb_allocate_zero(&geometry->allocator, scene->mesh_count, sizeof *geometry->surfaces);
-    if (geometry->surfaces == NULL) return NEBEL_ERROR_MEMORY;
+    geometry->masks = nb_allocate_zero(&geometry->allocator, scene->mesh_count, sizeof *geometry->masks);
+    if (geometry->surfaces == NULL || geometry->masks == NULL) return NEBEL_ERROR_MEMORY;
     for (size_t i = 0; i < scene->mesh_count && result == NEBEL_OK; i++) {
-        if (scene->meshes[i].triangle_count > 0) result = make_surface(geometry, &scene->meshes[i]);
+        if (scene->meshes[i].triangle_count > 0) result = make_surface(geometry, scene, &scene->meshes[i]);
     }
     if (result == NEBEL_OK) result = set_ids(geometry);
     if (result == NEBEL_OK) result = make_tree(geometry);
@@ -266,6 +282,26 @@ static void move_positions(const double origin[3], nb_surface *surface)
     }
 }
 
+/* Rays pass through holes. Embree has what it met in rows of N numbers, in the order of RTCHit; names for them in C++
+ * alone. */
+static void drop_holes(const struct RTCFilterFunctionNArguments *met)
+{
+    const nb_surface *surface = met->geometryUserPtr;
+    const float *us = (const float *)met->hit + 3 * (size_t)met->N, *vs = us + met->N;
+    const unsigned *triangles = (const unsigned *)met->hit + 5 * (size_t)met->N;
+    for (unsigned i = 0; i < met->N; i++) {
+        if (met->valid[i] == 0) continue;
+        const uint32_t *index = surface->mesh->indices + 3 * (size_t)triangles[i];
+        const float weights[3] = {1 - us[i] - vs[i], us[i], vs[i]};
+        float place[2] = {0, 0};
+        for (int k = 0; k < 3; k++) {
+            const float *uv = surface->mesh->uvs + 2 * (size_t)index[k];
+            for (int c = 0; c < 2; c++) place[c] += isfinite(uv[c]) ? weights[k] * uv[c] : 0;
+        }
+        if (nb_mask_is_hole(surface->mask, place[0], place[1])) met->valid[i] = 0;
+    }
+}
+
 static nebel_result attach(nb_geometry *geometry, size_t number)
 {
     const nb_surface *surface = &geometry->surfaces[number];
@@ -275,6 +311,11 @@ static nebel_result attach(nb_geometry *geometry, size_t number)
                                3 * sizeof(float), surface->mesh->vertex_count);
     rtcSetSharedGeometryBuffer(triangles, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, surface->mesh->indices, 0,
                                3 * sizeof(uint32_t), surface->mesh->triangle_count);
+    if (surface->mask != NULL) {
+        rtcSetGeometryUserData(triangles, &geometry->surfaces[number]);
+        rtcSetGeometryIntersectFilterFunction(triangles, drop_holes);
+        rtcSetGeometryOccludedFilterFunction(triangles, drop_holes);
+    }
     rtcCommitGeometry(triangles);
     rtcAttachGeometryByID(geometry->scene, triangles, (unsigned)number);
     rtcReleaseGeometry(triangles);
@@ -339,6 +380,8 @@ void nb_geometry_free(nb_geometry *geometry)
         nb_release(&geometry->allocator, geometry->surfaces[i].positions);
         nb_release(&geometry->allocator, geometry->surfaces[i].ends);
     }
+    for (size_t i = 0; i < geometry->mask_count; i++) nb_mask_free(&geometry->masks[i], &geometry->allocator);
+    nb_release(&geometry->allocator, geometry->masks);
     nb_release(&geometry->allocator, geometry->nodes);
     nb_release(&geometry->allocator, geometry->owners);
     nb_release(&geometry->allocator, geometry->surfaces);

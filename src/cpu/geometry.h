@@ -4,6 +4,7 @@
 
 #include "base/base.h"
 #include "lanes.h"
+#include "mask.h"
 
 #include <nebel/scene.h>
 
@@ -23,6 +24,7 @@ typedef struct nb_node {
 /* A mesh with its positions relative to the origin of the geometry. */
 typedef struct nb_surface {
     const nebel_mesh *mesh;
+    const nb_mask *mask;   /* NULL: no holes */
     float *positions;      /* 3 per vertex, and one float more: Embree loads four */
     int16_t *ends;         /* 4 per vertex: like those of a node, in the picture that is being rasterized */
     float low[3], high[3]; /* corners of the mesh around its own origin */
@@ -42,7 +44,9 @@ typedef struct nb_geometry {
     size_t surface_count;
     size_t vertex_count;  /* of all surfaces */
     nb_surface *surfaces; /* the number of a surface is its geometry ID in Embree */
-    uint32_t *owners;     /* the surface of NB_FAN triangles whose IDs follow each other */
+    nb_mask *masks;       /* each pair of a texture and a cutoff once */
+    size_t mask_count;
+    uint32_t *owners; /* the surface of NB_FAN triangles whose IDs follow each other */
     void *nodes;
     int level_count;
     nb_node *levels[NB_LEVELS]; /* of the tree: parts of `nodes`, leaves first; a node is on two lines of the cache */

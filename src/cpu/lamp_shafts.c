@@ -1,6 +1,6 @@
 #include "lamp_shafts.h"
 
-#include "shaft_rays.h"
+#include "sheet.h"
 
 #include "base/vector.h"
 
@@ -215,10 +215,11 @@ static void cut_hole(const nb_hole *hole, const nb_shaft_rays *rays, int i, nb_s
     found->leave[i] = fminf((float)enter, found->leave[i]);
 }
 
-NB_ALWAYS_INLINE int add(nb_shafts *shafts, const nebel_allocator *allocator, const nb_stretch *found,
-                         nb_shaft_rays *rays)
+NB_ALWAYS_INLINE int add(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sheet *sheet,
+                         const nb_sheet_lamp *lamp, const nb_stretch *found, nb_shaft_rays *rays)
 {
     int fresh[NB_PACKET];
+    if (sheet != NULL) return nb_sheet_cast(sheet, lamp, shafts, allocator, found, rays);
     return !nb_extend(found, rays, fresh) || nb_replace(shafts, allocator, found, fresh, rays);
 }
 
@@ -256,9 +257,11 @@ NB_ALWAYS_INLINE int see(const nb_caster *caster, const nb_lamp_place *lamp, nb_
     return 1;
 }
 
-NB_ALWAYS_INLINE int cast(nb_shafts *shafts, const nebel_allocator *allocator, const nb_caster *caster,
-                          const nb_lamp_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
+NB_ALWAYS_INLINE int cast(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+                          size_t number, const nb_lamp_place *lamp, const nb_flats *flats, nb_shaft_rays *rays)
 {
+    const nb_caster *caster = &tree->casters[number];
+    const nb_sheet *sheet = nb_shadow_tree_sheet(tree, number);
     nb_seen_caster seen;
     nb_stretch found, rest;
     float corner[3][3], slack = 0;
@@ -269,10 +272,11 @@ NB_ALWAYS_INLINE int cast(nb_shafts *shafts, const nebel_allocator *allocator, c
             slack += 1e-6f * (fabsf(at) + fabsf(place));
         }
     if (!may_meet((const float(*)[3])corner, slack, flats) || !see(caster, lamp, &seen)) return 1;
+    const nb_sheet_lamp view = {lamp->place, seen.hole.normal, sqrt(seen.hole.distance2)};
     nb_cross_prism(&seen.pyramid, rays, &found);
-    if (seen.hole.distance2 >= seen.hole.radius2) return add(shafts, allocator, &found, rays);
+    if (seen.hole.distance2 >= seen.hole.radius2) return add(shafts, allocator, sheet, &view, &found, rays);
     for (int i = 0; i < NB_PACKET; i++) cut_hole(&seen.hole, rays, i, &found, &rest);
-    return add(shafts, allocator, &found, rays) && add(shafts, allocator, &rest, rays);
+    return add(shafts, allocator, sheet, &view, &found, rays) && add(shafts, allocator, sheet, &view, &rest, rays);
 }
 
 typedef struct nb_lamp_visit {
@@ -297,7 +301,7 @@ NB_CLONES static int walk_to_lamp(nb_shafts *shafts, const nebel_allocator *allo
             if (meets(&box, flats)) visits[count++] = (nb_lamp_visit){visit.level - 1, first + k};
         }
         for (size_t k = first; k < first + NB_SHADOW_FAN && k < tree->count && visit.level < 0; k++)
-            if (!cast(shafts, allocator, &tree->casters[k], lamp, flats, rays)) return 0;
+            if (!cast(shafts, allocator, tree, k, lamp, flats, rays)) return 0;
     }
     return 1;
 }

@@ -9,7 +9,7 @@ static const double growth = 0x1p-14;
 
 int nb_raster_is_apt(const nb_geometry *geometry, nebel_projection projection, uint32_t width, uint32_t height)
 {
-    if (projection == NEBEL_PROJECTION_PANORAMA || geometry->scene == NULL) return 0;
+    if (projection == NEBEL_PROJECTION_PANORAMA || geometry->scene == NULL || geometry->mask_count > 0) return 0;
     return geometry->node_counts[0] * NB_FAN <= (size_t)width * height;
 }
 

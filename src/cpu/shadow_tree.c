@@ -14,6 +14,7 @@ typedef struct nb_making {
     int is_for_lamps;
     size_t count;
     nb_caster *triangles;
+    uint32_t *numbers; /* of their sheets, see nb_shadow_tree */
     nb_key *keys, *other_keys;
     float low[3], scale; /* corner of all triangles; steps of codes per metre */
 } nb_making;
@@ -46,10 +47,41 @@ static double seen_area(const nb_caster *t)
     return bx * cy - by * cx;
 }
 
+/* The gradient of texture coordinates in the plane of the corners: of all that change along two edges as they do, the one
+ * that does not change across the plane. Seen by the sun corners lie at one height. */
+static nb_sheet make_sheet(const nb_surface *surface, const uint32_t *index, const nb_caster *t, int is_for_lamps)
+{
+    const nebel_texture *texture = surface->mask->texture;
+    nb_sheet sheet = {.mask = surface->mask};
+    double edge[2][3], normal[3], across[2][3], texels[3][2];
+    for (int k = 0; k < 3; k++) {
+        const float *uv = surface->mesh->uvs + 2 * (size_t)index[k];
+        texels[k][0] = isfinite(uv[0]) ? (double)uv[0] * texture->width : 0;
+        texels[k][1] = isfinite(uv[1]) ? (double)uv[1] * texture->height : 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        const int counts = i < 2 || is_for_lamps;
+        sheet.place[i] = counts ? (double)t->corner[0][i] : 0;
+        for (int k = 0; k < 2; k++) edge[k][i] = counts ? (double)t->corner[k + 1][i] - (double)t->corner[0][i] : 0;
+    }
+    nb_vector_cross(edge[0], edge[1], normal);
+    nb_vector_cross(edge[1], normal, across[0]);
+    nb_vector_cross(normal, edge[0], across[1]);
+    const double square = nb_vector_dot(normal, normal);
+    for (int c = 0; c < 2; c++) {
+        sheet.at[c] = texels[0][c];
+        for (int i = 0; i < 3 && square > 0; i++)
+            sheet.slope[c][i] =
+                ((texels[1][c] - texels[0][c]) * across[0][i] + (texels[2][c] - texels[0][c]) * across[1][i]) / square;
+    }
+    return sheet;
+}
+
 /* Triangles that cast a shadow: those that are level with the sun's way do not, nor do those without a place. Which are
  * level with a lamp's way each lamp finds out. */
-static void list_triangles(const nb_geometry *geometry, const double axes[3][3], nb_making *making)
+static void list_triangles(const nb_geometry *geometry, const double axes[3][3], nb_sheet *sheets, nb_making *making)
 {
+    uint32_t sheet_count = 0;
     making->count = 0;
     for (size_t s = 0; s < geometry->surface_count; s++) {
         const nb_surface *surface = &geometry->surfaces[s];
@@ -59,7 +91,11 @@ static void list_triangles(const nb_geometry *geometry, const double axes[3][3],
             for (int k = 0; k < 3; k++) turn(axes, surface->positions + 3 * (size_t)index[k], triangle->corner[k]);
             const double area = seen_area(triangle);
             const float depth = triangle->corner[0][2] + triangle->corner[1][2] + triangle->corner[2][2];
-            if ((area != 0 || making->is_for_lamps) && isfinite(area) && isfinite(depth)) making->count++;
+            if ((area == 0 && !making->is_for_lamps) || !isfinite(area) || !isfinite(depth)) continue;
+            if (surface->mask != NULL) sheets[sheet_count] = make_sheet(surface, index, triangle, making->is_for_lamps);
+            if (making->numbers != NULL)
+                making->numbers[making->count] = surface->mask != NULL ? sheet_count++ : NB_NONE;
+            making->count++;
         }
     }
 }
@@ -195,6 +231,7 @@ static void set_leaves(nb_shadow_tree *tree, const nb_making *making, size_t num
             tree->casters[place] = *t;
         else
             make_prism(t, &tree->prisms[place]);
+        if (making->numbers != NULL) tree->numbers[place] = making->numbers[making->keys[place].number];
         for (int c = 0; c < 3; c++) enlarge(node, (int)(k / NB_SHADOW_FAN), t->corner[c], t->corner[c]);
     }
 }
@@ -247,6 +284,8 @@ static int allocate_tree(nb_shadow_tree *tree, const nebel_allocator *allocator,
     else
         tree->prisms = nb_allocate(allocator, count, sizeof *tree->prisms);
     tree->nodes = nb_allocate(allocator, all, sizeof(nb_shadow_node));
+    if (making->numbers != NULL) tree->numbers = nb_allocate(allocator, count, sizeof *tree->numbers);
+    if (making->numbers != NULL && tree->numbers == NULL) return 0;
     if ((tree->prisms == NULL && tree->casters == NULL) || tree->nodes == NULL) return 0;
     nb_shadow_node *nodes = tree->nodes;
     for (int level = 0; level < tree->level_count; level++) {
@@ -254,6 +293,18 @@ static int allocate_tree(nb_shadow_tree *tree, const nebel_allocator *allocator,
         nodes += tree->node_counts[level];
     }
     return 1;
+}
+
+/* Where any triangle has holes. */
+static int allocate_sheets(nb_shadow_tree *tree, const nb_geometry *geometry, size_t triangles, nb_making *making)
+{
+    size_t holed = 0;
+    for (size_t s = 0; s < geometry->surface_count; s++)
+        holed += geometry->surfaces[s].mask != NULL ? geometry->surfaces[s].mesh->triangle_count : 0;
+    if (holed == 0) return 1;
+    tree->sheets = nb_allocate(&geometry->allocator, holed, sizeof *tree->sheets);
+    making->numbers = nb_allocate(&geometry->allocator, triangles, sizeof *making->numbers);
+    return tree->sheets != NULL && making->numbers != NULL;
 }
 
 static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, const double axes[3][3], nb_making *making,
@@ -265,7 +316,8 @@ static nebel_result build(nb_shadow_tree *tree, const nb_geometry *geometry, con
     making->keys = nb_allocate(&geometry->allocator, count + 1, sizeof *making->keys);
     making->other_keys = nb_allocate(&geometry->allocator, count + 1, sizeof *making->other_keys);
     if (making->triangles == NULL || making->keys == NULL || making->other_keys == NULL) return NEBEL_ERROR_MEMORY;
-    list_triangles(geometry, axes, making);
+    if (!allocate_sheets(tree, geometry, count, making)) return NEBEL_ERROR_MEMORY;
+    list_triangles(geometry, axes, tree->sheets, making);
     set_scale(making);
     sort_triangles(making);
     if (!allocate_tree(tree, &geometry->allocator, making)) return NEBEL_ERROR_MEMORY;
@@ -283,6 +335,7 @@ static nebel_result set(nb_shadow_tree *tree, const nb_geometry *geometry, const
     nb_shadow_tree_free(tree, &geometry->allocator);
     const nebel_result result = build(tree, geometry, axes, making, threads);
     nb_release(&geometry->allocator, making->triangles);
+    nb_release(&geometry->allocator, making->numbers);
     nb_release(&geometry->allocator, making->keys);
     nb_release(&geometry->allocator, making->other_keys);
     if (result != NEBEL_OK) {
@@ -316,6 +369,8 @@ void nb_shadow_tree_free(nb_shadow_tree *tree, const nebel_allocator *allocator)
 {
     nb_release(allocator, tree->prisms);
     nb_release(allocator, tree->casters);
+    nb_release(allocator, tree->numbers);
+    nb_release(allocator, tree->sheets);
     nb_release(allocator, tree->nodes);
     *tree = (nb_shadow_tree){.is_built = 0};
 }

@@ -26,6 +26,13 @@ typedef struct nb_caster {
     float corner[3][3];
 } nb_caster;
 
+/* One with holes: its mask over places in its plane, or, in a tree for the sun, before and behind it as well. */
+typedef struct nb_sheet {
+    const nb_mask *mask;
+    double place[3], at[2]; /* a corner, in the frame of the tree, and there in texels */
+    double slope[2][3];     /* texels per metre */
+} nb_sheet;
+
 /* Boxes around the triangles below each child; the sun's shadows have no end at the third side. Missing children
  * begin at 1e30 of the third axis. */
 typedef struct nb_shadow_node {
@@ -39,6 +46,8 @@ typedef struct nb_shadow_tree {
     size_t count;       /* of triangles, leaf after leaf */
     nb_prism *prisms;   /* for the sun, else NULL */
     nb_caster *casters; /* for lamps, else NULL */
+    uint32_t *numbers;  /* of each triangle's sheet, or NB_NONE; NULL: no triangle has holes */
+    nb_sheet *sheets;
     void *nodes;
     int level_count;
     nb_shadow_node *levels[NB_SHADOW_LEVELS]; /* parts of `nodes`, those above leaves first; the last has one node */
@@ -52,6 +61,12 @@ nebel_result nb_shadow_tree_set_sun(nb_shadow_tree *tree, const nb_geometry *geo
 
 /* The same for all lamps. */
 nebel_result nb_shadow_tree_set_lamps(nb_shadow_tree *tree, const nb_geometry *geometry, int threads);
+
+/* NULL: the triangle has no holes. */
+static inline const nb_sheet *nb_shadow_tree_sheet(const nb_shadow_tree *tree, size_t triangle)
+{
+    return tree->numbers == NULL || tree->numbers[triangle] == NB_NONE ? NULL : &tree->sheets[tree->numbers[triangle]];
+}
 
 /* A plane of this normal through the point; scaled so that products with coordinates stay numbers. */
 void nb_shadow_plane(const double normal[3], const double point[3], float plane[4]);

@@ -1,4 +1,4 @@
-#include "shaft_rays.h"
+#include "sheet.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -132,6 +132,11 @@ NB_ALWAYS_INLINE int visit_leaf(nb_shafts *shafts, const nebel_allocator *alloca
         nb_stretch found;
         int fresh[NB_PACKET];
         nb_cross_prism(&tree->prisms[first + i], rays, &found);
+        const nb_sheet *sheet = nb_shadow_tree_sheet(tree, first + i);
+        if (sheet != NULL) {
+            if (!nb_sheet_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
+            continue;
+        }
         if (nb_extend(&found, rays, fresh) && !nb_replace(shafts, allocator, &found, fresh, rays)) return 0;
     }
     return 1;

@@ -150,7 +150,8 @@ static void draw_meshes(const frame *f, unsigned program)
     const nb_meshes *const meshes = &f->renderer->meshes;
     const GLint offset = glGetUniformLocation(program, "scene_offset"),
                 color = glGetUniformLocation(program, "scene_color"),
-                has_texture = glGetUniformLocation(program, "scene_has_texture");
+                has_texture = glGetUniformLocation(program, "scene_has_texture"),
+                cutoff = glGetUniformLocation(program, "scene_cutoff");
     for (size_t i = 0; i < meshes->count; i++) {
         const nb_mesh *const mesh = &meshes->list[i];
         float from_eye[3];
@@ -159,6 +160,7 @@ static void draw_meshes(const frame *f, unsigned program)
         glUniform3fv(color, 1, mesh->base_color);
         glUniform1i(has_texture, mesh->texture != 0);
         bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
+        nb_meshes_bind_mask(mesh, cutoff);
         if (f->panorama) {
             nb_corners_draw(mesh, NB_PANORAMA_STRIP);
         } else {

@@ -6,6 +6,8 @@
  * follow each other as x, y and z do. Depth is 1 at the lamp and falls to 0: floats are as fine in all distances. */
 
 const char nb_lamp_map_vertex_text[] = "layout(location = 0) in vec3 mesh_position;\n"
+                                       "layout(location = 2) in vec2 mesh_uv;\n"
+                                       "out vec2 surface_uv;\n"
                                        "uniform vec3 scene_offset;\n"
                                        "uniform mat3 map_turn;\n"   /* to coordinates of the face */
                                        "uniform float map_share;\n" /* of the face, without what is its neighbours' */
@@ -14,15 +16,18 @@ const char nb_lamp_map_vertex_text[] = "layout(location = 0) in vec3 mesh_positi
                                        "void main()\n"
                                        "{\n"
                                        "    map_place = map_turn * (mesh_position + scene_offset);\n"
+                                       "    surface_uv = mesh_uv;\n"
                                        "    gl_Position = vec4(map_share * map_place.xy, map_place.z - 2.0 * map_near, "
                                        "map_place.z);\n"
                                        "}\n";
 
 const char nb_lamp_map_fragment_text[] = "in vec3 map_place;\n"
+                                         "in vec2 surface_uv;\n"
                                          "uniform float map_radius;\n"
                                          "void main()\n"
                                          "{\n"
                                          "    if (dot(map_place, map_place) < map_radius * map_radius) discard;\n"
+                                         "    if (is_hole(surface_uv)) discard;\n"
                                          "    gl_FragDepth = 1.0 / (1.0 + map_place.z);\n"
                                          "}\n";
 

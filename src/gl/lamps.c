@@ -250,7 +250,8 @@ static void draw_face(const nb_lamps *lamps, const nb_lamp_source *source, int f
                       const nb_meshes *meshes)
 {
     const float share = 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face;
-    const GLint offset = glGetUniformLocation(program, "scene_offset");
+    const GLint offset = glGetUniformLocation(program, "scene_offset"),
+                cutoff = glGetUniformLocation(program, "scene_cutoff");
     float turn[9];
     set_turn(face, turn);
     glUniformMatrix3fv(glGetUniformLocation(program, "map_turn"), 1, GL_FALSE, turn);
@@ -267,6 +268,7 @@ static void draw_face(const nb_lamps *lamps, const nb_lamp_source *source, int f
         }
         if (!is_in_face(low, high, face, 1 / share)) continue;
         glUniform3fv(offset, 1, from_lamp);
+        nb_meshes_bind_mask(mesh, cutoff);
         glBindVertexArray(mesh->vertex_array);
         glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
     }

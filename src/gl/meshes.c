@@ -1,5 +1,9 @@
 #include "meshes.h"
 
+#include "shading.h"
+
+#include "base/holes.h"
+
 #include <epoxy/gl.h>
 #include <math.h>
 #include <string.h>
@@ -58,7 +62,8 @@ static nebel_result check_mesh(const nb_meshes *meshes, const nebel_scene_data *
         return nb_fail(&meshes->log, NEBEL_ERROR_VALUE, "mesh %zu: origin and base_color must be finite numbers",
                        number);
     }
-    return check_indices(meshes, mesh, number);
+    const nebel_result result = nb_holes_check(scene, number, &meshes->log);
+    return result == NEBEL_OK ? check_indices(meshes, mesh, number) : result;
 }
 
 /* ---- vertices -------------------------------------------------------------------------------- */
@@ -82,7 +87,10 @@ static nb_vertex vertex_of(const nebel_mesh *mesh, uint32_t index)
     nb_vertex v = {.uv = {0, 0}};
     memcpy(v.position, position_of(mesh, index), sizeof v.position);
     if (mesh->normals != NULL) memcpy(v.normal, mesh->normals + 3 * (size_t)index, sizeof v.normal);
-    if (mesh->uvs != NULL) memcpy(v.uv, mesh->uvs + 2 * (size_t)index, sizeof v.uv);
+    for (size_t k = 0; k < 2 && mesh->uvs != NULL; k++) {
+        const float at = mesh->uvs[2 * (size_t)index + k];
+        v.uv[k] = isfinite(at) ? at : 0;
+    }
     return v;
 }
 
@@ -178,6 +186,10 @@ static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh
     memcpy(made->origin, mesh->origin, sizeof made->origin);
     memcpy(made->base_color, mesh->base_color, sizeof made->base_color);
     if (mesh->texture >= 0 && mesh->uvs != NULL) made->texture = meshes->textures[mesh->texture];
+    if (mesh->alpha_cutoff > 0) {
+        made->mask = meshes->textures[mesh->mask];
+        made->cutoff = mesh->alpha_cutoff - 0.125f / 255; /* as the CPU renderer has it */
+    }
     if (result == NEBEL_OK) {
         fill(&d);
         result = upload(meshes, &d);
@@ -260,6 +272,14 @@ static void delete_objects(const nb_meshes *meshes)
         glDeleteVertexArrays(2, arrays);
         glDeleteBuffers(5, buffers);
     }
+}
+
+void nb_meshes_bind_mask(const nb_mesh *mesh, int cutoff)
+{
+    glUniform1f(cutoff, mesh->cutoff);
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_MASK);
+    glBindTexture(GL_TEXTURE_2D, mesh->mask);
+    glBindSampler(NB_UNIT_MASK, 0);
 }
 
 void *nb_meshes_map(unsigned buffer, size_t size, unsigned access)

@@ -19,6 +19,8 @@ typedef struct nb_mesh {
     float low[3], high[3]; /* of the positions that are used */
     float base_color[3];
     unsigned vertex_array, vertices, indices, texture; /* texture 0: none */
+    unsigned mask;                                     /* a texture; 0: no holes */
+    float cutoff;                                      /* of its alpha; 0 without it */
     unsigned fog; /* per vertex: the light that fog adds, and the amount of fog; 0: not made yet */
     unsigned corner_array, corners, corner_fog; /* the same by triangles, as instances; 0: not made yet */
     size_t vertex_count;
@@ -38,6 +40,10 @@ typedef struct nb_meshes {
 /* Checks and copies. What was made before an error is freed by nb_meshes_delete. Changes the bindings of TEXTURE_2D on
  * the active unit, ARRAY_BUFFER and the vertex array. Errors: as nebel_create_gl_renderer. */
 nebel_result nb_meshes_make(nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene);
+
+/* The mask of a mesh, for a program that has it on NB_UNIT_MASK and the cutoff at this location. Changes the active unit.
+ */
+void nb_meshes_bind_mask(const nb_mesh *mesh, int cutoff);
 
 /* A buffer's bytes in memory, as glMapBufferRange gives them, and back; 0 where the driver lost what was written.
  * Change the binding of ARRAY_BUFFER. */

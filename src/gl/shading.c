@@ -56,6 +56,12 @@ static const char interpolated_text[] = "in vec3 surface_place;\n"
                                         "flat in vec3 surface_corner;\n"
                                         "flat in vec3 surface_face;\n";
 
+/* A mask and its cutoff, which is 0 where there are no holes. */
+static const char hole_text[] =
+    "uniform float scene_cutoff;\n"
+    "uniform highp sampler2D scene_mask;\n"
+    "bool is_hole(vec2 uv) { return scene_cutoff > 0.0 && textureLod(scene_mask, uv, 0.0).a < scene_cutoff; }\n";
+
 static const char distance_text[] =
     "float surface_distance(vec3 origin, vec3 direction)\n"
     "{\n"
@@ -82,7 +88,7 @@ static const char surface_fragment_text[] =
     "void main()\n"
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
-    "    if (!surface_is_met(direction)) discard;\n"
+    "    if (!surface_is_met(direction) || is_hole(surface_uv)) discard;\n"
     "    float t = surface_distance(origin, direction);\n"
     "    if (!(t > 0.0)) discard;\n"
     "    vec3 side = dot(surface_face, direction) > 0.0 ? -surface_face : surface_face;\n"
@@ -153,7 +159,8 @@ static const char vertex_fog_vertex_text[] = "layout(location = 0) in vec3 mesh_
 static const char fog_attribute_text[] = "in vec4 surface_fog;\n"
                                          "bool surface_is_met(vec3 direction) { return true; }\n";
 
-/* Of the surface that is seen alone; two programs need not find the same distance to the last bit. */
+/* Of the surface that is seen alone; two programs need not find the same distance to the last bit. What is nearer is a
+ * hole. */
 static const char vertex_fog_fragment_text[] =
     "uniform highp sampler2D scene_place;\n"
     "uniform float scene_weakening;\n" /* 1: fog hides the surface, 0: it only adds */
@@ -164,7 +171,8 @@ static const char vertex_fog_fragment_text[] =
     "    vec3 direction = ray_direction(gl_FragCoord.xy);\n"
     "    if (!surface_is_met(direction)) discard;\n"
     "    float t = surface_distance(ray_origin(gl_FragCoord.xy), direction);\n"
-    "    if (!(t > 0.0 && t <= 1.0001 * texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x)) discard;\n"
+    "    float seen = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
+    "    if (!(t > 0.0 && t <= 1.0001 * seen) || (scene_cutoff > 0.0 && t < 0.999 * seen)) discard;\n"
     "    vec4 fog = surface_fog;\n"
     "    if (factor_mode >= 0) fog = (1.0 - fog_factor(fog.a)) * vec4(factor_color, 1.0);\n"
     "    out_in_scattering = vec4(fog.rgb, 1.0);\n"
@@ -254,6 +262,8 @@ static const char round_surface_text[] =
 
 static const char shadow_vertex_text[] =
     "layout(location = 0) in vec3 mesh_position;\n"
+    "layout(location = 2) in vec2 mesh_uv;\n"
+    "out vec2 surface_uv;\n"
     "uniform vec3 scene_offset;\n"
     "uniform mat3 scene_light;\n" /* to light coordinates */
     "uniform vec3 map_low;\n"
@@ -261,10 +271,15 @@ static const char shadow_vertex_text[] =
     "void main()\n"
     "{\n"
     "    vec3 at = (scene_light * (mesh_position + scene_offset) - map_low) * map_scale - 1.0;\n"
+    "    surface_uv = mesh_uv;\n"
     "    gl_Position = vec4(at.xy, -at.z, 1.0);\n"
     "}\n";
 
-static const char shadow_fragment_text[] = "void main() {}\n";
+static const char shadow_fragment_text[] = "in vec2 surface_uv;\n"
+                                           "void main()\n"
+                                           "{\n"
+                                           "    if (is_hole(surface_uv)) discard;\n"
+                                           "}\n";
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
@@ -476,20 +491,23 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
     const nb_texts surface_fragment = {{version, precision, words_text, ray_text, interpolated_text, attributes_text,
-                                        distance_text, surface_fragment_text},
-                                       8};
+                                        distance_text, hole_text, surface_fragment_text},
+                                       9};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
     const nb_texts survey_vertex = {{version, light_vertex_text}, 2};
     const nb_texts survey_fragment = {{version, precision, block, survey_text}, 4};
     const nb_texts shadow_vertex = {{version, shadow_vertex_text}, 2};
-    const nb_texts shadow_fragment = {{version, shadow_fragment_text}, 2};
+    const nb_texts shadow_fragment = {{version, precision, hole_text, shadow_fragment_text}, 4};
     nebel_result result = nb_program_build(log, &surface_vertex, &surface_fragment, &shading->surface);
     if (result == NEBEL_OK) result = nb_program_build(log, &survey_vertex, &survey_fragment, &shading->survey);
     if (result == NEBEL_OK) result = nb_program_build(log, &shadow_vertex, &shadow_fragment, &shading->shadow);
     if (result != NEBEL_OK) return result;
     glUseProgram(shading->surface);
     set_unit(shading->surface, "scene_texture", NB_UNIT_REFLECTANCE);
+    set_unit(shading->surface, "scene_mask", NB_UNIT_MASK);
+    glUseProgram(shading->shadow);
+    set_unit(shading->shadow, "scene_mask", NB_UNIT_MASK);
     glUseProgram(shading->survey);
     set_unit(shading->survey, "scene_place", NB_UNIT_PLACE);
     return NEBEL_OK;
@@ -500,8 +518,8 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
     const nb_texts fragment = {{version, precision_of(context), words_text, ray_text, interpolated_text,
-                                fog_attribute_text, distance_text, factor_text, vertex_fog_fragment_text},
-                               9};
+                                fog_attribute_text, distance_text, hole_text, factor_text, vertex_fog_fragment_text},
+                               10};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
     if (result != NEBEL_OK) return result;
@@ -514,9 +532,13 @@ nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *con
 {
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, nb_lamp_map_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), nb_lamp_map_fragment_text}, 3};
+    const nb_texts fragment = {{version, precision_of(context), hole_text, nb_lamp_map_fragment_text}, 4};
     if (shading->lamp_map != 0) return NEBEL_OK;
-    return nb_program_build(log, &vertex, &fragment, &shading->lamp_map);
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->lamp_map);
+    if (result != NEBEL_OK) return result;
+    glUseProgram(shading->lamp_map);
+    set_unit(shading->lamp_map, "scene_mask", NB_UNIT_MASK);
+    return NEBEL_OK;
 }
 
 nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
@@ -540,13 +562,14 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts vertex = {{version, option, words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
     const nb_texts fragment = {{version, option, precision, words_text, nb_panorama_ray_text, round_surface_text,
-                                distance_text, factor_text, fragment_text},
-                               9};
+                                distance_text, hole_text, factor_text, fragment_text},
+                               10};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;
     glUseProgram(*name);
     set_unit(*name, sampler, unit);
+    set_unit(*name, "scene_mask", NB_UNIT_MASK);
     return NEBEL_OK;
 }
 

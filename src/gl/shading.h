@@ -16,7 +16,8 @@ enum {
     NB_UNIT_DIMMING,
     NB_UNIT_VEIL,
     NB_UNIT_LAMPS,
-    NB_UNIT_LAMP_MAPS
+    NB_UNIT_LAMP_MAPS,
+    NB_UNIT_MASK = NB_UNIT_NORMAL /* while surfaces are drawn nothing reads normals */
 };
 
 enum { NB_CASCADES = 4 };

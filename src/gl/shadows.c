@@ -350,7 +350,8 @@ static int is_in_map(const nb_shadows *shadows, int map, const nb_mesh *mesh, co
 static void draw_map(const nb_shadows *shadows, int map, unsigned program, const nb_meshes *meshes, const double eye[3])
 {
     const float *const place = shadows->places[map], size = (float)shadows->size;
-    const GLint offset = glGetUniformLocation(program, "scene_offset");
+    const GLint offset = glGetUniformLocation(program, "scene_offset"),
+                cutoff = glGetUniformLocation(program, "scene_cutoff");
     glUniform3f(glGetUniformLocation(program, "map_low"), place[0], place[1], shadows->low);
     glUniform3f(glGetUniformLocation(program, "map_scale"), 2 * place[2] / size, 2 * place[3] / size,
                 2 / (shadows->high - shadows->low));
@@ -360,6 +361,7 @@ static void draw_map(const nb_shadows *shadows, int map, unsigned program, const
         if (!is_in_map(shadows, map, mesh, eye)) continue;
         nb_camera_subtract(mesh->origin, eye, from_eye);
         glUniform3fv(offset, 1, from_eye);
+        nb_meshes_bind_mask(mesh, cutoff);
         glBindVertexArray(mesh->vertex_array);
         glDrawElements(GL_TRIANGLES, mesh->index_count, GL_UNSIGNED_INT, NULL);
     }

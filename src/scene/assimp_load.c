@@ -125,6 +125,27 @@ static nebel_result walk(nb_assimp *in)
 
 /* ---- loading --------------------------------------------------------------------------------- */
 
+static void note_left_out(const nb_assimp *in)
+{
+    const nb_model_load *load = in->load;
+    const char *file = load->source->file;
+    if (in->left_out_faces > 0)
+        nb_model_fail(load, NEBEL_OK, "%llu points and lines of \"%s\" are left out; only triangles are drawn",
+                      (unsigned long long)in->left_out_faces, file);
+    if (in->left_out_triangles > 0)
+        nb_model_fail(load, NEBEL_OK,
+                      "%llu triangles of \"%s\" are left out; their corners are not numbers or do not exist",
+                      (unsigned long long)in->left_out_triangles, file);
+    if (in->left_out_masks > 0)
+        nb_model_fail(load, NEBEL_OK,
+                      "%llu meshes of \"%s\" are drawn without holes; they have an alpha mask, but no "
+                      "texture coordinates to place it",
+                      (unsigned long long)in->left_out_masks, file);
+    if (in->left_out_clear > 0)
+        nb_model_fail(load, NEBEL_OK, "%llu meshes of \"%s\" are left out; their alpha is below the cutoff everywhere",
+                      (unsigned long long)in->left_out_clear, file);
+}
+
 static nebel_result convert_meshes(nb_assimp *in)
 {
     const nb_model_load *load = in->load;
@@ -134,13 +155,7 @@ static nebel_result convert_meshes(nb_assimp *in)
     if (in->folder == NULL || in->surfaces == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     const nebel_result result = walk(in);
     if (result != NEBEL_OK) return result;
-    if (in->left_out_faces > 0)
-        nb_model_fail(load, NEBEL_OK, "%llu points and lines of \"%s\" are left out; only triangles are drawn",
-                      (unsigned long long)in->left_out_faces, load->source->file);
-    if (in->left_out_triangles > 0)
-        nb_model_fail(load, NEBEL_OK,
-                      "%llu triangles of \"%s\" are left out; their corners are not numbers or do not exist",
-                      (unsigned long long)in->left_out_triangles, load->source->file);
+    note_left_out(in);
     if (load->set->triangle_count > before || load->source->has_fog) return NEBEL_OK;
     return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no triangle", load->source->file);
 }

@@ -10,12 +10,16 @@
 typedef struct nb_surface {
     bool known;
     float base_color[3];
-    int32_t texture;   /* or -1 */
-    unsigned uv_index; /* which set of coordinates the texture takes */
+    int32_t texture;    /* or -1 */
+    int32_t mask;       /* or -1: no holes */
+    float alpha_cutoff; /* > 0 and <= 1 with a mask, else 0 */
+    bool is_clear;      /* all of it is a hole */
+    unsigned uv_index;  /* which set of coordinates both take */
 } nb_surface;
 
 typedef struct nb_loaded_texture {
     const char *key;
+    bool of_grey;
     int32_t index;
 } nb_loaded_texture;
 
@@ -29,6 +33,7 @@ typedef struct nb_assimp {
     size_t loaded_count, loaded_capacity;
     uint64_t left_out_faces, left_out_triangles; /* points and lines; triangles with bad corners */
     uint64_t left_out_points;                    /* not finite */
+    uint64_t left_out_masks, left_out_clear;     /* meshes: with a mask but nothing to place it; all of them a hole */
 } nb_assimp;
 
 /* Refuse, or mend, what Assimp would not survive: before it reads the file, and before it works on what it read.
@@ -47,5 +52,12 @@ nebel_result nb_assimp_add_points(nb_assimp *in, const struct aiMesh *mesh, cons
 
 /* Finds the surface of a material; a texture that cannot be read leaves the plain colour and a note in the log. */
 nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface);
+
+/* Finds the texture of this name, or -1 where it cannot be read. With `of_grey` its alpha is the grey of a picture that
+ * has no alpha of its own. */
+nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, int32_t *index);
+
+/* Finds the mask of a material, in the members of a surface whose texture is known. */
+nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface);
 
 #endif

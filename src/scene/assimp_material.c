@@ -83,6 +83,17 @@ static const char *find_file(nb_assimp *in, const char *path)
     return beside != NULL && nb_file_check(&silent, NULL, "texture", beside) == NEBEL_OK ? beside : joined;
 }
 
+/* Where a picture has no alpha. */
+static void set_alpha_of_grey(nebel_texture *texture)
+{
+    const size_t count = (size_t)texture->width * texture->height;
+    uint8_t *rgba = (uint8_t *)texture->rgba;
+    for (size_t i = 0; i < count; i++)
+        if (rgba[4 * i + 3] != 255) return;
+    for (size_t i = 0; i < count; i++)
+        rgba[4 * i + 3] = (uint8_t)((rgba[4 * i] + rgba[4 * i + 1] + rgba[4 * i + 2] + 1) / 3);
+}
+
 /* What a decoder says goes on as a note: the model is good without its texture. */
 static nebel_result read_picture(nb_assimp *in, const char *path, nebel_texture *texture)
 {
@@ -99,7 +110,7 @@ static nebel_result read_picture(nb_assimp *in, const char *path, nebel_texture 
     return NEBEL_OK;
 }
 
-static nebel_result remember(nb_assimp *in, const char *path, int32_t index)
+static nebel_result remember(nb_assimp *in, const char *path, bool of_grey, int32_t index)
 {
     void *textures = in->textures;
     const char *key = nb_arena_copy_text(&in->scratch, path, strlen(path));
@@ -107,24 +118,25 @@ static nebel_result remember(nb_assimp *in, const char *path, int32_t index)
                                 &in->loaded_capacity, in->loaded_count + 1))
         return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
     in->textures = textures;
-    in->textures[in->loaded_count++] = (nb_loaded_texture){key, index};
+    in->textures[in->loaded_count++] = (nb_loaded_texture){key, of_grey, index};
     return NEBEL_OK;
 }
 
-static nebel_result find_texture(nb_assimp *in, char *path, int32_t *index)
+nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, int32_t *index)
 {
     nebel_texture texture = {0};
     *index = -1;
     for (char *at = path; *at != '\0'; at++)
         if (*at == '\\') *at = '/';
     for (size_t i = 0; i < in->loaded_count; i++)
-        if (strcmp(in->textures[i].key, path) == 0) {
+        if (in->textures[i].of_grey == of_grey && strcmp(in->textures[i].key, path) == 0) {
             *index = in->textures[i].index;
             return NEBEL_OK;
         }
     nebel_result result = read_picture(in, path, &texture);
+    if (texture.rgba != NULL && of_grey) set_alpha_of_grey(&texture);
     if (result == NEBEL_OK && texture.rgba != NULL) result = nb_model_add_texture(in->load, &texture, index);
-    return result == NEBEL_OK ? remember(in, path, *index) : result;
+    return result == NEBEL_OK ? remember(in, path, of_grey, *index) : result;
 }
 
 /* ---- the surface ----------------------------------------------------------------------------- */
@@ -149,24 +161,26 @@ static nebel_result read_texture(nb_assimp *in, const struct aiMaterial *materia
             aiReturn_SUCCESS)
             continue;
         surface->uv_index = uv_index;
-        return find_texture(in, path.data, &surface->texture);
+        return nb_assimp_find_texture(in, path.data, false, &surface->texture);
     }
     return NEBEL_OK;
 }
 
-/* The colour of the scene file replaces the model's own, texture and all. Some exporters leave a textured material
- * black, which would leave its texture black, too. */
+/* The colour of the scene file replaces the model's own, texture and all, but not its holes. Some exporters leave a
+ * textured material black, which would leave its texture black, too. */
 static nebel_result read_surface(nb_assimp *in, unsigned material, nb_surface *surface)
 {
     const nb_model_source *source = in->load->source;
-    *surface = (nb_surface){.known = true, .base_color = {0.5f, 0.5f, 0.5f}, .texture = -1};
+    *surface = (nb_surface){.known = true, .base_color = {0.5f, 0.5f, 0.5f}, .texture = -1, .mask = -1};
     for (int i = 0; i < 3 && source->has_color; i++) surface->base_color[i] = (float)source->color[i];
-    if (source->has_color || material >= in->scene->mNumMaterials) return NEBEL_OK;
+    if (material >= in->scene->mNumMaterials) return NEBEL_OK;
+    const struct aiMaterial *const found = in->scene->mMaterials[material];
+    if (source->has_color) return nb_assimp_find_mask(in, found, surface);
     float *color = surface->base_color;
-    read_color(in->scene->mMaterials[material], color);
-    const nebel_result result = read_texture(in, in->scene->mMaterials[material], surface);
+    read_color(found, color);
+    const nebel_result result = read_texture(in, found, surface);
     if (surface->texture >= 0 && color[0] == 0 && color[1] == 0 && color[2] == 0) color[0] = color[1] = color[2] = 1;
-    return result;
+    return result == NEBEL_OK ? nb_assimp_find_mask(in, found, surface) : result;
 }
 
 nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface)

@@ -165,13 +165,16 @@ static uint32_t count_triangles(nb_assimp *in, const struct aiMesh *mesh)
     return count;
 }
 
-static const struct aiVector3D *find_uvs(const struct aiMesh *mesh, nb_surface *surface)
+static const struct aiVector3D *find_uvs(nb_assimp *in, const struct aiMesh *mesh, nb_surface *surface)
 {
-    const struct aiVector3D *uvs = surface->texture >= 0 && surface->uv_index < AI_MAX_NUMBER_OF_TEXTURECOORDS
-                                       ? mesh->mTextureCoords[surface->uv_index]
-                                       : NULL;
-    if (uvs == NULL) surface->texture = -1;
-    return uvs;
+    const bool wanted = surface->texture >= 0 || surface->mask >= 0;
+    const struct aiVector3D *uvs =
+        wanted && surface->uv_index < AI_MAX_NUMBER_OF_TEXTURECOORDS ? mesh->mTextureCoords[surface->uv_index] : NULL;
+    if (uvs != NULL) return uvs;
+    in->left_out_masks += surface->mask >= 0;
+    surface->texture = surface->mask = -1;
+    surface->alpha_cutoff = 0;
+    return NULL;
 }
 
 static void collect_triangles(const struct aiMesh *mesh, uint32_t *corner)
@@ -201,6 +204,8 @@ static void fill(const builder *out, const nb_surface *surface, const uint32_t *
     clear_broken_positions(mesh);
     mend_normals(mesh);
     mesh->texture = surface->texture;
+    mesh->mask = surface->mask;
+    mesh->alpha_cutoff = surface->alpha_cutoff;
     for (int i = 0; i < 3; i++) {
         mesh->base_color[i] = surface->base_color[i];
         mesh->origin[i] = out->in->load->source->position[i];
@@ -237,11 +242,13 @@ nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *source, cons
     if (triangle_count > NB_MAX_TRIANGLES) return nb_model_refuse_triangles(load);
     const nebel_result result = nb_assimp_find_surface(in, source->mMaterialIndex, &surface);
     if (result != NEBEL_OK) return result;
+    in->left_out_clear += surface.is_clear;
+    if (surface.is_clear) return NEBEL_OK;
     builder out = {.in = in,
                    .draft = {.allocator = load->allocator,
                              .positions = source->mVertices,
                              .normals = source->mNormals,
-                             .uvs = find_uvs(source, &surface),
+                             .uvs = find_uvs(in, source, &surface),
                              .given_count = source->mNumVertices,
                              .triangle_count = triangle_count},
                    .place = *place};

@@ -61,6 +61,7 @@ static nebel_result build(const nb_model_load *load, const nb_heights *map)
                              (unsigned long long)triangle_count, (unsigned long long)NB_MAX_TRIANGLES);
     nebel_mesh mesh = {.triangle_count = (uint32_t)triangle_count,
                        .texture = -1,
+                       .mask = -1,
                        .indices = nb_allocate(&load->allocator, triangle_count, 3 * sizeof(uint32_t))};
     if (mesh.indices == NULL || !nb_mesh_allocate_vertices(&load->allocator, map->width * map->height, false, &mesh)) {
         nb_mesh_release(&load->allocator, &mesh);

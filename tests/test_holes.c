@@ -1,0 +1,220 @@
+/* Meshes with holes: what is seen through them and lit through them, against alpha that is looked up pixel by pixel; and
+ * masks that are none. */
+#include "test_render_scene.h"
+
+#include "cpu/mask.h"
+#include "dice.h"
+
+enum { SIZE = 120 };
+
+/* Straight down, 10 m for all pixels. */
+static nebel_camera camera_above(void)
+{
+    nebel_camera camera = test_camera(0, 5, 0, 0, 0, 0);
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.up[1] = 0;
+    camera.up[2] = -1;
+    camera.view_height = 10;
+    return camera;
+}
+
+static double at(uint32_t pixel)
+{
+    return (pixel + .5 - SIZE / 2) * 10 / SIZE;
+}
+
+typedef struct tally {
+    size_t solid, hole, dark, lit;
+} tally;
+
+/* What alpha decides within a hundredth is left out: pixels at edges. */
+static void check_pixel(const test_card *card, const test_picture *picture, uint32_t x, uint32_t y, tally *seen)
+{
+    static const double near = .01;
+    const double *sun = card->scene.sun_direction, above = test_card_alpha(card, at(x), at(y));
+    if (fabs(above) < near || fabs(fabs(at(x)) - 2) < 1e-6 || fabs(fabs(at(y)) - 2) < 1e-6) return;
+    assert_true(fabs((double)test_depth(picture, x, y) - (above > 0 ? 3 : 5)) < 1e-4);
+    seen->solid += above > 0;
+    seen->hole += above < 0;
+    if (above > 0) return;
+    const double on_way[2] = {at(x) + 2 * sun[0] / sun[1], at(y) + 2 * sun[2] / sun[1]};
+    const double shade = test_card_alpha(card, on_way[0], on_way[1]);
+    if (fabs(shade) < near || fabs(fabs(on_way[0]) - 2) < 1e-3 || fabs(fabs(on_way[1]) - 2) < 1e-3) return;
+    assert_true((test_color(picture, x, y)[0] == 0) == (shade > 0));
+    seen->dark += shade > 0;
+    seen->lit += shade < 0;
+}
+
+static void holes_are_where_alpha_is_low(void **state)
+{
+    static const float times[] = {1, 3, -2};
+    test_picture picture = test_picture_make(SIZE, SIZE);
+    static test_card card;
+    (void)state;
+    for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
+        tally seen = {0, 0, 0, 0};
+        const nebel_camera camera = camera_above();
+        test_card_make(&card, fabsf(times[i]));
+        if (times[i] < 0)
+            for (int k = 0; k < 8; k++) card.uvs[k] += -64; /* texture coordinates below 0 repeat as well */
+        test_render(&card.scene, NULL, &(nebel_renderer_desc){0}, &camera, 1, &picture);
+        if (times[i] < 0) test_card_make(&card, fabsf(times[i]));
+        for (uint32_t y = 0; y < SIZE; y++)
+            for (uint32_t x = 0; x < SIZE; x++) check_pixel(&card, &picture, x, y, &seen);
+        assert_true(seen.solid > 500 && seen.hole > 500 && seen.dark > 300 && seen.lit > 300);
+    }
+    test_picture_free(&picture);
+}
+
+/* Lamps, too; and the reference has the same surfaces. */
+static void lamps_shine_through_holes(void **state)
+{
+    static test_card card;
+    const nebel_lamp lamp = {.position = {.5, 4, .25}, .intensity = {10, 10, 10}};
+    const nebel_camera camera = camera_above();
+    test_picture picture = test_picture_make(SIZE, SIZE);
+    size_t dark = 0, lit = 0;
+    (void)state;
+    test_card_make(&card, 1);
+    card.scene.has_sun = 0;
+    card.scene.lamp_count = 1;
+    card.scene.lamps = &lamp;
+    test_render(&card.scene, NULL, &(nebel_renderer_desc){0}, &camera, 1, &picture);
+    for (uint32_t y = 0; y < SIZE; y++)
+        for (uint32_t x = 0; x < SIZE; x++) {
+            const double middle[2] = {.5 * (at(x) + lamp.position[0]), .5 * (at(y) + lamp.position[2])};
+            const double shade = test_card_alpha(&card, middle[0], middle[1]);
+            if (test_depth(&picture, x, y) < 4 || fabs(shade) < .01 || fabs(fabs(middle[0]) - 2) < 1e-3 ||
+                fabs(fabs(middle[1]) - 2) < 1e-3)
+                continue;
+            assert_true((test_color(&picture, x, y)[0] == 0) == (shade > 0));
+            dark += shade > 0;
+            lit += shade < 0;
+        }
+    assert_true(dark > 300 && lit > 300);
+    test_picture_free(&picture);
+}
+
+/* ---- lines over masks ------------------------------------------------------------------------ */
+
+/* How many places of a line its stretches and nb_mask_is_hole disagree about, but for those near an end. */
+static size_t compare_line(const nb_mask *mask, uint64_t *numbers, size_t *places)
+{
+    const double width = mask->texture->width, height = mask->texture->height;
+    double from[2], to[2], ends[512], enter, leave;
+    size_t count = 0, wrong = 0;
+    for (int i = 0; i < 2; i++) {
+        from[i] = dice(numbers, -60, 60);
+        to[i] = dice(numbers, 0, 1) < .2 ? from[i] : from[i] + dice(numbers, -40, 40);
+    }
+    nb_mask_walk walk = nb_mask_begin(mask, from, to);
+    while (nb_mask_next(&walk, &enter, &leave)) {
+        assert_true(enter >= (count > 0 ? ends[count - 1] : 0) && leave >= enter && leave <= 1 && count < 510);
+        ends[count++] = enter;
+        ends[count++] = leave;
+    }
+    for (int k = 0; k < 50; k++) {
+        const double s = dice(numbers, 0, 1), x = from[0] + s * (to[0] - from[0]), y = from[1] + s * (to[1] - from[1]);
+        size_t before = 0;
+        int near = 0;
+        for (size_t i = 0; i < count; i++) {
+            before += ends[i] <= s;
+            near |= fabs(ends[i] - s) < 1e-5;
+        }
+        if (near) continue;
+        *places += 1;
+        wrong += nb_mask_is_hole(mask, (float)(x / width), (float)(y / height)) != (before % 2 == 0);
+    }
+    return wrong;
+}
+
+static void a_line_is_cut_where_alpha_passes_the_cutoff(void **state)
+{
+    enum { WIDE = 64, HIGH = 40 };
+    static uint8_t texels[WIDE * HIGH][4];
+    uint64_t numbers = 3;
+    size_t places = 0, wrong = 0;
+    (void)state;
+    for (int kind = 0; kind < 4; kind++) {
+        const uint32_t width = kind == 3 ? 1 : WIDE, height = kind == 2 ? 1 : HIGH;
+        const nebel_texture texture = {width, height, texels[0]};
+        const nebel_scene_data scene = {.texture_count = 1, .textures = &texture};
+        const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
+        nb_mask mask;
+        for (int i = 0; i < WIDE * HIGH; i++) {
+            const int x = i % WIDE, y = i / WIDE, inside = hypot(x - 20, y - 15) < 11 && hypot(x - 22, y - 17) > 4;
+            texels[i][3] = kind == 0 ? (uint8_t)(inside ? 255 : 0) : (uint8_t)dice(&numbers, 0, 256);
+        }
+        assert_int_equal(nb_mask_make(&mask, &allocator, &scene, 0, .5f), NEBEL_OK);
+        for (int line = 0; line < 2000; line++) wrong += compare_line(&mask, &numbers, &places);
+        nb_mask_free(&mask, &allocator);
+    }
+    print_message("%zu of %zu places wrong\n", wrong, places);
+    assert_true(places > 300000 && wrong <= places / 20000);
+}
+
+/* ---- what is no mask ------------------------------------------------------------------------- */
+
+static nebel_result create(const test_card *card)
+{
+    nebel_renderer *renderer = NULL;
+    const nebel_result result = nebel_create_renderer(&card->scene, NULL, &(nebel_renderer_desc){0}, &renderer);
+    nebel_destroy_renderer(renderer);
+    return result;
+}
+
+static void odd_masks_are_refused(void **state)
+{
+    static const float cutoffs[] = {-.1f, 1.1f, NAN, INFINITY};
+    static test_card card;
+    (void)state;
+    for (size_t i = 0; i < sizeof cutoffs / sizeof *cutoffs; i++) {
+        test_card_make(&card, 1);
+        card.meshes[0].alpha_cutoff = cutoffs[i];
+        assert_int_equal(create(&card), NEBEL_ERROR_VALUE);
+    }
+    for (int i = 0; i < 3; i++) {
+        test_card_make(&card, 1);
+        if (i == 0) card.meshes[0].mask = 1;
+        if (i == 1) card.meshes[0].mask = -1;
+        if (i == 2) card.meshes[0].uvs = NULL;
+        assert_int_equal(create(&card), NEBEL_ERROR_ARGUMENT);
+    }
+    test_card_make(&card, 1);
+    card.texture.width = 0;
+    assert_int_equal(create(&card), NEBEL_ERROR_ARGUMENT);
+}
+
+/* Texture coordinates that are no numbers or far too large: there is a picture, and soon, of shafts as well. */
+static void odd_coordinates_are_survived(void **state)
+{
+    static const float odd[] = {NAN, INFINITY, 1e6f, 1e20f, 3e38f};
+    static test_card card;
+    const nebel_volume_desc volume = {.extinction = {.1, .1, .1}, .albedo = {1, 1, 1}};
+    const nebel_fog_desc desc = {.sun = {.direction = {.3, .9, .2}, .irradiance = {3, 3, 3}}};
+    nebel_snapshot *fog = fog_commit(&desc, &volume, 1);
+    test_picture picture = test_picture_make(16, 16);
+    (void)state;
+    for (size_t i = 0; i < sizeof odd / sizeof *odd; i++)
+        for (int k = 0; k < 8; k++) {
+            const nebel_camera camera = test_camera(0, 1, 8, 0, 2, 0);
+            test_card_make(&card, 1);
+            card.uvs[k] = odd[i];
+            test_render(&card.scene, fog, &(nebel_renderer_desc){0}, &camera, 1, &picture);
+            for (int p = 0; p < 3 * 16 * 16; p++) assert_true(isfinite(picture.planes.in_scattering[p]));
+        }
+    test_picture_free(&picture);
+    nebel_release_snapshot(fog);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(holes_are_where_alpha_is_low),
+        cmocka_unit_test(lamps_shine_through_holes),
+        cmocka_unit_test(a_line_is_cut_where_alpha_passes_the_cutoff),
+        cmocka_unit_test(odd_masks_are_refused),
+        cmocka_unit_test(odd_coordinates_are_survived),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
