@@ -8,7 +8,8 @@ WERROR ?= $(if $(CI),ON,OFF)
 JOBS ?= $(or $(patsubst -j%,%,$(filter -j%,$(MAKEFLAGS))),$(shell nproc 2>/dev/null || echo 2))
 SOURCES = $(shell git ls-files '*.c' '*.h' '*.cpp')
 MODELS = examples/scenes/models/landscape.png examples/scenes/models/planet.obj examples/scenes/models/gates.gltf \
-	examples/scenes/models/hall.obj examples/scenes/models/rooms.obj examples/scenes/models/smoke.raw
+	examples/scenes/models/hall.obj examples/scenes/models/rooms.obj examples/scenes/models/smoke.raw \
+	examples/scenes/models/tree.glb
 
 ifeq ($(V),0)
 CONFIGURE = cmake -S . -DNEBEL_WERROR=$(WERROR) -DCMAKE_RULE_MESSAGES=OFF -DCMAKE_TARGET_MESSAGES=OFF >/dev/null
@@ -86,6 +87,10 @@ examples/scenes/models/%.gltf: examples/make_%.py
 	@python3 $< $@
 
 examples/scenes/models/%.obj: examples/make_%.py
+	@scripts/install_packages.sh example
+	@python3 $< $@
+
+examples/scenes/models/%.glb: examples/make_%.py
 	@scripts/install_packages.sh example
 	@python3 $< $@
 

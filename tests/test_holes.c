@@ -100,7 +100,7 @@ static void lamps_shine_through_holes(void **state)
 /* How many places of a line its stretches and nb_mask_is_hole disagree about, but for those near an end. */
 static size_t compare_line(const nb_mask *mask, uint64_t *numbers, size_t *places)
 {
-    const double width = mask->texture->width, height = mask->texture->height;
+    const double width = mask->width, height = mask->height;
     double from[2], to[2], ends[512], enter, leave;
     size_t count = 0, wrong = 0;
     for (int i = 0; i < 2; i++) {

@@ -5,11 +5,6 @@
 
 /* ---- cells ----------------------------------------------------------------------------------- */
 
-static float alpha_at(const nebel_texture *texture, uint32_t x, uint32_t y)
-{
-    return texture->rgba[4 * ((size_t)y * texture->width + x) + 3];
-}
-
 static uint32_t after(uint32_t x, uint32_t size)
 {
     return x + 1 < size ? x + 1 : 0;
@@ -25,12 +20,11 @@ typedef struct nb_cell {
     float at[2][2]; /* by y, x */
 } nb_cell;
 
-static nb_cell cell_at(const nb_mask *mask, uint32_t x, uint32_t y)
+static inline nb_cell cell_at(const nb_mask *mask, uint32_t x, uint32_t y)
 {
-    const nebel_texture *t = mask->texture;
-    const uint32_t right = after(x, t->width), below = after(y, t->height);
-    return (nb_cell){{{alpha_at(t, x, y) - mask->threshold, alpha_at(t, right, y) - mask->threshold},
-                      {alpha_at(t, x, below) - mask->threshold, alpha_at(t, right, below) - mask->threshold}}};
+    const uint8_t *above = mask->alphas + (size_t)y * (mask->width + 1) + x, *below = above + mask->width + 1;
+    const float threshold = mask->threshold;
+    return (nb_cell){{{above[0] - threshold, above[1] - threshold}, {below[0] - threshold, below[1] - threshold}}};
 }
 
 static int has_edge(const nb_cell *cell)
@@ -53,7 +47,7 @@ static uint8_t next_to(uint8_t clearance)
  * the first row or, back, from the last. Returns whether it changed anything. */
 static int sweep(const nb_mask *mask, int back)
 {
-    const uint32_t width = mask->texture->width, height = mask->texture->height;
+    const uint32_t width = mask->width, height = mask->height;
     int changed = 0;
     for (uint32_t i = 0; i < height; i++) {
         const uint32_t y = back ? height - 1 - i : i, other = back ? after(y, height) : before(y, height);
@@ -73,7 +67,7 @@ static int sweep(const nb_mask *mask, int back)
 /* What a sweep leaves at one border of the texture another takes up at the opposite one. */
 static void set_clearances(const nb_mask *mask)
 {
-    const uint32_t width = mask->texture->width, height = mask->texture->height;
+    const uint32_t width = mask->width, height = mask->height;
     for (uint32_t y = 0; y < height; y++)
         for (uint32_t x = 0; x < width; x++) {
             const nb_cell cell = cell_at(mask, x, y);
@@ -86,20 +80,32 @@ static void set_clearances(const nb_mask *mask)
     }
 }
 
+static void copy_alphas(const nb_mask *mask, const nebel_texture *texture)
+{
+    for (uint32_t y = 0; y <= mask->height; y++)
+        for (uint32_t x = 0; x <= mask->width; x++) {
+            const size_t texel = (size_t)(y % mask->height) * mask->width + x % mask->width;
+            mask->alphas[(size_t)y * (mask->width + 1) + x] = texture->rgba[4 * texel + 3];
+        }
+}
+
 nebel_result nb_mask_make(nb_mask *mask, const nebel_allocator *allocator, const nebel_scene_data *scene,
                           int32_t number, float cutoff)
 {
     const nebel_texture *texture = &scene->textures[number];
-    *mask = (nb_mask){.texture = texture, .number = number, .cutoff = cutoff};
+    *mask = (nb_mask){.number = number, .cutoff = cutoff, .width = texture->width, .height = texture->height};
     mask->threshold = 255 * cutoff - 0.125f;
-    mask->clearances = nb_allocate(allocator, (size_t)texture->width * texture->height, 1);
-    if (mask->clearances == NULL) return NEBEL_ERROR_MEMORY;
+    mask->alphas = nb_allocate(allocator, (size_t)texture->width + 1, (size_t)texture->height + 1);
+    mask->clearances = nb_allocate(allocator, texture->width, texture->height);
+    if (mask->alphas == NULL || mask->clearances == NULL) return NEBEL_ERROR_MEMORY;
+    copy_alphas(mask, texture);
     set_clearances(mask);
     return NEBEL_OK;
 }
 
 void nb_mask_free(nb_mask *mask, const nebel_allocator *allocator)
 {
+    nb_release(allocator, mask->alphas);
     nb_release(allocator, mask->clearances);
 }
 
@@ -116,12 +122,11 @@ static uint32_t find_cell(double place, uint32_t size, double *within)
 
 int nb_mask_is_hole(const nb_mask *mask, float u, float v)
 {
-    const nebel_texture *texture = mask->texture;
-    const double x = isfinite(u) ? (double)u * texture->width : 0, y = isfinite(v) ? (double)v * texture->height : 0;
+    const double x = isfinite(u) ? (double)u * mask->width : 0, y = isfinite(v) ? (double)v * mask->height : 0;
     double f, g;
-    const uint32_t column = find_cell(x, texture->width, &f), row = find_cell(y, texture->height, &g);
+    const uint32_t column = find_cell(x, mask->width, &f), row = find_cell(y, mask->height, &g);
     const nb_cell cell = cell_at(mask, column, row);
-    if (mask->clearances[(size_t)row * texture->width + column] > 0) return cell.at[0][0] < 0;
+    if (mask->clearances[(size_t)row * mask->width + column] > 0) return cell.at[0][0] < 0;
     const double above = (double)cell.at[0][0] + f * (double)(cell.at[0][1] - cell.at[0][0]);
     const double below = (double)cell.at[1][0] + f * (double)(cell.at[1][1] - cell.at[1][0]);
     return above + g * (below - above) < 0;
@@ -129,86 +134,125 @@ int nb_mask_is_hole(const nb_mask *mask, float u, float v)
 
 /* ---- lines ----------------------------------------------------------------------------------- */
 
+/* Steps end so far beyond a cell: in another one, whatever rounding does. */
+static const double margin = 1e-6;
+
+static nb_mask_axis axis_of(double from, double to, uint32_t size)
+{
+    const double way = to - from, least = (way < 0 ? to : from) - 0.5 - margin;
+    const double start = from - 0.5 - size * floor(least / size);
+    return (nb_mask_axis){.start = start,
+                          .way = way,
+                          .inverse = 1 / (fabs(way) > 1e-200 ? way : 1e-200),
+                          .size = size,
+                          .lap = (uint32_t)start / size * size};
+}
+
+static int is_short(double from, double to)
+{
+    const double reach = NB_MASK_REACH;
+    return fabs(to - from) <= reach && isfinite(from);
+}
+
 nb_mask_walk nb_mask_begin(const nb_mask *mask, const double from[2], const double to[2])
 {
-    const nebel_texture *t = mask->texture;
-    /* Near the origin, where doubles are finest. */
-    const double left = t->width * floor(from[0] / t->width), top = t->height * floor(from[1] / t->height);
+    if (!is_short(from[0], to[0]) || !is_short(from[1], to[1]))
+        return (nb_mask_walk){.mask = mask, .at = 1, .ends = {1}, .solid = {1}, .count = 1};
     return (nb_mask_walk){
-        .mask = mask, .x = from[0] - left, .y = from[1] - top, .dx = to[0] - from[0], .dy = to[1] - from[1]};
+        .mask = mask, .x = axis_of(from[0], to[0], mask->width), .y = axis_of(from[1], to[1], mask->height)};
 }
 
-/* How long a line stays below `high` and above `low` along one axis. */
-static double stay(double place, double way, double low, double high)
+/* In which cell of the mask a line is, and how far within. */
+static inline uint32_t enter_axis(nb_mask_axis *axis, double at, double *within)
 {
-    return way > 0 ? (high - place) / way : way < 0 ? (low - place) / way : HUGE_VAL;
+    const double place = axis->start + at * axis->way;
+    const uint32_t cell = (uint32_t)place;
+    *within = place - cell;
+    while (cell < axis->lap) axis->lap -= axis->size;
+    while (cell - axis->lap >= axis->size) axis->lap += axis->size;
+    return cell - axis->lap;
 }
 
-static void add_piece(nb_mask_walk *walk, double end, int solid)
+/* How long a line stays within so many cells. */
+static inline double stay(const nb_mask_axis *axis, double within, double reach)
+{
+    const double end = axis->way < 0 ? 1 - reach - margin : reach + margin;
+    return (end - within) * axis->inverse;
+}
+
+static inline void add_piece(nb_mask_walk *walk, double end, int solid)
 {
     walk->ends[walk->count] = end;
     walk->solid[walk->count++] = solid;
 }
 
-/* a + b s + c s^2 is alpha over the threshold, for s from 0 to `length`; its roots part pieces. */
-static void cut_cell(nb_mask_walk *walk, double a, double b, double c, double length)
+/* Alpha over the threshold along a line in a cell is a + b s + c s^2. */
+typedef struct nb_quadratic {
+    double a, b, c;
+} nb_quadratic;
+
+static inline double value_at(const nb_quadratic *q, double s)
 {
-    const double discriminant = b * b - 4 * a * c;
+    return q->a + s * (q->b + s * q->c);
+}
+
+/* Of one sign from 0 to `length`: at both ends, without a turn between them that may lead beyond 0. */
+static inline int is_of_one_sign(const nb_quadratic *q, double length)
+{
+    const int solid = q->a >= 0, falls = q->b<0, rises = q->b + 2 * length * q->c> 0;
+    return (value_at(q, length) >= 0) == solid && (solid ? !(falls && rises) : falls || rises);
+}
+
+/* Parts the cell at the roots. */
+static void cut_cell(nb_mask_walk *walk, const nb_quadratic *q, double length)
+{
+    const double discriminant = q->b * q->b - 4 * q->a * q->c;
     double start = 0;
     if (discriminant > 0) {
-        const double sum = b < 0 ? sqrt(discriminant) - b : -sqrt(discriminant) - b;
-        const double one = sum / (2 * (c != 0 ? c : 1e-300)), other = sum != 0 ? 2 * a / sum : HUGE_VAL;
-        const double roots[2] = {fmin(one, other), fmax(one, other)};
+        const double root = sqrt(discriminant), sum = q->b < 0 ? root - q->b : -root - q->b;
+        const double one = sum / (2 * (q->c != 0 ? q->c : 1e-300)), other = sum != 0 ? 2 * q->a / sum : HUGE_VAL;
+        const double roots[2] = {one < other ? one : other, one < other ? other : one};
         for (int i = 0; i < 2; i++) {
             if (!(roots[i] > start && roots[i] < length)) continue;
-            const double middle = 0.5 * (start + roots[i]);
-            add_piece(walk, walk->at + roots[i], a + middle * (b + middle * c) >= 0);
+            add_piece(walk, walk->at + roots[i], value_at(q, 0.5 * (start + roots[i])) >= 0);
             start = roots[i];
         }
     }
-    const double middle = 0.5 * (start + length);
-    add_piece(walk, walk->at + length, a + middle * (b + middle * c) >= 0);
+    add_piece(walk, walk->at + length, value_at(q, 0.5 * (start + length)) >= 0);
 }
 
-/* The pieces of the cell at walk->at, or of all cells around that are like it, and a little of the next one: a millionth
- * of a texel, so that each step ends in another cell. */
+/* The pieces of the cell at walk->at, or of all cells around that are like it. */
 static void enter_cell(nb_mask_walk *walk)
 {
-    const nebel_texture *t = walk->mask->texture;
-    const double x = walk->x + walk->at * walk->dx, y = walk->y + walk->at * walk->dy;
+    const nb_mask *mask = walk->mask;
+    const double left = 1 - walk->at;
     double f, g;
-    const uint32_t column = find_cell(x, t->width, &f), row = find_cell(y, t->height, &g);
-    const nb_cell cell = cell_at(walk->mask, column, row);
-    const uint8_t clearance = walk->mask->clearances[(size_t)row * t->width + column];
-    const double margin = 1e-6, reach = clearance > 0 ? clearance : 1;
-    const double across = stay(f, walk->dx, 1 - reach - margin, reach + margin);
-    const double down = stay(g, walk->dy, 1 - reach - margin, reach + margin);
-    const double length = fmin(fmin(across, down), 1 - walk->at);
+    const uint32_t column = enter_axis(&walk->x, walk->at, &f), row = enter_axis(&walk->y, walk->at, &g);
+    const nb_cell cell = cell_at(mask, column, row);
+    const uint8_t clearance = mask->clearances[(size_t)row * mask->width + column];
+    const double reach = clearance > 0 ? clearance : 1;
+    const double across = stay(&walk->x, f, reach), down = stay(&walk->y, g, reach);
+    const double shorter = across < down ? across : down, length = shorter < left ? shorter : left;
+    const double origin = (double)cell.at[0][0], right = (double)(cell.at[0][1] - cell.at[0][0]);
+    const double below = (double)(cell.at[1][0] - cell.at[0][0]);
+    const double twist = (double)(cell.at[1][1] - cell.at[1][0]) - right;
+    const nb_quadratic q = {origin + right * f + below * g + twist * f * g,
+                            right * walk->x.way + below * walk->y.way + twist * (f * walk->y.way + g * walk->x.way),
+                            twist * walk->x.way * walk->y.way};
     walk->count = walk->next = 0;
-    if (clearance > 0) {
-        add_piece(walk, walk->at + length, cell.at[0][0] >= 0);
-    } else {
-        const double origin = (double)cell.at[0][0], right = (double)(cell.at[0][1] - cell.at[0][0]);
-        const double below = (double)(cell.at[1][0] - cell.at[0][0]);
-        const double twist = (double)(cell.at[1][1] - cell.at[1][0]) - right;
-        cut_cell(walk, origin + right * f + below * g + twist * f * g,
-                 right * walk->dx + below * walk->dy + twist * (f * walk->dy + g * walk->dx),
-                 twist * walk->dx * walk->dy, length);
-    }
-    walk->at = walk->ends[walk->count - 1];
-}
-
-static int is_too_long(const nb_mask_walk *walk)
-{
-    const double reach = NB_MASK_REACH;
-    return !(fabs(walk->dx) <= reach && fabs(walk->dy) <= reach && isfinite(walk->x) && isfinite(walk->y));
+    if (clearance > 0)
+        add_piece(walk, walk->at + length, origin >= 0);
+    else if (is_of_one_sign(&q, length))
+        add_piece(walk, walk->at + length, q.a >= 0);
+    else
+        cut_cell(walk, &q, length);
+    walk->at = length < left ? walk->ends[walk->count - 1] : 1;
 }
 
 int nb_mask_next(nb_mask_walk *walk, double *enter, double *leave)
 {
     int found = 0;
-    double start = walk->next > 0 ? walk->ends[walk->next - 1] : walk->at;
-    if (walk->at == 0 && is_too_long(walk)) add_piece(walk, walk->at = 1, 1);
+    double start = walk->next > 0 ? walk->ends[walk->next - 1] : walk->count > 0 ? 0 : walk->at;
     while (walk->next < walk->count || walk->at < 1) {
         if (walk->next == walk->count) enter_cell(walk);
         const int solid = walk->solid[walk->next];

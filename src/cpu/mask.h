@@ -11,10 +11,11 @@
 #include <nebel/scene.h>
 
 typedef struct nb_mask {
-    const nebel_texture *texture;
-    int32_t number;      /* of the texture */
-    float cutoff;        /* as the meshes have it */
+    int32_t number; /* of the texture */
+    float cutoff;   /* as the meshes have it */
+    uint32_t width, height;
     float threshold;     /* of alpha in bytes */
+    uint8_t *alphas;     /* of each texel and, in one more column and row, of the first ones again */
     uint8_t *clearances; /* of each cell, row after row: those less than so many cells away have no edge of a hole, at
                             most 255; 0: it has one itself. Cell 0 begins at the centre of texel 0, all are periodic */
 } nb_mask;
@@ -27,11 +28,16 @@ void nb_mask_free(nb_mask *mask, const nebel_allocator *allocator);
 /* Whether there is a hole at these texture coordinates. What is no number is 0. */
 int nb_mask_is_hole(const nb_mask *mask, float u, float v);
 
-/* A line over a mask: its place at s is x + s dx, y + s dy for s from 0 to 1, in texels; 0 is the border of the first.
- */
+/* One axis of a line: its place at s is start + s way, in cells; never below 0. */
+typedef struct nb_mask_axis {
+    double start, way, inverse; /* of the way; never infinite */
+    uint32_t size, lap;         /* of cells; the first of those around the mask that the line is on */
+} nb_mask_axis;
+
+/* A line over a mask, from s = 0 to 1. */
 typedef struct nb_mask_walk {
     const nb_mask *mask;
-    double x, y, dx, dy;
+    nb_mask_axis x, y;
     double at; /* how far it has been walked */
     double ends[3];
     int solid[3]; /* the pieces of the present cell that lie ahead */
@@ -41,6 +47,7 @@ typedef struct nb_mask_walk {
 /* Lines with more than so many texels along either axis are taken for solid. */
 enum { NB_MASK_REACH = 1 << 20 };
 
+/* Between two places in texels; 0 is the border of the first. */
 nb_mask_walk nb_mask_begin(const nb_mask *mask, const double from[2], const double to[2]);
 
 /* The next stretch of the line without holes; 0 where there is none left. */

@@ -51,13 +51,12 @@ static double seen_area(const nb_caster *t)
  * that does not change across the plane. Seen by the sun corners lie at one height. */
 static nb_sheet make_sheet(const nb_surface *surface, const uint32_t *index, const nb_caster *t, int is_for_lamps)
 {
-    const nebel_texture *texture = surface->mask->texture;
     nb_sheet sheet = {.mask = surface->mask};
     double edge[2][3], normal[3], across[2][3], texels[3][2];
     for (int k = 0; k < 3; k++) {
         const float *uv = surface->mesh->uvs + 2 * (size_t)index[k];
-        texels[k][0] = isfinite(uv[0]) ? (double)uv[0] * texture->width : 0;
-        texels[k][1] = isfinite(uv[1]) ? (double)uv[1] * texture->height : 0;
+        texels[k][0] = isfinite(uv[0]) ? (double)uv[0] * surface->mask->width : 0;
+        texels[k][1] = isfinite(uv[1]) ? (double)uv[1] * surface->mask->height : 0;
     }
     for (int i = 0; i < 3; i++) {
         const int counts = i < 2 || is_for_lamps;
