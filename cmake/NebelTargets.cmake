@@ -84,7 +84,7 @@ endfunction()
 
 function(nebel_add_core)
     nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c
-        src/classic/*.c)
+        src/classic/*.c src/planet/*.c)
     nebel_add_shader_text(text)
     list(APPEND sources ${text})
     nebel_add_kernels(kernel_objects definitions)

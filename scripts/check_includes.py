@@ -20,7 +20,7 @@ ROOMS = {
     "shader": {"base", "formulas", "media", "march"},
     "classic": {"base", "formulas", "kernels", "march", "media"},
     "nebula": {"base", "formulas", "march", "media"},
-    "planet": {"base", "march", "media"},
+    "planet": {"base", "formulas", "march", "media"},
     "scene": {"base"},
     "cpu": {"base"},
     "gl": {"base"},

@@ -88,7 +88,7 @@ nb_phase nb_phase_resolve(const nebel_phase *phase)
 
 /* ---- value and mean -------------------------------------------------------------------------- */
 
-static double value_of(const nb_phase *phase, double cosine)
+double nb_phase_at(const nb_phase *phase, double cosine)
 {
     const nb_turn turn = {cosine, 1 - cosine, 1 + cosine};
     double sum = 0;
@@ -103,7 +103,7 @@ double nebel_phase_value(const nebel_phase *phase, double cosine)
 {
     if (nb_phase_fault(phase) != NULL || !(fabs(cosine) <= 1)) return (double)NAN;
     const nb_phase resolved = nb_phase_resolve(phase);
-    return value_of(&resolved, cosine);
+    return nb_phase_at(&resolved, cosine);
 }
 
 double nebel_phase_mean_cosine(const nebel_phase *phase)
@@ -191,7 +191,7 @@ static double invert_light_below(const nb_phase *phase, double part)
         const double over = light_below(phase, c) - part;
         if (over == 0) break;
         *(over > 0 ? &high : &low) = c;
-        const double next = c - over / (2 * PI * value_of(phase, c));
+        const double next = c - over / (2 * PI * nb_phase_at(phase, c));
         const double before = c;
         c = next > low && next < high ? next : 0.5 * (low + high);
         if (c == before) break;

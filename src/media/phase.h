@@ -24,4 +24,7 @@ const char *nb_phase_fault(const nebel_phase *phase);
 /* Of a phase function that is in order. */
 nb_phase nb_phase_resolve(const nebel_phase *phase);
 
+/* 1/sr for a cosine within -1 and 1. */
+double nb_phase_at(const nb_phase *phase, double cosine);
+
 #endif

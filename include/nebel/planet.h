@@ -1,0 +1,102 @@
+/* The air of planets: what it leaves of light, and what it scatters of the sun's, in all orders.
+ *
+ *     nebel_atmosphere *air = NULL;
+ *     nebel_create_atmosphere(&(nebel_atmosphere_desc){0}, &air); // the Earth's
+ *
+ *     const nebel_sun sun = {.direction = {0.6, 0.3, 0}, .irradiance = {1, 1, 1}};
+ *     const nebel_ray ray = {{0, 1.7, 0}, {1, 0.1, 0}, INFINITY};
+ *     nebel_light light;
+ *     nebel_trace_air(air, &sun, 1, &ray, 0, &light, 0);          // light.in_scattering is the sky
+ *
+ * The planet is a ball; its air is up to NEBEL_MAX_AIRS kinds of it over each other, each of which thins out with height,
+ * or is a layer, and ends where the atmosphere does. Light that was scattered once comes from quadrature with the exact
+ * optical depth (formulas/planet.inc) in both directions. What was scattered more often comes from a table over height
+ * and the sun's height, made when the atmosphere is: there the light from everywhere is kept by its moments, as much of
+ * it as Rayleigh's phase function sees; that is exact for air, and smoothes what dust sends ahead.
+ *
+ * Places are those of the scene, y up. Units are metres. Nothing here calls a graphics interface.
+ */
+#ifndef NEBEL_PLANET_H
+#define NEBEL_PLANET_H
+
+#include <nebel/nebel.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- describing air -------------------------------------------------------------------------- */
+
+#define NEBEL_MAX_AIRS 4
+#define NEBEL_MAX_AIR_EXTINCTION 1e3 /* 1/m */
+#define NEBEL_MAX_AIR_RATIO 1000.    /* of the atmosphere's thickness to a scale height or a layer's width */
+
+typedef enum nebel_air_profile {
+    NEBEL_AIR_EXPONENTIAL = 0, /* e^(-height / scale_height) */
+    NEBEL_AIR_LAYER,           /* 1 at `center`, falling to 0 at center - width and center + width in straight lines */
+    NEBEL_AIR_PROFILE_COUNT
+} nebel_air_profile;
+
+/* One kind of air. */
+typedef struct nebel_air {
+    double scattering[3]; /* 1/m where the density is 1, 0 to 1e3 */
+    double absorption[3]; /* the same */
+    nebel_phase phase;
+    nebel_air_profile profile;
+    double scale_height;  /* EXPONENTIAL: m, at least thickness / NEBEL_MAX_AIR_RATIO */
+    double center, width; /* LAYER: m above the ground, and m, at least as much */
+} nebel_air;
+
+/* How much work goes into the table of light that was scattered more than once. */
+typedef enum nebel_air_quality { NEBEL_AIR_FAST = 0, NEBEL_AIR_PRECISE, NEBEL_AIR_QUALITY_COUNT } nebel_air_quality;
+
+typedef struct nebel_atmosphere_desc {
+    double ground[3]; /* where the ground is above (y) the planet's centre: m. {0}: the origin */
+    double radius;    /* of the ground: m, 1 to 1e12; 0: 6.36e6 */
+    double thickness; /* of the air: m, at most 1e12, at least radius / 1e6; 0: 1e5 */
+    nebel_air airs[NEBEL_MAX_AIRS];
+    uint32_t air_count;      /* 0: the Earth's air, see nebel_find_atmosphere */
+    double ground_albedo[3]; /* what the ground gives back to the air, 0 to 1 */
+    nebel_air_quality quality;
+    nebel_allocator allocator; /* {0}: malloc and free */
+    nebel_log log;
+} nebel_atmosphere_desc;
+
+/* Known airs: "earth" (constants of the demonstration of Hillaire, A Scalable and Production Ready Sky and Atmosphere
+ * Rendering Technique, 2020), "mars" and "toy", a ball of 1 km in the Earth's colours. NULL where there is none of that name. Any thread. */
+const nebel_atmosphere_desc *nebel_find_atmosphere(const char *name);
+
+/* ---- atmospheres ----------------------------------------------------------------------------- */
+
+typedef struct nebel_atmosphere nebel_atmosphere;
+
+/* Makes an atmosphere that does not change any more, with its table. Free it with nebel_destroy_atmosphere. Errors:
+ * ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY. Any thread. */
+nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere);
+
+/* NULL is fine. */
+void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
+
+/* What the air does along each of n rays, up to t_max, the ground or the end of the air, whichever comes first; nothing
+ * below the ground. The light of the ground itself is not in it. Strides are in bytes. sun NULL: no light. `error` is
+ * what the quality promises: see docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite
+ * where it must not be, of no direction, of negative t_max). */
+nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
+                             size_t ray_stride, nebel_light *lights, size_t light_stride);
+
+/* Light that arrives at a place. */
+typedef struct nebel_air_light {
+    double sun[3]; /* irradiance on a surface that faces the sun; 0 in the planet's shadow */
+    double sky[3]; /* irradiance on level ground below the place, of all that the air scatters */
+} nebel_air_light;
+
+/* The light at each of n places; strides in bytes. Any thread. Errors: ARGUMENT. */
+nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
+                             const double (*places)[3], size_t place_stride, nebel_air_light *lights,
+                             size_t light_stride);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

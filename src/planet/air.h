@@ -1,0 +1,58 @@
+/* The air along a ray, as far as it does not depend on the sun. */
+#ifndef NB_PLANET_AIR_H
+#define NB_PLANET_AIR_H
+
+#include "base/base.h"
+#include "media/phase.h"
+
+#include <nebel/planet.h>
+
+enum { NB_MOMENTS = 5 }; /* orders of phase functions that light scattered often is kept by */
+
+/* One kind of air, ready for evaluation. */
+typedef struct nb_air {
+    double scattering[3], extinction[3]; /* 1/m where the density is 1 */
+    double scale;                        /* m; 0: a layer */
+    double center, width;                /* of a layer */
+    nb_phase phase;
+    double moments[NB_MOMENTS + 1]; /* of the phase function: the means of Legendre's polynomials */
+} nb_air;
+
+enum { NB_MOST_SHELLS = 3 + 3 * NEBEL_MAX_AIRS };
+
+/* Air around a ball. */
+typedef struct nb_airs {
+    double radius, top;            /* m from the centre */
+    double shells[NB_MOST_SHELLS]; /* m from the centre: where rays are cut, since the air is another above */
+    int shell_count;
+    nb_air airs[NEBEL_MAX_AIRS];
+    int count;
+} nb_airs;
+
+/* A ray through air: `radius` m from the centre at its start, and how far that is behind the place where the ray is
+ * lowest, which may lie ahead (below 0). */
+typedef struct nb_track {
+    double radius, rise;
+} nb_track;
+
+double nb_air_density(const nb_air *air, double height);
+
+/* Sets the shells of airs that have everything else. */
+void nb_airs_cut(nb_airs *airs);
+
+/* The same ray further on. */
+nb_track nb_track_ahead(nb_track track, double length);
+
+/* How far a ray that starts within a sphere around the planet's centre, or on it, goes until it leaves it. */
+double nb_track_leave(nb_track track, double sphere);
+
+/* How far a ray from outside goes until it enters the sphere; HUGE_VAL where it never does. */
+double nb_track_enter(nb_track track, double sphere);
+
+/* Optical depth of `length` m of a ray that stays within the air. */
+void nb_track_depth(const nb_airs *airs, nb_track track, double length, double depth[3]);
+
+/* What air leaves of the light of a sun in a direction: 0 in the shadow of the planet. */
+void nb_track_sunlight(const nb_airs *airs, nb_track track, double light[3]);
+
+#endif

@@ -1,0 +1,69 @@
+#include "atmosphere.h"
+
+#include "check.h"
+
+#include <math.h>
+
+/* Those of the form of Henyey and Greenstein are g^order; those of its product with 1 + alpha c^2 follow from the
+ * recurrence of c times Legendre's polynomials. */
+static double lobe_moment(const nb_lobe *lobe, int order)
+{
+    const double l = order, g = lobe->g;
+    const double ahead = (l + 1) * (l + 2) / ((2 * l + 1) * (2 * l + 3));
+    const double same = (l + 1) * (l + 1) / ((2 * l + 1) * (2 * l + 3)) + l * l / ((2 * l + 1) * (2 * l - 1));
+    double square = ahead * pow(g, l + 2) + same * pow(g, l);
+    if (order >= 2) square += l * (l - 1) / ((2 * l + 1) * (2 * l - 1)) * pow(g, l - 2);
+    return (pow(g, l) + lobe->alpha * square) / (1 + lobe->alpha * (1 + 2 * g * g) / 3);
+}
+
+static void resolve_air(const nebel_air *desc, nb_air *air)
+{
+    air->phase = nb_phase_resolve(&desc->phase);
+    air->scale = desc->profile == NEBEL_AIR_EXPONENTIAL ? desc->scale_height : 0;
+    air->center = desc->center;
+    air->width = desc->width;
+    for (int c = 0; c < 3; c++) {
+        air->scattering[c] = desc->scattering[c];
+        air->extinction[c] = desc->scattering[c] + desc->absorption[c];
+    }
+    for (int order = 0; order <= NB_MOMENTS; order++)
+        for (int i = 0; i < air->phase.lobe_count; i++)
+            air->moments[order] += air->phase.lobes[i].weight * lobe_moment(&air->phase.lobes[i], order);
+}
+
+nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere)
+{
+    if (atmosphere == NULL) return NEBEL_ERROR_ARGUMENT;
+    *atmosphere = NULL;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    const nebel_atmosphere_desc whole = nb_atmosphere_resolve(desc);
+    nebel_result result = nb_atmosphere_check(&whole);
+    if (result != NEBEL_OK) return result;
+    const nebel_allocator allocator = nb_resolve_allocator(&whole.allocator);
+    nebel_atmosphere *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    if (made == NULL) return nb_fail(&whole.log, NEBEL_ERROR_MEMORY, "atmosphere: out of memory");
+    made->allocator = allocator;
+    made->airs.radius = whole.radius;
+    made->airs.top = whole.radius + whole.thickness;
+    made->airs.count = (int)whole.air_count;
+    for (int i = 0; i < made->airs.count; i++) resolve_air(&whole.airs[i], &made->airs.airs[i]);
+    nb_airs_cut(&made->airs);
+    for (int c = 0; c < 3; c++) made->center[c] = whole.ground[c] - (c == 1 ? whole.radius : 0);
+    made->rule = nb_rule_make(NB_RULE_MOST);
+    made->share_off = whole.quality == NEBEL_AIR_PRECISE ? 0.02 : 0.1;
+    result = nb_scatter_make(&allocator, &made->airs, whole.quality, whole.ground_albedo, &made->scatter);
+    if (result == NEBEL_OK) {
+        *atmosphere = made;
+        return NEBEL_OK;
+    }
+    nebel_destroy_atmosphere(made);
+    return nb_fail(&whole.log, result, "atmosphere: out of memory");
+}
+
+void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere)
+{
+    if (atmosphere == NULL) return;
+    const nebel_allocator allocator = atmosphere->allocator;
+    nb_scatter_free(&allocator, &atmosphere->scatter);
+    nb_release(&allocator, atmosphere);
+}

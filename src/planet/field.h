@@ -1,0 +1,33 @@
+/* Light from everywhere at one place, by its moments. */
+#ifndef NB_PLANET_FIELD_H
+#define NB_PLANET_FIELD_H
+
+#include "air.h"
+
+/* Of each order those that tell the sun's side from the other; light is the same on both sides of the plane through the
+ * zenith and the sun. */
+enum { NB_FIELD = NB_MOMENTS * (NB_MOMENTS + 1) / 2 };
+
+/* The frame of a field has z up and x towards the sun. Air asks for the orders 0 to 2, dust for those that its phase
+ * function has: `orders` says how many are kept. */
+typedef struct nb_field {
+    double moments[NB_FIELD][3];
+} nb_field;
+
+/* The cosines of a direction to the zenith and to the sun, and of the sun to the zenith. */
+typedef struct nb_aspect {
+    double zenith, sun, height_of_sun;
+} nb_aspect;
+
+/* Adds light (radiance times solid angle) that comes from a direction. */
+void nb_field_add(nb_field *field, int orders, nb_aspect from, const double light[3]);
+
+/* What a field gives towards a direction by kinds of air of such density: radiance to the metre. */
+void nb_field_scatter(const nb_field *field, int orders, const nb_airs *airs, const double density[], nb_aspect toward,
+                      double radiance[3]);
+
+/* About what it would give more or less if the next order were kept, too. */
+void nb_field_missing(const nb_field *field, int orders, const nb_airs *airs, const double density[],
+                      double radiance[3]);
+
+#endif

@@ -1,0 +1,80 @@
+#include "path.h"
+
+#include <math.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+enum { MOST_ENDS = 2 * NB_MOST_SHELLS + 5 };
+
+typedef struct nb_ends {
+    int count;
+    double at[MOST_ENDS];
+} nb_ends;
+
+/* Keeps the ends in order. */
+static void add_end(nb_ends *ends, double length, double s)
+{
+    if (!(s > 0 && s < length)) return;
+    int i = ends->count++;
+    for (; i > 0 && ends->at[i - 1] > s; i--) ends->at[i] = ends->at[i - 1];
+    ends->at[i] = s;
+}
+
+static void find_ends(const nb_airs *airs, nb_track track, double length, const double cuts[2], nb_ends *ends)
+{
+    ends->count = 0;
+    ends->at[ends->count++] = 0;
+    add_end(ends, length, -track.rise);
+    for (int i = 0; i < airs->shell_count; i++) {
+        add_end(ends, length, nb_track_enter(track, airs->shells[i]));
+        add_end(ends, length, nb_track_leave(track, airs->shells[i]));
+    }
+    for (int i = 0; i < 2; i++) add_end(ends, length, cuts[i]);
+    ends->at[ends->count++] = length;
+}
+
+/* Adds the nodes from a to b; `depth` is that of the ray up to a, and becomes that up to b. */
+static void lay_piece(const nb_airs *airs, const nb_rule *rule, nb_track track, double a, double b, double depth[3],
+                      nb_path *path)
+{
+    const double half = 0.5 * (b - a);
+    nb_path_node *nodes = path->nodes + path->count;
+    double extinction[NB_RULE_MOST][3];
+    for (int i = 0; i < rule->count; i++) {
+        nb_path_node *node = &nodes[i];
+        node->s = a + half * (1 + rule->nodes[i]);
+        node->radius = nb_track_ahead(track, node->s).radius;
+        node->weight = half * rule->weights[i];
+        for (int c = 0; c < 3; c++) extinction[i][c] = 0;
+        for (int k = 0; k < airs->count; k++) {
+            node->density[k] = nb_air_density(&airs->airs[k], node->radius - airs->radius);
+            for (int c = 0; c < 3; c++) extinction[i][c] += node->density[k] * airs->airs[k].extinction[c];
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        double whole = 0;
+        for (int i = 0; i < rule->count; i++) {
+            double before = 0;
+            for (int j = 0; j < rule->count; j++) before += rule->before[i][j] * extinction[j][c];
+            nodes[i].transmittance[c] = nb_exp(-(depth[c] + half * before));
+            whole += rule->weights[i] * extinction[i][c];
+        }
+        depth[c] += half * whole;
+    }
+    path->count += rule->count;
+}
+
+void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, const double cuts[2],
+                 nb_path *path)
+{
+    nb_ends ends;
+    double depth[3] = {0, 0, 0};
+    path->count = 0;
+    find_ends(airs, track, length, cuts, &ends);
+    for (int i = 1; i < ends.count; i++)
+        if (ends.at[i] > ends.at[i - 1]) lay_piece(airs, rule, track, ends.at[i - 1], ends.at[i], depth, path);
+    for (int c = 0; c < 3; c++) path->transmittance[c] = nb_exp(-depth[c]);
+}

@@ -1,0 +1,308 @@
+#include "scatter.h"
+
+#include "path.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+#define PI 3.14159265358979323846
+
+/* ---- looking up ------------------------------------------------------------------------------ */
+
+/* Entries are denser near the ground, and where the sun is near the horizon. */
+static double height_at(const nb_scatter *scatter, const nb_airs *airs, int i)
+{
+    const double part = (double)i / (scatter->heights - 1);
+    return (airs->top - airs->radius) * part * part;
+}
+
+/* The sine of the angle at which the horizon lies, seen from the top of the air. */
+static double dip(const nb_airs *airs)
+{
+    const double ratio = airs->radius / airs->top;
+    return sqrt((1 - ratio) * (1 + ratio));
+}
+
+/* Entries over the sun's height lie evenly over this. */
+static double spread(double sun, double scale)
+{
+    return copysign(log(1 + fabs(sun) / scale), sun);
+}
+
+static double sun_at(const nb_scatter *scatter, int i)
+{
+    const double part = (double)i / (scatter->suns - 1);
+    const double place = scatter->first_sun + part * (scatter->last_sun - scatter->first_sun);
+    return copysign(fmin(1, scatter->sun_scale * (exp(fabs(place)) - 1)), place);
+}
+
+/* A place among entries 0 to count - 1. */
+typedef struct nb_between {
+    int first;
+    double part;
+} nb_between;
+
+static nb_between between(double place, int count)
+{
+    const double bounded = fmax(0, fmin(place, count - 1));
+    const int first = bounded < count - 2 ? (int)bounded : count - 2;
+    return (nb_between){first, bounded - first};
+}
+
+static nb_between between_suns(const nb_scatter *scatter, double sun)
+{
+    const double place = copysign(nb_log(1 + fabs(sun) / scatter->sun_scale), sun) - scatter->first_sun;
+    return between(place / (scatter->last_sun - scatter->first_sun) * (scatter->suns - 1), scatter->suns);
+}
+
+nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun)
+{
+    const double part = sqrt(fmax(0, (radius - airs->radius) / (airs->top - airs->radius)));
+    const nb_between h = between(part * (scatter->heights - 1), scatter->heights), s = between_suns(scatter, sun);
+    const nb_field *low = &scatter->fields[h.first * scatter->suns + s.first], *high = low + scatter->suns;
+    nb_field field;
+    for (int c = 0; c < 3; c++) {
+        double all = 1;
+        for (int m = 0; m < scatter->orders * (scatter->orders + 1) / 2; m++) {
+            const double below = low[0].moments[m][c] + s.part * (low[1].moments[m][c] - low[0].moments[m][c]);
+            const double above = high[0].moments[m][c] + s.part * (high[1].moments[m][c] - high[0].moments[m][c]);
+            const double here = below + h.part * (above - below);
+            if (m == 0) all = nb_exp(here);
+            field.moments[m][c] = m == 0 ? all : all * here;
+        }
+    }
+    return field;
+}
+
+void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3])
+{
+    const nb_between s = between_suns(scatter, sun);
+    const double *a = scatter->ground[s.first], *b = scatter->ground[s.first + 1];
+    for (int c = 0; c < 3; c++) irradiance[c] = nb_exp(a[c] + s.part * (b[c] - a[c]));
+}
+
+/* Light falls by powers of ten where the sun sets. */
+static double to_power(double light)
+{
+    return log(fmax(light, 1e-30));
+}
+
+/* Makes a table of moments one that can be looked up. */
+static void seal(nb_scatter *scatter)
+{
+    for (int i = 0; i < scatter->heights * scatter->suns; i++)
+        for (int c = 0; c < 3; c++) {
+            double(*moments)[3] = scatter->fields[i].moments;
+            const double all = fmax(moments[0][c], 1e-30);
+            moments[0][c] = to_power(all);
+            for (int m = 1; m < NB_FIELD; m++) moments[m][c] /= all;
+        }
+    for (int i = 0; i < scatter->suns; i++)
+        for (int c = 0; c < 3; c++) scatter->ground[i][c] = to_power(scatter->ground[i][c]);
+}
+
+/* ---- making ---------------------------------------------------------------------------------- */
+
+enum { MOST_TURNS = 16 };
+
+/* Numbers of a quality: entries of the table, directions up and down and around, nodes of a piece of a
+ * ray, how often light is scattered, and by how many moments it is kept. */
+typedef struct nb_effort {
+    int heights, suns, slopes, turns, nodes, orders, moments;
+} nb_effort;
+
+static const nb_effort efforts[NEBEL_AIR_QUALITY_COUNT] = {
+    [NEBEL_AIR_FAST] = {12, 32, 6, 6, 2, 4, 3},
+    [NEBEL_AIR_PRECISE] = {20, 40, 6, 6, 3, 5, NB_MOMENTS},
+};
+
+typedef struct nb_maker {
+    const nb_airs *airs;
+    nb_scatter *scatter, *next;
+    const double *albedo;
+    const nb_effort *effort;
+    nb_rule slopes, nodes;
+    double turn_cosines[MOST_TURNS];
+    nb_path path;
+    int first; /* the light to be scattered is the sun's */
+} nb_maker;
+
+/* What arrives at a place from one direction, of light scattered once more. */
+static void gather(nb_maker *maker, nb_track track, nb_aspect aspect, double end, int hits_ground, double light[3])
+{
+    const nb_airs *airs = maker->airs;
+    const nb_path *path = &maker->path;
+    for (int c = 0; c < 3; c++) light[c] = 0;
+    for (int i = 0; i < path->count; i++) {
+        const nb_path_node *node = &path->nodes[i];
+        const double along = (track.rise + node->s) / node->radius;
+        const double sun = (track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
+        const nb_aspect here = {along, aspect.sun, sun};
+        nb_field field;
+        if (maker->first) {
+            double sunlight[3];
+            nb_track_sunlight(airs, (nb_track){node->radius, node->radius * sun}, sunlight);
+            memset(&field, 0, sizeof field);
+            nb_field_add(&field, maker->effort->moments, (nb_aspect){sun, 1, sun}, sunlight);
+        } else {
+            field = nb_scatter_look_up(maker->scatter, airs, node->radius, sun);
+        }
+        double radiance[3];
+        nb_field_scatter(&field, maker->effort->moments, airs, node->density, here, radiance);
+        for (int c = 0; c < 3; c++) light[c] += node->weight * node->transmittance[c] * radiance[c];
+    }
+    if (!hits_ground) return;
+    const double sun = (track.radius * aspect.height_of_sun + end * aspect.sun) / airs->radius;
+    double irradiance[3];
+    if (maker->first) {
+        nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, irradiance);
+        for (int c = 0; c < 3; c++) irradiance[c] *= fmax(0, sun);
+    } else {
+        nb_scatter_look_up_ground(maker->scatter, sun, irradiance);
+    }
+    for (int c = 0; c < 3; c++) light[c] += path->transmittance[c] * maker->albedo[c] / PI * irradiance[c];
+}
+
+/* Adds what comes to all entries of one height from directions of one slope. */
+static void add_slope(nb_maker *maker, int height, double zenith, double weight)
+{
+    static const double nowhere[2] = {-1, -1};
+    const nb_airs *airs = maker->airs;
+    const nb_effort *effort = maker->effort;
+    const double radius = airs->radius + height_at(maker->scatter, airs, height);
+    const nb_track track = {radius, radius * zenith};
+    const double ground = nb_track_enter(track, airs->radius);
+    const int hits = ground < HUGE_VAL;
+    const double end = hits ? ground : nb_track_leave(track, airs->top);
+    nb_path_lay(airs, &maker->nodes, track, end, nowhere, &maker->path);
+    for (int i = 0; i < effort->suns; i++) {
+        const double sun = sun_at(maker->scatter, i), side = sqrt(fmax(0, 1 - sun * sun));
+        const double level = sqrt(fmax(0, 1 - zenith * zenith));
+        for (int k = 0; k < effort->turns; k++) {
+            const double x = level * maker->turn_cosines[k];
+            const nb_aspect aspect = {zenith, x * side + zenith * sun, sun};
+            double light[3];
+            gather(maker, track, aspect, end, hits, light);
+            for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / effort->turns;
+            nb_field_add(&maker->next->fields[height * effort->suns + i], effort->moments, aspect, light);
+            if (height == 0 && zenith > 0)
+                for (int c = 0; c < 3; c++) maker->next->ground[i][c] += zenith * light[c];
+        }
+    }
+}
+
+/* From both sides of the horizon directions are denser near it, where light changes most. */
+static void add_order(nb_maker *maker)
+{
+    const nb_airs *airs = maker->airs;
+    for (int i = 0; i < maker->effort->heights; i++) {
+        const double ratio = airs->radius / (airs->radius + height_at(maker->scatter, airs, i));
+        const double horizon = -sqrt(fmax(0, 1 - ratio * ratio));
+        for (int k = 0; k < maker->slopes.count; k++) {
+            const double part = 0.5 * (1 + maker->slopes.nodes[k]), weight = maker->slopes.weights[k] * part;
+            add_slope(maker, i, horizon + (1 - horizon) * part * part, (1 - horizon) * weight);
+            add_slope(maker, i, horizon - (1 + horizon) * part * part, (1 + horizon) * weight);
+        }
+    }
+}
+
+static size_t entries(const nb_scatter *scatter)
+{
+    return (size_t)scatter->heights * (size_t)scatter->suns;
+}
+
+static nebel_result allocate(const nebel_allocator *allocator, const nb_airs *airs, const nb_effort *effort,
+                             nb_scatter *scatter)
+{
+    *scatter = (nb_scatter){.heights = effort->heights, .suns = effort->suns, .orders = effort->moments};
+    scatter->sun_scale = 0.25 * dip(airs);
+    scatter->first_sun = spread(-fmin(1, 2.5 * dip(airs)), scatter->sun_scale);
+    scatter->last_sun = spread(1, scatter->sun_scale);
+    scatter->fields = nb_allocate_zero(allocator, entries(scatter), sizeof *scatter->fields);
+    scatter->ground = nb_allocate_zero(allocator, (size_t)scatter->suns, sizeof *scatter->ground);
+    return scatter->fields != NULL && scatter->ground != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+}
+
+void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter)
+{
+    nb_release(allocator, scatter->fields);
+    nb_release(allocator, scatter->ground);
+}
+
+/* Adds so many times another table, colour by colour. */
+static void add_table(nb_scatter *sum, const nb_scatter *more, const double times[3])
+{
+    for (size_t i = 0; i < entries(sum); i++)
+        for (int m = 0; m < NB_FIELD; m++)
+            for (int c = 0; c < 3; c++) sum->fields[i].moments[m][c] += times[c] * more->fields[i].moments[m][c];
+    for (int i = 0; i < sum->suns; i++)
+        for (int c = 0; c < 3; c++) sum->ground[i][c] += times[c] * more->ground[i][c];
+}
+
+static double light_of(const nb_scatter *scatter, int c)
+{
+    double sum = 0;
+    for (size_t i = 0; i < entries(scatter); i++) sum += scatter->fields[i].moments[0][c];
+    return sum;
+}
+
+/* Late orders are each the same part of the one before: the orders behind the last one are a geometric series. */
+static void add_rest(nb_scatter *sum, const nb_scatter *last, const double before[3])
+{
+    double times[3];
+    for (int c = 0; c < 3; c++) {
+        const double part = light_of(last, c) / fmax(before[c], DBL_MIN);
+        times[c] = part < 0.99 ? part / (1 - part) : 99;
+    }
+    add_table(sum, last, times);
+}
+
+/* One order after the other: `last` is what the order before has brought, `next` what this one brings. */
+static void sum_orders(nb_maker *maker, nb_scatter *sum, nb_scatter *last, nb_scatter *next)
+{
+    static const double once[3] = {1, 1, 1};
+    double before[3] = {0, 0, 0};
+    for (int order = 1; order <= maker->effort->orders; order++) {
+        maker->first = order == 1;
+        maker->scatter = last;
+        maker->next = next;
+        memset(next->fields, 0, entries(next) * sizeof *next->fields);
+        memset(next->ground, 0, (size_t)next->suns * sizeof *next->ground);
+        add_order(maker);
+        add_table(sum, next, once);
+        if (order == maker->effort->orders) add_rest(sum, next, before);
+        for (int c = 0; c < 3; c++) before[c] = light_of(next, c);
+        seal(next);
+        const nb_scatter other = *last;
+        *last = *next;
+        *next = other;
+    }
+    seal(sum);
+}
+
+nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_airs *airs, nebel_air_quality quality,
+                             const double albedo[3], nb_scatter *scatter)
+{
+    const nb_effort *effort = &efforts[quality];
+    nb_scatter last, next;
+    nb_maker maker = {.airs = airs,
+                      .albedo = albedo,
+                      .effort = effort,
+                      .slopes = nb_rule_make(effort->slopes),
+                      .nodes = nb_rule_make(effort->nodes)};
+    for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
+    nebel_result result = allocate(allocator, airs, effort, scatter);
+    const nebel_result has_last = allocate(allocator, airs, effort, &last),
+                       has_next = allocate(allocator, airs, effort, &next);
+    if (result == NEBEL_OK) result = has_last == NEBEL_OK ? has_next : has_last;
+    if (result == NEBEL_OK) sum_orders(&maker, scatter, &last, &next);
+    nb_scatter_free(allocator, &last);
+    nb_scatter_free(allocator, &next);
+    return result;
+}

@@ -1,0 +1,25 @@
+/* Light that air has scattered, from everywhere, over height and the sun's height. */
+#ifndef NB_PLANET_SCATTER_H
+#define NB_PLANET_SCATTER_H
+
+#include "field.h"
+#include "rule.h"
+
+typedef struct nb_scatter {
+    int heights, suns;
+    double first_sun, last_sun, sun_scale; /* what entries over the sun's height are spread over */
+    int orders;                            /* of moments that are kept, at most NB_MOMENTS */
+    nb_field *fields;    /* [height][sun]: of sunlight that was scattered at least once, for a sun of irradiance 1: the
+                         logarithm of the first moment, and the others as parts of it */
+    double (*ground)[3]; /* [sun]: the logarithm of the same light's irradiance on the ground */
+} nb_scatter;
+
+nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun);
+void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3]);
+
+/* Makes the table; `albedo` is the ground's. Errors: MEMORY. */
+nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_airs *airs, nebel_air_quality quality,
+                             const double albedo[3], nb_scatter *scatter);
+void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter);
+
+#endif

@@ -1,0 +1,556 @@
+/* The air of planets: T12, T13, T30, T31, T40 and T41 of the collected physics, the furnace, and bad input. */
+#include <nebel/planet.h>
+
+#include "planet/atmosphere.h"
+#include "planet/path.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+#include "formulas/planet.inc"
+
+#include "unit.h"
+
+#define PI 3.14159265358979323846
+#define DEGREES (PI / 180)
+
+static void expect_near(const char *what, double got, double wanted, double relative)
+{
+    if (!(fabs(got - wanted) <= relative * fabs(wanted))) fail_msg("%s: %.12g; it should be %.12g", what, got, wanted);
+}
+
+/* ---- optical depth --------------------------------------------------------------------------- */
+
+/* One kind of air that takes 1/m at the ground. */
+static nb_airs make_airs(double radius, double top, double scale)
+{
+    return (nb_airs){.radius = radius, .top = top, .airs = {{.extinction = {1, 1, 1}, .scale = scale}}, .count = 1};
+}
+
+static nb_track track_from(double radius, double zenith)
+{
+    return (nb_track){radius, radius * cos(zenith * DEGREES)};
+}
+
+/* Chapman's function at X: e^-height over a planet whose radius is X scale heights. Below the horizon T12 counts as if
+ * the air went on into the ground. */
+static double chapman(double x, double angle)
+{
+    const double cosine = cos(angle * DEGREES), lowest = x * sin(angle * DEGREES);
+    if (cosine >= 0) return nb_air_length(x, x * cosine, 1, 1e12);
+    return 2 * exp(x - lowest) * nb_air_length(lowest, 0, 1, 1e12) - nb_air_length(x, -x * cosine, 1, 1e12);
+}
+
+static void chapman_is_that_of_T12(void **state)
+{
+    (void)state;
+    static const double angles[] = {0, 30, 60, 75, 85, 90, 92};
+    static const struct {
+        double x, values[7];
+    } rows[] = {{50,
+                 {1, 1.147557389503968, 1.901410753767386, 3.228210295964845, 5.82441153461427, 8.92832792794078,
+                  10.98253507520586}},
+                {200,
+                 {1, 1.152813475785078, 1.97164833800908, 3.639793369877136, 8.27681695528619, 17.75772031700074,
+                  27.62785973729099}},
+                {795,
+                 {1, 1.154218805988315, 1.992564113614203, 3.799511552787073, 10.13831325324861, 35.35478740004325,
+                  96.07018359541071}},
+                {1000,
+                 {1, 1.154317169140512, 1.994070666833737, 3.812137613526903, 10.35179932774321, 39.64813081296021,
+                  126.1046023107734}},
+                {5300,
+                 {1, 1.154627970454929, 1.998870478574592, 3.853634264529489, 11.20971931867749, 91.24910192149449,
+                  4580.251729695695}}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        for (int k = 0; k < 7; k++) expect_near("Chapman", chapman(rows[i].x, angles[k]), rows[i].values[k], 4e-9);
+}
+
+static void lengths_are_those_of_T13(void **state)
+{
+    (void)state;
+    static const double rows[][5] = {
+        {8, 0, 0, 100, 7.999970186774623},
+        {8, 0, 60, 195.5592129305035, 15.94045603926011},
+        {8, 0, 85, 706.3480964018881, 81.10635762834525},
+        {8, 0, 90, 1132.254388377453, 282.8381350729285},
+        {8, 10, 95, 129.8267670070311, 76.1184334348113},
+        {8, 1, 91, 1243.093940244648, 388.0146601597486},
+        {1.2, 0, 0, 100, 1.2},
+        {1.2, 0, 60, 195.5592129305035, 2.398644574289511},
+        {1.2, 0, 85, 706.3480964018881, 13.45166318241299},
+        {1.2, 0, 90, 1132.254388377453, 109.4989223057934},
+        {1.2, 10, 95, 129.8267670070311, 17.26555231138646},
+        {1.2, 1, 91, 1243.093940244648, 191.629293746838},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const double *row = rows[i];
+        const nb_airs airs = make_airs(6360, 6460, row[0]);
+        const nb_track track = track_from(6360 + row[1], row[2]);
+        const double end = fmin(nb_track_enter(track, airs.radius), nb_track_leave(track, airs.top));
+        double depth[3];
+        nb_track_depth(&airs, track, end, depth);
+        expect_near("way", end, row[3], 1e-10);
+        expect_near("length", depth[0], row[4], 4e-9);
+    }
+}
+
+/* Any piece of a ray is what both of its halves are. */
+static void pieces_add_up(void **state)
+{
+    (void)state;
+    nb_airs airs = make_airs(6360, 6460, 8);
+    airs.airs[1] = (nb_air){.extinction = {2, 0, 1}, .center = 25, .width = 15};
+    airs.count = 2;
+    for (int i = 0; i < 1000; i++) {
+        const nb_track track = track_from(6361 + 97.0 * (i % 17) / 17, 93.0 * (i % 31) / 31);
+        const double end = fmin(nb_track_enter(track, airs.radius), nb_track_leave(track, airs.top));
+        const double cut = end * (i % 13) / 13;
+        double whole[3], first[3], rest[3];
+        nb_track_depth(&airs, track, end, whole);
+        nb_track_depth(&airs, track, cut, first);
+        nb_track_depth(&airs, nb_track_ahead(track, cut), end - cut, rest);
+        for (int c = 0; c < 3; c++)
+            if (whole[c] > 0) expect_near("sum", first[c] + rest[c], whole[c], c == 1 ? 4e-9 : 2e-5);
+    }
+}
+
+static nebel_atmosphere *make(const nebel_atmosphere_desc *desc)
+{
+    nebel_atmosphere *atmosphere = NULL;
+    assert_int_equal(nebel_create_atmosphere(desc, &atmosphere), NEBEL_OK);
+    return atmosphere;
+}
+
+static nebel_light trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, nebel_ray ray)
+{
+    nebel_light light;
+    assert_int_equal(nebel_trace_air(atmosphere, sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+    return light;
+}
+
+static void transmittance_is_that_of_T30(void **state)
+{
+    (void)state;
+    static const struct {
+        double height, zenith, left[3];
+    } rows[] = {{0, 0, {0.940358750533824, 0.8676155338551916, 0.7623099761372377}},
+                {0, 60, {0.8847836305216896, 0.753857873568479, 0.5822823929955865}},
+                {0, 80, {0.7129408349046308, 0.45937850094540184, 0.22162743186558614}},
+                {0, 85, {0.5436440049996943, 0.24946636541070918, 0.06362829520185741}},
+                {0, 89, {0.22617603357496321, 0.03923721879735659, 0.0010945432827706909}},
+                {0, 90, {0.10642949387218092, 0.00957975569921481, 5.207093553721818e-05}},
+                {10, 90, {0.5337529126605932, 0.21129856810545702, 0.06686940936695239}},
+                {10, 92, {0.2419706064641268, 0.03397747215487229, 0.0006590211656675128}},
+                {2, 45, {0.9359246538814264, 0.8517230142965991, 0.7449021300051336}}};
+    nebel_atmosphere *earth = make(nebel_find_atmosphere("earth"));
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const double angle = rows[i].zenith * DEGREES;
+        const nebel_ray ray = {{0, 1e3 * rows[i].height, 0}, {sin(angle), cos(angle), 0}, (double)INFINITY};
+        const nebel_light light = trace(earth, NULL, ray);
+        for (int c = 0; c < 3; c++) {
+            expect_near("transmittance", light.transmittance[c], rows[i].left[c], 1e-6);
+            assert_true(light.in_scattering[c] == 0);
+        }
+    }
+    nebel_destroy_atmosphere(earth);
+}
+
+/* The part of light, scattered alike to all sides, that is scattered again before it leaves or meets the ground. */
+static void gain_is_that_of_T31(void **state)
+{
+    (void)state;
+    static const double rows[][4] = {{10, 0.08184176779694083, 0.14650410522771493, 0.25042832065092446},
+                                     {1000, 0.09391954466598366, 0.16878565493378345, 0.296771255787103},
+                                     {10000, 0.09454518608437013, 0.17501879121877703, 0.32030411574217416},
+                                     {50000, 0.06237947042135505, 0.10835963614682466, 0.21987139072115106}};
+    static const double nowhere[2] = {-1, -1};
+    nebel_atmosphere *earth = make(nebel_find_atmosphere("earth"));
+    const nb_airs *airs = &earth->airs;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const double radius = airs->radius + rows[i][0], horizon = -sqrt(1 - pow(airs->radius / radius, 2));
+        double sum[3] = {0, 0, 0};
+        for (int k = 0; k < 2 * 8 * 16; k++) { /* from the horizon up and down, denser near it */
+            const nb_rule *rule = &earth->rule;
+            const double part = (k / 16 + 0.5 * (1 + rule->nodes[k % 8])) / 16,
+                         span = k % 16 < 8 ? 1 - horizon : -1 - horizon;
+            const double weight = 0.5 / 16 * rule->weights[k % 8] * 3 * part * part * fabs(span);
+            const nb_track track = {radius, radius * (horizon + span * part * part * part)};
+            nb_path path;
+            nb_path_lay(airs, rule, track, fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top)),
+                        nowhere, &path);
+            for (int n = 0; n < path.count; n++)
+                for (int c = 0; c < 3; c++) {
+                    const nb_path_node *node = &path.nodes[n];
+                    const double scattering =
+                        airs->airs[0].scattering[c] * node->density[0] + airs->airs[1].scattering[c] * node->density[1];
+                    sum[c] += 0.5 * weight * node->weight * node->transmittance[c] * scattering;
+                }
+        }
+        for (int c = 0; c < 3; c++) expect_near("gain", sum[c], rows[i][1 + c], 1e-4);
+    }
+    nebel_destroy_atmosphere(earth);
+}
+
+/* ---- scattered light ------------------------------------------------------------------------- */
+
+static nb_gathered gather(const nebel_atmosphere *atmosphere, double height, double zenith, double sun)
+{
+    const nb_track track = track_from(atmosphere->airs.radius + height, zenith);
+    nb_gathered gathered;
+    nb_gather(atmosphere, track, (nb_aspect){cos(zenith * DEGREES), cos((zenith - sun) * DEGREES), cos(sun * DEGREES)},
+              fmin(nb_track_enter(track, atmosphere->airs.radius), nb_track_leave(track, atmosphere->airs.top)),
+              &gathered);
+    return gathered;
+}
+
+/* Bruneton's cases that have closed forms, on his small planet; without the phase function. */
+static void light_is_that_of_T40(void **state)
+{
+    (void)state;
+    nebel_atmosphere_desc desc = {
+        .radius = 1e6,
+        .thickness = 5e5,
+        .airs = {{.scattering = {1e-6, 1e-6, 1e-6}, .scale_height = 6e4},
+                 {.scattering = {0, 1.5e-6, 0}, .absorption = {0, 0.5e-6, 2e-6}, .scale_height = 3e4}},
+        .air_count = 2};
+    nebel_atmosphere *small = make(&desc);
+    const nb_track level = {1.4e6, 0}, up = {1.4e6, 1.4e6};
+    double depth[3];
+    expect_near("up", nb_track_leave(up, small->airs.top), 1e5, 1e-12);
+    expect_near("level", nb_track_leave(level, small->airs.top), 538516.4807134504, 1e-12);
+    nb_track_depth(&small->airs, up, 1e5, depth);
+    expect_near("length", depth[0] / 1e-6, 61.93585949521763, 1e-8);
+    const nb_gathered above = gather(small, 0, 0, 0);
+    expect_near("both", 4 * PI * above.once[1], 0.05320320237142445 + 0.039911993097991726, 1e-6);
+    expect_near("Rayleigh", 4 * PI * above.once[2], 0.05320320237142445, 1e-6);
+    expect_near("from above", 4 * PI * gather(small, 5e5, 180, 0).once[0], 0.05652699014088097, 1e-6);
+    nebel_destroy_atmosphere(small);
+    desc.airs[0] = (nebel_air){.absorption = {1.2e-6}, .profile = NEBEL_AIR_LAYER, .center = 2.5e5, .width = 2.5e5};
+    desc.airs[1] = (nebel_air){.scattering = {0, 1e-6, 0}, .scale_height = 1e15};
+    nebel_atmosphere *odd = make(&desc);
+    nb_track_depth(&odd->airs, (nb_track){1e6, 1e6}, 5e5, depth);
+    expect_near("layer", exp(-depth[0]), 0.7408182206817179, 1e-9);
+    nb_track_depth(&odd->airs, level, 538516.4807134504, depth);
+    expect_near("even", exp(-depth[1]), 0.5836134122275815, 1e-8);
+    nebel_destroy_atmosphere(odd);
+}
+
+static const nebel_atmosphere_desc measured = {.radius = 6.36e6,
+                                               .thickness = 6e4,
+                                               .airs = {{.scattering = {5.80234e-6, 13.55776e-6, 33.10001e-6},
+                                                         .phase = {.type = NEBEL_PHASE_RAYLEIGH},
+                                                         .scale_height = 8000},
+                                                        {.scattering = {3.996e-6, 3.996e-6, 3.996e-6},
+                                                         .absorption = {0.444e-6, 0.444e-6, 0.444e-6},
+                                                         .phase = {.type = NEBEL_PHASE_CORNETTE_SHANKS, .g = 0.8},
+                                                         .scale_height = 1200},
+                                                        {.absorption = {0.6497166e-6, 1.8809e-6, 0.08501668e-6},
+                                                         .profile = NEBEL_AIR_LAYER,
+                                                         .center = 25000,
+                                                         .width = 15000}},
+                                               .air_count = 3,
+                                               .ground_albedo = {0.1, 0.1, 0.1}};
+
+/* View's zenith, azimuth from the sun, the sun's zenith, height [km]; once and all orders for red, green and blue. */
+static const double skies[][10] = {
+    {0, 0, 30, 0, 5.5267e-3, 1.06077e-2, 2.1428e-2, 6.408e-3, 1.3134e-2, 3.032e-2},
+    {0, 0, 80, 0, 2.3556e-3, 4.0925e-3, 7.1744e-3, 2.753e-3, 5.289e-3, 1.1524e-2},
+    {60, 180, 60, 0, 6.1458e-3, 1.21793e-2, 2.2922e-2, 7.551e-3, 1.6392e-2, 3.743e-2},
+    {60, 0, 45, 0, 1.90861e-2, 2.8106e-2, 4.5262e-2, 2.0808e-2, 3.3053e-2, 6.185e-2},
+    {85, 90, 85, 0, 1.5207e-2, 1.5720e-2, 9.4888e-3, 1.8496e-2, 2.2052e-2, 2.0703e-2},
+    {80, 180, 88, 0, 1.4227e-2, 1.2390e-2, 8.602e-3, 1.5889e-2, 1.5019e-2, 1.3690e-2},
+    {0, 0, 60, 10, 9.540e-4, 2.1004e-3, 5.0336e-3, 1.1192e-3, 2.6177e-3, 7.176e-3},
+    {120, 90, 45, 30, 2.3913e-2, 2.5179e-2, 3.1942e-2, 2.6427e-2, 3.1098e-2, 4.9953e-2},
+};
+
+/* Where a ray meets the ground the truth has the ground's light, too: once of the sun, else of the sky as well. */
+static void add_ground(const nebel_atmosphere *atmosphere, const nebel_sun *sun, const nebel_ray *ray,
+                       const nebel_light *light, double once[3], double all[3])
+{
+    const double radius = atmosphere->airs.radius, height = ray->origin[1];
+    const nb_track track = {radius + height, (radius + height) * ray->direction[1]};
+    const double way = nb_track_enter(track, radius);
+    if (!(way < HUGE_VAL)) return;
+    double place[3], up[3], cosine = 0;
+    for (int c = 0; c < 3; c++) {
+        place[c] = ray->origin[c] + way * ray->direction[c];
+        up[c] = (place[c] + (c == 1 ? radius : 0)) / radius;
+        cosine += up[c] * sun->direction[c];
+    }
+    nebel_air_light arrives;
+    assert_int_equal(nebel_light_air(atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+    for (int c = 0; c < 3; c++) {
+        once[c] += light->transmittance[c] * 0.1 / PI * cosine * arrives.sun[c];
+        all[c] += light->transmittance[c] * 0.1 / PI * (cosine * arrives.sun[c] + arrives.sky[c]);
+    }
+}
+
+static void skies_are_those_of_T41(void **state)
+{
+    (void)state;
+    for (int quality = 0; quality < NEBEL_AIR_QUALITY_COUNT; quality++) {
+        nebel_atmosphere_desc desc = measured;
+        double worst_once = 0, worst = 0, worst_told = 0;
+        desc.quality = (nebel_air_quality)quality;
+        nebel_atmosphere *earth = make(&desc);
+        for (size_t i = 0; i < sizeof skies / sizeof *skies; i++) {
+            const double *row = skies[i];
+            const double zenith = row[0] * DEGREES, azimuth = row[1] * DEGREES, low = row[2] * DEGREES;
+            const nebel_sun sun = {.direction = {sin(low), cos(low), 0}, .irradiance = {1, 1, 1}};
+            const nebel_ray ray = {{0, 1e3 * row[3], 0},
+                                   {sin(zenith) * cos(azimuth), cos(zenith), sin(zenith) * sin(azimuth)},
+                                   (double)INFINITY};
+            const nebel_light light = trace(earth, &sun, ray);
+            const nb_track track = {earth->airs.radius + ray.origin[1],
+                                    (earth->airs.radius + ray.origin[1]) * cos(zenith)};
+            const double cosine = ray.direction[0] * sun.direction[0] + ray.direction[1] * sun.direction[1];
+            nb_gathered gathered;
+            nb_gather(earth, track, (nb_aspect){cos(zenith), cosine, cos(low)},
+                      fmin(nb_track_enter(track, earth->airs.radius), nb_track_leave(track, earth->airs.top)),
+                      &gathered);
+            double all[3];
+            memcpy(all, light.in_scattering, sizeof all);
+            add_ground(earth, &sun, &ray, &light, gathered.once, all);
+            for (int c = 0; c < 3; c++) {
+                worst_once = fmax(worst_once, fabs(gathered.once[c] / row[4 + c] - 1));
+                worst = fmax(worst, fabs(all[c] / row[7 + c] - 1));
+                /* Of the truth 4 standard errors of 8e-4 are not known. */
+                worst_told = fmax(worst_told, (fabs(all[c] - row[7 + c]) - 3.2e-3 * row[7 + c]) / light.error);
+            }
+        }
+        print_message("quality %d: once %.2e off, all orders %.2e, %.2f of the error told\n", quality, worst_once,
+                      worst, worst_told);
+        assert_true(worst_once <= 2e-3 && worst <= (quality == NEBEL_AIR_PRECISE ? 0.01 : 0.03) && worst_told <= 1);
+        nebel_destroy_atmosphere(earth);
+    }
+}
+
+/* Other airs: both qualities agree within what they say of themselves. */
+static void qualities_agree(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"earth", "mars", "toy"};
+    for (int n = 0; n < 3; n++) {
+        nebel_atmosphere_desc desc = *nebel_find_atmosphere(names[n]);
+        nebel_atmosphere *fast = make(&desc);
+        desc.quality = NEBEL_AIR_PRECISE;
+        nebel_atmosphere *precise = make(&desc);
+        double worst = 0, most = 0;
+        for (int i = 0; i < 400; i++) {
+            const double zenith = PI * (i % 20 + 0.5) / 20, azimuth = PI * (i % 7) / 6,
+                         low = 100 * DEGREES * (i / 20) / 19;
+            const nebel_sun sun = {.direction = {sin(low), cos(low), 0}, .irradiance = {1, 1, 1}};
+            const nebel_ray ray = {{0, desc.thickness * (i % 3) / 5, 0},
+                                   {sin(zenith) * cos(azimuth), cos(zenith), sin(zenith) * sin(azimuth)},
+                                   (double)INFINITY};
+            const nebel_light a = trace(fast, &sun, ray), b = trace(precise, &sun, ray);
+            for (int c = 0; c < 3; c++) {
+                worst = fmax(worst, fabs(a.in_scattering[c] - b.in_scattering[c]) / (a.error + b.error));
+                most = fmax(
+                    most, a.error / fmax(1e-4, fmax(fmax(a.in_scattering[0], a.in_scattering[1]), a.in_scattering[2])));
+            }
+        }
+        print_message("%s: apart by at most %.2f of both errors told; fast tells at most %.2f of the light\n", names[n],
+                      worst, most);
+        assert_true(worst <= 1);
+        nebel_destroy_atmosphere(fast);
+        nebel_destroy_atmosphere(precise);
+    }
+}
+
+/* Air and ground that take nothing, in light from everywhere: everything looks alike. */
+static void a_furnace_stays_white(void **state)
+{
+    (void)state;
+    enum { RINGS = 24, TURNS = 48 };
+    const nebel_atmosphere_desc desc = {.radius = 6.36e6,
+                                        .thickness = 1e5,
+                                        .airs = {{.scattering = {5.802e-6, 13.558e-6, 33.1e-6},
+                                                  .phase = {.type = NEBEL_PHASE_RAYLEIGH},
+                                                  .scale_height = 8000},
+                                                 {.scattering = {4e-6, 4e-6, 4e-6},
+                                                  .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5},
+                                                  .scale_height = 1200}},
+                                        .air_count = 2,
+                                        .ground_albedo = {1, 1, 1},
+                                        .quality = NEBEL_AIR_PRECISE};
+    static const double zeniths[] = {0, 60, 85, 90, 93, 120, 180};
+    nebel_atmosphere *white = make(&desc);
+    for (int i = 0; i < 7; i++) {
+        const double angle = zeniths[i] * DEGREES, height = zeniths[i] > 90 ? 2e4 : 100;
+        const nebel_ray ray = {{0, height, 0}, {sin(angle), cos(angle), 0}, (double)INFINITY};
+        const nb_track track = {6.36e6 + height, (6.36e6 + height) * cos(angle)};
+        const double way = nb_track_enter(track, 6.36e6);
+        double light[3] = {0, 0, 0}, ground[3] = {0, 0, 0};
+        nebel_light clear = {.error = 0};
+        for (int k = 0; k < RINGS * TURNS; k++) {
+            const double z = 2 * (k / TURNS + 0.5) / RINGS - 1, turn = 2 * PI * (k % TURNS + 0.5) / TURNS,
+                         weight = 4 * PI / (RINGS * TURNS);
+            const nebel_sun sun = {.direction = {sqrt(1 - z * z) * cos(turn), z, sqrt(1 - z * z) * sin(turn)},
+                                   .irradiance = {weight, weight, weight}};
+            clear = trace(white, &sun, ray);
+            for (int c = 0; c < 3; c++) light[c] += clear.in_scattering[c];
+            if (!(way < HUGE_VAL)) continue;
+            nebel_air_light arrives;
+            const double place[3] = {way * ray.direction[0], height + way * ray.direction[1], 0};
+            const double up[2] = {place[0] / 6.36e6, 1 + place[1] / 6.36e6};
+            const double cosine = fmax(0, up[0] * sun.direction[0] + up[1] * sun.direction[1]);
+            assert_int_equal(nebel_light_air(white, &sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+            for (int c = 0; c < 3; c++) ground[c] += (cosine * arrives.sun[c] + arrives.sky[c]) / PI;
+        }
+        for (int c = 0; c < 3; c++) {
+            const double behind = way < HUGE_VAL ? ground[c] : 1;
+            expect_near("white", light[c] + clear.transmittance[c] * behind, 1, 0.01);
+        }
+    }
+    nebel_destroy_atmosphere(white);
+}
+
+/* ---- odd places and bad input ---------------------------------------------------------------- */
+
+static void odd_rays_have_answers(void **state)
+{
+    (void)state;
+    const nebel_sun sun = {.direction = {0.6, 0.8, 0}, .irradiance = {1, 1, 1}};
+    static const char *const names[] = {"earth", "mars", "toy"};
+    for (int i = 0; i < 3; i++) {
+        const nebel_atmosphere_desc *desc = nebel_find_atmosphere(names[i]);
+        nebel_atmosphere *air = make(desc);
+        const double radius = desc->radius, top = desc->thickness;
+        const double places[][3] = {{0, 0, 0},       {0, -radius, 0}, {0, -radius / 2, 0}, {0, top, 0},
+                                    {0, 2 * top, 0}, {0, 1e15, 0},    {1e15, 1e15, -1e15}, {radius, -radius, 0}};
+        const double ways[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {1e-300, 0, 0}, {1e300, -1e300, 0}, {-1, -1, 1}};
+        const double reach[] = {0, 1e-9, 1, 1e5, (double)INFINITY};
+        for (int p = 0; p < 8; p++)
+            for (int w = 0; w < 6; w++)
+                for (int r = 0; r < 5; r++) {
+                    nebel_ray ray = {.t_max = reach[r]};
+                    memcpy(ray.origin, places[p], sizeof ray.origin);
+                    memcpy(ray.direction, ways[w], sizeof ray.direction);
+                    const nebel_light light = trace(air, &sun, ray);
+                    for (int c = 0; c < 3; c++) {
+                        assert_true(light.transmittance[c] >= 0 && light.transmittance[c] <= 1);
+                        assert_true(light.in_scattering[c] >= 0 && light.in_scattering[c] < 1);
+                        if (reach[r] == 0) assert_true(light.transmittance[c] == 1 && light.in_scattering[c] == 0);
+                    }
+                    assert_true(light.error >= 0 && light.error < 1);
+                }
+        nebel_destroy_atmosphere(air);
+    }
+}
+
+/* The planet seen from 1e15 m away is the same as from close by. */
+static void distance_changes_nothing(void **state)
+{
+    (void)state;
+    nebel_atmosphere *earth = make(nebel_find_atmosphere("earth"));
+    const nebel_sun sun = {.direction = {1, 0.2, 0}, .irradiance = {1, 1, 1}};
+    for (int i = 0; i < 20; i++) {
+        const double x = 6.4e6 * i / 19 + 1e4;
+        const nebel_light near_by = trace(earth, &sun, (nebel_ray){{x, 1e6, 0}, {0, -1, 0}, (double)INFINITY});
+        const nebel_light far_away = trace(earth, &sun, (nebel_ray){{x, 1e14, 0}, {0, -1, 0}, (double)INFINITY});
+        for (int c = 0; c < 3; c++) {
+            assert_true(fabs(near_by.transmittance[c] - far_away.transmittance[c]) <= 1e-5);
+            assert_true(fabs(near_by.in_scattering[c] - far_away.in_scattering[c]) <= 1e-6);
+        }
+    }
+    nebel_destroy_atmosphere(earth);
+}
+
+static void expect_fault(const nebel_atmosphere_desc *desc)
+{
+    nebel_atmosphere *none = (nebel_atmosphere *)1;
+    assert_int_equal(nebel_create_atmosphere(desc, &none), NEBEL_ERROR_VALUE);
+    assert_null(none);
+}
+
+static void bad_numbers_are_refused(void **state)
+{
+    (void)state;
+    static const double bad[] = {-1, 1e300, (double)NAN, (double)INFINITY, -(double)INFINITY};
+    for (int i = 0; i < 5; i++) {
+        const double x = bad[i];
+        expect_fault(&(nebel_atmosphere_desc){.radius = x});
+        expect_fault(&(nebel_atmosphere_desc){.thickness = x});
+        expect_fault(&(nebel_atmosphere_desc){.ground_albedo = {0, x, 0}});
+        if (i > 0) expect_fault(&(nebel_atmosphere_desc){.ground = {0, x, 0}});
+        expect_fault(&(nebel_atmosphere_desc){.airs = {{.scattering = {x}, .scale_height = 1e4}}, .air_count = 1});
+        expect_fault(&(nebel_atmosphere_desc){.airs = {{.absorption = {x}, .scale_height = 1e4}}, .air_count = 1});
+        expect_fault(&(nebel_atmosphere_desc){.airs = {{.scale_height = x}}, .air_count = 1});
+    }
+    expect_fault(&(nebel_atmosphere_desc){.airs = {{.scale_height = 0}}, .air_count = 1});
+    expect_fault(&(nebel_atmosphere_desc){.thickness = 1, .radius = 1e7});
+    expect_fault(&(nebel_atmosphere_desc){.air_count = NEBEL_MAX_AIRS + 1});
+    expect_fault(&(nebel_atmosphere_desc){.quality = NEBEL_AIR_QUALITY_COUNT});
+    nebel_atmosphere *earth = make(&(nebel_atmosphere_desc){.radius = 0});
+    nebel_light light;
+    const nebel_ray good = {{0, 0, 0}, {0, 1, 0}, 1}, still = {{0, 0, 0}, {0, 0, 0}, 1},
+                    back = {{0, 0, 0}, {0, 1, 0}, -1};
+    const nebel_sun none = {.irradiance = {1}}, dark = {.direction = {0}}, negative = {{0, 1, 0}, {-1}};
+    assert_int_equal(nebel_trace_air(earth, &none, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &negative, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &dark, 1, &still, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, &dark, 1, &back, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(NULL, &dark, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_air(earth, NULL, 0, NULL, 0, NULL, 0), NEBEL_OK);
+    nebel_destroy_atmosphere(earth);
+    nebel_destroy_atmosphere(NULL);
+    assert_null(nebel_find_atmosphere("venus"));
+    assert_null(nebel_find_atmosphere(NULL));
+}
+
+/* Fails at the n-th call. */
+static void *allocate_some(size_t size, void *user)
+{
+    int *left = user;
+    return (*left)-- > 0 ? malloc(size) : NULL;
+}
+
+static void release_some(void *memory, void *user)
+{
+    (void)user;
+    free(memory);
+}
+
+static void memory_may_run_out(void **state)
+{
+    (void)state;
+    for (int calls = 0;; calls++) {
+        int left = calls;
+        nebel_atmosphere *atmosphere = NULL;
+        const nebel_atmosphere_desc desc = {.allocator = {allocate_some, release_some, &left}};
+        const nebel_result result = nebel_create_atmosphere(&desc, &atmosphere);
+        nebel_destroy_atmosphere(atmosphere);
+        if (result == NEBEL_OK) break;
+        assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        assert_null(atmosphere);
+        assert_true(calls < 20);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(chapman_is_that_of_T12),
+        cmocka_unit_test(lengths_are_those_of_T13),
+        cmocka_unit_test(pieces_add_up),
+        cmocka_unit_test(transmittance_is_that_of_T30),
+        cmocka_unit_test(gain_is_that_of_T31),
+        cmocka_unit_test(light_is_that_of_T40),
+        cmocka_unit_test(skies_are_those_of_T41),
+        cmocka_unit_test(qualities_agree),
+        cmocka_unit_test(a_furnace_stays_white),
+        cmocka_unit_test(odd_rays_have_answers),
+        cmocka_unit_test(distance_changes_nothing),
+        cmocka_unit_test(bad_numbers_are_refused),
+        cmocka_unit_test(memory_may_run_out),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
