@@ -93,6 +93,7 @@ static void set_holed(holed *h, uint64_t seed, float (*positions)[3])
 }
 
 typedef struct trial {
+    nb_sun_cells cells;
     nb_shadow_tree tree;
     nb_shafts shafts;
     nb_rays rays;
@@ -164,47 +165,121 @@ static void report_trial(const trial *run)
     assert_true(run->wrong <= run->shadows / 10000);
 }
 
+/* With the sun from different sides, level and straight above among them. */
+static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t numbers, trial *run)
+{
+    double sun[3] = {dice(&numbers, -1, 1), seed == 3 ? 0 : dice(&numbers, 0, 1), seed == 4 ? 0 : 1};
+    if (seed == 5) sun[0] = sun[1] = 0;
+    nb_vector_make_unit(sun);
+    const nebel_camera camera = trial_camera(seed);
+    nb_geometry geometry = place_triangles(scene, &camera, &run->view);
+    assert_int_equal(nb_sun_cells_set(&run->cells, &geometry, sun), NEBEL_OK);
+    nb_region_points points;
+    nb_sample_region(0, 1, &points);
+    for (int first = 0; first < NB_PIXELS; first += 4 * NB_BATCH) {
+        const nb_lit_box box = {{-12, -12, -12}, {12, seed == 2 ? 3 : 12, 12}};
+        nb_view_rays(&run->view, 0, 0, points.x + first, points.y + first, &run->rays);
+        for (int i = 0; i < NB_BATCH; i++) run->distance[i] = i % 5 == 0 ? 20 : INFINITY;
+        const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+        assert_int_equal(nb_shafts_find(&run->shafts, &geometry.allocator, &run->cells, seed == 2 ? &box : &all,
+                                        &run->rays, run->view.advance, run->distance),
+                         NEBEL_OK);
+        run->toggles += run->shafts.toggle_count;
+        const nebel_lit_pieces lit = {run->shafts.first, run->shafts.toggles};
+        for (int i = 0; i < NB_BATCH; i++) {
+            expect_rising(&lit, i);
+            if (seed != 2) compare_places(run, &geometry, &lit, sun, NULL, i, &numbers);
+        }
+    }
+    nb_geometry_free(&geometry);
+}
+
+static void end_trial(trial *run)
+{
+    const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
+    nb_shafts_free(&run->shafts, &allocator);
+    report_trial(run);
+}
+
 /* One in 10,000 places may be within rounding of a needle. */
 static void ends_are_those_of_visibility(void **state)
 {
     static float positions[3 * TRIANGLES][3];
     static holed h;
     static trial run;
+    const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
     (void)state;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 31 * seed + 7;
         draw_triangles(&numbers, positions);
         positions[5][1] = NAN;
         set_holed(&h, seed, positions);
-        double sun[3] = {dice(&numbers, -1, 1), seed == 3 ? 0 : dice(&numbers, 0, 1), seed == 4 ? 0 : 1};
-        if (seed == 5) sun[0] = sun[1] = 0;
-        nb_vector_make_unit(sun);
-        const nebel_camera camera = trial_camera(seed);
-        nb_geometry geometry = place_triangles(&h.scene, &camera, &run.view);
-        assert_int_equal(nb_shadow_tree_set_sun(&run.tree, &geometry, sun, 1), NEBEL_OK);
-        nb_region_points points;
-        nb_sample_region(0, 1, &points);
-        for (int first = 0; first < NB_PIXELS; first += 4 * NB_BATCH) {
-            const nb_lit_box box = {{-12, -12, -12}, {12, seed == 2 ? 3 : 12, 12}};
-            nb_view_rays(&run.view, 0, 0, points.x + first, points.y + first, &run.rays);
-            for (int i = 0; i < NB_BATCH; i++) run.distance[i] = i % 5 == 0 ? 20 : INFINITY;
-            const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
-            assert_int_equal(nb_shafts_find(&run.shafts, &geometry.allocator, &run.tree, seed == 2 ? &box : &all,
-                                            &run.rays, run.view.advance, run.distance),
-                             NEBEL_OK);
-            run.toggles += run.shafts.toggle_count;
-            const nebel_lit_pieces lit = {run.shafts.first, run.shafts.toggles};
-            for (int i = 0; i < NB_BATCH; i++) {
-                expect_rising(&lit, i);
-                if (seed != 2) compare_places(&run, &geometry, &lit, sun, NULL, i, &numbers);
-            }
-        }
-        nb_shadow_tree_free(&run.tree, &geometry.allocator);
-        nb_geometry_free(&geometry);
+        try_scene(&h.scene, seed, numbers, &run);
+        nb_sun_cells_free(&run.cells, &allocator);
     }
+    end_trial(&run);
+}
+
+enum { FIELDS = 48, FIELD_POINTS = (FIELDS + 1) * (FIELDS + 1) };
+
+/* Steep hills, whose slopes hide each other; with holes, and triangles whose corners go round the wrong way, where
+ * `is_torn`. Returns how many indices there are. */
+static uint32_t draw_hills(uint64_t *numbers, int is_torn, float (*positions)[3], uint32_t *indices)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < FIELD_POINTS; i++) {
+        const double x = (double)(i % (FIELDS + 1)) / FIELDS, z = (double)(i / (FIELDS + 1)) / FIELDS;
+        positions[i][0] = (float)(20 * x - 10);
+        positions[i][1] = (float)(2 * sin(17 * x) * sin(11 * z) + dice(numbers, -0.4, 0.4));
+        positions[i][2] = (float)(20 * z - 10);
+    }
+    for (uint32_t i = 0; i < FIELDS * FIELDS; i++) {
+        const uint32_t a = i / FIELDS * (FIELDS + 1) + i % FIELDS, c = a + FIELDS + 1;
+        const uint32_t corners[2][6] = {{a, c, c + 1, a, c + 1, a + 1}, {a, c + 1, c, a, c + 1, a + 1}};
+        const double fate = is_torn ? dice(numbers, 0, 1) : 1;
+        if (fate < 0.05) continue;
+        memcpy(indices + count, corners[fate < 0.1], sizeof corners[0]);
+        count += 6;
+    }
+    return count;
+}
+
+static size_t count_covered(const nb_sun_cells *cells)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < cells->node_count; i++)
+        for (int k = 0; k < NB_CELL_FAN; k++) count += isfinite(cells->nodes[i].covered[k]) ? 1 : 0;
+    return count;
+}
+
+/* Where a landscape covers cells, and where it does not quite. */
+static void ends_behind_hills_are_those_of_visibility(void **state)
+{
+    static float positions[FIELD_POINTS][3];
+    static uint32_t indices[6 * FIELDS * FIELDS];
+    static holed h;
+    static trial run;
+    size_t covered = 0;
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
-    nb_shafts_free(&run.shafts, &allocator);
-    report_trial(&run);
+    (void)state;
+    for (uint64_t seed = 0; seed < 12; seed++) {
+        uint64_t numbers = 41 * seed + 3;
+        const uint32_t count = draw_hills(&numbers, seed % 2 == 1, positions, indices);
+        set_holed(&h, seed, positions);
+        h.mesh = (nebel_mesh){.positions = positions[0],
+                              .uvs = &positions[0][0], /* any */
+                              .indices = indices,
+                              .vertex_count = FIELD_POINTS,
+                              .triangle_count = count / 3,
+                              .texture = -1,
+                              .alpha_cutoff = seed % 4 == 2 ? 0.4f : 0};
+        try_scene(&h.scene, seed, numbers, &run);
+        covered += count_covered(&run.cells);
+        nb_sun_cells_free(&run.cells, &allocator);
+    }
+    print_message("%zu cells are covered\n", covered);
+    assert_true(covered > 1000);
+    end_trial(&run);
 }
 
 enum { LAMPS = 4 };
@@ -614,6 +689,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ends_are_those_of_visibility),
+        cmocka_unit_test(ends_behind_hills_are_those_of_visibility),
         cmocka_unit_test(ends_of_lamplight_are_those_of_visibility),
         cmocka_unit_test(the_shadow_of_a_box_is_cut_out),
         cmocka_unit_test(shafts_are_those_of_small_steps),

@@ -75,7 +75,7 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
     const nebel_renderer *renderer = frame->renderer;
     nebel_result result = NEBEL_OK;
     if (frame->has_shafts) {
-        result = nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_tree, &frame->sunlit_box,
+        result = nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_cells, &frame->sunlit_box,
                                 &scratch->rays, frame->view.advance, scratch->distance);
         *sunlit = (nebel_lit_pieces){scratch->shafts.first, scratch->shafts.toggles};
         trace->sunlit = sunlit;

@@ -54,7 +54,7 @@ static nebel_result set_shafts(nb_frame *frame)
     frame->has_lamp_shafts = may && nebel_snapshot_lamplit_fog(renderer->fog, min, max);
     if (frame->has_shafts) {
         frame->sunlit_box = box_of(geometry, fog.min, fog.max);
-        result = nb_shadow_tree_set_sun(&renderer->sun_tree, geometry, fog.direction, renderer->threads);
+        result = nb_sun_cells_set(&renderer->sun_cells, geometry, fog.direction);
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
         frame->lamplit_box = box_of(geometry, min, max);

@@ -2,6 +2,7 @@
 #ifndef NB_CPU_LAMP_SHAFTS_H
 #define NB_CPU_LAMP_SHAFTS_H
 
+#include "shadow_tree.h"
 #include "shafts.h"
 
 #include <nebel/nebel.h>

@@ -231,7 +231,7 @@ void nebel_destroy_renderer(nebel_renderer *renderer)
     if (renderer == NULL) return;
     const nebel_allocator allocator = renderer->allocator;
     nb_geometry_free(&renderer->geometry);
-    nb_shadow_tree_free(&renderer->sun_tree, &allocator);
+    nb_sun_cells_free(&renderer->sun_cells, &allocator);
     nb_shadow_tree_free(&renderer->lamp_tree, &allocator);
     for (int i = 0; i < renderer->threads && renderer->scratch != NULL; i++) {
         nb_shafts_free(&renderer->scratch[i].shafts, &allocator);

@@ -72,7 +72,7 @@ struct nebel_renderer {
     nebel_isa fog_isa;
     int threads;
     nb_geometry geometry;
-    nb_shadow_tree sun_tree;  /* for the last frame with fog that the sun lights */
+    nb_sun_cells sun_cells;   /* for the last frame with fog that the sun lights */
     nb_shadow_tree lamp_tree; /* the same of lamps */
     nb_srgb_table table;
     void *scratch_memory;

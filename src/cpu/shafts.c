@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const float far_away = 1e18f;
 
@@ -43,10 +44,10 @@ void nb_shafts_clip(const nb_lit_box *box, const nb_rays *rays, double advance, 
     clip(box, rays, advance, distance, from, to);
 }
 
-NB_CLONES static void turn(const nb_shadow_tree *tree, const nb_rays *rays, int first, nb_shaft_rays *packet)
+NB_CLONES static void turn(const nb_sun_cells *cells, const nb_rays *rays, int first, nb_shaft_rays *packet)
 {
     for (int a = 0; a < 3; a++) {
-        const float x = tree->axes[a][0], y = tree->axes[a][1], z = tree->axes[a][2];
+        const float x = cells->axes[a][0], y = cells->axes[a][1], z = cells->axes[a][2];
         NB_SIMD
         for (int i = 0; i < NB_PACKET; i++) {
             const int k = first + i;
@@ -62,7 +63,7 @@ NB_CLONES static void turn(const nb_shadow_tree *tree, const nb_rays *rays, int 
 
 static int touch(float enter, float leave, float other_enter, float other_leave)
 {
-    const float gap = nb_closeness * fabsf(fminf(leave, other_leave));
+    const float gap = nb_closeness * fabsf(nb_least(leave, other_leave));
     return (enter <= other_leave + gap) & (leave >= other_enter - gap);
 }
 
@@ -72,8 +73,8 @@ int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t
     if (!(enter <= leave)) return 1;
     nb_shadow *before = rays->kept[lane] > 0 ? &shafts->shadows[rays->kept[lane] - 1] : NULL;
     if (before != NULL && touch(enter, leave, before->enter, before->leave)) {
-        before->enter = fminf(enter, before->enter);
-        before->leave = fmaxf(leave, before->leave);
+        before->enter = nb_least(enter, before->enter);
+        before->leave = nb_most(leave, before->leave);
         return 1;
     }
     if (shafts->shadow_count == shafts->shadow_capacity) {
@@ -88,95 +89,216 @@ int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t
     return 1;
 }
 
-/* Whether any ray may meet a shadow of this child where it is not known to be in shadow. */
-NB_ALWAYS_INLINE int enters(const nb_shadow_node *node, int child, const nb_shaft_rays *rays)
+/* ---- cells ----------------------------------------------------------------------------------- */
+
+/* A border that a beam comes to at `scale` (border - at) m from its beginning, or later by `never`. */
+typedef struct nb_border {
+    float at, scale, never;
+} nb_border;
+
+/* A packet as one ray that has a width. Of each axis of the plane, where the first of its rays may enter a child and the
+ * last may leave it; and the depth of the deepest ray. */
+typedef struct nb_beam {
+    float from, length; /* m along the rays */
+    int falls[2];       /* it comes to the high border first */
+    nb_border enter[2], leave[2], depth;
+    int rises;               /* towards where shadows are */
+    float least, least_rise; /* depth of the ray that is least deep */
+} nb_beam;
+
+/* What rays do along an axis. */
+typedef struct nb_spread {
+    float low, high, way_low, way_high; /* places where the beam begins; changes of them for each m */
+} nb_spread;
+
+static nb_spread spread_along(const nb_shaft_rays *rays, int axis, float from)
 {
-    const float low_x = node->low[0][child], high_x = node->high[0][child];
-    const float low_y = node->low[1][child], high_y = node->high[1][child], first = node->low[2][child];
-    int some[NB_PACKET], any = 0;
-    NB_SIMD
+    nb_spread s = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     for (int i = 0; i < NB_PACKET; i++) {
-        const float x = rays->start[0][i], y = rays->start[1][i], z = rays->start[2][i];
-        const float ix = rays->inverse[0][i], iy = rays->inverse[1][i], iz = rays->inverse[2][i];
-        const float ax = (low_x - x) * ix, bx = (high_x - x) * ix, ay = (low_y - y) * iy, by = (high_y - y) * iy;
-        const float az = (first - z) * iz;
-        float enter = rays->from[i], leave = rays->to[i];
-        const float near_x = ax < bx ? ax : bx, far_x = ax < bx ? bx : ax;
-        const float near_y = ay < by ? ay : by, far_y = ay < by ? by : ay;
-        const float near_z = iz > 0 ? az : -INFINITY, far_z = iz > 0 ? INFINITY : az;
-        enter = near_x > enter ? near_x : enter;
-        enter = near_y > enter ? near_y : enter;
-        enter = near_z > enter ? near_z : enter;
-        leave = far_x < leave ? far_x : leave;
-        leave = far_y < leave ? far_y : leave;
-        leave = far_z < leave ? far_z : leave;
-        some[i] = (enter < leave) & ((enter < rays->enter[i]) | (leave > rays->leave[i]));
+        if (!(rays->from[i] < rays->to[i])) continue;
+        const float way = rays->way[axis][i], start = rays->start[axis][i] + way * from;
+        s.low = start < s.low ? start : s.low;
+        s.high = start > s.high ? start : s.high;
+        s.way_low = way < s.way_low ? way : s.way_low;
+        s.way_high = way > s.way_high ? way : s.way_high;
     }
-    for (int i = 0; i < NB_PACKET; i++) any |= some[i];
-    return any;
+    const float rounding = 0x1p-21f * (s.high > -s.low ? s.high : -s.low);
+    s.low -= rounding;
+    s.high += rounding;
+    return s;
 }
+
+/* Where rays part, some rising and some falling, they enter by the low border if at all, and never leave. */
+static void set_axis(nb_beam *beam, int axis, const nb_spread *s)
+{
+    const nb_border low = {s->high, reciprocal(s->way_high), 0}, high = {s->low, reciprocal(s->way_low), 0};
+    beam->falls[axis] = s->way_high < 0;
+    beam->enter[axis] = beam->falls[axis] ? high : low;
+    beam->leave[axis] = beam->falls[axis] ? low : high;
+    if (s->way_low < 0 && s->way_high >= 0) beam->leave[axis] = (nb_border){0, 0, INFINITY};
+}
+
+static void set_beam(const nb_shaft_rays *rays, nb_beam *beam)
+{
+    float from = INFINITY, to = -INFINITY;
+    for (int i = 0; i < NB_PACKET; i++) {
+        const int counts = rays->from[i] < rays->to[i];
+        from = counts && rays->from[i] < from ? rays->from[i] : from;
+        to = counts && rays->to[i] > to ? rays->to[i] : to;
+    }
+    beam->from = from;
+    beam->length = to - from;
+    for (int axis = 0; axis < 2; axis++) {
+        const nb_spread s = spread_along(rays, axis, from);
+        set_axis(beam, axis, &s);
+    }
+    const nb_spread s = spread_along(rays, 2, from);
+    beam->rises = s.way_high >= 0;
+    beam->depth = (nb_border){s.high, reciprocal(s.way_high), 0};
+    beam->least = s.low;
+    beam->least_rise = s.way_low;
+}
+
+/* Children as bits of a number: those in whose shadows the beam may come, and, 16 bits above them, those in which it is
+ * in shadow all along. */
+typedef struct nb_met {
+    uint32_t children;
+    float begin[NB_CELL_FAN], end[NB_CELL_FAN]; /* m along the beam */
+} nb_met;
+
+NB_ALWAYS_INLINE void meet_children(const nb_cell_node *node, const nb_beam *beam, nb_met *met)
+{
+    const float *restrict first_x = beam->falls[0] ? node->high[0] : node->low[0];
+    const float *restrict last_x = beam->falls[0] ? node->low[0] : node->high[0];
+    const float *restrict first_y = beam->falls[1] ? node->high[1] : node->low[1];
+    const float *restrict last_y = beam->falls[1] ? node->low[1] : node->high[1];
+    const nb_border x0 = beam->enter[0], y0 = beam->enter[1], x1 = beam->leave[0], y1 = beam->leave[1];
+    const nb_border z = beam->depth;
+    const float soonest = beam->rises ? 0 : -INFINITY, latest = beam->rises ? INFINITY : 0;
+    const float length = beam->length, least = beam->least, rise = beam->least_rise;
+    uint32_t children = 0;
+    NB_SIMD
+    for (int i = 0; i < NB_CELL_FAN; i++) {
+        const float in_x = (first_x[i] - x0.at) * x0.scale, in_y = (first_y[i] - y0.at) * y0.scale;
+        const float out_x = (last_x[i] - x1.at) * x1.scale + x1.never;
+        const float out_y = (last_y[i] - y1.at) * y1.scale + y1.never;
+        const float deep = (node->nearest[i] - z.at) * z.scale;
+        float enter = in_x > in_y ? in_x : in_y, leave = out_x < out_y ? out_x : out_y;
+        const float in_z = deep + soonest, out_z = deep + latest;
+        enter = enter > 0 ? enter : 0;
+        enter = enter > in_z ? enter : in_z;
+        leave = leave < length ? leave : length;
+        leave = leave < out_z ? leave : out_z;
+        const float depth = least + rise * (rise >= 0 ? enter : leave);
+        met->begin[i] = enter;
+        met->end[i] = leave;
+        const uint32_t meets = enter <= leave ? 1u << i : 0, hides = depth >= node->covered[i] ? 0x10000u << i : 0;
+        children |= meets | hides;
+    }
+    met->children = children;
+}
+
+enum { VISITS = NB_CELL_LEVELS * NB_CELL_FAN };
 
 typedef struct nb_visit {
-    int level;
-    size_t number; /* of the node; at level -1 of the leaf */
+    float begin, end; /* m along the rays */
+    uint32_t child;   /* NB_CELL_FAN times the number of the node that it belongs to, and its place there */
+    int is_dark;
 } nb_visit;
 
-enum { VISITS = NB_SHADOW_LEVELS * NB_SHADOW_FAN };
-
-NB_ALWAYS_INLINE int visit_leaf(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                                size_t number, nb_shaft_rays *rays)
+/* Numbers of children, the farthest along the beam first: what is found next mostly touches what was found last. How far
+ * is not below 0, so that it is in the order of its bits; the last four of them make room for the number. */
+NB_ALWAYS_INLINE int sort_children(const nb_met *met, uint32_t *order)
 {
-    const size_t first = number * NB_SHADOW_FAN, left = tree->count - first;
-    const size_t count = left < NB_SHADOW_FAN ? left : NB_SHADOW_FAN;
-    for (size_t i = 0; i < count; i++) {
-        nb_stretch found;
-        int fresh[NB_PACKET];
-        nb_cross_prism(&tree->prisms[first + i], rays, &found);
-        const nb_sheet *sheet = nb_shadow_tree_sheet(tree, first + i);
-        if (sheet != NULL) {
-            if (!nb_sheet_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
-            continue;
-        }
-        if (nb_extend(&found, rays, fresh) && !nb_replace(shafts, allocator, &found, fresh, rays)) return 0;
-    }
-    return 1;
-}
-
-/* The children that the rays enter, the farthest along them first, as the middle of the packet goes: what is found next
- * mostly touches what was found last. Returns how many. */
-NB_ALWAYS_INLINE int list_children(const nb_shadow_node *node, const nb_visit *visit, const nb_shaft_rays *rays,
-                                   nb_visit *children)
-{
-    const float x = rays->way[0][NB_PACKET / 2 + 1], y = rays->way[1][NB_PACKET / 2 + 1];
-    float ways[NB_SHADOW_FAN];
     int count = 0;
-    for (int k = 0; k < NB_SHADOW_FAN; k++) {
-        if (!enters(node, k, rays)) continue;
-        const float way = x * (node->low[0][k] + node->high[0][k]) + y * (node->low[1][k] + node->high[1][k]);
+    for (uint32_t left = met->children & 0xffff; left != 0; left &= left - 1) {
+        const uint32_t k = (uint32_t)__builtin_ctz(left);
+        uint32_t key;
         int i = count++;
-        for (; i > 0 && ways[i - 1] < way; i--) {
-            ways[i] = ways[i - 1];
-            children[i] = children[i - 1];
-        }
-        ways[i] = way;
-        children[i] = (nb_visit){visit->level - 1, visit->number * NB_SHADOW_FAN + (size_t)k};
+        memcpy(&key, &met->begin[k], sizeof key);
+        key = (key & ~(uint32_t)(NB_CELL_FAN - 1)) | k;
+        for (; i > 0 && order[i - 1] < key; i--) order[i] = order[i - 1];
+        order[i] = key;
     }
     return count;
 }
 
+/* Returns how many. */
+NB_ALWAYS_INLINE int list_children(const nb_cell_node *nodes, uint32_t number, const nb_beam *beam, nb_visit *visits)
+{
+    nb_met met;
+    uint32_t order[NB_CELL_FAN];
+    meet_children(&nodes[number], beam, &met);
+    const int count = sort_children(&met, order);
+    for (int i = 0; i < count; i++) {
+        const uint32_t k = order[i] % NB_CELL_FAN;
+        visits[i] = (nb_visit){beam->from + met.begin[k], beam->from + met.end[k], NB_CELL_FAN * number + k,
+                               (int)(met.children >> 16 >> k & 1)};
+    }
+    return count;
+}
+
+/* Whether any ray is asked for between these places, and not known to be in shadow there. */
+NB_ALWAYS_INLINE int is_open(const nb_visit *visit, const nb_shaft_rays *rays)
+{
+    const float begin = visit->begin, end = visit->end;
+    int any = 0;
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const float first = rays->from[i] > begin ? rays->from[i] : begin;
+        const float last = rays->to[i] < end ? rays->to[i] : end;
+        any |= (first < last) & ((first < rays->enter[i]) | (last > rays->leave[i]));
+    }
+    return any;
+}
+
+/* What a cell leaves of each ray. */
+NB_ALWAYS_INLINE void cross_cell(const nb_cell_node *node, uint32_t child, const nb_shaft_rays *rays, nb_stretch *found)
+{
+    const float low_x = node->low[0][child], high_x = node->high[0][child];
+    const float low_y = node->low[1][child], high_y = node->high[1][child];
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const float x = rays->start[0][i], y = rays->start[1][i], ix = rays->inverse[0][i], iy = rays->inverse[1][i];
+        const float ax = (low_x - x) * ix, bx = (high_x - x) * ix, ay = (low_y - y) * iy, by = (high_y - y) * iy;
+        const float near_x = ax < bx ? ax : bx, far_x = ax < bx ? bx : ax;
+        const float near_y = ay < by ? ay : by, far_y = ay < by ? by : ay;
+        float enter = rays->from[i], leave = rays->to[i];
+        enter = near_x > enter ? near_x : enter;
+        enter = near_y > enter ? near_y : enter;
+        leave = far_x < leave ? far_x : leave;
+        leave = far_y < leave ? far_y : leave;
+        found->enter[i] = enter;
+        found->leave[i] = leave;
+    }
+}
+
 /* Returns 0 when memory is out. */
-NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
-                          nb_shaft_rays *rays)
+NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                          const nb_beam *beam, nb_shaft_rays *rays)
 {
     nb_visit visits[VISITS];
-    int count = 1;
-    visits[0] = (nb_visit){tree->level_count - 1, 0};
+    int count = list_children(cells->nodes, 0, beam, visits);
     while (count > 0) {
         const nb_visit visit = visits[--count];
-        if (visit.level >= 0)
-            count += list_children(&tree->levels[visit.level][visit.number], &visit, rays, visits + count);
-        else if (!visit_leaf(shafts, allocator, tree, visit.number, rays))
-            return 0;
+        const nb_cell_node *node = &cells->nodes[visit.child / NB_CELL_FAN];
+        const uint32_t place = visit.child % NB_CELL_FAN, child = node->child[place];
+        nb_stretch found;
+        int fresh[NB_PACKET];
+        if (!is_open(&visit, rays)) continue;
+        if (visit.is_dark) {
+            cross_cell(node, place, rays, &found);
+        } else if ((child & NB_IS_PRISM) != 0) {
+            const uint32_t prism = child & ~NB_IS_PRISM;
+            const nb_sheet *sheet = nb_sun_cells_sheet(cells, prism);
+            nb_cross_prism(&cells->prisms[prism], rays, &found);
+            if (sheet != NULL && !nb_sheet_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
+            if (sheet != NULL) continue;
+        } else {
+            count += list_children(cells->nodes, child, beam, visits + count);
+            continue;
+        }
+        if (nb_extend(&found, rays, fresh) && !nb_replace(shafts, allocator, &found, fresh, rays)) return 0;
     }
     return 1;
 }
@@ -220,7 +342,7 @@ static void sort_by_lane(nb_shafts *shafts, size_t ends[NB_PACKET])
 /* From where fog begins to count, in which a shadow that begins with it begins at 0. */
 static void toggle(nb_shafts *shafts, float t)
 {
-    shafts->toggles[shafts->toggle_count++] = fmaxf(t, 0);
+    shafts->toggles[shafts->toggle_count++] = nb_most(t, 0);
 }
 
 /* The shadows of one lane, sorted, as toggles. */
@@ -234,7 +356,7 @@ static void join(nb_shafts *shafts, const nb_shadow *shadows, size_t count, floa
             enter = shadows[i].enter;
             leave = shadows[i].leave;
         }
-        leave = fmaxf(leave, shadows[i].leave);
+        leave = nb_most(leave, shadows[i].leave);
     }
     toggle(shafts, enter + skipped);
     toggle(shafts, leave + skipped);
@@ -269,7 +391,7 @@ int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_sha
     return 1;
 }
 
-static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                        const nb_rays *rays, double advance, int first, nb_shaft_rays *packet)
 {
     for (int i = 0; i < NB_PACKET; i++) {
@@ -277,13 +399,15 @@ static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, cons
         packet->leave[i] = -INFINITY;
         packet->kept[i] = 0;
     }
-    turn(tree, rays, first, packet);
+    nb_beam beam;
+    turn(cells, rays, first, packet);
+    set_beam(packet, &beam);
     shafts->shadow_count = 0;
-    return walk(shafts, allocator, tree, packet) &&
+    return walk(shafts, allocator, cells, &beam, packet) &&
            nb_shafts_finish(shafts, allocator, packet, rays->length + first, advance, shafts->first + first);
 }
 
-nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                             const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance)
 {
     float from[NB_BATCH], to[NB_BATCH];
@@ -291,13 +415,13 @@ nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator,
     shafts->toggle_count = 0;
     for (int p = 0; p < NB_BATCH; p += NB_PACKET) {
         for (int i = 0; i < NB_PACKET; i++) shafts->first[p + i] = (uint32_t)shafts->toggle_count;
-        if (tree->count == 0 || nb_is_empty(from + p, to + p)) continue;
+        if (cells->node_count == 0 || nb_is_empty(from + p, to + p)) continue;
         nb_shaft_rays packet;
         for (int i = 0; i < NB_PACKET; i++) {
             packet.from[i] = from[p + i];
             packet.to[i] = to[p + i];
         }
-        if (!find_packet(shafts, allocator, tree, rays, advance, p, &packet)) return NEBEL_ERROR_MEMORY;
+        if (!find_packet(shafts, allocator, cells, rays, advance, p, &packet)) return NEBEL_ERROR_MEMORY;
     }
     shafts->first[NB_BATCH] = (uint32_t)shafts->toggle_count;
     return NEBEL_OK;

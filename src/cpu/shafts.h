@@ -2,7 +2,7 @@
 #ifndef NB_CPU_SHAFTS_H
 #define NB_CPU_SHAFTS_H
 
-#include "shadow_tree.h"
+#include "sun_cells.h"
 #include "view.h"
 
 /* The fog that the sun lights, relative to the origin of the geometry; infinite where it has no end. */
@@ -29,7 +29,7 @@ typedef struct nb_shafts {
 
 /* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Errors:
  * MEMORY. */
-nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_shadow_tree *tree,
+nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                             const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance);
 
 void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator);
