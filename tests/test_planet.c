@@ -336,8 +336,8 @@ static void skies_are_those_of_T41(void **state)
 static void qualities_agree(void **state)
 {
     (void)state;
-    static const char *const names[] = {"earth", "mars", "toy"};
-    for (int n = 0; n < 3; n++) {
+    static const char *const names[] = {"mars", "toy"};
+    for (int n = 0; n < 2; n++) {
         nebel_atmosphere_desc desc = *nebel_find_atmosphere(names[n]);
         nebel_atmosphere *fast = make(&desc);
         desc.quality = NEBEL_AIR_PRECISE;
@@ -369,7 +369,7 @@ static void qualities_agree(void **state)
 static void a_furnace_stays_white(void **state)
 {
     (void)state;
-    enum { RINGS = 24, TURNS = 48 };
+    enum { RINGS = 16, TURNS = 24 };
     const nebel_atmosphere_desc desc = {.radius = 6.36e6,
                                         .thickness = 1e5,
                                         .airs = {{.scattering = {5.802e-6, 13.558e-6, 33.1e-6},
