@@ -395,6 +395,46 @@ static void test_300_es_block(void **state)
     try_language(NB_GL_300ES, BLOCK, 1);
 }
 
+/* ---- sunlight -------------------------------------------------------------------------------- */
+
+/* What the sun makes of `fog`, from an eye in its midst or beside it. */
+static void trace_sunlit_fog(random_fog_kind kind, uint64_t seed)
+{
+    tracer t;
+    char features[64];
+    random_fog_make(&fog, kind, seed);
+    uint64_t state = seed + 100;
+    random_fog_light(&fog, &state);
+    nebel_fog_desc desc = random_fog_desc(&fog);
+    desc.sun = (nebel_sun){{dice(&state, -1, 1), dice(&state, .2, 1), .3}, {3, 2.5, 2}};
+    nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
+    double eye[3];
+    char name[64];
+    for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
+    snprintf(name, sizeof name, "sunlit %s %d", kinds[kind], (int)seed);
+    camera_rays(eye, fog.shift, seed);
+    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(snapshot));
+    open_tracer(&t, seed % 2 == 0 ? NB_GL_330 : NB_GL_300ES, TEXTURE, features, trace_body);
+    pack_and_upload(&t, snapshot, eye);
+    evaluate(&t);
+    compare(snapshot, &(nebel_trace_desc){.tolerance = 1e-4}, eye, largest_source(&fog), 0, name);
+    nb_gl_close(&t.gl);
+    nebel_release_snapshot(snapshot);
+}
+
+static int all_kinds; /* an argument asks for them */
+
+/* Never MANY, of which llvmpipe's loops see no end: see docs/shaders.md. */
+static void test_sunlit_fog(void **state)
+{
+    (void)state;
+    trace_sunlit_fog(RANDOM_FOG_PROFILES, 1);
+    trace_sunlit_fog(RANDOM_FOG_EXCLUDE, 0);
+    trace_sunlit_fog(RANDOM_FOG_LEVEL, 1);
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT && all_kinds; kind++)
+        if (kind != RANDOM_FOG_MANY) trace_sunlit_fog((random_fog_kind)kind, (uint64_t)(kind + 1) % 2);
+}
+
 /* ---- very many, very far --------------------------------------------------------------------- */
 
 static nebel_volume_desc ball_of(double x, double y, double z, double radius)
@@ -729,7 +769,7 @@ static void test_block_layout(void **state)
     }
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_330_texture),
@@ -739,6 +779,7 @@ int main(void)
         cmocka_unit_test(test_soft_edges_in_haze),
         cmocka_unit_test(test_priorities_among_many),
         cmocka_unit_test(test_rays_to_a_light_know_no_distances),
+        cmocka_unit_test(test_sunlit_fog),
         cmocka_unit_test(test_more_than_slots),
         cmocka_unit_test(test_thousand_volumes),
         cmocka_unit_test(test_silhouettes_from_afar),
@@ -750,5 +791,7 @@ int main(void)
         cmocka_unit_test(test_light_without_end),
         cmocka_unit_test(test_block_layout),
     };
+    all_kinds = argc > 1;
+    (void)argv;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -103,6 +103,15 @@
  * NEBEL_MOST_TURNS as how many turns of loops a ray may take, for drivers that end loops: see docs/shaders.md. The GLSL
  * ES text makes highp the default precision.
  *
+ * Fog that the sun lights knows no surfaces. A host says where they keep the sun away by a function in front of the
+ * text, named by
+ *
+ *     #define NEBEL_SUN_LIT(origin, direction, t, end) my_sun_lit(origin, direction, t, end)
+ *     vec2 my_sun_lit(vec3 origin, vec3 direction, float t, float end)
+ *
+ * which returns the share of sunlight, 0 to 1, that reaches the ray from t on, and up to where along the ray that holds
+ * (more than t, at most end) [m]. Without it all fog is lit. See docs/shaders.md.
+ *
  * docs/shaders.md shows a complete shader, the same for Vulkan and HLSL, and says how exact and how fast all this is.
  *
  * A direction of no length, a t_max that is not above 0, or a NaN anywhere gives transmittance 1 and no light.

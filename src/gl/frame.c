@@ -88,6 +88,15 @@ static nebel_result set_method(frame *f)
     return nb_fail(&f->renderer->log, result, "frame: what this method needs is missing or not valid");
 }
 
+static nebel_result check_shafts(const frame *f)
+{
+    nebel_sunlit_fog lit;
+    const nebel_gl_renderer *const r = f->renderer;
+    if (!f->casts || r->fog == NULL || !nebel_snapshot_sunlit_fog(r->fog, &lit)) return NEBEL_OK;
+    return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                   "frame: OpenGL does not draw the shadows of models in sunlit fog yet; the CPU does (--device cpu)");
+}
+
 static nebel_result set_frame(frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -102,7 +111,7 @@ static nebel_result set_frame(frame *f)
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
-    return result;
+    return result == NEBEL_OK ? check_shafts(f) : result;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */

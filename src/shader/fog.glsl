@@ -3,7 +3,8 @@
  * Transmittance is a plain sum over media, and so is light where one medium or one radiance is met: most rays end there
  * (nb_sum_media). Where light of different colour mixes, or one medium takes away another's fog, nb_walk goes from event to event
  * with a few slots as memory; rays that meet more volumes than there are slots walk in windows, and through places where more
- * overlap than that they read everything again for each step: slower, never wrong. */
+ * overlap than that they read everything again for each step: slower, never wrong. Fog that the sun lights is always walked: from turn
+ * to turn, see sun.glsl. */
 
 /* ---- sums over media ------------------------------------------------------------------------- */
 
@@ -27,6 +28,7 @@ struct nb_media_sum {
     bool met, emits;
     bool mixed; /* more than one quotient of light and extinction */
     bool covers; /* one that covers is met, and another */
+    bool sunlit;
 };
 
 nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
@@ -39,6 +41,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     sum.emits = false;
     sum.mixed = false;
     sum.covers = false;
+    sum.sunlit = false;
     bool any = false;
     bool covering = false;
     int most = NB_HAS(NB_HAS_SEVERAL) ? count : 1; /* with one, all places in the words are constants */
@@ -71,6 +74,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
             sum.mixed = sum.mixed || (sum.met && (other || emits || sum.emits));
             sum.emits = sum.emits || emits;
             sum.met = true;
+            if (NB_HAS(NB_HAS_SUN)) sum.sunlit = sum.sunlit || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
             sum.radiance = radiance.xyz;
             sum.depth += extinction.xyz * length;
             sum.light += light.xyz * length;
@@ -176,6 +180,18 @@ float nb_weight(int j)
     return j == 2 ? 0.35555555555555555556 : j == 1 || j == 3 ? 0.27222222222222222222 : 0.05;
 }
 
+/* The same of Gauss's rule of four points, exact for degree 7, which looks at no end: behind the silhouette of what is round the way to
+ * the sun is steep there. The fifth is the end alone. Source: Abramowitz and Stegun, table 25.4. */
+float nb_sun_node(int j)
+{
+    return j == 0 ? 0.06943184420297371239 : j == 1 ? 0.33000947820757186760 : j == 2 ? 0.66999052179242813240 : j == 3 ? 0.93056815579702628761 : 1.0;
+}
+
+float nb_sun_weight(int j)
+{
+    return j == 4 ? 0.0 : j == 1 || j == 2 ? 0.32607257743127307131 : 0.17392742256872692869;
+}
+
 /* How fast the logarithm of the density changes along the ray [1/m], for the profiles that are no polynomials, as fast as a step of
  * the rule above can bear: it takes 3 of an exponential, 1.2 units of a bell curve. */
 float nb_profile_rate(nb_profile profile)
@@ -219,6 +235,7 @@ struct nb_piece {
     nb_vec3 extinction, light; /* per metre, of even media */
     nb_vec3 least, most;       /* radiance */
     float rate;                /* of the fastest profile */
+    bool sunlit;
 };
 
 nb_piece nb_open_piece(float start, float end)
@@ -235,6 +252,7 @@ nb_piece nb_open_piece(float start, float end)
     piece.least = nb_splat3(NB_HUGE);
     piece.most = nb_splat3(0.0);
     piece.rate = 0.0;
+    piece.sunlit = false;
     return piece;
 }
 
@@ -291,6 +309,7 @@ nb_piece nb_note_slot(nb_piece piece, nb_vec3 slot, nb_ray ray)
             piece.emits = piece.emits || (int(light.w) & NB_LIGHT_EMITS) != 0;
             piece.least = min(piece.least, radiance);
             piece.most = max(piece.most, radiance);
+            if (NB_HAS(NB_HAS_SUN)) piece.sunlit = piece.sunlit || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
             if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT) {
                 piece = nb_note_profile(piece, nb_profile_of(at, kind, ray, piece.start));
             } else {
@@ -303,7 +322,7 @@ nb_piece nb_note_slot(nb_piece piece, nb_vec3 slot, nb_ray ray)
 }
 
 /* A leg, one step of h metres, `from` metres behind the start of its piece: optical depth up to each node and light there, and
- * all its light if nothing attenuated it. Legs without mixed light know the last node only. */
+ * all its light if nothing attenuated it. Legs without mixed light and sunlight know the last node only. */
 struct nb_leg {
     float from, h;
     bool mixed;
@@ -311,6 +330,11 @@ struct nb_leg {
     nb_vec3 depth[NB_NODES];
     nb_vec3 density[NB_NODES];
     nb_vec3 light;
+    float stop;    /* no leg goes on from before to behind it: a turn, or where sunlight ends or begins; from the start of the piece */
+    float sunlight; /* share of it that surfaces let through; 0: the leg is dark */
+    bool first_is_curved, last_is_curved; /* there is a turn at its start, at its stop, behind which light changes as a root does */
+    nb_vec3 glow[NB_NODES]; /* what full sunlight would add at each node, and in all */
+    nb_vec3 shine;
 };
 
 nb_leg nb_open_leg(float from, float h, bool mixed, int number)
@@ -321,34 +345,76 @@ nb_leg nb_open_leg(float from, float h, bool mixed, int number)
     leg.mixed = mixed;
     leg.number = number;
     leg.light = nb_splat3(0.0);
+    leg.stop = NB_FAR;
+    leg.sunlight = 0.0;
+    leg.first_is_curved = false;
+    leg.last_is_curved = false;
+    leg.shine = nb_splat3(0.0);
     for (int j = 0; j < NB_NODES; j++) {
         leg.depth[j] = nb_splat3(0.0);
         leg.density[j] = nb_splat3(0.0);
+        leg.glow[j] = nb_splat3(0.0);
     }
     return leg;
 }
+
+bool nb_is_sunlit(nb_leg leg) { return NB_HAS(NB_HAS_SUN) && leg.sunlight > 0.0; }
+
+/* Places of nodes on a leg, from 0 to 1, on a scale that is flat where light changes as a root does: x (a + x (b + x c)). */
+nb_vec3 nb_leg_scale(nb_leg leg)
+{
+    bool last = leg.last_is_curved && !(leg.from + leg.h < leg.stop);
+    if (leg.first_is_curved) return last ? nb_vec3(0.0, 3.0, -2.0) : nb_vec3(0.0, 1.0, 0.0);
+    return last ? nb_vec3(2.0, -1.0, 0.0) : nb_vec3(1.0, 0.0, 0.0);
+}
+
+float nb_leg_node(nb_leg leg, int j)
+{
+    if (!nb_is_sunlit(leg)) return nb_node(j);
+    float x = nb_sun_node(j);
+    nb_vec3 scale = nb_leg_scale(leg);
+    return x * (scale.x + x * (scale.y + x * scale.z));
+}
+
+float nb_leg_weight(nb_leg leg, int j)
+{
+    if (!nb_is_sunlit(leg)) return nb_weight(j);
+    float x = nb_sun_node(j);
+    nb_vec3 scale = nb_leg_scale(leg);
+    return nb_sun_weight(j) * (scale.x + x * (2.0 * scale.y + x * (3.0 * scale.z)));
+}
+
+/* Whether a leg asks for its nodes, or for its end alone. */
+bool nb_has_nodes(nb_leg leg) { return leg.mixed || (nb_is_sunlit(leg) && !nb_sun_is_closed()); }
 
 void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
 {
     int at = int(slot.z);
     nb_vec4 extinction = NEBEL_WORD(at);
     nb_vec3 light = NEBEL_WORD(at + 1).xyz;
+    nb_vec3 glow = nb_splat3(0.0);
+    if (nb_is_sunlit(leg)) glow = nb_sunlit_radiance(at, ray.direction) * extinction.xyz;
     nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
     profile.offset += profile.slope * leg.from;
     /* linear within a piece, which ends at kinks: dear to find for many faces */
     bool flat_sided = NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES;
     float first = 0.0;
     if (flat_sided) first = nb_planes_density(profile, 0.0);
-    for (int j = leg.mixed ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
-        float s = leg.h * nb_node(j);
+    for (int j = nb_has_nodes(leg) ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
+        float s = leg.h * nb_leg_node(leg, j);
         float length = 0.0;
         if (flat_sided)
             length = 0.5 * s * (first + nb_planes_density(profile, s));
         else
             length = nb_integral(profile, s);
+        float density = nb_density(profile, s);
         leg.depth[j] += extinction.xyz * length;
-        leg.density[j] += light * nb_density(profile, s);
-        if (j == NB_NODES - 1) leg.light += light * length;
+        leg.density[j] += light * density;
+        if (NB_HAS(NB_HAS_SUN)) leg.glow[j] += glow * density;
+        if (j == NB_NODES - 1) {
+            leg.light += light * length;
+            if (NB_HAS(NB_HAS_SUN)) leg.shine += glow * length;
+        }
     }
 }
 
@@ -357,6 +423,7 @@ struct nb_gathered {
     nb_vec3 depth;
     nb_vec3 light; /* if nothing attenuated it */
     nb_vec3 radiance;
+    nb_vec3 sunlight; /* of the radiance */
 };
 
 /* Light through what lies before it, if the quotient of light and extinction were the same all along the way. */
@@ -378,15 +445,52 @@ float nb_even_error(nb_vec3 light, nb_vec3 depth, nb_vec3 before, nb_vec3 spread
 nb_vec3 nb_light_mixed(nb_leg leg, nb_vec3 before)
 {
     nb_vec3 sum = nb_splat3(0.0);
-    for (int j = 0; j < NB_NODES; j++) sum += nb_weight(j) * leg.density[j] * nb_exp3(-(before + leg.depth[j]));
+    for (int j = 0; j < NB_NODES; j++) sum += nb_leg_weight(leg, j) * leg.density[j] * nb_exp3(-(before + leg.depth[j]));
     return sum * leg.h;
+}
+
+/* Sunlight of a leg, and by how much the depth to the sun varies over it as far as that matters; 0 where a step may be as long as it
+ * likes. */
+struct nb_sun_sum {
+    nb_vec3 light;
+    float strain;
+};
+
+nb_sun_sum nb_light_of_sun(nb_leg leg, nb_piece piece, nb_ray ray, nb_vec3 before, float tolerance)
+{
+    nb_sun_sum sum;
+    sum.light = nb_splat3(0.0);
+    sum.strain = 0.0;
+    bool closed = nb_sun_is_closed();
+    float start = piece.start + leg.from;
+    nb_vec3 least = nb_splat3(NB_HUGE);
+    nb_vec3 most = nb_splat3(0.0);
+    nb_vec3 first = nb_splat3(0.0);
+    nb_vec3 last = nb_splat3(0.0);
+    for (int j = 0; j < (closed ? 2 : NB_NODES - 1); j++) {
+        float share = closed ? float(j) : nb_leg_node(leg, j);
+        nb_vec3 depth = nb_depth_to_sun(ray.origin + ray.direction * (start + leg.h * share));
+        if (closed && j == 0) first = before + depth;
+        if (closed && j == 1) last = before + leg.depth[NB_NODES - 1] + depth;
+        if (!closed) sum.light += leg.h * nb_leg_weight(leg, j) * leg.glow[j] * nb_exp3(-(before + leg.depth[j] + depth));
+        least = min(least, depth);
+        most = max(most, depth);
+    }
+    if (closed) {
+        nb_vec3 change = abs(last - first);
+        sum.light = leg.shine * nb_exp3(-min(first, last)) * nb_attenuate(change).mean;
+    } else if (nb_largest(leg.shine * nb_exp3(-(before + least)) * nb_attenuate(leg.depth[NB_NODES - 1]).mean) > tolerance) {
+        sum.strain = nb_largest(most - least);
+    }
+    sum.light *= leg.sunlight;
+    return sum;
 }
 
 /* What one leg bears: so much of optical depth and of change of the densities' logarithm together. */
 #define NB_LEG_BEARS 2.0
 
-/* Then what is left of the piece counts as even. */
-#define NB_MOST_LEGS 32
+/* Then what is left of the piece counts as even; of a sunlit one, which has turns and shadows, as one leg. */
+int nb_most_legs(nb_piece piece) { return NB_HAS(NB_HAS_SUN) && piece.sunlit ? 1000 : 32; }
 
 /* Nothing behind adds a bit to a picture. */
 #define NB_OPAQUE 17.0
@@ -395,7 +499,7 @@ nb_vec3 nb_light_mixed(nb_leg leg, nb_vec3 before)
 bool nb_is_even(nb_leg leg, nb_piece piece, nb_vec3 before, float tolerance)
 {
     nb_vec3 spread = piece.emits ? nb_splat3(NB_HUGE) : piece.most - piece.least;
-    return !leg.mixed || leg.number >= NB_MOST_LEGS ||
+    return !leg.mixed || leg.number >= nb_most_legs(piece) ||
            nb_even_error(leg.light, leg.depth[NB_NODES - 1], before, spread) <= tolerance;
 }
 
@@ -403,20 +507,63 @@ bool nb_is_even(nb_leg leg, nb_piece piece, nb_vec3 before, float tolerance)
  * the densities hardly change: then optical depth is in proportion to length. */
 nb_leg nb_next_leg(nb_leg leg, nb_piece piece, float rest, float strain, bool fits, bool even)
 {
-    float h = leg.h * min(2.0, 0.9 * NB_LEG_BEARS / strain);
+    float h = leg.h * min(nb_is_sunlit(leg) ? 8.0 : 2.0, 0.9 * NB_LEG_BEARS / max(strain, 1e-3));
     if (!fits && piece.rate * leg.h > 0.6 * NB_LEG_BEARS) h = 0.5 * NB_LEG_BEARS / piece.rate;
-    if ((fits && even) || leg.number + 1 >= NB_MOST_LEGS) h = rest;
-    return nb_open_leg(fits ? leg.from + leg.h : leg.from, min(h, rest), leg.mixed, leg.number + 1);
+    if ((fits && even) || leg.number + 1 >= nb_most_legs(piece)) h = rest;
+    nb_leg next = nb_open_leg(fits ? leg.from + leg.h : leg.from, min(h, rest), leg.mixed, leg.number + 1);
+    next.stop = leg.stop;
+    next.sunlight = leg.sunlight;
+    next.first_is_curved = !fits && leg.first_is_curved;
+    next.last_is_curved = leg.last_is_curved;
+    return next;
+}
+
+/* How far the next leg goes at most, and whether the sun lights it. `lit` is the host's last answer. */
+void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit)
+{
+    float t = piece.start + leg.from;
+    float near = max(t * (8.0 * NB_EPSILON), 1e-6);
+    if (leg.number > 0 && leg.from < leg.stop - near) return;
+    if (lit.y <= t + near) {
+        lit = NEBEL_SUN_LIT(ray.origin, ray.direction, t + near, ray.t_max);
+        lit.y = max(lit.y, t + 2.0 * near);
+    }
+    leg.sunlight = lit.x;
+    leg.first_is_curved = leg.number > 0 && leg.last_is_curved;
+    leg.last_is_curved = false;
+    leg.stop = min(piece.end, lit.y) - piece.start;
+    if (leg.sunlight > 0.0) {
+        nb_turning turning = nb_find_turn(ray, t, piece.start + leg.stop);
+        leg.stop = turning.next - piece.start;
+        leg.last_is_curved = turning.curved;
+    }
 }
 
 /* Moves behind a leg, or makes it shorter. Returns what is left of the piece [m]. */
-float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, float tolerance, bool lit)
+float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, nb_ray ray, float tolerance, bool lit)
 {
     nb_vec3 depth = leg.depth[NB_NODES - 1];
     float strain = nb_largest(depth) + piece.rate * leg.h;
     bool even = nb_is_even(leg, piece, g.depth, tolerance);
-    bool fits = even || strain <= NB_LEG_BEARS;
+    bool is_last = leg.number >= nb_most_legs(piece);
+    bool fits = even || strain <= NB_LEG_BEARS || is_last;
     float rest = piece.end - piece.start - leg.from;
+    if (nb_is_sunlit(leg) && fits) {
+        bool closed = nb_sun_is_closed();
+        nb_vec3 most = leg.shine * nb_exp3(-g.depth) * nb_attenuate(depth).mean;
+        bool faint = nb_largest(most) <= tolerance;
+        fits = closed || faint || is_last || strain <= NB_LEG_BEARS;
+        if (fits) {
+            nb_sun_sum sun = nb_light_of_sun(leg, piece, ray, g.depth, tolerance);
+            strain += sun.strain;
+            fits = sun.strain == 0.0 || faint || is_last || strain <= NB_LEG_BEARS;
+            if (fits) {
+                g.radiance += sun.light;
+                g.sunlight += sun.light;
+            }
+        }
+        even = even && (closed || faint);
+    }
     if (fits) {
         if (lit) g.radiance += even ? nb_light_even(leg.light, depth, g.depth) : nb_light_mixed(leg, g.depth);
         g.light += leg.light;
@@ -425,6 +572,15 @@ float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, float to
     }
     leg = nb_next_leg(leg, piece, rest, strain, fits, even);
     return rest;
+}
+
+/* About how many turns of loops a leg in sunlight takes, besides those of the slots. */
+int nb_turns_to_sun()
+{
+    int media = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    int way = 2 + (NB_HAS(NB_HAS_GROUP) ? 16 : 0) + (NB_HAS(NB_HAS_PLANES) ? 12 : 0) + (NB_HAS(NB_HAS_SOFT) ? 8 : 0);
+    int search = NB_MOST_PASSED + (NB_HAS(NB_HAS_PLANES) ? 32 : 0);
+    return media * (search + (nb_sun_is_closed() ? 2 : NB_NODES - 1) * way);
 }
 
 /* The first leg of a piece: all of it. */
@@ -443,11 +599,16 @@ void nb_pass_piece(inout nb_gathered g, nb_piece piece, bool lit)
     g.depth += depth;
 }
 
-/* The rest of a ray that is too much to walk, where no medium covers another: what is left of all, as if it were mixed evenly. */
+/* The rest of a ray that is too much to walk, where no medium covers another: what is left of all, as if it were mixed evenly, and as
+ * sunny as what lies before it. */
 nb_gathered nb_pass_rest(nb_gathered g, nb_media_sum all)
 {
     nb_vec3 depth = max(all.depth - g.depth, nb_splat3(0.0));
     g.radiance += nb_light_even(max(all.light - g.light, nb_splat3(0.0)), depth, g.depth);
+    if (NB_HAS(NB_HAS_SUN)) {
+        nb_vec3 taken = nb_attenuate(g.depth).mean * g.depth;
+        g.radiance += g.sunlight * nb_exp3(-g.depth) * nb_attenuate(depth).mean * depth / max(taken, nb_splat3(1e-6));
+    }
     g.depth += depth;
     return g;
 }
@@ -464,7 +625,9 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit, nb_
     g.depth = nb_splat3(0.0);
     g.light = nb_splat3(0.0);
     g.radiance = nb_splat3(0.0);
+    g.sunlight = nb_splat3(0.0);
     int turns = count; /* of the sums */
+    nb_vec2 sunlit = nb_vec2(1.0, 0.0);
     nb_piece piece = nb_open_piece(0.0, 0.0);
     nb_leg leg = nb_open_leg(0.0, 0.0, false, 0);
     nb_window window;
@@ -473,7 +636,11 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit, nb_
     window.end = 0.0;
     window.turns = 0;
     while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
-        bool on_leg = NB_HAS(NB_HAS_PROFILE) && stepping;
+        bool on_leg = NB_HAS(NB_HAS_PROFILE | NB_HAS_SUN) && stepping;
+        if (NB_HAS(NB_HAS_SUN) && on_leg && lit && piece.sunlit) {
+            nb_plan_leg(leg, piece, ray, sunlit);
+            leg.h = min(leg.h, leg.stop - leg.from);
+        }
         bool stale = crowd || t >= window.end;
         if (!on_leg) piece = nb_open_piece(t, ray.t_max);
         for (int next = 0; next < count;) {
@@ -499,10 +666,12 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit, nb_
         }
         if (nb_is_tired(turns)) break;
         bool foggy = piece.present > 0;
-        bool begins = NB_HAS(NB_HAS_PROFILE) && foggy && !on_leg && piece.varies;
+        bool legged = (NB_HAS(NB_HAS_PROFILE) && piece.varies) || (NB_HAS(NB_HAS_SUN) && lit && piece.sunlit);
+        bool begins = foggy && !on_leg && legged;
         bool over = !begins;
+        if (NB_HAS(NB_HAS_SUN) && on_leg && nb_is_sunlit(leg)) turns += nb_turns_to_sun();
         if (on_leg)
-            over = nb_end_leg(g, leg, piece, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
+            over = nb_end_leg(g, leg, piece, ray, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
         else if (begins)
             leg = nb_first_leg(piece, lit);
         else if (foggy)
@@ -548,7 +717,8 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
         light.transmittance = attenuation.left;
         light.in_scattering = sum.light * attenuation.mean;
         bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
-        if (covers || (NB_HAS(NB_HAS_MIXED) && lit && sum.mixed)) {
+        bool walks = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.sunlit);
+        if (covers || (lit && walks)) {
             nb_gathered walked = nb_walk(ray, first, count, listed, lit, sum);
             light.in_scattering = walked.radiance;
             if (covers) light.transmittance = nb_exp3(-walked.depth);

@@ -310,11 +310,10 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (!(fabs(eye[i]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
-    if (snapshot->is_sunlit || snapshot->is_lamplit)
-        return nb_fail(
-            &snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-            "pack: shaders cannot light fog with the sun or lamps yet; use nebel_trace or the CPU's renderer "
-            "(--device cpu), or give volumes a source instead of an albedo");
+    if (snapshot->is_lamplit)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot light fog with lamps yet; use nebel_trace or the CPU's renderer "
+                       "(--device cpu), or give volumes a source instead of an albedo");
     if (has_grid(snapshot))
         return nb_fail(
             &snapshot->log, NEBEL_ERROR_UNSUPPORTED,

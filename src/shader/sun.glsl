@@ -1,0 +1,345 @@
+/* The way from places on a ray to the sun, as src/march/trace_sun.h and trace_turns.h have it: the optical depth there, and the
+ * *turns*, where that way begins or ends to meet a body or passes one of its edges. Between turns the depth is smooth along the ray.
+ *
+ * What surfaces keep away is the host's to say, by a function that it defines before this text:
+ *
+ *     #define NEBEL_SUN_LIT(origin, direction, t, end)
+ *
+ * is a vec2: the share of sunlight that reaches the ray from t on, and up to where along the ray that holds, at most `end`. */
+#ifndef NEBEL_SUN_LIT
+#define NEBEL_SUN_LIT(origin, direction, t, end) nb_vec2(1.0, end)
+#endif
+
+nb_vec3 nb_to_sun() { return NEBEL_WORD(NB_HEADER_SUN).xyz; }
+
+/* Whether light along a ray has a closed form between turns: the whole depth is linear in that along the ray. */
+bool nb_sun_is_closed() { return NEBEL_WORD(NB_HEADER_SUN).w > 0.0; }
+
+/* What part of the light that comes from `towards` a medium's phase function sends back along the ray, per steradian. */
+float nb_scattered(int scattering, nb_vec3 direction, nb_vec3 towards)
+{
+    nb_turn turn = nb_turn_between(direction, towards);
+    float value = 0.0;
+    int lobes = int(NEBEL_WORD(scattering).w);
+    for (int i = 1; i <= lobes; i++) {
+        nb_vec4 lobe = NEBEL_WORD(scattering + i);
+        value += nb_phase_lobe(lobe.x, lobe.y, lobe.z, lobe.w, turn);
+    }
+    return value;
+}
+
+/* Radiance of opaque fog of this medium in full sunlight; 0 where it scatters none. */
+nb_vec3 nb_sunlit_radiance(int medium, nb_vec3 direction)
+{
+    int scattering = int(NEBEL_WORD(medium + NB_MEDIUM_SCATTERING).w);
+    nb_vec3 radiance = nb_splat3(0.0);
+    if (scattering > 0) {
+        float phase = nb_scattered(scattering, direction, nb_to_sun());
+        radiance = NEBEL_WORD(scattering).xyz * NEBEL_WORD(NB_HEADER_SUN + 1).xyz * phase;
+    }
+    return radiance;
+}
+
+/* ---- depth ----------------------------------------------------------------------------------- */
+
+nb_vec3 nb_depth_within(int at, nb_ray ray, nb_stretch s)
+{
+    nb_vec4 extinction = NEBEL_WORD(at);
+    return extinction.xyz * min(nb_integral(nb_profile_of(at, int(extinction.w), ray, s.enter), s.leave - s.enter), NB_FAR);
+}
+
+/* Where no medium covers another. */
+nb_vec3 nb_added_depth(nb_ray ray, int count)
+{
+    nb_vec3 depth = nb_splat3(0.0);
+    for (int i = 0; i < count; i++) {
+        int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+        int leaves = int(NEBEL_WORD(at + 2).w);
+        float from = 0.0;
+        for (int part = 0; part < (NB_HAS(NB_HAS_GROUP) ? leaves : 1); part++) {
+            nb_stretch s = nb_next_stretch(at, leaves, ray, from);
+            if (!(s.enter < s.leave)) break;
+            depth += nb_depth_within(at, ray, s);
+            from = s.leave;
+        }
+    }
+    return depth;
+}
+
+/* Where some may: from event to event, each time first to find the next event and what covers, then to sum. Media come by rank. */
+nb_vec3 nb_covered_depth(nb_ray ray, int count)
+{
+    nb_vec3 depth = nb_splat3(0.0);
+    float t = 0.0;
+    float end = ray.t_max;
+    int floor = 0;
+    bool summing = false;
+    while (t < ray.t_max) {
+        for (int i = 0; i < count; i++) {
+            int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+            int leaves = int(NEBEL_WORD(at + 2).w);
+            int flags = int(NEBEL_WORD(at + 1).w);
+            if (summing && flags / NB_LIGHT_RANK < floor) continue;
+            nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+            if (!(s.enter < s.leave)) continue;
+            if (!summing) {
+                end = min(end, s.enter > t ? s.enter : s.leave);
+                if (s.enter <= t && (flags & NB_LIGHT_COVERS) != 0) floor = max(floor, flags / NB_LIGHT_RANK);
+            } else if (s.enter <= t && int(NEBEL_WORD(at).w) != NB_KIND_EXCLUDE) {
+                depth += nb_depth_within(at, ray, nb_stretch_of(t, end));
+            }
+        }
+        if (summing) {
+            t = end;
+            end = ray.t_max;
+            floor = 0;
+        }
+        summing = !summing;
+    }
+    return depth;
+}
+
+nb_vec3 nb_depth_to_sun(nb_vec3 place)
+{
+    nb_ray ray;
+    ray.origin = place;
+    ray.direction = nb_to_sun();
+    ray.t_max = NB_FAR;
+    ray.from_eye = false;
+    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    if (NB_HAS(NB_HAS_COVER)) return nb_covered_depth(ray, count);
+    return nb_added_depth(ray, count);
+}
+
+/* ---- turns ----------------------------------------------------------------------------------- */
+
+/* Kept by the search: the next turn behind t, and whether light changes there as a root does, as behind the silhouette of what is
+ * round. */
+struct nb_turning {
+    float t;    /* turns up to here are behind */
+    float next;
+    bool curved;
+};
+
+void nb_note_turn(inout nb_turning turning, float t, bool curved)
+{
+    if (t > turning.t && t < turning.next) {
+        turning.next = t;
+        turning.curved = curved;
+    }
+}
+
+/* a t^2 + 2 b t + c = 0 */
+void nb_note_roots(inout nb_turning turning, float a, float b, float c, bool curved)
+{
+    float square = b * b - a * c;
+    if (!(square >= 0.0)) return;
+    float root = sqrt(square);
+    float sum = -(b + (b < 0.0 ? -root : root));
+    nb_note_turn(turning, sum * nb_rcp_bounded(a), curved);
+    nb_note_turn(turning, c * nb_rcp_bounded(sum), curved);
+}
+
+/* The places p + t d, from which ways go along v; `p` counts from the ball's centre. */
+void nb_note_ball(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, float radius)
+{
+    nb_vec3 moment = cross(p, v);
+    nb_vec3 rate = cross(d, v);
+    nb_note_roots(turning, dot(rate, rate), dot(moment, rate), dot(moment, moment) - radius * radius * dot(v, v), true);
+}
+
+/* x x + y y - w w, w the radius of the mantle. */
+float nb_mantle_form(nb_vec3 a, float wa, nb_vec3 b, float wb) { return a.x * b.x + a.y * b.y - wa * wb; }
+
+void nb_note_mantle(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, float radius, float slope)
+{
+    float wp = radius + slope * p.z;
+    float wd = slope * d.z;
+    float wv = slope * v.z;
+    float pv = nb_mantle_form(p, wp, v, wv);
+    float dv = nb_mantle_form(d, wd, v, wv);
+    float vv = nb_mantle_form(v, wv, v, wv);
+    nb_note_roots(turning, dv * dv - vv * nb_mantle_form(d, wd, d, wd), pv * dv - vv * nb_mantle_form(p, wp, d, wd),
+                  pv * pv - vv * nb_mantle_form(p, wp, p, wp), true);
+}
+
+/* The rim of the mantle at this z. */
+void nb_note_rim(inout nb_turning turning, nb_vec3 p, nb_vec3 d, nb_vec3 v, float z, float radius)
+{
+    nb_vec2 at = p.xy * v.z + (z - p.z) * v.xy;
+    nb_vec2 rate = d.xy * v.z - d.z * v.xy;
+    float r = radius * v.z;
+    nb_note_roots(turning, dot(rate, rate), dot(at, rate), dot(at, at) - r * r, true);
+}
+
+void nb_note_round(inout nb_turning turning, int leaf, int type, nb_vec3 p, nb_vec3 d, nb_vec3 v)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL) {
+        nb_note_ball(turning, p, d, v, head.y);
+    } else if (NB_HAS(NB_HAS_CAPSULE) && type == NB_TYPE_CAPSULE) {
+        nb_note_mantle(turning, p, d, v, 1.0, 0.0);
+        nb_note_ball(turning, p, d, v, 1.0);
+        nb_note_ball(turning, p - nb_vec3(0.0, 0.0, head.y), d, v, 1.0);
+    } else if (NB_HAS(NB_HAS_TUBE | NB_HAS_CONE)) {
+        float radius = type == NB_TYPE_CONE ? head.y : 1.0;
+        float slope = type == NB_TYPE_CONE ? head.z : 0.0;
+        nb_note_mantle(turning, p, d, v, radius, slope);
+        nb_note_rim(turning, p, d, v, 0.0, radius);
+        nb_note_rim(turning, p, d, v, 1.0, radius + slope);
+    }
+}
+
+/* Flat faces: the length of the way within them is the least distance to one that it leaves by, less the greatest to one that it enters
+ * by, or 0. All are linear along the ray, so that it is linear from where one takes over to where the next does. A distance and how
+ * fast it grows along the ray are a vec2; those to leave by have the other sign, so that the greatest counts, too. */
+nb_vec2 nb_greater(nb_vec2 a, nb_vec2 b) { return b.x > a.x || (b.x == a.x && b.y > a.y) ? b : a; }
+
+/* Where the other takes over. */
+float nb_takeover(nb_vec2 a, nb_vec2 other) { return other.y > a.y ? (a.x - other.x) / (other.y - a.y) : NB_FAR; }
+
+struct nb_way_through {
+    nb_vec2 enter, leave;
+};
+
+nb_way_through nb_open_way()
+{
+    nb_way_through way;
+    way.enter = nb_vec2(0.0, 0.0);
+    way.leave = nb_vec2(-NB_FAR, 0.0);
+    return way;
+}
+
+nb_way_through nb_box_way(nb_vec3 near, nb_vec3 far, nb_vec3 rate)
+{
+    nb_way_through way = nb_open_way();
+    way.enter = nb_greater(way.enter, nb_vec2(near.x, rate.x));
+    way.enter = nb_greater(way.enter, nb_vec2(near.y, rate.y));
+    way.enter = nb_greater(way.enter, nb_vec2(near.z, rate.z));
+    way.leave = nb_greater(nb_vec2(-far.x, -rate.x), nb_vec2(-far.y, -rate.y));
+    way.leave = nb_greater(way.leave, nb_vec2(-far.z, -rate.z));
+    return way;
+}
+
+float nb_box_takeover(nb_way_through way, nb_vec3 near, nb_vec3 far, nb_vec3 rate)
+{
+    float next = nb_takeover(way.enter, nb_vec2(0.0, 0.0));
+    next = min(next, nb_takeover(way.enter, nb_vec2(near.x, rate.x)));
+    next = min(next, nb_takeover(way.enter, nb_vec2(near.y, rate.y)));
+    next = min(next, nb_takeover(way.enter, nb_vec2(near.z, rate.z)));
+    next = min(next, nb_takeover(way.leave, nb_vec2(-far.x, -rate.x)));
+    next = min(next, nb_takeover(way.leave, nb_vec2(-far.y, -rate.y)));
+    return min(next, nb_takeover(way.leave, nb_vec2(-far.z, -rate.z)));
+}
+
+/* Distance and rate to a face; whether the way enters by it. */
+nb_vec3 nb_way_to_face(nb_vec4 face, nb_vec3 place, nb_vec3 d, nb_vec3 v)
+{
+    float rise = dot(face.xyz, v);
+    float inverse = nb_rcp_bounded(rise);
+    return nb_vec3((face.w - dot(face.xyz, place)) * inverse, -dot(face.xyz, d) * inverse, rise < 0.0 ? 1.0 : -1.0);
+}
+
+nb_way_through nb_planes_way(int first, int count, nb_vec3 place, nb_vec3 d, nb_vec3 v)
+{
+    nb_way_through way = nb_open_way();
+    for (int i = 0; i < count; i++) {
+        nb_vec3 to = nb_way_to_face(NEBEL_WORD(first + i), place, d, v);
+        if (to.z > 0.0)
+            way.enter = nb_greater(way.enter, to.xy);
+        else
+            way.leave = nb_greater(way.leave, -to.xy);
+    }
+    return way;
+}
+
+float nb_planes_takeover(nb_way_through way, int first, int count, nb_vec3 place, nb_vec3 d, nb_vec3 v)
+{
+    float next = nb_takeover(way.enter, nb_vec2(0.0, 0.0));
+    for (int i = 0; i < count; i++) {
+        nb_vec3 to = nb_way_to_face(NEBEL_WORD(first + i), place, d, v);
+        if (to.z > 0.0)
+            next = min(next, nb_takeover(way.enter, to.xy));
+        else
+            next = min(next, nb_takeover(way.leave, -to.xy));
+    }
+    return next;
+}
+
+/* Of faces that the way does not pass between, those that take over are passed by. */
+#define NB_MOST_PASSED 6
+
+void nb_note_faces(inout nb_turning turning, int leaf, bool box, nb_vec3 p, nb_vec3 d, nb_vec3 v)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_vec3 inverse = nb_vec3(nb_rcp_bounded(v.x), nb_rcp_bounded(v.y), nb_rcp_bounded(v.z));
+    float t = turning.t;
+    for (int i = 0; i < NB_MOST_PASSED; i++) {
+        nb_vec3 place = p + d * t;
+        nb_way_through way;
+        float next = NB_FAR;
+        if (NB_HAS(NB_HAS_BOX) && box) {
+            nb_vec3 low = (NEBEL_WORD(leaf + 1).xyz - place) * inverse;
+            nb_vec3 high = (NEBEL_WORD(leaf + 2).xyz - place) * inverse;
+            way = nb_box_way(min(low, high), max(low, high), -d * inverse);
+            next = nb_box_takeover(way, min(low, high), max(low, high), -d * inverse);
+        } else {
+            way = nb_planes_way(int(head.z), int(head.y), place, d, v);
+            next = nb_planes_takeover(way, int(head.z), int(head.y), place, d, v);
+        }
+        nb_vec2 gap = -(way.enter + way.leave);
+        if (gap.x <= 0.0 && gap.y <= 0.0) return; /* the shadow is behind */
+        float zero = gap.y != 0.0 ? -gap.x / gap.y : NB_FAR;
+        bool outside = gap.x <= 0.0 && next < zero;
+        if (zero > 0.0) next = min(next, zero);
+        if (!outside || i + 1 == NB_MOST_PASSED) {
+            nb_note_turn(turning, t + next, false);
+            return;
+        }
+        t += next * (1.0 + 8.0 * NB_EPSILON);
+        if (!(t < turning.next)) return;
+    }
+}
+
+void nb_note_leaf(inout nb_turning turning, int leaf, nb_ray ray, nb_vec3 sun)
+{
+    int type = int(NEBEL_WORD(leaf).x);
+    bool turned = type >= NB_TYPE_TURNED;
+    if (turned) type -= NB_TYPE_TURNED;
+    if (type == NB_TYPE_WORLD) return;
+    bool flat_sided = NB_HAS(NB_HAS_PLANES | NB_HAS_BOX) && (type == NB_TYPE_PLANES || type == NB_TYPE_BOX);
+    nb_ray way = ray;
+    way.direction = sun;
+    nb_ray local = nb_turned_ray(leaf, turned, ray);
+    nb_vec3 v = nb_turned_ray(leaf, turned, way).direction;
+    if (flat_sided)
+        nb_note_faces(turning, leaf, type == NB_TYPE_BOX, local.origin, local.direction, v);
+    else
+        nb_note_round(turning, leaf, type, local.origin + NEBEL_WORD(leaf + 1).xyz, local.direction, v);
+}
+
+/* The first turn of all media behind t and before `end`, or `end`. */
+nb_turning nb_find_turn(nb_ray ray, float t, float end)
+{
+    nb_turning turning;
+    turning.t = t + max(abs(t) * (8.0 * NB_EPSILON), 1e-6);
+    turning.next = end;
+    turning.curved = false;
+    nb_vec3 sun = nb_to_sun();
+    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    for (int i = 0; i < count; i++) {
+        int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+        int leaves = int(NEBEL_WORD(at + 2).w);
+        bool several = NB_HAS(NB_HAS_GROUP) && leaves > 1;
+        int leaf = at + NB_MEDIUM_LEAF;
+        if (several) leaf = int(NEBEL_WORD(leaf).w);
+        for (int k = 0; k < (several ? leaves : 1); k++) nb_note_leaf(turning, leaf + NB_LEAF_WORDS * k, ray, sun);
+        if (NB_HAS(NB_HAS_GAUSSIAN) && int(NEBEL_WORD(at).w) == NB_KIND_GAUSSIAN) {
+            nb_vec4 word = NEBEL_WORD(at + 3);
+            float sigma = 0.70710678118654752440 / word.w;
+            nb_note_ball(turning, ray.origin + word.xyz, ray.direction, sun, sigma);
+            nb_note_ball(turning, ray.origin + word.xyz, ray.direction, sun, 4.0 * sigma);
+        }
+    }
+    return turning;
+}
