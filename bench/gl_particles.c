@@ -19,8 +19,8 @@ typedef struct nb_sprite {
 
 typedef struct nb_drawing {
     nb_sky sky;
-    nebel_scene_data scene;
-    nebel_gl_renderer *renderer;
+    nebel_scene_data scene, walled; /* without surfaces; with one across the picture, in the nebula's middle */
+    nebel_gl_renderer *renderer, *with_wall;
     unsigned target, framebuffer, vertex_array, buffer, program;
 } nb_drawing;
 
@@ -136,21 +136,57 @@ static double run_sprites(void *user)
 
 /* ---- particles ------------------------------------------------------------------------------- */
 
-static double run_particles(void *user)
+static double run_frame(const nb_drawing *d, nebel_gl_renderer *renderer)
 {
-    const nb_drawing *const d = user;
     const nebel_gl_frame_desc desc = {
         .camera = d->sky.camera, .width = d->sky.width, .height = d->sky.height, .samples = 1};
     glFinish();
     const double start = nb_clock_wall();
-    if (nebel_gl_render_frame(d->renderer, &desc) != NEBEL_OK) return -1;
+    if (nebel_gl_render_frame(renderer, &desc) != NEBEL_OK) return -1;
     glFinish();
     return nb_clock_wall() - start;
 }
 
+static double run_particles(void *user)
+{
+    const nb_drawing *const d = user;
+    return run_frame(d, d->renderer);
+}
+
+static double run_with_wall(void *user)
+{
+    const nb_drawing *const d = user;
+    return run_frame(d, d->with_wall);
+}
+
 static int set_particles(nb_drawing *d)
 {
-    return nebel_set_gl_renderer_particles(d->renderer, d->sky.particles, d->sky.count) == NEBEL_OK ? 0 : -1;
+    const nebel_particle *const particles = d->sky.particles;
+    return nebel_set_gl_renderer_particles(d->renderer, particles, d->sky.count) == NEBEL_OK &&
+                   nebel_set_gl_renderer_particles(d->with_wall, particles, d->sky.count) == NEBEL_OK
+               ? 0
+               : -1;
+}
+
+static int make_renderers(nb_drawing *d)
+{
+    static const float corners[] = {-40, -40, 0, 40, -40, 0, 40, 40, 0, -40, 40, 0};
+    static const uint32_t indices[] = {0, 1, 2, 0, 2, 3};
+    static const nebel_mesh wall = {.positions = corners,
+                                    .indices = indices,
+                                    .vertex_count = 4,
+                                    .triangle_count = 2,
+                                    .base_color = {.5f, .5f, .5f},
+                                    .texture = -1};
+    const nebel_gl_renderer_desc desc = {.shadow_size = 0};
+    d->scene.camera = d->sky.camera;
+    d->walled = d->scene;
+    d->walled.meshes = &wall;
+    d->walled.mesh_count = 1;
+    return nebel_create_gl_renderer(&d->scene, NULL, &desc, &d->renderer) == NEBEL_OK &&
+                   nebel_create_gl_renderer(&d->walled, NULL, &desc, &d->with_wall) == NEBEL_OK
+               ? 0
+               : -1;
 }
 
 /* Particles of one colour take all of the light alike: they need one pass. */
@@ -182,26 +218,35 @@ static void add(nb_figures *figures, const nb_drawing *d, const char *what, nb_f
     nb_figures_add(figures, &figure);
 }
 
-static const char *measure(nb_drawing *d, const char *what, int repetitions, nb_figures *figures)
+/* The one with a surface has no target: sprites are not tested against depth, and half of the particles are hidden. */
+static const char *measure(nb_drawing *d, const char *what, const char *what_with_wall, int repetitions,
+                           nb_figures *figures)
 {
-    nb_contest contests[] = {{.run = run_sprites, .user = d}, {.run = run_particles, .user = d}};
-    if (set_particles(d) != 0 || nb_measure(contests, 2, repetitions) != 0) return failed;
+    nb_contest contests[] = {
+        {.run = run_sprites, .user = d}, {.run = run_particles, .user = d}, {.run = run_with_wall, .user = d}};
+    if (set_particles(d) != 0 || nb_measure(contests, 3, repetitions) != 0) return failed;
     add(figures, d, what,
         (nb_figure){.unit = "ms",
                     .value = 1e3 * contests[1].seconds,
                     .floor_name = "additive sprites",
                     .floor = 1e3 * contests[0].seconds,
                     .at_most = 2});
+    add(figures, d, what_with_wall,
+        (nb_figure){.unit = "ms",
+                    .value = 1e3 * contests[2].seconds,
+                    .floor_name = "additive sprites without a surface",
+                    .floor = 1e3 * contests[0].seconds});
     return NULL;
 }
 
 static const char *measure_all(nb_drawing *d, int repetitions, nb_figures *figures)
 {
     double overlap = 0;
-    const char *fault = measure(d, "particles of three colors", repetitions, figures);
+    const char *fault =
+        measure(d, "particles of three colors", "of three colors, a surface among them", repetitions, figures);
     if (fault != NULL) return fault;
     make_grey(d);
-    fault = measure(d, "grey particles", repetitions, figures);
+    fault = measure(d, "grey particles", "grey, a surface among them", repetitions, figures);
     if (fault != NULL) return fault;
     if (count_overlap(d, &overlap) != 0) return failed;
     add(figures, d, "particles: on a covered pixel", (nb_figure){.unit = "", .value = overlap});
@@ -211,6 +256,7 @@ static const char *measure_all(nb_drawing *d, int repetitions, nb_figures *figur
 static void delete_all(nb_drawing *d)
 {
     nebel_destroy_gl_renderer(d->renderer);
+    nebel_destroy_gl_renderer(d->with_wall);
     glDeleteTextures(1, &d->target);
     glDeleteFramebuffers(1, &d->framebuffer);
     glDeleteVertexArrays(1, &d->vertex_array);
@@ -224,12 +270,9 @@ const char *nb_bench_opengl_particles(const nb_bench_desc *desc, nb_figures *fig
     nb_drawing d = {0};
     const char *fault = out_of_memory;
     if (nb_sky_make(desc->quick, &d.sky) == 0 && make_sprites(&d) == 0) {
-        d.scene.camera = d.sky.camera;
         fault = failed;
-        if (make_program(&d) == 0 && make_target(&d) == 0 &&
-            nebel_create_gl_renderer(&d.scene, NULL, &(nebel_gl_renderer_desc){0}, &d.renderer) == NEBEL_OK) {
+        if (make_program(&d) == 0 && make_target(&d) == 0 && make_renderers(&d) == 0)
             fault = measure_all(&d, desc->quick ? 1 : 5, figures);
-        }
     }
     delete_all(&d);
     return fault;
