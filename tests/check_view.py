@@ -33,6 +33,8 @@ class PicturesTest(ViewTest):
 
     def test_what_goes_wrong_at_the_start(self):
         self.assert_failed(nebel("view", self.scene, env={"DISPLAY": ""}), "no screen", "nebel render")
+        self.assert_failed(nebel("view", self.scene, env={"DISPLAY": self.screen.name, "MESA_GL_VERSION_OVERRIDE": "2.1"}),
+                           "no window with OpenGL 3.3 core", "the driver has OpenGL 2.1")
         self.assert_failed(nebel("view", "none.json", env={"DISPLAY": self.screen.name}), "none.json")
         self.assert_misused(nebel("view", self.scene, "--size", "5x5"), "--size", "64 to 8192")
 

@@ -75,6 +75,31 @@ class FogTest(ViewTest):
         self.assertEqual(viewer.said("view: saved"), 0)
         viewer.end()
 
+    def test_why_nothing_is_saved(self):
+        viewer = Viewer(self, "--size", "400x900")
+        good = self.scene.read_text()
+        viewer.say("scene.json:1:", lambda: self.scene.write_text("{"))
+        viewer.say("view: nothing is saved", lambda: viewer.key("ctrl+s"))
+        self.assertEqual(viewer.said("scene.json:1:"), 2, "and why is said again")
+        self.assertEqual(self.scene.read_text(), "{")
+        viewer.say(f"view: read {self.scene} again", lambda: self.scene.write_text(good + " "))
+        self.scene.unlink()
+        viewer.say("view: nothing is saved", lambda: viewer.key("ctrl+s"))
+        viewer.press("fog[0].visibility", 0.2)
+        viewer.say("view: nothing is saved", lambda: viewer.key("ctrl+s"))
+        self.assertEqual(viewer.said("No such file"), 2)
+        self.assertFalse(self.scene.exists())
+        self.scene.write_text(good)
+        viewer.say(f"view: saved {self.scene}", lambda: viewer.press("Save mine into it"))
+        viewer.end()
+
+    def test_small_numbers_keep_their_digits(self):
+        viewer = Viewer(self, "--size", "400x900")
+        for colour, typed in enumerate(("2.996e-05", "1.2345e-05", "1.5e-05")):
+            viewer.type("fog[0].extinction", typed, 0.1 + 0.2 * colour)
+        self.assertEqual(viewer.save()["fog"][0]["extinction"], [2.996e-05, 1.2345e-05, 1.5e-05])
+        viewer.end()
+
     def test_the_file_changes(self):
         viewer = Viewer(self)
         first = viewer.take_picture()

@@ -11,11 +11,11 @@ enum { DEVICES_MOST = 16 };
 enum { STAGE_NONE, STAGE_DISPLAY, STAGE_CONFIG, STAGE_SURFACE, STAGE_CONTEXT };
 
 /* Of several attempts the one counts that came farthest, and of those the first. */
-static int fail(nb_gl_context *gl, int stage, const char *what)
+static int fail(nb_gl_context *gl, int stage, const char *what, EGLint error)
 {
     if (stage <= gl->stage) return -1;
     gl->stage = stage;
-    (void)snprintf(gl->fault, sizeof gl->fault, "%s (EGL error 0x%x)", what, (unsigned)eglGetError());
+    (void)snprintf(gl->fault, sizeof gl->fault, "%s (EGL error 0x%x)", what, (unsigned)error);
     return -1;
 }
 
@@ -74,6 +74,24 @@ static int has_fixed_pipeline(void)
     return (profile & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT) != 0;
 }
 
+/* That the wanted context is missing, and what OpenGL there is instead. */
+static int fail_context(nb_gl_context *gl, EGLDisplay display, EGLConfig config, nb_gl_api api)
+{
+    static const EGLint older[] = {EGL_CONTEXT_MAJOR_VERSION, 2, EGL_NONE}, any[] = {EGL_NONE};
+    char words[192];
+    const EGLint error = eglGetError();
+    const char *const wanted = api == NB_GL_API_ES      ? "the driver has no OpenGL ES 3.0"
+                               : api == NB_GL_API_FIXED ? "the driver has no compatibility profile of OpenGL 3.3"
+                                                        : "the driver has no OpenGL 3.3 core";
+    const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, api == NB_GL_API_ES ? older : any);
+    const int found = context != EGL_NO_CONTEXT && eglMakeCurrent(display, gl->surface, gl->surface, context);
+    (void)snprintf(words, sizeof words, "%s%s%.120s", wanted, found ? ", but " : "",
+                   found ? (const char *)glGetString(GL_VERSION) : "");
+    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    if (context != EGL_NO_CONTEXT) eglDestroyContext(display, context);
+    return fail(gl, STAGE_CONTEXT, words, error);
+}
+
 /* A surface of one pixel, because not every driver makes a context current without one. */
 static int open_on(nb_gl_context *gl, EGLDisplay display, nb_gl_api api)
 {
@@ -83,25 +101,23 @@ static int open_on(nb_gl_context *gl, EGLDisplay display, nb_gl_api api)
     EGLConfig config;
     EGLint count = 0;
     if (display == EGL_NO_DISPLAY || !eglInitialize(display, NULL, NULL))
-        return fail(gl, STAGE_DISPLAY, "no display of EGL starts");
+        return fail(gl, STAGE_DISPLAY, "no display of EGL starts", eglGetError());
     if (!eglBindAPI(api == NB_GL_API_ES ? EGL_OPENGL_ES_API : EGL_OPENGL_API) ||
         !eglChooseConfig(display, kinds, &config, 1, &count) || count < 1) {
         return fail(gl, STAGE_CONFIG,
-                    api == NB_GL_API_ES ? "EGL offers no OpenGL ES 3.0" : "EGL offers no OpenGL but OpenGL ES");
+                    api == NB_GL_API_ES ? "EGL offers no OpenGL ES 3.0" : "EGL offers no OpenGL but OpenGL ES",
+                    eglGetError());
     }
     gl->display = display;
     gl->surface = eglCreatePbufferSurface(display, config, pixel);
-    if (gl->surface == EGL_NO_SURFACE) return fail(gl, STAGE_SURFACE, "EGL makes no surface off the screen");
+    if (gl->surface == EGL_NO_SURFACE)
+        return fail(gl, STAGE_SURFACE, "EGL makes no surface off the screen", eglGetError());
     gl->context = make_context(display, config, api);
     if (gl->context != EGL_NO_CONTEXT && eglMakeCurrent(display, gl->surface, gl->surface, gl->context) &&
         (api != NB_GL_API_FIXED || has_fixed_pipeline())) {
         return 0;
     }
-    (void)fail(gl, STAGE_CONTEXT,
-               api == NB_GL_API_ES      ? "the driver has no OpenGL ES 3.0"
-               : api == NB_GL_API_FIXED ? "the driver has no compatibility profile of OpenGL 3.3"
-                                        : "the driver has no OpenGL 3.3 core");
-    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    (void)fail_context(gl, display, config, api);
     if (gl->context != EGL_NO_CONTEXT) eglDestroyContext(display, gl->context);
     eglDestroySurface(display, gl->surface);
     return -1;

@@ -65,6 +65,29 @@ bool slide_whole(const char *name, int *value, int low, int high, bool logarithm
     return finish(ImGui::SliderInt(name, value, low, high, "%d", flags), name, help);
 }
 
+static bool fits(const char *format, const double *values, int count, float width)
+{
+    char text[64];
+    for (int i = 0; i < count; i++) {
+        snprintf(text, sizeof text, format, values[i]);
+        if (ImGui::CalcTextSize(text).x > width) return false;
+    }
+    return true;
+}
+
+// As many digits as the boxes of a group have room for; small numbers have exponents beside them.
+static const char *shorten(const char *format, const double *values, int count)
+{
+    static const char *const shorter[] = {"%.4g", "%.3g", "%.2g", "%.1g"};
+    const ImGuiStyle &style = ImGui::GetStyle();
+    const float boxes = ImGui::CalcItemWidth() - style.ItemInnerSpacing.x * float(count - 1);
+    if (strcmp(format, shorter[0]) != 0) return format;
+    int digits = 0;
+    while (digits < 3 && !fits(shorter[digits], values, count, boxes / float(count) - 2 * style.FramePadding.x))
+        digits++;
+    return digits > 0 ? shorter[digits] : format;
+}
+
 // Dear ImGui 1.86 forgets to take back the width of a group of one.
 static bool drag_numbers(const char *name, double *values, int count, float step, const double *low, const double *high,
                          const char *format, ImGuiSliderFlags flags)
@@ -79,8 +102,11 @@ bool drag(const char *name, double *values, int count, double least, double low,
     const bool has_low = low > -DBL_MAX;
     double largest = least;
     for (int i = 0; i < count; i++) largest = fmax(largest, fabs(values[i]));
+    const char *const shown = shorten(format, values, count);
+    const ImGuiSliderFlags flags =
+        (has_low ? ImGuiSliderFlags_AlwaysClamp : 0) | (shown != format ? ImGuiSliderFlags_NoRoundToFormat : 0);
     const bool changed = drag_numbers(name, values, count, float(largest / 100), has_low ? &low : nullptr,
-                                      has_low ? &high : nullptr, format, has_low ? ImGuiSliderFlags_AlwaysClamp : 0);
+                                      has_low ? &high : nullptr, shown, flags);
     return finish(changed, name, help);
 }
 

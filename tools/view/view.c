@@ -349,6 +349,29 @@ static nebel_result watch_file(viewer *all)
     return NEBEL_OK;
 }
 
+/* Why, the last message has said. */
+static nebel_result say_not_saved(viewer *all, nebel_result why)
+{
+    char words[sizeof all->message];
+    (void)snprintf(words, sizeof words, "Nothing is saved. %.480s", all->message);
+    memcpy(all->message, words, sizeof words);
+    all->is_fault = 1;
+    nb_report_message("view: nothing is saved");
+    return forgive(why);
+}
+
+/* Where the file has gone or is broken it does not have what the window shows. */
+static nebel_result say_nothing_to_save(viewer *all)
+{
+    nebel_scene *scene = NULL;
+    const nebel_result result = nebel_load_scene(all->settings->scene, &(nebel_scene_desc){.log = all->log}, &scene);
+    if (result != NEBEL_OK) return say_not_saved(all, result);
+    nebel_destroy_scene(scene);
+    say(all, "Nothing to save: the file has it all.");
+    nb_report_message("view: nothing to save");
+    return NEBEL_OK;
+}
+
 /* A file that somebody else has changed is not written before the question about that was seen; then what is new in it
  * stays there, and is read. */
 static nebel_result save(viewer *all)
@@ -360,13 +383,10 @@ static nebel_result save(viewer *all)
         all->panel.file_is_newer = 1;
         return NEBEL_OK;
     }
-    if (!was_newer && !must_read && !all->panel.saves_camera && !nb_draft_is_changed(&all->draft)) {
-        say(all, "Nothing to save: the file has it all.");
-        nb_report_message("view: nothing to save");
-        return NEBEL_OK;
-    }
+    if (!was_newer && !must_read && !all->panel.saves_camera && !nb_draft_is_changed(&all->draft))
+        return say_nothing_to_save(all);
     const nebel_result result = nb_draft_save(&all->draft, path, all->panel.saves_camera);
-    if (result != NEBEL_OK) return forgive(result);
+    if (result != NEBEL_OK) return say_not_saved(all, result);
     nb_report_message("view: saved %s", path);
     all->panel.file_is_newer = 0;
     nb_watch_take(&all->watch);

@@ -116,6 +116,24 @@ static GLFWwindow *make_window(const char *title, uint32_t width, uint32_t heigh
     return glfwCreateWindow((int)width, (int)height, title, NULL, NULL);
 }
 
+/* Says what OpenGL there is instead. */
+static int fail_window(void)
+{
+    char words[512] = "no window with OpenGL 3.3 core opens";
+    glfwDefaultWindowHints();
+    glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
+    GLFWwindow *const any = glfwCreateWindow(64, 64, "nebel", NULL, NULL);
+    if (any != NULL) {
+        glfwMakeContextCurrent(any);
+        (void)snprintf(words, sizeof words, "no window with OpenGL 3.3 core opens: the driver has OpenGL %s",
+                       (const char *)glGetString(GL_VERSION));
+        glfwDestroyWindow(any);
+    }
+    const size_t used = strlen(words);
+    (void)snprintf(words + used, sizeof words - used, "; update the driver, or install Mesa (Debian: libgl1-mesa-dri)");
+    return fail(words);
+}
+
 static void listen(nb_window *window)
 {
     glfwSetWindowUserPointer(window->handle, window);
@@ -133,9 +151,7 @@ int nb_window_open(nb_window *window, const char *title, uint32_t width, uint32_
     if (!glfwInit()) return fail("there is no screen for a window; 'nebel render' makes pictures without one");
     (void)snprintf(name, sizeof name, "%s - nebel", title);
     window->handle = make_window(name, width, height);
-    if (window->handle == NULL) {
-        return fail("no window with OpenGL 3.3 opens; update the driver, or install Mesa (Debian: libgl1-mesa-dri)");
-    }
+    if (window->handle == NULL) return fail_window();
     glfwMakeContextCurrent(window->handle);
     glfwSwapInterval(1);
     (void)snprintf(window->driver, sizeof window->driver, "%s, %s", (const char *)glGetString(GL_RENDERER),
