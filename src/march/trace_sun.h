@@ -76,6 +76,13 @@ static void set_glow(contact *k, const packet *rays, const sunlight *sun)
 
 /* ---- turns ----------------------------------------------------------------------------------- */
 
+static int is_ball_alone(const sunlight *sun)
+{
+    const nb_medium *medium = &sun->snapshot->media[0];
+    return sun->snapshot->way_to_sun == NB_WAY_ADDED && sun->snapshot->medium_count == 1 &&
+           medium->body.leaves[0].type == NB_LEAF_BALL;
+}
+
 /* Those of the lamp, or of the sun where it is NULL. Returns whether they were not there yet. */
 static int find_turns(sunlight *sun, const packet *rays, const nb_lamp *lamp)
 {
@@ -83,7 +90,7 @@ static int find_turns(sunlight *sun, const packet *rays, const nb_lamp *lamp)
     sun->turn_count = 0;
     sun->has_turns = 1;
     sun->turning = lamp;
-    note_media(sun, rays, lamp);
+    if (lamp != NULL || !is_ball_alone(sun)) note_media(sun, rays, lamp); /* inside a ball there are none */
     return 1;
 }
 
@@ -464,12 +471,18 @@ typedef struct sun_walk {
     nb_wide along, along_error; /* of a grid: the integral of its density from the start of the piece up to here */
 } sun_walk;
 
+#include "trace_sun_ball.h"
 #include "trace_sun_grid.h"
 
 static sun_step try_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
                          nb_real length, nb_wide end, nb_wmask turns)
 {
     if (is_grid_alone(sun)) return try_grid_step(sun, m, g, w, length, end);
+    if (is_ball_alone(sun)) {
+        sun_step s = try_ball_step(sun, m, p, g, w, length, end);
+        limit_step(m, w->before, &s);
+        return s;
+    }
     sun_step s = {.start = w->t, .length = length, .amount = NB_W(0.0), .amount_error = NB_F(0.0)};
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
     transmittance_until(m, p, g, end, s.behind);
