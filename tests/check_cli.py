@@ -457,6 +457,22 @@ class RenderTest(PictureCase):
         self.assertNotIn("note", self.render("c.exr", *paths, "--seed", "1", "--bounces", "1", "--quiet").err)
         self.assertNotIn("RMSE: 0\n", nebel("compare", self.folder / "a.exr", self.folder / "c.exr").out)
 
+    def test_multiple_scattering(self):
+        scene = self.folder / "ball.json"
+        scene.write_text('{"nebel": 1, "camera": {"position": [0, 0, 9]}, "sun": {"direction": [1, 1, 1], "irradiance": 3},'
+                         '"fog": [{"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 2}, "extinction": 2, "albedo": 1}],'
+                         '"multiple_scattering": {"model": "diffusion", "cells": 8000}}')
+        def render(name, *options):
+            done = nebel("render", scene, "-o", self.folder / name, "--size", "16x16", *options)
+            self.assert_done(done)
+            return (self.folder / name).read_bytes()
+        own = render("own.exr")
+        self.assertEqual(render("same.exr", "--multiple-scattering", "diffusion", "--threads", "1"), own)
+        self.assertNotEqual(render("off.exr", "--multiple-scattering", "off"), own)
+        done = nebel("render", scene, "-o", self.folder / "no.exr", "--device", "gl")
+        self.assertEqual(done.returncode, 1)
+        self.assertFalse((self.folder / "no.exr").exists())
+
     def test_fog_in_cells(self):
         self.assert_failed(self.render("a.exr", "--method", "cells"), "scene.json", 'no section "cells"')
         room = {"shape": {"type": "box", "min": [-9, -9, 1], "max": [9, 9, 4]}, "density": 0.1, "color": 0.5}
@@ -574,6 +590,8 @@ class RenderTest(PictureCase):
         self.assert_misused(self.render("a.png", "--device", "gpu"), "--device", "cpu, gl")
         self.assert_misused(self.render("a.png", "--bounces", "2"), "--bounces", "--method reference")
         self.assert_misused(self.render("a.png", "--method", "reference", "--bounces", "0"), "--bounces", "1 to 10000")
+        self.assert_misused(self.render("a.png", "--multiple-scattering", "octaves"), "--multiple-scattering", "off, diffusion")
+        self.assert_misused(self.render("a.png", "--multiple-scattering", "off", "--method", "reference"), "--bounces")
         self.assert_misused(self.render("a.png", "--method", "magic"), "--method", "exact, cells, cells-pixel, vertex, additive, linear, exp, exp2, five-tap, fog-coord, two-pass, alpha, d3d9, reference")
         self.assert_misused(self.render("a.png", "--method", "cells", "--tolerance", "0.1"), "--tolerance", "exact")
         self.assert_misused(self.render("a.png", "--method", "five-tap"), "--method", "--device gl")

@@ -466,6 +466,8 @@ static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
     if (a->has_sun) SAME(&a->sun_direction, &b->sun_direction);
     if (a->has_sun) SAME(&a->sun_irradiance, &b->sun_irradiance);
     SAME(&a->max_opacity, &b->max_opacity);
+    WHOLE(a->diffusion == NULL, b->diffusion == NULL);
+    if (a->diffusion != NULL) assert_memory_equal(a->diffusion, b->diffusion, sizeof *a->diffusion);
     same_volumes(a, b);
     same_nebulae(a, b);
     same_cells(a, b);
@@ -552,9 +554,10 @@ static void test_good_scenes(void **state)
         "fuzz/corpus/scene/heightfield",   "fuzz/corpus/scene/import",
         "fuzz/corpus/scene/linear",        "fuzz/corpus/scene/minimal",
         "fuzz/corpus/scene/nebula",        "fuzz/corpus/scene/numbers",
-        "fuzz/corpus/scene/soft_edge",     "fuzz/corpus/scene/space",
-        "fuzz/corpus/scene/sphere_radial", "fuzz/corpus/scene/text",
-        "fuzz/corpus/scene/turntable",     "fuzz/corpus/scene/union",
+        "fuzz/corpus/scene/scattering",    "fuzz/corpus/scene/soft_edge",
+        "fuzz/corpus/scene/space",         "fuzz/corpus/scene/sphere_radial",
+        "fuzz/corpus/scene/text",          "fuzz/corpus/scene/turntable",
+        "fuzz/corpus/scene/union",
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[512];

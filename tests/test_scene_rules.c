@@ -29,7 +29,7 @@ static void test_what_no_scene_has(void **state)
         {FORMAT, SCENE("`\"ambiant\": 0"),
          "ambiant: unknown key; a scene has: nebel, up, unit, camera, background, sun, ambient, max_opacity, lights, "
          "models, fog, "
-         "nebula, cells, classic; did "
+         "nebula, cells, classic, multiple_scattering; did "
          "you "
          "mean "
          "\"ambient\"?"},

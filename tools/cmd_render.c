@@ -479,11 +479,21 @@ static int check_count(const studio *all)
                              all->wanted->scene, count, NEBEL_MOST_PACKED_VOLUMES);
 }
 
+static void choose_scattering(const nb_render_call *wanted, nebel_scene *scene)
+{
+    const nebel_diffusion_desc by_default = {0};
+    const int is_off = wanted->scattering == NB_SCATTERING_OFF;
+    if (wanted->scattering == NB_SCATTERING_OF_FILE) return;
+    if (is_off || nebel_scene_contents(scene)->diffusion == NULL)
+        (void)nebel_set_scene_diffusion(scene, is_off ? NULL : &by_default);
+}
+
 static int load(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
     if (status == NB_DONE) status = check_count(all);
+    if (status == NB_DONE) choose_scattering(wanted, all->loaded.scene);
     return status == NB_DONE ? nb_load_fog(wanted->scene, wanted->first_frame, &all->listener, &all->loaded) : status;
 }
 

@@ -21,6 +21,7 @@ enum {
     AOV,
     TOLERANCE,
     METHOD,
+    MULTIPLE_SCATTERING,
     TESSELLATE,
     TESSELLATE_TRIANGLES,
     TESSELLATE_DEPTH,
@@ -58,6 +59,9 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
          "OpenGL 1.x takes it; d3d9: the states\nin \"classic\"; cells, cells-pixel: section \"cells\"\nat vertices or "
          "pixels; five-tap, of --device gl:\nparticles meet surfaces by five depths; reference,\nof the CPU: paths of "
          "light, by chance and without\nbias, slow."},
+    [MULTIPLE_SCATTERING] = {"multiple-scattering", 0, "MODEL",
+                             "Of sunlight in fog, in place of what the scene says:\ndiffusion, which adds what comes "
+                             "after the first\nscattering; or off."},
     [TESSELLATE] = {"tessellate", 0, "E",
                     "With --method vertex or additive: smaller triangles,\nuntil the fog's factor is within E of the "
                     "exact one\nfor the camera, 1e-6 < E <= 1."},
@@ -211,6 +215,19 @@ static void read_device(nb_arguments *arguments, nb_render_call *wanted)
         nb_options_refuse(arguments, TOLERANCE, "is for --method exact; leave it out with another");
 }
 
+static void read_scattering(nb_arguments *arguments, nb_render_call *wanted)
+{
+    static const char *const models[] = {"off", "diffusion", NULL};
+    static const nb_scattering chosen[] = {NB_SCATTERING_OFF, NB_SCATTERING_DIFFUSION};
+    const int is_reference = wanted->method == NEBEL_METHOD_REFERENCE;
+    /* The reference scatters light as often as it likes: a solution would be work for nothing. */
+    wanted->scattering = is_reference ? NB_SCATTERING_OFF : NB_SCATTERING_OF_FILE;
+    if (arguments->values[MULTIPLE_SCATTERING] == NULL) return;
+    if (is_reference)
+        nb_options_refuse(arguments, MULTIPLE_SCATTERING, "is not for --method reference, which has --bounces");
+    wanted->scattering = chosen[nb_options_choice(arguments, MULTIPLE_SCATTERING, models, 0)];
+}
+
 int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
 {
     wanted->scene = arguments->operands[0];
@@ -227,6 +244,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
     read_output(arguments, wanted);
     read_device(arguments, wanted);
     read_reference(arguments, wanted);
+    read_scattering(arguments, wanted);
     read_tessellate(arguments, wanted);
     if (arguments->misused) return nb_report_misuse("render", "render: nothing was done");
     return -1;

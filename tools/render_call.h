@@ -6,6 +6,13 @@
 
 #include <nebel/render.h>
 
+/* What becomes of light that fog has scattered once. */
+typedef enum nb_scattering {
+    NB_SCATTERING_OF_FILE,
+    NB_SCATTERING_OFF,
+    NB_SCATTERING_DIFFUSION /* as the file says, or by default */
+} nb_scattering;
+
 typedef struct nb_render_call {
     const char *scene, *output;
     nebel_image_format format;
@@ -16,10 +23,11 @@ typedef struct nb_render_call {
     uint32_t first_frame, last_frame;
     int many_frames, aov, quiet, gl;
     nebel_method method;
+    nb_scattering scattering;
     nebel_renderer_desc renderer;
 } nb_render_call;
 
-enum { NB_RENDER_OPTIONS = 18 };
+enum { NB_RENDER_OPTIONS = 19 };
 
 extern const nb_option nb_render_options[NB_RENDER_OPTIONS];
 

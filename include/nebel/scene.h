@@ -15,6 +15,7 @@
 
 #include <nebel/cells.h>
 #include <nebel/classic.h>
+#include <nebel/diffusion.h>
 #include <nebel/nebel.h>
 #include <nebel/nebula.h>
 
@@ -134,6 +135,8 @@ typedef struct nebel_scene_data {
     const float *classic_table;         /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
     const nebel_d3d9_fog *classic_d3d9; /* switched on. NULL: none */
 
+    const nebel_diffusion_desc *diffusion; /* the section "multiple_scattering"; NULL: none */
+
     size_t file_count; /* models, height maps and points that it names; what those name in turn is not among them */
     const char *const *files; /* as they are opened, once for each time they are named */
 
@@ -201,6 +204,11 @@ typedef enum nebel_volume_origin {
 
 /* index < contents->volume_count. */
 nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index);
+
+/* Light that fog scatters more than once, of snapshots from now on: what the section "multiple_scattering" says, in place
+ * of it. NULL: none; the description is copied. Not thread safe against readers of the same scene. Errors: ARGUMENT; a
+ * commit has those of nebel_set_diffusion. */
+nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc);
 
 /* A snapshot of the scene's fog at a frame, its nebulae's particles and, as exact fog, its cells among it; release it
  * with nebel_release_snapshot before the scene's allocator goes away. On an error *snapshot is NULL. Errors: ARGUMENT,

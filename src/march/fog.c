@@ -3,6 +3,7 @@
 
 #include "media/check.h"
 
+#include <math.h>
 #include <string.h>
 
 /* An id is the slot in the low half and the slot's generation in the high half, so that a stale id is recognised. */
@@ -183,4 +184,31 @@ nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity)
     const nebel_result result = check_opacity(&fog->log, max_opacity);
     if (result == NEBEL_OK) fog->max_opacity = max_opacity;
     return result;
+}
+
+static const char *fault_of_diffusion(const nebel_diffusion_desc *desc)
+{
+    if (desc->cells != 0 && (desc->cells < NEBEL_MIN_DIFFUSION_CELLS || desc->cells > NEBEL_MAX_DIFFUSION_CELLS))
+        return "cells: must be 0 or within " NB_TEXT(NEBEL_MIN_DIFFUSION_CELLS) " and " NB_TEXT(
+            NEBEL_MAX_DIFFUSION_CELLS);
+    if (!desc->has_ground) return NULL;
+    if (!(fabs(desc->ground_height) <= NEBEL_MAX_LENGTH)) return "ground_height: must be at most 1e15 m";
+    for (int c = 0; c < 3; c++)
+        if (!(desc->ground_albedo[c] >= 0 && desc->ground_albedo[c] <= 1))
+            return "ground_albedo: must be within 0 and 1";
+    return NULL;
+}
+
+nebel_result nebel_set_diffusion(nebel_fog *fog, const nebel_diffusion_desc *desc)
+{
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL) {
+        fog->diffusion = (nebel_diffusion_desc){0};
+        return NEBEL_OK;
+    }
+    const char *fault = fault_of_diffusion(desc);
+    if (fault != NULL) return nb_fail(&fog->log, NEBEL_ERROR_VALUE, "diffusion: %s", fault);
+    fog->diffusion = *desc;
+    if (desc->cells == 0) fog->diffusion.cells = NEBEL_DEFAULT_DIFFUSION_CELLS;
+    return NEBEL_OK;
 }

@@ -5,6 +5,8 @@
 #include "media/lamp.h"
 #include "media/volume.h"
 
+#include <nebel/diffusion.h>
+
 typedef struct nb_slot {
     nb_volume volume;
     size_t next_free; /* 1 + slot, 0: none */
@@ -20,6 +22,7 @@ struct nebel_fog {
     size_t lamp_count;
     nb_lamp *lamps;
     double max_opacity;
+    nebel_diffusion_desc diffusion; /* cells 0: off */
     nb_slot *slots;
     size_t slot_count, slot_capacity, first_free, free_count;
 };

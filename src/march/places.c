@@ -1,5 +1,5 @@
 /* Fog at places and bounds of it along rays: what stochastic renderers ask. */
-#include "snapshot.h"
+#include "places.h"
 
 #include "base/vector.h"
 #include "media/density.h"
@@ -91,6 +91,27 @@ static void sample(const nebel_snapshot *snapshot, const nebel_place *place, neb
             matter->extinction[c] += density * body->extinction[c];
             matter->scattering[c] += density * body->extinction[c] * body->albedo[c];
             matter->emission[c] += density * glow_of(body, c);
+        }
+    }
+}
+
+void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_transport *sum)
+{
+    const nebel_place place = {{position[0], position[1], position[2]}, -1};
+    const int64_t cover = find_cover(snapshot, &place);
+    walk w;
+    begin_at(&w, snapshot, position);
+    for (const nb_medium *medium; (medium = walk_on(&w)) != NULL;) {
+        const nb_volume *body = &medium->body;
+        if (!shows_at(medium, &place, cover)) continue;
+        const double density = nb_density_within(body, position);
+        for (int c = 0; c < 3; c++) {
+            const double extinction = density * body->extinction[c], scattering = extinction * body->albedo[c];
+            const double turned = scattering * (1 - medium->ahead);
+            sum->extinction[c] += extinction;
+            sum->scattering[c] += scattering;
+            sum->turned[c] += turned;
+            sum->forward[c] += turned * medium->turned_cosine;
         }
     }
 }

@@ -1,6 +1,6 @@
 #include "snapshot.h"
 
-#include "fog.h"
+#include "diffusion.h"
 #include "media/grid.h"
 
 #include <math.h>
@@ -26,6 +26,14 @@ static double densest_of(const nebel_density *density)
     return density->type == NEBEL_DENSITY_GRID ? nb_grid_peak(density->grid) : 1;
 }
 
+static void find_moments(nb_medium *medium)
+{
+    const nb_volume *v = &medium->body;
+    const double cosine = v->lit ? nebel_phase_mean_cosine(&v->described_phase) : 0;
+    medium->ahead = cosine > 0 ? cosine * cosine : 0;
+    medium->turned_cosine = cosine > 0 ? cosine / (1 + cosine) : cosine;
+}
+
 static void light_medium(nb_medium *medium, const nebel_fog *fog)
 {
     const nb_volume *v = &medium->body;
@@ -48,6 +56,7 @@ static void free_snapshot(nebel_snapshot *s)
 {
     const nebel_allocator allocator = s->allocator;
     for (size_t i = 0; i < s->medium_count; i++) nb_volume_free(&allocator, &s->media[i].body);
+    nb_diffusion_free(&allocator, s->diffusion);
     nb_bvh_free(&allocator, &s->bvh);
     nb_release(&allocator, s->media);
     nb_release(&allocator, s->lamps);
@@ -85,17 +94,41 @@ static int has_body(const nb_volume *volume)
     return 1;
 }
 
+/* What a snapshot takes of a fog, and how. */
+typedef struct selection {
+    int is_scaled; /* see scale_medium */
+    int is_level;  /* fog without an end along x or z alone */
+} selection;
+
+static int is_level(const nb_volume *volume)
+{
+    return isinf(volume->low[0]) || isinf(volume->high[0]) || isinf(volume->low[2]) || isinf(volume->high[2]);
+}
+
+/* Fog that takes from light what does not go straight on, and gives none. */
+static void scale_medium(nb_medium *medium)
+{
+    nb_volume *v = &medium->body;
+    for (int c = 0; c < 3; c++) {
+        v->extinction[c] *= 1 - (v->lit ? v->albedo[c] * medium->ahead : 0);
+        v->albedo[c] = v->source[c] = v->emission[c] = 0;
+    }
+    v->lit = 0;
+}
+
 /* Copies the volumes that can touch a ray. 0 when memory is out. */
-static int copy_media(const nebel_fog *fog, nebel_snapshot *s)
+static int copy_media(const nebel_fog *fog, selection of, nebel_snapshot *s)
 {
     s->media = nb_allocate_zero(&s->allocator, fog->slot_count, sizeof *s->media);
     if (s->media == NULL) return 0;
     for (size_t i = 0; i < fog->slot_count; i++) {
         const nb_slot *slot = &fog->slots[i];
-        if (!slot->used || !has_body(&slot->volume)) continue;
+        if (!slot->used || !has_body(&slot->volume) || (of.is_level && !is_level(&slot->volume))) continue;
         nb_medium *medium = &s->media[s->medium_count];
         if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
         s->medium_count++;
+        find_moments(medium);
+        if (of.is_scaled) scale_medium(medium);
         light_medium(medium, fog);
         s->is_sunlit = s->is_sunlit || medium->is_sunlit;
         s->covering_count += nb_volume_covers(&medium->body) ? 1 : 0;
@@ -195,33 +228,82 @@ static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
     return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;
 }
 
-nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
+static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snapshot **snapshot)
 {
-    if (snapshot != NULL) *snapshot = NULL;
-    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (snapshot == NULL)
-        return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
     nebel_snapshot *s = nb_allocate_zero(&fog->allocator, 1, sizeof *s);
-    if (s == NULL) return nb_fail(&fog->log, NEBEL_ERROR_MEMORY, "snapshot: out of memory");
+    *snapshot = NULL;
+    if (s == NULL) return NEBEL_ERROR_MEMORY;
     s->allocator = fog->allocator;
     s->log = fog->log;
     s->max_opacity = fog->max_opacity > 0 ? fog->max_opacity : 1;
     atomic_init(&s->owners, 1);
     point_to_sun(s, &fog->sun);
     nebel_result result = NEBEL_ERROR_MEMORY;
-    if (copy_media(fog, s) && copy_lamps(fog, s)) {
+    if (copy_media(fog, of, s) && copy_lamps(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
         s->is_gray = is_gray(s);
         s->way_to_sun = find_way_to_sun(s);
         result = index_media(s);
     }
-    if (result != NEBEL_OK) {
+    if (result == NEBEL_OK)
+        *snapshot = s;
+    else
         free_snapshot(s);
-        return nb_fail(&fog->log, result, "snapshot: out of memory for %zu volumes", fog->slot_count);
+    return result;
+}
+
+static int has_distances(const nebel_snapshot *s)
+{
+    int has = 0;
+    for (size_t i = 0; i < s->medium_count; i++) has |= nb_volume_has_distances(&s->media[i].body);
+    return has;
+}
+
+static nebel_result diffuse_selected(const nebel_fog *fog, const nebel_snapshot *s, int level, nb_diffusion **made)
+{
+    nebel_snapshot *scaled = NULL;
+    nebel_result result = make_snapshot(fog, (selection){.is_scaled = 1, .is_level = level}, &scaled);
+    if (result == NEBEL_OK) result = nb_diffusion_make(fog, s, scaled, made);
+    nebel_release_snapshot(scaled);
+    return result;
+}
+
+static nebel_result diffuse_level(const nebel_fog *fog, nb_diffusion **made)
+{
+    nebel_snapshot *level = NULL;
+    nebel_result result = make_snapshot(fog, (selection){.is_level = 1}, &level);
+    if (result == NEBEL_OK) result = diffuse_selected(fog, level, 1, made);
+    nebel_release_snapshot(level);
+    return result;
+}
+
+static nebel_result diffuse(const nebel_fog *fog, nebel_snapshot *s)
+{
+    if (s->max_opacity < 1 || has_distances(s))
+        return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
+                       "diffusion: max_opacity, start and cutoff are looks that no light has; leave them out");
+    const nebel_result result = diffuse_selected(fog, s, 0, &s->diffusion);
+    if (result != NEBEL_OK || s->diffusion == NULL || !nb_lattice_has_bodies(&s->diffusion->lattice)) return result;
+    return diffuse_level(fog, &s->diffusion->beside);
+}
+
+nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
+{
+    if (snapshot != NULL) *snapshot = NULL;
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (snapshot == NULL)
+        return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
+    nebel_snapshot *s;
+    nebel_result result = make_snapshot(fog, (selection){0}, &s);
+    if (result == NEBEL_OK && fog->diffusion.cells > 0 && s->is_sunlit) result = diffuse(fog, s);
+    if (result == NEBEL_OK) {
+        *snapshot = s;
+        return NEBEL_OK;
     }
-    *snapshot = s;
-    return NEBEL_OK;
+    nebel_release_snapshot(s);
+    if (result == NEBEL_ERROR_UNSUPPORTED) return result;
+    return nb_fail(&fog->log, result, "snapshot: out of memory for %zu volumes", fog->slot_count);
 }
 
 nebel_snapshot *nebel_retain_snapshot(nebel_snapshot *snapshot)

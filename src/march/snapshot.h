@@ -21,6 +21,10 @@ typedef struct nb_medium {
     int is_sunlit;
     int is_lamplit;
     double shine[3]; /* albedo times the sun's irradiance: of opaque fog, if the phase function were 1 */
+    double ahead;    /* of what it scatters, for many scatterings: the part taken to go straight on */
+    double
+        turned_cosine; /* and the mean cosine of the rest. Both are the least that have its phase function's two first
+                             moments: Joseph, Wiscombe and Weinman 1976 */
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium;
 
@@ -60,8 +64,9 @@ struct nebel_snapshot {
     size_t covering_count;    /* media that cover others */
     size_t endless_count;     /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
-    nb_bvh bvh;        /* over the others */
-    uint32_t *bounded; /* the media that the tree's boxes stand for */
+    struct nb_diffusion *diffusion; /* light that is scattered more than once; NULL: left out */
+    nb_bvh bvh;                     /* over the others */
+    uint32_t *bounded;              /* the media that the tree's boxes stand for */
     size_t bounded_count;
 };
 

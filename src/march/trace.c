@@ -1,5 +1,5 @@
 /* The public queries: arguments checked, a kernel chosen. */
-#include "trace_kernel.h"
+#include "diffusion.h"
 
 #include "base/cpu.h"
 #include "base/levels.h"
@@ -79,7 +79,7 @@ static double element(const void *plane, size_t size, size_t stride, size_t i)
     return size == sizeof(double) ? *(const double *)(const void *)at : (double)*(const float *)(const void *)at;
 }
 
-static nebel_ray ray_in_planes(const nebel_ray_planes *planes, size_t i)
+nebel_ray nb_trace_ray_in_planes(const nebel_ray_planes *planes, size_t i)
 {
     nebel_ray ray = {.t_max = HUGE_VAL};
     for (int c = 0; c < 3; c++) {
@@ -99,7 +99,7 @@ static nebel_ray ray_in_planes(const nebel_ray_planes *planes, size_t i)
 size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count)
 {
     for (size_t i = first; i < first + count; i++) {
-        const nebel_ray ray = ray_in_planes(rays, i);
+        const nebel_ray ray = nb_trace_ray_in_planes(rays, i);
         if (ray.t_max != 0 && fault_of_ray(&ray) != NULL) return i;
     }
     return first + count;
@@ -110,7 +110,7 @@ static nebel_result explain(const nb_trace_job *job, nebel_result result, size_t
     if (result == NEBEL_OK) return result;
     if (failed != NULL) *failed = job->failed;
     if (result == NEBEL_ERROR_ARGUMENT) {
-        const nebel_ray ray = ray_in_planes(job->ray_planes, job->failed);
+        const nebel_ray ray = nb_trace_ray_in_planes(job->ray_planes, job->failed);
         return nb_fail(&job->snapshot->log, result, "ray %zu: %s", job->failed, fault_of_ray(&ray));
     }
     if (result == NEBEL_ERROR_UNBOUNDED)
@@ -184,7 +184,8 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
     job->count = n;
     const unsigned precision = nb_full_precision();
-    const nebel_result result = kernel(job);
+    nebel_result result = kernel(job);
+    if (result == NEBEL_OK && snapshot->diffusion != NULL && !job->transmittance_only) result = nb_diffusion_add(job);
     nb_restore_precision(precision);
     return explain(job, result, desc->failed_ray);
 }

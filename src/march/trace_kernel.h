@@ -30,6 +30,9 @@ typedef nebel_result nb_trace_fn(nb_trace_job *job);
 nb_trace_fn nb_trace_scalar, nb_trace_sse2, nb_trace_avx2, nb_trace_avx512, nb_trace_neon, nb_trace_double,
     nb_trace_quad;
 
+/* A ray of planes none of whose strides is 0. */
+nebel_ray nb_trace_ray_in_planes(const nebel_ray_planes *planes, size_t i);
+
 /* The first of `count` rays in planes that is none; first + count where all are right. A ray of no length is, whatever
  * else it says. */
 size_t nb_trace_first_fault(const nebel_ray_planes *rays, size_t first, size_t count);

@@ -22,12 +22,13 @@ enum {
     NEBULA,
     CELLS,
     CLASSIC,
+    MULTIPLE_SCATTERING,
     SECTION_COUNT = NB_SCENE_SECTIONS
 };
 
-static const char *const section_names[] = {"nebel", "up",      "unit",        "camera", "background",
-                                            "sun",   "ambient", "max_opacity", "lights", "models",
-                                            "fog",   "nebula",  "cells",       "classic"};
+static const char *const section_names[] = {"nebel", "up",      "unit",        "camera",  "background",
+                                            "sun",   "ambient", "max_opacity", "lights",  "models",
+                                            "fog",   "nebula",  "cells",       "classic", "multiple_scattering"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
@@ -76,6 +77,8 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
         return nb_read_cells(in, node) && (in->save == NULL || nb_save_cells(in->save, in, node));
     case CLASSIC:
         return nb_read_classic(in, node);
+    case MULTIPLE_SCATTERING:
+        return nb_read_multiple_scattering(in, node);
     default:
         return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }
@@ -338,6 +341,17 @@ static nebel_result add_cells(nebel_fog *fog, const nebel_cells_desc *cells)
     return result;
 }
 
+nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion_desc *desc)
+{
+    if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (desc != NULL) {
+        scene->diffusion = *desc;
+        desc = &scene->diffusion;
+    }
+    scene->data.diffusion = desc;
+    return NEBEL_OK;
+}
+
 static nebel_result commit(const nebel_scene *scene, double frame, int with_particles, nebel_snapshot **snapshot)
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -350,6 +364,7 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
+    if (result == NEBEL_OK) result = nebel_set_diffusion(fog, scene->data.diffusion);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
     if (result == NEBEL_OK) result = add_cells(fog, scene->data.cells);
     if (result == NEBEL_OK && with_particles) result = add_particles(fog, scene);

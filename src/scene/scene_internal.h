@@ -43,6 +43,7 @@ struct nebel_scene {
     nb_arena arena;
     const char *folder; /* of the file, ending in a slash; "" is the current one */
     nebel_scene_data data;
+    nebel_diffusion_desc diffusion; /* that of nebel_set_scene_diffusion */
 
     nebel_volume_desc *volumes;
     const char **volume_names;
@@ -85,7 +86,7 @@ typedef struct nb_fog_node {
 } nb_fog_node;
 
 /* The keys that a scene may have. */
-enum { NB_SCENE_SECTIONS = 14 };
+enum { NB_SCENE_SECTIONS = 15 };
 
 /* The longest scene file. */
 #define NB_SCENE_TEXT_LIMIT ((size_t)1 << 30)
@@ -118,6 +119,7 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node);
 /* Points, their number and their place, from a model file. NULL: none. */
 bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
                     nebel_transform *place);

@@ -314,6 +314,10 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
                        "pack: shaders cannot light fog with lamps yet; use nebel_trace or the CPU's renderer "
                        "(--device cpu), or give volumes a source instead of an albedo");
+    if (snapshot->diffusion != NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot show light that fog scatters more than once; use nebel_trace or the CPU's "
+                       "renderer (--device cpu), or leave multiple scattering out");
     if (has_grid(snapshot))
         return nb_fail(
             &snapshot->log, NEBEL_ERROR_UNSUPPORTED,

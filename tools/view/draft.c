@@ -35,6 +35,7 @@ static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition,
     nebel_result result = nebel_create_fog(&desc, fog);
     const nebel_scene_data *const file = nebel_scene_contents(draft->file);
     if (result == NEBEL_OK) result = nebel_set_lamps(*fog, file->lamp_count, file->lamps);
+    if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
     if (result != NEBEL_OK) nebel_destroy_fog(*fog);
     return result;
 }
@@ -454,7 +455,7 @@ int nb_draft_is_for_cpu(const nb_draft *draft)
     const nb_edition *const good = &draft->good;
     const int has_sun = good->has_sun && !is_black(good->sun_irradiance);
     const int is_lit = has_sun || nebel_scene_contents(draft->file)->lamp_count > 0;
-    int is = 0;
+    int is = nebel_scene_contents(draft->file)->diffusion != NULL;
     for (size_t i = 0; i < good->count && !is; i++)
         is = good->volumes[i].density.type == NEBEL_DENSITY_GRID || (is_lit && !is_black(good->volumes[i].albedo));
     return is;

@@ -1,0 +1,218 @@
+/* What fog makes of the sun's light after it has scattered it once: from a fog to the numbers at a lattice's nodes. */
+#include "diffusion.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+#define PI 3.14159265358979323846
+
+/* Nodes whose sunlight is asked for at once. */
+enum { BATCH = 256 };
+
+static void node_place(const nb_lattice *l, size_t node, double place[3])
+{
+    const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
+    const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
+    for (int a = 0; a < 3; a++) place[a] = at[a] == l->size[a] ? l->high[a] : l->low[a] + (double)at[a] * l->spacing[a];
+}
+
+/* ---- sunlight at the nodes ------------------------------------------------------------------- */
+
+static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, size_t first, size_t count,
+                              float out[3][BATCH])
+{
+    const nb_lattice *l = &d->lattice;
+    float offset[3][BATCH];
+    nebel_ray_planes rays = {.t_max = NULL};
+    nebel_light_planes lights = {.error = NULL};
+    for (int a = 0; a < 3; a++) {
+        rays.origin[a] = l->low[a] + (l->high[a] - l->low[a]) / 2;
+        rays.direction[a] = d->to_sun[a];
+        rays.offset[a] = offset[a];
+        lights.transmittance[a] = out[a];
+    }
+    for (size_t i = 0; i < count; i++) {
+        double place[3];
+        node_place(l, first + i, place);
+        for (int a = 0; a < 3; a++) offset[a][i] = (float)(place[a] - rays.origin[a]);
+    }
+    return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, count, &rays, &lights);
+}
+
+static nebel_result light_nodes(const nb_diffusion *d, const nebel_snapshot *fog, nb_node_sun *sun)
+{
+    const size_t count = nb_lattice_nodes(&d->lattice);
+    for (size_t first = 0; first < count; first += BATCH) {
+        const size_t n = count - first < BATCH ? count - first : BATCH;
+        float scaled[3][BATCH], whole[3][BATCH];
+        nebel_result result = trace_sun(d, d->scaled, first, n, scaled);
+        if (result == NEBEL_OK && d->has_peaks) result = trace_sun(d, fog, first, n, whole);
+        if (result != NEBEL_OK) return result;
+        for (size_t i = 0; i < n; i++) {
+            for (int c = 0; c < 3; c++) {
+                sun[first + i].scaled[c] = (double)scaled[c][i];
+                sun[first + i].whole[c] = d->has_peaks ? (double)whole[c][i] : (double)scaled[c][i];
+            }
+        }
+    }
+    return NEBEL_OK;
+}
+
+/* ---- sources at the nodes -------------------------------------------------------------------- */
+
+/* What the cells around a node hold together. */
+static nb_transport around(const nb_lattice *l, const nb_transport *cells, size_t node)
+{
+    const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
+    const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
+    nb_transport sum = {{0}, {0}, {0}, {0}};
+    for (size_t octant = 0; octant < 8; octant++) {
+        size_t cell[3];
+        for (int a = 0; a < 3; a++) {
+            const size_t up = at[a] + (octant >> a & 1u);
+            cell[a] = up == 0 ? 0 : up > l->size[a] ? l->size[a] - 1u : up - 1;
+        }
+        const nb_transport *t = &cells[cell[0] + l->size[0] * (cell[1] + l->size[1] * cell[2])];
+        for (int c = 0; c < 3; c++) {
+            sum.extinction[c] += t->extinction[c];
+            sum.scattering[c] += t->scattering[c];
+            sum.turned[c] += t->turned[c];
+            sum.forward[c] += t->forward[c];
+        }
+    }
+    return sum;
+}
+
+static double share(double part, double whole)
+{
+    return whole > 0 ? part / whole : 0;
+}
+
+/* g of what went almost straight on `n` times, where the rest has the mean cosine `turned`: the second moment of what is
+ * taken to go straight on is that of this lobe for n = 1. */
+static double width_of(double turned, double n)
+{
+    const double g = turned > 0 ? turned / (1 - turned) : 0;
+    return g > 0 && g < 1 ? nb_exp(n / 2 * nb_log(2 * g / (1 + g))) : 0;
+}
+
+/* `light`: fluence and flux. */
+static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const double light[4], float *out)
+{
+    const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
+    const double turned = share(t->turned[c], scaled), cosine = share(t->forward[c], t->turned[c]);
+    const double ahead = share(t->scattering[c] - t->turned[c], t->extinction[c]);
+    const double straight = fmax(sun->scaled[c] - sun->whole[c], 0);
+    /* How often light that went almost straight on did so: a Poisson number that is not 0. */
+    const double mean = sun->whole[c] > 0 ? fmin(nb_log(fmax(sun->scaled[c] / sun->whole[c], 1)), 50) : 50;
+    const double times = mean > 1e-6 ? mean / nb_one_minus_exp(mean) : 1;
+    out[NB_NODE_DIFFUSE] = (float)(turned * light[0] / (4 * PI));
+    for (int a = 0; a < 3; a++) out[NB_NODE_FLUX + a] = (float)(cosine * turned * light[1 + a] / (4 * PI));
+    out[NB_NODE_TURNED] = (float)(turned * sun->scaled[c]);
+    out[NB_NODE_ONCE] = (float)(share(t->turned[c], t->extinction[c]) * sun->whole[c]);
+    out[NB_NODE_GLOW] = (float)(ahead * straight);
+    out[NB_NODE_WIDTH] = (float)width_of(cosine, times + 1);
+}
+
+static int has_colour(const nebel_snapshot *snapshot, const nebel_diffusion_desc *desc)
+{
+    const double *ground = desc->ground_albedo;
+    if (desc->has_ground && (ground[0] != ground[1] || ground[1] != ground[2])) return 1;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const double *albedo = snapshot->media[i].body.albedo;
+        if (albedo[0] != albedo[1] || albedo[1] != albedo[2]) return 1;
+    }
+    return !snapshot->is_gray;
+}
+
+static int has_peaks(const nebel_snapshot *snapshot)
+{
+    int has = 0;
+    for (size_t i = 0; i < snapshot->medium_count; i++) has |= snapshot->media[i].ahead > 0;
+    return has;
+}
+
+/* Scratch of a solution. */
+typedef struct draft {
+    nb_transport *cells;
+    nb_node_sun *sun;
+    nb_diffuse_light light[3];
+} draft;
+
+static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+{
+    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    nb_lattice_mean(&d->lattice, snapshot, made->cells);
+    const nebel_result result = light_nodes(d, snapshot, made->sun);
+    for (int c = 0; c < d->channel_count && result == NEBEL_OK; c++) {
+        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, made->sun, d->to_sun,
+                                fog->diffusion.ground_albedo[c], c, &made->light[c]))
+            return NEBEL_ERROR_MEMORY;
+        for (size_t i = 0; i < nodes; i++) {
+            const nb_transport t = around(&d->lattice, made->cells, i);
+            float *node = &d->nodes[i * d->node_numbers];
+            set_node(&t, c, &made->sun[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS);
+            node[d->node_numbers - 1] =
+                (float)share(t.forward[0] + t.forward[1] + t.forward[2], t.turned[0] + t.turned[1] + t.turned[2]);
+        }
+    }
+    return result;
+}
+
+static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot)
+{
+    const nebel_allocator *allocator = &fog->allocator;
+    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    draft made = {.cells = nb_allocate(allocator, nb_lattice_cells(&d->lattice), sizeof *made.cells),
+                  .sun = nb_allocate(allocator, nodes, sizeof *made.sun)};
+    double *light = nb_allocate(allocator, nodes, 4 * sizeof *light);
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (int c = 0; c < 3; c++) made.light[c].nodes = light;
+    d->nodes = nb_allocate(allocator, nodes, d->node_numbers * sizeof *d->nodes);
+    if (made.cells != NULL && made.sun != NULL && light != NULL && d->nodes != NULL)
+        result = fill(d, fog, snapshot, &made);
+    if (result == NEBEL_OK) result = nb_diffusion_balance(snapshot, d, made.light);
+    nb_release(allocator, made.cells);
+    nb_release(allocator, made.sun);
+    nb_release(allocator, light);
+    return result;
+}
+
+nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled,
+                               nb_diffusion **made)
+{
+    nb_lattice lattice;
+    int lit;
+    *made = NULL;
+    nebel_result result = nb_lattice_place(fog, snapshot, scaled, &lattice, &lit);
+    if (result != NEBEL_OK || !lit) return result;
+    nb_diffusion *d = nb_allocate_zero(&fog->allocator, 1, sizeof *d);
+    if (d == NULL) return NEBEL_ERROR_MEMORY;
+    d->lattice = lattice;
+    d->scaled = nebel_retain_snapshot(scaled);
+    d->has_peaks = has_peaks(snapshot);
+    d->channel_count = has_colour(snapshot, &fog->diffusion) ? 3 : 1;
+    d->node_numbers = (size_t)d->channel_count * NB_NODE_NUMBERS + 1;
+    memcpy(d->to_sun, snapshot->to_sun, sizeof d->to_sun);
+    memcpy(d->irradiance, fog->sun.irradiance, sizeof d->irradiance);
+    result = solve(d, fog, snapshot);
+    if (result == NEBEL_OK)
+        *made = d;
+    else
+        nb_diffusion_free(&fog->allocator, d);
+    return result;
+}
+
+void nb_diffusion_free(const nebel_allocator *allocator, nb_diffusion *diffusion)
+{
+    if (diffusion == NULL) return;
+    nb_diffusion_free(allocator, diffusion->beside);
+    nebel_release_snapshot(diffusion->scaled);
+    nb_release(allocator, diffusion->nodes);
+    nb_release(allocator, diffusion);
+}

@@ -1,0 +1,113 @@
+/* Light that fog scatters more than once: its mean over all directions, and which way it goes on the whole, as diffusion
+ * has them, on a lattice. The model, with all its limits, is in docs/multiple-scattering.md.
+ *
+ * What phase functions send almost straight on is taken to go straight on (delta-Eddington: Joseph, Wiscombe and Weinman
+ * 1976): it dims no light. For what is left radiance is taken to be linear in the cosine of the angle (P1), which makes
+ * one elliptic equation of the fluence.
+ */
+#ifndef NB_MARCH_DIFFUSION_H
+#define NB_MARCH_DIFFUSION_H
+
+#include "fog.h"
+#include "places.h"
+#include "trace_kernel.h"
+
+/* What is beyond the end of a lattice. */
+typedef enum nb_lattice_end {
+    NB_END_OPEN,  /* nothing: no diffuse light comes from there */
+    NB_END_LEVEL, /* fog as it is at the end, for ever */
+    NB_END_GROUND
+} nb_lattice_end;
+
+typedef struct nb_lattice {
+    uint32_t size[3];                   /* cells, >= 1 */
+    double low[3], high[3], spacing[3]; /* m */
+    nb_lattice_end ends[3][2];
+} nb_lattice;
+
+/* Of one channel at a node, per unit of the sun's irradiance. */
+enum {
+    NB_NODE_DIFFUSE, /* source radiance of diffuse light, that of extinction after scaling: mean over directions, */
+    NB_NODE_FLUX,    /* and its first moments along x, y and z: three numbers */
+    NB_NODE_TURNED = NB_NODE_FLUX + 3, /* sunlight through scaled fog, times what is turned of it; no phase function */
+    NB_NODE_ONCE,  /* the same through the fog as it is, of its extinction: in NB_NODE_TURNED, and in the exact light */
+    NB_NODE_GLOW,  /* sunlight that went almost straight on and does so again, of the fog's extinction */
+    NB_NODE_WIDTH, /* g of the lobe that this makes */
+    NB_NODE_NUMBERS
+};
+
+typedef struct nb_diffusion {
+    nb_lattice lattice;
+    int channel_count;    /* 1: all channels are alike */
+    int has_peaks;        /* some fog scatters forwards, so that `scaled` is another fog */
+    double to_sun[3];     /* of length 1 */
+    double irradiance[3]; /* of the sun */
+    size_t node_numbers;  /* of all channels, and one more: g of what is turned */
+    double gain[3][3][2]; /* of channels: of NB_NODE_DIFFUSE and NB_NODE_FLUX, in light that leaves along an axis
+                                  to one side: see nb_diffusion_balance */
+    float *nodes;         /* x fastest, then y; size + 1 along each axis */
+    struct nb_diffusion
+        *beside;            /* of the endless fog alone, for what is beside the lattice; NULL where that is no more */
+    nebel_snapshot *scaled; /* takes from light what does not go straight on; scatters nothing */
+} nb_diffusion;
+
+static inline size_t nb_lattice_cells(const nb_lattice *lattice)
+{
+    return (size_t)lattice->size[0] * lattice->size[1] * lattice->size[2];
+}
+
+static inline size_t nb_lattice_nodes(const nb_lattice *lattice)
+{
+    return ((size_t)lattice->size[0] + 1) * ((size_t)lattice->size[1] + 1) * ((size_t)lattice->size[2] + 1);
+}
+
+/* What the sun gives a node: through scaled fog, and through the fog as it is. Of each channel. */
+typedef struct nb_node_sun {
+    double scaled[3], whole[3];
+} nb_node_sun;
+
+/* Where the lattice is, and its cells. *lit: 0 where there is nothing to be solved. Errors: UNSUPPORTED. */
+nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
+                              nb_lattice *lattice, int *lit);
+
+/* Whether it holds bodies in fog that goes on beside it. */
+int nb_lattice_has_bodies(const nb_lattice *lattice);
+
+/* Means over the cells. */
+void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, nb_transport *cells);
+
+/* One channel's diffuse light, per unit of irradiance. */
+typedef struct nb_diffuse_light {
+    double *nodes;        /* fluence and flux, four numbers each */
+    double leaving[3][2]; /* power through the lattice's ends [m^2] */
+    double ground;        /* mean radiance of the ground */
+} nb_diffuse_light;
+
+/* Fills *light, whose nodes are the caller's. 0 when memory is out. */
+int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *lattice, const nb_transport *cells,
+                       const nb_node_sun *sun, const double to_sun[3], double ground_albedo, int channel,
+                       nb_diffuse_light *light);
+
+/* Sets the gains of a diffusion that is ready but for them. The radiance at an end of the lattice, which comes from what
+ * is scattered towards it all along a ray, carries less out than diffusion says: that knows the energy better than where
+ * near the end the light is. The gains make both alike. */
+nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3]);
+
+/* Light per unit of irradiance that rays gather from the sun's light scattered in scaled fog; of what fog is there is no
+ * less, where `is_rest` is 1: what exact light of one scattering lacks. Rays of t_max 0 gather none. */
+nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
+                                 const nebel_ray *rays, double (*light)[3]);
+
+/* How many rays are gathered at once, at most. */
+enum { NB_DIFFUSION_RAYS = 64 };
+
+/* *made: NULL where the sun lights no fog that scatters. `snapshot` is complete but for this. */
+nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled,
+                               nb_diffusion **made);
+
+void nb_diffusion_free(const nebel_allocator *allocator, nb_diffusion *diffusion);
+
+/* Adds to the in-scattering of a job that is done. */
+nebel_result nb_diffusion_add(const nb_trace_job *job);
+
+#endif

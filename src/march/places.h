@@ -1,0 +1,17 @@
+/* What fog is at a place, for light that is scattered many times. */
+#ifndef NB_MARCH_PLACES_H
+#define NB_MARCH_PLACES_H
+
+#include "snapshot.h"
+
+/* Sums over volumes [1/m]. Of what a volume scatters, a part (nb_medium.ahead) is taken to go straight on. */
+typedef struct nb_transport {
+    double extinction[3], scattering[3];
+    double turned[3];  /* what is scattered and does not go straight on */
+    double forward[3]; /* the same times its mean cosine */
+} nb_transport;
+
+/* Adds what is at the place. `start` and `cutoff` do not count. */
+void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3], nb_transport *sum);
+
+#endif

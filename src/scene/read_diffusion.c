@@ -1,0 +1,43 @@
+/* The section "multiple_scattering". */
+#include "scene/scene_internal.h"
+
+/* Level, and of one height. */
+static bool read_ground(nb_scene_reader *in, const nb_json_node *node, nebel_diffusion_desc *desc)
+{
+    enum { HEIGHT, ALBEDO, COUNT };
+    static const char *const names[] = {"height", "albedo"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "the ground"};
+    const nb_json_node *found[COUNT];
+    if (node == NULL) return true;
+    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"height\": ..., \"albedo\": ...}") ||
+        !nb_value_members(in->json, node, &keys, found) ||
+        !nb_value_number(in->json, found[HEIGHT], &nb_range_place, &desc->ground_height) ||
+        !nb_value_color(in->json, found[ALBEDO], &nb_range_fraction, desc->ground_albedo))
+        return false;
+    desc->has_ground = 1;
+    desc->ground_height *= in->space.unit;
+    return true;
+}
+
+bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node)
+{
+    enum { MODEL, CELLS, GROUND, COUNT };
+    static const char *const names[] = {"model", "cells", "ground"};
+    static const char *const model_names[] = {"diffusion"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "multiple scattering"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    int cells = 0;
+    nebel_diffusion_desc *desc = nb_arena_allocate(&in->scene->arena, 1, sizeof *desc);
+    if (desc == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    *desc = (nebel_diffusion_desc){0};
+    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {\"model\": ...}") ||
+        !nb_value_members(json, node, &keys, found) || nb_value_choice(json, found[MODEL], model_names, 1) < 0 ||
+        (found[CELLS] != NULL &&
+         !nb_value_integer(json, found[CELLS], NEBEL_MIN_DIFFUSION_CELLS, NEBEL_MAX_DIFFUSION_CELLS, &cells)) ||
+        !read_ground(in, found[GROUND], desc))
+        return false;
+    desc->cells = (uint32_t)cells;
+    in->scene->data.diffusion = desc;
+    return true;
+}

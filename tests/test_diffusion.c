@@ -1,0 +1,505 @@
+/* Multiple scattering by diffusion: layers beside published numbers, energy, furnaces, contracts. With the argument
+ * "table" it prints rows of docs/multiple-scattering.md. */
+#include "fog_help.h"
+
+#include <nebel/diffusion.h>
+
+static const double pi = 3.14159265358979323846;
+
+/* ---- fog ------------------------------------------------------------------------------------- */
+
+typedef struct light {
+    nebel_phase phase;
+    double albedo, cosine; /* of the sun's zenith angle */
+} light;
+
+static nebel_volume_desc volume_of(const light *l, double extinction)
+{
+    return (nebel_volume_desc){.extinction = {extinction, extinction, extinction},
+                               .albedo = {l->albedo, l->albedo, l->albedo},
+                               .phase = l->phase};
+}
+
+static nebel_fog *start(const light *l, const nebel_volume_desc *volume, const nebel_diffusion_desc *diffusion)
+{
+    nebel_fog *fog = NULL;
+    const nebel_fog_desc desc = {
+        .sun = {.direction = {-sqrt(1 - l->cosine * l->cosine), l->cosine, 0}, .irradiance = {1, 1, 1}}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, diffusion), NEBEL_OK);
+    return fog;
+}
+
+static nebel_snapshot *commit(const light *l, const nebel_volume_desc *volume, const nebel_diffusion_desc *diffusion)
+{
+    nebel_snapshot *snapshot = NULL;
+    nebel_fog *fog = start(l, volume, diffusion);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* From 0 to 1 m, without an end to the sides. */
+static nebel_volume_desc layer_of(const light *l, double depth)
+{
+    static const nebel_plane planes[] = {{{0, 1, 0}, 1}, {{0, -1, 0}, 0}};
+    nebel_volume_desc volume = volume_of(l, depth);
+    volume.shape = (nebel_shape){.type = NEBEL_SHAPE_CONVEX, .planes = planes, .plane_count = 2};
+    return volume;
+}
+
+/* ---- flux ------------------------------------------------------------------------------------ */
+
+enum { COSINES = 24, TURNS = 48 };
+
+/* Gauss's rule on 0 to 1, by Newton's method on the Legendre polynomial. */
+static void find_rule(double nodes[COSINES], double weights[COSINES])
+{
+    for (int i = 0; i < COSINES; i++) {
+        double x = cos(pi * (i + .75) / (COSINES + .5)), slope = 1;
+        for (int k = 0; k < 30; k++) {
+            double value = 1, before = 0;
+            for (int j = 0; j < COSINES; j++) {
+                const double next = ((2 * j + 1) * x * value - j * before) / (j + 1);
+                before = value;
+                value = next;
+            }
+            slope = COSINES * (x * value - before) / (x * x - 1);
+            x -= value / slope;
+        }
+        nodes[i] = (1 + x) / 2;
+        weights[i] = 1 / ((1 - x * x) * slope * slope);
+    }
+}
+
+/* What leaves a layer upwards at `height`, or downwards, of the sun's flux there. Light is the same on both sides of the
+ * plane that the sun is in. */
+static double flux_at(const nebel_snapshot *snapshot, const light *l, double height, int down)
+{
+    double nodes[COSINES], weights[COSINES], sum = 0;
+    find_rule(nodes, weights);
+    for (int i = 0; i < COSINES; i++) {
+        nebel_ray rays[TURNS];
+        nebel_light lights[TURNS];
+        const double sine = sqrt(1 - nodes[i] * nodes[i]);
+        for (int k = 0; k < TURNS; k++) {
+            const double angle = pi * (k + .5) / TURNS;
+            rays[k] = (nebel_ray){
+                {0, height, 0}, {sine * cos(angle), down ? nodes[i] : -nodes[i], sine * sin(angle)}, HUGE_VAL};
+        }
+        const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .tolerance = 1e-4};
+        assert_int_equal(nebel_trace(snapshot, &desc, TURNS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+        for (int k = 0; k < TURNS; k++)
+            sum += weights[i] * nodes[i] * 2 * pi / TURNS * lights[k].in_scattering[1] / l->cosine;
+    }
+    return sum;
+}
+
+/* ---- layers ---------------------------------------------------------------------------------- */
+
+typedef struct layer {
+    const char *phase;
+    light light;
+    double depth, reflected, transmitted; /* of the sun's flux, the latter without what comes through unscattered */
+} layer;
+
+#define ISOTROPIC                                                                                                      \
+    {                                                                                                                  \
+        .type = NEBEL_PHASE_ISOTROPIC                                                                                  \
+    }
+#define RAYLEIGH                                                                                                       \
+    {                                                                                                                  \
+        .type = NEBEL_PHASE_RAYLEIGH                                                                                   \
+    }
+#define FORWARD(number)                                                                                                \
+    {                                                                                                                  \
+        .type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = number                                                             \
+    }
+
+/* By adding and doubling, good to the last digit: two programs, by that and by discrete ordinates, agree. */
+static const layer layers[] = {
+    {"isotropic", {ISOTROPIC, 1, .5}, .1, .09104, .09023},      {"isotropic", {ISOTROPIC, 1, .5}, 1, .49838, .36629},
+    {"isotropic", {ISOTROPIC, 1, 1}, 1, .34133, .29079},        {"isotropic", {ISOTROPIC, 1, .5}, 10, .89825, .10175},
+    {"isotropic", {ISOTROPIC, .9, .5}, 1, .39366, .27950},      {"isotropic", {ISOTROPIC, .9, 1}, 1, .26741, .22375},
+    {"Rayleigh", {RAYLEIGH, 1, .6}, .5, .29645, .26895},        {"Rayleigh", {RAYLEIGH, 1, .2}, 1, .64920, .34406},
+    {"Rayleigh", {RAYLEIGH, 1, 1}, 1, .34047, .29165},          {"HG .75", {FORWARD(.75), .9, 1}, 2, .09739, .52562},
+    {"HG .75", {FORWARD(.75), 1, 1}, 1, .07874, .55338},        {"HG .75", {FORWARD(.75), 1, 1}, 8, .50641, .49325},
+    {"HG .85", {FORWARD(.85), 1, .5}, 1, .16488, .69979},       {"HG .85", {FORWARD(.85), 1, .5}, 10, .60403, .39597},
+    {"HG .85", {FORWARD(.85), 1, .8660254}, 30, .73760, .26240}};
+
+enum { LAYERS = sizeof layers / sizeof *layers };
+
+typedef struct fluxes {
+    double reflected, transmitted;
+} fluxes;
+
+static fluxes measure(const layer *l, const nebel_diffusion_desc *diffusion)
+{
+    const nebel_volume_desc volume = layer_of(&l->light, l->depth);
+    nebel_snapshot *snapshot = commit(&l->light, &volume, diffusion);
+    const fluxes found = {flux_at(snapshot, &l->light, 1.5, 0), flux_at(snapshot, &l->light, -.5, 1)};
+    nebel_release_snapshot(snapshot);
+    return found;
+}
+
+static const nebel_diffusion_desc by_default;
+
+static void print_layers(void)
+{
+    printf("| phase | albedo | optical depth | cosine of the sun's zenith | R | one scattering | diffusion | T | one "
+           "scattering | diffusion |\n|---|---|---|---|---|---|---|---|---|---|\n");
+    for (int i = 0; i < LAYERS; i++) {
+        const layer *l = &layers[i];
+        const fluxes once = measure(l, NULL), all = measure(l, &by_default);
+        printf("| %s | %g | %g | %.3g | %.3f | %+.3f | %+.3f | %.3f | %+.3f | %+.3f |\n", l->phase, l->light.albedo,
+               l->depth, l->light.cosine, l->reflected, once.reflected - l->reflected, all.reflected - l->reflected,
+               l->transmitted, once.transmitted - l->transmitted, all.transmitted - l->transmitted);
+    }
+}
+
+/* The model's errors, as measured, and little room: up to .037 of the sun's flux, .014 rms. One scattering is off by up to
+ * .7. */
+#define MOST_OFF .04
+#define MOST_RMS .02
+
+static void test_layers_are_near_published_ones(void **unused)
+{
+    (void)unused;
+    double square = 0, once = 0;
+    for (int i = 0; i < LAYERS; i++) {
+        const layer *l = &layers[i];
+        const fluxes all = measure(l, &by_default), single = measure(l, NULL);
+        const double off[2] = {all.reflected - l->reflected, all.transmitted - l->transmitted};
+        for (int k = 0; k < 2; k++) {
+            assert_true(fabs(off[k]) < MOST_OFF);
+            square += off[k] * off[k] / (2 * LAYERS);
+        }
+        once += (single.reflected - l->reflected) * (single.reflected - l->reflected) / LAYERS;
+    }
+    assert_true(sqrt(square) < MOST_RMS);
+    assert_true(sqrt(once) > .25);
+}
+
+static void test_white_layers_keep_the_suns_light(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < LAYERS; i++) {
+        const layer *l = &layers[i];
+        if (l->light.albedo < 1) continue;
+        const fluxes all = measure(l, &by_default);
+        assert_true(fabs(all.reflected + all.transmitted + exp(-l->depth / l->light.cosine) - 1) < MOST_OFF);
+    }
+}
+
+/* ---- height fog ------------------------------------------------------------------------------ */
+
+/* Level fog knows optical depth alone: height fog above black ground reflects as a layer of that depth does. */
+static void test_height_fog_reflects_as_a_layer(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < LAYERS; i += 3) {
+        const layer *l = &layers[i];
+        nebel_volume_desc volume = volume_of(&l->light, l->depth / 50);
+        volume.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .base = 7, .scale_height = 50};
+        const nebel_diffusion_desc on_ground = {.has_ground = 1, .ground_height = 7};
+        nebel_snapshot *snapshot = commit(&l->light, &volume, &on_ground);
+        /* Fog below the ground would add to what rays see; they end there, as at a surface. */
+        double nodes[COSINES], weights[COSINES], sum = 0;
+        find_rule(nodes, weights);
+        for (int k = 0; k < COSINES * TURNS; k++) {
+            const double cosine = nodes[k / TURNS], sine = sqrt(1 - cosine * cosine),
+                         angle = pi * (k % TURNS + .5) / TURNS;
+            const nebel_ray ray = {{0, 2000, 0}, {sine * cos(angle), -cosine, sine * sin(angle)}, 1993 / cosine};
+            nebel_light out;
+            const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT};
+            assert_int_equal(nebel_trace(snapshot, &desc, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
+            sum += weights[k / TURNS] * cosine * 2 * pi / TURNS * out.in_scattering[0] / l->light.cosine;
+        }
+        nebel_release_snapshot(snapshot);
+        assert_true(fabs(sum - l->reflected) < MOST_OFF);
+    }
+}
+
+/* Chandrasekhar's half space: what comes back of the sun's flux, 1 - H sqrt(1 - albedo). */
+static void test_endless_depth(void **unused)
+{
+    (void)unused;
+    static const struct {
+        double albedo, cosine, reflected;
+    } truths[] = {{.5, .5, .160144},  {.9, .5, .507939},  {.9, 1, .414947},
+                  {.99, .5, .815140}, {.999, 1, .912835}, {1, 1, 1}};
+    for (size_t i = 0; i < sizeof truths / sizeof *truths; i++) {
+        const light l = {.albedo = truths[i].albedo, .cosine = truths[i].cosine};
+        nebel_volume_desc volume = volume_of(&l, .3);
+        volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {3, 20, 4}, .normal = {0, 1, 0}};
+        nebel_snapshot *snapshot = commit(&l, &volume, &by_default);
+        const double off = flux_at(snapshot, &l, 21, 0) - truths[i].reflected;
+        nebel_release_snapshot(snapshot);
+        assert_true(fabs(off) < MOST_OFF);
+    }
+}
+
+/* What fog of these albedos of the ground adds to the flux upwards, above it: no more light than there is. */
+static void test_ground_reflects(void **unused)
+{
+    (void)unused;
+    const light l = {.albedo = 1, .cosine = .7};
+    const nebel_volume_desc volume = layer_of(&l, 2);
+    double back[3];
+    for (int k = 0; k < 3; k++) {
+        const double albedo = k / 2.;
+        const nebel_diffusion_desc on_ground = {.has_ground = 1, .ground_albedo = {albedo, albedo, albedo}};
+        nebel_snapshot *snapshot = commit(&l, &volume, &on_ground);
+        back[k] = flux_at(snapshot, &l, 2, 0);
+        nebel_release_snapshot(snapshot);
+    }
+    assert_true(back[0] + .05 < back[1] && back[1] + .05 < back[2]);
+    assert_true(back[2] < 1);
+}
+
+/* ---- furnaces, and what stays as it is ------------------------------------------------------- */
+
+static const light white = {.phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8}, .albedo = 1, .cosine = .6};
+
+static nebel_volume_desc ball(const light *l, double extinction)
+{
+    nebel_volume_desc volume = volume_of(l, extinction);
+    volume.shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {1, 2, 3}, .radius = 2};
+    return volume;
+}
+
+enum { RAYS = 150 };
+
+static void set_rays(nebel_ray rays[RAYS])
+{
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (nebel_ray){{9, 2 + .02 * i, -4}, {-8, .03 * i - 2, 7 + .01 * i}, i % 5 ? HUGE_VAL : .2 * i};
+}
+
+static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_light lights[RAYS])
+{
+    nebel_ray rays[RAYS];
+    set_rays(rays);
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
+static void test_white_fog_under_a_white_sky_is_white(void **unused)
+{
+    (void)unused;
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    nebel_light lights[RAYS];
+    const nebel_volume_desc volume = ball(&white, 3);
+    const nebel_fog_desc desc = {.ambient = {1, 1, 1}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    trace(snapshot, &(nebel_trace_desc){0}, lights);
+    for (int i = 0; i < RAYS; i++)
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(lights[i].transmittance[c] + lights[i].in_scattering[c] - 1) < 1e-9);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+}
+
+static void test_transmittance_stays_and_light_is_added(void **unused)
+{
+    (void)unused;
+    const nebel_volume_desc volume = ball(&white, 3);
+    nebel_snapshot *once = commit(&white, &volume, NULL), *all = commit(&white, &volume, &by_default);
+    nebel_light lights[2][RAYS];
+    double more = 0;
+    trace(once, &(nebel_trace_desc){0}, lights[0]);
+    trace(all, &(nebel_trace_desc){0}, lights[1]);
+    for (int i = 0; i < RAYS; i++)
+        for (int c = 0; c < 3; c++) {
+            assert_true(lights[0][i].transmittance[c] == lights[1][i].transmittance[c]);
+            assert_true(lights[0][i].in_scattering[c] <= lights[1][i].in_scattering[c]);
+            more = fmax(more, lights[1][i].in_scattering[c] - lights[0][i].in_scattering[c]);
+        }
+    assert_true(more > .03);
+    nebel_release_snapshot(once);
+    nebel_release_snapshot(all);
+}
+
+static void test_same_bits_for_every_isa_and_split(void **unused)
+{
+    (void)unused;
+    nebel_volume_desc volume = ball(&white, 3);
+    volume.extinction[1] = 2;
+    volume.albedo[2] = .9;
+    nebel_snapshot *snapshot = commit(&white, &volume, &by_default);
+    nebel_light first[RAYS], other[RAYS];
+    nebel_ray rays[RAYS];
+    set_rays(rays);
+    trace(snapshot, &(nebel_trace_desc){.precision = NEBEL_PRECISION_FLOAT, .isa = NEBEL_ISA_SCALAR}, first);
+    for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
+        if (!nebel_isa_available((nebel_isa)isa)) continue;
+        const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
+        trace(snapshot, &desc, other);
+        assert_memory_equal(first, other, sizeof first);
+        for (size_t i = 0; i < RAYS; i += 7) {
+            const size_t n = RAYS - i < 7 ? RAYS - i : 7;
+            assert_int_equal(nebel_trace(snapshot, &desc, n, &rays[i], sizeof *rays, &other[i], sizeof *other),
+                             NEBEL_OK);
+        }
+        assert_memory_equal(first, other, sizeof first);
+    }
+    trace(snapshot, &(nebel_trace_desc){0}, other);
+    for (int i = 0; i < RAYS; i++) assert_true(fog_difference(&first[i], &other[i]) < 1e-3);
+    nebel_release_snapshot(snapshot);
+}
+
+/* A finer lattice is no other light. */
+static void test_cells_do_not_matter_much(void **unused)
+{
+    (void)unused;
+    const nebel_volume_desc volume = ball(&white, 3);
+    nebel_light lights[2][RAYS];
+    for (int k = 0; k < 2; k++) {
+        nebel_snapshot *snapshot = commit(&white, &volume, &(nebel_diffusion_desc){.cells = k ? 65536 : 8000});
+        trace(snapshot, &(nebel_trace_desc){0}, lights[k]);
+        nebel_release_snapshot(snapshot);
+    }
+    for (int i = 0; i < RAYS; i++) assert_true(fog_difference(&lights[0][i], &lights[1][i]) < .01);
+}
+
+/* Fog without an end, and a body in it. */
+static void test_bodies_in_height_fog(void **unused)
+{
+    (void)unused;
+    nebel_volume_desc haze = volume_of(&white, .02);
+    haze.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 20};
+    nebel_fog *fog = start(&white, &haze, &(nebel_diffusion_desc){.has_ground = 1});
+    nebel_snapshot *alone = NULL, *both = NULL;
+    nebel_light lights[2][2];
+    const nebel_volume_desc body = ball(&white, 1);
+    assert_int_equal(nebel_commit_fog(fog, &alone), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &body, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &both), NEBEL_OK);
+    /* One ray through the body, one far from it. */
+    const nebel_ray rays[] = {{{1, 2, 40}, {0, 0, -1}, 60}, {{500, 2, 40}, {0, 0, -1}, 60}};
+    assert_int_equal(nebel_trace(alone, NULL, 2, rays, sizeof *rays, lights[0], sizeof *lights[0]), NEBEL_OK);
+    assert_int_equal(nebel_trace(both, NULL, 2, rays, sizeof *rays, lights[1], sizeof *lights[1]), NEBEL_OK);
+    assert_true(lights[1][0].in_scattering[0] > lights[0][0].in_scattering[0] + .01);
+    assert_true(fabs(lights[1][1].in_scattering[0] / lights[0][1].in_scattering[0] - 1) < .05);
+    nebel_release_snapshot(alone);
+    nebel_release_snapshot(both);
+    nebel_destroy_fog(fog);
+}
+
+/* ---- bad input ------------------------------------------------------------------------------- */
+
+static void test_bad_descriptions(void **unused)
+{
+    (void)unused;
+    const nebel_volume_desc volume = ball(&white, 1);
+    nebel_fog *fog = start(&white, &volume, NULL);
+    static const nebel_diffusion_desc bad[] = {{.cells = 1},
+                                               {.cells = NEBEL_MAX_DIFFUSION_CELLS + 1},
+                                               {.has_ground = 1, .ground_height = HUGE_VAL},
+                                               {.has_ground = 1, .ground_height = -2e15},
+                                               {.has_ground = 1, .ground_albedo = {0, 1.5, 0}},
+                                               {.has_ground = 1, .ground_albedo = {0, 0, -.1}}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_int_equal(nebel_set_diffusion(fog, &bad[i]), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_set_diffusion(NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_fog(fog);
+}
+
+static void assert_refused(const nebel_volume_desc *volume, double max_opacity, const char *word)
+{
+    fog_messages said = {0};
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    const nebel_fog_desc desc = {.log = fog_messages_log(&said),
+                                 .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}},
+                                 .max_opacity = max_opacity};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_ERROR_UNSUPPORTED);
+    assert_null(snapshot);
+    assert_int_equal(said.count, 1);
+    assert_non_null(strstr(said.text, word));
+    nebel_destroy_fog(fog);
+}
+
+static void test_what_diffusion_cannot_do_is_refused(void **unused)
+{
+    (void)unused;
+    nebel_volume_desc volume = ball(&white, 1);
+    assert_refused(&volume, .5, "max_opacity");
+    volume.cutoff = 9;
+    assert_refused(&volume, 0, "cutoff");
+    volume = volume_of(&white, 1);
+    volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .normal = {1, 1, 0}};
+    assert_refused(&volume, 0, "endless");
+}
+
+/* Fog that no light comes out of, or no light gets into, is no error. */
+static void test_fog_without_light(void **unused)
+{
+    (void)unused;
+    nebel_volume_desc volumes[] = {volume_of(&white, 1), ball(&white, 0), ball(&white, 1e6), ball(&white, 1e-9)};
+    for (size_t i = 0; i < sizeof volumes / sizeof *volumes; i++) {
+        nebel_snapshot *snapshot = commit(&white, &volumes[i], &by_default);
+        nebel_light lights[RAYS];
+        trace(snapshot, &(nebel_trace_desc){0}, lights);
+        for (int k = 0; k < RAYS; k++) assert_true(lights[k].in_scattering[0] >= 0 && lights[k].in_scattering[0] < 2);
+        nebel_release_snapshot(snapshot);
+    }
+}
+
+static void test_memory_runs_out(void **unused)
+{
+    (void)unused;
+    fog_memory memory = {0};
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    const nebel_volume_desc volume = ball(&white, 1);
+    nebel_fog *fog = NULL;
+    const nebel_fog_desc desc = {.allocator = fog_memory_allocator(&memory),
+                                 .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.cells = 512}), NEBEL_OK);
+    const size_t live = memory.live;
+    size_t tries = 0;
+    while (result == NEBEL_ERROR_MEMORY) {
+        nebel_snapshot *snapshot = NULL;
+        memory.fail_first = ++tries;
+        memory.fail_count = 1;
+        result = nebel_commit_fog(fog, &snapshot);
+        assert_true(result == NEBEL_ERROR_MEMORY ? snapshot == NULL && memory.live == live : result == NEBEL_OK);
+        nebel_release_snapshot(snapshot);
+    }
+    assert_int_equal(memory.live, live);
+    assert_true(tries > 20);
+    memory.fail_first = 0;
+    nebel_destroy_fog(fog);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1 && strcmp(argv[1], "table") == 0) {
+        print_layers();
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_layers_are_near_published_ones),
+                                       cmocka_unit_test(test_white_layers_keep_the_suns_light),
+                                       cmocka_unit_test(test_height_fog_reflects_as_a_layer),
+                                       cmocka_unit_test(test_endless_depth),
+                                       cmocka_unit_test(test_ground_reflects),
+                                       cmocka_unit_test(test_white_fog_under_a_white_sky_is_white),
+                                       cmocka_unit_test(test_transmittance_stays_and_light_is_added),
+                                       cmocka_unit_test(test_same_bits_for_every_isa_and_split),
+                                       cmocka_unit_test(test_cells_do_not_matter_much),
+                                       cmocka_unit_test(test_bodies_in_height_fog),
+                                       cmocka_unit_test(test_bad_descriptions),
+                                       cmocka_unit_test(test_what_diffusion_cannot_do_is_refused),
+                                       cmocka_unit_test(test_fog_without_light),
+                                       cmocka_unit_test(test_memory_runs_out)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,210 @@
+/* Diffusion in bodies, clouds and height fog, beside pictures of the reference. The argument "table" prints rows of
+ * docs/multiple-scattering.md, of 16 times as many samples. */
+#include "test_render_scene.h"
+
+enum { SIDE = 16, PIXELS = SIDE * SIDE, BLOCK = 4 };
+
+static uint32_t samples = 64;
+
+/* White fog, seen from the front and a little from above. */
+typedef struct trial {
+    const char *name;
+    nebel_shape shape;
+    nebel_density density;
+    double extinction, g;
+    double sun[3];
+    double most_off, most_rms; /* of the picture's mean, and of its blocks: in terms of that mean */
+} trial;
+
+#define BALL                                                                                                           \
+    {                                                                                                                  \
+        .type = NEBEL_SHAPE_SPHERE, .radius = 1                                                                        \
+    }
+#define BOX                                                                                                            \
+    {                                                                                                                  \
+        .type = NEBEL_SHAPE_BOX, .min = {-1, -.5, -.6}, .max = { 1, .4, .6 }                                           \
+    }
+#define SIDEWAYS                                                                                                       \
+    {                                                                                                                  \
+        1, .6, .5                                                                                                      \
+    }
+#define AHEAD                                                                                                          \
+    {                                                                                                                  \
+        .2, .3, -1                                                                                                     \
+    }
+#define BEHIND                                                                                                         \
+    {                                                                                                                  \
+        .2, .3, 1                                                                                                      \
+    }
+
+/* What is measured, and some room for chance. */
+static const trial trials[] = {
+    {"ball, depth 2", BALL, {0}, 1, 0, SIDEWAYS, .06, .1},
+    {"ball, depth 10, sun behind the eye", BALL, {0}, 5, 0, BEHIND, .08, .1},
+    {"ball, depth 10, sun ahead", BALL, {0}, 5, 0, AHEAD, .15, .25},
+    {"ball, depth 20, g .85", BALL, {0}, 10, .85, SIDEWAYS, .15, .25},
+    {"ball, depth 20, g .85, sun ahead", BALL, {0}, 10, .85, AHEAD, .15, .3},
+    {"ball, depth 20, g .85, sun behind the eye", BALL, {0}, 10, .85, BEHIND, .35, .45},
+    {"ball that thins out, depth 10", BALL, {.type = NEBEL_DENSITY_RADIAL, .power = 2}, 10, 0, SIDEWAYS, .1, .22},
+    {"box, depth 6", BOX, {0}, 5, 0, SIDEWAYS, .08, .12},
+    {"box, depth 20, g .85", BOX, {0}, 16, .85, SIDEWAYS, .25, .4},
+    {"cloud of voxels, depth 20 in a knot, g .85", BOX, {.type = NEBEL_DENSITY_GRID}, 40, .85, SIDEWAYS, .2, .3},
+    {"height fog above black ground, depth 8, g .85",
+     {.type = NEBEL_SHAPE_WORLD},
+     {.type = NEBEL_DENSITY_HEIGHT, .base = -1.2, .scale_height = .4},
+     20,
+     .85,
+     SIDEWAYS,
+     .2,
+     .25}};
+
+enum { TRIALS = sizeof trials / sizeof *trials };
+
+/* ---- pictures -------------------------------------------------------------------------------- */
+
+typedef struct shot {
+    float color[3 * PIXELS], error[3 * PIXELS];
+} shot;
+
+static nebel_grid *make_cloud(void)
+{
+    nebel_grid *grid = NULL;
+    const nebel_noise_desc desc = {
+        .size = {48, 48, 48}, .cells = {4, 3, 3}, .octaves = 3, .coverage = .55, .edge = {.3, .3, .3}};
+    assert_int_equal(nebel_create_noise(&desc, &grid), NEBEL_OK);
+    return grid;
+}
+
+static nebel_snapshot *commit(const trial *t, int is_diffuse)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    nebel_fog_desc desc = {.sun = {.irradiance = {1, 1, 1}}};
+    nebel_volume_desc volume = {.shape = t->shape,
+                                .density = t->density,
+                                .extinction = {t->extinction, t->extinction, t->extinction},
+                                .albedo = {1, 1, 1},
+                                .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = t->g}};
+    const nebel_diffusion_desc diffusion = {.has_ground = t->shape.type == NEBEL_SHAPE_WORLD,
+                                            .ground_height = t->density.base};
+    if (t->density.type == NEBEL_DENSITY_GRID) volume.density.grid = make_cloud();
+    memcpy(desc.sun.direction, t->sun, sizeof desc.sun.direction);
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, is_diffuse ? &diffusion : NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_release_grid(volume.density.grid);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Black ground, as far as anybody sees. */
+static nebel_mesh make_ground(double height)
+{
+    static const float positions[] = {-1e4f, 0, -1e4f, 1e4f, 0, -1e4f, 0, 0, 2e4f};
+    static const uint32_t indices[] = {0, 2, 1};
+    return (nebel_mesh){.origin = {0, height, 0},
+                        .positions = positions,
+                        .indices = indices,
+                        .vertex_count = 3,
+                        .triangle_count = 1,
+                        .texture = -1};
+}
+
+static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
+{
+    nebel_renderer *renderer = NULL;
+    const int is_endless = t->shape.type == NEBEL_SHAPE_WORLD;
+    const nebel_mesh ground = make_ground(t->density.base);
+    nebel_scene_data scene = {
+        .has_sun = 1, .sun_irradiance = {1, 1, 1}, .meshes = &ground, .mesh_count = is_endless ? 1 : 0};
+    const double length = sqrt(t->sun[0] * t->sun[0] + t->sun[1] * t->sun[1] + t->sun[2] * t->sun[2]);
+    for (int c = 0; c < 3; c++) scene.sun_direction[c] = t->sun[c] / length;
+    scene.camera = test_camera(0, 10, 50, 0, 0, 0);
+    scene.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    scene.camera.view_height = 2.4;
+    nebel_snapshot *fog = commit(t, is_diffuse);
+    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){.threads = 2}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
+    const nebel_frame_desc frame = {.camera = scene.camera,
+                                    .width = SIDE,
+                                    .height = SIDE,
+                                    .samples = method == NEBEL_METHOD_REFERENCE ? samples : 4};
+    const nebel_frame planes = {.color = out->color, .standard_error = out->error};
+    assert_int_equal(nebel_render_frame(renderer, &frame, &planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+}
+
+/* ---- judgement ------------------------------------------------------------------------------- */
+
+static double mean_of(const float *plane, int x, int y, int side)
+{
+    double sum = 0;
+    for (int j = y; j < y + side; j++)
+        for (int i = x; i < x + side; i++) sum += (double)plane[3 * (j * SIDE + i)];
+    return sum / (side * side);
+}
+
+/* In terms of the reference's mean. */
+typedef struct verdict {
+    double off, rms, chance;
+} verdict;
+
+static verdict judge(const shot *is, const shot *reference)
+{
+    const double mean = mean_of(reference->color, 0, 0, SIDE);
+    double square = 0, chance = 0;
+    for (int y = 0; y < SIDE; y += BLOCK)
+        for (int x = 0; x < SIDE; x += BLOCK) {
+            const double off = mean_of(is->color, x, y, BLOCK) - mean_of(reference->color, x, y, BLOCK);
+            square += off * off * BLOCK * BLOCK / PIXELS;
+        }
+    for (int i = 0; i < PIXELS; i++) chance += (double)reference->error[3 * i] * (double)reference->error[3 * i];
+    return (verdict){mean_of(is->color, 0, 0, SIDE) / mean - 1, sqrt(square) / mean, sqrt(chance) / PIXELS / mean};
+}
+
+static shot once, all, reference;
+
+static void take_all(const trial *t)
+{
+    take(t, NEBEL_METHOD_EXACT, 0, &once);
+    take(t, NEBEL_METHOD_EXACT, 1, &all);
+    take(t, NEBEL_METHOD_REFERENCE, 0, &reference);
+}
+
+static void print_trials(void)
+{
+    printf(
+        "| white fog | light of one scattering | diffusion | its RMS over blocks | chance |\n|---|---|---|---|---|\n");
+    for (int i = 0; i < TRIALS; i++) {
+        take_all(&trials[i]);
+        const verdict single = judge(&once, &reference), many = judge(&all, &reference);
+        printf("| %s | %+.0f %% | %+.0f %% | %.0f %% | %.1f %% |\n", trials[i].name, 100 * single.off, 100 * many.off,
+               100 * many.rms, 100 * many.chance);
+    }
+}
+
+static void test_bodies_are_as_bright_as_the_reference(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < TRIALS; i++) {
+        const trial *t = &trials[i];
+        take_all(t);
+        const verdict single = judge(&once, &reference), many = judge(&all, &reference);
+        if (fabs(many.off) >= t->most_off + 3 * many.chance || many.rms >= t->most_rms + 3 * many.chance)
+            fail_msg("%s: off by %.3f, %.3f rms, chance %.3f", t->name, many.off, many.rms, many.chance);
+        assert_true(single.off < -.4);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1 && strcmp(argv[1], "table") == 0) {
+        samples *= 16;
+        print_trials();
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bodies_are_as_bright_as_the_reference)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
