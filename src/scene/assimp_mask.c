@@ -61,7 +61,7 @@ static nebel_result find_of_gltf(nb_assimp *in, const struct aiMaterial *materia
         return result;
     }
     if (strcmp(mode, "MASK") != 0) return NEBEL_OK;
-    aiGetMaterialFloat(material, AI_MATKEY_GLTF_ALPHACUTOFF, &cutoff);
+    aiGetMaterialFloatArray(material, AI_MATKEY_GLTF_ALPHACUTOFF, &cutoff, NULL);
     aiGetMaterialColor(material, AI_MATKEY_BASE_COLOR, &color);
     if (!(cutoff > 0)) return NEBEL_OK;
     surface->is_clear = !(color.a >= cutoff);
