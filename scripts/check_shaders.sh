@@ -54,10 +54,10 @@ try_opengl() {
     verdict "$1 $3" glslangValidator "$work/fog.frag"
 }
 
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
     try_opengl glsl_330 "330 core" "$defines"
 done
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n"; do
     try_opengl glsl_300_es "300 es" "$defines"
 done
 
@@ -68,12 +68,14 @@ layout(std140, binding = 0) uniform fog { vec4 words[1024]; };
 layout(std430, binding = 1) readonly buffer tiles { uint entries[]; };
 layout(std140, binding = 2) uniform view { vec4 rays[10]; };
 layout(binding = 3) uniform sampler2D opaque;
+layout(std430, binding = 4) readonly buffer grids { uvec4 texels[]; };
 layout(location = 0) in vec3 place;
 layout(location = 0) out vec4 color;
 #define NEBEL_VIEW
 #define NEBEL_TRANSPARENT
 #define NEBEL_WORD(i) words[i]
 #define NEBEL_INDEX(i) int(entries[i])
+#define NEBEL_VOXEL(i) texels[i]
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x
 GLSL
@@ -87,12 +89,14 @@ verdict glsl_450 glslangValidator -V "$work/fog.frag" -o "$work/fog.spv"
 cbuffer fog { float4 words[1024]; };
 cbuffer view { float4 rays[10]; };
 StructuredBuffer<uint> entries;
+StructuredBuffer<uint4> texels;
 Texture2D opaque;
 SamplerState opaque_sampler;
 #define NEBEL_VIEW
 #define NEBEL_TRANSPARENT
 #define NEBEL_WORD(i) words[i]
 #define NEBEL_INDEX(i) int(entries[i])
+#define NEBEL_VOXEL(i) texels[i]
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) opaque.SampleLevel(opaque_sampler, at, 0.0).x
 HLSL

@@ -700,6 +700,14 @@ static void volumes_need_a_box_and_a_grid(void **test)
     nebel_snapshot *snapshot = NULL;
     size_t words;
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    assert_int_equal(nebel_pack_fog(snapshot, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_OK);
+    nebel_release_snapshot(snapshot);
+    const nebel_sun sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}};
+    v.shape = (nebel_shape){.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}};
+    v.albedo[0] = 1;
+    assert_int_equal(nebel_set_sun(fog, &sun), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &v, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     assert_int_equal(nebel_pack_fog(snapshot, (double[3]){0, 0, 0}, NULL, 0, &words), NEBEL_ERROR_UNSUPPORTED);
     assert_non_null(strstr(messages.text, "grids"));
     nebel_destroy_fog(fog);

@@ -186,6 +186,28 @@ static void test_shaders_that_the_driver_refuses(void **state)
     close_stage(&s);
 }
 
+/* One box of `size` voxels along each axis, no two alike. */
+static nebel_snapshot *fog_of_voxels(size_t size)
+{
+    const size_t count = size * size * size;
+    nebel_grid *grid = NULL;
+    float *const voxels = calloc(count, sizeof *voxels);
+    assert_non_null(voxels);
+    for (size_t i = 0; i < count; i++) voxels[i] = (float)i / (float)count;
+    assert_int_equal(nebel_create_grid(&(nebel_grid_desc){.size = {size, size, size}, .voxels = voxels}, &grid),
+                     NEBEL_OK);
+    const nebel_volume_desc v = {
+        .shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, -9, -9}, .max = {9, 9, 9}},
+        .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
+        .extinction = {.1, .1, .1},
+        .source = {1, 1, 1},
+    };
+    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){0}, &v, 1);
+    nebel_release_grid(grid);
+    free(voxels);
+    return fog;
+}
+
 static void test_more_volumes_than_a_texture_holds(void **state)
 {
     (void)state;
@@ -200,6 +222,10 @@ static void test_more_volumes_than_a_texture_holds(void **state)
     epoxy_glGetIntegerv = true_get_integer;
     expect_message(nebel_gl_set_fog(narrow, many, &s.picture.view), NEBEL_ERROR_LIMIT, "has 3 (GL_MAX_TEXTURE_SIZE)");
     assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
+    nebel_snapshot *const fine = fog_of_voxels(32);
+    expect_message(nebel_gl_set_fog(narrow, fine, &s.picture.view), NEBEL_ERROR_LIMIT, "use fewer voxels");
+    assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
+    nebel_release_snapshot(fine);
     nebel_destroy_gl(narrow);
     nebel_release_snapshot(many);
     close_stage(&s);
@@ -225,6 +251,14 @@ static void test_a_driver_without_memory(void **state)
     expect_message(draw(&s), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
     assert_int_equal(nebel_gl_set_fog(s.gl, many, &s.picture.view), NEBEL_OK);
     assert_int_equal(draw(&s), NEBEL_OK);
+    nebel_snapshot *const voxels = fog_of_voxels(12);
+    epoxy_glGetError = out_of_memory;
+    const nebel_result refused = nebel_gl_set_fog(s.gl, voxels, &s.picture.view);
+    epoxy_glGetError = true_error;
+    expect_message(refused, NEBEL_ERROR_MEMORY, "no memory for the texture of voxels");
+    assert_int_equal(nebel_gl_set_fog(s.gl, voxels, &s.picture.view), NEBEL_OK);
+    assert_int_equal(draw(&s), NEBEL_OK);
+    nebel_release_snapshot(voxels);
     nebel_release_snapshot(many);
     close_stage(&s);
 }
@@ -237,7 +271,7 @@ static void test_memory_that_runs_out(void **state)
     (void)state;
     static stage s;
     open_stage(&s, NB_GL_330);
-    nebel_snapshot *const many = pass_fog(60);
+    nebel_snapshot *const many = pass_fog(60), *const voxels = fog_of_voxels(12);
     const nebel_gl_pass pass = pass_of(&s);
     nebel_result result = NEBEL_ERROR_MEMORY;
     size_t fails = 0;
@@ -249,14 +283,16 @@ static void test_memory_that_runs_out(void **state)
         result = nebel_create_gl(&desc, &gl);
         if (result == NEBEL_OK) result = nebel_gl_set_fog(gl, many, &s.picture.view);
         if (result == NEBEL_OK) result = nebel_gl_draw_fog(gl, &pass);
+        if (result == NEBEL_OK) result = nebel_gl_set_fog(gl, voxels, &s.picture.view);
         if (result != NEBEL_OK) expect_message(result, NEBEL_ERROR_MEMORY, "memory");
         fails += result != NEBEL_OK;
         nebel_destroy_gl(gl);
         assert_int_equal(memory.live, 0);
         assert_int_equal(pass_count_objects(), objects);
     }
-    assert_true(fails >= 4);
+    assert_true(fails >= 5);
     nebel_release_snapshot(many);
+    nebel_release_snapshot(voxels);
     close_stage(&s);
 }
 

@@ -11,6 +11,7 @@
 #include "pass_help.h"
 #include "picture_help.h"
 #include "random_fog.h"
+#include "random_grid.h"
 
 enum {
     DEMO_WIDTH = 320,
@@ -19,7 +20,8 @@ enum {
     ROUND_HEIGHT = 144,
     RANDOM_WIDTH = 96,
     RANDOM_HEIGHT = 64,
-    RANDOM_SCENES = 40
+    RANDOM_SCENES = 40,
+    GRID_SCENES = 12
 };
 
 static picture_report report;
@@ -99,7 +101,7 @@ static void check_panorama(const nebel_scene *scene, const char *name)
     picture_free(&pair);
 }
 
-/* OpenGL refuses fog that lamps light, or the sun around models, and voxels. */
+/* OpenGL refuses fog that lamps light, or the sun around models and voxels. */
 static int is_drawn(const nebel_scene *scene)
 {
     const double eye[3] = {0, 0, 0};
@@ -201,22 +203,20 @@ static nebel_camera camera_for(const random_fog *fog, int number)
     return camera;
 }
 
-static picture_difference check_random(int number)
+static picture_difference check_random(random_fog *random, const char *kind, int number)
 {
-    static random_fog random;
     static float positions[4][8][3];
     nebel_mesh meshes[4];
     char name[64];
     nb_gl context;
-    random_fog_make(&random, (random_fog_kind)(number % RANDOM_FOG_KIND_COUNT), (uint64_t)number);
-    nebel_snapshot *const fog = commit(&random);
-    const nebel_scene_data scene = scene_around(random.shift, meshes, positions);
-    const nebel_camera camera = camera_for(&random, number);
+    nebel_snapshot *const fog = commit(random);
+    const nebel_scene_data scene = scene_around(random->shift, meshes, positions);
+    const nebel_camera camera = camera_for(random, number);
     picture_pair pair = picture_make(RANDOM_WIDTH, RANDOM_HEIGHT);
     pass_open(&context, number % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
     picture_render(&scene, fog, &camera, 1, &pair);
     pass_close(&context);
-    snprintf(name, sizeof name, "random-%d", number);
+    snprintf(name, sizeof name, "%s-%d", kind, number);
     const picture_difference d = check(name, &pair);
     picture_free(&pair);
     nebel_release_snapshot(fog);
@@ -224,20 +224,48 @@ static picture_difference check_random(int number)
 }
 
 /* The scenes are small, so that their pixels are counted together. */
+static void count(picture_difference *all, const picture_difference *d)
+{
+    all->fogged += d->fogged;
+    all->beyond_step += d->beyond_step;
+    all->largest = fmax(all->largest, d->largest);
+}
+
+static void expect_all(const picture_difference *all, int scenes)
+{
+    print_message("all: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255\n", all->fogged, all->beyond_step,
+                  255 * all->largest);
+    assert_true(all->fogged > (size_t)scenes * RANDOM_WIDTH * RANDOM_HEIGHT / 4);
+    expect_sameness(all);
+}
+
 static void test_random_fog_around_boxes(void **state)
 {
     (void)state;
+    static random_fog random;
     picture_difference all = {.fogged = 0};
     for (int i = 0; i < RANDOM_SCENES; i++) {
-        const picture_difference d = check_random(i);
-        all.fogged += d.fogged;
-        all.beyond_step += d.beyond_step;
-        all.largest = fmax(all.largest, d.largest);
+        random_fog_make(&random, (random_fog_kind)(i % RANDOM_FOG_KIND_COUNT), (uint64_t)i);
+        const picture_difference d = check_random(&random, "random", i);
+        count(&all, &d);
     }
-    print_message("all: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255\n", all.fogged, all.beyond_step,
-                  255 * all.largest);
-    assert_true(all.fogged > RANDOM_SCENES * RANDOM_WIDTH * RANDOM_HEIGHT / 4);
-    expect_sameness(&all);
+    expect_all(&all, RANDOM_SCENES);
+}
+
+/* Voxels alone, and among six, five and forty others. */
+static void test_random_grids_around_boxes(void **state)
+{
+    (void)state;
+    static random_fog random;
+    picture_difference all = {.fogged = 0};
+    for (int i = 0; i < GRID_SCENES; i++) {
+        nebel_grid *grids[RANDOM_GRIDS];
+        random_grids_make(&random, (random_fog_kind)(i % (RANDOM_FOG_MANY + 1)), (uint64_t)i, grids);
+        const picture_difference d = check_random(&random, "grids", i);
+        count(&all, &d);
+        random_grids_release(grids);
+    }
+    expect_all(&all, GRID_SCENES);
 }
 
 int main(void)
@@ -245,6 +273,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_demo_scenes),
         cmocka_unit_test(test_random_fog_around_boxes),
+        cmocka_unit_test(test_random_grids_around_boxes),
     };
     report = picture_report_open("nebel: OpenGL beside the CPU");
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);

@@ -148,6 +148,124 @@ static void test_bad_input(void **state)
     nebel_release_snapshot(snapshot);
 }
 
+/* ---- voxels ---------------------------------------------------------------------------------- */
+
+static nebel_grid *grid_of(const uint8_t *voxels, size_t x, size_t y, size_t z, nebel_filter filter)
+{
+    nebel_grid *grid = NULL;
+    const nebel_grid_desc desc = {
+        .size = {x, y, z}, .type = NEBEL_VOXEL_UINT8, .voxels = voxels, .filter = filter, .scale = 2, .offset = 1};
+    assert_int_equal(nebel_create_grid(&desc, &grid), NEBEL_OK);
+    return grid;
+}
+
+/* A box for each grid, one behind the other. */
+static nebel_snapshot *boxes_of(nebel_grid *const *grids, size_t count, nebel_log log)
+{
+    nebel_volume_desc v[8];
+    for (size_t i = 0; i < count; i++)
+        v[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .max = {1 + (double)i, 1, 1}},
+                                   .density = {.type = NEBEL_DENSITY_GRID, .grid = grids[i]},
+                                   .extinction = {1, 1, 1}};
+    return fog_commit(&(nebel_fog_desc){.log = log}, v, count);
+}
+
+static float float_of(uint32_t bits)
+{
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* 9 x 1 x 1 voxels in cells: two bricks, of which the second one is even. */
+static void test_texels(void **state)
+{
+    (void)state;
+    const uint8_t voxels[9] = {0, 255, 51, 0, 0, 0, 0, 51, 51};
+    nebel_grid *grid = grid_of(voxels, 9, 1, 1, NEBEL_FILTER_LINEAR);
+    nebel_snapshot *snapshot = boxes_of(&grid, 1, (nebel_log){0});
+    nebel_texel texels[3 + 512];
+    size_t count = 0;
+    assert_int_equal(nebel_pack_voxels(snapshot, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(count, 3 + 512);
+    assert_int_equal(nebel_pack_voxels(snapshot, texels, count, &count), NEBEL_OK);
+    assert_memory_equal(texels[0].v, ((uint32_t[]){2, 1, 1, 1}), sizeof texels[0].v);
+    assert_float_equal(float_of(texels[1].v[0]), 1, 0);
+    assert_float_equal(float_of(texels[1].v[1]) * 65535, 2, 1e-6);
+    assert_int_equal(texels[1].v[2], 3);
+    assert_float_equal(float_of(texels[2].v[0]), 1.4, 1e-6);
+    assert_int_equal(texels[2].v[2], 0);
+    for (int i = 0; i < 4; i++) { /* level across, and outwards from the outermost middles */
+        assert_int_equal(texels[3].v[i], 0);
+        assert_int_equal(texels[4].v[i], 65535u << 16);
+        assert_int_equal(texels[5].v[i], 65535u | 13107u << 16);
+    }
+    nebel_release_snapshot(snapshot);
+    nebel_release_grid(grid);
+}
+
+static void test_shared_and_same_voxels(void **state)
+{
+    (void)state;
+    const uint8_t voxels[8] = {1, 2, 3, 4, 5, 6, 7, 8}, even[8] = {0};
+    nebel_grid *one = grid_of(voxels, 2, 2, 2, NEBEL_FILTER_NEAREST),
+               *twin = grid_of(voxels, 2, 2, 2, NEBEL_FILTER_NEAREST);
+    nebel_grid *other = grid_of(even, 2, 2, 2, NEBEL_FILTER_NEAREST);
+    nebel_snapshot *const alone = boxes_of(&one, 1, (nebel_log){0}), *const again = boxes_of(&twin, 1, (nebel_log){0});
+    nebel_snapshot *const shared = boxes_of((nebel_grid *[]){one, one, one}, 3, (nebel_log){0});
+    nebel_snapshot *const both = boxes_of((nebel_grid *[]){one, other}, 2, (nebel_log){0});
+    nebel_snapshot *const none = fog_commit(&(nebel_fog_desc){0}, NULL, 0);
+    size_t count = 0;
+    assert_int_equal(nebel_pack_voxels(shared, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(count, 2 + 512);
+    assert_int_equal(nebel_pack_voxels(both, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(count, 2 + 512 + 2);
+    assert_int_equal(nebel_pack_voxels(none, NULL, 0, &count), NEBEL_OK);
+    assert_int_equal(count, 0);
+    assert_true(nebel_same_voxels(alone, shared) && nebel_same_voxels(alone, again) && nebel_same_voxels(none, none));
+    assert_false(nebel_same_voxels(alone, both) || nebel_same_voxels(both, alone) || nebel_same_voxels(none, alone));
+    nebel_release_snapshot(alone);
+    nebel_release_snapshot(again);
+    nebel_release_snapshot(shared);
+    nebel_release_snapshot(both);
+    nebel_release_snapshot(none);
+    nebel_release_grid(one);
+    nebel_release_grid(twin);
+    nebel_release_grid(other);
+}
+
+static void test_voxels_that_cannot_be_packed(void **state)
+{
+    (void)state;
+    enum { SIDE = 256, LAYERS = 257 };
+    const size_t voxels = (size_t)SIDE * SIDE * LAYERS;
+    const double eye[3] = {0, 0, 0};
+    fog_messages messages = {0};
+    nebel_texel texel = {{77, 0, 0, 0}};
+    size_t count = 0;
+    uint8_t *const many = malloc(voxels);
+    assert_non_null(many);
+    for (size_t i = 0; i < voxels; i++) many[i] = (uint8_t)i;
+    nebel_grid *small = grid_of(many, 2, 2, 2, NEBEL_FILTER_LINEAR),
+               *large = grid_of(many, SIDE, SIDE, LAYERS, NEBEL_FILTER_LINEAR);
+    nebel_snapshot *const fog_of_small = boxes_of(&small, 1, fog_messages_log(&messages));
+    nebel_snapshot *const fog_of_large = boxes_of(&large, 1, fog_messages_log(&messages));
+    assert_int_equal(nebel_pack_voxels(NULL, NULL, 0, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_voxels(fog_of_small, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_voxels(fog_of_small, NULL, 1, &count), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_pack_voxels(fog_of_small, &texel, 1, &count), NEBEL_ERROR_LIMIT);
+    assert_non_null(strstr(messages.text, "room for 1"));
+    assert_int_equal(texel.v[0], 77);
+    assert_int_equal(nebel_pack_voxels(fog_of_large, NULL, 0, &count), NEBEL_ERROR_LIMIT);
+    assert_non_null(strstr(messages.text, "too large for shaders"));
+    assert_int_equal(nebel_pack_fog(fog_of_large, eye, NULL, 0, &count), NEBEL_ERROR_LIMIT);
+    nebel_release_snapshot(fog_of_small);
+    nebel_release_snapshot(fog_of_large);
+    nebel_release_grid(small);
+    nebel_release_grid(large);
+    free(many);
+}
+
 static void test_features(void **state)
 {
     (void)state;
@@ -186,6 +304,9 @@ int main(void)
         cmocka_unit_test(test_layout),
         cmocka_unit_test(test_order_and_repetition),
         cmocka_unit_test(test_bad_input),
+        cmocka_unit_test(test_texels),
+        cmocka_unit_test(test_shared_and_same_voxels),
+        cmocka_unit_test(test_voxels_that_cannot_be_packed),
         cmocka_unit_test(test_features),
         cmocka_unit_test(test_texts),
     };

@@ -17,7 +17,7 @@
  * exactly. Link with libnebel_gl and libnebel.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
- * what nebel/gl.h lists it changes, while it runs, texture units 4 to 11, and TEXTURE_2D_ARRAY of units 7, 9 and 11; both
+ * what nebel/gl.h lists it changes, while it runs, texture units 5 to 12, and TEXTURE_2D_ARRAY of units 8, 10 and 12; both
  * framebuffers; the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth
  * function, mask and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and
  * the clip control, where they exist. Conditional rendering must not be under way: pictures would be missing within a

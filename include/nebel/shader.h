@@ -99,7 +99,9 @@
  * RGBA32F; a host that defines NEBEL_WORD itself gets neither. The Vulkan and HLSL texts declare nothing: define
  * NEBEL_WORD before them. NEBEL_INDEX(i), an int, is only needed by the _list functions, which are there when it is
  * defined; NEBEL_TILES makes GLSL define it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of
- * NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_FEATURES may be defined as what nebel_pack_features says, and
+ * NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_VOXEL(i), a uvec4 of nebel_pack_voxels, is only needed for grids, which are
+ * no fog without it; NEBEL_VOXELS makes GLSL define it and declare `uniform highp usampler2D nebel_voxel_texture;`,
+ * rows of NEBEL_TEXTURE_WIDTH texels RGBA32UI. NEBEL_FEATURES may be defined as what nebel_pack_features says, and
  * NEBEL_MOST_TURNS as how many turns of loops a ray may take, for drivers that end loops: see docs/shaders.md. The GLSL
  * ES text makes highp the default precision.
  *
@@ -155,6 +157,22 @@ typedef struct nebel_word {
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
                             size_t *count);
 
+/* Four integers of a grid's voxels: a uvec4. */
+typedef struct nebel_texel {
+    uint32_t v[4];
+} nebel_texel;
+
+/* Packs the voxels of a snapshot's grids. *count receives the number of texels needed, 0 where there is no grid; they
+ * are written when `capacity` is at least that. A cube of 8 x 8 x 8 voxels takes one texel where all are equal, else
+ * 513: each voxel in 65,536 steps between the least and the most of its cube. They do not depend on the eye: pack again
+ * when nebel_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for
+ * texels NULL and capacity 0, which only asks) or when more than 2^24 texels (256 MiB) would be needed, for which
+ * nebel_pack_fog answers LIMIT, too. */
+nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel *texels, size_t capacity, size_t *count);
+
+/* Whether nebel_pack_voxels makes the same of both. O(volumes) where they share their grids. Any thread. */
+int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b);
+
 /* What the fog has, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
  * name, and a driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong
  * answers; masks of several snapshots may be joined with |. NULL gives everything. O(volumes and their parts). Any
@@ -163,6 +181,9 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 
 /* The feature of fog whose volumes are of different light: rays may have to be walked, from event to event. */
 #define NEBEL_FEATURE_MIXED 512u
+
+/* The feature of fog that has grids: the text needs NEBEL_VOXELS, or NEBEL_VOXEL, defined before it. */
+#define NEBEL_FEATURE_GRID 1048576u
 
 /* ---- views ----------------------------------------------------------------------------------- */
 

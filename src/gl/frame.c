@@ -369,6 +369,13 @@ static void set_face_tiles(const frame *f, const nebel_gl_fog *fog, unsigned pro
     glUniform1iv(glGetUniformLocation(program, "face_first"), 6, gl->face_first);
 }
 
+static void bind_media(const nebel_gl_fog *fog)
+{
+    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
+    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    if (fog->voxels != 0) bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
+}
+
 static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
     const int parallel = f->view.clip_from_eye[15] != 0;
@@ -382,8 +389,7 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     const int five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP;
     if (five_taps) set_taps(f, program);
     bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, five_taps ? f->renderer->targets.place : f->renderer->targets.depth);
-    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
-    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    bind_media(fog);
     if (fog->tiles == 0) return;
     bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
     if (f->panorama) {
@@ -560,8 +566,7 @@ static void set_lamps(const frame *f, unsigned program)
 
 static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
-    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
-    if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    bind_media(fog);
     if (fog->tiles != 0 && f->casts) set_tiles(f, fog, program);
 }
 

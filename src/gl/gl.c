@@ -60,9 +60,9 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl)
 /* Names of 0 are skipped by OpenGL. */
 static void delete_objects(nebel_gl *gl)
 {
-    const GLuint textures[] = {gl->texture, gl->tiles};
+    const GLuint textures[] = {gl->texture, gl->voxels, gl->tiles};
     nb_programs_delete(&gl->programs);
-    glDeleteTextures(2, textures);
+    glDeleteTextures(3, textures);
     glDeleteBuffers(1, &gl->block);
     glDeleteFramebuffers(1, &gl->framebuffer);
     glDeleteSamplers(1, &gl->sampler);
@@ -76,6 +76,7 @@ void nebel_destroy_gl(nebel_gl *gl)
     if (nb_context_check(&silent, gl->vertex_array) == NEBEL_OK) delete_objects(gl);
     nebel_release_snapshot(gl->empty);
     nebel_release_snapshot(gl->packed);
+    nebel_release_snapshot(gl->voxels_of);
     nb_release(&gl->allocator, gl->programs.list);
     nb_release(&gl->allocator, gl->words);
     nb_release(&gl->allocator, gl->entries);

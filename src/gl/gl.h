@@ -12,15 +12,16 @@ struct nebel_gl {
     nebel_snapshot *empty; /* what is seen where there is no fog */
 
     /* Names in OpenGL; 0: not made yet. The sampler fetches single texels, whatever the host's textures ask for. */
-    unsigned vertex_array, sampler, block, texture, tiles, framebuffer;
-    uint32_t texture_rows, tile_rows; /* allocated */
+    unsigned vertex_array, sampler, block, texture, voxels, tiles, framebuffer;
+    uint32_t texture_rows, voxel_rows, tile_rows; /* allocated */
     nb_programs programs;
 
-    int dims_alone;         /* the fog is asked for transmittance alone: nothing of it is mixed */
-    int has_warned;         /* of the turns of loops */
-    int has_fog;            /* what follows is of the last nebel_gl_set_fog, and that went well */
-    nebel_snapshot *packed; /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
-    nebel_view views[6];    /* one, or six of a panorama */
+    int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
+    int has_warned;            /* of the turns of loops */
+    int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
+    nebel_snapshot *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
+    nebel_snapshot *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
+    nebel_view views[6];       /* one, or six of a panorama */
     int view_count;
     int face_first[6]; /* entry of the first tile of each */
     nebel_gl_fog fog;

@@ -186,6 +186,7 @@ static nebel_result bind_textures(const task *t)
     const GLenum target = t->pass->samples > 1 ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D;
     if (gl->fog.texture != 0) bind_texture(gl, NB_UNIT_FOG, GL_TEXTURE_2D, gl->fog.texture);
     if (gl->fog.block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, gl->fog.block);
+    if (gl->fog.voxels != 0) bind_texture(gl, NB_UNIT_VOXELS, GL_TEXTURE_2D, gl->fog.voxels);
     if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
     bind_host_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
     const nebel_result result = check_size(t, target, "depth");

@@ -135,12 +135,13 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
     char limits[128];
     const char *const shares = kind->multisampled ? "(pass_sample_range.y - pass_sample_range.x)" : "1";
     (void)snprintf(text, size,
-                   "%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
+                   "%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
                    "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
                    "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
                    nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
                    nb_program_limits(context, shares, limits, sizeof limits),
                    kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+                   (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
                    kind->multisampled ? samples : "", output[kind->output],
                    kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
                    kind->panorama ? "#define PASS_PANORAMA\n" : "");
@@ -222,6 +223,7 @@ static void set_uniforms(nb_program *program)
     glUseProgram(name);
     glUniform1i(glGetUniformLocation(name, "nebel_fog_texture"), NB_UNIT_FOG);
     glUniform1i(glGetUniformLocation(name, "nebel_tile_texture"), NB_UNIT_TILES);
+    glUniform1i(glGetUniformLocation(name, "nebel_voxel_texture"), NB_UNIT_VOXELS);
     glUniform1i(glGetUniformLocation(name, "pass_depth"), NB_UNIT_DEPTH);
     glUniform1i(glGetUniformLocation(name, "pass_color"), NB_UNIT_COLOR);
 }

@@ -7,7 +7,7 @@
 #include <nebel/gl.h>
 
 /* Texture units of the samplers in a program. */
-enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_DEPTH, NB_UNIT_COLOR };
+enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_VOXELS, NB_UNIT_DEPTH, NB_UNIT_COLOR };
 
 enum { NB_SAMPLES_MOST = 32 };
 

@@ -13,7 +13,7 @@ static const struct {
 };
 enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS };
 
-static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE7, GL_TEXTURE9, GL_TEXTURE11};
+static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE8, GL_TEXTURE10, GL_TEXTURE12};
 
 /* The last two are of OpenGL alone. */
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,

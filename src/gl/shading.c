@@ -587,7 +587,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
     char limits[128];
     (void)snprintf(
         text, size,
-        "%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
+        "%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
         "%d\n#define NB_LAMP_TEXELS %d\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
@@ -595,8 +595,8 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lamplit ? "#define SCENE_LAMPLIT\n" : "",
         kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
         kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-        kind->of_particles, kind->veil_layers, NB_CASCADES, NB_LAMP_TEXELS, (unsigned)kind->features,
-        precision_of(context));
+        (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "", kind->of_particles,
+        kind->veil_layers, NB_CASCADES, NB_LAMP_TEXELS, (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -606,6 +606,7 @@ static void set_units(unsigned program)
     glUseProgram(program);
     set_unit(program, "nebel_fog_texture", NB_UNIT_FOG);
     set_unit(program, "nebel_tile_texture", NB_UNIT_TILES);
+    set_unit(program, "nebel_voxel_texture", NB_UNIT_VOXELS);
     set_unit(program, "scene_place", NB_UNIT_PLACE);
     set_unit(program, "scene_depth", NB_UNIT_PLACE);
     set_unit(program, "scene_normal", NB_UNIT_NORMAL);

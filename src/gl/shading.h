@@ -7,7 +7,7 @@
 
 /* Texture units of the samplers; the fog's are those of the passes. */
 enum {
-    NB_UNIT_PLACE = 2,
+    NB_UNIT_PLACE = NB_UNIT_VOXELS + 1,
     NB_UNIT_NORMAL,
     NB_UNIT_REFLECTANCE,
     NB_UNIT_IN_SCATTERING,

@@ -129,11 +129,15 @@ static void warn_of_turns(nebel_gl *gl)
 
 typedef struct texel_kind {
     GLenum internal, format, type;
-    const char *what;
+    const char *what, *fewer;
 } texel_kind;
 
-static const texel_kind word_texels = {GL_RGBA32F, GL_RGBA, GL_FLOAT, "the texture of packed fog"};
-static const texel_kind entry_texels = {GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, "the texture of volumes per tile"};
+static const texel_kind word_texels = {GL_RGBA32F, GL_RGBA, GL_FLOAT, "the texture of packed fog", "volumes"};
+static const texel_kind entry_texels = {GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, "the texture of volumes per tile",
+                                        "volumes"};
+
+static const texel_kind voxel_texels = {GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, "the texture of voxels",
+                                        "voxels"};
 
 static void make_texture(unsigned *name)
 {
@@ -161,10 +165,9 @@ static nebel_result fill_texture(const nebel_gl *gl, const texel_kind *kind, con
 {
     const size_t needed = whole_rows(count) / NEBEL_TEXTURE_WIDTH;
     if (needed > gl->context.widest) {
-        return nb_fail(
-            &gl->log, NEBEL_ERROR_LIMIT,
-            "nebel_gl_set_fog: %s needs %zu rows, this context has %u (GL_MAX_TEXTURE_SIZE); use fewer volumes",
-            kind->what, needed, (unsigned)gl->context.widest);
+        return nb_fail(&gl->log, NEBEL_ERROR_LIMIT,
+                       "nebel_gl_set_fog: %s needs %zu rows, this context has %u (GL_MAX_TEXTURE_SIZE); use fewer %s",
+                       kind->what, needed, (unsigned)gl->context.widest, kind->fewer);
     }
     if (*name == 0) make_texture(name);
     glBindTexture(GL_TEXTURE_2D, *name);
@@ -202,6 +205,40 @@ static nebel_result upload_words(nebel_gl *gl)
     return result;
 }
 
+static nebel_result write_voxels(nebel_gl *gl, const nebel_snapshot *snapshot, size_t count)
+{
+    const size_t room = whole_rows(count);
+    nebel_texel *const texels = nb_allocate(&gl->allocator, room, sizeof *texels);
+    if (texels == NULL) return out_of_memory(gl);
+    nebel_result result = nebel_pack_voxels(snapshot, texels, count, &count);
+    memset(texels + count, 0, (room - count) * sizeof *texels);
+    if (result == NEBEL_OK) result = fill_texture(gl, &voxel_texels, texels, count, &gl->voxels, &gl->voxel_rows);
+    nb_release(&gl->allocator, texels);
+    return result;
+}
+
+/* A snapshot stays with the gl, so that no other can have its address. */
+static void keep(nebel_snapshot **kept, nebel_snapshot *snapshot)
+{
+    if (snapshot != NULL) (void)nebel_retain_snapshot(snapshot);
+    nebel_release_snapshot(*kept);
+    *kept = snapshot;
+}
+
+/* Voxels stay where they are while other fog and the eye change. */
+static nebel_result upload_voxels(nebel_gl *gl, nebel_snapshot *snapshot)
+{
+    size_t count = 0;
+    nebel_result result = nebel_pack_voxels(snapshot, NULL, 0, &count);
+    if (result != NEBEL_OK || count == 0) return result;
+    if (gl->voxels_of == NULL || !nebel_same_voxels(gl->voxels_of, snapshot)) {
+        result = write_voxels(gl, snapshot, count);
+        keep(&gl->voxels_of, result == NEBEL_OK ? snapshot : NULL);
+    }
+    gl->fog.voxels = gl->voxels;
+    return result;
+}
+
 static nebel_result upload_tiles(nebel_gl *gl, size_t count)
 {
     const nebel_result result = fill_texture(gl, &entry_texels, gl->entries, count, &gl->tiles, &gl->tile_rows);
@@ -212,12 +249,14 @@ static nebel_result upload_tiles(nebel_gl *gl, size_t count)
     return result;
 }
 
-static nebel_result upload(nebel_gl *gl, int with_words, size_t entry_count)
+/* The snapshot is NULL where words and voxels are there already. */
+static nebel_result upload(nebel_gl *gl, nebel_snapshot *snapshot, size_t entry_count)
 {
     nb_unpacking unpacking;
     nebel_result result = NEBEL_OK;
     nb_state_save_unpacking(&gl->context, &unpacking);
-    if (with_words) result = upload_words(gl);
+    if (snapshot != NULL) result = upload_voxels(gl, snapshot);
+    if (result == NEBEL_OK && snapshot != NULL) result = upload_words(gl);
     if (result == NEBEL_OK && entry_count > 0) result = upload_tiles(gl, entry_count);
     nb_state_restore_unpacking(&gl->context, &unpacking);
     return result;
@@ -228,14 +267,6 @@ static int is_same_view(const nebel_view *a, const nebel_view *b)
     return a->width == b->width && a->height == b->height &&
            memcmp(a->eye_from_world, b->eye_from_world, sizeof a->eye_from_world) == 0 &&
            memcmp(a->clip_from_eye, b->clip_from_eye, sizeof a->clip_from_eye) == 0;
-}
-
-/* The snapshot stays with the gl, so that no other can have its address. */
-static void keep(nebel_gl *gl, nebel_snapshot *snapshot)
-{
-    if (snapshot != NULL) (void)nebel_retain_snapshot(snapshot);
-    nebel_release_snapshot(gl->packed);
-    gl->packed = snapshot;
 }
 
 static int are_same_views(const nebel_gl *gl, const nebel_view *views, int count)
@@ -263,8 +294,8 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     if (result == NEBEL_OK && nebel_snapshot_volume_count(snapshot) > FEW_VOLUMES) {
         result = list_tiles(gl, snapshot, &entry_count);
     }
-    if (result == NEBEL_OK) result = upload(gl, !has_words, entry_count);
-    keep(gl, result == NEBEL_OK ? snapshot : NULL);
+    if (result == NEBEL_OK) result = upload(gl, has_words ? NULL : snapshot, entry_count);
+    keep(&gl->packed, result == NEBEL_OK ? snapshot : NULL);
     if (result == NEBEL_OK) warn_of_turns(gl);
     gl->has_fog = result == NEBEL_OK;
     return result;

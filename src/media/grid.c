@@ -104,7 +104,10 @@ static void measure_bricks(nebel_grid *grid)
     brick *b = grid->brick;
     for (int z = 0; z < grid->bricks[2]; z++)
         for (int y = 0; y < grid->bricks[1]; y++)
-            for (int x = 0; x < grid->bricks[0]; x++) *b++ = measure_brick(grid, x, y, z);
+            for (int x = 0; x < grid->bricks[0]; x++, b++) {
+                *b = measure_brick(grid, x, y, z);
+                grid->uneven_bricks += b->least < b->most;
+            }
 }
 
 static int allocate_grid(nebel_grid *grid, size_t count)

@@ -22,6 +22,7 @@ struct nebel_grid {
     size_t stride[3];
     int cells[3]; /* for the filter */
     int bricks[3];
+    size_t uneven_bricks; /* whose voxels are not all equal */
     nebel_voxel_type type;
     nebel_filter filter;
     double scale, offset; /* density = offset + scale * voxel, voxels of integers counted from 0 to 1 */

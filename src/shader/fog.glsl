@@ -216,6 +216,8 @@ float nb_profile_kink(nb_profile profile, float near)
     if (NB_HAS(NB_HAS_SOFT_ROUND) && profile.kind == NB_KIND_SOFT_ROUND)
         kink = nb_round_edge_kink(profile.offset, profile.slope, profile.size, profile.form, near);
     if (NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES) kink = nb_planes_kink(profile, near);
+    if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID)
+        kink = nb_grid_kink(profile.offset, profile.slope, profile.first, near);
     if (NB_HAS(NB_HAS_SLOPE) && (profile.kind == NB_KIND_LINEAR || profile.kind == NB_KIND_HEIGHT_CAPPED)) {
         float inverse = nb_rcp_bounded(profile.slope.x);
         float zero = -profile.offset.x * inverse;
@@ -387,6 +389,19 @@ float nb_leg_weight(nb_leg leg, int j)
 /* Whether a leg asks for its nodes, or for its end alone. */
 bool nb_has_nodes(nb_leg leg) { return leg.mixed || (nb_is_sunlit(leg) && !nb_sun_is_closed()); }
 
+/* A grid's density is one polynomial within a piece: that of the cell in its middle, `middle` metres behind the leg's start. */
+void nb_add_grid(inout nb_leg leg, nb_profile profile, nb_vec3 extinction, nb_vec3 light, float middle)
+{
+    nb_grid_spot spot = nb_grid_spot_at(profile.first, profile.offset + profile.slope * middle);
+    for (int j = leg.mixed ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
+        float s = leg.h * nb_node(j);
+        float length = nb_grid_spot_integral(spot, profile.offset, profile.slope, s);
+        leg.depth[j] += extinction * length;
+        leg.density[j] += light * nb_grid_density(spot, profile.offset + profile.slope * s);
+        if (j == NB_NODES - 1) leg.light += light * length;
+    }
+}
+
 void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
 {
     int at = int(slot.z);
@@ -396,6 +411,10 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
     if (nb_is_sunlit(leg)) glow = nb_sunlit_radiance(at, ray.direction) * extinction.xyz;
     nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
     profile.offset += profile.slope * leg.from;
+    if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID) {
+        nb_add_grid(leg, profile, extinction.xyz, light, 0.5 * (piece.end - piece.start) - leg.from);
+        return;
+    }
     /* linear within a piece, which ends at kinks: dear to find for many faces */
     bool flat_sided = NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES;
     float first = 0.0;

@@ -14,7 +14,7 @@
  *     2  radiance of opaque fog, leaves
  *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye,
  *        1 / (sqrt(2) sigma); soft edge of a box: three unused, 1 / distance; of a round body: gain, steepness and
- *        inner of nb_edge, one unused; of planes: unused
+ *        inner of nb_edge, one unused; of planes: unused; grid: cells per unit of the box along each axis, first texel
  *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
  *        The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does
  *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or lamps.
@@ -32,7 +32,14 @@
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
  * both must hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule;
  * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's.
- * Faces with a soft edge are scaled: a place is distance - normal . place edges deep. */
+ * Faces with a soft edge are scaled: a place is distance - normal . place edges deep.
+ *
+ * Voxels are texels of four unsigned integers of 32 bits, the same for every eye. A grid:
+ *     0  bricks along x, y, z; 1 where voxels are interpolated, so that the box begins in the middle of the first cell
+ *     then one for each brick of 8 x 8 x 8 cells, x fastest: least density and its step, as the bits of floats; the
+ *     first texel of its cells, 0 where the whole brick has the least density
+ * and for each brick that has cells 512 texels, x fastest: what the corners are above the least density, in steps, 16
+ * bits each. Components are the corners with y and z at 00, 10, 01, 11; x low in the lower half, high in the upper. */
 #ifndef NB_SHADER_LAYOUT_H
 #define NB_SHADER_LAYOUT_H
 
@@ -54,8 +61,9 @@
 #define NB_KIND_SOFT_EDGE 5 /* of a box */
 #define NB_KIND_SOFT_ROUND 6
 #define NB_KIND_SOFT_PLANES 7
-#define NB_KIND_RADIAL 8 /* plus power - 1, 0 to 2 */
-#define NB_KIND_EXCLUDE 11
+#define NB_KIND_GRID 8
+#define NB_KIND_RADIAL 9 /* plus power - 1, 0 to 2 */
+#define NB_KIND_EXCLUDE 12
 
 #define NB_LIGHT_EMITS 1
 #define NB_LIGHT_COVERS 2
@@ -91,8 +99,9 @@
 #define NB_HAS_SOFT_ROUND 131072
 #define NB_HAS_SOFT_PLANES 262144
 #define NB_HAS_SUN 524288 /* which lights fog */
-#define NB_HAS_ALL 1048575
+#define NB_HAS_GRID 1048576
+#define NB_HAS_ALL 2097151
 #define NB_HAS_SOFT (NB_HAS_SOFT_EDGE | NB_HAS_SOFT_ROUND | NB_HAS_SOFT_PLANES)
-#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL)
+#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL | NB_HAS_GRID)
 
 #endif

@@ -20,7 +20,6 @@ struct nb_ray {
     bool from_eye; /* distances along it count */
 };
 
-nb_vec3 nb_splat3(float x) { return nb_vec3(x, x, x); }
 nb_vec3 nb_exp3(nb_vec3 v) { return nb_vec3(nb_exp(v.x), nb_exp(v.y), nb_exp(v.z)); }
 /* By its bits: compilers take comparisons for granted that a NaN would fail. */
 bool nb_is_number(float x) { return (nb_to_bits(x) & 0x7fffffff) <= 0x7f800000; }
@@ -200,10 +199,10 @@ struct nb_profile {
     nb_vec3 offset;
     nb_vec3 slope;
     nb_vec3 size;  /* soft edge: half widths */
-    float level;   /* gaussian: m; radial: c */
+    float level;   /* gaussian: m; radial: c; grid: the integral that is enough */
     nb_vec3 side;  /* soft edge of a round body: see nb_round_edge; of planes it has offset and slope of the ray */
     int form;
-    int first;     /* planes */
+    int first;     /* planes, grid */
     int count;
 };
 
@@ -249,6 +248,18 @@ nb_profile nb_round_body_profile(nb_profile profile, int leaf, nb_vec4 word, nb_
     return profile;
 }
 
+/* In cells. */
+nb_profile nb_grid_profile(nb_profile profile, int leaf, nb_vec4 word, nb_ray ray, float start)
+{
+    nb_vec4 head = NEBEL_WORD(leaf);
+    nb_ray local = nb_turned_ray(leaf, int(head.x) >= NB_TYPE_TURNED, ray);
+    profile.first = int(word.w);
+    profile.offset = (local.origin + local.direction * start - NEBEL_WORD(leaf + 1).xyz) * word.xyz +
+                     nb_splat3(0.5 * float(NEBEL_VOXEL(profile.first).w));
+    profile.slope = local.direction * word.xyz;
+    return profile;
+}
+
 nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray, float start)
 {
     nb_vec4 head = NEBEL_WORD(leaf);
@@ -265,6 +276,9 @@ nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray
     }
     return profile;
 }
+
+/* Nothing behind so much optical depth adds a bit to a picture. */
+#define NB_ENOUGH 20.0
 
 nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
 {
@@ -289,6 +303,9 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
             profile = nb_round_body_profile(profile, medium + NB_MEDIUM_LEAF, word, ray, start);
         } else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES) {
             profile = nb_planes_profile(profile, medium + NB_MEDIUM_LEAF, ray, start);
+        } else if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID) {
+            profile = nb_grid_profile(profile, medium + NB_MEDIUM_LEAF, word, ray, start);
+            profile.level = NB_ENOUGH / max(nb_smallest(NEBEL_WORD(medium).xyz), NB_TINY);
         } else {
             profile = nb_leaf_profile(profile, medium + NB_MEDIUM_LEAF, word.w, ray, start);
         }
@@ -405,6 +422,8 @@ float nb_integral(nb_profile profile, float h)
                 nb_round_edge_integral(profile.side, profile.offset, profile.slope, profile.size, profile.form, h).value;
         } else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES) {
             integral = nb_planes_integral(profile, h);
+        } else if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID) {
+            integral = nb_grid_integral(profile.offset, profile.slope, profile.first, h, profile.level);
         } else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE) {
             integral = nb_radial_integral(profile.level, u, slope, h, kind - NB_KIND_RADIAL + 1).value;
         }

@@ -1,8 +1,10 @@
 /* Fog as words: every place is brought to the eye in long double before it becomes float. */
 #include "layout.h"
+#include "voxels.h"
 
 #include "base/precision.h"
 #include "march/snapshot.h"
+#include "media/grid.h"
 
 #include <nebel/shader.h>
 
@@ -45,7 +47,8 @@ static void set_color(nebel_word *word, const double v[3], double last)
     word->v[3] = (float)last;
 }
 
-_Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED, "the public name of a feature");
+_Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID,
+               "the public names of features");
 
 /* ---- leaves ---------------------------------------------------------------------------------- */
 
@@ -179,6 +182,8 @@ static int kind_of(const nb_volume *body)
         return body->leaves[0].type == NB_LEAF_BOX      ? NB_KIND_SOFT_EDGE
                : body->leaves[0].type == NB_LEAF_PLANES ? NB_KIND_SOFT_PLANES
                                                         : NB_KIND_SOFT_ROUND;
+    case NEBEL_DENSITY_GRID:
+        return NB_KIND_GRID;
     case NEBEL_DENSITY_RADIAL:
         return NB_KIND_RADIAL + body->density.power - 1;
     default:
@@ -197,6 +202,13 @@ static void pack_linear(const packer *p, const nebel_density *density, nebel_wor
     }
     for (int i = 0; i < 3; i++) word->v[i] = narrow(axis[i] / square);
     word->v[3] = narrow(value / square);
+}
+
+static void pack_grid(const nb_volume *body, nebel_word *word)
+{
+    double rate[3];
+    nb_grid_rate(body->density.grid, body->leaves[0].low, body->leaves[0].high, rate);
+    for (int i = 0; i < 3; i++) word->v[i] = narrow((long double)rate[i]);
 }
 
 static void pack_density(const packer *p, const nb_volume *body, nebel_word *word)
@@ -221,6 +233,9 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
         word->v[1] = (float)body->edge.steepness;
         word->v[2] = (float)body->edge.inner;
         word->v[3] = narrow(1 / (long double)density->distance);
+        break;
+    case NEBEL_DENSITY_GRID:
+        pack_grid(body, word);
         break;
     default:
         break;
@@ -293,11 +308,21 @@ static size_t count_words(const nebel_snapshot *snapshot)
     return count;
 }
 
-static int has_grid(const nebel_snapshot *snapshot)
+static nebel_result refuse_light(const nebel_snapshot *snapshot)
 {
-    for (size_t i = 0; i < snapshot->medium_count; i++)
-        if (snapshot->media[i].body.density.type == NEBEL_DENSITY_GRID) return 1;
-    return 0;
+    if (snapshot->is_lamplit)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot light fog with lamps yet; use nebel_trace or the CPU's renderer "
+                       "(--device cpu), or give volumes a source instead of an albedo");
+    if (snapshot->diffusion != NULL)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot show light that fog scatters more than once; use nebel_trace or the CPU's "
+                       "renderer (--device cpu), or leave multiple scattering out");
+    if (snapshot->is_sunlit && nb_has_voxels(snapshot))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot light fog with the sun where there are grids yet; use nebel_trace or the "
+                       "CPU's renderer (--device cpu), or give volumes a source instead of an albedo");
+    return NEBEL_OK;
 }
 
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
@@ -310,19 +335,9 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (!(fabs(eye[i]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
-    if (snapshot->is_lamplit)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot light fog with lamps yet; use nebel_trace or the CPU's renderer "
-                       "(--device cpu), or give volumes a source instead of an albedo");
-    if (snapshot->diffusion != NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot show light that fog scatters more than once; use nebel_trace or the CPU's "
-                       "renderer (--device cpu), or leave multiple scattering out");
-    if (has_grid(snapshot))
-        return nb_fail(
-            &snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-            "pack: shaders cannot read grids yet; use nebel_trace or the CPU's renderer (--device cpu), or a "
-            "density of another type");
+    nebel_result result = refuse_light(snapshot);
+    if (result == NEBEL_OK) result = nb_check_voxels(snapshot);
+    if (result != NEBEL_OK) return result;
     *count = count_words(snapshot);
     if (*count > MOST_WORDS)
         return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
@@ -347,6 +362,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
     }
     nb_restore_precision(precision);
+    nb_place_voxels(snapshot, words);
     return NEBEL_OK;
 }
 
@@ -373,6 +389,7 @@ static uint32_t features_of_kind(int kind)
     if (kind == NB_KIND_SOFT_EDGE) return NB_HAS_SOFT_EDGE;
     if (kind == NB_KIND_SOFT_ROUND) return NB_HAS_SOFT_ROUND;
     if (kind == NB_KIND_SOFT_PLANES) return NB_HAS_SOFT_PLANES;
+    if (kind == NB_KIND_GRID) return NB_HAS_GRID;
     return kind == NB_KIND_EXCLUDE ? 0 : NB_HAS_RADIAL;
 }
 

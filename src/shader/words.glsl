@@ -12,6 +12,10 @@ layout(std140) uniform nebel_fog_block { vec4 nebel_words[1024]; };
 uniform highp usampler2D nebel_tile_texture;
 #define NEBEL_INDEX(i) int(texelFetch(nebel_tile_texture, ivec2((i) & 1023, (i) >> 10), 0).x)
 #endif
+#if defined(NEBEL_VOXELS) && !defined(NEBEL_VOXEL)
+uniform highp usampler2D nebel_voxel_texture;
+#define NEBEL_VOXEL(i) texelFetch(nebel_voxel_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#endif
 #if defined(NEBEL_VIEW) && !defined(NEBEL_RAY)
 uniform vec4 nebel_rays[10];
 #define NEBEL_RAY(i) nebel_rays[i]

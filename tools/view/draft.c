@@ -456,8 +456,7 @@ int nb_draft_is_for_cpu(const nb_draft *draft)
     const int has_sun = good->has_sun && !is_black(good->sun_irradiance);
     const int is_lit = has_sun || nebel_scene_contents(draft->file)->lamp_count > 0;
     int is = nebel_scene_contents(draft->file)->diffusion != NULL;
-    for (size_t i = 0; i < good->count && !is; i++)
-        is = good->volumes[i].density.type == NEBEL_DENSITY_GRID || (is_lit && !is_black(good->volumes[i].albedo));
+    for (size_t i = 0; i < good->count && !is; i++) is = is_lit && !is_black(good->volumes[i].albedo);
     return is;
 }
 

@@ -1,0 +1,16 @@
+/* Where the voxels of a snapshot's grids lie among the texels. */
+#ifndef NB_SHADER_VOXELS_H
+#define NB_SHADER_VOXELS_H
+
+#include <nebel/shader.h>
+
+/* Whether there are any. */
+int nb_has_voxels(const nebel_snapshot *snapshot);
+
+/* LIMIT, with a message, where the texels are more than can be addressed. */
+nebel_result nb_check_voxels(const nebel_snapshot *snapshot);
+
+/* Writes the first texel of each grid into the words of the media. */
+void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words);
+
+#endif
