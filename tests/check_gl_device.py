@@ -47,6 +47,20 @@ class GlDeviceTest(PictureCase):
         self.assert_done(self.draw("t%d.png", "--frames", "0-1"))
         self.assertNotEqual((self.folder / "t0.png").read_bytes(), (self.folder / "t1.png").read_bytes())
 
+    def test_noise_drifts_as_on_the_cpu(self):
+        wisps = {"shape": {"type": "box", "min": [-2, -1, -2], "max": [2, 1, 2]}, "extinction": 2, "source": [0.3, 0.5, 0.7],
+                 "density": {"type": "noise", "size": [24, 12, 24], "cells": [4, 2, 4], "octaves": 2, "drift": [0.3, 0, 0], "change": 0.2}}
+        self.scene = self.write_scene("wisps.json", [wisps, FOG], models=[{"file": "triangle.obj"}], background=1,
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        words = ("--aov", "--samples", 1, "--frames", "0-2")
+        self.assert_done(self.render("cpu%d.exr", *words))
+        self.assert_done(self.draw("gl%d.exr", *words))
+        for frame in range(3):
+            for channel in ("transmittance.G", "in_scattering.B"):
+                self.assert_done(nebel("compare", f"cpu{frame}.exr", f"gl{frame}.exr", "-c", channel, "--fail-above", 1e-4, cwd=self.folder))
+        still = nebel("compare", "gl0.exr", "gl2.exr", "-c", "transmittance.G", "--fail-above", 1e-2, cwd=self.folder)
+        self.assertEqual(still.returncode, 1)
+
     def test_particles(self):
         cloud = {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "count": 50, "absorption": 1, "emission": 1}
         self.scene = self.write_scene("cloud.json", [FOG], nebula=[cloud], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
