@@ -4,7 +4,7 @@
 
 #include "casters.h"
 
-enum { NB_COVER_MOST = 64 }; /* triangles; of more nothing is known */
+enum { NB_COVER_MOST = 200 }; /* triangles; of more nothing is known */
 
 /* A part of the plane that the sun looks at. */
 typedef struct nb_cell {

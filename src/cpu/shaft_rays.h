@@ -78,6 +78,16 @@ static inline int nb_replace(nb_shafts *shafts, const nebel_allocator *allocator
     return 1;
 }
 
+/* What of a ray is on the good side of a plane, which it is `at` m from, in units of the plane, and goes away from by
+ * `rise` with each metre. A ray that is level goes away so slowly that it is met beyond all places. */
+#define NB_CUT(at, rise, enter, leave)                                                                                 \
+    do {                                                                                                               \
+        const float steep = (rise) != 0 ? (rise) : 1e-30f, t = -(at) / steep;                                          \
+        const float first = steep > 0 ? t : -INFINITY, last = steep > 0 ? INFINITY : t;                                \
+        (enter) = first > (enter) ? first : (enter);                                                                   \
+        (leave) = last < (leave) ? last : (leave);                                                                     \
+    } while (0)
+
 /* One side of a prism. */
 NB_ALWAYS_INLINE void nb_cut(const float *plane, const nb_shaft_rays *rays, nb_stretch *stretch)
 {
@@ -86,11 +96,25 @@ NB_ALWAYS_INLINE void nb_cut(const float *plane, const nb_shaft_rays *rays, nb_s
     for (int i = 0; i < NB_PACKET; i++) {
         const float at = a * rays->start[0][i] + b * rays->start[1][i] + c * rays->start[2][i] + d;
         const float rise = a * rays->way[0][i] + b * rays->way[1][i] + c * rays->way[2][i];
-        const float t = -at / rise, enter = stretch->enter[i], leave = stretch->leave[i];
-        const float first = rise > 0 ? t : -INFINITY, level = at < 0 ? -INFINITY : INFINITY;
-        const float falling = rise < 0 ? t : INFINITY, last = rise != 0 ? falling : level;
-        stretch->enter[i] = first > enter ? first : enter;
-        stretch->leave[i] = last < leave ? last : leave;
+        float enter = stretch->enter[i], leave = stretch->leave[i];
+        NB_CUT(at, rise, enter, leave);
+        stretch->enter[i] = enter;
+        stretch->leave[i] = leave;
+    }
+}
+
+/* One that the third axis runs along. */
+NB_ALWAYS_INLINE void nb_cut_side(const float *plane, const nb_shaft_rays *rays, nb_stretch *stretch)
+{
+    const float a = plane[0], b = plane[1], d = plane[3];
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const float at = a * rays->start[0][i] + b * rays->start[1][i] + d;
+        const float rise = a * rays->way[0][i] + b * rays->way[1][i];
+        float enter = stretch->enter[i], leave = stretch->leave[i];
+        NB_CUT(at, rise, enter, leave);
+        stretch->enter[i] = enter;
+        stretch->leave[i] = leave;
     }
 }
 

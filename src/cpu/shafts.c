@@ -273,11 +273,35 @@ NB_ALWAYS_INLINE void cross_cell(const nb_cell_node *node, uint32_t child, const
     }
 }
 
+NB_ALWAYS_INLINE void cross_prism(const nb_prism *prism, const nb_shaft_rays *rays, nb_stretch *found)
+{
+    for (int i = 0; i < NB_PACKET; i++) {
+        found->enter[i] = rays->from[i];
+        found->leave[i] = rays->to[i];
+    }
+    for (int k = 0; k < 3; k++) nb_cut_side(prism->planes[k], rays, found);
+    nb_cut(prism->planes[3], rays, found);
+}
+
+/* Prisms that were cut out of the rays not long ago: a triangle is in all cells that it touches. */
+enum { RECENT = 64 };
+
+typedef struct nb_recent {
+    uint32_t children[RECENT];
+} nb_recent;
+
+NB_ALWAYS_INLINE int is_recent(const nb_recent *recent, uint32_t child)
+{
+    return recent->children[child % RECENT] == child;
+}
+
 /* Returns 0 when memory is out. */
 NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
                           const nb_beam *beam, nb_shaft_rays *rays)
 {
     nb_visit visits[VISITS];
+    nb_recent recent;
+    memset(&recent, 0, sizeof recent); /* of no prism: that of a node */
     int count = list_children(cells->nodes, 0, beam, visits);
     while (count > 0) {
         const nb_visit visit = visits[--count];
@@ -285,13 +309,14 @@ NB_CLONES static int walk(nb_shafts *shafts, const nebel_allocator *allocator, c
         const uint32_t place = visit.child % NB_CELL_FAN, child = node->child[place];
         nb_stretch found;
         int fresh[NB_PACKET];
-        if (!is_open(&visit, rays)) continue;
+        if (is_recent(&recent, child) || !is_open(&visit, rays)) continue;
         if (visit.is_dark) {
             cross_cell(node, place, rays, &found);
         } else if ((child & NB_IS_PRISM) != 0) {
             const uint32_t prism = child & ~NB_IS_PRISM;
+            recent.children[child % RECENT] = child;
             const nb_sheet *sheet = nb_sun_cells_sheet(cells, prism);
-            nb_cross_prism(&cells->prisms[prism], rays, &found);
+            cross_prism(&cells->prisms[prism], rays, &found);
             if (sheet != NULL && !nb_sheet_cast(sheet, NULL, shafts, allocator, &found, rays)) return 0;
             if (sheet != NULL) continue;
         } else {

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { ENOUGH = 16 }; /* triangles of a cell that is not divided */
+enum { ENOUGH = 48 }; /* triangles of a cell that is not divided */
 
 /* What is needed while cells are made. */
 typedef struct nb_division {
