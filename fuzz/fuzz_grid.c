@@ -50,7 +50,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     witness seen = {0};
     nb_voxels voxels = {.data = NULL};
     const nb_bytes bytes = {(unsigned char *)data, size, size};
-    const nb_codec codec = {{allocate, release, &seen}, {count_message, &seen}, "fuzz.nvdb"};
+    const nb_codec codec = {
+        .allocator = {allocate, release, &seen}, .log = {count_message, &seen}, .name = "fuzz.nvdb"};
     const nebel_result result = nb_nanovdb_read(&codec, &bytes, NULL, &voxels);
     if ((result == NEBEL_OK) != (voxels.data != NULL)) abort();
     if ((result == NEBEL_OK) != (seen.messages == 0)) abort();

@@ -24,7 +24,7 @@ ACROSS = re.compile(
     r"times the emission|flat or sheared|has the normal 0|body is empty|another sign|differs from|they must be the same|"
     r"is outside cell|outside cell|has no area|is not convex|overlap|has no end|has no bounds|at least -?\S+ m$|"
     r"so it must be|reads version 1|fog here overwrites|another scale along|above 1000000|"
-    r"all fog here has one|does not touch|inner_angle|from 0 to outer_angle|units of|cannot read the (model|grid)|"
+    r"all fog here has one|does not touch|inner_angle|from 0 to outer_angle|units of|cannot read the (model|grid|picture)|"
     r"of two voxels each")
 
 # Stands in a text where a number will.

@@ -133,7 +133,7 @@ static nebel_result read_nanovdb(const void *data, size_t size, const char *name
     meter m;
     nb_voxels voxels;
     const nebel_scene_desc desc = metered_desc(&m, kept);
-    const nb_codec codec = {desc.allocator, desc.log, "x.nvdb"};
+    const nb_codec codec = {.allocator = desc.allocator, .log = desc.log, .name = "x.nvdb"};
     const nb_bytes bytes = {(unsigned char *)data, size, size};
     const nebel_result result = nb_nanovdb_read(&codec, &bytes, name, &voxels);
     if (result == NEBEL_OK) nb_release(&codec.allocator, voxels.data);

@@ -242,6 +242,42 @@ static trial lamps_on_surfaces(void)
     return t;
 }
 
+/* Ambient light alone, of a sky that is bright level with the eye and blue above. */
+static trial gradient(void)
+{
+    trial t = start("gradient");
+    t.scene.has_sun = 0;
+    set_rgb(t.scene.sun_irradiance, 0, 0, 0);
+    t.scene.shows_ambient = 1;
+    t.scene.environment.type = NEBEL_ENVIRONMENT_GRADIENT;
+    set_rgb(t.scene.environment.zenith, .1, .3, 1);
+    set_rgb(t.scene.environment.horizon, 1, .8, .5);
+    set_rgb(t.scene.environment.ground, .1, .05, 0);
+    add_mesh(&t, barrel.mesh);
+    add_mesh(&t, test_ground());
+    add(&t, .05, 1)->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8};
+    t.volumes[0].density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 3};
+    t.volumes[0].shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .normal = {0, -1, 0}};
+    add(&t, .4, .9)->shape = (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {-2, 2, 0}, .radius = 2};
+    return t;
+}
+
+/* A picture with a bright corner behind the camera's back and one before it, turned. */
+static trial environment(void)
+{
+    trial t = gradient();
+    t.name = "map";
+    enum { ROWS = 16 };
+    float pixels[ROWS][2 * ROWS][3];
+    for (int y = 0; y < ROWS; y++)
+        for (int x = 0; x < 2 * ROWS; x++)
+            for (int c = 0; c < 3; c++) pixels[y][x][c] = (x / 4 + y / 4 * 3) % 5 == c ? 1.5F : .1F + .02F * (float)y;
+    const nebel_environment_map_desc desc = {.width = 2 * ROWS, .height = ROWS, .pixels = pixels[0][0]};
+    t.scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .rotation = 50};
+    assert_int_equal(nebel_create_environment_map(&desc, &t.scene.environment.map), NEBEL_OK);
+    return t;
+}
+
 /* ---- pictures -------------------------------------------------------------------------------- */
 
 static nebel_snapshot *commit(const nebel_fog_desc *sky, const trial *t)
@@ -251,6 +287,8 @@ static nebel_snapshot *commit(const nebel_fog_desc *sky, const trial *t)
     assert_int_equal(nebel_create_fog(sky, &fog), NEBEL_OK);
     for (size_t i = 0; i < t->volume_count; i++)
         assert_int_equal(nebel_add_volume(fog, &t->volumes[i], NULL), NEBEL_OK);
+    if (t->scene.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
+        assert_int_equal(nebel_set_environment(fog, &t->scene.environment), NEBEL_OK);
     assert_int_equal(nebel_set_lamps(fog, t->scene.lamp_count, t->lamps), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
@@ -309,6 +347,7 @@ static void compare(trial t)
     print_message("%-10s off by %.2f of what it may be; standard error of a block %.1e\n", t.name, worst,
                   sqrt(told) / BLOCK);
     for (size_t i = 0; i < t.volume_count; i++) nebel_release_grid(t.volumes[i].density.grid);
+    nebel_release_environment_map(t.scene.environment.map);
     assert_true(worst <= 1);
 }
 
@@ -333,6 +372,8 @@ TRIAL(cloud_of_voxels)
 TRIAL(lamps_in_fog)
 TRIAL(lamps_behind_a_column)
 TRIAL(lamps_on_surfaces)
+TRIAL(gradient)
+TRIAL(environment)
 
 int main(int count, char **words)
 {
@@ -351,6 +392,8 @@ int main(int count, char **words)
         cmocka_unit_test(lamps_in_fog_agrees),
         cmocka_unit_test(lamps_behind_a_column_agrees),
         cmocka_unit_test(lamps_on_surfaces_agrees),
+        cmocka_unit_test(gradient_agrees),
+        cmocka_unit_test(environment_agrees),
     };
     if (count > 1) samples *= (uint32_t)strtoul(words[1], NULL, 10);
     test_barrel_make(&barrel);

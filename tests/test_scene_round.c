@@ -262,6 +262,10 @@ static void change_all(change *c)
     change_models(c);
     dim(data->background);
     dim(data->ambient);
+    dim(data->environment.zenith);
+    dim(data->environment.horizon);
+    dim(data->environment.ground);
+    data->shows_ambient = !data->shows_ambient;
     dim(data->sun_irradiance);
     data->max_opacity = data->max_opacity == 0 ? .75 : data->max_opacity / 2;
 }
@@ -460,8 +464,13 @@ static void same_models(const nebel_scene_data *a, const nebel_scene_data *b)
 static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     same_camera(a, b);
-    SAME(&a->background, &b->background);
-    SAME(&a->ambient, &b->ambient);
+    WHOLE(a->shows_ambient, b->shows_ambient);
+    if (!a->shows_ambient) SAME(&a->background, &b->background);
+    WHOLE(a->environment.type, b->environment.type);
+    if (a->environment.type == NEBEL_ENVIRONMENT_CONSTANT) SAME(&a->ambient, &b->ambient);
+    SAME(&a->environment.zenith, &b->environment.zenith);
+    SAME(&a->environment.horizon, &b->environment.horizon);
+    SAME(&a->environment.ground, &b->environment.ground);
     WHOLE(a->has_sun, b->has_sun);
     if (a->has_sun) SAME(&a->sun_direction, &b->sun_direction);
     if (a->has_sun) SAME(&a->sun_irradiance, &b->sun_irradiance);
@@ -550,14 +559,14 @@ static void test_good_scenes(void **state)
         "fuzz/corpus/scene/convex",        "fuzz/corpus/scene/presets",
         "fuzz/corpus/scene/cylinder",      "fuzz/corpus/scene/ellipsoid",
         "fuzz/corpus/scene/every_import",  "fuzz/corpus/scene/every_key",
-        "fuzz/corpus/scene/fog_keys",      "fuzz/corpus/scene/half_space",
-        "fuzz/corpus/scene/heightfield",   "fuzz/corpus/scene/import",
-        "fuzz/corpus/scene/linear",        "fuzz/corpus/scene/minimal",
-        "fuzz/corpus/scene/nebula",        "fuzz/corpus/scene/numbers",
-        "fuzz/corpus/scene/scattering",    "fuzz/corpus/scene/soft_edge",
-        "fuzz/corpus/scene/space",         "fuzz/corpus/scene/sphere_radial",
-        "fuzz/corpus/scene/text",          "fuzz/corpus/scene/turntable",
-        "fuzz/corpus/scene/union",
+        "fuzz/corpus/scene/fog_keys",      "fuzz/corpus/scene/gradient",
+        "fuzz/corpus/scene/half_space",    "fuzz/corpus/scene/heightfield",
+        "fuzz/corpus/scene/import",        "fuzz/corpus/scene/linear",
+        "fuzz/corpus/scene/minimal",       "fuzz/corpus/scene/nebula",
+        "fuzz/corpus/scene/numbers",       "fuzz/corpus/scene/scattering",
+        "fuzz/corpus/scene/soft_edge",     "fuzz/corpus/scene/space",
+        "fuzz/corpus/scene/sphere_radial", "fuzz/corpus/scene/text",
+        "fuzz/corpus/scene/turntable",     "fuzz/corpus/scene/union",
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[512];

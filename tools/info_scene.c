@@ -48,6 +48,24 @@ static void print_camera(const nebel_scene_data *scene)
     }
 }
 
+static void print_ambient(const nebel_scene_data *scene)
+{
+    const nebel_environment *const environment = &scene->environment;
+    switch (environment->type) {
+    case NEBEL_ENVIRONMENT_GRADIENT:
+        print_triple("ambient: gradient, zenith ", environment->zenith);
+        print_triple(", horizon ", environment->horizon);
+        print_triple(", ground ", environment->ground);
+        break;
+    case NEBEL_ENVIRONMENT_MAP:
+        (void)printf("ambient: environment %s, rotation %.4g degrees, intensity %.4g", scene->environment_file,
+                     environment->rotation, environment->intensity);
+        break;
+    default:
+        print_triple("ambient: ", scene->ambient);
+    }
+}
+
 static void print_light(const nebel_scene_data *scene)
 {
     if (scene->has_sun) {
@@ -55,8 +73,11 @@ static void print_light(const nebel_scene_data *scene)
         (void)printf(", %.3g degrees above the horizon\n", asin(fmin(fmax(scene->sun_direction[Y], -1), 1)) * degrees);
     }
     if (scene->lamp_count > 0) (void)printf("lamps: %zu\n", scene->lamp_count);
-    print_triple("ambient: ", scene->ambient);
-    print_triple("\nbackground: ", scene->background);
+    print_ambient(scene);
+    if (scene->shows_ambient)
+        (void)printf("\nbackground: ambient");
+    else
+        print_triple("\nbackground: ", scene->background);
     (void)printf("\n");
 }
 
@@ -181,9 +202,17 @@ static int is_black(const double *color)
     return color[0] == 0 && color[1] == 0 && color[2] == 0;
 }
 
+static int has_ambient(const nebel_scene_data *scene)
+{
+    const nebel_environment *const environment = &scene->environment;
+    if (environment->type == NEBEL_ENVIRONMENT_GRADIENT)
+        return !is_black(environment->zenith) || !is_black(environment->horizon) || !is_black(environment->ground);
+    return environment->type == NEBEL_ENVIRONMENT_MAP || !is_black(scene->ambient);
+}
+
 static int is_lit(const nebel_scene_data *scene)
 {
-    return (scene->has_sun && !is_black(scene->sun_irradiance)) || !is_black(scene->ambient) || scene->lamp_count > 0;
+    return (scene->has_sun && !is_black(scene->sun_irradiance)) || has_ambient(scene) || scene->lamp_count > 0;
 }
 
 static const char *find_mistake(const nebel_scene_data *scene, const nebel_volume_desc *volume)

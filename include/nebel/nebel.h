@@ -338,8 +338,8 @@ typedef struct nebel_volume_desc {
     double extinction[3]; /* 1/m, 0 to 1e9, where the density is 1 */
     double source[3];     /* radiance of opaque fog, 0 to 1e9: alone it gives source * (1 - transmittance) */
     double albedo[3];     /* 0..1: lit by the fog's ambient light and its sun; not together with source */
-    nebel_phase phase;    /* where the sun's light is scattered to; ambient light comes from everywhere */
-    double emission[3];   /* radiance per metre, 0 to 1e9, where the density is 1 */
+    nebel_phase phase;  /* where light is scattered to; makes no difference to light that is the same from everywhere */
+    double emission[3]; /* radiance per metre, 0 to 1e9, where the density is 1 */
     double start, cutoff; /* m along a ray from where it starts, >= 0: the volume acts between them alone, whatever its
                              operation; cutoff 0: no end. No physics: see nebel_trace_desc.ignore_distances */
 } nebel_volume_desc;
@@ -472,7 +472,8 @@ nebel_result nebel_change_volume(nebel_fog *fog, nebel_volume_id id, const nebel
 /* Removes a volume. Cost O(1). An id that is unknown or was removed is ARGUMENT. */
 nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id);
 
-/* Sets the ambient radiance, 0 to 1e9. Cost O(1). Errors: ARGUMENT, VALUE. */
+/* Sets the ambient radiance, 0 to 1e9, the same from everywhere, in place of any environment before (nebel/environment.h). Cost O(1).
+ * Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3]);
 
 /* Sets the sun. Cost O(1). Errors: ARGUMENT, VALUE. */

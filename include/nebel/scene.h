@@ -16,6 +16,7 @@
 #include <nebel/cells.h>
 #include <nebel/classic.h>
 #include <nebel/diffusion.h>
+#include <nebel/environment.h>
 #include <nebel/nebel.h>
 #include <nebel/nebula.h>
 
@@ -103,12 +104,15 @@ typedef struct nebel_scene_data {
     const nebel_camera_key *camera_keys; /* ascending frames */
     uint32_t turntable_frames;           /* 0: none */
 
-    double background[3]; /* radiance where no surface is */
+    double background[3]; /* radiance where no surface is, */
+    int shows_ambient;    /* or the ambient light from that direction in its place */
     int has_sun;
-    double sun_direction[3];  /* towards the sun, unit length */
-    double sun_irradiance[3]; /* on a surface that faces it, before any fog */
-    double ambient[3];        /* radiance */
-    size_t lamp_count;        /* the section "lights" */
+    double sun_direction[3];       /* towards the sun, unit length */
+    double sun_irradiance[3];      /* on a surface that faces it, before any fog */
+    double ambient[3];             /* radiance, the same from everywhere, */
+    nebel_environment environment; /* or where it is not CONSTANT this in its place; a map is the scene's */
+    const char *environment_file;  /* of a map, as it is opened; NULL: none */
+    size_t lamp_count;             /* the section "lights" */
     const nebel_lamp *lamps;
     const char *const *lamp_names; /* UTF-8; "" where the file gives none */
     double max_opacity;            /* of all fog; 0: no limit */
@@ -225,7 +229,7 @@ nebel_result nebel_commit_scene_volumes_at(const nebel_scene *scene, double fram
 void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
- * of it with other numbers in the camera and its motion, the background, the sun, the ambient light, max_opacity, the
+ * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that the file names, or of none), max_opacity, the
  * classic fog, the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
  * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), and with
  * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and

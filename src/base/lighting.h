@@ -9,10 +9,22 @@
 
 typedef struct nb_lighting {
     float background[3], ambient[3];
-    float sun[3], sunlight[3]; /* 0 where there is no sun; sunlight: its irradiance over pi */
+    nebel_environment environment; /* whatever its type: all ambient light */
+    int shows_ambient;             /* where no surface is, in place of the background; which is the same light where
+                                      the environment is constant */
+    float sun[3], sunlight[3];     /* 0 where there is no sun; sunlight: its irradiance over pi */
     double sun_direction[3];
     int has_sun;
 } nb_lighting;
+
+/* All the ambient light of a scene, whatever its type. */
+static inline nebel_environment nb_scene_environment(const nebel_scene_data *scene)
+{
+    nebel_environment environment = scene->environment;
+    for (int c = 0; c < 3 && environment.type == NEBEL_ENVIRONMENT_CONSTANT; c++)
+        environment.radiance[c] = scene->ambient[c];
+    return environment;
+}
 
 static inline int nb_lighting_is_light(const double rgb[3])
 {
@@ -34,12 +46,14 @@ static inline nebel_result nb_lighting_set(nb_lighting *lighting, const nebel_sc
             return nb_fail(log, NEBEL_ERROR_VALUE,
                            "scene: lamp %zu: place and intensity must be finite, intensity not negative", i);
     }
+    lighting->environment = nb_scene_environment(scene);
+    lighting->shows_ambient = scene->shows_ambient;
     lighting->has_sun = scene->has_sun != 0;
     if (lighting->has_sun && !nb_vector_make_unit(direction)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "scene: sun_direction has no direction");
     }
     for (int c = 0; c < 3; c++) {
-        lighting->background[c] = (float)scene->background[c];
+        lighting->background[c] = (float)(scene->shows_ambient ? scene->ambient : scene->background)[c];
         lighting->ambient[c] = (float)scene->ambient[c];
         lighting->sunlight[c] = lighting->has_sun ? (float)(scene->sun_irradiance[c] * 0.31830988618379067) : 0;
         lighting->sun_direction[c] = lighting->has_sun ? direction[c] : 0;

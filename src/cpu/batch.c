@@ -260,6 +260,34 @@ NB_CLONES static void set_colors(const nb_lighting *lighting, nb_scratch *scratc
     }
 }
 
+/* The same where ambient light depends on the direction: of the normal, or of the ray where the background shows it. */
+static void set_colors_by_direction(const nb_lighting *lighting, nb_scratch *scratch)
+{
+    const nb_light_samples *samples = &scratch->samples;
+    for (int i = 0; i < NB_BATCH; i++) {
+        double direction[3], light[3] = {0, 0, 0};
+        const int is_surface = scratch->hits.surface[i] != NB_NONE;
+        for (int c = 0; c < 3; c++)
+            direction[c] = is_surface ? (double)scratch->points.normal[c][i] : scratch->rays.direction[c][i];
+        if (is_surface)
+            nebel_environment_reflected(&lighting->environment, direction, light);
+        else if (lighting->shows_ambient)
+            nebel_environment_radiance(&lighting->environment, direction, light);
+        for (int c = 0; c < 3; c++) {
+            const float ambient = (float)light[c];
+            const float reflected = scratch->points.reflectance[c][i] * (samples->color[c][i] + ambient);
+            const float background = lighting->shows_ambient ? ambient : lighting->background[c];
+            scratch->samples.color[c][i] =
+                samples->transmittance[c][i] * (is_surface ? reflected : background) + samples->in_scattering[c][i];
+        }
+    }
+}
+
+static int has_one_light(const nb_lighting *lighting)
+{
+    return lighting->environment.type == NEBEL_ENVIRONMENT_CONSTANT;
+}
+
 static void find_hits(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
 {
     const nb_geometry *geometry = &frame->renderer->geometry;
@@ -294,6 +322,10 @@ nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint3
     if (frame->renderer->method == NEBEL_METHOD_REFERENCE) return nb_reference_trace(frame, place, scratch);
     nebel_result result = trace_camera_fog(frame, scratch);
     if (result == NEBEL_OK && nb_hits_any(&scratch->hits)) result = light_surfaces(frame, scratch);
-    if (result == NEBEL_OK) set_colors(&frame->lighting, scratch);
+    if (result != NEBEL_OK) return result;
+    if (has_one_light(&frame->lighting))
+        set_colors(&frame->lighting, scratch);
+    else
+        set_colors_by_direction(&frame->lighting, scratch);
     return result;
 }

@@ -280,6 +280,23 @@ static nebel_result add_reflected(path *p, const nb_meeting *at)
     return add_arriving(p, p->ray.origin, sight->direction, sight->reach, chosen.lamp->intensity, share);
 }
 
+/* Ambient light from where the path goes on. */
+static void add_ambient(path *p)
+{
+    double ambient[3];
+    nebel_environment_radiance(&p->world->environment, p->ray.direction, ambient);
+    add(p, ambient, 1);
+}
+
+/* What is behind everything. */
+static void add_background(path *p)
+{
+    if (p->is_first && !p->world->shows_ambient)
+        add(p, p->world->background, 1);
+    else
+        add_ambient(p);
+}
+
 /* ---- bounces --------------------------------------------------------------------------------- */
 
 /* Scatters at a collision. The throughput is 0 where the light is absorbed. */
@@ -343,7 +360,7 @@ static nebel_result go_on(path *p, const nb_meeting *at, nb_flight *flight, int 
     if (p->is_first) memcpy(p->shone, p->radiance, sizeof p->shone);
     *ended = !flight->collided && at->t == HUGE_VAL;
     if (*ended)
-        add(p, p->is_first ? world->background : world->ambient, 1);
+        add_background(p);
     else
         result = flight->collided ? scatter(p, &lit, flight) : reflect(p, at);
     p->ray.t_max = HUGE_VAL;
@@ -362,7 +379,7 @@ static nebel_result follow(path *p, const nb_meeting *first, int *came_through)
         if (result != NEBEL_OK) return result;
         if (bounce == 1) *came_through = !flight.collided;
         p->is_first = 0;
-        if (!ended && bounce == world->bounces) add(p, world->ambient, 1);
+        if (!ended && bounce == world->bounces) add_ambient(p);
         if (ended || bounce == world->bounces || !survives(p)) return NEBEL_OK;
         at = find_meeting(p);
         p->ray.t_max = at.t;

@@ -30,9 +30,10 @@ typedef struct nb_path_world {
     const nebel_scene_data *scene; /* for its surfaces and lamps */
     const nb_geometry *geometry;
     const nb_srgb_table *table;
-    double to_sun[3], sun[3]; /* unit direction; irradiance, 0 without sun */
-    double ambient[3], background[3];
-    int has_sun, is_grey;
+    double to_sun[3], sun[3];      /* unit direction; irradiance, 0 without sun */
+    nebel_environment environment; /* ambient light */
+    double background[3];
+    int has_sun, is_grey, shows_ambient;
     uint32_t
         bounces; /* after so many no light is looked for but the sun's, lamps' and the ambient light of the place */
 } nb_path_world;

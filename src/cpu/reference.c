@@ -29,7 +29,8 @@ nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc)
                              .is_grey = renderer->fog == NULL || nebel_is_fog_grey(renderer->fog),
                              .bounces = desc->bounces != 0 ? desc->bounces : MOST_BOUNCES};
     copy(frame->lighting.sun_direction, world->to_sun);
-    copy(scene->ambient, world->ambient);
+    world->environment = frame->lighting.environment;
+    world->shows_ambient = frame->lighting.shows_ambient;
     copy(scene->background, world->background);
     if (world->has_sun) copy(scene->sun_irradiance, world->sun);
     frame->seed = desc->seed;

@@ -107,6 +107,9 @@ static nebel_result set_frame(frame *f)
     if (result == NEBEL_OK) result = check_method(r, desc);
     if (result == NEBEL_OK) result = set_method(f);
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
+    if (result == NEBEL_OK && f->light.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
+        result = nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                         "frame: OpenGL cannot draw a gradient or an environment yet; use the CPU (--device cpu)");
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];

@@ -29,7 +29,8 @@ int nb_boxes_have_one_color(const nebel_snapshot *snapshot)
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
         const double *extinction = medium->body.extinction;
-        if (medium->emits || extinction[0] != extinction[1] || extinction[1] != extinction[2]) return 0;
+        if (medium->emits || medium->sky != NULL || extinction[0] != extinction[1] || extinction[1] != extinction[2])
+            return 0;
         for (int c = 0; c < 3; c++)
             if (medium->radiance[c] != snapshot->media[0].radiance[c]) return 0;
     }

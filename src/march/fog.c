@@ -42,7 +42,7 @@ nebel_result nebel_create_fog(const nebel_fog_desc *desc, nebel_fog **fog)
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "fog: out of memory");
     made->allocator = allocator;
     made->log = desc->log;
-    memcpy(made->ambient, desc->ambient, sizeof made->ambient);
+    memcpy(made->sky.radiance, desc->ambient, sizeof made->sky.radiance);
     made->sun = desc->sun;
     made->max_opacity = desc->max_opacity;
     *fog = made;
@@ -55,6 +55,7 @@ void nebel_destroy_fog(nebel_fog *fog)
     const nebel_allocator allocator = fog->allocator;
     for (size_t i = 0; i < fog->slot_count; i++)
         if (fog->slots[i].used) nb_volume_free(&allocator, &fog->slots[i].volume);
+    nebel_release_environment_map(fog->sky.map);
     nb_release(&allocator, fog->lamps);
     nb_release(&allocator, fog->slots);
     nb_release(&allocator, fog);
@@ -143,8 +144,21 @@ nebel_result nebel_set_ambient(nebel_fog *fog, const double ambient[3])
     if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
     if (ambient == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "ambient: must not be NULL");
     const nebel_result result = nb_check_color(&fog->log, "ambient", ambient, NEBEL_MAX_AMOUNT);
-    if (result == NEBEL_OK) memcpy(fog->ambient, ambient, sizeof fog->ambient);
-    return result;
+    if (result != NEBEL_OK) return result;
+    return nebel_set_environment(fog, &(nebel_environment){.radiance = {ambient[0], ambient[1], ambient[2]}});
+}
+
+nebel_result nebel_set_environment(nebel_fog *fog, const nebel_environment *sky)
+{
+    if (fog == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (sky == NULL) return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "environment: must not be NULL");
+    const nebel_result result = nb_check_sky(&fog->log, sky);
+    if (result != NEBEL_OK) return result;
+    nebel_environment_map *before = fog->sky.map;
+    fog->sky = *sky;
+    fog->sky.map = sky->type == NEBEL_ENVIRONMENT_MAP ? nebel_retain_environment_map(sky->map) : NULL;
+    nebel_release_environment_map(before);
+    return NEBEL_OK;
 }
 
 nebel_result nebel_set_sun(nebel_fog *fog, const nebel_sun *sun)

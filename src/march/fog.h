@@ -3,6 +3,7 @@
 #define NB_MARCH_FOG_H
 
 #include "media/lamp.h"
+#include "media/sky.h"
 #include "media/volume.h"
 
 #include <nebel/diffusion.h>
@@ -17,7 +18,7 @@ typedef struct nb_slot {
 struct nebel_fog {
     nebel_allocator allocator;
     nebel_log log;
-    double ambient[3];
+    nebel_environment sky; /* one owner of its map */
     nebel_sun sun;
     size_t lamp_count;
     nb_lamp *lamps;

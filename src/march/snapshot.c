@@ -37,8 +37,10 @@ static void find_moments(nb_medium *medium)
 static void light_medium(nb_medium *medium, const nebel_fog *fog)
 {
     const nb_volume *v = &medium->body;
+    double ambient[3];
+    nb_sky_most(&fog->sky, ambient);
     for (int c = 0; c < 3; c++) {
-        medium->radiance[c] = v->lit ? v->albedo[c] * fog->ambient[c] : v->source[c];
+        medium->radiance[c] = v->lit ? v->albedo[c] * ambient[c] : v->source[c];
         medium->light[c] = medium->radiance[c] * v->extinction[c] + v->emission[c];
         medium->densest = fmax(medium->densest, v->extinction[c]);
         medium->brightest = fmax(medium->brightest, medium->light[c]);
@@ -57,8 +59,11 @@ static void free_snapshot(nebel_snapshot *s)
     const nebel_allocator allocator = s->allocator;
     for (size_t i = 0; i < s->medium_count; i++) nb_volume_free(&allocator, &s->media[i].body);
     nb_diffusion_free(&allocator, s->diffusion);
+    for (size_t i = 0; i < s->skylight_count; i++) nb_sky_filter_release(s->skylights[i].filter);
+    nebel_release_environment_map(s->sky.map);
     nb_bvh_free(&allocator, &s->bvh);
     nb_release(&allocator, s->media);
+    nb_release(&allocator, s->skylights);
     nb_release(&allocator, s->lamps);
     nb_release(&allocator, s->endless);
     nb_release(&allocator, s->bounded);
@@ -69,7 +74,7 @@ static int may_join(const nb_medium *medium)
 {
     const nb_volume *v = &medium->body;
     return v->operation == NEBEL_OPERATION_ADD && v->density.type == NEBEL_DENSITY_CONSTANT && v->leaf_count == 1 &&
-           !medium->emits && !medium->is_sunlit && !medium->is_lamplit;
+           !medium->emits && !medium->is_sunlit && !medium->is_lamplit && medium->sky == NULL;
 }
 
 /* Of the media that may join, those of the rank that has most of them do. */
@@ -146,6 +151,40 @@ static int copy_lamps(const nebel_fog *fog, nebel_snapshot *s)
     s->lamps = nb_allocate(&s->allocator, s->lamp_count, sizeof *s->lamps);
     if (s->lamps != NULL) memcpy(s->lamps, fog->lamps, s->lamp_count * sizeof *s->lamps);
     return s->lamps != NULL;
+}
+
+static int scatters_sky(const nebel_snapshot *s, const nb_medium *medium)
+{
+    return s->sky.type != NEBEL_ENVIRONMENT_CONSTANT && medium->body.lit;
+}
+
+static const nb_skylight *find_skylight(const nebel_snapshot *s, const nb_phase *phase)
+{
+    for (size_t i = 0; i < s->skylight_count; i++)
+        if (nb_phase_compare(nb_sky_filter_phase(s->skylights[i].filter), phase) == 0) return &s->skylights[i];
+    return NULL;
+}
+
+/* Media of one phase function share what it makes of the sky. 0 when memory is out. */
+static int light_from_sky(const nebel_fog *fog, nebel_snapshot *s)
+{
+    size_t lit = 0;
+    s->sky = fog->sky;
+    (void)nebel_retain_environment_map(s->sky.map);
+    for (size_t i = 0; i < s->medium_count; i++) lit += scatters_sky(s, &s->media[i]) ? 1 : 0;
+    if (lit == 0) return 1;
+    s->skylights = nb_allocate(&s->allocator, lit, sizeof *s->skylights);
+    for (size_t i = 0; i < s->medium_count && s->skylights != NULL; i++) {
+        nb_medium *medium = &s->media[i];
+        if (!scatters_sky(s, medium)) continue;
+        medium->sky = find_skylight(s, &medium->body.phase);
+        if (medium->sky != NULL) continue;
+        nb_sky_filter *filter = nb_sky_filter_make(&s->allocator, &s->sky, &medium->body.phase);
+        if (filter == NULL) return 0;
+        s->skylights[s->skylight_count] = nb_skylight_of(&s->sky, filter);
+        medium->sky = &s->skylights[s->skylight_count++];
+    }
+    return s->skylights != NULL;
 }
 
 static int is_bounded(const nb_volume *volume)
@@ -239,7 +278,7 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
     atomic_init(&s->owners, 1);
     point_to_sun(s, &fog->sun);
     nebel_result result = NEBEL_ERROR_MEMORY;
-    if (copy_media(fog, of, s) && copy_lamps(fog, s)) {
+    if (copy_media(fog, of, s) && copy_lamps(fog, s) && light_from_sky(fog, s)) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
         s->is_gray = is_gray(s);

@@ -4,6 +4,7 @@
 
 #include "bvh.h"
 #include "media/lamp.h"
+#include "media/sky.h"
 #include "media/volume.h"
 
 #include <stdatomic.h>
@@ -11,11 +12,12 @@
 /* A volume and what the integrator wants to know of it at once. */
 typedef struct nb_medium {
     nb_volume body;
-    double radiance[3]; /* of opaque fog: source, or albedo times ambient */
+    double radiance[3]; /* of opaque fog: source, or albedo times ambient; the most of it where there is a skylight */
     double light[3];    /* radiance * extinction + emission: radiance per metre at density 1 */
-    double densest;     /* largest extinction of any channel anywhere */
-    double brightest;   /* the same of light */
-    double proportion;  /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
+    const nb_skylight *sky; /* what lights it instead, by the direction of the ray; NULL: nothing */
+    double densest;         /* largest extinction of any channel anywhere */
+    double brightest;       /* the same of light */
+    double proportion; /* of the body's extent to the least of its leaves' sizes where their frames scale, at least 1;
                            for margins */
     int emits;
     int is_sunlit;
@@ -59,6 +61,9 @@ struct nebel_snapshot {
     int is_lamplit;           /* whether any medium is */
     size_t lamp_count;
     nb_lamp *lamps;
+    nebel_environment sky;    /* one owner of its map */
+    size_t skylight_count;    /* one for each phase function that scatters it, where it is not constant */
+    nb_skylight *skylights;   /* each an owner of its filter */
     const nb_medium *joining; /* one that joins; NULL where none does */
     size_t joining_count;     /* how many do; they are of one rank */
     size_t covering_count;    /* media that cover others */

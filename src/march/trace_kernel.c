@@ -189,6 +189,7 @@ static int meet_fog(workspace *w, const nebel_snapshot *snapshot)
     m->doubt_from = NB_W(2.0) * NB_WFAR;
     m->drift = NB_F(0.0);
     m->event_count = NB_F(0.0);
+    m->sky = NULL;
     if (snapshot->bounded_count <= FEW_MEDIA) {
         for (size_t i = 0; i < snapshot->medium_count; i++)
             if (!meet_one(w, snapshot, i)) return 0;
@@ -749,6 +750,11 @@ nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
     workspace w;
     open_workspace(&w);
     const int is_lit = (job->snapshot->is_sunlit || job->snapshot->is_lamplit) && !job->transmittance_only;
+#if defined(NB_DOUBLE)
+    w.m.wants_sky = 1; /* more digits are asked by what light may be off, also where transmittance alone is wanted */
+#else
+    w.m.wants_sky = !job->transmittance_only;
+#endif
     const nebel_result result = is_lit ? trace_lit(job, &w) : trace_job(job, &w);
     close_workspace(&w, &job->snapshot->allocator);
     return result;

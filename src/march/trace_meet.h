@@ -251,6 +251,33 @@ static void count_drift(march *m, const contact *k)
 }
 #endif
 
+/* Skies are looked up one lane after the other, in double, so that lanes agree with rays alone. */
+static void look_at_sky(march *m, const nb_skylight *sky)
+{
+    double direction[3][NB_WIDTH];
+    nb_scalar light[3][NB_WIDTH];
+    nb_wstore_lanes(direction[0], m->rays.direction.x);
+    nb_wstore_lanes(direction[1], m->rays.direction.y);
+    nb_wstore_lanes(direction[2], m->rays.direction.z);
+    for (size_t i = 0; i < NB_WIDTH; i++) {
+        double radiance[3];
+        nb_sky_scattered(sky, (const double[3]){direction[0][i], direction[1][i], direction[2][i]}, radiance);
+        for (int c = 0; c < 3; c++) light[c][i] = (nb_scalar)radiance[c];
+    }
+    for (int c = 0; c < 3; c++) m->sky_light[c] = nb_load_lanes(light[c]);
+    m->sky = sky;
+}
+
+static void set_skylight(march *m, contact *k, const nb_medium *medium)
+{
+    const nb_volume *body = &medium->body;
+    if (m->sky != medium->sky) look_at_sky(m, medium->sky);
+    for (int c = 0; c < 3; c++) {
+        k->radiance[c] = REAL(body->albedo[c]) * m->sky_light[c];
+        k->light[c] = k->radiance[c] * k->extinction[c] + REAL(body->emission[c]);
+    }
+}
+
 struct sunlight;
 static void set_glow(contact *k, const packet *rays, const struct sunlight *sun);
 
@@ -268,6 +295,7 @@ static void meet_medium(march *m, const nb_medium *medium)
         k->radiance[c] = REAL(medium->radiance[c]);
         k->glow[c] = NB_F(0.0);
     }
+    if (medium->sky != NULL && m->wants_sky) set_skylight(m, k, medium);
     if (m->sun != NULL && medium->is_sunlit) set_glow(k, &m->rays, m->sun);
     k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
     if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);

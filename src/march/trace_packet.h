@@ -78,9 +78,12 @@ typedef struct known {
 
 typedef struct march {
     packet rays;
-    int wants_error;      /* 0: media that no ray comes near may be left out */
-    const known *total;   /* NULL the first time */
-    struct sunlight *sun; /* NULL where sunlight is not asked for, or none is there */
+    int wants_error;        /* 0: media that no ray comes near may be left out */
+    const known *total;     /* NULL the first time */
+    struct sunlight *sun;   /* NULL where sunlight is not asked for, or none is there */
+    int wants_sky;          /* 0: light is not asked for, and the sky's may be taken for its most */
+    const nb_skylight *sky; /* the last that a medium had, NULL: none yet, */
+    nb_real sky_light[3];   /* and what comes of it along the rays */
     int ignores_distances;
     size_t contact_count, span_count;
     contact *contacts;

@@ -230,7 +230,7 @@ static int is_straight(const nb_trace_job *job)
     const nebel_snapshot *snapshot = job->snapshot;
     if (snapshot->medium_count != 1 || job->wants_error) return 0;
     const nb_medium *medium = &snapshot->media[0];
-    const int is_lit = (medium->is_sunlit || medium->is_lamplit) && !job->transmittance_only;
+    const int is_lit = (medium->is_sunlit || medium->is_lamplit || medium->sky != NULL) && !job->transmittance_only;
     return nb_volume_has_fog(&medium->body) && medium->body.leaf_count == 1 && !medium->emits && !is_lit &&
            medium->body.density.type == NEBEL_DENSITY_CONSTANT &&
            (job->ignore_distances || !nb_volume_has_distances(&medium->body));

@@ -85,6 +85,7 @@ static void open_workspace(workspace *w)
     w->m.lasts = w->lasts;
     w->m.total = NULL;
     w->m.sun = NULL;
+    w->m.wants_sky = 0;
     w->m.spans = w->spans;
     w->m.crowd.memory = NULL;
     w->m.crowd.capacity = 0;

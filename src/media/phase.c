@@ -86,6 +86,23 @@ nb_phase nb_phase_resolve(const nebel_phase *phase)
     }
 }
 
+static int compare_numbers(double a, double b)
+{
+    return (a > b) - (a < b);
+}
+
+int nb_phase_compare(const nb_phase *a, const nb_phase *b)
+{
+    int order = a->lobe_count - b->lobe_count;
+    for (int i = 0; i < a->lobe_count && order == 0; i++) {
+        const nb_lobe *x = &a->lobes[i], *y = &b->lobes[i];
+        order = compare_numbers(x->g, y->g);
+        if (order == 0) order = compare_numbers(x->alpha, y->alpha);
+        if (order == 0) order = compare_numbers(x->weight, y->weight);
+    }
+    return order;
+}
+
 /* ---- value and mean -------------------------------------------------------------------------- */
 
 double nb_phase_at(const nb_phase *phase, double cosine)
@@ -106,24 +123,29 @@ double nebel_phase_value(const nebel_phase *phase, double cosine)
     return nb_phase_at(&resolved, cosine);
 }
 
-double nebel_phase_mean_cosine(const nebel_phase *phase)
+double nb_phase_mean_cosine(const nb_phase *phase)
 {
-    if (nb_phase_fault(phase) != NULL) return (double)NAN;
-    const nb_phase resolved = nb_phase_resolve(phase);
     double mean = 0;
-    for (int i = 0; i < resolved.lobe_count; i++) {
-        const nb_lobe *lobe = &resolved.lobes[i];
+    for (int i = 0; i < phase->lobe_count; i++) {
+        const nb_lobe *lobe = &phase->lobes[i];
         const double g2 = lobe->g * lobe->g, alpha = lobe->alpha;
         mean += lobe->weight * lobe->g * (1 + alpha * (3 + 2 * g2) / 5) / (1 + alpha * (1 + 2 * g2) / 3);
     }
     return mean;
 }
 
+double nebel_phase_mean_cosine(const nebel_phase *phase)
+{
+    if (nb_phase_fault(phase) != NULL) return (double)NAN;
+    const nb_phase resolved = nb_phase_resolve(phase);
+    return nb_phase_mean_cosine(&resolved);
+}
+
 /* ---- sampling -------------------------------------------------------------------------------- */
 
 /* The lobe's form without alpha has the part (1 + s) / 2 of its light below this cosine. The inversion of Witt,
  * Multiple Scattering in Reflection Nebulae, 1977, multiplied out, so that nothing cancels where g is small. */
-static double cosine_of_part(double g, double s)
+double nb_phase_cosine_of_part(double g, double s)
 {
     const double h = 1 + g * s;
     return (s + g * (0.5 * (s * s + 3) + g * (s + 0.5 * g * (s * s - 1)))) / (h * h);
@@ -135,8 +157,8 @@ static double distance_to(double g, double ahead)
     return sqrt((1 - g) * (1 - g) + 2 * g * ahead);
 }
 
-/* The inverse of cosine_of_part for g >= 0, from 1 - c, counted from the peak for the same reason. */
-static double part_of_cosine(double g, double ahead)
+/* The inverse of nb_phase_cosine_of_part for g >= 0, from 1 - c, counted from the peak for the same reason. */
+double nb_phase_part_of_cosine(double g, double ahead)
 {
     const double q = distance_to(g, ahead);
     return ((1 - g) * (1 - g) * (2 + g) - 2 * ahead) / (q * (1 - g * g + q));
@@ -153,11 +175,11 @@ static double square_below(double g, double ahead)
         const double sum = a * a * (1 / q - 1 / last) - 2 * a * (last - q) + (last * last * last - q * q * q) / 3;
         return (1 - g * g) / (8 * g * g * g) * sum;
     }
-    const double half = 0.5 * (part_of_cosine(g, ahead) + 1);
+    const double half = 0.5 * (nb_phase_part_of_cosine(g, ahead) + 1);
     double sum = 0;
     for (int i = 0; i < 8; i++) {
         const double node = i % 2 ? nodes[i / 2] : -nodes[i / 2];
-        const double c = cosine_of_part(g, half * (1 + node) - 1);
+        const double c = nb_phase_cosine_of_part(g, half * (1 + node) - 1);
         sum += weights[i / 2] * c * c;
     }
     return 0.5 * half * sum;
@@ -166,7 +188,7 @@ static double square_below(double g, double ahead)
 /* The part of a lobe's light below the cosine c, for g >= 0. */
 static double lobe_below(double g, double alpha, double c)
 {
-    const double plain = 0.5 * (1 + part_of_cosine(g, 1 - c));
+    const double plain = 0.5 * (1 + nb_phase_part_of_cosine(g, 1 - c));
     const double square = alpha > 0 ? square_below(g, 1 - c) : 0;
     return (plain + alpha * square) / (1 + alpha * (1 + 2 * g * g) / 3);
 }
@@ -186,7 +208,7 @@ static double light_below(const nb_phase *phase, double c)
 /* Newton's steps, and halving where they leave what is known to hold the root. */
 static double invert_light_below(const nb_phase *phase, double part)
 {
-    double low = -1, high = 1, c = cosine_of_part(phase->lobes[0].g, 2 * part - 1);
+    double low = -1, high = 1, c = nb_phase_cosine_of_part(phase->lobes[0].g, 2 * part - 1);
     for (int i = 0; i < 100 && high - low > 1e-15; i++) {
         const double over = light_below(phase, c) - part;
         if (over == 0) break;
@@ -205,7 +227,7 @@ double nebel_phase_sample(const nebel_phase *phase, double part)
     const nb_phase resolved = nb_phase_resolve(phase);
     double c;
     if (resolved.lobe_count == 1 && resolved.lobes[0].alpha == 0)
-        c = cosine_of_part(resolved.lobes[0].g, 2 * part - 1);
+        c = nb_phase_cosine_of_part(resolved.lobes[0].g, 2 * part - 1);
     else
         c = invert_light_below(&resolved, part);
     return fmin(fmax(c, -1), 1);

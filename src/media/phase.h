@@ -27,4 +27,14 @@ nb_phase nb_phase_resolve(const nebel_phase *phase);
 /* 1/sr for a cosine within -1 and 1. */
 double nb_phase_at(const nb_phase *phase, double cosine);
 
+/* An order of all of them, by what their lobes are made of; 0: the same. */
+int nb_phase_compare(const nb_phase *a, const nb_phase *b);
+
+double nb_phase_mean_cosine(const nb_phase *phase);
+
+/* A lobe without alpha has the part (1 + s) / 2 of its light below a cosine: that cosine, and for g >= 0 s of the cosine
+ * 1 - ahead. */
+double nb_phase_cosine_of_part(double g, double s);
+double nb_phase_part_of_cosine(double g, double ahead);
+
 #endif

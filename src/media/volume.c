@@ -283,18 +283,6 @@ static int compare_body(const nb_volume *a, const nb_volume *b)
     return order;
 }
 
-/* What a lobe is made of says what it is. */
-static int compare_phases(const nb_phase *a, const nb_phase *b)
-{
-    int order = a->lobe_count - b->lobe_count;
-    for (int i = 0; i < a->lobe_count && order == 0; i++) {
-        const double x[] = {a->lobes[i].g, a->lobes[i].alpha, a->lobes[i].weight};
-        const double y[] = {b->lobes[i].g, b->lobes[i].alpha, b->lobes[i].weight};
-        order = compare_numbers(x, y, 3);
-    }
-    return order;
-}
-
 int nb_volume_compare(const nb_volume *a, const nb_volume *b)
 {
     int order = (a->rank > b->rank) - (a->rank < b->rank);
@@ -303,7 +291,7 @@ int nb_volume_compare(const nb_volume *a, const nb_volume *b)
     if (order == 0) order = compare_numbers(a->source, b->source, 3);
     if (order == 0) order = compare_numbers(a->albedo, b->albedo, 3);
     if (order == 0) order = compare_numbers(a->emission, b->emission, 3);
-    if (order == 0) order = compare_phases(&a->phase, &b->phase);
+    if (order == 0) order = nb_phase_compare(&a->phase, &b->phase);
     if (order == 0) order = compare_density(&a->density, &b->density);
     if (order == 0) order = compare_numbers(&a->edge.gain, &b->edge.gain, 1);
     if (order == 0) order = compare_numbers(&a->edge.steepness, &b->edge.steepness, 1);

@@ -100,7 +100,7 @@ static nebel_result read_picture(nb_assimp *in, const char *path, nebel_texture 
     nb_note note = {""};
     const struct aiTexture *embedded = find_embedded(in->scene, path);
     const char *file = embedded == NULL ? find_file(in, path) : in->load->source->file;
-    const nb_codec codec = {in->load->allocator, nb_note_log(&note), file};
+    const nb_codec codec = {.allocator = in->load->allocator, .log = nb_note_log(&note), .name = file};
     if (file == NULL) return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
     const nebel_result result =
         embedded != NULL ? read_embedded(&codec, embedded, texture) : read_file(&codec, file, texture);

@@ -13,6 +13,7 @@ typedef struct nb_codec {
     nebel_allocator allocator;
     nebel_log log;
     const char *name;
+    uint64_t most_pixels; /* 0: NB_MAX_PIXELS */
 } nb_codec;
 
 /* Larger pictures are refused before memory is asked for: pixels, and samples of all channels. */
@@ -40,6 +41,9 @@ nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, neb
 /* The encoded file in *bytes; free bytes->data also after an error. */
 nebel_result nb_png_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
 nebel_result nb_exr_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
+
+/* The picture at codec->name, whichever it is. Errors: FILE, FORMAT, LIMIT, MEMORY, UNSUPPORTED; it is empty then. */
+nebel_result nb_image_read(const nb_codec *codec, nebel_image *image);
 
 /* Gives the image memory for its samples, cleared, and copies of the names. Checks the limits. */
 nebel_result nb_image_allocate(const nb_codec *codec, uint64_t width, uint64_t height, size_t channel_count,

@@ -84,7 +84,7 @@ static nebel_result read_map(const nb_model_load *load, nb_heights *map)
 {
     const char *file = load->source->file;
     nb_note note = {""};
-    const nb_codec codec = {load->allocator, nb_note_log(&note), file};
+    const nb_codec codec = {.allocator = load->allocator, .log = nb_note_log(&note), .name = file};
     nb_bytes bytes;
     nebel_result result =
         nb_file_read(&load->allocator, &load->log, load->source->where, "height map", file, FILE_LIMIT, &bytes);

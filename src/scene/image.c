@@ -1,6 +1,7 @@
 /* Pictures: which format, which memory, which file. */
 #include "scene/codec.h"
 
+#include <math.h>
 #include <string.h>
 #include <strings.h>
 
@@ -14,14 +15,15 @@ enum { MAX_NAME = 255, MAX_CHANNELS = 1024 };
 
 nebel_result nb_codec_check_size(const nb_codec *codec, uint64_t width, uint64_t height, uint64_t channel_count)
 {
-    const bool fits = width <= NB_MAX_PIXELS && height <= NB_MAX_PIXELS && width * height <= NB_MAX_PIXELS &&
-                      channel_count <= MAX_CHANNELS && width * height * channel_count <= NB_MAX_SAMPLES;
+    const uint64_t most = codec->most_pixels > 0 ? codec->most_pixels : NB_MAX_PIXELS;
+    const bool fits = width <= most && height <= most && width * height <= most && channel_count <= MAX_CHANNELS &&
+                      width * height * channel_count <= NB_MAX_SAMPLES;
     if (fits) return NEBEL_OK;
     return nb_fail(
         &codec->log, NEBEL_ERROR_LIMIT,
-        "%s: a picture of %llu x %llu pixels and %llu channels; at most 2^28 pixels, 2^30 samples, %d channels",
+        "%s: a picture of %llu x %llu pixels and %llu channels; at most 2^%d pixels, 2^30 samples, %d channels",
         codec->name, (unsigned long long)width, (unsigned long long)height, (unsigned long long)channel_count,
-        MAX_CHANNELS);
+        (int)log2((double)most), MAX_CHANNELS);
 }
 
 /* Pointers and names share one block. */
@@ -85,19 +87,26 @@ static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_i
     return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: neither a PNG nor an OpenEXR picture", codec->name);
 }
 
+nebel_result nb_image_read(const nb_codec *codec, nebel_image *image)
+{
+    nb_bytes bytes;
+    *image = (nebel_image){0};
+    nebel_result result =
+        nb_file_read(&codec->allocator, &codec->log, NULL, "picture", codec->name, FILE_LIMIT, &bytes);
+    if (result != NEBEL_OK) return result;
+    result = decode(codec, &bytes, image);
+    nb_release(&codec->allocator, bytes.data);
+    return result;
+}
+
 nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image)
 {
     if (image != NULL) *image = (nebel_image){0};
     if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = check_desc(desc);
+    const nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
-    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
-    nb_bytes bytes;
-    result = nb_file_read(&codec.allocator, &codec.log, NULL, "picture", path, FILE_LIMIT, &bytes);
-    if (result != NEBEL_OK) return result;
-    result = decode(&codec, &bytes, image);
-    nb_release(&codec.allocator, bytes.data);
-    return result;
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
+    return nb_image_read(&codec, image);
 }
 
 void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image)
@@ -168,7 +177,7 @@ nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *de
     if (path == NULL || desc == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
-    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE) return fail_ending(&codec);
     return nb_file_try(&codec.allocator, &codec.log, path);
 }
@@ -178,7 +187,7 @@ nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, c
     if (path == NULL || desc == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
-    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, path};
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     nb_bytes bytes = {0};
     result = check_image(&codec, image);
     if (result == NEBEL_OK) result = encode(&codec, image, &bytes);

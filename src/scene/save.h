@@ -81,6 +81,10 @@ bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node)
 void nb_save_classic(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
 void nb_save_add_classic(nb_save *save, const nb_space *space);
 
+/* Ambient light and background; `node` is their section in the file, NULL where it has none. */
+void nb_save_ambient(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
+void nb_save_background(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
+
 /* The camera, in the file or not. */
 void nb_save_camera(nb_save *save, const nb_scene_reader *in);
 

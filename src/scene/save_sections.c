@@ -100,13 +100,16 @@ static bool is_there(const nebel_scene_data *scene, int section)
     return section == CLASSIC ? scene->classic != NULL : true;
 }
 
-static void save_light(nb_save *save, const nb_scene_reader *in, int section)
+/* `node`: where it stands; NULL: it is not in the file. */
+static void save_light(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, int section)
 {
-    const nebel_scene_data *was = save->before, *now = save->changed;
-    const double *const from[SECTIONS] = {NULL, was->ambient, was->background, &was->max_opacity};
-    const double *const to[SECTIONS] = {NULL, now->ambient, now->background, &now->max_opacity};
-    nb_edit_numbers(&save->edit, in->json, &save->root, section_names[section], section == MAX_OPACITY ? 1 : 3,
-                    from[section], to[section], NB_EDIT_AMOUNT);
+    if (section == AMBIENT)
+        nb_save_ambient(save, in, node);
+    else if (section == BACKGROUND)
+        nb_save_background(save, in, node);
+    else
+        nb_edit_numbers(&save->edit, in->json, &save->root, section_names[section], 1, &save->before->max_opacity,
+                        &save->changed->max_opacity, NB_EDIT_AMOUNT);
 }
 
 /* One that is in the file, and stays there. */
@@ -129,7 +132,7 @@ static void save_section(nb_save *save, const nb_scene_reader *in, const nb_json
         nb_edit_remove(&save->edit, save->models.spans, save->models.count);
         break;
     default:
-        save_light(save, in, section);
+        save_light(save, in, node, section);
     }
 }
 
@@ -153,15 +156,16 @@ static void add_section(nb_save *save, const nb_scene_reader *in, int section)
     if (section == CAMERA)
         nb_save_camera(save, in);
     else if (section <= MAX_OPACITY)
-        save_light(save, in, section);
+        save_light(save, in, NULL, section);
     else if (section == SUN && save->changed->has_sun)
         add_sun(save, &in->space);
     else if (section == CLASSIC && save->changed->classic != NULL)
         nb_save_add_classic(save, &in->space);
 }
 
-static bool check_counts(const nb_scene_reader *in, const nebel_scene_data *before, const nb_json_node *root)
+static bool check_counts(const nb_scene_reader *in, const nb_save *save, const nb_json_node *root)
 {
+    const nebel_scene_data *before = save->before, *changed = save->changed;
     const nebel_scene_data *now = &in->scene->data;
     if (now->volume_count != before->volume_count)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
@@ -171,6 +175,12 @@ static bool check_counts(const nb_scene_reader *in, const nebel_scene_data *befo
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "has %zu models where %zu were; the file has changed, load it again",
                             in->scene->model_count, before->model_count);
+    if (now->environment.type != before->environment.type)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
+                            "has not the ambient light that it had; the file has changed, load it again");
+    if (now->environment.type != changed->environment.type && changed->environment.type == NEBEL_ENVIRONMENT_MAP)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
+                            "names no picture of its ambient light; write one into the file");
     if ((now->cells == NULL) == (before->cells == NULL) && (now->classic == NULL) == (before->classic == NULL) &&
         now->has_sun == before->has_sun)
         return true;
@@ -180,7 +190,7 @@ static bool check_counts(const nb_scene_reader *in, const nebel_scene_data *befo
 
 bool nb_save_rest(nb_save *save, const nb_scene_reader *in, const nb_json_node *root)
 {
-    if (!check_counts(in, save->before, root) || !nb_save_check_removed(save, in, root)) return false;
+    if (!check_counts(in, save, root) || !nb_save_check_removed(save, in, root)) return false;
     save->root.node = root;
     for (int i = 0; i < SECTIONS; i++)
         if ((save->done >> i & 1) == 0) add_section(save, in, i);

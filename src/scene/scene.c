@@ -66,11 +66,11 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     case CAMERA:
         return nb_read_camera(in, node);
     case BACKGROUND:
-        return nb_value_color(in->json, node, &nb_range_light, data->background);
+        return nb_read_background(in, node);
     case SUN:
         return nb_read_sun(in, node);
     case AMBIENT:
-        return nb_value_color(in->json, node, &nb_range_light, data->ambient);
+        return nb_read_ambient(in, node);
     case MAX_OPACITY:
         return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
     case CELLS:
@@ -363,6 +363,8 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     memcpy(desc.sun.irradiance, scene->data.sun_irradiance, sizeof desc.sun.irradiance);
     desc.max_opacity = scene->data.max_opacity;
     nebel_result result = nebel_create_fog(&desc, &fog);
+    if (result == NEBEL_OK && scene->data.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
+        result = nebel_set_environment(fog, &scene->data.environment);
     if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(fog, scene->data.diffusion);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);
@@ -406,6 +408,7 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, scene->models);
     nb_release(&allocator, scene->placements);
     nb_release(&allocator, (void *)scene->files);
+    nebel_release_environment_map(scene->environment_map);
     for (size_t i = 0; i < scene->grid_count; i++) nebel_release_grid(scene->grids[i]);
     nb_release(&allocator, (void *)scene->grids);
     nb_release(&allocator, scene->noises);

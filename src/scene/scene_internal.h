@@ -63,6 +63,8 @@ struct nebel_scene {
     const char **files;
     size_t file_capacity;
 
+    nebel_environment_map *environment_map; /* NULL: none */
+
     nebel_grid **grids;
     size_t grid_count, grid_capacity;
 
@@ -112,6 +114,8 @@ nebel_result nb_scene_parse(const char *text, size_t size, const char *name, con
                             nb_save *save, nebel_scene **scene);
 
 bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_background(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_ambient(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);

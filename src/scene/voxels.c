@@ -148,7 +148,7 @@ static nebel_result read_slice(const nb_codec *codec, size_t slice, nb_voxels *v
 static nebel_result read_slices(const nb_codec *codec, const nebel_grid_file *file, nb_voxels *voxels)
 {
     char path[PATH_SIZE];
-    const nb_codec of_slice = {codec->allocator, codec->log, path};
+    const nb_codec of_slice = {.allocator = codec->allocator, .log = codec->log, .name = path};
     nebel_result result = NEBEL_OK;
     if (file->slices < 1 || file->slices > NEBEL_MAX_GRID_SIZE)
         return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu slices; must be 1 to %d", codec->name, file->slices,
@@ -221,7 +221,7 @@ nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc
     if (file == NULL || desc == NULL || grid == NULL || file->file == NULL) return NEBEL_ERROR_ARGUMENT;
     if (!nb_allocator_is_valid(&desc->allocator))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
-    const nb_codec codec = {nb_resolve_allocator(&desc->allocator), desc->log, file->file};
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = file->file};
     nb_voxels voxels = {.data = NULL};
     nebel_result result = read_voxels(&codec, file, &voxels);
     if (result == NEBEL_OK) result = make_grid(&codec, file, &voxels, grid);

@@ -318,6 +318,10 @@ static nebel_result refuse_light(const nebel_snapshot *snapshot)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
                        "pack: shaders cannot show light that fog scatters more than once; use nebel_trace or the CPU's "
                        "renderer (--device cpu), or leave multiple scattering out");
+    if (snapshot->skylight_count > 0)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                       "pack: shaders cannot light fog with a gradient or a map yet; use nebel_trace or the CPU's "
+                       "renderer (--device cpu), or a constant ambient light");
     if (snapshot->is_sunlit && nb_has_voxels(snapshot))
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
                        "pack: shaders cannot light fog with the sun where there are grids yet; use nebel_trace or the "

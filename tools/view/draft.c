@@ -30,10 +30,11 @@ static nebel_sun sun_of(const nb_edition *edition)
 static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
-    memcpy(desc.ambient, edition->ambient, sizeof desc.ambient);
     desc.sun = sun_of(edition);
     nebel_result result = nebel_create_fog(&desc, fog);
     const nebel_scene_data *const file = nebel_scene_contents(draft->file);
+    const nebel_environment environment = nb_edition_environment(edition, file->environment.map);
+    if (result == NEBEL_OK) result = nebel_set_environment(*fog, &environment);
     if (result == NEBEL_OK) result = nebel_set_lamps(*fog, file->lamp_count, file->lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
     if (result != NEBEL_OK) nebel_destroy_fog(*fog);
@@ -106,7 +107,9 @@ static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_
     for (size_t i = 0; i < now->count && result == NEBEL_OK; i++)
         if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]))
             result = nebel_change_volume(draft->fog, draft->ids[i], &now->volumes[i]);
-    if (result == NEBEL_OK) result = nebel_set_ambient(draft->fog, now->ambient);
+    const nebel_environment environment =
+        nb_edition_environment(now, nebel_scene_contents(draft->file)->environment.map);
+    if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
     const nebel_sun sun = sun_of(now);
     if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
     if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
@@ -455,7 +458,8 @@ int nb_draft_is_for_cpu(const nb_draft *draft)
     const nb_edition *const good = &draft->good;
     const int has_sun = good->has_sun && !is_black(good->sun_irradiance);
     const int is_lit = has_sun || nebel_scene_contents(draft->file)->lamp_count > 0;
-    int is = nebel_scene_contents(draft->file)->diffusion != NULL;
+    int is =
+        nebel_scene_contents(draft->file)->diffusion != NULL || good->environment.type != NEBEL_ENVIRONMENT_CONSTANT;
     for (size_t i = 0; i < good->count && !is; i++) is = is_lit && !is_black(good->volumes[i].albedo);
     return is;
 }

@@ -217,6 +217,9 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
                        .classic = scene->classic != NULL ? *scene->classic : plain_classic};
     memcpy(made.background, scene->background, sizeof made.background);
     memcpy(made.ambient, scene->ambient, sizeof made.ambient);
+    made.environment = scene->environment;
+    made.environment.map = NULL;
+    made.shows_ambient = scene->shows_ambient;
     memcpy(made.sun_direction, scene->sun_direction, sizeof made.sun_direction);
     memcpy(made.sun_irradiance, scene->sun_irradiance, sizeof made.sun_irradiance);
     int result = add_nebulae(&made, scene->nebulae, scene->nebula_places, scene->nebula_count);
@@ -308,6 +311,8 @@ void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
     scene->max_opacity = edition->max_opacity;
     memcpy(scene->background, edition->background, sizeof scene->background);
     memcpy(scene->ambient, edition->ambient, sizeof scene->ambient);
+    scene->environment = nb_edition_environment(edition, scene->environment.map);
+    scene->shows_ambient = edition->shows_ambient;
     memcpy(scene->sun_direction, edition->sun_direction, sizeof scene->sun_direction);
     memcpy(scene->sun_irradiance, edition->sun_irradiance, sizeof scene->sun_irradiance);
 }
@@ -433,10 +438,29 @@ static int has_same_classic(const nb_edition *a, const nb_edition *b)
            memcmp(from->color, to->color, sizeof from->color) == 0;
 }
 
+static int has_same_environment(const nb_edition *a, const nb_edition *b)
+{
+    const nebel_environment *const from = &a->environment, *const to = &b->environment;
+    return a->shows_ambient == b->shows_ambient && from->type == to->type &&
+           memcmp(from->zenith, to->zenith, sizeof from->zenith) == 0 &&
+           memcmp(from->horizon, to->horizon, sizeof from->horizon) == 0 &&
+           memcmp(from->ground, to->ground, sizeof from->ground) == 0 && from->rotation == to->rotation &&
+           from->intensity == to->intensity;
+}
+
+nebel_environment nb_edition_environment(const nb_edition *edition, nebel_environment_map *map)
+{
+    nebel_environment environment = edition->environment;
+    memcpy(environment.radiance, edition->ambient, sizeof environment.radiance);
+    environment.map = map;
+    if (environment.type == NEBEL_ENVIRONMENT_MAP && map == NULL) environment.type = NEBEL_ENVIRONMENT_CONSTANT;
+    return environment;
+}
+
 int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b)
 {
     return a->has_sun == b->has_sun && a->max_opacity == b->max_opacity &&
-           HAS_SAME(a, b, nb_edition, background, max_opacity) && has_same_classic(a, b);
+           HAS_SAME(a, b, nb_edition, background, max_opacity) && has_same_environment(a, b) && has_same_classic(a, b);
 }
 
 int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b)

@@ -25,6 +25,8 @@ typedef struct nb_edition {
     nebel_cells_desc cells_desc; /* of them; its portals are the scene's */
     int has_sun, has_classic;
     nebel_factor_desc classic;
+    nebel_environment environment; /* in place of ambient, where it is not constant; its map is that of the file */
+    int shows_ambient;
     double background[3], ambient[3], sun_direction[3], sun_irradiance[3], max_opacity;
 } nb_edition;
 
@@ -33,6 +35,8 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition);
 int nb_edition_copy(const nb_edition *from, nb_edition *to);
 int nb_edition_add(nb_edition *edition, const nebel_volume_desc *volume, const nebel_volume_entry *entry,
                    const char *name);
+/* All its ambient light, with the map of the file, NULL where that has none. */
+nebel_environment nb_edition_environment(const nb_edition *edition, nebel_environment_map *map);
 /* An entry of a volume without keys, contrast or phase of its own. */
 nebel_volume_entry nb_edition_plain_entry(void);
 

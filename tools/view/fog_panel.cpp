@@ -74,7 +74,7 @@ bool draw_phase(nebel_phase *phase)
     while (type < 4 && types[type] != phase->type) type++;
     bool changed = choose(
         "phase", &type, names, 5,
-        "Into which direction sunlight is scattered. Under ambient light, the same from everywhere, all look the "
+        "Into which direction sunlight is scattered. Under ambient light that is the same from everywhere all look the "
         "same.");
     phase->type = types[type];
     if (phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS)

@@ -66,6 +66,30 @@ bool draw_opacity(nb_edition *now)
     return true;
 }
 
+bool draw_ambient(nb_edition *now)
+{
+    nebel_environment *const sky = &now->environment;
+    if (sky->type == NEBEL_ENVIRONMENT_GRADIENT) {
+        bool changed = pick("zenith", sky->zenith, false, "Ambient radiance from straight above.");
+        changed |= pick("horizon", sky->horizon, false, "Ambient radiance from level directions.");
+        return pick("ground", sky->ground, false, "Ambient radiance from straight below.") || changed;
+    }
+    if (sky->type == NEBEL_ENVIRONMENT_MAP) {
+        const bool turned = slide("rotation", &sky->rotation, -180, 180, "%.1f deg", false,
+                                  "Turns the picture that ambient light comes from to the left, about the vertical.");
+        return slide("intensity", &sky->intensity, 0.001, 1000, "%.3g", true, "Of what the picture sends.") || turned;
+    }
+    return pick("ambient", now->ambient, false, "Radiance from everywhere. Lights surfaces, and fog with an albedo.");
+}
+
+bool draw_background(nb_edition *now)
+{
+    const bool switched = tick("ambient as background", &now->shows_ambient,
+                               "Where no surface is one sees what ambient light comes from there.");
+    if (now->shows_ambient) return switched;
+    return pick("background", now->background, false, "Radiance where no surface is: the sky.") || switched;
+}
+
 /* ---- models
  * ----------------------------------------------------------------------------------------------------------
  */
@@ -210,9 +234,8 @@ void draw_lights(nb_panel *panel)
 {
     nb_edition *const now = panel->now;
     if (!open_section("Light", false)) return;
-    bool changed =
-        pick("ambient", now->ambient, false, "Radiance from everywhere. Lights surfaces, and fog with an albedo.");
-    changed |= pick("background", now->background, false, "Radiance where no surface is: the sky.");
+    bool changed = draw_ambient(now);
+    changed |= draw_background(now);
     changed |= draw_opacity(now);
     panel->fog_changed |= (now->has_sun ? draw_sun(now) : draw_missing_sun(now)) || changed;
 }

@@ -106,6 +106,8 @@ static void take_light(nebel_scene_data *scene, const nebel_scene_data *light)
 {
     memcpy(scene->background, light->background, sizeof scene->background);
     memcpy(scene->ambient, light->ambient, sizeof scene->ambient);
+    scene->environment = light->environment;
+    scene->shows_ambient = light->shows_ambient;
     scene->has_sun = light->has_sun;
     memcpy(scene->sun_direction, light->sun_direction, sizeof scene->sun_direction);
     memcpy(scene->sun_irradiance, light->sun_irradiance, sizeof scene->sun_irradiance);

@@ -1,0 +1,42 @@
+/* Skies in a picture: see sky_map.c. */
+#ifndef NB_MEDIA_SKY_MAP_H
+#define NB_MEDIA_SKY_MAP_H
+
+#include "phase.h"
+#include "sky.h"
+
+#include <stdatomic.h>
+
+/* Cubic B-splines over longitude and latitude; `columns` is twice `rows`. */
+typedef struct nb_sky_table {
+    size_t rows, columns;
+    float *coefficients; /* 3 for each knot, the top row first */
+} nb_sky_table;
+
+/* Knots of a gradient's filter: see sky.c. */
+enum { NB_SKY_KNOTS = 129 };
+
+struct nb_sky_filter {
+    nebel_allocator allocator;
+    atomic_size_t owners;
+    nb_phase phase;
+    nb_sky_table table;             /* of a map */
+    double mean_cosine, width;      /* of a gradient */
+    double rectified[NB_SKY_KNOTS]; /* the same */
+};
+
+/* An empty one with one owner; NULL when memory is out. */
+nb_sky_filter *nb_sky_filter_create(const nebel_allocator *allocator, const nb_phase *phase);
+
+/* The map's filter for a phase function, made where it has none. The caller becomes an owner. NULL when memory is out. */
+nb_sky_filter *nb_sky_map_filter(nebel_environment_map *map, const nb_phase *phase);
+
+/* In the map's own frame and at intensity 1; direction of unit length. */
+void nb_sky_map_radiance(const nebel_environment_map *map, const double direction[3], double radiance[3]);
+void nb_sky_map_reflected(const nebel_environment_map *map, const double normal[3], double radiance[3]);
+void nb_sky_map_scattered(const nb_sky_table *table, const double direction[3], double radiance[3]);
+
+/* The largest of all pixels. */
+void nb_sky_map_most(const nebel_environment_map *map, double most[3]);
+
+#endif
