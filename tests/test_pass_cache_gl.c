@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fog_help.h"
 #include "pass_help.h"
 
 #include <epoxy/gl.h>
@@ -14,7 +15,7 @@
 
 static PFNGLBUFFERSUBDATAPROC true_buffer;
 static PFNGLTEXSUBIMAGE2DPROC true_texture;
-static int words, tiles; /* uploads */
+static int words, tiles, voxels; /* uploads */
 
 static void EPOXY_CALLSPEC count_buffer(GLenum target, GLintptr offset, GLsizeiptr size, const void *data)
 {
@@ -27,6 +28,8 @@ static void EPOXY_CALLSPEC count_texture(GLenum target, GLint level, GLint x, GL
 {
     if (format == GL_RED_INTEGER) {
         tiles++;
+    } else if (format == GL_RGBA_INTEGER) {
+        voxels++;
     } else {
         words++;
     }
@@ -57,7 +60,7 @@ static void start_counting(void)
     true_texture = epoxy_glTexSubImage2D;
     epoxy_glBufferSubData = count_buffer;
     epoxy_glTexSubImage2D = count_texture;
-    words = tiles = 0;
+    words = tiles = voxels = 0;
 }
 
 static void stop_counting(void)
@@ -159,6 +162,58 @@ static void test_passes_hand_over_what_is_new(void **state)
     pass_close(&context);
 }
 
+/* A box before the eye. */
+static nebel_snapshot *fog_of_voxels(nebel_grid *grid, double extinction)
+{
+    const double *const e = pass_eye;
+    nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX,
+                                     .min = {e[0] - 3, e[1] - 3, e[2] - 12},
+                                     .max = {e[0] + 3, e[1] + 3, e[2] - 6}},
+                           .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
+                           .source = {1, .8, .6}};
+    for (int i = 0; i < 3; i++) v.extinction[i] = extinction;
+    return fog_commit(&(nebel_fog_desc){0}, &v, 1);
+}
+
+/* 10 voxels along each axis, the last of which is `last`. */
+static nebel_grid *grid_ending_in(float last)
+{
+    enum { SIDE = 10 };
+    float densities[SIDE * SIDE * SIDE];
+    nebel_grid *grid = NULL;
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++) densities[i] = (float)(i % 7) / 6;
+    densities[SIDE * SIDE * SIDE - 1] = last;
+    const nebel_grid_desc desc = {.size = {SIDE, SIDE, SIDE}, .voxels = densities};
+    assert_int_equal(nebel_create_grid(&desc, &grid), NEBEL_OK);
+    return grid;
+}
+
+/* Voxels are handed over when there are others, not when the eye moves or the same ones come back. */
+static void test_voxels_stay(void **state)
+{
+    (void)state;
+    nb_gl context;
+    nebel_gl *gl = NULL;
+    nebel_view view = pass_view(PERSPECTIVE, usual, 0, 0);
+    nebel_grid *const grids[] = {grid_ending_in(1), grid_ending_in(1), grid_ending_in(2)};
+    nebel_snapshot *const fogs[] = {fog_of_voxels(grids[0], .3), fog_of_voxels(grids[1], .4), pass_fog(-1),
+                                    fog_of_voxels(grids[0], .5), fog_of_voxels(grids[2], .5)};
+    const int uploads[] = {1, 0, 0, 0, 1};
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_create_gl(&(nebel_gl_desc){0}, &gl), NEBEL_OK);
+    for (int i = 0; i < 5; i++) {
+        check(gl, fogs[i], &view, 1, 0);
+        assert_int_equal(voxels, uploads[i]);
+        view.eye_from_world[12] += .5;
+        check(gl, fogs[i], &view, 1, 0);
+        assert_int_equal(voxels, 0);
+    }
+    nebel_destroy_gl(gl);
+    for (int i = 0; i < 5; i++) nebel_release_snapshot(fogs[i]);
+    for (int i = 0; i < 3; i++) nebel_release_grid(grids[i]);
+    pass_close(&context);
+}
+
 /* An error forgets what was there. */
 static void test_errors_are_not_kept(void **state)
 {
@@ -208,6 +263,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_passes_hand_over_what_is_new),
+        cmocka_unit_test(test_voxels_stay),
         cmocka_unit_test(test_errors_are_not_kept),
         cmocka_unit_test(test_samples_share_the_fog),
     };
