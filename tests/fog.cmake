@@ -1,6 +1,7 @@
 # The tests of the core's queries with random fog, and with threads of their own.
 find_package(Threads REQUIRED)
 target_sources(test_classic_vertices PRIVATE random_fog.c)
+target_sources(test_diffusion PRIVATE random_fog.c)
 target_sources(test_distances PRIVATE random_fog.c)
 target_sources(test_edges PRIVATE random_fog.c)
 target_sources(test_find PRIVATE random_fog.c)

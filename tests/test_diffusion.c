@@ -1,8 +1,11 @@
 /* Multiple scattering by diffusion: layers beside published numbers, energy, furnaces, contracts. With the argument
  * "table" it prints rows of docs/multiple-scattering.md. */
 #include "fog_help.h"
+#include "random_fog.h"
 
 #include <nebel/diffusion.h>
+
+static uint64_t random_count = 27;
 
 static const double pi = 3.14159265358979323846;
 
@@ -453,6 +456,42 @@ static void test_fog_without_light(void **unused)
     }
 }
 
+/* Whatever fog there is: it is refused, or light is a number. */
+static void test_random_fog(void **unused)
+{
+    (void)unused;
+    static random_fog fog;
+    size_t lit = 0;
+    for (uint64_t seed = 0; seed < random_count; seed++) {
+        nebel_fog *made = NULL;
+        nebel_snapshot *snapshot = NULL;
+        uint64_t numbers = seed;
+        random_fog_make(&fog, (random_fog_kind)(seed % RANDOM_FOG_KIND_COUNT), seed);
+        random_fog_light(&fog, &numbers);
+        nebel_fog_desc desc = {.sun = {.direction = {.3, (double)(seed % 7) / 3 - 1, -.2}, .irradiance = {3, 2, 1}}};
+        assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
+        for (size_t i = 0; i < fog.count; i++)
+            assert_int_equal(nebel_add_volume(made, &fog.volumes[i], NULL), NEBEL_OK);
+        const nebel_diffusion_desc few = {.cells = 1000, .has_ground = seed % 3 == 0, .ground_albedo = {.5, .5, 1}};
+        assert_int_equal(nebel_set_diffusion(made, &few), NEBEL_OK);
+        const nebel_result result = nebel_commit_fog(made, &snapshot);
+        assert_true(result == NEBEL_OK || result == NEBEL_ERROR_UNSUPPORTED);
+        for (uint64_t i = 0; i < 20 && result == NEBEL_OK; i++) {
+            nebel_light out;
+            const nebel_ray ray = random_fog_ray(&fog, i);
+            const nebel_trace_desc in_float = {.precision = NEBEL_PRECISION_FLOAT};
+            const nebel_result traced = nebel_trace(snapshot, &in_float, 1, &ray, sizeof ray, &out, sizeof out);
+            if (traced == NEBEL_ERROR_UNBOUNDED) continue;
+            assert_int_equal(traced, NEBEL_OK);
+            for (int c = 0; c < 3; c++) assert_true(out.in_scattering[c] >= 0 && isfinite(out.in_scattering[c]));
+            lit += out.in_scattering[0] > 0;
+        }
+        nebel_release_snapshot(snapshot);
+        nebel_destroy_fog(made);
+    }
+    assert_true(lit > random_count);
+}
+
 static void test_memory_runs_out(void **unused)
 {
     (void)unused;
@@ -481,12 +520,14 @@ static void test_memory_runs_out(void **unused)
     nebel_destroy_fog(fog);
 }
 
+/* The first argument: another number of random fogs. */
 int main(int argc, char **argv)
 {
     if (argc > 1 && strcmp(argv[1], "table") == 0) {
         print_layers();
         return 0;
     }
+    if (argc > 1) random_count = strtoull(argv[1], NULL, 10);
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_layers_are_near_published_ones),
                                        cmocka_unit_test(test_white_layers_keep_the_suns_light),
                                        cmocka_unit_test(test_height_fog_reflects_as_a_layer),
@@ -500,6 +541,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(test_bad_descriptions),
                                        cmocka_unit_test(test_what_diffusion_cannot_do_is_refused),
                                        cmocka_unit_test(test_fog_without_light),
+                                       cmocka_unit_test(test_random_fog),
                                        cmocka_unit_test(test_memory_runs_out)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -93,10 +93,14 @@ int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *latti
  * near the end the light is. The gains make both alike. */
 nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3]);
 
+typedef struct nb_gathered {
+    double light[3], diffuse[3]; /* all, and what of it is diffuse */
+} nb_gathered;
+
 /* Light per unit of irradiance that rays gather from the sun's light scattered in scaled fog; of what fog is there is no
  * less, where `is_rest` is 1: what exact light of one scattering lacks. Rays of t_max 0 gather none. */
 nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
-                                 const nebel_ray *rays, double (*light)[3]);
+                                 const nebel_ray *rays, nb_gathered *gathered);
 
 /* How many rays are gathered at once, at most. */
 enum { NB_DIFFUSION_RAYS = 64 };

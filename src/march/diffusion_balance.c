@@ -6,7 +6,7 @@
 #define PI 3.14159265358979323846
 
 /* Places on an end along each of its axes, and directions at each. */
-enum { PLACES = 8, HEIGHTS = 4, TURNS = 16 };
+enum { PLACES = 6, HEIGHTS = 4, TURNS = 16 };
 
 _Static_assert((int)HEIGHTS *(int)TURNS == (int)NB_DIFFUSION_RAYS, "the rays of a place are gathered at once");
 
@@ -23,6 +23,11 @@ static const double cosines[HEIGHTS] = {0.06943184420297371, 0.33000947820757187
                                         0.93056815579702629};
 static const double shares[HEIGHTS] = {0.17392742256872693, 0.32607257743127307, 0.32607257743127307,
                                        0.17392742256872693};
+
+/* What leaves along rays [m^2]: what is diffuse, and all else. */
+typedef struct power {
+    double diffuse[3], rest[3];
+} power;
 
 typedef struct survey {
     const nebel_snapshot *fog;
@@ -56,7 +61,7 @@ static double way_to_ground(const nb_lattice *l, const nebel_ray *ray)
 
 /* Adds what comes straight from the ground. */
 static nebel_result add_ground(const survey *v, nebel_ray rays[NB_DIFFUSION_RAYS],
-                               const double weights[NB_DIFFUSION_RAYS], double power[3])
+                               const double weights[NB_DIFFUSION_RAYS], power *sum)
 {
     nebel_light lights[NB_DIFFUSION_RAYS];
     const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .transmittance_only = 1, .ignore_distances = 1};
@@ -68,28 +73,33 @@ static nebel_result add_ground(const survey *v, nebel_ray rays[NB_DIFFUSION_RAYS
     const nebel_result result =
         nebel_trace(v->diffusion->scaled, &desc, NB_DIFFUSION_RAYS, rays, sizeof *rays, lights, sizeof *lights);
     for (int k = 0; k < NB_DIFFUSION_RAYS && result == NEBEL_OK; k++)
-        for (int c = 0; c < 3; c++) power[c] += seen[k] * v->ground[c] * lights[k].transmittance[c];
+        for (int c = 0; c < 3; c++) sum->rest[c] += seen[k] * v->ground[c] * lights[k].transmittance[c];
     return result;
 }
 
 /* Adds what leaves around a place. */
-static nebel_result add_place(const survey *v, int axis, int side, const double place[3], double area, double power[3])
+static nebel_result add_place(const survey *v, int axis, int side, const double place[3], double area, power *sum)
 {
     nebel_ray rays[NB_DIFFUSION_RAYS];
-    double light[NB_DIFFUSION_RAYS][3], weights[NB_DIFFUSION_RAYS];
+    nb_gathered gathered[NB_DIFFUSION_RAYS];
+    double weights[NB_DIFFUSION_RAYS];
     for (int k = 0; k < NB_DIFFUSION_RAYS; k++) {
         weights[k] = area * set_ray(axis, side, k, &rays[k]);
         for (int a = 0; a < 3; a++) rays[k].origin[a] = place[a];
     }
-    const nebel_result result = nb_diffusion_gather(v->fog, v->diffusion, 0, NB_DIFFUSION_RAYS, rays, light);
-    for (int k = 0; k < NB_DIFFUSION_RAYS; k++)
-        for (int c = 0; c < 3; c++) power[c] += weights[k] * light[k][c];
+    const nebel_result result = nb_diffusion_gather(v->fog, v->diffusion, 0, NB_DIFFUSION_RAYS, rays, gathered);
+    for (int k = 0; k < NB_DIFFUSION_RAYS; k++) {
+        for (int c = 0; c < 3; c++) {
+            sum->diffuse[c] += weights[k] * gathered[k].diffuse[c];
+            sum->rest[c] += weights[k] * (gathered[k].light[c] - gathered[k].diffuse[c]);
+        }
+    }
     const int has_ground = v->ground[0] > 0 || v->ground[1] > 0 || v->ground[2] > 0;
-    return result == NEBEL_OK && has_ground ? add_ground(v, rays, weights, power) : result;
+    return result == NEBEL_OK && has_ground ? add_ground(v, rays, weights, sum) : result;
 }
 
-/* The power that leaves along rays through one end of the lattice. */
-static nebel_result gather_end(const survey *v, int axis, int side, double power[3])
+/* Through one end of the lattice. */
+static nebel_result gather_end(const survey *v, int axis, int side, power *sum)
 {
     const nb_lattice *l = &v->diffusion->lattice;
     const int across[2] = {(axis + 1) % 3, (axis + 2) % 3};
@@ -97,7 +107,7 @@ static nebel_result gather_end(const survey *v, int axis, int side, double power
     double area = 1;
     nebel_result result = NEBEL_OK;
     for (int k = 0; k < 2; k++) area *= (l->high[across[k]] - l->low[across[k]]) / count[k];
-    for (int c = 0; c < 3; c++) power[c] = 0;
+    *sum = (power){{0}, {0}};
     for (int i = 0; i < count[0] * count[1] && result == NEBEL_OK; i++) {
         const int at[2] = {i % count[0], i / count[0]};
         double place[3];
@@ -106,70 +116,50 @@ static nebel_result gather_end(const survey *v, int axis, int side, double power
             const double width = l->high[across[k]] - l->low[across[k]];
             place[across[k]] = l->low[across[k]] + (at[k] + 0.5) / count[k] * width;
         }
-        result = add_place(v, axis, side, place, area, power);
+        result = add_place(v, axis, side, place, area, sum);
     }
     return result;
 }
 
-static void set_gains(nb_diffusion *d, double gain)
+/* What makes the rest and so much of what is diffuse add up to `leaving`. */
+static double find_gain(double leaving, double rest, double diffuse, double least, double most)
 {
-    for (int c = 0; c < 3; c++)
-        for (int i = 0; i < 6; i++) d->gain[c][i / 2][i % 2] = gain;
+    return fmin(fmax(diffuse > 0 ? (leaving - rest) / diffuse : 1, least), most);
 }
 
-/* What makes `without` and so much of what is diffuse add up to `leaving`. */
-static double find_gain(double leaving, double without, double with, double least, double most)
+/* `ends`: of each axis and side; nothing where they are not open. */
+static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *light, const power ends[6])
 {
-    const double diffuse = with - without;
-    return diffuse > 0 ? fmin(fmax((leaving - without) / diffuse, least), most) : fmin(fmax(1, least), most);
-}
-
-/* Of all ends that light leaves through, and of each. */
-typedef struct power {
-    double ends[3][2][3], all[3];
-} power;
-
-static nebel_result gather_ends(const survey *v, power *gathered)
-{
-    *gathered = (power){.all = {0, 0, 0}};
+    double leaving = 0, diffuse = 0, rest = 0;
     for (int i = 0; i < 6; i++) {
-        const int axis = i / 2, side = i % 2;
-        double *of_end = gathered->ends[axis][side];
-        if (v->diffusion->lattice.ends[axis][side] != NB_END_OPEN) continue;
-        const nebel_result result = gather_end(v, axis, side, of_end);
-        if (result != NEBEL_OK) return result;
-        for (int c = 0; c < 3; c++) gathered->all[c] += of_end[c];
+        if (d->lattice.ends[i / 2][i % 2] != NB_END_OPEN) continue;
+        leaving += light->leaving[i / 2][i % 2];
+        diffuse += ends[i].diffuse[c];
+        rest += ends[i].rest[c];
     }
-    return NEBEL_OK;
-}
-
-static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *light, const power *without,
-                            const power *with)
-{
-    double leaving = 0;
-    for (int i = 0; i < 6; i++)
-        if (d->lattice.ends[i / 2][i % 2] == NB_END_OPEN) leaving += light->leaving[i / 2][i % 2];
-    const double all = find_gain(leaving, without->all[c], with->all[c], LEAST_GAIN, MOST_GAIN);
+    const double all = find_gain(leaving, rest, diffuse, LEAST_GAIN, MOST_GAIN);
     for (int i = 0; i < 6; i++) {
         const int axis = i / 2, side = i % 2;
-        double *gain = &d->gain[c][axis][side];
-        *gain = all;
+        d->gain[c][axis][side] = all;
         if (d->lattice.ends[axis][side] != NB_END_OPEN) continue;
-        *gain = find_gain(light->leaving[axis][side], without->ends[axis][side][c], with->ends[axis][side][c],
-                          all / GAIN_OF_SIDE, all * GAIN_OF_SIDE);
+        d->gain[c][axis][side] = find_gain(light->leaving[axis][side], ends[i].rest[c], ends[i].diffuse[c],
+                                           all / GAIN_OF_SIDE, all * GAIN_OF_SIDE);
     }
 }
 
 nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffusion, const nb_diffuse_light light[3])
 {
-    power without, with;
+    power ends[6];
     survey v = {.fog = fog, .diffusion = diffusion};
-    for (int c = 0; c < 3; c++) v.ground[c] = light[c < diffusion->channel_count ? c : 0].ground;
-    set_gains(diffusion, 0);
-    nebel_result result = gather_ends(&v, &without);
-    set_gains(diffusion, 1);
-    if (result == NEBEL_OK) result = gather_ends(&v, &with);
-    for (int c = 0; c < diffusion->channel_count && result == NEBEL_OK; c++)
-        balance_channel(diffusion, c, &light[c], &without, &with);
-    return result;
+    for (int c = 0; c < 3; c++) {
+        v.ground[c] = light[c < diffusion->channel_count ? c : 0].ground;
+        for (int i = 0; i < 6; i++) diffusion->gain[c][i / 2][i % 2] = 1;
+    }
+    for (int i = 0; i < 6; i++) {
+        if (diffusion->lattice.ends[i / 2][i % 2] != NB_END_OPEN) continue;
+        const nebel_result result = gather_end(&v, i / 2, i % 2, &ends[i]);
+        if (result != NEBEL_OK) return result;
+    }
+    for (int c = 0; c < diffusion->channel_count; c++) balance_channel(diffusion, c, &light[c], ends);
+    return NEBEL_OK;
 }

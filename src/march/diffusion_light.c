@@ -31,8 +31,9 @@ typedef struct walker {
     double t, end;                  /* m; t >= end: done */
     double scaled[3], whole[3];     /* transmittance up to t, of scaled fog and of fog as it is */
     double source[3], once[3];      /* source radiance at t, of each of them */
-    double light[3];
-    int halvings; /* of steps, where fog is thick */
+    double diffuse[3];              /* of the former: what is diffuse */
+    double light[3], spread[3];     /* what was gathered, and what of it is diffuse */
+    int halvings;                   /* of steps, where fog is thick */
 } walker;
 
 typedef struct block {
@@ -123,8 +124,8 @@ static void look(const block *b, walker *w)
         const size_t first = (size_t)own * NB_NODE_NUMBERS;
         double numbers[4];
         for (size_t k = 0; k < 4; k++) numbers[k] = mix(d, nodes, weights, first + NB_NODE_DIFFUSE + k);
-        w->source[c] = gain_of(d, own, w->direction) * diffuse_source(numbers, fmax(g, 0), w->direction) +
-                       turned * mix(d, nodes, weights, first + NB_NODE_TURNED);
+        w->diffuse[c] = gain_of(d, own, w->direction) * diffuse_source(numbers, fmax(g, 0), w->direction);
+        w->source[c] = w->diffuse[c] + turned * mix(d, nodes, weights, first + NB_NODE_TURNED);
         if (!b->is_rest) continue;
         w->once[c] = -turned * mix(d, nodes, weights, first + NB_NODE_ONCE);
         if (d->has_peaks)
@@ -225,6 +226,7 @@ static void advance(block *b, size_t i)
         const ends of_scaled = weigh(scaled), of_whole = weigh(whole);
         w->light[c] += w->scaled[c] * (of_scaled.first * before.source[c] + of_scaled.last * w->source[c]) +
                        w->whole[c] * (of_whole.first * before.once[c] + of_whole.last * w->once[c]);
+        w->spread[c] += w->scaled[c] * (of_scaled.first * before.diffuse[c] + of_scaled.last * w->diffuse[c]);
         is_thin = is_thin && scaled > THIN;
         w->scaled[c] *= scaled;
         w->whole[c] *= whole;
@@ -285,7 +287,7 @@ static nebel_result go_through(block *b)
 }
 
 nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *diffusion, int is_rest, size_t count,
-                                 const nebel_ray *rays, double (*light)[3])
+                                 const nebel_ray *rays, nb_gathered *gathered)
 {
     const nb_diffusion *d = diffusion;
     block b = {.fog = fog, .diffusion = d, .is_rest = is_rest, .count = count};
@@ -293,7 +295,11 @@ nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *
     for (size_t i = 0; i < count; i++) start(&b, i, &rays[i]);
     const nebel_result result = go_through(&b);
     for (size_t i = 0; i < count; i++)
-        for (int c = 0; c < 3; c++) light[i][c] = fmax(b.walkers[i].light[d->channel_count == 1 ? 0 : c], 0);
+        for (int c = 0; c < 3; c++) {
+            const int own = d->channel_count == 1 ? 0 : c;
+            gathered[i].light[c] = fmax(b.walkers[i].light[own], 0);
+            gathered[i].diffuse[c] = b.walkers[i].spread[own];
+        }
     return result;
 }
 
@@ -324,12 +330,12 @@ nebel_result nb_diffusion_add(const nb_trace_job *job)
     for (size_t first = 0; first < job->count; first += NB_DIFFUSION_RAYS) {
         const size_t n = job->count - first < NB_DIFFUSION_RAYS ? job->count - first : NB_DIFFUSION_RAYS;
         nebel_ray rays[NB_DIFFUSION_RAYS];
-        double light[NB_DIFFUSION_RAYS][3];
+        nb_gathered gathered[NB_DIFFUSION_RAYS];
         for (size_t i = 0; i < n; i++) rays[i] = ray_of(job, first + i);
-        const nebel_result result = nb_diffusion_gather(job->snapshot, d, 1, n, rays, light);
+        const nebel_result result = nb_diffusion_gather(job->snapshot, d, 1, n, rays, gathered);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < n; i++)
-            for (int c = 0; c < 3; c++) add(job, first + i, c, light[i][c] * d->irradiance[c]);
+            for (int c = 0; c < 3; c++) add(job, first + i, c, gathered[i].light[c] * d->irradiance[c]);
     }
     return NEBEL_OK;
 }
