@@ -452,6 +452,30 @@ static void what_is_no_map_is_refused(void **state)
     assert_int_equal(nebel_create_environment_map(NULL, &map), NEBEL_ERROR_ARGUMENT);
 }
 
+/* As many phase functions as there may be, and one more. */
+static void phase_functions_have_a_limit(void **state)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    (void)state;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_set_environment(fog, &dusk), NEBEL_OK);
+    for (int i = 0; i <= NEBEL_MAX_ENVIRONMENT_PHASES; i++) {
+        const nebel_phase phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.01 * i};
+        const nebel_volume_desc volume = {.extinction = {1, 1, 1}, .albedo = {1, 1, 1}, .phase = phase};
+        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+        if (i + 1 < NEBEL_MAX_ENVIRONMENT_PHASES) continue;
+        const nebel_result wanted = i < NEBEL_MAX_ENVIRONMENT_PHASES ? NEBEL_OK : NEBEL_ERROR_LIMIT;
+        assert_int_equal(nebel_commit_fog(fog, &snapshot), wanted);
+        nebel_release_snapshot(snapshot);
+    }
+    assert_int_equal(nebel_set_ambient(fog, (const double[3]){1, 1, 1}), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+}
+
 /* Every allocation that may fail does, and nothing is lost. */
 static void memory_may_be_out(void **state)
 {
@@ -494,6 +518,7 @@ int main(void)
         cmocka_unit_test(a_box_at_vertices_is_lit_by_direction),
         cmocka_unit_test(what_is_no_environment_is_refused),
         cmocka_unit_test(what_is_no_map_is_refused),
+        cmocka_unit_test(phase_functions_have_a_limit),
         cmocka_unit_test(memory_may_be_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -492,7 +492,7 @@ nebel_result nebel_set_max_opacity(nebel_fog *fog, double max_opacity);
 
 /* Makes an immutable snapshot of the fog as it is. Cost O(n log n) in the number of volumes. The same volumes give the
  * same bits in every query, in whatever order they were added. Free it with nebel_release_snapshot. Errors: ARGUMENT,
- * MEMORY, UNSUPPORTED (see nebel/diffusion.h). */
+ * MEMORY, UNSUPPORTED (see nebel/diffusion.h), LIMIT (see nebel/environment.h). */
 nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot);
 
 /* One more owner of the snapshot; any thread. Returns its argument. */

@@ -153,11 +153,6 @@ static int copy_lamps(const nebel_fog *fog, nebel_snapshot *s)
     return s->lamps != NULL;
 }
 
-static int scatters_sky(const nebel_snapshot *s, const nb_medium *medium)
-{
-    return s->sky.type != NEBEL_ENVIRONMENT_CONSTANT && medium->body.lit;
-}
-
 static const nb_skylight *find_skylight(const nebel_snapshot *s, const nb_phase *phase)
 {
     for (size_t i = 0; i < s->skylight_count; i++)
@@ -165,26 +160,34 @@ static const nb_skylight *find_skylight(const nebel_snapshot *s, const nb_phase 
     return NULL;
 }
 
-/* Media of one phase function share what it makes of the sky. 0 when memory is out. */
-static int light_from_sky(const nebel_fog *fog, nebel_snapshot *s)
+static nebel_result add_skylight(nebel_snapshot *s, nb_medium *medium)
 {
-    size_t lit = 0;
+    if (s->skylight_count == NEBEL_MAX_ENVIRONMENT_PHASES)
+        return nb_fail(&s->log, NEBEL_ERROR_LIMIT, "environment: more than %d phase functions scatter it",
+                       NEBEL_MAX_ENVIRONMENT_PHASES);
+    nb_sky_filter *filter = nb_sky_filter_make(&s->allocator, &s->sky, &medium->body.phase);
+    if (filter == NULL) return NEBEL_ERROR_MEMORY;
+    s->skylights[s->skylight_count] = nb_skylight_of(&s->sky, filter);
+    medium->sky = &s->skylights[s->skylight_count++];
+    return NEBEL_OK;
+}
+
+/* Media of one phase function share what it makes of the sky. */
+static nebel_result light_from_sky(const nebel_fog *fog, nebel_snapshot *s)
+{
+    nebel_result result = NEBEL_OK;
     s->sky = fog->sky;
     (void)nebel_retain_environment_map(s->sky.map);
-    for (size_t i = 0; i < s->medium_count; i++) lit += scatters_sky(s, &s->media[i]) ? 1 : 0;
-    if (lit == 0) return 1;
-    s->skylights = nb_allocate(&s->allocator, lit, sizeof *s->skylights);
-    for (size_t i = 0; i < s->medium_count && s->skylights != NULL; i++) {
+    if (s->sky.type == NEBEL_ENVIRONMENT_CONSTANT) return NEBEL_OK;
+    s->skylights = nb_allocate(&s->allocator, NEBEL_MAX_ENVIRONMENT_PHASES, sizeof *s->skylights);
+    if (s->skylights == NULL) return NEBEL_ERROR_MEMORY;
+    for (size_t i = 0; i < s->medium_count && result == NEBEL_OK; i++) {
         nb_medium *medium = &s->media[i];
-        if (!scatters_sky(s, medium)) continue;
+        if (!medium->body.lit) continue;
         medium->sky = find_skylight(s, &medium->body.phase);
-        if (medium->sky != NULL) continue;
-        nb_sky_filter *filter = nb_sky_filter_make(&s->allocator, &s->sky, &medium->body.phase);
-        if (filter == NULL) return 0;
-        s->skylights[s->skylight_count] = nb_skylight_of(&s->sky, filter);
-        medium->sky = &s->skylights[s->skylight_count++];
+        if (medium->sky == NULL) result = add_skylight(s, medium);
     }
-    return s->skylights != NULL;
+    return result;
 }
 
 static int is_bounded(const nb_volume *volume)
@@ -277,8 +280,10 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
     s->max_opacity = fog->max_opacity > 0 ? fog->max_opacity : 1;
     atomic_init(&s->owners, 1);
     point_to_sun(s, &fog->sun);
-    nebel_result result = NEBEL_ERROR_MEMORY;
-    if (copy_media(fog, of, s) && copy_lamps(fog, s) && light_from_sky(fog, s)) {
+    const int is_whole = !of.is_scaled && !of.is_level; /* of others nobody asks the light */
+    nebel_result result = copy_media(fog, of, s) && copy_lamps(fog, s) ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    if (result == NEBEL_OK && is_whole) result = light_from_sky(fog, s);
+    if (result == NEBEL_OK) {
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
         s->is_gray = is_gray(s);
@@ -341,7 +346,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
         return NEBEL_OK;
     }
     nebel_release_snapshot(s);
-    if (result == NEBEL_ERROR_UNSUPPORTED) return result;
+    if (result == NEBEL_ERROR_UNSUPPORTED || result == NEBEL_ERROR_LIMIT) return result;
     return nb_fail(&fog->log, result, "snapshot: out of memory for %zu volumes", fog->slot_count);
 }
 
