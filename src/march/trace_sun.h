@@ -472,6 +472,7 @@ typedef struct sun_walk {
 } sun_walk;
 
 #include "trace_sun_ball.h"
+#include "trace_sun_closed.h"
 #include "trace_sun_grid.h"
 
 static sun_step try_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
@@ -534,90 +535,12 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     w->guess = nb_select(taken, nb_max(w->guess, s->length + s->length), NB_F(0.5) * s->length);
 }
 
-/* ---- steps in closed form -------------------------------------------------------------------- */
-
-/* Where the whole depth, that up to t and that from there to the sun, is linear in the optical depth along the ray:
- * between the flat faces of constant densities, and in height fog, where both are multiples of differences of
- * densities (T16 of the collected physics is the layer). */
-static int has_closed_steps(const sunlight *sun)
-{
-    return sun->snapshot->way_to_sun == NB_WAY_FLAT || sun->snapshot->way_to_sun == NB_WAY_HEIGHT;
-}
-
-/* By how much the whole depth changes over a length of `length` at density 1. In height fog that is known without the
- * difference, also where its densities are beyond all numbers: the way to the sun loses direction.y / sun.y of what
- * the ray gains. */
-static nb_real change_of_depth(const sunlight *sun, const march *m, const contact *k, int c, nb_real length,
-                               nb_real difference)
-{
-    if (sun->snapshot->way_to_sun != NB_WAY_HEIGHT) return nb_abs(difference);
-    const nb_real kept = NB_F(1.0) - nb_narrow(m->rays.direction.y / sun->direction.y);
-    return nb_abs(k->extinction[c] * kept) * length;
-}
-
-/* What an error of the depth at one end does to the light, relative to it: less where the depth rises by `rise`
- * towards that end, so that most light comes from elsewhere. */
-static nb_real doubt_of_end(nb_real error, nb_real rise)
-{
-    return nb_min(error * nb_min(NB_F(2.0) / nb_max(rise, NB_TINY), NB_F(1.0)), NB_F(1.0));
-}
-
-static sun_step closed_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
-                            nb_wide end)
-{
-    const nb_real zero = NB_F(0.0), h = nb_narrow(end - w->t);
-    nb_real before[3], error[3], behind[3], last_error[3], light[3] = {zero, zero, zero},
-                                                           light_error[3] = {zero, zero, zero};
-    nb_real length = zero;
-    depth_until(m, p, g, w->t, before, error);
-    depth_until(m, p, g, end, behind, last_error);
-    const light_depth from = depth_to_sun(sun, m, w->t, w->lanes), to = depth_to_sun(sun, m, end, w->lanes);
-    for (size_t i = m->present_first; i < m->present_end; i++) {
-        const contact *k = present(m, i);
-        const nb_estimate along = contact_integral(k, w->t, end, h);
-        length = nb_max(length, nb_select(k->inside, along.value, zero));
-        for (int c = 0; c < 3; c++) {
-            light[c] = light[c] + nb_select(k->inside, k->glow[c] * along.value, zero);
-            light_error[c] = light_error[c] + nb_select(k->inside, k->glow[c] * along.error, zero);
-        }
-    }
-    sun_step s = {
-        .start = w->t, .length = h, .error = zero, .rounding = zero, .amount = NB_W(0.0), .amount_error = zero};
-    nb_real least[3], change[3], most_seen[3], ratio[3];
-    for (int c = 0; c < 3; c++) {
-        const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c];
-        least[c] = nb_min(first, last);
-        change[c] = change_of_depth(sun, m, present(m, m->present_first), c, length, last - first);
-    }
-    map_channels(sun->snapshot, transmitted, least, most_seen);
-    map_channels(sun->snapshot, nb_exp_ratio, change, ratio);
-    map_channels(sun->snapshot, transmitted, behind, s.behind);
-    for (int c = 0; c < 3; c++) {
-        const nb_real first = before[c] + from.depth[c], last = behind[c] + to.depth[c];
-        const nb_real seen = most_seen[c] * ratio[c];
-        const nb_real doubt = doubt_of_end(error[c] + from.error[c], first - last) +
-                              doubt_of_end(last_error[c] + to.error[c], last - first);
-        s.light[c] = light[c] * seen;
-        const nb_real rounding = doubt + (least[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
-        s.rounding = nb_max(s.rounding, s.light[c] * rounding + light_error[c] * seen);
-    }
-    return s;
-}
-
 /* What steps of a piece share. */
 typedef struct sun_piece {
     const piece *p;
     gathered before;       /* what was gathered before it */
     nb_real whole, pieces; /* its length; how many there may be */
 } sun_piece;
-
-static void step_in_closed_form(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
-{
-    const nb_wide bright = nb_wmin(sun->shade.toggle, s->p->end);
-    const nb_wide end = nb_wmin(next_turn(sun, w->t, bright), nearest_kink(m, w->t, bright));
-    const sun_step taken = closed_step(sun, m, s->p, &s->before, w, end);
-    take_sun_step(g, w, &taken, end, nb_wmask_false, nb_narrow_mask(w->lanes));
-}
 
 static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
 {
@@ -659,6 +582,10 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathe
     const nb_mask lit = sunlit_lanes(m, p);
     if (!nb_any(lit)) return;
     (void)find_turns(sun, &m->rays, NULL);
+    if (has_closed_steps(sun)) {
+        gather_in_closed_form(sun, m, p, lit, g);
+        return;
+    }
     const sun_piece s = {p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0)};
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
@@ -667,8 +594,6 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathe
         if (nb_wany(dark) && is_grid_alone(sun)) pass_voxels(&sun->shade, m, p, &w, dark);
         if (nb_wany(dark))
             pass_shadow(&sun->shade, m, &s, &w, dark);
-        else if (has_closed_steps(sun))
-            step_in_closed_form(sun, m, &s, &w, g);
         else
             step_along(sun, m, &s, &w, g);
         w.lanes = nb_wand(w.lanes, w.t < p->end);
