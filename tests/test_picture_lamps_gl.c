@@ -5,9 +5,10 @@
 
 #include "pass_help.h"
 #include "picture_help.h"
+#include "random_fog.h"
 #include "test_render_scene.h"
 
-enum { WIDTH = 128, HEIGHT = 96, MANY = 100, BEYOND_ROOM = 700 };
+enum { WIDTH = 128, HEIGHT = 96, MANY = 100, BEYOND_ROOM = 700, FOG_LAMPS = 3, FOG_WIDTH = 48, FOG_HEIGHT = 32 };
 
 static const double pi = 3.14159265358979323846;
 
@@ -178,9 +179,98 @@ static void test_lamps_have_a_limit(void **state)
     nebel_release_snapshot(s.fog);
 }
 
+/* ---- fog ------------------------------------------------------------------------------------- */
+
+/* Lamps among the volumes, and one of them beside. */
+static void strew_lamps(const random_fog *fog, uint64_t *numbers, nebel_lamp lamps[FOG_LAMPS])
+{
+    for (int i = 0; i < FOG_LAMPS; i++) {
+        lamps[i] = (nebel_lamp){.radius = i == 1 ? dice(numbers, .05, 1) : 0};
+        for (int k = 0; k < 3; k++) {
+            lamps[i].position[k] = fog->shift[k] + dice(numbers, -6, 6) * (i == 2 ? 3 : 1);
+            lamps[i].intensity[k] = dice(numbers, 2, 30);
+            lamps[i].direction[k] = dice(numbers, -1, 1);
+        }
+    }
+    lamps[0].type = NEBEL_LAMP_SPOT;
+    lamps[0].outer_angle = dice(numbers, 20, 120);
+    lamps[0].inner_angle = dice(numbers, 0, 1) * lamps[0].outer_angle;
+}
+
+static nebel_snapshot *commit_lit(const nebel_fog_desc *desc, const random_fog *random, const nebel_lamp *lamps)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < random->count; i++)
+        assert_int_equal(nebel_add_volume(fog, &random->volumes[i], NULL), NEBEL_OK);
+    const size_t lamp_count = random->kind == RANDOM_FOG_EXCLUDE ? 1 : FOG_LAMPS;
+    assert_int_equal(nebel_set_lamps(fog, lamp_count, lamps), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static picture_difference check_random(random_fog_kind kind, uint64_t seed)
+{
+    static random_fog random;
+    nebel_lamp lamps[FOG_LAMPS];
+    nb_gl context;
+    uint64_t numbers = seed + 7;
+    random_fog_make(&random, kind, seed);
+    random_fog_light(&random, &numbers);
+    strew_lamps(&random, &numbers, lamps);
+    const nebel_fog_desc desc = random_fog_desc(&random);
+    nebel_snapshot *const fog = commit_lit(&desc, &random, lamps);
+    nebel_camera camera = test_camera(dice(&numbers, -20, 20), dice(&numbers, -4, 8), dice(&numbers, -20, 20), 0, 0, 0);
+    for (int k = 0; k < 3; k++) {
+        camera.position[k] += random.shift[k];
+        camera.look_at[k] += random.shift[k];
+    }
+    if ((seed + kind) % 3 == 1) camera.projection = NEBEL_PROJECTION_PANORAMA;
+    if ((seed + kind) % 3 == 2) camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    const nebel_scene_data scene = {.background = {.1, .1, .1}, .lamp_count = FOG_LAMPS, .lamps = lamps};
+    picture_pair pair = picture_make(FOG_WIDTH, FOG_HEIGHT);
+    pass_open(&context, seed % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
+    picture_render(&scene, fog, &camera, 1, &pair);
+    pass_close(&context);
+    double most = 1;
+    for (size_t i = 0; i < 3 * (size_t)FOG_WIDTH * FOG_HEIGHT; i++)
+        most = fmax(most, (double)pair.cpu.in_scattering[i]);
+    const picture_difference d = picture_compare(&pair, most);
+    print_message("kind %d, seed %d: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255 at %u, %u\n", (int)kind,
+                  (int)seed, d.fogged, d.beyond_step, 255 * d.largest, (unsigned)d.x, (unsigned)d.y);
+    picture_free(&pair);
+    nebel_release_snapshot(fog);
+    return d;
+}
+
+/* Mesa's software ends the loops of many volumes in the light of lamps, and of those that cover others in that of
+ * several: see docs/shaders.md. */
+static void test_lamps_light_fog_as_on_the_cpu(void **state)
+{
+    (void)state;
+    picture_difference all = {.fogged = 0};
+    for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
+        if (kind == RANDOM_FOG_MANY) continue;
+        for (uint64_t seed = 0; seed < 2; seed++) {
+            const picture_difference d = check_random((random_fog_kind)kind, seed);
+            all.fogged += d.fogged;
+            all.beyond_step += d.beyond_step;
+            all.largest = fmax(all.largest, d.largest);
+        }
+    }
+    print_message("all: %zu pixels with fog, %zu beyond 1/255, worst %.2g/255\n", all.fogged, all.beyond_step,
+                  255 * all.largest);
+    assert_true(all.fogged > FOG_WIDTH * FOG_HEIGHT);
+    assert_int_equal(all.beyond_step, 0);
+    assert_true(all.largest <= .5 / 255);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_lamps_light_fog_as_on_the_cpu),
         cmocka_unit_test(test_surfaces_are_lit_as_on_the_cpu),
         cmocka_unit_test(test_many_lamps_cast_shadows),
         cmocka_unit_test(test_lamps_may_change_from_frame_to_frame),

@@ -31,6 +31,14 @@
  *         The same for a ray that does not begin at the eye, as one to a light: `start` and `cutoff` of volumes do not
  *         count.
  *
+ * Lamps (nebel_set_lamps) are packed with the fog that they light, and in-scattering has their light, attenuated by all
+ * fog on its way. Where surfaces keep it away the host says, where it defines before the text
+ *
+ *     NEBEL_LAMP_LIT(lamp, origin, direction, t, end)
+ *         A vec2: what share of the light of lamp number `lamp`, in the order of nebel_set_lamps, reaches the ray from t
+ *         on, and up to where on the ray that holds, more than t and at most `end` (which may be 1e18). Looked up in a
+ *         shadow map, say; all but 0 and 1 is soft shadow.
+ *
  * With NEBEL_VIEW defined before it, the text also declares, in every dialect:
  *
  *     struct nebel_sight { vec3 origin; vec3 direction; float t_max; };
@@ -184,6 +192,9 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 
 /* The feature of fog that has grids: the text needs NEBEL_VOXELS, or NEBEL_VOXEL, defined before it. */
 #define NEBEL_FEATURE_GRID 1048576u
+
+/* The feature of fog that lamps light, which transmittance has no need of. */
+#define NEBEL_FEATURE_LAMPS 2097152u
 
 /* ---- views ----------------------------------------------------------------------------------- */
 

@@ -199,6 +199,11 @@ static void draw_surfaces(const frame *f)
     draw_meshes(f, program);
 }
 
+static int has_lamps(const frame *f)
+{
+    return f->renderer->scene->lamp_count > 0 && f->renderer->meshes.count > 0;
+}
+
 /* ---- fog ------------------------------------------------------------------------------------- */
 
 /* Transmittance 1 and no light. */
@@ -270,6 +275,24 @@ static nebel_result draw_factor(const frame *f)
     return NEBEL_OK;
 }
 
+static void set_lamps(const frame *f, unsigned program)
+{
+    const nb_lamps *const lamps = &f->renderer->lamps;
+    bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
+    bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
+    glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->lamp_count);
+    glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
+    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face);
+}
+
+/* In the programs of passes, too. */
+static void set_lamp_shade(const void *of, unsigned program)
+{
+    glUniform1i(glGetUniformLocation(program, "scene_lamps"), NB_UNIT_LAMPS);
+    glUniform1i(glGetUniformLocation(program, "lamp_maps"), NB_UNIT_LAMP_MAPS);
+    set_lamps(of, program);
+}
+
 /* From the surfaces' distances. */
 static nebel_result draw_exact_fog(const frame *f)
 {
@@ -279,6 +302,9 @@ static nebel_result draw_exact_fog(const frame *f)
                                 .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
     nb_gl_picture picture = {
         .rays = f->rays, .width = f->view.width, .height = f->view.height, .panorama = f->panorama};
+    double low[3], high[3];
+    if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
+        picture.shade = (nb_gl_shade){{nb_lamp_map_text, nb_lamp_shade_text}, set_lamp_shade, f};
     if (!f->panorama && nebel_view_rays(&f->sample_view, &pass.depth, &picture.rays) != NEBEL_OK)
         return NEBEL_ERROR_ARGUMENT;
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
@@ -319,11 +345,6 @@ static nebel_result draw_pixel_fog(const frame *f)
 static int has_particles(const frame *f)
 {
     return f->renderer->particles.count > 0 && !f->method.replaces_fog;
-}
-
-static int has_lamps(const frame *f)
-{
-    return f->renderer->scene->lamp_count > 0 && f->renderer->meshes.count > 0;
 }
 
 /* Particles ask for the renderer's fog before them whatever is on surfaces, and lamps for that before surfaces. */
@@ -415,7 +436,7 @@ static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_
     kind.has_fog = passes != NULL;
     kind.in_texture = fog->texture != 0;
     kind.tiled = fog->tiles != 0;
-    kind.features = fog->features;
+    kind.features = kind.of_particles ? fog->features : fog->features & ~NEBEL_FEATURE_LAMPS;
     return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
 
@@ -548,21 +569,11 @@ static nebel_result prepare_lamps(const frame *f)
     nebel_gl_renderer *const r = f->renderer;
     if (!has_lamps(f)) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_LAMPS);
-    nebel_result result = nb_lamps_set(&r->lamps, &r->allocator, &r->log, r->scene, f->eye);
+    nebel_result result = nb_lamps_set(&r->lamps, &r->allocator, &r->log, r->scene, r->fog, f->eye);
     if (result == NEBEL_OK) result = nb_shading_make_lamp_map(&r->shading, &r->context, &r->log);
     if (result == NEBEL_OK) result = nb_lamps_draw(&r->lamps, &r->context, &r->log, r->shading.lamp_map, &r->meshes);
     glActiveTexture(GL_TEXTURE0);
     return result;
-}
-
-static void set_lamps(const frame *f, unsigned program)
-{
-    const nb_lamps *const lamps = &f->renderer->lamps;
-    bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
-    bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
-    glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->lamp_count);
-    glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
-    glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face);
 }
 
 /* ---- light ----------------------------------------------------------------------------------- */

@@ -16,8 +16,9 @@ struct nebel_gl {
     uint32_t texture_rows, voxel_rows, tile_rows; /* allocated */
     nb_programs programs;
 
-    int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
-    int has_warned;            /* of the turns of loops */
+    int dims_alone; /* the fog is asked for transmittance alone: nothing of it is mixed */
+    int has_warned; /* of the turns of loops */
+    int has_warned_of_lamps;
     int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_snapshot *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
     nebel_snapshot *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
@@ -35,12 +36,21 @@ struct nebel_gl {
 nebel_result nb_gl_set_fog_around(nebel_gl *gl, nebel_snapshot *snapshot, const double eye[3], uint32_t width,
                                   uint32_t height);
 
+/* What keeps light away from fog, as the fog's text asks for it (NEBEL_LAMP_LIT). `set` sets the uniforms of a program
+ * that is current. */
+typedef struct nb_gl_shade {
+    const char *texts[2]; /* before that of the fog; they live for ever. NULL: none */
+    void (*set)(const void *of, unsigned program);
+    const void *of;
+} nb_gl_shade;
+
 /* What a pass is drawn along: rays of another view, or panorama, than the fog was set for, whose pixels lie within
  * those of that. */
 typedef struct nb_gl_picture {
     nebel_rays rays; /* of a panorama: its words */
     uint32_t width, height;
     int panorama;
+    nb_gl_shade shade;
 } nb_gl_picture;
 
 /* nebel_gl_draw_fog along these. */

@@ -41,7 +41,7 @@ static void set_cone(const nebel_lamp *lamp, float *axis, float *rise)
     *rise = is_spot ? (float)fmin(1 / (inner - edge), 1e30) : 1e30f;
 }
 
-static void set_words(const nebel_lamp *lamp, const double eye[3], int layer, float *words)
+static void set_words(const nebel_lamp *lamp, const double eye[3], int layer, int fog_layer, float *words)
 {
     const double radius = fmax(lamp->radius, least_radius);
     nb_camera_subtract(lamp->position, eye, words);
@@ -50,7 +50,18 @@ static void set_words(const nebel_lamp *lamp, const double eye[3], int layer, fl
     words[7] = (float)(radius * radius);
     set_cone(lamp, words + 8, words + 12);
     words[13] = (float)lamp->radius;
-    words[14] = words[15] = 0;
+    words[14] = (float)fog_layer;
+    words[15] = 0;
+}
+
+/* Whether it is the lamp of this number in the fog, too. */
+static int is_in_fog(const nebel_lamp *lamp, const nebel_snapshot *fog, size_t number)
+{
+    double place[3], radius;
+    if (fog == NULL || number >= nebel_snapshot_lamp_count(fog)) return 0;
+    nebel_snapshot_lamp(fog, number, place, &radius);
+    return place[0] == lamp->position[0] && place[1] == lamp->position[1] && place[2] == lamp->position[2] &&
+           radius == lamp->radius;
 }
 
 static void fill_words(nb_lamps *lamps, uint32_t rows)
@@ -188,7 +199,7 @@ static int choose_layers(nb_lamps *lamps, const nebel_allocator *allocator, cons
 }
 
 nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_log *log,
-                          const nebel_scene_data *scene, const double eye[3])
+                          const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3])
 {
     const uint32_t rows = (uint32_t)(scene->lamp_count * NB_LAMP_TEXELS / NEBEL_TEXTURE_WIDTH + 1);
     if (scene->lamp_count == 0) return NEBEL_OK;
@@ -198,8 +209,11 @@ nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, con
                        scene->lamp_count, (int)NB_LAMPS_MOST);
     }
     if (!make_room(lamps, allocator, rows) || !choose_layers(lamps, allocator, scene, eye)) return out_of_memory(log);
-    for (size_t i = 0; i < scene->lamp_count; i++)
-        set_words(&scene->lamps[i], eye, lamps->layers[i], lamps->texels + 4 * NB_LAMP_TEXELS * i);
+    for (size_t i = 0; i < scene->lamp_count; i++) {
+        const nebel_lamp *const lamp = &scene->lamps[i];
+        const int layer = lamps->layers[i];
+        set_words(lamp, eye, layer, is_in_fog(lamp, fog, i) ? layer : -1, lamps->texels + 4 * NB_LAMP_TEXELS * i);
+    }
     fill_words(lamps, rows);
     return nb_context_check_memory(log, "the lamps");
 }

@@ -7,7 +7,8 @@
 #include <nebel/scene.h>
 
 /* Lamps of a scene; texels of each among the words; texels around a face of a map that are its neighbours'. */
-enum { NB_LAMPS_MOST = 4096, NB_LAMP_TEXELS = 4, NB_LAMP_BORDER = 4 };
+enum { NB_LAMPS_MOST = 4096, NB_LAMP_BORDER = 4 };
+#define NB_LAMP_TEXELS 4 /* a part of a shader's text, too */
 
 /* What a layer of the maps shows: surfaces around a place, none nearer than the radius. */
 typedef struct nb_lamp_source {
@@ -27,11 +28,11 @@ typedef struct nb_lamps {
     size_t capacity;         /* of the two */
 } nb_lamps;
 
-/* Makes the words of a scene's lamps as seen from an eye, and chooses which of them have maps: all that shine while
+/* Makes the words of a scene's lamps, and of those of the fog (NULL: none) that are the same, as seen from an eye, and chooses which of them have maps: all that shine while
  * there is room, then those that are brightest at the eye. Changes the bindings of TEXTURE_2D on the active unit. LIMIT,
  * MEMORY. */
 nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, const nebel_log *log,
-                          const nebel_scene_data *scene, const double eye[3]);
+                          const nebel_scene_data *scene, const nebel_snapshot *fog, const double eye[3]);
 
 /* Draws the maps that are not there yet. `program` is nb_shading.lamp_map. Depth is tested afterwards. MEMORY. */
 nebel_result nb_lamps_draw(nb_lamps *lamps, const nb_context *context, const nebel_log *log, unsigned program,
@@ -41,7 +42,9 @@ nebel_result nb_lamps_draw(nb_lamps *lamps, const nb_context *context, const neb
 void nb_lamps_delete(const nb_lamps *lamps);
 void nb_lamps_release(const nebel_allocator *allocator, const nb_lamps *lamps);
 
-/* The programs that make the maps, and functions that read them and the words: lamp_visible, lamplight. */
-extern const char nb_lamp_map_vertex_text[], nb_lamp_map_fragment_text[], nb_lamp_map_text[], nb_lamp_text[];
+/* The programs that make the maps, and functions that read them and the words: lamp_visible; lamplight; what
+ * nebel_shader_text asks of surfaces, to stand before it. The last two behind the first. */
+extern const char nb_lamp_map_vertex_text[], nb_lamp_map_fragment_text[], nb_lamp_map_text[], nb_lamp_text[],
+    nb_lamp_shade_text[];
 
 #endif

@@ -251,6 +251,7 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     glUniform2i(p->corner, (GLint)t->pass->x, (GLint)t->pass->y);
     if (t->gl->fog.tiles != 0) set_tiling(t);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
+    if (t->picture->shade.set != NULL) t->picture->shade.set(t->picture->shade.of, p->name);
 }
 
 static void draw_triangles(const task *t)
@@ -290,7 +291,8 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .depth = t->pass->depth.kind,
                                   .from_eye = t->picture->rays.from_eye,
                                   .panorama = t->picture->panorama,
-                                  .features = gl->fog.features};
+                                  .features = gl->fog.features,
+                                  .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =
         nb_programs_find(&gl->programs, &gl->context, &gl->allocator, &gl->log, &kind, &t->program);
     return result == NEBEL_OK ? draw(t, target_framebuffer) : result;

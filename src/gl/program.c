@@ -228,6 +228,9 @@ static void set_uniforms(nb_program *program)
     glUniform1i(glGetUniformLocation(name, "pass_color"), NB_UNIT_COLOR);
 }
 
+/* The fog's text has its own. */
+static const char precision_text[] = "#ifdef GL_ES\nprecision highp float;\nprecision highp int;\n#endif\n";
+
 static nebel_result make(const nb_context *context, const nebel_log *log, const nb_program_kind *kind,
                          nb_program *program)
 {
@@ -237,7 +240,10 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
     const char *const ray = kind->panorama ? nb_panorama_ray_text : "";
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts fragment = {{head, fog, ray, tile, fragment_text}, 5};
+    const int is_shaded = kind->shade[0] != NULL;
+    const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
+                                is_shaded ? kind->shade[1] : "", fog, ray, tile, fragment_text},
+                               8};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
@@ -248,7 +254,7 @@ static int is_same(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
            a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
-           a->features == b->features;
+           a->features == b->features && a->shade[0] == b->shade[0] && a->shade[1] == b->shade[1];
 }
 
 nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,

@@ -588,7 +588,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
     (void)snprintf(
         text, size,
         "%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
-        "%d\n#define NB_LAMP_TEXELS %d\n#define NEBEL_FEATURES %u\n%s",
+        "%d\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
         kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
@@ -596,7 +596,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
         kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "", kind->of_particles,
-        kind->veil_layers, NB_CASCADES, NB_LAMP_TEXELS, (unsigned)kind->features, precision_of(context));
+        kind->veil_layers, NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)

@@ -125,6 +125,24 @@ static void warn_of_turns(nebel_gl *gl)
         (unsigned)gl->fog.tile_most, (const char *)glGetString(GL_RENDERER), (int)SURELY_WALKED);
 }
 
+/* Each stretch between the ends of volumes takes some two steps for each lamp, of eight places, at which all volumes of
+ * the tile are asked, and all there are on the way to the lamp. */
+static void warn_of_lamps(nebel_gl *gl, const nebel_snapshot *snapshot)
+{
+    const double lamps = (double)nebel_snapshot_lamp_count(snapshot),
+                 all = (double)nebel_snapshot_volume_count(snapshot);
+    const double listed = gl->fog.tiles != 0 ? (double)gl->fog.tile_most : all;
+    const int is_much = lamps * (2 * listed) * 2 * 8 * (listed + all) > (double)gl->context.most_turns;
+    const int is_lit = (gl->fog.features & NEBEL_FEATURE_LAMPS) != 0 && !gl->dims_alone;
+    if (gl->context.most_turns == 0 || gl->has_warned_of_lamps || !is_lit || !is_much) return;
+    gl->has_warned_of_lamps = 1;
+    (void)nb_fail(&gl->log, NEBEL_OK,
+                  "nebel_gl_set_fog: %.0f lamps light up to %.0f volumes on a ray. This driver (%s) ends long loops: "
+                  "light of lamps that is far behind others' may be missing. A graphics processor or the CPU renderer "
+                  "has no such bound",
+                  lamps, listed, (const char *)glGetString(GL_RENDERER));
+}
+
 /* ---- textures -------------------------------------------------------------------------------- */
 
 typedef struct texel_kind {
@@ -297,6 +315,7 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     if (result == NEBEL_OK) result = upload(gl, has_words ? NULL : snapshot, entry_count);
     keep(&gl->packed, result == NEBEL_OK ? snapshot : NULL);
     if (result == NEBEL_OK) warn_of_turns(gl);
+    if (result == NEBEL_OK) warn_of_lamps(gl, snapshot);
     gl->has_fog = result == NEBEL_OK;
     return result;
 }

@@ -28,7 +28,7 @@ struct nb_media_sum {
     bool met, emits;
     bool mixed; /* more than one quotient of light and extinction */
     bool covers; /* one that covers is met, and another */
-    bool sunlit;
+    bool scatters; /* light of sun or lamps */
 };
 
 nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
@@ -41,7 +41,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     sum.emits = false;
     sum.mixed = false;
     sum.covers = false;
-    sum.sunlit = false;
+    sum.scatters = false;
     bool any = false;
     bool covering = false;
     int most = NB_HAS(NB_HAS_SEVERAL) ? count : 1; /* with one, all places in the words are constants */
@@ -74,7 +74,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
             sum.mixed = sum.mixed || (sum.met && (other || emits || sum.emits));
             sum.emits = sum.emits || emits;
             sum.met = true;
-            if (NB_HAS(NB_HAS_SUN)) sum.sunlit = sum.sunlit || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
+            if (NB_HAS(NB_HAS_SUN | NB_HAS_LAMPS)) sum.scatters = sum.scatters || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
             sum.radiance = radiance.xyz;
             sum.depth += extinction.xyz * length;
             sum.light += light.xyz * length;
@@ -708,6 +708,9 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit, nb_
 
 /* ---- the face -------------------------------------------------------------------------------- */
 
+/* See lamp.glsl. */
+nb_vec3 nb_lamplight(nb_ray ray, int first, int count, bool listed);
+
 /* See nebel_set_max_opacity. */
 nebel_light nb_limit_opacity(nebel_light light, float most)
 {
@@ -736,12 +739,13 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
         light.transmittance = attenuation.left;
         light.in_scattering = sum.light * attenuation.mean;
         bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
-        bool walks = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.sunlit);
+        bool walks = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
         if (covers || (lit && walks)) {
             nb_gathered walked = nb_walk(ray, first, count, listed, lit, sum);
             light.in_scattering = walked.radiance;
             if (covers) light.transmittance = nb_exp3(-walked.depth);
         }
+        if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) light.in_scattering += nb_lamplight(ray, first, count, listed);
         if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
         light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
     }

@@ -2,9 +2,10 @@
  * GLSL and HLSL. A word is four floats; integers are kept as floats, exact to 2^24, because a texture may change the
  * bits of small numbers. Lengths are in metres, places relative to the packed eye, distances at most 1e18 in size.
  *
- * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, 0.
+ * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, lamps that light
+ *         fog.
  * Word 1: the direction towards the sun, of length 1; 1 where what the sun adds has a closed form between turns.
- * Word 2: the sun's irradiance; 0. Words 1 and 2 are 0 where no medium is sunlit.
+ * Word 2: the sun's irradiance; the first word of the lamps. The sun's numbers are 0 where no medium is sunlit.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
@@ -29,6 +30,12 @@
  *     1  first lobe: factor, alpha, peak, slope of nb_phase_lobe
  *     2  second lobe; zeros where there is none
  *
+ * A lamp, NB_LAMP_WORDS words; for formulas/lamp.inc:
+ *     0  place, square of the radius, which is not 0
+ *     1  intensity, how near to its place light does not pass through fog [m]
+ *     2  axis and cosine at the edge of its cone; 0, -1 where it has none
+ *     3  what nb_lamp_cone calls rise, cosine of the inner angle, 0, 0
+ *
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
  * both must hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule;
  * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's.
@@ -45,6 +52,7 @@
 
 #define NB_HEADER_WORDS 3
 #define NB_HEADER_SUN 1
+#define NB_HEADER_LAMPS 2 /* its last number */
 #define NB_MEDIUM_WORDS 10
 #define NB_MEDIUM_LEAF 4
 #define NB_MEDIUM_START 5
@@ -52,6 +60,7 @@
 #define NB_MEDIUM_SCATTERING 7
 #define NB_LEAF_WORDS 6
 #define NB_SCATTERING_WORDS 3
+#define NB_LAMP_WORDS 4
 
 #define NB_KIND_CONSTANT 0
 #define NB_KIND_HEIGHT 1        /* grows below the base */
@@ -100,7 +109,8 @@
 #define NB_HAS_SOFT_PLANES 262144
 #define NB_HAS_SUN 524288 /* which lights fog */
 #define NB_HAS_GRID 1048576
-#define NB_HAS_ALL 2097151
+#define NB_HAS_LAMPS 2097152 /* as the sun does */
+#define NB_HAS_ALL 4194303
 #define NB_HAS_SOFT (NB_HAS_SOFT_EDGE | NB_HAS_SOFT_ROUND | NB_HAS_SOFT_PLANES)
 #define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL | NB_HAS_GRID)
 

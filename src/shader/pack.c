@@ -47,7 +47,8 @@ static void set_color(nebel_word *word, const double v[3], double last)
     word->v[3] = (float)last;
 }
 
-_Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID,
+_Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID &&
+                   NEBEL_FEATURE_LAMPS == NB_HAS_LAMPS,
                "the public names of features");
 
 /* ---- leaves ---------------------------------------------------------------------------------- */
@@ -273,6 +274,27 @@ static void pack_sun(const nebel_snapshot *snapshot, nebel_word word[2])
     set_color(&word[1], snapshot->irradiance, 0);
 }
 
+static void pack_lamp(const packer *p, const nb_lamp *lamp, nebel_word word[NB_LAMP_WORDS])
+{
+    long double place[3];
+    for (int i = 0; i < 3; i++) place[i] = (long double)lamp->place[i] - p->eye[i];
+    memset(word, 0, NB_LAMP_WORDS * sizeof *word);
+    set_word(&word[0], place, lamp->radius2);
+    set_color(&word[1], lamp->intensity, lamp->clear);
+    set_color(&word[2], lamp->axis, lamp->is_spot ? lamp->edge : -1);
+    word[3].v[0] = lamp->is_spot ? (float)lamp->rise : 1e30f; /* without a cone everything is within */
+    word[3].v[1] = (float)lamp->inner;
+}
+
+static void pack_lamps(packer *p, const nebel_snapshot *snapshot)
+{
+    if (!snapshot->is_lamplit) return;
+    p->words[0].v[3] = (float)snapshot->lamp_count;
+    p->words[NB_HEADER_LAMPS].v[3] = (float)p->used;
+    for (size_t i = 0; i < snapshot->lamp_count; i++, p->used += NB_LAMP_WORDS)
+        pack_lamp(p, &snapshot->lamps[i], &p->words[p->used]);
+}
+
 /* ---- fog ------------------------------------------------------------------------------------- */
 
 static double light_flags(const nb_medium *medium, size_t rank)
@@ -305,15 +327,12 @@ static size_t count_words(const nebel_snapshot *snapshot)
         count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_WORDS : 0);
         count += scatters(&snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
     }
+    if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LAMP_WORDS;
     return count;
 }
 
 static nebel_result refuse_light(const nebel_snapshot *snapshot)
 {
-    if (snapshot->is_lamplit)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot light fog with lamps yet; use nebel_trace or the CPU's renderer "
-                       "(--device cpu), or give volumes a source instead of an albedo");
     if (snapshot->diffusion != NULL)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
                        "pack: shaders cannot show light that fog scatters more than once; use nebel_trace or the CPU's "
@@ -322,10 +341,11 @@ static nebel_result refuse_light(const nebel_snapshot *snapshot)
         return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
                        "pack: shaders cannot light fog with a gradient or a map yet; use nebel_trace or the CPU's "
                        "renderer (--device cpu), or a constant ambient light");
-    if (snapshot->is_sunlit && nb_has_voxels(snapshot))
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot light fog with the sun where there are grids yet; use nebel_trace or the "
-                       "CPU's renderer (--device cpu), or give volumes a source instead of an albedo");
+    if ((snapshot->is_sunlit || snapshot->is_lamplit) && nb_has_voxels(snapshot))
+        return nb_fail(
+            &snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+            "pack: shaders cannot light fog with sun or lamps where there are grids yet; use nebel_trace or the "
+            "CPU's renderer (--device cpu), or give volumes a source instead of an albedo");
     return NEBEL_OK;
 }
 
@@ -365,6 +385,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
         pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
     }
+    pack_lamps(&p, snapshot);
     nb_restore_precision(precision);
     nb_place_voxels(snapshot, words);
     return NEBEL_OK;
@@ -419,7 +440,8 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
 {
     if (snapshot == NULL) return NB_HAS_ALL;
     uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
-                        (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0);
+                        (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0) |
+                        (snapshot->is_lamplit ? NB_HAS_LAMPS : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |

@@ -456,12 +456,15 @@ static int is_black(const double rgb[3])
 int nb_draft_is_for_cpu(const nb_draft *draft)
 {
     const nb_edition *const good = &draft->good;
+    const nebel_scene_data *const file = nebel_scene_contents(draft->file);
     const int has_sun = good->has_sun && !is_black(good->sun_irradiance);
-    const int is_lit = has_sun || nebel_scene_contents(draft->file)->lamp_count > 0;
-    int is =
-        nebel_scene_contents(draft->file)->diffusion != NULL || good->environment.type != NEBEL_ENVIRONMENT_CONSTANT;
-    for (size_t i = 0; i < good->count && !is; i++) is = is_lit && !is_black(good->volumes[i].albedo);
-    return is;
+    int scatters = 0, has_voxels = 0;
+    for (size_t i = 0; i < good->count; i++) {
+        scatters |= !is_black(good->volumes[i].albedo);
+        has_voxels |= good->volumes[i].density.type == NEBEL_DENSITY_GRID;
+    }
+    const int is_beyond = file->diffusion != NULL || good->environment.type != NEBEL_ENVIRONMENT_CONSTANT;
+    return is_beyond || (scatters && (has_sun || (file->lamp_count > 0 && has_voxels)));
 }
 
 int nb_draft_can_save_camera(const nb_draft *draft)

@@ -1,0 +1,352 @@
+/* Light of lamps that fog scatters towards the eye, once, as src/march/trace_lamp.h has it: steps of equal angles as the lamp sees them
+ * (formulas/lamp.inc), Kronrod's seven nodes compared with the three of Gauss's rule among them, a step made shorter until they agree.
+ *
+ * What surfaces keep away is the host's to say, by a function that it defines before this text:
+ *
+ *     #define NEBEL_LAMP_LIT(lamp, origin, direction, t, end)
+ *
+ * is a vec2: the share of the light of lamp number `lamp` that reaches the ray from t on, and up to where along the ray that holds, at
+ * most `end`. */
+#ifndef NEBEL_LAMP_LIT
+#define NEBEL_LAMP_LIT(lamp, origin, direction, t, end) nb_vec2(1.0, end)
+#endif
+
+/* A lamp that is passed by a ray. */
+struct nb_lamp_pass {
+    int number;
+    nb_vec3 intensity, axis;
+    float radius2, clear, edge, inner, rise;
+    nb_vec3 foot;   /* from the lamp to the place closest to it on the line of the ray */
+    float closest;  /* where that is, m along the ray */
+    float aside2;   /* its distance squared */
+    float aside;    /* its distance, at least the lamp's radius */
+};
+
+nb_lamp_pass nb_pass_lamp(nb_ray ray, int number)
+{
+    int at = int(NEBEL_WORD(NB_HEADER_LAMPS).w) + NB_LAMP_WORDS * number;
+    nb_vec4 place = NEBEL_WORD(at);
+    nb_vec4 intensity = NEBEL_WORD(at + 1);
+    nb_vec4 axis = NEBEL_WORD(at + 2);
+    nb_vec4 cone = NEBEL_WORD(at + 3);
+    nb_vec3 apart = ray.origin - place.xyz;
+    nb_lamp_pass by;
+    by.number = number;
+    by.intensity = intensity.xyz;
+    by.axis = axis.xyz;
+    by.radius2 = place.w;
+    by.clear = intensity.w;
+    by.edge = axis.w;
+    by.inner = cone.y;
+    by.rise = cone.x;
+    by.closest = -dot(apart, ray.direction);
+    by.foot = apart + ray.direction * by.closest;
+    by.aside2 = dot(by.foot, by.foot);
+    by.aside = sqrt(max(by.aside2, by.radius2));
+    return by;
+}
+
+/* The most irradiance between two places, times the length over which it may last: an angle over a distance. */
+float nb_most_fluence(nb_lamp_pass by, float start, float end)
+{
+    float nearest = clamp(by.closest, start, end) - by.closest;
+    return nb_lamp_fluence(by.aside2 + nearest * nearest, by.radius2) * nb_largest(by.intensity);
+}
+
+/* The first root of a u^2 + 2 b u + c behind t, u from the closest place on, or `end`. */
+float nb_root_behind(float closest, float t, float end, float a, float b, float c)
+{
+    float square = b * b - a * c;
+    float next = end;
+    if (square >= 0.0) {
+        float root = sqrt(square);
+        float sum = -(b + (b < 0.0 ? -root : root));
+        float one = closest + sum * nb_rcp_bounded(a);
+        float other = closest + c * nb_rcp_bounded(sum);
+        if (one > t) next = min(next, one);
+        if (other > t) next = min(next, other);
+    }
+    return next;
+}
+
+/* Where the ray next enters or leaves the lamp, or the light of its cone changes otherwise. */
+float nb_lamp_turn(nb_lamp_pass by, nb_ray ray, float t, float end)
+{
+    float near = t + max(abs(t) * (8.0 * NB_EPSILON), 1e-6);
+    float next = nb_root_behind(by.closest, near, end, 1.0, 0.0, by.aside2 - by.radius2);
+    if (by.edge > -1.0) {
+        float f = dot(by.foot, by.axis);
+        float d = dot(ray.direction, by.axis);
+        float edge2 = by.edge * by.edge;
+        float inner2 = by.inner * by.inner;
+        next = nb_root_behind(by.closest, near, next, d * d - edge2, f * d, f * f - edge2 * by.aside2);
+        next = nb_root_behind(by.closest, near, next, d * d - inner2, f * d, f * f - inner2 * by.aside2);
+    }
+    return next;
+}
+
+/* ---- media ----------------------------------------------------------------------------------- */
+
+/* A piece of the ray on which the same media are there, at and behind `start`. */
+struct nb_lamp_piece {
+    float start, end;
+    int floor;        /* what ranks lower is covered */
+    int media;        /* how many to ask: those in slots, or in a crowd all */
+    bool crowd;
+    bool scatters;
+    nb_vec3 depth;    /* of all of it */
+    float scatter;    /* radiance per irradiance that opaque fog of it gives at most */
+};
+
+/* Of all lobes at their peaks, of either side. */
+float nb_most_scattered(int scattering)
+{
+    nb_vec4 albedo = NEBEL_WORD(scattering);
+    float most = 0.0;
+    for (int i = 1; i <= int(albedo.w); i++) {
+        nb_vec4 lobe = NEBEL_WORD(scattering + i);
+        most += lobe.x * (1.0 + lobe.y) / (lobe.z * sqrt(lobe.z));
+    }
+    return most * nb_largest(albedo.xyz);
+}
+
+/* Word of the medium number `i` of a piece; where they are more than there are slots each is asked whether it is there, 0: it is not. */
+int nb_lamp_medium(nb_ray ray, int first, bool listed, nb_lamp_piece piece, int i, inout int turns)
+{
+    int at = 0;
+    if (!piece.crowd) {
+        at = int(nb_slot(i).z);
+    } else {
+        int asked = nb_medium_at(first + i, listed);
+        int leaves = int(NEBEL_WORD(asked + 2).w);
+        nb_stretch s = nb_next_stretch(asked, leaves, ray, piece.start);
+        turns += nb_stretch_turns(leaves, s);
+        if (s.enter <= piece.start && s.leave > piece.start) at = asked;
+        if (int(NEBEL_WORD(asked).w) == NB_KIND_EXCLUDE || nb_is_covered(asked, piece.floor)) at = 0;
+    }
+    return at;
+}
+
+/* Keeps what is not covered. */
+int nb_drop_covered(int used, int floor)
+{
+    int kept = 0;
+    for (int i = 0; i < used; i++) {
+        nb_vec3 slot = nb_slot(i);
+        int at = int(slot.z);
+        if (nb_is_covered(at, floor) || int(NEBEL_WORD(at).w) == NB_KIND_EXCLUDE) continue;
+        nb_set_slot(kept, at, nb_stretch_of(slot.x, slot.y));
+        kept++;
+    }
+    return kept;
+}
+
+nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float t, inout int turns)
+{
+    nb_lamp_piece piece;
+    piece.start = t;
+    piece.end = ray.t_max;
+    piece.floor = 0;
+    piece.media = 0;
+    piece.crowd = false;
+    piece.scatters = false;
+    piece.depth = nb_splat3(0.0);
+    piece.scatter = 0.0;
+    for (int i = 0; i < count; i++) {
+        int at = nb_medium_at(first + i, listed);
+        int leaves = int(NEBEL_WORD(at + 2).w);
+        nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+        turns += nb_stretch_turns(leaves, s);
+        if (!(s.enter < s.leave)) continue;
+        piece.end = min(piece.end, s.enter > t ? s.enter : s.leave);
+        if (s.enter > t) continue;
+        int flags = int(NEBEL_WORD(at + 1).w);
+        if (NB_HAS(NB_HAS_COVER) && (flags & NB_LIGHT_COVERS) != 0) piece.floor = max(piece.floor, flags / NB_LIGHT_RANK);
+        if (piece.media < NEBEL_SLOTS) nb_set_slot(piece.media, at, s);
+        piece.media++;
+    }
+    piece.crowd = piece.media > NEBEL_SLOTS;
+    if (NB_HAS(NB_HAS_COVER) && !piece.crowd) piece.media = nb_drop_covered(piece.media, piece.floor);
+    if (piece.crowd) piece.media = count;
+    for (int i = 0; i < piece.media; i++) {
+        int at = nb_lamp_medium(ray, first, listed, piece, i, turns);
+        turns += 1;
+        if (at == 0) continue;
+        nb_vec4 extinction = NEBEL_WORD(at);
+        int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
+        piece.depth += extinction.xyz * nb_integral(nb_profile_of(at, int(extinction.w), ray, t), piece.end - t);
+        if (scattering > 0) {
+            piece.scatters = true;
+            piece.scatter = max(piece.scatter, nb_most_scattered(scattering));
+        }
+    }
+    return piece;
+}
+
+/* What media make of light at a place of the piece. */
+struct nb_lamp_place {
+    nb_vec3 depth;      /* from the start of the piece */
+    nb_vec3 extinction;
+    nb_vec3 glow;       /* radiance per metre and irradiance that comes from `towards` */
+};
+
+nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piece piece, float t, nb_vec3 towards, inout int turns)
+{
+    nb_lamp_place place;
+    place.depth = nb_splat3(0.0);
+    place.extinction = nb_splat3(0.0);
+    place.glow = nb_splat3(0.0);
+    for (int i = 0; i < piece.media; i++) {
+        int at = nb_lamp_medium(ray, first, listed, piece, i, turns);
+        turns += 1;
+        if (at == 0) continue;
+        nb_vec4 extinction = NEBEL_WORD(at);
+        nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
+        int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
+        nb_vec3 here = extinction.xyz * nb_density(profile, t - piece.start);
+        place.depth += extinction.xyz * nb_integral(profile, t - piece.start);
+        place.extinction += here;
+        if (scattering > 0) place.glow += here * NEBEL_WORD(scattering).xyz * nb_scattered(scattering, ray.direction, towards);
+    }
+    return place;
+}
+
+/* ---- steps ----------------------------------------------------------------------------------- */
+
+/* Kronrod's extension of Gauss's rule of three nodes on [0, 1], whose nodes are the second, the middle and the last but one. Source:
+ * Kronrod, Nodes and Weights of Quadrature Formulas, 1965. */
+#define NB_LAMP_NODES 7
+
+float nb_lamp_node(int j)
+{
+    int k = j < 3 ? 3 - j : j - 3;
+    float off = k == 0 ? 0.0 : k == 1 ? 0.21712187467340129 : k == 2 ? 0.38729833462074169 : 0.48024563435401014;
+    return j < 3 ? 0.5 - off : 0.5 + off;
+}
+
+float nb_lamp_weight(int j)
+{
+    int k = j < 3 ? 3 - j : j - 3;
+    return k == 0 ? 0.22545826932923707 : k == 1 ? 0.20069870738798111 : k == 2 ? 0.13424404493416672 : 0.052328113013233632;
+}
+
+float nb_lamp_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j == 5 ? 5.0 / 18.0 : 0.0; }
+
+struct nb_lamp_step {
+    nb_vec3 light;
+    float error;
+};
+
+/* Light of the first part of a swing, up to w = length, of which `drop` of transmittance is lost. `before` is the depth in front of the
+ * piece. Where nodes do not see that loss they have passed over what causes it. */
+nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing,
+                               float length, nb_vec3 before, nb_vec3 drop, inout int turns)
+{
+    nb_vec3 seven = nb_splat3(0.0);
+    nb_vec3 three = nb_splat3(0.0);
+    nb_vec3 taken = nb_splat3(0.0);
+    for (int j = 0; j < NB_LAMP_NODES; j++) {
+        float w = length * nb_lamp_node(j);
+        float t = nb_swing_place(swing, w);
+        float from = t - by.closest;
+        nb_vec3 apart = by.foot + ray.direction * from;
+        float square = dot(apart, apart);
+        float distance = sqrt(square);
+        nb_vec3 towards = apart * -nb_rcp_bounded(distance);
+        float speed = (by.aside * by.aside + from * from) * nb_swing_rate(swing, w) * length;
+        float cosine = -dot(towards, by.axis);
+        float fluence = nb_lamp_fluence(square, by.radius2) * speed * nb_lamp_cone(cosine, by.edge, by.rise);
+        nb_lamp_place place = nb_place_in_piece(ray, first, listed, piece, t, towards, turns);
+        nb_vec3 depth = before + place.depth;
+        nb_vec3 light = nb_splat3(0.0);
+        if (fluence > 0.0) {
+            nb_vec3 to_lamp = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), turns);
+            light = place.glow * by.intensity * fluence * nb_exp3(-(depth + to_lamp));
+        }
+        seven += nb_lamp_weight(j) * light;
+        three += nb_lamp_weight_of_three(j) * light;
+        taken += nb_lamp_weight(j) * speed * place.extinction * nb_exp3(-depth);
+    }
+    float end = nb_swing_place(swing, length);
+    float most = nb_most_fluence(by, swing.start, end) * piece.scatter;
+    nb_lamp_step s;
+    s.light = seven;
+    s.error = max(nb_largest(abs(seven - three)), most * nb_largest(abs(taken - drop)));
+    s.error = min(s.error, most * nb_largest(drop));
+    return s;
+}
+
+/* Behind a lamp nothing of its light is left [m]; squares of squares of it are numbers. */
+#define NB_LAMP_REACH 1e8
+
+/* Steps that a lamp takes in a piece; the rest is one. A step is a right angle at most. */
+#define NB_MOST_LAMP_STEPS 96
+
+/* The light of one lamp in a piece. */
+nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_vec3 before,
+                           float tolerance, inout int turns)
+{
+    nb_vec3 sum = nb_splat3(0.0);
+    nb_vec3 seen = nb_exp3(-before);
+    nb_vec2 lit = nb_vec2(1.0, piece.start);
+    float t = piece.start;
+    float far = min(piece.end, by.closest + NB_LAMP_REACH);
+    float guess = 1.0;
+    for (int i = 0; i < NB_MOST_LAMP_STEPS; i++) {
+        if (!(t < far) || nb_is_tired(turns)) break;
+        if (lit.y <= t) {
+            lit = NEBEL_LAMP_LIT(by.number, ray.origin, ray.direction, t, far);
+            lit.y = min(max(lit.y, t + max(t * (8.0 * NB_EPSILON), 1e-6)), far);
+        }
+        bool last = i + 1 == NB_MOST_LAMP_STEPS;
+        float stop = last ? far : nb_lamp_turn(by, ray, t, lit.y);
+        nb_swing swing = nb_swing_between(by.closest, by.aside, t, stop);
+        float length = lit.x > 0.0 && !last ? min(min(guess, 1.0), swing.end) : swing.end;
+        float end = length >= swing.end ? stop : min(nb_swing_place(swing, length), stop);
+        nb_vec3 behind = nb_exp3(-(before + nb_place_in_piece(ray, first, listed, piece, end, ray.direction, turns).depth));
+        turns += NB_LAMP_NODES + 1;
+        bool fits = true;
+        if (lit.x > 0.0) {
+            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, before, seen - behind, turns);
+            fits = last || taken.error <= tolerance || length < 1e-4;
+            if (fits) sum += lit.x * taken.light;
+            guess = fits ? max(guess, 2.0 * length) : 0.5 * length;
+        }
+        if (fits) {
+            t = end;
+            seen = behind;
+        }
+    }
+    return sum;
+}
+
+/* ---- all lamps ------------------------------------------------------------------------------- */
+
+/* Nodes of a step are far better than the three that its error is told by. */
+#define NB_LAMP_TOLERANCE 60.0
+/* What lamps that are left out may give, of that. */
+#define NB_FAINT_SHARE 0.05
+
+nb_vec3 nb_lamplight(nb_ray ray, int first, int count, bool listed)
+{
+    nb_vec3 sum = nb_splat3(0.0);
+    nb_vec3 before = nb_splat3(0.0);
+    float tolerance = NEBEL_WORD(0).y * NB_LAMP_TOLERANCE;
+    int lamps = int(NEBEL_WORD(0).w);
+    int turns = 0;
+    float t = 0.0;
+    while (t < ray.t_max && nb_smallest(before) < NB_OPAQUE && !nb_is_tired(turns)) {
+        nb_lamp_piece piece = nb_next_piece(ray, first, count, listed, t, turns);
+        nb_vec3 drop = nb_exp3(-before) - nb_exp3(-(before + piece.depth));
+        for (int i = 0; i < (piece.scatters ? lamps : 0); i++) {
+            nb_lamp_pass by = nb_pass_lamp(ray, i);
+            float most = nb_most_fluence(by, piece.start, piece.end) * piece.scatter * nb_largest(drop);
+            turns += 1;
+            if (most * float(lamps) <= tolerance * NB_FAINT_SHARE) continue;
+            sum += nb_light_past_lamp(ray, first, listed, piece, by, before, tolerance, turns);
+        }
+        before += piece.depth;
+        t = piece.end;
+    }
+    return sum;
+}
