@@ -268,6 +268,37 @@ class KeysTest(ViewTest):
         self.assertEqual([key["frame"] for key in viewer.save()["fog"][0]["keys"]], [0, 30])
         viewer.end()
 
+    def test_keys_of_the_camera(self):
+        self.scene = self.write_scene("scene.json", [FOG], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        before = self.scene.read_text()
+        viewer = Viewer(self, "--size", "400x900")
+        viewer.type("samples", "1")
+        viewer.press("fog[0].open")
+        viewer.press("Camera")
+        viewer.press("camera[0].Add a key here")
+        viewer.press("Time")
+        viewer.type("frame", "24")
+        viewer.type("eye", "2", 0.1)
+        viewer.press("camera[0].Add a key here")
+        keys = viewer.save()["camera"]["keys"]
+        self.assertEqual([(key["frame"], key["position"]) for key in keys], [(0, [0, 0, 6]), (24, [2, 0, 6])])
+        viewer.type("frame", "12")
+        self.assertTrue(self.same(viewer.take_picture(), self.draw_at("12.png", 12), ROUNDING_TOGETHER))
+        viewer.press("camera[0].keys[1].Go")
+        viewer.type("eye", "3", 0.1)
+        viewer.press("camera[0].Change the key here")
+        viewer.type("camera[0].keys[1].##frame", "30")
+        keys = viewer.save()["camera"]["keys"]
+        self.assertEqual([(key["frame"], key["position"]) for key in keys], [(0, [0, 0, 6]), (30, [3, 0, 6])])
+        viewer.press("camera[0].keys[1].x")
+        viewer.press("camera[0].keys[0].x")
+        viewer.save()
+        self.assertEqual(json.loads(self.scene.read_text()), json.loads(before))
+        viewer.press("Undo")
+        viewer.press("Undo")
+        self.assertEqual(viewer.save()["camera"]["keys"], keys)
+        viewer.end()
+
     def test_time_goes_on(self):
         fog = {**FOG, "keys": [{"frame": 0, "extinction": 0.001}, {"frame": 100000}]}
         self.scene = self.write_scene("scene.json", [fog], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})

@@ -186,6 +186,9 @@ const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene);
  * and after the last). */
 nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
 
+/* The same of any 1 or more keys. */
+nebel_camera nebel_camera_between_keys(const nebel_camera_key *keys, size_t count, double frame);
+
 /* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
 nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);

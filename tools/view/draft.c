@@ -249,21 +249,13 @@ static int is_saved(const nb_draft *draft, size_t volume)
     return origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
 }
 
-static int find_camera_frames(const nebel_scene_data *scene, double range[2])
-{
-    const size_t count = scene->camera_key_count;
-    range[0] = count > 0 ? scene->camera_keys[0].frame : 0;
-    range[1] = count > 0 ? scene->camera_keys[count - 1].frame : scene->turntable_frames;
-    return count > 0 || scene->turntable_frames > 0;
-}
-
 int nb_draft_find_frames(const nb_draft *draft, double range[2])
 {
-    double camera[2];
-    const int fog_moves = nb_keys_find_range(&draft->now, range);
-    if (!find_camera_frames(nebel_scene_contents(draft->file), camera)) return fog_moves;
-    range[0] = fog_moves ? fmin(range[0], camera[0]) : camera[0];
-    range[1] = fog_moves ? fmax(range[1], camera[1]) : camera[1];
+    const double turns = draft->data.turntable_frames;
+    const int has_keys = nb_keys_find_range(&draft->now, range);
+    if (!(turns > 0)) return has_keys;
+    range[0] = has_keys ? fmin(range[0], 0) : 0;
+    range[1] = has_keys ? fmax(range[1], turns) : turns;
     return 1;
 }
 
@@ -276,8 +268,11 @@ static void place_volumes(nb_draft *draft)
 
 static void place_camera(nb_draft *draft)
 {
-    if (draft->data.camera_key_count == 0 && draft->data.turntable_frames == 0) return;
-    draft->data.camera = nebel_scene_camera(draft->file, draft->frame);
+    const nb_edition *const now = &draft->now;
+    if (now->camera_key_count > 0)
+        draft->data.camera = nebel_camera_between_keys(now->camera_keys, now->camera_key_count, draft->frame);
+    else if (draft->data.turntable_frames > 0)
+        draft->data.camera = nebel_scene_camera(draft->file, draft->frame);
 }
 
 /* ---- open and close
@@ -428,7 +423,7 @@ int nb_draft_is_changed(const nb_draft *draft)
     const nb_edition *const now = &draft->now, *const was = &draft->written;
     if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
         !nb_edition_has_same_cells(now, was) || !nb_edition_has_same_models(now, was) ||
-        !nb_edition_has_same_light(now, was))
+        !nb_edition_has_same_light(now, was) || !nb_edition_has_same_camera_keys(now, was))
         return 1;
     for (size_t i = 0; i < now->count; i++) {
         if (!is_saved(draft, i)) continue;
@@ -469,20 +464,7 @@ int nb_draft_is_for_cpu(const nb_draft *draft)
 
 int nb_draft_can_save_camera(const nb_draft *draft)
 {
-    const nebel_scene_data *const file = nebel_scene_contents(draft->file);
-    return file->camera_key_count == 0 && file->turntable_frames == 0;
-}
-
-/* To a hundred-thousandth of the distance: nobody sees the difference, and the file stays readable. */
-static nebel_camera round_camera(nebel_camera camera)
-{
-    const double step = pow(10, floor(log10(nb_navigate_distance(&camera))) - 5);
-    for (int i = 0; i < 3; i++) {
-        camera.position[i] = rint(camera.position[i] / step) * step;
-        camera.look_at[i] = rint(camera.look_at[i] / step) * step;
-    }
-    camera.view_height = rint(camera.view_height / step) * step;
-    return camera;
+    return draft->now.camera_key_count == 0 && draft->data.turntable_frames == 0;
 }
 
 /* Points and portals are those of the scene that stays. */
@@ -545,7 +527,8 @@ nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
     const nebel_scene_data *const before = nebel_scene_contents(draft->file);
     nebel_scene_data changed = *before;
     nb_edition_show(&draft->now, &changed);
-    if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = round_camera(draft->data.camera);
+    if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = nb_navigate_round(draft->data.camera);
+    if (changed.camera_key_count > 0) changed.camera.projection = changed.camera_keys->camera.projection;
     nb_interrupt_hold();
     const nebel_result result = nebel_save_scene(path, &desc, before, &changed, draft->now.sources);
     nb_interrupt_release();

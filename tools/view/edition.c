@@ -192,6 +192,13 @@ static int add_models(nb_edition *edition, const nebel_model *models, size_t cou
     return edition->models != NULL ? 0 : -1;
 }
 
+static int add_camera_keys(nb_edition *edition, const nebel_camera_key *keys, size_t count)
+{
+    edition->camera_keys = copy_array(keys, count, sizeof *keys);
+    edition->camera_key_count = edition->camera_keys != NULL ? count : 0;
+    return edition->camera_keys != NULL ? 0 : -1;
+}
+
 static int add_cells(nb_edition *edition, const nebel_cells_desc *desc)
 {
     if (desc == NULL) return 0;
@@ -224,6 +231,7 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
     memcpy(made.sun_irradiance, scene->sun_irradiance, sizeof made.sun_irradiance);
     int result = add_nebulae(&made, scene->nebulae, scene->nebula_places, scene->nebula_count);
     if (result == 0) result = add_models(&made, scene->models, scene->model_count);
+    if (result == 0) result = add_camera_keys(&made, scene->camera_keys, scene->camera_key_count);
     if (result == 0) result = add_cells(&made, scene->cells);
     for (size_t i = 0; i < scene->volume_count && result == 0; i++)
         result = add(&made, &scene->volumes[i], &scene->volume_entries[i], scene->volume_names[i], i);
@@ -242,11 +250,13 @@ int nb_edition_copy(const nb_edition *from, nb_edition *to)
     made.nebulae = NULL;
     made.nebula_places = NULL;
     made.models = NULL;
+    made.camera_keys = NULL;
     made.cells = NULL;
     made.cells_desc.cell_count = 0;
-    made.count = made.capacity = made.nebula_count = made.model_count = 0;
+    made.count = made.capacity = made.nebula_count = made.model_count = made.camera_key_count = 0;
     int result = add_nebulae(&made, from->nebulae, from->nebula_places, from->nebula_count);
     if (result == 0) result = add_models(&made, from->models, from->model_count);
+    if (result == 0) result = add_camera_keys(&made, from->camera_keys, from->camera_key_count);
     if (result == 0 && from->cells != NULL) result = add_cells(&made, &from->cells_desc);
     for (size_t i = 0; i < from->count && result == 0; i++)
         result = add(&made, &from->volumes[i], &from->entries[i], from->names[i], from->sources[i]);
@@ -276,6 +286,7 @@ void nb_edition_free(nb_edition *edition)
     free(edition->nebulae);
     free(edition->nebula_places);
     free(edition->models);
+    free(edition->camera_keys);
     free(edition->cells);
     *edition = (nb_edition){.volumes = NULL};
 }
@@ -305,6 +316,8 @@ void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
     scene->nebula_places = edition->nebula_places;
     scene->models = edition->models;
     scene->model_count = edition->model_count;
+    scene->camera_keys = edition->camera_keys;
+    scene->camera_key_count = edition->camera_key_count;
     scene->cells = edition->cells != NULL ? &edition->cells_desc : NULL;
     scene->classic = edition->has_classic ? &edition->classic : NULL;
     scene->has_sun = edition->has_sun;
@@ -324,6 +337,7 @@ size_t nb_edition_size(const nb_edition *edition)
         size += sizeof *edition->volumes + sizeof *edition->entries + nb_shape_size(&edition->volumes[i].shape) +
                 (edition->entries[i].key_count + 1) * sizeof(nebel_volume_key) + strlen(edition->names[i]);
     size += edition->model_count * sizeof *edition->models;
+    size += edition->camera_key_count * sizeof *edition->camera_keys;
     for (size_t i = 0; i < edition->nebula_count; i++)
         size += sizeof *edition->nebulae + nb_shape_size(&edition->nebulae[i].shape);
     for (size_t i = 0; i < edition->cells_desc.cell_count; i++)
@@ -430,6 +444,18 @@ int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
+int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b)
+{
+    if (a->camera_key_count != b->camera_key_count) return 0;
+    for (size_t i = 0; i < a->camera_key_count; i++) {
+        const nebel_camera_key *const from = &a->camera_keys[i], *const to = &b->camera_keys[i];
+        if (from->frame != to->frame || from->camera.projection != to->camera.projection ||
+            !HAS_SAME(&from->camera, &to->camera, nebel_camera, position, projection))
+            return 0;
+    }
+    return 1;
+}
+
 static int has_same_classic(const nb_edition *a, const nb_edition *b)
 {
     const nebel_factor_desc *const from = &a->classic, *const to = &b->classic;
@@ -472,7 +498,7 @@ int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b)
 int nb_edition_is_same(const nb_edition *a, const nb_edition *b)
 {
     if (!nb_edition_has_same_sources(a, b) || !nb_edition_has_same_nebulae(a, b) || !nb_edition_has_same_cells(a, b) ||
-        !nb_edition_has_same_models(a, b) || !nb_edition_has_same_light(a, b))
+        !nb_edition_has_same_models(a, b) || !nb_edition_has_same_light(a, b) || !nb_edition_has_same_camera_keys(a, b))
         return 0;
     for (size_t i = 0; i < a->count; i++)
         if (!nb_edition_is_same_volume(&a->volumes[i], &b->volumes[i]) ||

@@ -22,7 +22,9 @@ typedef struct nb_edition {
     nebel_model *models; /* their file names are those of the file that was read: not to be used */
     size_t model_count;
     nebel_cell *cells;
-    nebel_cells_desc cells_desc; /* of them; its portals are the scene's */
+    nebel_cells_desc cells_desc;   /* of them; its portals are the scene's */
+    nebel_camera_key *camera_keys; /* all of one projection */
+    size_t camera_key_count;       /* 0: the camera stands still or turns */
     int has_sun, has_classic;
     nebel_factor_desc classic;
     nebel_environment environment; /* in place of ambient, where it is not constant; its map is that of the file */
@@ -58,10 +60,11 @@ int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_ent
 int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b);
+int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b);
 
-/* Puts light, volumes, nebulae, cells and models in the place of the scene's, which points to the edition then. */
+/* Puts light, camera keys, volumes, nebulae, cells and models in the place of the scene's, which points to the edition then. */
 void nb_edition_show(nb_edition *edition, nebel_scene_data *scene);
 
 /* Bytes that it takes, more or less. */

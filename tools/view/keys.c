@@ -1,5 +1,7 @@
 #include "keys.h"
 
+#include "navigate.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,9 +136,54 @@ int nb_keys_store(nb_edition *edition, const nb_edition *before, double frame)
     return result;
 }
 
+/* ---- the camera
+ * ------------------------------------------------------------------------------------------------------
+ */
+
+int nb_keys_set_camera(nb_edition *edition, const nebel_camera *camera, double frame)
+{
+    const size_t count = edition->camera_key_count;
+    nebel_camera_key *const keys = realloc(edition->camera_keys, (count + 1) * sizeof *keys);
+    nebel_camera_key key = {frame, nb_navigate_round(*camera)};
+    size_t at = 0;
+    if (keys == NULL) return -1;
+    edition->camera_keys = keys;
+    if (count > 0) key.camera.projection = keys->camera.projection;
+    while (at < count && keys[at].frame < frame) at++;
+    if (at == count || keys[at].frame != frame) {
+        memmove(keys + at + 1, keys + at, (count - at) * sizeof *keys);
+        edition->camera_key_count++;
+    }
+    keys[at] = key;
+    return 0;
+}
+
+void nb_keys_remove_camera(nb_edition *edition, size_t key)
+{
+    nebel_camera_key *const gone = edition->camera_keys + key;
+    memmove(gone, gone + 1, (--edition->camera_key_count - key) * sizeof *gone);
+}
+
+void nb_keys_move_camera(nb_edition *edition, size_t key, double frame)
+{
+    nebel_camera_key *const keys = edition->camera_keys;
+    const int has_room_before = key == 0 || frame > keys[key - 1].frame;
+    const int has_room_behind = key + 1 == edition->camera_key_count || frame < keys[key + 1].frame;
+    if (has_room_before && has_room_behind) keys[key].frame = frame;
+}
+
+/* ---- time
+ * ------------------------------------------------------------------------------------------------------------
+ */
+
 int nb_keys_find_range(const nb_edition *edition, double range[2])
 {
-    int has_keys = 0;
+    const size_t count = edition->camera_key_count;
+    int has_keys = count > 0;
+    if (has_keys) {
+        range[0] = edition->camera_keys[0].frame;
+        range[1] = edition->camera_keys[count - 1].frame;
+    }
     for (size_t i = 0; i < edition->count; i++) {
         const nebel_volume_entry *const entry = &edition->entries[i];
         if (entry->key_count == 0) continue;

@@ -1,4 +1,4 @@
-/* Fog that moves: keys of volumes in an edition. */
+/* What moves: keys of volumes and of the camera in an edition. */
 #ifndef NB_KEYS_H
 #define NB_KEYS_H
 
@@ -18,7 +18,12 @@ void nb_keys_remove(nb_edition *edition, size_t volume, size_t key);
 /* Moves a key to another frame, no further than to its neighbours. */
 void nb_keys_move(nb_edition *edition, size_t volume, size_t key, double frame);
 
-/* All that moves, as it is at a frame. */
+/* The same of the camera. */
+int nb_keys_set_camera(nb_edition *edition, const nebel_camera *camera, double frame);
+void nb_keys_remove_camera(nb_edition *edition, size_t key);
+void nb_keys_move_camera(nb_edition *edition, size_t key, double frame);
+
+/* All volumes that move, as they are at a frame. */
 void nb_keys_place(nb_edition *edition, double frame);
 
 /* What was changed by hand since `before`, of the same volumes at the same frame, goes into keys: numbers that move

@@ -113,3 +113,14 @@ double nb_navigate_distance(const nebel_camera *camera)
 {
     return find_axes(camera).distance;
 }
+
+nebel_camera nb_navigate_round(nebel_camera camera)
+{
+    const double step = pow(10, floor(log10(nb_navigate_distance(&camera))) - 5);
+    for (int i = 0; i < 3; i++) {
+        camera.position[i] = rint(camera.position[i] / step) * step;
+        camera.look_at[i] = rint(camera.look_at[i] / step) * step;
+    }
+    camera.view_height = rint(camera.view_height / step) * step;
+    return camera;
+}

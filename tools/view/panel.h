@@ -25,7 +25,7 @@ typedef struct nb_panel {
     double *frame;       /* of what moves */
     double frames[2];    /* the first and the last at which anything moves; the same: nothing does */
     int plays;           /* the frame goes on by itself */
-    int camera_is_keyed; /* the camera moves by its keys */
+    int camera_is_keyed; /* the camera moves by its keys, or turns */
     int saves_camera;
     const char *message; /* "": none */
     int is_fault;        /* the message says what went wrong */

@@ -3,6 +3,7 @@
 
 #include "controls.h"
 #include "fog_panel.h"
+#include "keys.h"
 
 #include <float.h>
 #include <math.h>
@@ -257,6 +258,46 @@ void draw_classic(nb_panel *panel, double reach)
     panel->fog_changed = 1;
 }
 
+// Returns whether it goes.
+static bool draw_camera_key(nb_panel *panel, size_t key)
+{
+    const Owner owner("keys", key);
+    double frame = panel->now->camera_keys[key].frame;
+    const bool is_here = frame == *panel->frame;
+    ImGui::SetNextItemWidth(90 * scale);
+    if (drag("##frame", &frame, 1, 25, -DBL_MAX, "frame %.4g", "When it is there. No further than to the next key.")) {
+        nb_keys_move_camera(panel->now, key, frame);
+        panel->fog_changed = 1;
+    }
+    ImGui::SameLine();
+    if (press_if(!is_here, is_here ? "here" : "Go", "To this frame.")) {
+        *panel->frame = frame;
+        panel->frame_changed = 1;
+    }
+    ImGui::SameLine();
+    return press("x", "Takes this key away. Ctrl + Z brings it back.");
+}
+
+static void draw_camera_keys(nb_panel *panel)
+{
+    const Owner owner("camera", 0);
+    nb_edition *const now = panel->now;
+    size_t gone = now->camera_key_count;
+    bool is_here = false;
+    for (size_t i = 0; i < now->camera_key_count; i++) {
+        is_here |= now->camera_keys[i].frame == *panel->frame;
+        if (draw_camera_key(panel, i)) gone = i;
+    }
+    if (gone < now->camera_key_count) {
+        nb_keys_remove_camera(now, gone);
+        panel->fog_changed = 1;
+    } else if (press(is_here ? "Change the key here" : "Add a key here",
+                     "At the present frame, see Time: the camera as it is now.")) {
+        panel->is_out_of_memory |= nb_keys_set_camera(now, &panel->data->camera, *panel->frame) != 0;
+        panel->fog_changed = 1;
+    }
+}
+
 void draw_camera(nb_panel *panel, double reach)
 {
     nebel_camera *const camera = &panel->data->camera;
@@ -266,8 +307,13 @@ void draw_camera(nb_panel *panel, double reach)
     changed |= drag_place("look at", camera->look_at, reach, "What is in the middle, and what a drag orbits about.");
     changed |= drag("up", camera->up, 3, 1, -DBL_MAX, "%.3g", "Which way is up in the picture.");
     panel->camera_changed |= changed;
+    if (panel->data->turntable_frames > 0) {
+        ImGui::TextDisabled("turns: changes here are not saved");
+        return;
+    }
     if (panel->camera_is_keyed)
-        ImGui::TextDisabled("moves: changes here are not saved");
+        ImGui::TextDisabled("moves: changes here go into keys by the button below");
     else
         tick("save the camera, too", &panel->saves_camera, "Save writes where the camera is now into the file.");
+    draw_camera_keys(panel);
 }
