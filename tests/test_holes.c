@@ -66,7 +66,31 @@ static void holes_are_where_alpha_is_low(void **state)
     test_picture_free(&picture);
 }
 
-/* Lamps, too; and the reference has the same surfaces. */
+/* The reference meets and shades the same surfaces: with one bounce and nothing between all paths are alike. */
+static void the_reference_has_the_same_holes(void **state)
+{
+    static test_card card;
+    test_picture picture = test_picture_make(SIZE, SIZE), reference = test_picture_make(SIZE, SIZE);
+    nebel_renderer *renderer = NULL;
+    (void)state;
+    test_card_make(&card, 3);
+    const nebel_frame_desc frame = {
+        .camera = camera_above(), .width = SIZE, .height = SIZE, .samples = 1, .bounces = 1};
+    assert_int_equal(nebel_create_renderer(&card.scene, NULL, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &picture.planes), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &reference.planes), NEBEL_OK);
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        assert_true(picture.planes.depth[i] == reference.planes.depth[i]);
+        for (int c = 0; c < 3; c++)
+            assert_true(fabsf(picture.planes.color[3 * i + c] - reference.planes.color[3 * i + c]) < 1e-5f);
+    }
+    nebel_destroy_renderer(renderer);
+    test_picture_free(&picture);
+    test_picture_free(&reference);
+}
+
+/* Lamps, too. */
 static void lamps_shine_through_holes(void **state)
 {
     static test_card card;
@@ -210,11 +234,9 @@ static void odd_coordinates_are_survived(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(holes_are_where_alpha_is_low),
-        cmocka_unit_test(lamps_shine_through_holes),
-        cmocka_unit_test(a_line_is_cut_where_alpha_passes_the_cutoff),
-        cmocka_unit_test(odd_masks_are_refused),
-        cmocka_unit_test(odd_coordinates_are_survived),
+        cmocka_unit_test(holes_are_where_alpha_is_low), cmocka_unit_test(the_reference_has_the_same_holes),
+        cmocka_unit_test(lamps_shine_through_holes),    cmocka_unit_test(a_line_is_cut_where_alpha_passes_the_cutoff),
+        cmocka_unit_test(odd_masks_are_refused),        cmocka_unit_test(odd_coordinates_are_survived),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
