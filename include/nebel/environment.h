@@ -64,12 +64,12 @@ typedef struct nebel_environment {
 
 #define NEBEL_MAX_ROTATION 1e6
 
-/* Radiance that comes from a direction, of any length but 0: NaN where it is none. `environment` must be in order. Any thread.
- */
+/* Radiance that comes from a direction, of any length. Where it is none, 0 or not finite, a constant environment sends
+ * what it always does and others 0. `environment` must be in order. Any thread. */
 void nebel_environment_radiance(const nebel_environment *environment, const double direction[3], double radiance[3]);
 
-/* Radiance of a white Lambertian surface of a normal, of any length but 0, that nothing hides from the sky: irradiance
- * over pi. Of a gradient in closed form, of a map within 1e-3 of the brightest normal's. Any thread. */
+/* Radiance of a white Lambertian surface of a normal, taken as the direction above, that nothing hides from the sky:
+ * irradiance over pi. Of a gradient in closed form, of a map within 1e-3 of the brightest normal's. Any thread. */
 void nebel_environment_reflected(const nebel_environment *environment, const double normal[3], double radiance[3]);
 
 /* More phase functions than these cannot scatter an environment that is not constant: a commit is LIMIT then. */

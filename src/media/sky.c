@@ -92,7 +92,7 @@ static void scale_map(const nebel_environment *sky, double light[3])
 static int make_unit(const double direction[3], double unit[3])
 {
     const double most = fmax(fmax(fabs(direction[0]), fabs(direction[1])), fabs(direction[2]));
-    if (!(most > 0) || !isfinite(most)) return 0;
+    if (!(most > 0) || !isfinite(direction[0]) || !isfinite(direction[1]) || !isfinite(direction[2])) return 0;
     for (int i = 0; i < 3; i++) unit[i] = direction[i] / most;
     const double length = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2]);
     for (int i = 0; i < 3; i++) unit[i] /= length;
@@ -246,40 +246,35 @@ void nb_sky_scattered(const nb_skylight *light, const double direction[3], doubl
 
 /* ---- the public queries ---------------------------------------------------------------------- */
 
-static void give_nothing(double light[3])
-{
-    for (int c = 0; c < 3; c++) light[c] = (double)NAN;
-}
-
-void nebel_environment_radiance(const nebel_environment *sky, const double direction[3], double radiance[3])
+void nebel_environment_radiance(const nebel_environment *environment, const double direction[3], double radiance[3])
 {
     double unit[3], turned[3];
-    if (!make_unit(direction, unit)) {
-        give_nothing(radiance);
-    } else if (sky->type == NEBEL_ENVIRONMENT_GRADIENT) {
-        mix_gradient(sky, unit[1], fabs(unit[1]), radiance);
-    } else if (sky->type == NEBEL_ENVIRONMENT_MAP) {
-        turn_to_map(turn_of(sky), unit, turned);
-        nb_sky_map_radiance(sky->map, turned, radiance);
-        scale_map(sky, radiance);
+    if (environment->type == NEBEL_ENVIRONMENT_CONSTANT) {
+        memcpy(radiance, environment->radiance, sizeof environment->radiance);
+    } else if (!make_unit(direction, unit)) {
+        memset(radiance, 0, 3 * sizeof *radiance);
+    } else if (environment->type == NEBEL_ENVIRONMENT_GRADIENT) {
+        mix_gradient(environment, unit[1], fabs(unit[1]), radiance);
     } else {
-        memcpy(radiance, sky->radiance, sizeof sky->radiance);
+        turn_to_map(turn_of(environment), unit, turned);
+        nb_sky_map_radiance(environment->map, turned, radiance);
+        scale_map(environment, radiance);
     }
 }
 
-void nebel_environment_reflected(const nebel_environment *sky, const double normal[3], double radiance[3])
+void nebel_environment_reflected(const nebel_environment *environment, const double normal[3], double radiance[3])
 {
     double unit[3], turned[3];
-    if (!make_unit(normal, unit)) {
-        give_nothing(radiance);
-    } else if (sky->type == NEBEL_ENVIRONMENT_GRADIENT) {
+    if (environment->type == NEBEL_ENVIRONMENT_CONSTANT) {
+        memcpy(radiance, environment->radiance, sizeof environment->radiance);
+    } else if (!make_unit(normal, unit)) {
+        memset(radiance, 0, 3 * sizeof *radiance);
+    } else if (environment->type == NEBEL_ENVIRONMENT_GRADIENT) {
         const double y = fmin(fmax(unit[1], -1), 1);
-        mix_gradient(sky, 2 * y / 3, rectified_by_cosine(fabs(y)), radiance);
-    } else if (sky->type == NEBEL_ENVIRONMENT_MAP) {
-        turn_to_map(turn_of(sky), unit, turned);
-        nb_sky_map_reflected(sky->map, turned, radiance);
-        scale_map(sky, radiance);
+        mix_gradient(environment, 2 * y / 3, rectified_by_cosine(fabs(y)), radiance);
     } else {
-        memcpy(radiance, sky->radiance, sizeof sky->radiance);
+        turn_to_map(turn_of(environment), unit, turned);
+        nb_sky_map_reflected(environment->map, turned, radiance);
+        scale_map(environment, radiance);
     }
 }
