@@ -198,7 +198,7 @@ NB_ALWAYS_INLINE void meet_children(const nb_cell_node *node, const nb_beam *bea
     met->children = children;
 }
 
-enum { VISITS = NB_CELL_LEVELS * NB_CELL_FAN };
+enum { VISITS = (NB_CELL_LEVELS + NB_LEAF_LEVELS) * NB_CELL_FAN };
 
 typedef struct nb_visit {
     float begin, end; /* m along the rays */

@@ -114,25 +114,24 @@ static inline nb_cell common(const nb_cell *a, const nb_cell *b)
     return both;
 }
 
-/* A node of triangles; what does not fit goes into one below it. */
+/* A node of triangles, or of nodes of as many as there are for each. */
 static int add_leaf(nb_division *d, const nb_cell *cell, const uint32_t *list, const nb_depths *depths, size_t count,
                     uint32_t *number)
 {
-    const int is_long = count > NB_CELL_FAN;
-    const size_t here = is_long ? NB_CELL_FAN - 1 : count;
+    size_t each = 1;
+    while (each * NB_CELL_FAN < count) each *= NB_CELL_FAN;
     if (!add_node(d, number)) return 0;
-    for (size_t i = 0; i < here; i++) {
-        const nb_cell bounds = common(&d->bounds[list[i]], cell);
-        uint32_t prism;
-        if (!prism_of(d, list[i], &prism)) return 0;
-        set_child(d, *number, (int)i, &bounds, (nb_depths){depths[i].nearest, INFINITY}, NB_IS_PRISM | prism);
+    for (size_t first = 0, k = 0; first < count; first += each, k++) {
+        const size_t here = count - first < each ? count - first : each;
+        const nb_cell bounds = each == 1 ? common(&d->bounds[list[first]], cell) : *cell;
+        nb_depths below = {INFINITY, INFINITY};
+        uint32_t child;
+        for (size_t i = first; i < first + here; i++) below.nearest = nb_least(below.nearest, depths[i].nearest);
+        const int made = each == 1 ? prism_of(d, list[first], &child)
+                                   : add_leaf(d, cell, list + first, depths + first, here, &child);
+        if (!made) return 0;
+        set_child(d, *number, (int)k, &bounds, below, each == 1 ? NB_IS_PRISM | child : child);
     }
-    if (!is_long) return 1;
-    float nearest = INFINITY;
-    uint32_t below;
-    for (size_t i = here; i < count; i++) nearest = nb_least(nearest, depths[i].nearest);
-    if (!add_leaf(d, cell, list + here, depths + here, count - here, &below)) return 0;
-    set_child(d, *number, NB_CELL_FAN - 1, cell, (nb_depths){nearest, INFINITY}, below);
     return 1;
 }
 

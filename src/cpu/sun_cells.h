@@ -15,7 +15,8 @@
 
 enum {
     NB_CELL_FAN = 16,    /* children of a node */
-    NB_CELL_LEVELS = 12, /* of nodes, at most */
+    NB_CELL_LEVELS = 12, /* of cells, at most */
+    NB_LEAF_LEVELS = 8,  /* of nodes in a cell that is not divided: 16^8 triangles */
 };
 
 /* A place p is in shadow where plane[0..2] . p + plane[3] >= 0 for each: those of the edges, and that of the triangle.
