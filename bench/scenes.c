@@ -1,5 +1,7 @@
 #include "scenes.h"
 
+#include "cloud.h"
+
 #include "height_map.h"
 
 #include <math.h>
@@ -26,6 +28,9 @@ static const nebel_volume_desc fogs[] = {
                     .extinction = {.05, .05, .05}},
     [NB_FOG_SPHERE] = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 4, 0}, .radius = 18},
                        .extinction = {.08, .08, .08}},
+    [NB_FOG_CLOUD] = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-18, 12, -18}, .max = {18, 34, 18}},
+                      .density = {.type = NEBEL_DENSITY_GRID},
+                      .extinction = {.9, .9, .9}},
     [NB_FOG_HEIGHT] = {.density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 8}, .extinction = {.05, .05, .05}},
 };
 
@@ -127,8 +132,10 @@ nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *s
     memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
     memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);
     if (kind == NB_FOG_NONE || nebel_create_fog(&desc, &fog) != NEBEL_OK) return NULL;
-    const nebel_volume_desc volume = volume_of(kind);
+    nebel_volume_desc volume = volume_of(kind);
+    if (kind == NB_FOG_CLOUD) volume.density.grid = nb_cloud_make();
     if (nebel_add_volume(fog, &volume, NULL) == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
+    nebel_release_grid(volume.density.grid);
     nebel_destroy_fog(fog);
     return snapshot;
 }

@@ -13,7 +13,8 @@ typedef enum nb_bench_fog {
     NB_FOG_SPHERE,     /* scene B1 */
     NB_FOG_LIT_BOX,    /* A2, lit by the scene's sun and ambient light */
     NB_FOG_LIT_SPHERE, /* B2 */
-    NB_FOG_HEIGHT      /* C */
+    NB_FOG_HEIGHT,     /* C */
+    NB_FOG_CLOUD       /* D */
 } nb_bench_fog;
 
 enum { NB_BENCH_WIDTH = 1280, NB_BENCH_HEIGHT = 720 };

@@ -715,8 +715,9 @@ static void volumes_need_a_box_and_a_grid(void **test)
     nebel_release_grid(grid);
 }
 
-/* A grid lives as long as anybody needs it; whatever fails gives back what it took. */
-static nebel_result live_and_die(const nebel_allocator *allocator)
+/* A grid lives as long as anybody needs it, and the lattice that the sun needs; whatever fails gives back what it took.
+ */
+static nebel_result live_and_die(const nebel_allocator *allocator, double albedo)
 {
     const float voxels[8] = {1, 2};
     nebel_grid *grid = NULL;
@@ -728,38 +729,49 @@ static nebel_result live_and_die(const nebel_allocator *allocator)
     if (result != NEBEL_OK) return result;
     nebel_volume_desc v = {.shape = {.type = NEBEL_SHAPE_BOX, .max = {1, 1, 1}},
                            .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
-                           .extinction = {1, 1, 1}};
-    result = nebel_create_fog(&(nebel_fog_desc){.allocator = *allocator}, &fog);
+                           .extinction = {1, 1, 1},
+                           .albedo = {albedo, albedo, albedo}};
+    const nebel_fog_desc sky = {.allocator = *allocator, .sun = {{.2, 1, .3}, {1, 1, 1}}};
+    result = nebel_create_fog(&sky, &fog);
     if (result == NEBEL_OK) result = nebel_add_volume(fog, &v, &id);
     if (result == NEBEL_OK) result = nebel_change_volume(fog, id, &v);
-    if (result == NEBEL_OK) result = nebel_commit_fog(fog, &snapshot);
+    for (int i = 0; i < 2 && result == NEBEL_OK; i++) {
+        nebel_release_snapshot(snapshot);
+        result = nebel_commit_fog(fog, &snapshot);
+    }
     if (result == NEBEL_OK) result = nebel_remove_volume(fog, id);
     nebel_release_grid(grid);
     nebel_destroy_fog(fog);
     if (result == NEBEL_OK) {
         const nebel_ray ray = {.origin = {-1, .5, .5}, .direction = {1, 0, 0}, .t_max = 9};
-        assert_near(trace(snapshot, NEBEL_PRECISION_DOUBLE, 0, &ray).transmittance[0], exp(-.375), 1e-15);
+        assert_near(trace(snapshot, NEBEL_PRECISION_DOUBLE, 2e-3, &ray).transmittance[0], exp(-.375), 1e-15);
     }
     nebel_release_snapshot(snapshot);
     return result;
 }
 
-static void memory_may_run_out(void **test)
+static void expect_no_loss(double albedo)
 {
-    (void)test;
     fog_memory memory = {0};
     const nebel_allocator allocator = fog_memory_allocator(&memory);
-    assert_int_equal(live_and_die(&allocator), NEBEL_OK);
+    assert_int_equal(live_and_die(&allocator, albedo), NEBEL_OK);
     const size_t calls = memory.calls;
     assert_int_equal(memory.live, 0);
     for (size_t i = 1; i <= calls; i++) {
         memory.fail_first = i;
         memory.fail_count = 1;
-        const nebel_result result = live_and_die(&allocator);
+        const nebel_result result = live_and_die(&allocator, albedo);
         assert_int_equal(memory.live, 0);
         if (memory.fail_first == 0) assert_int_equal(result, NEBEL_ERROR_MEMORY);
         memory.fail_first = 0;
     }
+}
+
+static void memory_may_run_out(void **test)
+{
+    (void)test;
+    expect_no_loss(0);
+    expect_no_loss(1);
 }
 
 int main(void)

@@ -259,6 +259,68 @@ static inline void nb_wstore_lanes(double *to, nb_wide x) { memcpy(to, &x, sizeo
 
 #define NB_WIDE_SIGN_BIT 0x8000000000000000u
 
+/* Numbers of an array, one for each lane: what lies at whole numbers below 2^31. Of bytes and shorts the bytes behind
+ * are read, too, three and two of them. */
+#if defined(NB_ISA_AVX512) || defined(NB_ISA_AVX2)
+#if defined(NB_ISA_AVX512)
+#define NB_INDEX(index) _mm512_cvttpd_epi32(index)
+#define NB_GATHER_REAL(from, at) _mm256_i32gather_ps(from, at, 4)
+#define NB_GATHER_BITS(from, at, size) (nb_bits)_mm256_i32gather_epi32((const int *)(const void *)(from), at, size)
+#define NB_TO_NUMBERS(bits) _mm256_cvtepi32_ps((__m256i)(bits))
+#else
+#define NB_INDEX(index) _mm256_cvttpd_epi32(index)
+#define NB_GATHER_REAL(from, at) _mm_i32gather_ps(from, at, 4)
+#define NB_GATHER_BITS(from, at, size) (nb_bits)_mm_i32gather_epi32((const int *)(const void *)(from), at, size)
+#define NB_TO_NUMBERS(bits) _mm_cvtepi32_ps((__m128i)(bits))
+#endif
+static inline nb_real nb_gather(const float *from, nb_wide index) { return NB_GATHER_REAL(from, NB_INDEX(index)); }
+
+static inline nb_real nb_gather_bytes(const uint8_t *from, nb_wide index)
+{
+    return NB_TO_NUMBERS(NB_GATHER_BITS(from, NB_INDEX(index), 1) & 0xffu);
+}
+
+static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index)
+{
+    return NB_TO_NUMBERS(NB_GATHER_BITS(from, NB_INDEX(index), 2) & 0xffffu);
+}
+
+/* And the number behind each. */
+static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
+{
+    const nb_bits both = NB_GATHER_BITS(from, NB_INDEX(index), 2);
+    *behind = NB_TO_NUMBERS(both >> 16);
+    return NB_TO_NUMBERS(both & 0xffffu);
+}
+#else
+static inline nb_real nb_gather(const float *from, nb_wide index)
+{
+    float lane[NB_WIDTH];
+    for (int i = 0; i < NB_WIDTH; ++i) lane[i] = from[(size_t)index[i]];
+    return nb_load_lanes(lane);
+}
+
+static inline nb_real nb_gather_bytes(const uint8_t *from, nb_wide index)
+{
+    float lane[NB_WIDTH];
+    for (int i = 0; i < NB_WIDTH; ++i) lane[i] = (float)from[(size_t)index[i]];
+    return nb_load_lanes(lane);
+}
+
+static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index)
+{
+    float lane[NB_WIDTH];
+    for (int i = 0; i < NB_WIDTH; ++i) lane[i] = (float)from[(size_t)index[i]];
+    return nb_load_lanes(lane);
+}
+
+static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
+{
+    *behind = nb_gather_shorts(from, index + 1.0);
+    return nb_gather_shorts(from, index);
+}
+#endif
+
 #endif
 
 #define nb_wmask_true (~(nb_wmask){0})

@@ -53,8 +53,10 @@ void nebel_destroy_fog(nebel_fog *fog)
 {
     if (fog == NULL) return;
     const nebel_allocator allocator = fog->allocator;
-    for (size_t i = 0; i < fog->slot_count; i++)
+    for (size_t i = 0; i < fog->slot_count; i++) {
         if (fog->slots[i].used) nb_volume_free(&allocator, &fog->slots[i].volume);
+        nb_grid_lattice_release(fog->slots[i].lattice);
+    }
     nebel_release_environment_map(fog->sky.map);
     nb_release(&allocator, fog->lamps);
     nb_release(&allocator, fog->slots);
@@ -131,6 +133,8 @@ nebel_result nebel_remove_volume(nebel_fog *fog, nebel_volume_id id)
     if (slot == NULL)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "volume id %llu: no such volume", (unsigned long long)id);
     nb_volume_free(&fog->allocator, &slot->volume);
+    nb_grid_lattice_release(slot->lattice);
+    slot->lattice = NULL;
     slot->used = 0;
     if (++slot->generation == 0) return NEBEL_OK; /* this slot's ids are used up: it is never taken again */
     slot->next_free = fog->first_free;

@@ -2,6 +2,7 @@
 #ifndef NB_MARCH_FOG_H
 #define NB_MARCH_FOG_H
 
+#include "media/grid_lattice.h"
 #include "media/lamp.h"
 #include "media/sky.h"
 #include "media/volume.h"
@@ -13,6 +14,7 @@ typedef struct nb_slot {
     size_t next_free; /* 1 + slot, 0: none */
     uint32_t generation;
     int used;
+    nb_grid_lattice *lattice; /* that the last commit needed, or NULL */
 } nb_slot;
 
 struct nebel_fog {

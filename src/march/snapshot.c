@@ -57,7 +57,10 @@ static void light_medium(nb_medium *medium, const nebel_fog *fog)
 static void free_snapshot(nebel_snapshot *s)
 {
     const nebel_allocator allocator = s->allocator;
-    for (size_t i = 0; i < s->medium_count; i++) nb_volume_free(&allocator, &s->media[i].body);
+    for (size_t i = 0; i < s->medium_count; i++) {
+        nb_volume_free(&allocator, &s->media[i].body);
+        nb_grid_lattice_release(s->media[i].lattice);
+    }
     nb_diffusion_free(&allocator, s->diffusion);
     for (size_t i = 0; i < s->skylight_count; i++) nb_sky_filter_release(s->skylights[i].filter);
     nebel_release_environment_map(s->sky.map);
@@ -131,6 +134,7 @@ static int copy_media(const nebel_fog *fog, selection of, nebel_snapshot *s)
         if (!slot->used || !has_body(&slot->volume) || (of.is_level && !is_level(&slot->volume))) continue;
         nb_medium *medium = &s->media[s->medium_count];
         if (!nb_volume_copy(&s->allocator, &slot->volume, &medium->body)) return 0;
+        medium->slot = i;
         s->medium_count++;
         find_moments(medium);
         if (of.is_scaled) scale_medium(medium);
@@ -270,6 +274,46 @@ static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
     return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;
 }
 
+/* ---- lattices -------------------------------------------------------------------------------- */
+
+/* Cells per metre of the way to the sun through voxels. */
+static void way_in_cells(const nebel_snapshot *s, const nb_volume *body, double way[3])
+{
+    const nb_leaf *leaf = &body->leaves[0];
+    double rate[3];
+    nb_grid_rate(body->density.grid, leaf->low, leaf->high, rate);
+    for (int i = 0; i < 3; i++) {
+        const double *row = &leaf->matrix[3 * i];
+        const double turned = row[0] * s->to_sun[0] + row[1] * s->to_sun[1] + row[2] * s->to_sun[2];
+        way[i] = rate[i] * (leaf->aligned ? s->to_sun[i] : turned);
+    }
+}
+
+static int needs_lattice(const nebel_snapshot *s)
+{
+    return s->way_to_sun == NB_WAY_GRID && nb_grid_is_linear(s->media[0].body.density.grid);
+}
+
+/* The one of the commit before where it still serves. 0 when memory is out. */
+static int take_lattice(const nebel_fog *fog, const nebel_snapshot *s, nb_medium *medium)
+{
+    nb_slot *slot = &fog->slots[medium->slot];
+    nebel_grid *grid = medium->body.density.grid;
+    double way[3];
+    way_in_cells(s, &medium->body, way);
+    if (slot->lattice == NULL || !nb_grid_lattice_is_of(slot->lattice, grid, way)) {
+        nb_grid_lattice_release(slot->lattice);
+        slot->lattice = nb_grid_lattice_make(grid, &s->allocator, way);
+    }
+    medium->lattice = nb_grid_lattice_retain(slot->lattice);
+    return medium->lattice != NULL;
+}
+
+static int take_lattices(const nebel_fog *fog, nebel_snapshot *s)
+{
+    return !needs_lattice(s) || take_lattice(fog, s, &s->media[0]);
+}
+
 static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snapshot **snapshot)
 {
     nebel_snapshot *s = nb_allocate_zero(&fog->allocator, 1, sizeof *s);
@@ -288,7 +332,7 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
         join_media(s);
         s->is_gray = is_gray(s);
         s->way_to_sun = find_way_to_sun(s);
-        result = index_media(s);
+        result = take_lattices(fog, s) ? index_media(s) : NEBEL_ERROR_MEMORY;
     }
     if (result == NEBEL_OK)
         *snapshot = s;

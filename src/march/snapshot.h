@@ -3,6 +3,7 @@
 #define NB_MARCH_SNAPSHOT_H
 
 #include "bvh.h"
+#include "media/grid_lattice.h"
 #include "media/lamp.h"
 #include "media/sky.h"
 #include "media/volume.h"
@@ -27,6 +28,8 @@ typedef struct nb_medium {
     double
         turned_cosine; /* and the mean cosine of the rest. Both are the least that have its phase function's two first
                              moments: Joseph, Wiscombe and Weinman 1976 */
+    size_t slot;       /* of the fog that it is from */
+    nb_grid_lattice *lattice; /* of linear voxels that the sun lights, alone; else NULL */
     int joins; /* its density is constant and its body convex, so that sums can stand for it among many of its kind */
 } nb_medium;
 

@@ -12,7 +12,7 @@
 
 #include "trace_kernel.h"
 
-#include "media/grid.h"
+#include "media/grid_voxels.h"
 
 #include "formulas/prelude.h"
 
@@ -228,16 +228,34 @@ static void note_clear(const march *m, const piece *p, gathered *g)
 
 #include "trace_lamp.h"
 
-static void gather_piece(const march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
+/* Sunlight that is found while voxels are crossed anyway. Returns the lanes that it is still to be added in. */
+static nb_mask cross_sunlit_voxels(march *m, const piece *p, gathered *g, nb_estimate *along)
 {
+    if (m->sun == NULL) return nb_mask_false;
+#if !defined(NB_DOUBLE)
+    if (has_lattice(m)) {
+        m->whole = along;
+        return gather_by_lattice(m->sun, m, p, g, along);
+    }
+#else
+    (void)g, (void)along;
+#endif
+    return sunlit_lanes(m, p);
+}
+
+static void gather_piece(march *m, const piece *p, const allowance *may, gathered *g, nb_mask *unbounded)
+{
+    nb_estimate along;
+    const nb_mask sunlit = cross_sunlit_voxels(m, p, g, &along);
     const piece_sum sum = sum_piece(m, p);
+    m->whole = NULL;
     note_overflow(m, p, g);
     if (may->transmittance_only) {
         pass_piece(g, &sum);
         return;
     }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
-    if (m->sun != NULL) gather_lights(m->sun, m, p, g);
+    if (m->sun != NULL) gather_lights(m->sun, m, p, sunlit, g);
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);

@@ -215,9 +215,10 @@ static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gath
 
 /* ---- all lights ------------------------------------------------------------------------------ */
 
-static void gather_lights(sunlight *sun, const march *m, const piece *p, gathered *g)
+/* `sunlit`: the lanes in which the sun's light is still to be added. */
+static void gather_lights(sunlight *sun, const march *m, const piece *p, nb_mask sunlit, gathered *g)
 {
-    if (sun->snapshot->is_sunlit) gather_sunlight(sun, m, p, g);
+    if (sun->snapshot->is_sunlit) gather_sunlight(sun, m, p, sunlit, g);
     if (sun->snapshot->is_lamplit) gather_lamplight(sun, m, p, g);
 }
 

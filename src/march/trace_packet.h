@@ -107,6 +107,8 @@ typedef struct march {
     size_t stretch_count;
     size_t entered; /* how many of the stretches the window has had */
     crowd crowd;
+    const nb_estimate
+        *whole; /* the integral of the density of the only medium of the piece at hand, where it is known */
 } march;
 
 /* What the rounding of a dot product is relative to. */
@@ -540,8 +542,8 @@ static nb_grid_line line_of_lane(const grid_lines *lines, size_t i)
                           {lines->slope[0][i], lines->slope[1][i], lines->slope[2][i]}};
 }
 
-/* Up to `enough` [m]: see nb_grid_integral. */
-static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
+/* Lane by lane, up to `enough` [m]: see nb_grid_integral. */
+static nb_estimate lanes_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
 {
     const grid_lines lines = lines_from(k, start);
     double length[NB_WIDTH];
@@ -589,6 +591,18 @@ static nb_wide next_in_grid(const contact *k, nb_wide t, grid_distance *next)
         distance[i] = fmin(next(k->medium->body.density.grid, &line, least), 1e18);
     }
     return t + nb_wload_lanes(distance);
+}
+
+#if !defined(NB_DOUBLE)
+#include "trace_voxels.h"
+#endif
+
+static nb_estimate grid_integral(const contact *k, nb_wide start, nb_wide end, nb_real enough)
+{
+#if !defined(NB_DOUBLE)
+    if (walks_voxels(k)) return voxels_integral(k, start, end, enough);
+#endif
+    return lanes_integral(k, start, end, enough);
 }
 
 /* ---- any profile ---------------------------------------------------------------------------- */

@@ -501,6 +501,10 @@ static nb_mask sunlit_lanes(const march *m, const piece *p)
     return nb_and(lit, p->lanes);
 }
 
+#if !defined(NB_DOUBLE)
+#include "trace_sun_lattice.h"
+#endif
+
 /* A first step of a few optical depths: endless pieces would be halved for ever. */
 static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb_mask lanes)
 {
@@ -576,10 +580,10 @@ static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s,
     w->t = nb_wselect(dark, end, w->t);
 }
 
-/* Adds the sunlight of a piece; `g` is what was gathered before it. A lane's steps are its own. */
-static void gather_sunlight(sunlight *sun, const march *m, const piece *p, gathered *g)
+/* Adds the sunlight of a piece in the lanes that are lit; `g` is what was gathered before it. A lane's steps are its own.
+ */
+static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_mask lit, gathered *g)
 {
-    const nb_mask lit = sunlit_lanes(m, p);
     if (!nb_any(lit)) return;
     (void)find_turns(sun, &m->rays, NULL);
     if (has_closed_steps(sun)) {

@@ -119,12 +119,11 @@ static nb_real largest(const nb_real v[3])
     return nb_max(nb_max(v[0], v[1]), v[2]);
 }
 
-/* Adds one medium's optical depth and light from `start` to `end`, h metres, to the sum. */
-static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_wide end, nb_real h)
+/* Adds one medium's optical depth and light to the sum, where its density has this integral. */
+static void add_estimate(piece_sum *sum, const contact *k, const nb_estimate *along)
 {
-    const nb_estimate along = contact_integral(k, start, end, h);
-    const nb_real length = nb_select(k->inside, along.value, NB_F(0.0));
-    const nb_real error = nb_select(k->inside, along.error, NB_F(0.0));
+    const nb_real length = nb_select(k->inside, along->value, NB_F(0.0));
+    const nb_real error = nb_select(k->inside, along->error, NB_F(0.0));
     for (int c = 0; c < 3; c++) {
         sum->depth[c] = sum->depth[c] + k->extinction[c] * length;
         sum->light[c] = sum->light[c] + k->light[c] * length;
@@ -132,6 +131,13 @@ static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_wide
         sum->light_error[c] = sum->light_error[c] + k->light[c] * error;
     }
     sum->relative_error = nb_max(sum->relative_error, nb_min(error / nb_max(length, NB_TINY), NB_F(1.0)));
+}
+
+/* From `start` to `end`, h metres. */
+static void add_contact(piece_sum *sum, const contact *k, nb_wide start, nb_wide end, nb_real h)
+{
+    const nb_estimate along = contact_integral(k, start, end, h);
+    add_estimate(sum, k, &along);
 }
 
 static piece_sum no_sum(void)
@@ -149,7 +155,10 @@ static piece_sum sum_piece(const march *m, const piece *p)
     nb_real first[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
-        add_contact(&sum, k, p->start, p->end, p->length);
+        if (m->whole != NULL)
+            add_estimate(&sum, k, m->whole);
+        else
+            add_contact(&sum, k, p->start, p->end, p->length);
         const nb_mask again = nb_and(k->inside, seen);
         nb_mask differs = k->medium->emits ? nb_mask_true : emits;
         for (int c = 0; c < 3; c++) {

@@ -84,6 +84,7 @@ static void open_workspace(workspace *w)
     w->m.stretches = w->stretches;
     w->m.lasts = w->lasts;
     w->m.total = NULL;
+    w->m.whole = NULL;
     w->m.sun = NULL;
     w->m.wants_sky = 0;
     w->m.spans = w->spans;

@@ -110,6 +110,41 @@ static void measure_bricks(nebel_grid *grid)
             }
 }
 
+/* ---- how far fog is -------------------------------------------------------------------------- */
+
+static size_t brick_number(const nebel_grid *grid, int x, int y, int z)
+{
+    return ((size_t)z * (size_t)grid->bricks[1] + (size_t)y) * (size_t)grid->bricks[0] + (size_t)x;
+}
+
+/* One more than the least of the 13 neighbours that a pass has seen before, `way` 1 or -1. */
+static void approach(const nebel_grid *grid, int x, int y, int z, int way)
+{
+    uint8_t *clear = &grid->clear[brick_number(grid, x, y, z)];
+    for (int i = 0; i < 13; i++) {
+        const int at[3] = {x + way * (i % 3 - 1), y + way * (i / 3 % 3 - 1), z + way * (i / 9 - 1)};
+        int inside = 1;
+        for (int a = 0; a < 3; a++) inside = inside && at[a] >= 0 && at[a] < grid->bricks[a];
+        if (!inside) continue;
+        const int next = grid->clear[brick_number(grid, at[0], at[1], at[2])] + 1;
+        if (next < *clear) *clear = (uint8_t)next;
+    }
+}
+
+/* Two passes find the distance along the axis that is farthest. Source: Rosenfeld and Pfaltz, Sequential operations in
+ * digital picture processing, 1966. */
+static void measure_clearance(nebel_grid *grid)
+{
+    const int x = grid->bricks[0], y = grid->bricks[1], z = grid->bricks[2], count = x * y * z;
+    for (int i = 0; i < count; i++) {
+        const brick *b = &grid->brick[i];
+        const int empty = b->least == b->most && !(density_of(grid, b->most) > 0);
+        grid->clear[i] = empty ? UINT8_MAX : 0;
+    }
+    for (int i = 0; i < count; i++) approach(grid, i % x, i / x % y, i / x / y, 1);
+    for (int i = count; i-- > 0;) approach(grid, i % x, i / x % y, i / x / y, -1);
+}
+
 static int allocate_grid(nebel_grid *grid, size_t count)
 {
     size_t bricks = 1;
@@ -119,9 +154,10 @@ static int allocate_grid(nebel_grid *grid, size_t count)
         bricks *= (size_t)grid->bricks[i];
     }
     grid->bytes = count * size_of_voxel(grid->type);
-    grid->voxels = nb_allocate(&grid->allocator, count, size_of_voxel(grid->type));
+    grid->voxels = nb_allocate(&grid->allocator, grid->bytes + sizeof(uint32_t), 1);
     grid->brick = nb_allocate(&grid->allocator, bricks, sizeof *grid->brick);
-    return grid->voxels != NULL && grid->brick != NULL;
+    grid->clear = nb_allocate(&grid->allocator, bricks + sizeof(uint32_t), 1);
+    return grid->voxels != NULL && grid->brick != NULL && grid->clear != NULL;
 }
 
 static void free_grid(nebel_grid *grid)
@@ -129,6 +165,7 @@ static void free_grid(nebel_grid *grid)
     const nebel_allocator allocator = grid->allocator;
     nb_release(&allocator, grid->voxels);
     nb_release(&allocator, grid->brick);
+    nb_release(&allocator, grid->clear);
     nb_release(&allocator, grid->name);
     nb_release(&allocator, grid);
 }
@@ -145,6 +182,7 @@ static nebel_result fill_grid(const nebel_grid_desc *desc, nebel_grid *grid, siz
     if (result != NEBEL_OK) return result;
     grid->hash = hash_bytes(grid->voxels, grid->bytes);
     measure_bricks(grid);
+    measure_clearance(grid);
     return NEBEL_OK;
 }
 
@@ -199,6 +237,21 @@ void nebel_release_grid(nebel_grid *grid)
 double nb_grid_margin(const nebel_grid *grid)
 {
     return grid->filter == NEBEL_FILTER_LINEAR ? 0.5 : 0;
+}
+
+int nb_grid_is_linear(const nebel_grid *grid)
+{
+    return grid->filter == NEBEL_FILTER_LINEAR;
+}
+
+int nb_grid_cells(const nebel_grid *grid, int axis)
+{
+    return grid->cells[axis];
+}
+
+double nb_grid_end(const nebel_grid *grid, int axis)
+{
+    return grid->size[axis] + nb_grid_margin(grid);
 }
 
 void nb_grid_rate(const nebel_grid *grid, const double low[3], const double high[3], double rate[3])

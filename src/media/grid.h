@@ -46,6 +46,17 @@ nb_grid_sum nb_grid_integral(const nebel_grid *grid, const nb_grid_line *line, d
 void nb_grid_places(const nebel_grid *grid, const nb_grid_line *line, double length, double amount, int count,
                     const double *share, double *place);
 
+/* The density integrated from 0 to each of `count` ascending places along the line, of which `length` is none beyond. */
+void nb_grid_sums(const nebel_grid *grid, const nb_grid_line *line, double length, int count, const double *place,
+                  double *sum);
+
+/* Whether the density is interpolated between voxels. */
+int nb_grid_is_linear(const nebel_grid *grid);
+
+/* How many cells there are along an axis, and where the box ends in them. */
+int nb_grid_cells(const nebel_grid *grid, int axis);
+double nb_grid_end(const nebel_grid *grid, int axis);
+
 /* The density at a place. */
 double nb_grid_density(const nebel_grid *grid, const double place[3]);
 

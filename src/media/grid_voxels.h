@@ -29,8 +29,9 @@ struct nebel_grid {
     double least, most;   /* density */
     uint64_t hash;        /* of what is stored */
     size_t bytes;
-    void *voxels;
+    void *voxels; /* and room behind for a word that begins in the last one */
     brick *brick;
+    uint8_t *clear; /* of each brick: 0 where there is fog, else how many bricks away the nearest fog is, at most 255 */
     char *name;
 };
 

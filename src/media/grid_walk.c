@@ -446,6 +446,22 @@ void nb_grid_places(const nebel_grid *grid, const nb_grid_line *line, double len
     }
 }
 
+void nb_grid_sums(const nebel_grid *grid, const nb_grid_line *line, double length, int count, const double *place,
+                  double *sum)
+{
+    cursor c = {.grid = grid, .line = line, .length = length, .bricks = walk_bricks(grid, line)};
+    double before = 0;
+    for (int i = 0; i < count;) {
+        const stretch s = next_stretch(&c);
+        const int last = c.t >= length && !c.within;
+        for (; i < count && (last || place[i] <= s.end); i++) {
+            const double share = s.end > s.start ? smaller((place[i] - s.start) / (s.end - s.start), 1) : 1;
+            sum[i] = before + share * s.amount;
+        }
+        before += s.amount;
+    }
+}
+
 /* ---- at a place ------------------------------------------------------------------------------ */
 
 typedef struct located {

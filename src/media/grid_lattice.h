@@ -1,0 +1,48 @@
+/* How much fog lies between any place in voxels and the sun, on a lattice.
+ *
+ * The lattice is sheared: its columns run along the way to the sun, and its layers are the faces of cells across the
+ * axis that this way follows most. So the integral at every node of a column is had in one walk, exactly; beside the
+ * box, where the way to the sun is the same, it is that where the way meets the box. Between nodes it is interpolated,
+ * whose error is estimated by second differences. */
+#ifndef NB_MEDIA_GRID_LATTICE_H
+#define NB_MEDIA_GRID_LATTICE_H
+
+#include "grid.h"
+
+#include <stddef.h>
+
+/* Nodes of a block along an axis. The estimate of the error is one for each. */
+#define NB_LATTICE_BLOCK 2
+
+/* With p a place in cells, nodes are at whole numbers of
+ *
+ *     (p[side[0]] - lean[0] p[axis]) per_cell - first[0], the same of [1], and p[axis],
+ *
+ * which count columns along both sides and layers. */
+typedef struct nb_grid_lattice {
+    int axis, side[2];
+    double lean[2]; /* cells that the way moves aside from one layer to the next */
+    double first[2];
+    double per_cell;
+    int count[3];     /* nodes: columns along both sides, layers; two at least */
+    int blocks[3];    /* of nodes */
+    double step;      /* what numbers of nodes are multiples of [m] */
+    uint16_t *amount; /* integral of the density from the node to the sun; columns along side[0] in turn. Less a twelfth
+                            of its second differences, by which linear interpolation of a parabola is too large on average
+                            */
+    uint16_t *deviation; /* of each block: what interpolation may be off by in its cells, with one more node */
+    size_t bytes;
+} nb_grid_lattice;
+
+/* `to_sun`: cells per metre of the way to the sun, not all 0. The lattice keeps the grid. NULL where memory is out. */
+nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3]);
+
+nb_grid_lattice *nb_grid_lattice_retain(nb_grid_lattice *lattice);
+
+/* NULL: nothing happens. */
+void nb_grid_lattice_release(nb_grid_lattice *lattice);
+
+/* Whether this is the lattice that nb_grid_lattice_make would make. */
+int nb_grid_lattice_is_of(const nb_grid_lattice *lattice, const nebel_grid *grid, const double to_sun[3]);
+
+#endif
