@@ -492,6 +492,29 @@ static void test_random_fog(void **unused)
     assert_true(lit > random_count);
 }
 
+/* Rays and fog at the limits of places. */
+static void test_far_away(void **unused)
+{
+    (void)unused;
+    nebel_volume_desc haze = volume_of(&white, 1e-15), far = ball(&white, 1e-13);
+    haze.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 1e14};
+    far.shape.radius = 1e14;
+    const nebel_volume_desc *volumes[] = {&haze, &far};
+    for (int k = 0; k < 2; k++) {
+        nebel_snapshot *snapshot = commit(&white, volumes[k], &(nebel_diffusion_desc){.cells = 1000, .has_ground = !k});
+        for (int i = 0; i < 60; i++) {
+            const double at = NEBEL_MAX_LENGTH * (i % 2 ? 1 : .9999);
+            const nebel_ray ray = {{i % 3 ? at : 0, i % 5 ? 2e13 : -at, i % 4 ? -at : 3},
+                                   {i % 7 - 3, i % 11 ? .01 : -1, i % 13 - 6.5},
+                                   HUGE_VAL};
+            nebel_light out;
+            assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
+            assert_true(out.in_scattering[0] >= 0 && isfinite(out.in_scattering[0]));
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
 static void test_memory_runs_out(void **unused)
 {
     (void)unused;
@@ -541,6 +564,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(test_bad_descriptions),
                                        cmocka_unit_test(test_what_diffusion_cannot_do_is_refused),
                                        cmocka_unit_test(test_fog_without_light),
+                                       cmocka_unit_test(test_far_away),
                                        cmocka_unit_test(test_random_fog),
                                        cmocka_unit_test(test_memory_runs_out)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -13,6 +13,9 @@
 
 #define PI 3.14159265358979323846
 
+/* Farther along an axis [m] no ray may begin, and none goes on. */
+#define FAR (NEBEL_MAX_LENGTH * 0.999)
+
 /* Steps that leave less than this are halved, so often at most: fog may begin anywhere in them. Where they leave more than
  * that they grow again. */
 #define THICK 0.5
@@ -141,6 +144,9 @@ static void clip(const nb_lattice *l, const double middle[3], walker *w)
 {
     for (int a = 0; a < 3; a++) {
         const double from = middle[a] + w->origin[a], d = w->direction[a];
+        if (d != 0) w->end = fmin(w->end, (copysign(FAR, d) - from) / d);
+        if (d != 0) w->t = fmax(w->t, (copysign(FAR, -d) - from) / d);
+        if (d == 0 && fabs(from) > FAR) w->end = 0;
         for (int side = 0; side < 2; side++) {
             const double face = side ? l->high[a] : l->low[a], outwards = side ? d : -d;
             if (l->ends[a][side] == NB_END_LEVEL) continue;

@@ -184,10 +184,11 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     job->promised = job->budget + (kernel == nb_trace_double ? DOUBLE_ROUNDING : FLOAT_ROUNDING);
     job->count = n;
     const unsigned precision = nb_full_precision();
-    nebel_result result = kernel(job);
-    if (result == NEBEL_OK && snapshot->diffusion != NULL && !job->transmittance_only) result = nb_diffusion_add(job);
+    const nebel_result result = kernel(job);
+    const int is_diffuse = result == NEBEL_OK && snapshot->diffusion != NULL && !job->transmittance_only;
+    const nebel_result added = is_diffuse ? nb_diffusion_add(job) : NEBEL_OK; /* which has said what is wrong */
     nb_restore_precision(precision);
-    return explain(job, result, desc->failed_ray);
+    return added == NEBEL_OK ? explain(job, result, desc->failed_ray) : added;
 }
 
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
