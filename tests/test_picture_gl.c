@@ -21,7 +21,8 @@ enum {
     RANDOM_WIDTH = 96,
     RANDOM_HEIGHT = 64,
     RANDOM_SCENES = 40,
-    GRID_SCENES = 8
+    GRID_SCENES = 8,
+    SUNLIT_SCENES = 4
 };
 
 static picture_report report;
@@ -101,16 +102,14 @@ static void check_panorama(const nebel_scene *scene, const char *name)
     picture_free(&pair);
 }
 
-/* OpenGL refuses fog that the sun lights around models, or the sun or lamps and voxels. */
+/* OpenGL refuses fog with voxels that the sun or lamps light. */
 static int is_drawn(const nebel_scene *scene)
 {
     const double eye[3] = {0, 0, 0};
     nebel_snapshot *fog = NULL;
-    nebel_sunlit_fog lit;
     size_t count;
     assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
-    nebel_result result = nebel_pack_fog(fog, eye, NULL, 0, &count);
-    if (nebel_snapshot_sunlit_fog(fog, &lit)) result = NEBEL_ERROR_UNSUPPORTED;
+    const nebel_result result = nebel_pack_fog(fog, eye, NULL, 0, &count);
     nebel_release_snapshot(fog);
     assert_true(result == NEBEL_OK || result == NEBEL_ERROR_UNSUPPORTED);
     return result == NEBEL_OK;
@@ -181,14 +180,15 @@ static nebel_scene_data scene_around(const double middle[3], nebel_mesh meshes[4
     return (nebel_scene_data){.background = {.3, .4, .5}, .ambient = {1, 1, 1}, .mesh_count = 4, .meshes = meshes};
 }
 
-/* With lamps it scatters light. */
-static nebel_snapshot *commit(random_fog *random, size_t lamp_count, const nebel_lamp *lamps)
+/* With lamps it scatters light; sun NULL: there is none. */
+static nebel_snapshot *commit(random_fog *random, const nebel_sun *sun, size_t lamp_count, const nebel_lamp *lamps)
 {
     uint64_t numbers = random->seed;
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
     nebel_fog_desc desc = random_fog_desc(random);
     desc.max_opacity = 0;
+    if (sun != NULL) desc.sun = *sun;
     if (lamp_count > 0) random_fog_light(random, &numbers);
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     for (size_t i = 0; i < random->count; i++)
@@ -237,18 +237,24 @@ static nebel_camera camera_for(const random_fog *fog, int number)
     return camera;
 }
 
-static picture_difference check_random(random_fog *random, const char *kind, int number)
+/* sun NULL: there is none. */
+static picture_difference check_random(random_fog *random, const nebel_sun *sun, const char *kind, int number)
 {
     static float positions[4][8][3];
     nebel_mesh meshes[4];
     char name[64];
     nb_gl context;
     nebel_lamp lamps[2];
-    const size_t lamp_count = place_lamps(random, number, lamps);
-    nebel_snapshot *const fog = commit(random, lamp_count, lamps);
+    const size_t lamp_count = sun != NULL ? 0 : place_lamps(random, number, lamps);
+    nebel_snapshot *const fog = commit(random, sun, lamp_count, lamps);
     nebel_scene_data scene = scene_around(random->shift, meshes, positions);
     scene.lamp_count = lamp_count;
     scene.lamps = lamps;
+    scene.has_sun = sun != NULL;
+    for (int k = 0; k < 3 && sun != NULL; k++) {
+        scene.sun_direction[k] = sun->direction[k];
+        scene.sun_irradiance[k] = sun->irradiance[k];
+    }
     const nebel_camera camera = camera_for(random, number);
     picture_pair pair = picture_make(RANDOM_WIDTH, RANDOM_HEIGHT);
     pass_open(&context, number % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
@@ -284,7 +290,7 @@ static void test_random_fog_around_boxes(void **state)
     picture_difference all = {.fogged = 0};
     for (int i = 0; i < RANDOM_SCENES; i++) {
         random_fog_make(&random, (random_fog_kind)(i % RANDOM_FOG_KIND_COUNT), (uint64_t)i);
-        const picture_difference d = check_random(&random, "random", i);
+        const picture_difference d = check_random(&random, NULL, "random", i);
         count(&all, &d);
     }
     expect_all(&all, RANDOM_SCENES);
@@ -299,11 +305,28 @@ static void test_random_grids_around_boxes(void **state)
     for (int i = 0; i < GRID_SCENES; i++) {
         nebel_grid *grids[RANDOM_GRIDS];
         random_grids_make(&random, (random_fog_kind)(i % RANDOM_FOG_MANY), (uint64_t)i, grids);
-        const picture_difference d = check_random(&random, "grids", i);
+        const picture_difference d = check_random(&random, NULL, "grids", i);
         count(&all, &d);
         random_grids_release(grids);
     }
     expect_all(&all, GRID_SCENES);
+}
+
+/* The boxes cut shadows out of it. */
+static void test_sunlit_fog_around_boxes(void **state)
+{
+    (void)state;
+    static random_fog random;
+    picture_difference all = {.fogged = 0};
+    for (int i = 0; i < SUNLIT_SCENES; i++) {
+        uint64_t numbers = (uint64_t)i + 1;
+        random_fog_make(&random, (random_fog_kind)i, (uint64_t)i);
+        random_fog_light(&random, &numbers);
+        const nebel_sun sun = {{dice(&numbers, -1, 1), dice(&numbers, .3, 1), dice(&numbers, -1, 1)}, {3, 2.5, 2}};
+        const picture_difference d = check_random(&random, &sun, "sunlit", i);
+        count(&all, &d);
+    }
+    expect_all(&all, SUNLIT_SCENES);
 }
 
 int main(void)
@@ -312,6 +335,7 @@ int main(void)
         cmocka_unit_test(test_demo_scenes),
         cmocka_unit_test(test_random_fog_around_boxes),
         cmocka_unit_test(test_random_grids_around_boxes),
+        cmocka_unit_test(test_sunlit_fog_around_boxes),
     };
     report = picture_report_open("nebel: OpenGL beside the CPU");
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);

@@ -11,10 +11,10 @@
  *
  * Surfaces, light and fog are those of nebel/render.h: Lambert surfaces lit by the sun and the scene's lamps, which are
  * attenuated by all fog on their way, and by the ambient radiance; colour = transmittance * surface + in-scattering.
- * Both renderers look through the same points of each pixel. The sun's shadows come from maps fitted to what is seen,
- * those of lamps from six maps around each, so their edges are a texel of the map wide. Particles dim the sun, not lamps.
- * Panoramas are no resampled views: each pixel has its own ray, which meets surfaces, fog and particles
- * exactly. Link with libnebel_gl and libnebel.
+ * Both renderers look through the same points of each pixel. The sun's shadows, on surfaces and in fog, come from
+ * maps fitted to what is seen, those of lamps from six maps around each, so their edges are a texel of the map wide.
+ * Particles dim the sun, not lamps. Panoramas are no resampled views: each pixel has its own ray, which meets
+ * surfaces, fog and particles exactly. Link with libnebel_gl and libnebel.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
  * what nebel/gl.h lists it changes, while it runs, texture units 5 to 12, and TEXTURE_2D_ARRAY of units 8, 10 and 12; both
@@ -38,8 +38,9 @@ typedef struct nebel_gl_renderer nebel_gl_renderer;
 typedef struct nebel_gl_renderer_desc {
     nebel_allocator allocator;
     nebel_log log;
-    uint32_t shadow_size; /* texels of a side of each of the sun's four shadow maps, 64 to 16384; 0: 2048. A lamp's six
-                             have a quarter of it, less where they would take more than 128 MiB together, but 64 */
+    uint32_t shadow_size; /* texels of a side of each of the sun's four shadow maps, and of eight more where it lights
+                             fog, 64 to 16384; 0: 2048. A lamp's six have a quarter of it, less where they would take
+                             more than 128 MiB together, but 64 */
 } nebel_gl_renderer_desc;
 
 /* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, lamps, background and

@@ -29,6 +29,7 @@ typedef struct frame {
     nebel_view sun_view;    /* of all that is seen, against the sun's light */
     int casts;              /* the sun shines, and there is something to cast shadows */
     int dims;               /* particles dim the sun */
+    int shafts;             /* models shade fog */
 } frame;
 
 /* ---- checks ---------------------------------------------------------------------------------- */
@@ -88,13 +89,12 @@ static nebel_result set_method(frame *f)
     return nb_fail(&f->renderer->log, result, "frame: what this method needs is missing or not valid");
 }
 
-static nebel_result check_shafts(const frame *f)
+/* Whether models shade fog: that of the pass, or before particles. */
+static int find_shafts(const frame *f)
 {
     nebel_sunlit_fog lit;
     const nebel_gl_renderer *const r = f->renderer;
-    if (!f->casts || r->fog == NULL || !nebel_snapshot_sunlit_fog(r->fog, &lit)) return NEBEL_OK;
-    return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
-                   "frame: OpenGL does not draw the shadows of models in sunlit fog yet; the CPU does (--device cpu)");
+    return f->casts && r->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(r->fog, &lit);
 }
 
 static nebel_result set_frame(frame *f)
@@ -114,7 +114,8 @@ static nebel_result set_frame(frame *f)
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
-    return result == NEBEL_OK ? check_shafts(f) : result;
+    f->shafts = find_shafts(f);
+    return result;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
@@ -300,8 +301,11 @@ static nebel_result draw_exact_fog(const frame *f)
     const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
                                 .depth_texture = r->targets.place,
                                 .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
-    nb_gl_picture picture = {
-        .rays = f->rays, .width = f->view.width, .height = f->view.height, .panorama = f->panorama};
+    nb_gl_picture picture = {.rays = f->rays,
+                             .width = f->view.width,
+                             .height = f->view.height,
+                             .panorama = f->panorama,
+                             .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
         picture.shade = (nb_gl_shade){{nb_lamp_map_text, nb_lamp_shade_text}, set_lamp_shade, f};
@@ -458,7 +462,8 @@ static nebel_result draw_particles(const frame *f)
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
     const nb_light_kind kind = {.of_particles = r->particles.profiles,
                                 .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
-                                .veil_layers = layers};
+                                .veil_layers = layers,
+                                .shafts = has_fog && f->shafts};
     const nebel_result result = find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.veil_buffer);
@@ -466,6 +471,7 @@ static nebel_result draw_particles(const frame *f)
     for (int i = 0; i < layers; i++) glClearBufferfv(GL_COLOR, i, clear[layers == 3]);
     nb_state_layer(&r->context, layers);
     set_particles(f, &fog, program);
+    if (kind.shafts) nb_shafts_set(&r->shafts, program);
     nb_particles_draw(&r->particles, f->panorama ? NB_PANORAMA_STRIP : 4);
     return NEBEL_OK;
 }
@@ -521,6 +527,14 @@ static nebel_result set_sun_cloud(frame *f)
     return nebel_gl_set_fog(r->sun_cloud, r->cloud, &f->sun_view);
 }
 
+static nebel_result prepare_shafts(frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    nb_shadows_turn(&r->shafts.maps, f->light.sun_direction);
+    return nb_shafts_draw(&r->shafts, &r->context, &r->log, r->shading.shadow, r->vertex_array, &r->shadows,
+                          &r->targets, &f->rays, f->panorama, &r->meshes);
+}
+
 static nebel_result prepare_sun(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
@@ -528,6 +542,7 @@ static nebel_result prepare_sun(frame *f)
     glBindVertexArray(r->vertex_array);
     nebel_result result = nb_shadows_fit(&r->shadows, &r->context, &r->allocator, &r->log, r->shading.survey,
                                          &r->targets, &f->rays, f->panorama, &r->meshes);
+    if (result == NEBEL_OK && f->shafts) result = prepare_shafts(f);
     if (result != NEBEL_OK) return result;
     f->casts = r->shadows.seen_low[0] < r->shadows.seen_high[0];
     if (!f->casts) return NEBEL_OK;

@@ -51,6 +51,7 @@ typedef struct nb_gl_picture {
     uint32_t width, height;
     int panorama;
     nb_gl_shade shade;
+    const struct nb_shafts *shafts; /* where surfaces shade fog; NULL: nowhere. Changes their units */
 } nb_gl_picture;
 
 /* nebel_gl_draw_fog along these. */

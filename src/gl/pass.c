@@ -1,5 +1,6 @@
 /* Fog over the host's picture: checks, state, one triangle. */
 #include "gl.h"
+#include "shafts.h"
 #include "state.h"
 
 typedef struct size {
@@ -252,6 +253,7 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     if (t->gl->fog.tiles != 0) set_tiling(t);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
     if (t->picture->shade.set != NULL) t->picture->shade.set(t->picture->shade.of, p->name);
+    if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
 }
 
 static void draw_triangles(const task *t)
@@ -291,6 +293,7 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .depth = t->pass->depth.kind,
                                   .from_eye = t->picture->rays.from_eye,
                                   .panorama = t->picture->panorama,
+                                  .shafts = t->picture->shafts != NULL,
                                   .features = gl->fog.features,
                                   .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =

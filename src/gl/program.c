@@ -1,6 +1,7 @@
 #include "program.h"
 
 #include "panorama.h"
+#include "shafts.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -242,8 +243,9 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const int is_shaded = kind->shade[0] != NULL;
     const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
-                                is_shaded ? kind->shade[1] : "", fog, ray, tile, fragment_text},
-                               8};
+                                is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "", fog, ray, tile,
+                                fragment_text},
+                               9};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
@@ -254,7 +256,8 @@ static int is_same(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
            a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
-           a->features == b->features && a->shade[0] == b->shade[0] && a->shade[1] == b->shade[1];
+           a->shafts == b->shafts && a->features == b->features && a->shade[0] == b->shade[0] &&
+           a->shade[1] == b->shade[1];
 }
 
 nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,

@@ -33,6 +33,7 @@ typedef struct nb_program_kind {
     nebel_depth_kind depth;
     int from_eye;         /* all rays start where the fog was packed for */
     int panorama;         /* rays go all around, and tiles are of six faces; depth is the distance */
+    int shafts;           /* surfaces shade fog */
     uint32_t features;    /* of the fog: what the text leaves out makes it faster */
     const char *shade[2]; /* texts before that of the fog; NULL: none */
 } nb_program_kind;

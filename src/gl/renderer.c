@@ -74,7 +74,10 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     made->scene = scene;
     made->context = context;
     const uint32_t size = desc->shadow_size != 0 ? desc->shadow_size : USUAL_SHADOW_SIZE;
-    made->shadows.size = size < context.widest ? size : context.widest;
+    made->shadows.size = made->shafts.maps.size = size < context.widest ? size : context.widest;
+    made->shadows.count = NB_CASCADES;
+    made->shafts.maps.count = NB_MOST_MAPS;
+    made->shafts.maps.leaning = 1;
     made->lamps.most_face = size / 4;
     made->fog = fog != NULL ? nebel_retain_snapshot(fog) : NULL;
     result = make(made);
@@ -95,6 +98,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     if (in_context) {
         nb_shading_delete(&r->shading);
         nb_shadows_delete(&r->shadows);
+        nb_shafts_delete(&r->shafts);
         nb_lamps_delete(&r->lamps);
         nb_targets_delete(&r->targets);
         nb_particles_delete(&r->particles);

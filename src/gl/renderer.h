@@ -9,6 +9,7 @@
 #include "scene_state.h"
 #include "shading.h"
 #include "shadows.h"
+#include "shafts.h"
 #include "targets.h"
 
 struct nebel_gl_renderer {
@@ -25,6 +26,7 @@ struct nebel_gl_renderer {
     nb_meshes meshes;
     nb_shading shading;
     nb_shadows shadows;
+    nb_shafts shafts;
     nb_lamps lamps;
     nb_targets targets;
     nb_particles particles;

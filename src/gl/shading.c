@@ -4,6 +4,7 @@
 #include "lamps.h"
 #include "panorama.h"
 #include "particle_text.h"
+#include "shafts.h"
 #include "targets.h"
 
 #include <epoxy/gl.h>
@@ -275,11 +276,16 @@ static const char shadow_vertex_text[] =
     "    gl_Position = vec4(at.xy, -at.z, 1.0);\n"
     "}\n";
 
-static const char shadow_fragment_text[] = "in vec2 surface_uv;\n"
-                                           "void main()\n"
-                                           "{\n"
-                                           "    if (is_hole(surface_uv)) discard;\n"
-                                           "}\n";
+/* Depth at the farthest corner of the texel, as far as map_lean. */
+static const char shadow_fragment_text[] =
+    "in vec2 surface_uv;\n"
+    "uniform float map_lean;\n"
+    "void main()\n"
+    "{\n"
+    "    float lean = 0.5 * (abs(dFdx(gl_FragCoord.z)) + abs(dFdy(gl_FragCoord.z)));\n"
+    "    if (is_hole(surface_uv)) discard;\n"
+    "    gl_FragDepth = gl_FragCoord.z + min(lean, map_lean);\n"
+    "}\n";
 
 /* ---- light ----------------------------------------------------------------------------------- */
 
@@ -455,7 +461,7 @@ static const char light_text[] =
 
 /* ---- the survey ------------------------------------------------------------------------------ */
 
-/* Of each block of pixels the nearest and the farthest surface; 0 where there is none. */
+/* Of each block of pixels the nearest and the farthest surface, 0 where there is none; whether some pixel has none. */
 static const char survey_text[] = "uniform highp sampler2D scene_place;\n"
                                   "uniform ivec2 scene_size;\n"
                                   "out highp vec4 out_distances;\n"
@@ -463,15 +469,16 @@ static const char survey_text[] = "uniform highp sampler2D scene_place;\n"
                                   "{\n"
                                   "    ivec2 first = ivec2(gl_FragCoord.xy) * NB_SURVEY_BLOCK;\n"
                                   "    ivec2 end = min(first + NB_SURVEY_BLOCK, scene_size);\n"
-                                  "    float nearest = 0.0, farthest = 0.0;\n"
+                                  "    float nearest = 0.0, farthest = 0.0, open = 0.0;\n"
                                   "    for (int y = first.y; y < end.y; y++) {\n"
                                   "        for (int x = first.x; x < end.x; x++) {\n"
                                   "            float t = texelFetch(scene_place, ivec2(x, y), 0).x;\n"
                                   "            if (t > 0.0) nearest = nearest > 0.0 ? min(nearest, t) : t;\n"
                                   "            farthest = max(farthest, t);\n"
+                                  "            if (!(t > 0.0)) open = 1.0;\n"
                                   "        }\n"
                                   "    }\n"
-                                  "    out_distances = vec4(nearest, farthest, 0.0, 0.0);\n"
+                                  "    out_distances = vec4(nearest, farthest, open, 0.0);\n"
                                   "}\n";
 
 /* ---- programs -------------------------------------------------------------------------------- */
@@ -640,9 +647,9 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
                              kind->lamplit ? nb_lamp_map_text : "", kind->lamplit ? nb_lamp_text : "", light_text},
                             9};
     const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
-    const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", fog, words_text, ray, tile,
-                                nb_particle_start_text, nb_particle_text},
-                               8};
+    const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,
+                                words_text, ray, tile, nb_particle_start_text, nb_particle_text},
+                               9};
     const nb_texts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
                                                  kind->of_particles ? &particle
@@ -658,8 +665,8 @@ static int is_same(const nb_light_kind *a, const nb_light_kind *b)
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
            a->sunlit == b->sunlit && a->lamplit == b->lamplit && a->five_taps == b->five_taps &&
            a->veil_layers == b->veil_layers && a->panorama == b->panorama && a->has_surfaces == b->has_surfaces &&
-           a->in_fog == b->in_fog && a->has_fog == b->has_fog && a->in_texture == b->in_texture &&
-           a->tiled == b->tiled && a->features == b->features;
+           a->in_fog == b->in_fog && a->has_fog == b->has_fog && a->shafts == b->shafts &&
+           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

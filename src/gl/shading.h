@@ -20,7 +20,7 @@ enum {
     NB_UNIT_MASK = NB_UNIT_NORMAL /* while surfaces are drawn nothing reads normals */
 };
 
-enum { NB_CASCADES = 4 };
+enum { NB_CASCADES = 4, NB_MOST_MAPS = 8 };
 
 /* What a program that asks fog is made for. */
 typedef struct nb_light_kind {
@@ -36,6 +36,7 @@ typedef struct nb_light_kind {
     int has_surfaces; /* there are meshes */
     int in_fog;       /* that the pass, or vertices, made for all pixels */
     int has_fog;
+    int shafts; /* surfaces shade fog */
     int in_texture, tiled;
     uint32_t features;
 } nb_light_kind;

@@ -212,10 +212,10 @@ static double pixel_width(const survey *s, double t)
 }
 
 /* Some texels at the borders belong to the filter. */
-static void lay_map(nb_shadows *shadows, const survey *s, int map)
+static void lay_map(nb_shadows *shadows, const survey *s, int map, const rectangle *seen)
 {
     enum { BORDER = 4 };
-    rectangle r = s->seen[map];
+    const rectangle r = *seen;
     if (r.low[0] > r.high[0]) {
         shadows->ends[map] = 0;
         return;
@@ -230,6 +230,21 @@ static void lay_map(nb_shadows *shadows, const survey *s, int map)
         shadows->seen_low[i] = fmin(shadows->seen_low[i], r.low[i] - margin);
         shadows->seen_high[i] = fmax(shadows->seen_high[i], r.high[i] + margin);
     }
+}
+
+/* Over which all that may cast shadows lies. */
+static rectangle casting(const nb_shadows *shadows, const double eye[3], const nb_meshes *meshes)
+{
+    rectangle r = nothing();
+    for (int corner = 0; corner < 8; corner++) {
+        double at[2] = {0, 0};
+        for (int i = 0; i < 3; i++) {
+            const double way = (corner >> i & 1 ? meshes->high[i] : meshes->low[i]) - eye[i];
+            for (int k = 0; k < 2; k++) at[k] += shadows->across[k][i] * way;
+        }
+        include(&r, at);
+    }
+    return r;
 }
 
 /* Heights of all that may cast shadows, and how fine floats are there. */
@@ -301,9 +316,123 @@ nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, cons
     if (!(s.farthest > 0)) return NEBEL_OK;
     set_ends(shadows, &s);
     find_rectangles(shadows, &s);
-    for (int k = 0; k < NB_CASCADES; k++) lay_map(shadows, &s, k);
+    for (int k = 0; k < NB_CASCADES; k++) lay_map(shadows, &s, k, &s.seen[k]);
     find_heights(shadows, rays->eye, meshes);
     return NEBEL_OK;
+}
+
+static void clip(rectangle *r, const rectangle *to)
+{
+    for (int i = 0; i < 2; i++) {
+        r->low[i] = fmax(r->low[i], to->low[i]);
+        r->high[i] = fmin(r->high[i], to->high[i]);
+    }
+}
+
+static int is_empty(const rectangle *r)
+{
+    return !(r->low[0] <= r->high[0] && r->low[1] <= r->high[1]);
+}
+
+/* Of all places before the surfaces of the blocks, those within a rectangle. Where a block has pixels without surface,
+ * rays go on to `reach`. */
+static rectangle places_before(const nb_shadows *shadows, const survey *s, double reach, const rectangle *within)
+{
+    rectangle all = nothing();
+    for (uint32_t row = 0; row < s->rows; row++) {
+        for (uint32_t column = 0; column < s->columns; column++) {
+            const float *const block = s->blocks + 4 * ((size_t)row * s->columns + column);
+            const extent e = block_extent(s, column, row);
+            rectangle r = nothing();
+            include_block(shadows, s, &e, 0, block[2] > 0 ? reach : (double)block[1], &r);
+            clip(&r, within);
+            if (is_empty(&r)) continue;
+            include(&all, r.low);
+            include(&all, r.high);
+        }
+    }
+    return all;
+}
+
+/* How far from the eye across the light, at least and at most. */
+static void find_radii(const rectangle *r, double *nearest, double *farthest)
+{
+    double near[2], far[2];
+    for (int k = 0; k < 2; k++) {
+        near[k] = fmax(fmax(r->low[k], -r->high[k]), 0);
+        far[k] = fmax(fabs(r->low[k]), fabs(r->high[k]));
+    }
+    *nearest = hypot(near[0], near[1]);
+    *farthest = hypot(far[0], far[1]);
+}
+
+/* Rays from the eye go away from it across the light. What a texel is off along a ray is in proportion to the way there
+ * where texels are in proportion to the distance across: each map is a square around the eye, its side a multiple of the
+ * one before. */
+static void lay_squares(nb_shadows *shadows, const survey *s, double reach, const rectangle *seen)
+{
+    static const double most_ratio = 4096;
+    double nearest, farthest;
+    find_radii(seen, &nearest, &farthest);
+    nearest = fmax(nearest, farthest / most_ratio);
+    for (int k = 0; k < shadows->count; k++) {
+        const double side = nearest * pow(farthest / nearest, (k + 1.) / shadows->count);
+        rectangle square = {{-side, -side}, {side, side}};
+        clip(&square, seen);
+        square = places_before(shadows, s, reach, &square);
+        lay_map(shadows, s, k, &square);
+    }
+}
+
+/* Parallel rays have no such place: the maps lie side by side, along the longer side. */
+static void lay_tiles(nb_shadows *shadows, const survey *s, const rectangle *seen)
+{
+    const int axis = seen->high[1] - seen->low[1] > seen->high[0] - seen->low[0], columns = shadows->count / 2;
+    for (int k = 0; k < shadows->count; k++) {
+        const int place[2] = {k % columns, k / columns}, most[2] = {columns, 2};
+        rectangle tile;
+        for (int i = 0; i < 2; i++) {
+            const int way = i == axis ? 0 : 1;
+            const double step = (seen->high[i] - seen->low[i]) / most[way];
+            tile.low[i] = seen->low[i] + place[way] * step;
+            tile.high[i] = tile.low[i] + step;
+        }
+        lay_map(shadows, s, k, &tile);
+    }
+}
+
+static int are_parallel(const survey *s)
+{
+    int same = !s->panorama;
+    for (int i = 0; i < 3; i++)
+        same = same && s->rays->words[4].v[i] == 0 && s->rays->words[5].v[i] == 0; /* directions do not change */
+    return same;
+}
+
+void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const nb_targets *targets,
+                        const nebel_rays *rays, int panorama, const nb_meshes *meshes)
+{
+    static const double longest = 1000; /* times the way across: of rays nearly along the light */
+    survey s = {.rays = rays,
+                .panorama = panorama,
+                .blocks = surfaces->blocks,
+                .columns = targets->survey_width,
+                .rows = targets->survey_height,
+                .width = targets->width,
+                .height = targets->height};
+    const rectangle all = casting(shadows, rays->eye, meshes);
+    double nearest;
+    find_radii(&all, &nearest, &s.farthest);
+    const double reach = longest * s.farthest;
+    const rectangle seen = places_before(shadows, &s, reach, &all);
+    for (int k = 0; k < shadows->count; k++) shadows->ends[k] = is_empty(&seen) ? 0 : 1;
+    find_heights(shadows, rays->eye, meshes);
+    if (is_empty(&seen)) return;
+    if (are_parallel(&s)) {
+        lay_tiles(shadows, &s, &seen);
+    } else {
+        lay_squares(shadows, &s, reach, &seen);
+    }
 }
 
 /* ---- maps ------------------------------------------------------------------------------------ */
@@ -317,7 +446,7 @@ static nebel_result make_texture(nb_shadows *shadows, const nebel_log *log)
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
-    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, size, size, NB_CASCADES, 0, GL_DEPTH_COMPONENT,
+    glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, size, size, shadows->count, 0, GL_DEPTH_COMPONENT,
                  GL_FLOAT, NULL);
     glGenFramebuffers(1, &shadows->buffer);
     glBindFramebuffer(GL_FRAMEBUFFER, shadows->buffer);
@@ -347,6 +476,9 @@ static int is_in_map(const nb_shadows *shadows, int map, const nb_mesh *mesh, co
     return 1;
 }
 
+/* Slope up to which what leans counts as leaning: of steeper faces the sun sees hardly anything. */
+enum { MOST_LEAN = 4 };
+
 static void draw_map(const nb_shadows *shadows, int map, unsigned program, const nb_meshes *meshes, const double eye[3])
 {
     const float *const place = shadows->places[map], size = (float)shadows->size;
@@ -355,6 +487,8 @@ static void draw_map(const nb_shadows *shadows, int map, unsigned program, const
     glUniform3f(glGetUniformLocation(program, "map_low"), place[0], place[1], shadows->low);
     glUniform3f(glGetUniformLocation(program, "map_scale"), 2 * place[2] / size, 2 * place[3] / size,
                 2 / (shadows->high - shadows->low));
+    const float texel = 1 / fminf(place[2], place[3]) / (shadows->high - shadows->low);
+    glUniform1f(glGetUniformLocation(program, "map_lean"), shadows->leaning ? MOST_LEAN * texel : 0);
     for (size_t i = 0; i < meshes->count; i++) {
         const nb_mesh *const mesh = &meshes->list[i];
         float from_eye[3];
@@ -381,7 +515,7 @@ nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, con
     glDepthFunc(GL_LESS);
     glUseProgram(program);
     glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, shadows->light);
-    for (int map = 0; map < NB_CASCADES; map++) {
+    for (int map = 0; map < shadows->count; map++) {
         glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, shadows->texture, 0, map);
         glClearBufferfv(GL_DEPTH, 0, &empty);
         if (shadows->ends[map] > 0) draw_map(shadows, map, program, meshes, eye);

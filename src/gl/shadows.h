@@ -10,15 +10,17 @@
 typedef struct nb_shadows {
     unsigned texture, buffer; /* 0: not made yet */
     uint32_t size;
+    int count;                        /* of maps */
     float light[9];                   /* to light coordinates, by columns */
     double across[2][3];              /* the first two axes */
-    float places[NB_CASCADES][4];     /* low corner, texels per metre */
-    float ends[NB_CASCADES];          /* distance up to which a map is the finest; 0: the map is empty */
+    float places[NB_MOST_MAPS][4];    /* low corner, texels per metre */
+    float ends[NB_MOST_MAPS];         /* distance up to which a map is the finest; 0: the map is empty */
     float low, high;                  /* of everything that may cast shadows, against the light */
     float rounding;                   /* what heights may be off by [m] */
     double seen_low[2], seen_high[2]; /* of all surfaces that are seen; low above high: there are none */
     float *blocks;                    /* the survey, read back */
     size_t capacity;
+    int leaning; /* depths are those of the farthest corners of texels, so that what leans does not shade the air above it */
 } nb_shadows;
 
 /* The axes of a sun in this direction. */
@@ -30,6 +32,10 @@ void nb_shadows_turn(nb_shadows *shadows, const double sun[3]);
 nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, const nebel_allocator *allocator,
                             const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
                             int panorama, const nb_meshes *meshes);
+
+/* Lays the maps around all places before those surfaces where shadows may be. */
+void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const nb_targets *targets,
+                        const nebel_rays *rays, int panorama, const nb_meshes *meshes);
 
 /* Draws the maps. Depth is tested afterwards. MEMORY, UNSUPPORTED. */
 nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, const nebel_log *log, unsigned program,

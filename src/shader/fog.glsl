@@ -496,8 +496,13 @@ nb_sun_sum nb_light_of_sun(nb_leg leg, nb_piece piece, nb_ray ray, nb_vec3 befor
         most = max(most, depth);
     }
     if (closed) {
-        nb_vec3 change = abs(last - first);
-        sum.light = leg.shine * nb_exp3(-min(first, last)) * nb_attenuate(change).mean;
+        /* in height fog without a difference of depths, which may be beyond all numbers */
+        nb_vec4 to_sun = NEBEL_WORD(NB_HEADER_SUN);
+        bool height = int(to_sun.w) == NB_SUN_HEIGHT;
+        float keeps = height ? 1.0 - ray.direction.y / to_sun.y : 1.0; /* of what the ray gains, what the way to the sun does not lose */
+        nb_vec3 change = height ? leg.depth[NB_NODES - 1] * abs(keeps) : abs(last - first);
+        nb_vec3 nearest = height ? (keeps < 0.0 ? last : first) : min(first, last);
+        sum.light = leg.shine * nb_exp3(-nearest) * nb_attenuate(change).mean;
     } else if (nb_largest(leg.shine * nb_exp3(-(before + least)) * nb_attenuate(leg.depth[NB_NODES - 1]).mean) > tolerance) {
         sum.strain = nb_largest(most - least);
     }

@@ -4,7 +4,7 @@
  *
  * Word 0: media, what one step of an integral without a closed form may be off by, the largest opacity, lamps that light
  *         fog.
- * Word 1: the direction towards the sun, of length 1; 1 where what the sun adds has a closed form between turns.
+ * Word 1: the direction towards the sun, of length 1; how what the sun adds is had between turns, NB_SUN_.
  * Word 2: the sun's irradiance; the first word of the lamps. The sun's numbers are 0 where no medium is sunlit.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
@@ -73,6 +73,10 @@
 #define NB_KIND_GRID 8
 #define NB_KIND_RADIAL 9 /* plus power - 1, 0 to 2 */
 #define NB_KIND_EXCLUDE 12
+
+#define NB_SUN_STEPS 0  /* in steps */
+#define NB_SUN_FLAT 1   /* in closed form: flat faces, constant densities */
+#define NB_SUN_HEIGHT 2 /* the same: one endless height fog */
 
 #define NB_LIGHT_EMITS 1
 #define NB_LIGHT_COVERS 2

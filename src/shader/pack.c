@@ -270,7 +270,9 @@ static void pack_sun(const nebel_snapshot *snapshot, nebel_word word[2])
 {
     memset(word, 0, 2 * sizeof *word);
     if (!snapshot->is_sunlit) return;
-    set_color(&word[0], snapshot->to_sun, snapshot->way_to_sun == NB_WAY_FLAT || snapshot->way_to_sun == NB_WAY_HEIGHT);
+    const nb_way_to_sun way = snapshot->way_to_sun;
+    const int form = way == NB_WAY_FLAT ? NB_SUN_FLAT : way == NB_WAY_HEIGHT ? NB_SUN_HEIGHT : NB_SUN_STEPS;
+    set_color(&word[0], snapshot->to_sun, form);
     set_color(&word[1], snapshot->irradiance, 0);
 }
 

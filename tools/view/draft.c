@@ -448,6 +448,7 @@ static int is_black(const double rgb[3])
     return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
 }
 
+/* Fog that lamps light, sunlight among voxels, ambient light that varies, and light that is scattered more than once. */
 int nb_draft_is_for_cpu(const nb_draft *draft)
 {
     const nb_edition *const good = &draft->good;
@@ -459,7 +460,7 @@ int nb_draft_is_for_cpu(const nb_draft *draft)
         has_voxels |= good->volumes[i].density.type == NEBEL_DENSITY_GRID;
     }
     const int is_beyond = file->diffusion != NULL || good->environment.type != NEBEL_ENVIRONMENT_CONSTANT;
-    return is_beyond || (scatters && (has_sun || (file->lamp_count > 0 && has_voxels)));
+    return is_beyond || (scatters && has_voxels && (has_sun || file->lamp_count > 0));
 }
 
 int nb_draft_can_save_camera(const nb_draft *draft)

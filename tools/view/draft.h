@@ -62,8 +62,7 @@ int nb_draft_find_frames(const nb_draft *draft, double range[2]);
  * with them. */
 int nb_draft_must_be_read(const nb_draft *draft);
 
-/* Whether the sun lights fog, lamps do and there are voxels, ambient light is not the same from everywhere, or fog
- * scatters light more than once: OpenGL does not draw that. */
+/* Whether the fog has light that OpenGL does not draw. */
 int nb_draft_is_for_cpu(const nb_draft *draft);
 
 /* Whether the camera is one that the file could hold. */
