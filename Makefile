@@ -2,6 +2,8 @@
 
 BUILD ?= build
 V ?= 0
+# Options of ctest that choose among the sanitizers' tests: make asan CHOSEN='-R grid'.
+CHOSEN ?=
 # A compiler that is newer than this source may have new warnings: they stop CI, not a first build.
 WERROR ?= $(if $(CI),ON,OFF)
 # As many as make -j says, else as many as there are processors.
@@ -59,7 +61,7 @@ asan: $(MODELS)
 	@echo "nebel: building with sanitizers"
 	@$(CONFIGURE) -B $(BUILD)-asan -DCMAKE_BUILD_TYPE=Debug -DNEBEL_SANITIZE=ON
 	@$(COMPILE) $(BUILD)-asan -j $(JOBS)
-	@ctest --test-dir $(BUILD)-asan --output-on-failure --no-tests=error -j 2
+	@ctest --test-dir $(BUILD)-asan --output-on-failure --no-tests=error -j 2 $(CHOSEN)
 
 lint: all
 	@scripts/install_packages.sh build test lint
