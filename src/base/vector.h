@@ -22,11 +22,11 @@ static inline double nb_vector_length(const double v[3])
     return sqrt(nb_vector_dot(v, v));
 }
 
-/* Scales to unit length, first by the largest component so that no square overflows. 0 where there is no direction. */
+/* Scales to unit length, first by the largest component so that no square overflows. 0 where there is no direction, or a number is none. */
 static inline int nb_vector_make_unit(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-    if (!(largest > 0) || isinf(largest)) return 0;
+    if (!(largest > 0) || !isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2])) return 0;
     for (int i = 0; i < 3; i++) v[i] /= largest;
     const double length = nb_vector_length(v);
     for (int i = 0; i < 3; i++) v[i] /= length;

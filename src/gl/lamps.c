@@ -3,6 +3,7 @@
 #include "camera.h"
 #include "shading.h"
 #include "state.h"
+#include "targets.h"
 
 #include "base/vector.h"
 
@@ -223,12 +224,8 @@ nebel_result nb_lamps_set(nb_lamps *lamps, const nebel_allocator *allocator, con
 static nebel_result make_maps(nb_lamps *lamps, const nebel_log *log)
 {
     const GLenum none = GL_NONE;
-    glGenTextures(1, &lamps->maps);
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_LAMP_MAPS);
-    glBindTexture(GL_TEXTURE_2D_ARRAY, lamps->maps);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    lamps->maps = nb_targets_make_array();
     glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, (GLsizei)(3 * lamps->face), (GLsizei)(2 * lamps->face),
                  (GLsizei)lamps->layer_count, 0, GL_DEPTH_COMPONENT, GL_FLOAT, NULL);
     glGenFramebuffers(1, &lamps->buffer);

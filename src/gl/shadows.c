@@ -440,12 +440,8 @@ void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const n
 static nebel_result make_texture(nb_shadows *shadows, const nebel_log *log)
 {
     const GLsizei size = (GLsizei)shadows->size;
-    glGenTextures(1, &shadows->texture);
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADOWS);
-    glBindTexture(GL_TEXTURE_2D_ARRAY, shadows->texture);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    shadows->texture = nb_targets_make_array();
     glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, size, size, shadows->count, 0, GL_DEPTH_COMPONENT,
                  GL_FLOAT, NULL);
     glGenFramebuffers(1, &shadows->buffer);

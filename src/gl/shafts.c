@@ -155,12 +155,8 @@ static GLsizei level_size(const nb_shafts *shafts, int level)
 static nebel_result make_ranges(nb_shafts *shafts, const nebel_log *log)
 {
     const GLsizei size = level_size(shafts, 1);
-    glGenTextures(1, &shafts->ranges);
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADOWS);
-    glBindTexture(GL_TEXTURE_2D_ARRAY, shafts->ranges);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    shafts->ranges = nb_targets_make_array();
     glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_RG32F, size, size, LEVELS * NB_MOST_MAPS, 0, GL_RG, GL_FLOAT, NULL);
     glGenFramebuffers(1, &shafts->buffer);
     return nb_context_check_memory(log, "the shadows in fog; ask for smaller shadow maps");

@@ -82,14 +82,21 @@ static void delete_veil(nb_targets *t)
     t->veil_layers = 0;
 }
 
-/* A layer for a colour: blending takes its factor from the fragment's alpha also where the target has none. */
-static void make_veil(nb_targets *t, int layers)
+unsigned nb_targets_make_array(void)
 {
-    glGenTextures(1, &t->veil);
-    glBindTexture(GL_TEXTURE_2D_ARRAY, t->veil);
+    unsigned texture = 0;
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D_ARRAY, texture);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAX_LEVEL, 0);
+    return texture;
+}
+
+/* A layer for a colour: blending takes its factor from the fragment's alpha also where the target has none. */
+static void make_veil(nb_targets *t, int layers)
+{
+    t->veil = nb_targets_make_array();
     glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, layers == 1 ? GL_RGBA32F : GL_RG32F, (GLsizei)t->width, (GLsizei)t->height,
                  layers, 0, layers == 1 ? GL_RGBA : GL_RG, GL_FLOAT, NULL);
     t->veil_layers = layers;

@@ -35,4 +35,7 @@ nebel_result nb_targets_fit_veil(nb_targets *targets, const nebel_log *log, int 
 
 void nb_targets_delete(nb_targets *targets);
 
+/* A new array of textures, read without filter and bound to the active unit; its size is the caller's. */
+unsigned nb_targets_make_array(void);
+
 #endif

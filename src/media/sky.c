@@ -8,6 +8,8 @@
 #include "check.h"
 #include "sky_map.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -86,17 +88,6 @@ static void turn_to_map(nb_sky_turn turn, const double direction[3], double turn
 static void scale_map(const nebel_environment *sky, double light[3])
 {
     for (int c = 0; c < 3; c++) light[c] *= intensity_of(sky);
-}
-
-/* 0 where there is no direction. */
-static int make_unit(const double direction[3], double unit[3])
-{
-    const double most = fmax(fmax(fabs(direction[0]), fabs(direction[1])), fabs(direction[2]));
-    if (!(most > 0) || !isfinite(direction[0]) || !isfinite(direction[1]) || !isfinite(direction[2])) return 0;
-    for (int i = 0; i < 3; i++) unit[i] = direction[i] / most;
-    const double length = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2]);
-    for (int i = 0; i < 3; i++) unit[i] /= length;
-    return 1;
 }
 
 /* ---- gradients ------------------------------------------------------------------------------- */
@@ -248,10 +239,10 @@ void nb_sky_scattered(const nb_skylight *light, const double direction[3], doubl
 
 void nebel_environment_radiance(const nebel_environment *environment, const double direction[3], double radiance[3])
 {
-    double unit[3], turned[3];
+    double unit[3] = {direction[0], direction[1], direction[2]}, turned[3];
     if (environment->type == NEBEL_ENVIRONMENT_CONSTANT) {
         memcpy(radiance, environment->radiance, sizeof environment->radiance);
-    } else if (!make_unit(direction, unit)) {
+    } else if (!nb_vector_make_unit(unit)) {
         memset(radiance, 0, 3 * sizeof *radiance);
     } else if (environment->type == NEBEL_ENVIRONMENT_GRADIENT) {
         mix_gradient(environment, unit[1], fabs(unit[1]), radiance);
@@ -264,10 +255,10 @@ void nebel_environment_radiance(const nebel_environment *environment, const doub
 
 void nebel_environment_reflected(const nebel_environment *environment, const double normal[3], double radiance[3])
 {
-    double unit[3], turned[3];
+    double unit[3] = {normal[0], normal[1], normal[2]}, turned[3];
     if (environment->type == NEBEL_ENVIRONMENT_CONSTANT) {
         memcpy(radiance, environment->radiance, sizeof environment->radiance);
-    } else if (!make_unit(normal, unit)) {
+    } else if (!nb_vector_make_unit(unit)) {
         memset(radiance, 0, 3 * sizeof *radiance);
     } else if (environment->type == NEBEL_ENVIRONMENT_GRADIENT) {
         const double y = fmin(fmax(unit[1], -1), 1);

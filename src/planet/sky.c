@@ -2,6 +2,8 @@
 #include "atmosphere.h"
 #include "path.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -74,34 +76,19 @@ void nb_gather(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect asp
 
 /* ---- places and directions ------------------------------------------------------------------- */
 
-static double dot(const double a[3], const double b[3])
-{
-    return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
-}
-
-/* 0 where a direction has no length, or is none. Scaled first: its squares may be too large or too small. */
-static int make_unit(const double direction[3], double unit[3])
-{
-    const double most = fmax(fmax(fabs(direction[0]), fabs(direction[1])), fabs(direction[2]));
-    if (!(most > 0 && most <= DBL_MAX)) return 0;
-    for (int c = 0; c < 3; c++) unit[c] = direction[c] / most;
-    const double length = sqrt(dot(unit, unit));
-    for (int c = 0; c < 3; c++) unit[c] /= length;
-    return isfinite(length);
-}
-
 /* The sun as all rays see it; a sun without light may come from nowhere. */
 static int resolve_sun(const nebel_sun *sun, nebel_sun *resolved)
 {
-    *resolved = (nebel_sun){.direction = {0, 1, 0}};
-    if (sun == NULL) return 1;
+    static const nebel_sun none = {.direction = {0, 1, 0}};
+    *resolved = sun == NULL ? none : *sun;
     int shines = 0;
     for (int c = 0; c < 3; c++) {
-        if (!(sun->irradiance[c] >= 0 && sun->irradiance[c] <= 1e9)) return 0;
-        shines |= sun->irradiance[c] > 0;
-        resolved->irradiance[c] = sun->irradiance[c];
+        if (!(resolved->irradiance[c] >= 0 && resolved->irradiance[c] <= 1e9)) return 0;
+        shines |= resolved->irradiance[c] > 0;
     }
-    return make_unit(sun->direction, resolved->direction) || !shines;
+    if (nb_vector_make_unit(resolved->direction)) return 1;
+    *resolved = none;
+    return !shines;
 }
 
 static double bound_cosine(double cosine)
@@ -113,7 +100,7 @@ static double bound_cosine(double cosine)
 static double place_over(const nebel_atmosphere *atmosphere, const double place[3], double relative[3])
 {
     for (int c = 0; c < 3; c++) relative[c] = place[c] - atmosphere->center[c];
-    return fmax(atmosphere->airs.radius, sqrt(dot(relative, relative)));
+    return fmax(atmosphere->airs.radius, sqrt(nb_vector_dot(relative, relative)));
 }
 
 /* A piece of a ray within the air; its length is 0 where there is none. */
@@ -130,18 +117,18 @@ static nb_inside find_inside(const nebel_atmosphere *atmosphere, const double st
     double from[3];
     nb_inside inside = {.track = {place_over(atmosphere, start, from), 0}};
     double left = t_max;
-    inside.track.rise = dot(from, unit);
+    inside.track.rise = nb_vector_dot(from, unit);
     if (inside.track.radius > airs->top) {
         double closest[3];
         for (int c = 0; c < 3; c++) closest[c] = from[c] - inside.track.rise * unit[c];
-        const double aside = sqrt(dot(closest, closest)), square = (airs->top - aside) * (airs->top + aside);
+        const double aside = sqrt(nb_vector_dot(closest, closest)), square = (airs->top - aside) * (airs->top + aside);
         if (!(square > 0 && inside.track.rise < 0)) return inside;
         const double half = sqrt(square);
         left -= -inside.track.rise - half;
         for (int c = 0; c < 3; c++) from[c] = closest[c] - half * unit[c];
         inside.track = (nb_track){airs->top, -half};
     }
-    inside.height_of_sun = bound_cosine(dot(from, sun) / inside.track.radius);
+    inside.height_of_sun = bound_cosine(nb_vector_dot(from, sun) / inside.track.radius);
     const double end = fmin(nb_track_enter(inside.track, airs->radius), nb_track_leave(inside.track, airs->top));
     inside.length = fmax(0, fmin(left, end));
     return inside;
@@ -156,13 +143,15 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     const nb_inside inside = find_inside(atmosphere, ray->origin, unit, ray->t_max, sun->direction);
     if (!(inside.length > 0)) return;
     double depth[3];
-    nb_gathered gathered;
     nb_track_depth(&atmosphere->airs, inside.track, inside.length, depth);
+    for (int c = 0; c < 3; c++) light->transmittance[c] = nb_exp(-depth[c]);
+    light->error = 1e-8;
+    if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
+    nb_gathered gathered;
     const nb_aspect aspect = {bound_cosine(inside.track.rise / inside.track.radius),
-                              bound_cosine(dot(unit, sun->direction)), inside.height_of_sun};
+                              bound_cosine(nb_vector_dot(unit, sun->direction)), inside.height_of_sun};
     nb_gather(atmosphere, inside.track, aspect, inside.length, &gathered);
     for (int c = 0; c < 3; c++) {
-        light->transmittance[c] = nb_exp(-depth[c]);
         light->in_scattering[c] = sun->irradiance[c] * (gathered.once[c] + gathered.often[c]);
         const double off =
             ONCE_OFF * gathered.once[c] + atmosphere->share_off * gathered.often[c] + gathered.missing[c];
@@ -186,8 +175,8 @@ nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun
     for (size_t i = 0; i < n; i++) {
         const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
         double unit[3];
-        if (!is_place(ray->origin) || !make_unit(ray->direction, unit) || !(ray->t_max >= 0))
-            return NEBEL_ERROR_ARGUMENT;
+        memcpy(unit, ray->direction, sizeof unit);
+        if (!is_place(ray->origin) || !nb_vector_make_unit(unit) || !(ray->t_max >= 0)) return NEBEL_ERROR_ARGUMENT;
         trace(atmosphere, &resolved, ray, unit, (nebel_light *)(void *)((char *)lights + i * light_stride));
     }
     return NEBEL_OK;
