@@ -50,6 +50,9 @@ typedef struct nebel_air {
 /* How much work goes into the table of light that was scattered more than once. */
 typedef enum nebel_air_quality { NEBEL_AIR_FAST = 0, NEBEL_AIR_PRECISE, NEBEL_AIR_QUALITY_COUNT } nebel_air_quality;
 
+/* Calls part(data, i) once for each i < parts, in any order and by any threads, and returns when all are done. */
+typedef void (*nebel_air_run_fn)(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
+
 typedef struct nebel_atmosphere_desc {
     double ground[3]; /* where the ground is above (y) the planet's centre: m. {0}: the origin */
     double radius;    /* of the ground: m, 1 to 1e12; 0: 6.36e6 */
@@ -58,6 +61,8 @@ typedef struct nebel_atmosphere_desc {
     uint32_t air_count;      /* 0: the Earth's air, see nebel_find_atmosphere */
     double ground_albedo[3]; /* what the ground gives back to the air, 0 to 1 */
     nebel_air_quality quality;
+    nebel_air_run_fn run; /* for threads that make the table; NULL: one part after the other */
+    void *run_user;
     nebel_allocator allocator; /* {0}: malloc and free */
     nebel_log log;
 } nebel_atmosphere_desc;
@@ -66,12 +71,17 @@ typedef struct nebel_atmosphere_desc {
  * Rendering Technique, 2020), "mars" and "toy", a ball of 1 km in the Earth's colours. NULL where there is none of that name. Any thread. */
 const nebel_atmosphere_desc *nebel_find_atmosphere(const char *name);
 
+/* Writes the description with every default in its place. desc may be resolved. Errors: ARGUMENT, VALUE (a number out of range;
+ * the description's log says which); *resolved is then untouched. Any thread. */
+nebel_result nebel_resolve_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere_desc *resolved);
+
 /* ---- atmospheres ----------------------------------------------------------------------------- */
 
 typedef struct nebel_atmosphere nebel_atmosphere;
 
-/* Makes an atmosphere that does not change any more, with its table. Free it with nebel_destroy_atmosphere. Errors:
- * ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY. Any thread. */
+/* Makes an atmosphere that does not change any more, with its table: the same bits however `run` splits the work. Free
+ * it with nebel_destroy_atmosphere. Errors: ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY.
+ * Any thread. */
 nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere);
 
 /* NULL is fine. */
@@ -94,6 +104,50 @@ typedef struct nebel_air_light {
 nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
                              const double (*places)[3], size_t place_stride, nebel_air_light *lights,
                              size_t light_stride);
+
+/* ---- many rays from one place ---------------------------------------------------------------- */
+
+/* What the air does to all rays from one place, from a table over their direction and, where they may end within the air,
+ * how far they go. The table ends at the horizon on both sides, and keeps phase functions apart, so that neither is smoothed.
+ * A ray takes some 0.1 us. */
+typedef struct nebel_air_view nebel_air_view;
+
+typedef struct nebel_air_view_desc {
+    const nebel_atmosphere *atmosphere; /* must outlive the view */
+    nebel_sun sun;
+    double position[3];   /* m; below the ground counts as on it */
+    int has_distances;    /* 0: rays go to the ground or the end of the air, t_max is not read */
+    nebel_air_run_fn run; /* for threads; NULL: one part after the other */
+    void *run_user;
+    nebel_allocator allocator;
+    nebel_log log;
+} nebel_air_view_desc;
+
+/* Makes the table. Errors: ARGUMENT (NULL, a sun or a place that is not in order), MEMORY. The same bits however `run`
+ * splits the work. */
+nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_view **view);
+
+/* NULL is fine. */
+void nebel_destroy_air_view(nebel_air_view *view);
+
+/* What nebel_trace_air says of n rays from the view's place, from the table. Planes have no gaps: strides of `lights` are
+ * not read, its planes of three are given all or none. t_max NULL: to the ground or the end of the air. A direction may be of any
+ * length; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
+ * nebel_trace_air tells. Any thread. Errors: ARGUMENT (NULL). */
+nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],
+                                  const float *t_max, const nebel_light_planes *lights);
+
+/* Where rays meet the ground, and the light there. Planes without gaps; each may be NULL. */
+typedef struct nebel_ground_planes {
+    float *distance;  /* m; 0 where the view's place is on the ground or below it, INFINITY: the ray does not meet it */
+    float *normal[3]; /* the rest means nothing where it does not */
+    float *sun[3];    /* irradiance of a surface that faces the sun; 0 in the planet's shadow */
+    float *sky[3];    /* irradiance of the ground by all that the air scatters */
+} nebel_ground_planes;
+
+/* The ground along n rays from the view's place, as of nebel_trace_air_view. Any thread. Errors: ARGUMENT (NULL). */
+nebel_result nebel_find_ground(const nebel_air_view *view, size_t n, const double *const direction[3],
+                               const nebel_ground_planes *planes);
 
 #ifdef __cplusplus
 }

@@ -79,6 +79,12 @@ static inline nb_real nb_gather(const float *from, nb_wide index) { return from[
 static inline nb_real nb_gather_bytes(const uint8_t *from, nb_wide index) { return (nb_real)from[(size_t)index]; }
 static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index) { return (nb_real)from[(size_t)index]; }
 
+static inline nb_real nb_gather_byte_pairs(const uint8_t *from, nb_wide index, nb_real *behind)
+{
+    *behind = (nb_real)from[(size_t)index + 1];
+    return (nb_real)from[(size_t)index];
+}
+
 static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
 {
     *behind = (nb_real)from[(size_t)index + 1];

@@ -286,6 +286,13 @@ static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index)
 }
 
 /* And the number behind each. */
+static inline nb_real nb_gather_byte_pairs(const uint8_t *from, nb_wide index, nb_real *behind)
+{
+    const nb_bits both = NB_GATHER_BITS(from, NB_INDEX(index), 1);
+    *behind = NB_TO_NUMBERS(both >> 8 & 0xffu);
+    return NB_TO_NUMBERS(both & 0xffu);
+}
+
 static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
 {
     const nb_bits both = NB_GATHER_BITS(from, NB_INDEX(index), 2);
@@ -312,6 +319,12 @@ static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index)
     float lane[NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; ++i) lane[i] = (float)from[(size_t)index[i]];
     return nb_load_lanes(lane);
+}
+
+static inline nb_real nb_gather_byte_pairs(const uint8_t *from, nb_wide index, nb_real *behind)
+{
+    *behind = nb_gather_bytes(from, index + 1.0);
+    return nb_gather_bytes(from, index);
 }
 
 static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)

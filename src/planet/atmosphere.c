@@ -31,6 +31,15 @@ static void resolve_air(const nebel_air *desc, nb_air *air)
             air->moments[order] += air->phase.lobes[i].weight * lobe_moment(&air->phase.lobes[i], order);
 }
 
+nebel_result nebel_resolve_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere_desc *resolved)
+{
+    if (desc == NULL || resolved == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_atmosphere_desc whole = nb_atmosphere_resolve(desc);
+    const nebel_result result = nb_atmosphere_check(&whole);
+    if (result == NEBEL_OK) *resolved = whole;
+    return result;
+}
+
 nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere)
 {
     if (atmosphere == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -51,7 +60,8 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     for (int c = 0; c < 3; c++) made->center[c] = whole.ground[c] - (c == 1 ? whole.radius : 0);
     made->rule = nb_rule_make(NB_RULE_MOST);
     made->share_off = whole.quality == NEBEL_AIR_PRECISE ? 0.02 : 0.1;
-    result = nb_scatter_make(&allocator, &made->airs, whole.quality, whole.ground_albedo, &made->scatter);
+    const nb_parts parts = {whole.run, whole.run_user};
+    result = nb_scatter_make(&allocator, &parts, &made->airs, whole.quality, whole.ground_albedo, &made->scatter);
     if (result == NEBEL_OK) {
         *atmosphere = made;
         return NEBEL_OK;

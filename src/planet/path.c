@@ -7,7 +7,7 @@
 
 #include "formulas/elementary.inc"
 
-enum { MOST_ENDS = 2 * NB_MOST_SHELLS + 5 };
+enum { MOST_ENDS = 2 * NB_MOST_SHELLS + 3 + NB_PATH_CUTS };
 
 typedef struct nb_ends {
     int count;
@@ -23,7 +23,8 @@ static void add_end(nb_ends *ends, double length, double s)
     ends->at[i] = s;
 }
 
-static void find_ends(const nb_airs *airs, nb_track track, double length, const double cuts[2], nb_ends *ends)
+static void find_ends(const nb_airs *airs, nb_track track, double length, int cut_count, const double cuts[],
+                      nb_ends *ends)
 {
     ends->count = 0;
     ends->at[ends->count++] = 0;
@@ -32,7 +33,7 @@ static void find_ends(const nb_airs *airs, nb_track track, double length, const 
         add_end(ends, length, nb_track_enter(track, airs->shells[i]));
         add_end(ends, length, nb_track_leave(track, airs->shells[i]));
     }
-    for (int i = 0; i < 2; i++) add_end(ends, length, cuts[i]);
+    for (int i = 0; i < cut_count; i++) add_end(ends, length, cuts[i]);
     ends->at[ends->count++] = length;
 }
 
@@ -67,13 +68,13 @@ static void lay_piece(const nb_airs *airs, const nb_rule *rule, nb_track track, 
     path->count += rule->count;
 }
 
-void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, const double cuts[2],
-                 nb_path *path)
+void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, int cut_count,
+                 const double cuts[], nb_path *path)
 {
     nb_ends ends;
     double depth[3] = {0, 0, 0};
     path->count = 0;
-    find_ends(airs, track, length, cuts, &ends);
+    find_ends(airs, track, length, cut_count, cuts, &ends);
     for (int i = 1; i < ends.count; i++)
         if (ends.at[i] > ends.at[i - 1]) lay_piece(airs, rule, track, ends.at[i - 1], ends.at[i], depth, path);
     for (int c = 0; c < 3; c++) path->transmittance[c] = nb_exp(-depth[c]);

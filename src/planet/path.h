@@ -5,7 +5,10 @@
 #include "air.h"
 #include "rule.h"
 
-enum { NB_PATH_MOST = (2 * NB_MOST_SHELLS + 4) * NB_RULE_MOST };
+enum {
+    NB_PATH_CUTS = 20,
+    NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS) * NB_RULE_MOST,
+};
 
 typedef struct nb_path_node {
     double s;                /* m from the start */
@@ -22,8 +25,8 @@ typedef struct nb_path {
 } nb_path;
 
 /* The ray must stay within the air for `length`. It is cut where it is lowest, where it passes shells of air, and at
- * `cuts`, at most two places in any order; those outside the ray do not count. */
-void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, const double cuts[2],
-                 nb_path *path);
+ * `cuts`, at most NB_PATH_CUTS places in any order; those outside the ray do not count. */
+void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, int cut_count,
+                 const double cuts[], nb_path *path);
 
 #endif

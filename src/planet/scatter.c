@@ -111,15 +111,16 @@ static void seal(nb_scatter *scatter)
 
 enum { MOST_TURNS = 16 };
 
-/* Numbers of a quality: entries of the table, directions up and down and around, nodes of a piece of a
+/* Light changes with the slope, near the horizon, far more than with the turn, so that turns are as few as moments bear.
+ * Numbers of a quality: entries of the table, directions up and down and around, nodes of a piece of a
  * ray, how often light is scattered, and by how many moments it is kept. */
 typedef struct nb_effort {
     int heights, suns, slopes, turns, nodes, orders, moments;
 } nb_effort;
 
 static const nb_effort efforts[NEBEL_AIR_QUALITY_COUNT] = {
-    [NEBEL_AIR_FAST] = {12, 32, 6, 6, 2, 4, 3},
-    [NEBEL_AIR_PRECISE] = {20, 40, 6, 6, 3, 5, NB_MOMENTS},
+    [NEBEL_AIR_FAST] = {12, 32, 8, 3, 3, 4, 3},
+    [NEBEL_AIR_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS},
 };
 
 typedef struct nb_maker {
@@ -129,36 +130,73 @@ typedef struct nb_maker {
     const nb_effort *effort;
     nb_rule slopes, nodes;
     double turn_cosines[MOST_TURNS];
-    nb_path path;
     int first; /* the light to be scattered is the sun's */
 } nb_maker;
 
-/* What arrives at a place from one direction, of light scattered once more. */
-static void gather(nb_maker *maker, nb_track track, nb_aspect aspect, double end, int hits_ground, double light[3])
+/* What is shared by all that comes to one height from directions of one slope. */
+typedef struct nb_fan {
+    const nb_maker *maker;
+    nb_track track;
+    double end;
+    int hits_ground;
+    nb_path path;
+} nb_fan;
+
+/* Of sunlight the field is Legendre's polynomials of one angle, which is the same along the whole ray: what a kind of
+ * air gives of it, as its phase function up to the orders that are kept. */
+static void phases_of(const nb_airs *airs, int orders, double sun, double phases[])
 {
-    const nb_airs *airs = maker->airs;
-    const nb_path *path = &maker->path;
-    for (int c = 0; c < 3; c++) light[c] = 0;
-    for (int i = 0; i < path->count; i++) {
-        const nb_path_node *node = &path->nodes[i];
-        const double along = (track.rise + node->s) / node->radius;
-        const double sun = (track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
-        const nb_aspect here = {along, aspect.sun, sun};
-        nb_field field;
-        if (maker->first) {
-            double sunlight[3];
-            nb_track_sunlight(airs, (nb_track){node->radius, node->radius * sun}, sunlight);
-            memset(&field, 0, sizeof field);
-            nb_field_add(&field, maker->effort->moments, (nb_aspect){sun, 1, sun}, sunlight);
-        } else {
-            field = nb_scatter_look_up(maker->scatter, airs, node->radius, sun);
+    for (int k = 0; k < airs->count; k++) {
+        double p = 1, before = 0, sum = 0;
+        for (int l = 0; l < orders; l++) {
+            sum += (2 * l + 1) * airs->airs[k].moments[l] * p;
+            const double next = ((2 * l + 1) * sun * p - l * before) / (l + 1);
+            before = p;
+            p = next;
         }
+        phases[k] = sum / (4 * PI);
+    }
+}
+
+static void gather_sunlight(const nb_fan *fan, nb_aspect aspect, double light[3])
+{
+    const nb_airs *airs = fan->maker->airs;
+    double phases[NEBEL_MAX_AIRS];
+    phases_of(airs, fan->maker->effort->moments, aspect.sun, phases);
+    for (int i = 0; i < fan->path.count; i++) {
+        const nb_path_node *node = &fan->path.nodes[i];
+        const double sun = (fan->track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
+        double sunlight[3];
+        nb_track_sunlight(airs, (nb_track){node->radius, node->radius * sun}, sunlight);
+        for (int c = 0; c < 3; c++) {
+            double scattered = 0;
+            for (int k = 0; k < airs->count; k++)
+                scattered += airs->airs[k].scattering[c] * node->density[k] * phases[k];
+            light[c] += node->weight * node->transmittance[c] * sunlight[c] * fmax(0, scattered);
+        }
+    }
+}
+
+static void gather_last(const nb_fan *fan, nb_aspect aspect, double light[3])
+{
+    const nb_maker *maker = fan->maker;
+    for (int i = 0; i < fan->path.count; i++) {
+        const nb_path_node *node = &fan->path.nodes[i];
+        const double along = (fan->track.rise + node->s) / node->radius;
+        const double sun = (fan->track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
+        const nb_field field = nb_scatter_look_up(maker->scatter, maker->airs, node->radius, sun);
         double radiance[3];
-        nb_field_scatter(&field, maker->effort->moments, airs, node->density, here, radiance);
+        nb_field_scatter(&field, maker->effort->moments, maker->airs, node->density,
+                         (nb_aspect){along, aspect.sun, sun}, radiance);
         for (int c = 0; c < 3; c++) light[c] += node->weight * node->transmittance[c] * radiance[c];
     }
-    if (!hits_ground) return;
-    const double sun = (track.radius * aspect.height_of_sun + end * aspect.sun) / airs->radius;
+}
+
+static void gather_ground(const nb_fan *fan, nb_aspect aspect, double light[3])
+{
+    const nb_maker *maker = fan->maker;
+    const nb_airs *airs = maker->airs;
+    const double sun = (fan->track.radius * aspect.height_of_sun + fan->end * aspect.sun) / airs->radius;
     double irradiance[3];
     if (maker->first) {
         nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * sun}, irradiance);
@@ -166,29 +204,38 @@ static void gather(nb_maker *maker, nb_track track, nb_aspect aspect, double end
     } else {
         nb_scatter_look_up_ground(maker->scatter, sun, irradiance);
     }
-    for (int c = 0; c < 3; c++) light[c] += path->transmittance[c] * maker->albedo[c] / PI * irradiance[c];
+    for (int c = 0; c < 3; c++) light[c] += fan->path.transmittance[c] * maker->albedo[c] / PI * irradiance[c];
+}
+
+/* What arrives at a place from one direction, of light scattered once more. */
+static void gather(const nb_fan *fan, nb_aspect aspect, double light[3])
+{
+    for (int c = 0; c < 3; c++) light[c] = 0;
+    if (fan->maker->first)
+        gather_sunlight(fan, aspect, light);
+    else
+        gather_last(fan, aspect, light);
+    if (fan->hits_ground) gather_ground(fan, aspect, light);
 }
 
 /* Adds what comes to all entries of one height from directions of one slope. */
-static void add_slope(nb_maker *maker, int height, double zenith, double weight)
+static void add_slope(const nb_maker *maker, int height, double zenith, double weight)
 {
-    static const double nowhere[2] = {-1, -1};
     const nb_airs *airs = maker->airs;
     const nb_effort *effort = maker->effort;
     const double radius = airs->radius + height_at(maker->scatter, airs, height);
-    const nb_track track = {radius, radius * zenith};
-    const double ground = nb_track_enter(track, airs->radius);
-    const int hits = ground < HUGE_VAL;
-    const double end = hits ? ground : nb_track_leave(track, airs->top);
-    nb_path_lay(airs, &maker->nodes, track, end, nowhere, &maker->path);
+    nb_fan fan = {.maker = maker, .track = {radius, radius * zenith}};
+    const double ground = nb_track_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
+    fan.hits_ground = ground < HUGE_VAL;
+    fan.end = fan.hits_ground ? ground : nb_track_leave(fan.track, airs->top);
+    nb_path_lay(airs, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
     for (int i = 0; i < effort->suns; i++) {
         const double sun = sun_at(maker->scatter, i), side = sqrt(fmax(0, 1 - sun * sun));
-        const double level = sqrt(fmax(0, 1 - zenith * zenith));
         for (int k = 0; k < effort->turns; k++) {
             const double x = level * maker->turn_cosines[k];
             const nb_aspect aspect = {zenith, x * side + zenith * sun, sun};
             double light[3];
-            gather(maker, track, aspect, end, hits, light);
+            gather(&fan, aspect, light);
             for (int c = 0; c < 3; c++) light[c] *= weight * 2 * PI / effort->turns;
             nb_field_add(&maker->next->fields[height * effort->suns + i], effort->moments, aspect, light);
             if (height == 0 && zenith > 0)
@@ -197,18 +244,17 @@ static void add_slope(nb_maker *maker, int height, double zenith, double weight)
     }
 }
 
-/* From both sides of the horizon directions are denser near it, where light changes most. */
-static void add_order(nb_maker *maker)
+/* All entries of one height. From both sides of the horizon directions are denser near it, where light changes most. */
+static void add_height(void *data, size_t height)
 {
+    const nb_maker *maker = data;
     const nb_airs *airs = maker->airs;
-    for (int i = 0; i < maker->effort->heights; i++) {
-        const double ratio = airs->radius / (airs->radius + height_at(maker->scatter, airs, i));
-        const double horizon = -sqrt(fmax(0, 1 - ratio * ratio));
-        for (int k = 0; k < maker->slopes.count; k++) {
-            const double part = 0.5 * (1 + maker->slopes.nodes[k]), weight = maker->slopes.weights[k] * part;
-            add_slope(maker, i, horizon + (1 - horizon) * part * part, (1 - horizon) * weight);
-            add_slope(maker, i, horizon - (1 + horizon) * part * part, (1 + horizon) * weight);
-        }
+    const double ratio = airs->radius / (airs->radius + height_at(maker->scatter, airs, (int)height));
+    const double horizon = -sqrt(fmax(0, 1 - ratio * ratio));
+    for (int k = 0; k < maker->slopes.count; k++) {
+        const double part = 0.5 * (1 + maker->slopes.nodes[k]), weight = maker->slopes.weights[k] * part;
+        add_slope(maker, (int)height, horizon + (1 - horizon) * part * part, (1 - horizon) * weight);
+        add_slope(maker, (int)height, horizon - (1 + horizon) * part * part, (1 + horizon) * weight);
     }
 }
 
@@ -264,7 +310,7 @@ static void add_rest(nb_scatter *sum, const nb_scatter *last, const double befor
 }
 
 /* One order after the other: `last` is what the order before has brought, `next` what this one brings. */
-static void sum_orders(nb_maker *maker, nb_scatter *sum, nb_scatter *last, nb_scatter *next)
+static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_scatter *sum, nb_scatter *last, nb_scatter *next)
 {
     static const double once[3] = {1, 1, 1};
     double before[3] = {0, 0, 0};
@@ -274,7 +320,7 @@ static void sum_orders(nb_maker *maker, nb_scatter *sum, nb_scatter *last, nb_sc
         maker->next = next;
         memset(next->fields, 0, entries(next) * sizeof *next->fields);
         memset(next->ground, 0, (size_t)next->suns * sizeof *next->ground);
-        add_order(maker);
+        nb_parts_run(parts, (size_t)maker->effort->heights, add_height, maker);
         add_table(sum, next, once);
         if (order == maker->effort->orders) add_rest(sum, next, before);
         for (int c = 0; c < 3; c++) before[c] = light_of(next, c);
@@ -286,8 +332,8 @@ static void sum_orders(nb_maker *maker, nb_scatter *sum, nb_scatter *last, nb_sc
     seal(sum);
 }
 
-nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_airs *airs, nebel_air_quality quality,
-                             const double albedo[3], nb_scatter *scatter)
+nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
+                             nebel_air_quality quality, const double albedo[3], nb_scatter *scatter)
 {
     const nb_effort *effort = &efforts[quality];
     nb_scatter last, next;
@@ -301,7 +347,7 @@ nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_airs *ai
     const nebel_result has_last = allocate(allocator, airs, effort, &last),
                        has_next = allocate(allocator, airs, effort, &next);
     if (result == NEBEL_OK) result = has_last == NEBEL_OK ? has_next : has_last;
-    if (result == NEBEL_OK) sum_orders(&maker, scatter, &last, &next);
+    if (result == NEBEL_OK) sum_orders(&maker, parts, scatter, &last, &next);
     nb_scatter_free(allocator, &last);
     nb_scatter_free(allocator, &next);
     return result;

@@ -3,6 +3,7 @@
 #define NB_PLANET_SCATTER_H
 
 #include "field.h"
+#include "parts.h"
 #include "rule.h"
 
 typedef struct nb_scatter {
@@ -18,8 +19,8 @@ nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, doub
 void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3]);
 
 /* Makes the table; `albedo` is the ground's. Errors: MEMORY. */
-nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_airs *airs, nebel_air_quality quality,
-                             const double albedo[3], nb_scatter *scatter);
+nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
+                             nebel_air_quality quality, const double albedo[3], nb_scatter *scatter);
 void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter);
 
 #endif

@@ -1,0 +1,135 @@
+/* Clouds with volume around a planet: shells of drops or ice between two heights, lit by the sun and the sky.
+ *
+ *     nebel_clouds *clouds = NULL;
+ *     nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1}, &clouds); // cumulus
+ *     nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .sun = sun}, &view);
+ *     nebel_create_cloud_workspace(view, &workspace);                                          // one per thread
+ *     nebel_trace_clouds(workspace, 1, &ray, 0, 0.001, &knots, 0);
+ *
+ * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/planet.md): noise in
+ * three dimensions in the planet's axes, so that there is no seam and no pole; who looks from afar gets its mean over
+ * what a pixel covers. Transmittance is integrated to a tolerance. Light is first order exact up to the shadow's
+ * lattice, and higher orders by a model, delta-Eddington's on a slab: docs/planet.md says how far off.
+ *
+ * Units are metres; places are those of the scene, y up. Nothing here calls a graphics interface.
+ */
+#ifndef NEBEL_CLOUDS_H
+#define NEBEL_CLOUDS_H
+
+#include <nebel/layers.h>
+#include <nebel/planet.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define NEBEL_MAX_CLOUD_LAYERS 4
+#define NEBEL_MAX_CLOUD_KNOTS 16
+#define NEBEL_MAX_CLOUD_RATIO 1e6 /* of the air's thickness to a layer's */
+#define NEBEL_CLOUD_NONE (-1.)    /* where 0 would mean the number of the kind */
+
+/* What a layer looks like, and its numbers where none are given. */
+typedef enum nebel_cloud_kind {
+    NEBEL_CLOUD_CUMULUS = 0, /* flat bases, heaped tops: 900 to 2700 m */
+    NEBEL_CLOUD_STRATUS,     /* a sheet with gaps: 300 to 800 m */
+    NEBEL_CLOUD_CIRRUS,      /* thin wisps of ice: 8000 to 9500 m */
+    NEBEL_CLOUD_KIND_COUNT
+} nebel_cloud_kind;
+
+/* One layer. 0 stands for the number of its kind, but for kind and wind. Lengths of a kind are those of the Earth: on
+ * planets with less than 100 km of air they shrink with it. */
+typedef struct nebel_cloud_layer {
+    nebel_cloud_kind kind;
+    double base, top;  /* m above the ground, more than 0, base < top, within the air */
+    double coverage;   /* part of the planet under clouds, 0 to 1, before detail is cut out */
+    double extinction; /* 1/m in their middle, to NEBEL_MAX_AIR_EXTINCTION */
+    double size;       /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9 */
+    double detail;     /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */
+    double variation;  /* how much more clouds are here than there, over ten sizes and more, to 1, or NONE */
+    double diameter;   /* um, of drops: 5 to 50 */
+    uint32_t seed;     /* of the noise */
+    double wind[2];    /* m per unit of time along x and z at the ground place over the centre: the shell turns */
+    nebel_map weather; /* one channel; times the coverage; as maps of layers lie. {0}: 1 everywhere */
+} nebel_cloud_layer;
+
+typedef struct nebel_clouds_desc {
+    const nebel_atmosphere *atmosphere; /* must outlive the clouds */
+    nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
+    uint32_t layer_count;
+    nebel_allocator allocator; /* {0}: malloc and free */
+    nebel_log log;
+} nebel_clouds_desc;
+
+typedef struct nebel_clouds nebel_clouds;
+
+/* Writes a layer with every number in its place, for air of that thickness, in m. desc may be resolved. Errors: ARGUMENT,
+ * VALUE (a number out of range; the log says which); *resolved is then untouched. Any thread. */
+nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
+                                       nebel_cloud_layer *resolved);
+
+/* Makes clouds that do not change any more. Free them with nebel_destroy_clouds. Errors: ARGUMENT (NULL), VALUE (a number
+ * out of range; the log says which), LIMIT (layers), MEMORY. Any thread. */
+nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **clouds);
+
+/* NULL is fine. */
+void nebel_destroy_clouds(nebel_clouds *clouds);
+
+/* Extinction of all layers at n places, 1/m, as a mean over about `width` metres (0: as it is). Strides in bytes. time:
+ * in the units of the wind, within -1e12 and 1e12. Any thread. Errors: ARGUMENT. */
+nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
+                                    const double (*places)[3], size_t place_stride, float *extinction);
+
+/* ---- light ----------------------------------------------------------------------------------- */
+
+/* Clouds at a moment under a sun. */
+typedef struct nebel_cloud_view nebel_cloud_view;
+
+typedef struct nebel_cloud_view_desc {
+    const nebel_clouds *clouds; /* must outlive the view */
+    nebel_sun sun;              /* irradiance {0}: dark */
+    double time;                /* within -1e12 and 1e12 */
+    double tolerance;           /* of transmittance, per ray; 0: NEBEL_DEFAULT_TOLERANCE */
+    nebel_allocator allocator;
+    nebel_log log;
+} nebel_cloud_view_desc;
+
+/* Errors: ARGUMENT, VALUE (time, tolerance), MEMORY. Any thread. */
+nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view);
+
+/* NULL is fine. */
+void nebel_destroy_cloud_view(nebel_cloud_view *view);
+
+/* What was found so far of shadows in a view, which must outlive it: some 19 MB. Results do not hang on it. One thread at
+ * a time. */
+typedef struct nebel_cloud_workspace nebel_cloud_workspace;
+
+/* With the view's allocator. Errors: ARGUMENT, MEMORY. */
+nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cloud_workspace **workspace);
+
+/* NULL is fine. */
+void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace);
+
+/* What clouds do along a ray up to some places of it. Between two of them transmittance is in between. */
+typedef struct nebel_cloud_knots {
+    uint32_t count;                                /* 0: no cloud; else the first is where they begin */
+    float t[NEBEL_MAX_CLOUD_KNOTS];                /* m, ascending */
+    float transmittance[NEBEL_MAX_CLOUD_KNOTS];    /* of clouds alone, grey */
+    float in_scattering[NEBEL_MAX_CLOUD_KNOTS][3]; /* of clouds alone, as if nothing else were on the way */
+    float error;                                   /* of transmittance: what quadrature tells */
+} nebel_cloud_knots;
+
+/* Along n rays up to t_max or the ground. spread: width of a pixel per metre of the way, 0 or more: what is narrower is
+ * seen as a mean. Strides in bytes. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order). */
+nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
+                                double spread, nebel_cloud_knots *knots, size_t knot_stride);
+
+/* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
+ * nebel_cloud_extinction. Errors: ARGUMENT. */
+nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
+                                size_t place_stride, float *parts);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,15 @@
+/* The ball that a lamp shines from. */
+#ifndef NB_BULB_H
+#define NB_BULB_H
+
+#define NB_LEAST_BULB                                                                                                  \
+    1e-3 /* m, radius of lamps that are given none: what a ray through a lamp sees has no bound without one */
+
+/* What is nearer gets no more light than at this distance [m], and casts no shadow: a lamp may stand on a surface, or lie
+ * in it, without rounding deciding what it lights. */
+static inline double nb_bulb(double radius)
+{
+    return radius > NB_LEAST_BULB ? radius : NB_LEAST_BULB;
+}
+
+#endif

@@ -1,0 +1,346 @@
+/* Light in clouds.
+ *
+ * Scattered once: the sun's light through the air and the optical depth that a lattice has for the way to the sun.
+ *
+ * Scattered often: what goes on nearly straight, a part g^2 of all, counts as not scattered (Joseph, Wiscombe and
+ * Weinman, The Delta-Eddington Approximation for Radiative Flux Transfer, 1976). The place is taken for one in a slab of
+ * cloud that absorbs nothing, whose flux F and mean radiance J along its depth x follow
+ *
+ *     dF/dx = E e^(-x/m)      dJ/dx = -3/(4 pi) ((1 - g') F - g' m E e^(-x/m))
+ *
+ * with g' = g / (1 + g) and m the cosine at which sunlight enters; nothing else enters on either side. The slab lies
+ * across the sunlight where the way up is no shorter, and level where it is. */
+#include "cloud_view.h"
+
+#include "base/hash.h"
+#include "base/vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+#define PI_F 3.14159265f
+
+static float falling(float depth)
+{
+    return (float)nb_exp(-(double)depth);
+}
+
+/* ---- clear air ------------------------------------------------------------------------------- */
+
+static nb_cloud_light clear_light(const nebel_cloud_view *view, double radius, double sun)
+{
+    const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
+    const nb_field field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
+    nb_cloud_light light;
+    double direct[3];
+    nb_track_sunlight(&atmosphere->airs, (nb_track){radius, radius * sun}, direct);
+    for (int c = 0; c < 3; c++) {
+        const double mean = field.moments[0][c] / (4 * 3.14159265358979323846);
+        const double side = field.moments[1][c] / (2 * 3.14159265358979323846), e = view->sun.irradiance[c];
+        light.sun[c] = (float)(e * direct[c]);
+        light.above[c] = (float)(e * fmax(0, mean + side));
+        light.below[c] = (float)(e * fmax(0, mean - side));
+    }
+    return light;
+}
+
+nebel_result nb_cloud_light_make(nebel_cloud_view *view)
+{
+    view->lights = nb_allocate(&view->allocator, NB_CLOUD_HEIGHTS, sizeof *view->lights);
+    if (view->lights == NULL) return NEBEL_ERROR_MEMORY;
+    for (int i = 0; i < NB_CLOUD_HEIGHTS; i++)
+        for (int k = 0; k < NB_CLOUD_SUNS; k++)
+            view->lights[i][k] = clear_light(view, view->low + (view->high - view->low) * i / (NB_CLOUD_HEIGHTS - 1.0),
+                                             view->lowest_sun + (1 - view->lowest_sun) * k / (NB_CLOUD_SUNS - 1.0));
+    return NEBEL_OK;
+}
+
+typedef struct nb_between {
+    int low;
+    float part;
+} nb_between;
+
+static nb_between between(double place, int count)
+{
+    const double bounded = fmax(0, fmin(count - 1, place));
+    const int low = bounded < count - 2 ? (int)bounded : count - 2;
+    return (nb_between){low, (float)(bounded - low)};
+}
+
+nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius)
+{
+    enum { NUMBERS = sizeof(nb_cloud_light) / sizeof(float) };
+    const double sun = nb_vector_dot(place, view->sun.direction) / radius;
+    const nb_between h =
+        between((radius - view->low) / (view->high - view->low) * (NB_CLOUD_HEIGHTS - 1), NB_CLOUD_HEIGHTS);
+    const nb_between s =
+        between((sun - view->lowest_sun) / (1 - view->lowest_sun) * (NB_CLOUD_SUNS - 1), NB_CLOUD_SUNS);
+    float sum[NUMBERS], corner[NUMBERS];
+    memset(sum, 0, sizeof sum);
+    for (int k = 0; k < 4; k++) {
+        const float weight = (k & 1 ? h.part : 1 - h.part) * (k & 2 ? s.part : 1 - s.part);
+        memcpy(corner, &view->lights[h.low + (k & 1)][s.low + (k >> 1)], sizeof corner);
+        for (int i = 0; i < NUMBERS; i++) sum[i] += weight * corner[i];
+    }
+    nb_cloud_light light;
+    memcpy(&light, sum, sizeof light);
+    return light;
+}
+
+/* ---- optical depths -------------------------------------------------------------------------- */
+
+int nb_cloud_pieces(double low, double high, const double from[3], const double unit[3], double t_max,
+                    double pieces[2][2])
+{
+    const double along = nb_vector_dot(from, unit);
+    double aside[3];
+    for (int c = 0; c < 3; c++) aside[c] = from[c] - along * unit[c];
+    const double near = sqrt(nb_vector_dot(aside, aside));
+    if (!(near < high)) return 0;
+    const double outer = sqrt((high - near) * (high + near));
+    const double inner = near < low ? sqrt((low - near) * (low + near)) : -1;
+    const double ends[2][2] = {{-along - outer, inner >= 0 ? -along - inner : -along + outer},
+                               {-along + inner, -along + outer}};
+    int count = 0;
+    for (int i = 0; i < (inner >= 0 ? 2 : 1); i++) {
+        const double a = fmax(0, ends[i][0]), b = fmin(t_max, ends[i][1]);
+        if (!(a < b)) continue;
+        pieces[count][0] = a;
+        pieces[count++][1] = b;
+    }
+    return count;
+}
+
+/* At most so many steps, of which the last one goes to the layer's end; and what nodes near by take of their own. */
+enum { STEPS = 40, OWN_STEPS = 4, COARSER = 2 };
+
+/* Optical depth of a layer from a place on. Steps grow: what is far away throws soft shadows. Each takes the mean over its
+ * length. *t: how far it came; returns whether there is more. */
+static int march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float width,
+                 int steps, double *sum, double *t)
+{
+    const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
+    double pieces[2][2];
+    if (nb_cloud_pieces(layer->low, layer->high, from, unit, HUGE_VAL, pieces) == 0) return 0;
+    const double end = pieces[0][1];
+    *t = pieces[0][0];
+    double step = fmax((double)width, 0.02 * *t);
+    for (int i = 0; i < steps && *t < end; i++) {
+        const double length = i == STEPS - 1 ? end - *t : fmin(step, end - *t);
+        double place[3];
+        for (int c = 0; c < 3; c++) place[c] = from[c] + (*t + 0.5 * length) * unit[c];
+        *sum += length * (double)nb_cloud_seen_at(workspace, k, place, fmaxf(width, 0.7f * (float)length));
+        *t += length;
+        step *= 1.5;
+    }
+    return *t < end;
+}
+
+static float depth_along(nebel_cloud_workspace *workspace, int but, const double from[3], const double unit[3],
+                         float width)
+{
+    double sum = 0, t;
+    for (int k = 0; k < workspace->view->clouds->layer_count; k++)
+        if (k != but) march(workspace, k, from, unit, width, STEPS, &sum, &t);
+    return (float)fmin(sum, 1e6);
+}
+
+static void read_level(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], int level,
+                       float weight, float depth[3]);
+
+/* The layer that a place is in, whose lattices so coarse do not show through it; -1: none. */
+static int layer_for(const nebel_cloud_view *view, const double place[3], double coarse)
+{
+    const double radius = nb_vector_length(place);
+    for (int k = 0; k < view->clouds->layer_count; k++) {
+        const nb_cloud_layer *layer = &view->clouds->layers[k];
+        if (radius > layer->low && radius < layer->high) return 5 * coarse <= layer->high - layer->low ? k : -1;
+    }
+    return -1;
+}
+
+/* After some steps of its own a way to the sun goes on as a lattice says whose nodes are as far apart as the next step is
+ * long. */
+static float depth_to_sun(nebel_cloud_workspace *workspace, const double from[3], int level)
+{
+    const double *sun = workspace->view->sun.direction;
+    const float width = (float)ldexp(1, level);
+    const int own = layer_for(workspace->view, from, ldexp(1, level + COARSER));
+    double sum = 0, t;
+    if (own >= 0 && march(workspace, own, from, sun, width, OWN_STEPS, &sum, &t)) {
+        double place[3];
+        float rest[3] = {0, 0, 0};
+        for (int c = 0; c < 3; c++) place[c] = from[c] + t * sun[c];
+        read_level(workspace, NB_CLOUD_TO_SUN, place, level + COARSER, 1, rest);
+        return (float)sum + rest[0];
+    }
+    return (float)sum + depth_along(workspace, own, from, sun, width);
+}
+
+static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t at[3], int level,
+                        float depth[3])
+{
+    double place[3], up[3], turned[3];
+    for (int i = 0; i < 3; i++) place[i] = ldexp((double)at[i], level);
+    if (ways == NB_CLOUD_TO_SUN) {
+        depth[0] = depth_to_sun(workspace, place, level);
+        return;
+    }
+    const float width = (float)ldexp(1, level);
+    const double radius = fmax(1, nb_vector_length(place));
+    for (int i = 0; i < 3; i++) turned[i] = -workspace->view->sun.direction[i];
+    depth[0] = depth_along(workspace, -1, place, turned, width);
+    for (int i = 0; i < 3; i++) up[i] = place[i] / radius;
+    depth[1] = depth_along(workspace, -1, place, up, width);
+    for (int i = 0; i < 3; i++) up[i] = -up[i];
+    depth[2] = depth_along(workspace, -1, place, up, width);
+}
+
+static uint32_t hash_of(const int32_t at[3], int level)
+{
+    return nb_mix_bits((uint32_t)at[0] * UINT32_C(0x9e3779b1) + (uint32_t)at[1] * UINT32_C(0x85ebca77) +
+                       (uint32_t)at[2] * UINT32_C(0xc2b2ae3d) + (uint32_t)level);
+}
+
+/* What is found on the way may take the node's place. */
+static void read_node(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t at[3], int level,
+                      float depth[3])
+{
+    nb_cloud_node *node = &workspace->lattices[ways].nodes[hash_of(at, level) & (NB_CLOUD_NODES - 1)];
+    if (!(node->is_set && node->level == level && memcmp(node->at, at, sizeof node->at) == 0)) {
+        nb_cloud_node found = {.at = {at[0], at[1], at[2]}, .level = (int16_t)level, .is_set = 1};
+        find_depths(workspace, ways, at, level, found.depth);
+        *node = found;
+    }
+    memcpy(depth, node->depth, sizeof node->depth);
+}
+
+static const nb_cloud_cell *cell_at(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t low[3],
+                                    int level)
+{
+    nb_cloud_cell *cell = &workspace->lattices[ways].cells[hash_of(low, level) & (NB_CLOUD_CELLS - 1)];
+    if (cell->is_set && cell->level == level && memcmp(cell->low, low, sizeof cell->low) == 0) return cell;
+    nb_cloud_cell found = {.low = {low[0], low[1], low[2]}, .level = (int16_t)level, .is_set = 1};
+    for (int k = 0; k < 8; k++) {
+        const int32_t at[3] = {low[0] + (k & 1), low[1] + (k >> 1 & 1), low[2] + (k >> 2)};
+        float depth[3];
+        read_node(workspace, ways, at, level, depth);
+        for (int i = 0; i < 3; i++) found.depth[i][k] = depth[i];
+    }
+    *cell = found;
+    return cell;
+}
+
+/* Linear between the eight nodes around a place. */
+static void read_level(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], int level,
+                       float weight, float depth[3])
+{
+    const double per = ldexp(1, -level);
+    int32_t low[3];
+    float part[3];
+    for (int i = 0; i < 3; i++) {
+        const double scaled = place[i] * per, whole = floor(scaled);
+        low[i] = (int32_t)whole;
+        part[i] = (float)(scaled - whole);
+    }
+    const nb_cloud_cell *cell = cell_at(workspace, ways, low, level);
+    for (int i = 0; i < (ways == NB_CLOUD_TO_SUN ? 1 : 3); i++) {
+        const float *d = cell->depth[i];
+        float row[4];
+        for (int k = 0; k < 4; k++) row[k] = d[2 * k] + part[0] * (d[2 * k + 1] - d[2 * k]);
+        const float near = row[0] + part[1] * (row[1] - row[0]), far = row[2] + part[1] * (row[3] - row[2]);
+        depth[i] += weight * (near + part[2] * (far - near));
+    }
+}
+
+/* Levels blend over the last quarter before the next. */
+static void read_nodes(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], float width,
+                       float depth[3])
+{
+    int level;
+    /* Numbers of nodes must be whole. */
+    const double least = workspace->view->high * 0x1p-29, mantissa = frexp(fmax((double)width, least), &level);
+    const float part = (float)fmax(0, 4 * (mantissa - 0.75));
+    depth[0] = depth[1] = depth[2] = 0;
+    if (part < 1) read_level(workspace, ways, place, level - 1, 1 - part, depth);
+    if (part > 0) read_level(workspace, ways, place, level, part, depth);
+}
+
+float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width)
+{
+    float depth[3];
+    read_nodes(workspace, NB_CLOUD_TO_SUN, place, width, depth);
+    return depth[0];
+}
+
+nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], float width)
+{
+    nb_cloud_depths depths = {.sun = nb_cloud_sun_depth_at(workspace, place, width)};
+    float others[3];
+    read_nodes(workspace, NB_CLOUD_AROUND, place, 4 * width, others);
+    depths.away = others[0];
+    depths.up = others[1];
+    depths.down = others[2];
+    return depths;
+}
+
+/* ---- the slab -------------------------------------------------------------------------------- */
+
+float nb_cloud_part_through(float depth, float mean_cosine)
+{
+    const float g = mean_cosine, apart = (1 - g * g) * depth;
+    return (5 - falling(apart)) / (4 + 3 * (1 - g / (1 + g)) * apart);
+}
+
+nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3])
+{
+    nb_cloud_ray ray = {.sun = fmax(-1, fmin(1, nb_vector_dot(direction, view->sun.direction)))};
+    memcpy(ray.direction, direction, sizeof ray.direction);
+    for (int k = 0; k < view->clouds->layer_count; k++) {
+        const nb_cloud_layer *layer = &view->clouds->layers[k];
+        const double g = layer->mean_cosine, wide = g / (1 + g);
+        const nebel_phase phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = wide};
+        const nb_phase lobe = nb_phase_resolve(&phase);
+        ray.phase[k] = (float)nb_phase_at(&layer->phase, ray.sun);
+        ray.wide_phase[k] = (float)nb_phase_at(&lobe, ray.sun);
+        ray.apart[k] = (float)(1 - g * g);
+    }
+    return ray;
+}
+
+/* Scattered light of the slab towards the eye, in parts of the sun's irradiance: J and F's first moment, without what
+ * was scattered once. */
+static float often_of(const nb_cloud_depths *depths, float apart, float wide, float sun, float up)
+{
+    const float m = fminf(1, (depths->up + 0.3f) / (depths->sun + 0.3f));
+    const float x = apart * m * depths->sun, all = x + apart * fminf(m * depths->away, depths->down);
+    const float here = falling(x / m), there = falling(all / m);
+    const float flux = m * (0.25f * (2 + 3 * m) + 0.25f * (2 - 3 * m) * there) / (1 + 0.75f * (1 - wide) * all);
+    const float mean = (0.5f * m + 0.75f * m * m - 0.5f * flux - 0.75f * ((1 - wide) * flux * x + m * m * here)) / PI_F;
+    const float toward = m * sun + (1 - m) * up;
+    return fmaxf(0, mean + 0.75f / PI_F * wide * (flux - m * here) * toward);
+}
+
+nb_cloud_source nb_cloud_source_of(const nebel_cloud_view *view, const nb_cloud_ray *ray, int layer,
+                                   const nb_cloud_depths *depths, const nb_cloud_light *light, const double up[3])
+{
+    const float g = (float)view->clouds->layers[layer].mean_cosine, wide = g / (1 + g), apart = ray->apart[layer];
+    const float left = falling(depths->sun), left_wide = falling(apart * depths->sun);
+    const float often = often_of(depths, apart, wide, (float)ray->sun, (float)nb_vector_dot(ray->direction, up));
+    const float over = (1 - g) * depths->up, whole = over + (1 - g) * depths->down;
+    const float from_above = (0.5f + 0.75f * (whole - over)) / (1 + 0.75f * whole);
+    /* Half of the ground that is seen lies in this cloud's shadow. */
+    const float ground = 0.5f + 0.5f * nb_cloud_part_through(depths->up + depths->down, g);
+    nb_cloud_source source;
+    for (int c = 0; c < 3; c++) {
+        source.once[c] = light->sun[c] * left * (ray->phase[layer] - apart * ray->wide_phase[layer]);
+        source.often[c] = light->sun[c] * apart * (often + left_wide * ray->wide_phase[layer]);
+        source.ambient[c] = from_above * light->above[c] + (1 - from_above) * ground * light->below[c];
+    }
+    return source;
+}

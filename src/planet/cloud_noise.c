@@ -1,0 +1,226 @@
+/* Two kinds of noise, both on periodic lattices: Perlin's gradient noise (Improving Noise, 2002), and billows, which are
+ * three octaves of one minus the distance to the nearest of random points (Worley, A Cellular Texture Basis Function,
+ * 1996), tabulated, since finding the nearest takes long. */
+#include "cloud_noise.h"
+
+#include "base/hash.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ---- gradient noise -------------------------------------------------------------------------- */
+
+static float pick(uint32_t hash)
+{
+    return (float)nb_mix_bits(hash) * 0x1p-31f - 1;
+}
+
+/* Points within a ball, made unit vectors: no side is liked. */
+static void fill_directions(float (*directions)[4])
+{
+    uint32_t hash = 1;
+    for (int i = 0; i < NB_CLOUD_DIRECTIONS; hash += 3) {
+        const float x = pick(hash), y = pick(hash + 1), z = pick(hash + 2), square = x * x + y * y + z * z;
+        if (!(square > 0.01f && square < 1)) continue;
+        const float scale = 1 / sqrtf(square);
+        directions[i][0] = x * scale;
+        directions[i][1] = y * scale;
+        directions[i][2] = z * scale;
+        directions[i++][3] = 0;
+    }
+}
+
+typedef struct nb_spot {
+    int at[3];
+    float part[3];
+} nb_spot;
+
+/* The lattice repeats at powers of two. */
+static inline nb_spot spot_of(const double place[3], int size)
+{
+    nb_spot spot;
+    for (int i = 0; i < 3; i++) {
+        const int64_t toward_zero = (int64_t)place[i], low = toward_zero - (place[i] < (double)toward_zero);
+        spot.at[i] = (int)(low & (size - 1));
+        spot.part[i] = (float)(place[i] - (double)low);
+    }
+    return spot;
+}
+
+static inline float mix(float a, float b, float part)
+{
+    return a + part * (b - a);
+}
+
+static inline float smooth(float u)
+{
+    return u * u * u * (u * (u * 6 - 15) + 10);
+}
+
+static inline float slope_at(const nb_cloud_noise *noise, int place, float x, float y, float z)
+{
+    const float *g = noise->directions[noise->turns[place]];
+    return g[0] * x + g[1] * y + g[2] * z;
+}
+
+float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3])
+{
+    enum { N = NB_CLOUD_LATTICE };
+    const nb_spot spot = spot_of(place, N);
+    const int x0 = spot.at[0], x1 = (x0 + 1) & (N - 1);
+    const int y0 = spot.at[1] * N, y1 = ((spot.at[1] + 1) & (N - 1)) * N;
+    const int z0 = spot.at[2] * N * N, z1 = ((spot.at[2] + 1) & (N - 1)) * N * N;
+    const float x = spot.part[0], y = spot.part[1], z = spot.part[2], u = smooth(x), v = smooth(y);
+    const float a = mix(slope_at(noise, z0 + y0 + x0, x, y, z), slope_at(noise, z0 + y0 + x1, x - 1, y, z), u);
+    const float b = mix(slope_at(noise, z0 + y1 + x0, x, y - 1, z), slope_at(noise, z0 + y1 + x1, x - 1, y - 1, z), u);
+    const float c = mix(slope_at(noise, z1 + y0 + x0, x, y, z - 1), slope_at(noise, z1 + y0 + x1, x - 1, y, z - 1), u);
+    const float d =
+        mix(slope_at(noise, z1 + y1 + x0, x, y - 1, z - 1), slope_at(noise, z1 + y1 + x1, x - 1, y - 1, z - 1), u);
+    return mix(mix(a, b, v), mix(c, d, v), smooth(z));
+}
+
+/* ---- billows --------------------------------------------------------------------------------- */
+
+/* One point per cell. */
+static float distance_to_point(int cells, const float place[3])
+{
+    const int low[3] = {(int)place[0], (int)place[1], (int)place[2]};
+    float nearest = 4;
+    for (int k = 0; k < 27; k++) {
+        const int step[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+        uint32_t hash = (uint32_t)cells;
+        for (int i = 0; i < 3; i++) hash = nb_mix_bits(hash + (uint32_t)((low[i] + step[i] + cells) & (cells - 1)));
+        float square = 0;
+        for (int i = 0; i < 3; i++) {
+            const float point = (float)(low[i] + step[i]) + (float)(hash >> (10 * i) & 1023) / 1024;
+            square += (point - place[i]) * (point - place[i]);
+        }
+        nearest = square < nearest ? square : nearest;
+    }
+    return sqrtf(nearest);
+}
+
+static float billow_at(const int at[3])
+{
+    float sum = 0, weight = 1;
+    for (int cells = NB_BILLOW_CELLS; cells <= 4 * NB_BILLOW_CELLS; cells *= 2) {
+        float place[3];
+        for (int i = 0; i < 3; i++) place[i] = ((float)at[i] + 0.5f) * (float)cells / NB_BILLOW_SIZE;
+        sum += weight * (1 - distance_to_point(cells, place));
+        weight *= 0.5f;
+    }
+    return fminf(1, fmaxf(0, sum / 1.75f));
+}
+
+static void halve(const float *fine, int size, float *coarse)
+{
+    const int half = size / 2;
+    for (int z = 0; z < half; z++)
+        for (int y = 0; y < half; y++)
+            for (int x = 0; x < half; x++) {
+                float sum = 0;
+                for (int k = 0; k < 8; k++)
+                    sum += fine[((2 * z + (k >> 2)) * size + 2 * y + (k >> 1 & 1)) * size + 2 * x + (k & 1)];
+                coarse[(z * half + y) * half + x] = sum / 8;
+            }
+}
+
+static float variance_of(const float *values, int count, double *mean)
+{
+    double sum = 0, square = 0;
+    for (int i = 0; i < count; i++) {
+        sum += (double)values[i];
+        square += (double)values[i] * (double)values[i];
+    }
+    *mean = sum / count;
+    return (float)(square / count - *mean * *mean);
+}
+
+static void fill_billows(nb_cloud_noise *noise)
+{
+    float *table = noise->billows[0], all = 0;
+    for (int i = 0; i < NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE; i++)
+        table[i] = billow_at((const int[3]){i % NB_BILLOW_SIZE, i / NB_BILLOW_SIZE % NB_BILLOW_SIZE,
+                                            i / NB_BILLOW_SIZE / NB_BILLOW_SIZE});
+    for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
+        const int size = NB_BILLOW_SIZE >> level;
+        double mean;
+        if (level > 0) halve(noise->billows[level - 1], 2 * size, noise->billows[level]);
+        const float left = variance_of(noise->billows[level], size * size * size, &mean);
+        if (level == 0) all = left;
+        noise->billow_mean = (float)mean;
+        noise->billow_variance[level] = all - left;
+    }
+}
+
+static float read_level(const nb_cloud_noise *noise, const double place[3], int level)
+{
+    const int size = NB_BILLOW_SIZE >> level;
+    double scaled[3];
+    for (int i = 0; i < 3; i++) scaled[i] = place[i] * size - 0.5;
+    const nb_spot spot = spot_of(scaled, size);
+    const float *table = noise->billows[level];
+    const int x0 = spot.at[0], x1 = (x0 + 1) & (size - 1);
+    const int y0 = spot.at[1] * size, y1 = ((spot.at[1] + 1) & (size - 1)) * size;
+    const int z0 = spot.at[2] * size * size, z1 = ((spot.at[2] + 1) & (size - 1)) * size * size;
+    const float u = spot.part[0], v = spot.part[1];
+    const float a = mix(table[z0 + y0 + x0], table[z0 + y0 + x1], u),
+                b = mix(table[z0 + y1 + x0], table[z0 + y1 + x1], u);
+    const float c = mix(table[z1 + y0 + x0], table[z1 + y0 + x1], u),
+                d = mix(table[z1 + y1 + x0], table[z1 + y1 + x1], u);
+    return mix(mix(a, b, v), mix(c, d, v), spot.part[2]);
+}
+
+/* Levels blend over the last quarter before the next. */
+static inline float next_part(float level, int low)
+{
+    return fmaxf(0, 4 * (level - (float)low) - 3);
+}
+
+float nb_billows_lost(const nb_cloud_noise *noise, float level)
+{
+    if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_variance[NB_BILLOW_LEVELS - 1];
+    const int low = (int)level;
+    return mix(noise->billow_variance[low], noise->billow_variance[low + 1], next_part(level, low));
+}
+
+float nb_billows(const nb_cloud_noise *noise, const double place[3], float level)
+{
+    if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_mean;
+    const int low = (int)level;
+    const float part = next_part(level, low), fine = read_level(noise, place, low);
+    return part > 0 ? mix(fine, read_level(noise, place, low + 1), part) : fine;
+}
+
+/* ---- making ---------------------------------------------------------------------------------- */
+
+nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_noise *noise)
+{
+    enum { POINTS = NB_CLOUD_LATTICE * NB_CLOUD_LATTICE * NB_CLOUD_LATTICE };
+    size_t all = 0, used = 0;
+    for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
+        const size_t size = (size_t)NB_BILLOW_SIZE >> level;
+        all += size * size * size;
+    }
+    noise->turns = nb_allocate(allocator, POINTS, 1);
+    noise->directions = nb_allocate(allocator, NB_CLOUD_DIRECTIONS, sizeof *noise->directions);
+    float *tables = nb_allocate(allocator, all, sizeof *tables);
+    noise->billows[0] = tables;
+    if (noise->turns == NULL || noise->directions == NULL || tables == NULL) return NEBEL_ERROR_MEMORY;
+    for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
+        const size_t size = (size_t)NB_BILLOW_SIZE >> level;
+        noise->billows[level] = tables + used;
+        used += size * size * size;
+    }
+    for (uint32_t i = 0; i < POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
+    fill_directions(noise->directions);
+    fill_billows(noise);
+    return NEBEL_OK;
+}
+
+void nb_cloud_noise_free(const nebel_allocator *allocator, nb_cloud_noise *noise)
+{
+    nb_release(allocator, noise->turns);
+    nb_release(allocator, noise->directions);
+    nb_release(allocator, noise->billows[0]);
+}

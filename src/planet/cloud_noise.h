@@ -1,0 +1,40 @@
+/* Noise that clouds are made of: see docs/planet.md. */
+#ifndef NB_PLANET_CLOUD_NOISE_H
+#define NB_PLANET_CLOUD_NOISE_H
+
+#include "base/base.h"
+
+enum {
+    NB_CLOUD_LATTICE = 64, /* points of gradient noise before it repeats, on each axis */
+    NB_CLOUD_DIRECTIONS = 256,
+    NB_BILLOW_SIZE = 64,  /* numbers of billows before they repeat */
+    NB_BILLOW_LEVELS = 6, /* each half the one before */
+    NB_BILLOW_CELLS = 4,  /* the largest billows, before they repeat */
+};
+
+typedef struct nb_cloud_noise {
+    uint8_t *turns; /* [z][y][x]: which direction */
+    float (*directions)[4];
+    float *billows[NB_BILLOW_LEVELS];
+    float billow_mean, billow_variance[NB_BILLOW_LEVELS]; /* what a level has lost of the first one's */
+} nb_cloud_noise;
+
+/* Errors: MEMORY. */
+nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_noise *noise);
+void nb_cloud_noise_free(const nebel_allocator *allocator, nb_cloud_noise *noise);
+
+/* Perlin's gradient noise at a place in units of its lattice; the mean is 0, the variance NB_GRADIENT_VARIANCE. */
+float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3]);
+
+/* Asserted by test_clouds: variance, and the largest slope per length of the lattice. */
+#define NB_GRADIENT_VARIANCE 0.0364f
+#define NB_GRADIENT_SLOPE 2.3f
+#define NB_BILLOW_SLOPE 7.f /* of billows, per period: each octave's is that of a distance */
+
+/* 0 to 1, 1 in the middle of a billow; `place` in periods; level: how often halved, 0 or more. */
+float nb_billows(const nb_cloud_noise *noise, const double place[3], float level);
+
+/* The variance that a level has lost. */
+float nb_billows_lost(const nb_cloud_noise *noise, float level);
+
+#endif

@@ -1,0 +1,133 @@
+/* Clouds at a moment under a sun. */
+#ifndef NB_PLANET_CLOUD_VIEW_H
+#define NB_PLANET_CLOUD_VIEW_H
+
+#include "clouds.h"
+
+enum {
+    NB_CLOUD_HEIGHTS = 6, /* of light without clouds */
+    NB_CLOUD_SUNS = 1024, /* and heights of the sun, as evenly spread cosines */
+    NB_CLOUD_NODES = 1 << 17,
+    NB_CLOUD_CELLS = 1 << 14,
+    NB_CLOUD_POINTS = 1 << 18,
+    NB_CLOUD_PATCHES = 1 << 14,
+    NB_CLOUD_BLOCKS = 1 << 15,
+};
+
+/* Light at a place in clear air: of the sun on what faces it, and the mean radiance of each half of the sky. */
+typedef struct nb_cloud_light {
+    float sun[3], above[3], below[3];
+} nb_cloud_light;
+
+struct nebel_cloud_view {
+    nebel_allocator allocator;
+    const nebel_clouds *clouds;
+    nebel_sun sun;
+    double tolerance;
+    nb_cloud_pose poses[NEBEL_MAX_CLOUD_LAYERS];
+    double low, high;                        /* of all layers, m from the centre */
+    double lowest_sun;                       /* cosine to the zenith */
+    nb_cloud_light (*lights)[NB_CLOUD_SUNS]; /* [height][sun] */
+};
+
+/* A node of the lattice on which optical depths are kept: towards the sun; or away from it, up and down. */
+typedef struct nb_cloud_node {
+    int32_t at[3];
+    int16_t level; /* nodes are 2^level m apart */
+    int16_t is_set;
+    float depth[3];
+} nb_cloud_node;
+
+/* The eight nodes around a cell of that lattice, x first. */
+typedef struct nb_cloud_cell {
+    int32_t low[3];
+    int16_t level, is_set;
+    float depth[3][8];
+} nb_cloud_cell;
+
+/* Which ways a lattice is of: to the sun; away from it, up and down. */
+typedef enum nb_cloud_ways { NB_CLOUD_TO_SUN, NB_CLOUD_AROUND } nb_cloud_ways;
+
+typedef struct nb_cloud_lattice {
+    nb_cloud_node *nodes;
+    nb_cloud_cell *cells;
+} nb_cloud_lattice;
+
+/* A point of the grid on which columns are kept. */
+typedef struct nb_cloud_point {
+    uint32_t key; /* 0: none; else face, layer and level */
+    int32_t at[2];
+    nb_cloud_column column;
+} nb_cloud_point;
+
+/* The four columns around a cell of that grid, x first. */
+typedef struct nb_cloud_patch {
+    uint32_t key;
+    int32_t at[2];
+    nb_cloud_column columns[4];
+} nb_cloud_patch;
+
+/* The largest rank, with all that a width hides, of a block of that grid. */
+typedef struct nb_cloud_block {
+    uint32_t key;
+    int32_t at[2];
+    float most;
+} nb_cloud_block;
+
+struct nebel_cloud_workspace {
+    const nebel_cloud_view *view;
+    nb_cloud_lattice lattices[2]; /* nb_cloud_ways */
+    nb_cloud_point *points;
+    nb_cloud_patch *patches;
+    nb_cloud_block *blocks;
+};
+
+/* Where a ray is within a shell: at most two pieces, before and behind what lies below it. Returns how many. */
+int nb_cloud_pieces(double low, double high, const double from[3], const double unit[3], double t_max,
+                    double pieces[2][2]);
+
+/* nb_cloud_column_at and nb_cloud_at, linear between columns that are found once. */
+nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double unit[3], float width);
+/* No column that a ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts variance in. Place and direction in
+ * the layer's axes. */
+float nb_cloud_most_rank(nebel_cloud_workspace *workspace, int layer, int size, const double place[3],
+                         const double direction[3], float width, double *way);
+float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
+
+nebel_result nb_cloud_light_make(nebel_cloud_view *view);
+
+/* Light of clear air at a place from the centre. */
+nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius);
+
+/* Optical depths at a place, from nodes that are about `width` apart. */
+typedef struct nb_cloud_depths {
+    float sun, away, up, down;
+} nb_cloud_depths;
+
+nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], float width);
+float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width);
+
+/* What comes through a slab of such depth, straight or scattered, for a mean cosine. */
+float nb_cloud_part_through(float depth, float mean_cosine);
+
+/* What a layer's drops send towards the eye, per unit of extinction. */
+typedef struct nb_cloud_source {
+    float once[3];    /* of sunlight, seen through all cloud between */
+    float often[3];   /* seen through what scatters it out of its way: see nb_cloud_layer_ray */
+    float ambient[3]; /* of the sky and the ground; through all cloud */
+} nb_cloud_source;
+
+/* What is the same along a ray. */
+typedef struct nb_cloud_ray {
+    float phase[NEBEL_MAX_CLOUD_LAYERS], wide_phase[NEBEL_MAX_CLOUD_LAYERS]; /* towards the eye */
+    float apart[NEBEL_MAX_CLOUD_LAYERS]; /* 1 - g^2: what part of scattering leads away */
+    double sun;                          /* cosine between ray and sun */
+    double direction[3];
+} nb_cloud_ray;
+
+nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3]);
+
+nb_cloud_source nb_cloud_source_of(const nebel_cloud_view *view, const nb_cloud_ray *ray, int layer,
+                                   const nb_cloud_depths *depths, const nb_cloud_light *light, const double up[3]);
+
+#endif

@@ -1,0 +1,424 @@
+/* Clouds along a ray: Simpson's rule on pieces that are halved or doubled by what it may miss, as far as the clouds
+ * before let it be seen. Where no cloud can be nothing is read: the sum that says where clouds are has a largest slope. */
+#include "cloud_view.h"
+
+#include "base/vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+/* Behind so little nothing is seen any more. */
+#define UNSEEN 0.01
+
+/* Of what a piece may miss: that of many pieces together is less than their number of it, since signs differ. */
+#define PIECES 1.5
+
+/* Optical depth of a piece, whose light is that of its middle. */
+#define MOST_DEPTH 0.8
+
+/* Where there may be cloud and is none, of a sixteenth of the smallest heaps. */
+#define LEAST_STEP 0.5
+
+enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
+
+typedef struct nb_walk {
+    const nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    double from[3], unit[3], spread; /* from the planet's centre */
+    double least;                    /* m, of pieces that are not yet known to be smooth */
+    nb_cloud_ray ray;
+    double turned[NEBEL_MAX_CLOUD_LAYERS][3]; /* the direction in layers' axes */
+    int layer;                                /* the only one here */
+    double depth, apart;                      /* so far: optical depths, of all scattering and of what leads away */
+    double light[3], missed;
+    nebel_cloud_knots *knots;
+} nb_walk;
+
+static double radius_at(const nb_walk *walk, double t, double place[3])
+{
+    for (int c = 0; c < 3; c++) place[c] = walk->from[c] + t * walk->unit[c];
+    return nb_vector_length(place);
+}
+
+/* A place of the ray in a layer's axes, and a part of its height. */
+typedef struct nb_spot {
+    double place[3], unit[3], radius;
+    float height, width;
+} nb_spot;
+
+static nb_spot spot_at(const nb_walk *walk, int k, double t)
+{
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
+    double place[3];
+    nb_spot spot = {.radius = radius_at(walk, t, place), .width = (float)(walk->spread * t)};
+    const double per = 1 / spot.radius;
+    for (int i = 0; i < 3; i++) {
+        spot.place[i] = nb_vector_dot(walk->view->poses[k].turn[i], place);
+        spot.unit[i] = spot.place[i] * per;
+    }
+    spot.height = (float)(spot.radius - layer->low) * layer->per_thickness;
+    return spot;
+}
+
+/* *clear: where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first
+ * scales, whatever the others do. */
+static float extinction_of(const nb_walk *walk, int k, const nb_spot *spot, double *clear)
+{
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
+    float missing[NB_CLOUD_BILLOWS + 1];
+    *clear = 0;
+    if (!(spot->height > 0 && spot->height < 1)) return 0;
+    const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->unit, spot->width);
+    const float found =
+        nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing);
+    if (found > 0) return found;
+    const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k])) * layer->per_thickness;
+    float slope = layer->slope * column.scale + NB_CLOUD_RANK_SLOPE * climb;
+    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
+        *clear = fmax(*clear, (double)(missing[n] / slope));
+        slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
+    }
+    return found;
+}
+
+static float look(const nb_walk *walk, int k, double t)
+{
+    const nb_spot spot = spot_at(walk, k, t);
+    double clear;
+    return extinction_of(walk, k, &spot, &clear);
+}
+
+/* The least rank on the way between two places: curves of rays sag below the line between their heights. */
+static float least_between(const nb_walk *walk, int k, const nb_spot *a, double way)
+{
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
+    const double climb = nb_vector_dot(a->place, walk->turned[k]) / a->radius, sag = way * way / a->radius;
+    const float end = a->height + (float)(climb * way) * layer->per_thickness;
+    const float low = fminf(a->height, end) - (float)sag * layer->per_thickness;
+    const float high = fmaxf(a->height, end) + (float)sag * layer->per_thickness;
+    if (layer->kind == NEBEL_CLOUD_CUMULUS) return nb_cloud_least_rank(layer, fmaxf(0, low));
+    return low < 0.5f && high > 0.5f ? 0 : nb_cloud_least_rank(layer, high <= 0.5f ? high : low);
+}
+
+/* How far ahead there is no cloud for sure; 0 where that is not known, and then *unknown is how far it is not. */
+static double clear_way(const nb_walk *walk, int k, const nb_spot *spot, double *unknown)
+{
+    for (int size = 2; size >= 0; size--) {
+        const float most =
+            nb_cloud_most_rank(walk->workspace, k, size, spot->place, walk->turned[k], spot->width, unknown);
+        *unknown += 1e-3 * walk->least;
+        if (least_between(walk, k, spot, *unknown) >= most) return *unknown;
+    }
+    return 0;
+}
+
+/* ---- knots ----------------------------------------------------------------------------------- */
+
+static void write_knot(nb_walk *walk, uint32_t i, double t)
+{
+    nebel_cloud_knots *knots = walk->knots;
+    knots->t[i] = (float)t;
+    knots->transmittance[i] = (float)nb_exp(-walk->depth);
+    for (int c = 0; c < 3; c++) knots->in_scattering[i][c] = (float)walk->light[c];
+}
+
+/* The last place may stay free until the end. */
+static void add_knot(nb_walk *walk, double t)
+{
+    nebel_cloud_knots *knots = walk->knots;
+    if (knots->count + 1 < MOST) write_knot(walk, knots->count++, t);
+}
+
+/* Where the clouds' transmittance has fallen, or the ray is far from the last knot. */
+static void pass(nb_walk *walk, double t)
+{
+    const nebel_cloud_knots *knots = walk->knots;
+    const uint32_t last = knots->count - 1;
+    const double fallen = (double)knots->transmittance[last] - nb_exp(-walk->depth);
+    if (fallen > 0.12 || (fallen > 0.02 && t > 1.5 * (double)knots->t[last])) add_knot(walk, t);
+}
+
+/* ---- pieces ---------------------------------------------------------------------------------- */
+
+/* Light of a piece as of its middle. */
+static void add_light(nb_walk *walk, int k, double t, double width, double depth)
+{
+    double place[3], up[3];
+    const double radius = radius_at(walk, t, place), apart = (double)walk->ray.apart[k];
+    for (int c = 0; c < 3; c++) up[c] = place[c] / radius;
+    const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, (float)width);
+    const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
+    const nb_cloud_source source = nb_cloud_source_of(walk->view, &walk->ray, k, &depths, &light, up);
+    const double seen = nb_exp(-walk->depth) * (1 - nb_exp(-depth));
+    const double seen_apart = nb_exp(-walk->apart) * (1 - nb_exp(-apart * depth)) / apart;
+    for (int c = 0; c < 3; c++)
+        walk->light[c] += seen * (double)(source.once[c] + source.ambient[c]) + seen_apart * (double)source.often[c];
+}
+
+static void take_piece(nb_walk *walk, int k, double t, double length, double depth)
+{
+    if (!(depth > 0)) return;
+    if (walk->knots->count == 0) add_knot(walk, t);
+    const double middle = t + 0.5 * length;
+    /* Wider lattices than the layer is high would show through it. */
+    const double thickness = 1 / (double)walk->view->clouds->layers[k].per_thickness;
+    add_light(walk, k, middle, fmax(fmin(5 * walk->spread * middle, 0.2 * thickness), 0.02 * walk->least), depth);
+    walk->depth += depth;
+    walk->apart += (double)walk->ray.apart[k] * depth;
+    pass(walk, t + length);
+}
+
+/* Goes on until there is cloud, by as much as there can be none, or by the least step. */
+static double skip(const nb_walk *walk, int k, double t, double end, float *far, double *length)
+{
+    double clear = 0, known = 0; /* up to where no block is clear */
+    while (t < end) {
+        nb_spot spot = spot_at(walk, k, t);
+        if (t >= known) {
+            double unknown;
+            const double way = clear_way(walk, k, &spot, &unknown);
+            if (way > 0) {
+                t += way;
+                continue;
+            }
+            known = t + unknown;
+        }
+        *length = fmin(end - t, fmax(clear, fmax(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
+        spot = spot_at(walk, k, t + *length);
+        *far = extinction_of(walk, k, &spot, &clear);
+        if (*far > 0) return t;
+        t += *length;
+    }
+    return end;
+}
+
+/* A piece of a ray in one layer; layers do not overlap. */
+static void walk_layer(nb_walk *walk, int k, double begin, double end)
+{
+    const double tolerance = PIECES * walk->view->tolerance;
+    double t = begin, length = walk->least;
+    float here = look(walk, k, t), far = 0;
+    int has_far = 0;
+    for (int i = 0; i < MOST_PIECES && t < end && nb_exp(-walk->apart) > UNSEEN; i++) {
+        if (!has_far && here == 0) {
+            t = skip(walk, k, t, end, &far, &length);
+            has_far = 1;
+            if (!(t < end)) return;
+        }
+        length = fmin(length, end - t);
+        if (!has_far) far = look(walk, k, t + length);
+        const float middle = look(walk, k, t + 0.5 * length);
+        const double depth = length / 6 * (double)(here + 4 * middle + far);
+        const double seen = nb_exp(-walk->depth), least = fmax(0.25 * walk->spread * t, 1e-3 * walk->least);
+        const double missed = seen * length / 6 * fabs((double)(here - 2 * middle + far));
+        has_far = 1;
+        if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + seen)) && length > 2 * least) {
+            length *= 0.5;
+            far = middle;
+            continue;
+        }
+        has_far = 0;
+        walk->missed += missed / PIECES;
+        take_piece(walk, k, t, length, depth);
+        t += length;
+        here = far;
+        if (missed < 0.2 * tolerance) length *= 1.7;
+        length = fmin(length, 8 * walk->least + 0.01 * t);
+    }
+}
+
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+typedef struct nb_stay {
+    int layer;
+    double begin, end;
+} nb_stay;
+
+static int find_stays(const nb_walk *walk, double t_max, nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS])
+{
+    const nebel_clouds *clouds = walk->view->clouds;
+    int count = 0;
+    for (int k = 0; k < clouds->layer_count; k++) {
+        double pieces[2][2];
+        const int found =
+            nb_cloud_pieces(clouds->layers[k].low, clouds->layers[k].high, walk->from, walk->unit, t_max, pieces);
+        for (int i = 0; i < found; i++) {
+            const nb_stay stay = {k, pieces[i][0], pieces[i][1]};
+            int at = count++;
+            for (; at > 0 && stays[at - 1].begin > stay.begin; at--) stays[at] = stays[at - 1];
+            stays[at] = stay;
+        }
+    }
+    return count;
+}
+
+/* Where the ray meets the ground. */
+static double to_ground(double radius, const double from[3], const double unit[3])
+{
+    const double along = nb_vector_dot(from, unit);
+    double aside[3];
+    for (int c = 0; c < 3; c++) aside[c] = from[c] - along * unit[c];
+    const double near = nb_vector_length(aside);
+    if (!(along < 0 && near < radius)) return HUGE_VAL;
+    return fmax(0, -along - sqrt((radius - near) * (radius + near)));
+}
+
+static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], double spread,
+                  nebel_cloud_knots *knots)
+{
+    const nebel_atmosphere *atmosphere = workspace->view->clouds->atmosphere;
+    nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS];
+    nb_walk walk = {.view = workspace->view, .workspace = workspace, .spread = spread, .knots = knots};
+    for (int c = 0; c < 3; c++) walk.from[c] = ray->origin[c] - atmosphere->center[c];
+    memcpy(walk.unit, unit, sizeof walk.unit);
+    walk.ray = nb_cloud_ray_make(workspace->view, unit);
+    for (int k = 0; k < workspace->view->clouds->layer_count; k++)
+        for (int i = 0; i < 3; i++) walk.turned[k][i] = nb_vector_dot(workspace->view->poses[k].turn[i], unit);
+    knots->count = 0;
+    knots->error = 0;
+    const double end = fmin(ray->t_max, to_ground(atmosphere->airs.radius, walk.from, unit));
+    const int count = find_stays(&walk, end, stays);
+    double last = 0;
+    for (int i = 0; i < count && nb_exp(-walk.apart) > UNSEEN; i++) {
+        const nb_cloud_layer *layer = &workspace->view->clouds->layers[stays[i].layer];
+        walk.least = (double)layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 16;
+        walk_layer(&walk, stays[i].layer, stays[i].begin, stays[i].end);
+        last = stays[i].end;
+    }
+    if (knots->count > 0) {
+        write_knot(&walk, knots->count, fmax(last, (double)knots->t[knots->count - 1]));
+        knots->count++;
+    }
+    knots->error = (float)walk.missed;
+}
+
+/* ---- the face -------------------------------------------------------------------------------- */
+
+nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
+                                double spread, nebel_cloud_knots *knots, size_t knot_stride)
+{
+    if (workspace == NULL || (n > 0 && (rays == NULL || knots == NULL)) || !(spread >= 0 && spread <= 10))
+        return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++) {
+        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
+        double unit[3];
+        if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
+        trace(workspace, ray, unit, spread, (nebel_cloud_knots *)(void *)((char *)knots + i * knot_stride));
+    }
+    return NEBEL_OK;
+}
+
+/* Below clouds their shadow is that of the place where the way to the sun enters them. */
+nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
+                                size_t place_stride, float *parts)
+{
+    if (workspace == NULL || (n > 0 && (places == NULL || parts == NULL)) || !(width >= 0 && width <= NEBEL_MAX_LENGTH))
+        return NEBEL_ERROR_ARGUMENT;
+    const nebel_cloud_view *view = workspace->view;
+    const nebel_clouds *clouds = view->clouds;
+    const double *sun = view->sun.direction, least = fmax(width, 1e-3 * (view->high - view->low));
+    for (size_t i = 0; i < n; i++) {
+        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
+        double from[3], pieces[2][2];
+        parts[i] = 1;
+        if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
+        for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+        if (!nb_cloud_pieces(view->low, view->high, from, sun, HUGE_VAL, pieces)) continue;
+        for (int c = 0; c < 3; c++) from[c] += pieces[0][0] * sun[c];
+        const float depth = nb_cloud_sun_depth_at(workspace, from, (float)fmax(least, 0.005 * pieces[0][0]));
+        if (depth > 0) parts[i] = nb_cloud_part_through(depth, (float)clouds->layers[0].mean_cosine);
+    }
+    return NEBEL_OK;
+}
+
+nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view)
+{
+    nebel_sun sun;
+    if (view == NULL) return NEBEL_ERROR_ARGUMENT;
+    *view = NULL;
+    if (desc == NULL || desc->clouds == NULL || !nb_allocator_is_valid(&desc->allocator) ||
+        !nb_air_resolve_sun(&desc->sun, &sun))
+        return NEBEL_ERROR_ARGUMENT;
+    if (!(fabs(desc->time) <= 1e12))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: time is %g; must be within -1e12 and 1e12", desc->time);
+    if (!(desc->tolerance >= 0 && desc->tolerance <= 1))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: tolerance is %g; must be within 0 and 1",
+                       desc->tolerance);
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    nebel_cloud_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
+    made->allocator = allocator;
+    made->clouds = desc->clouds;
+    made->sun = sun;
+    made->tolerance = fmax(1e-6, desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE);
+    made->low = HUGE_VAL;
+    for (int k = 0; k < desc->clouds->layer_count; k++) {
+        const nb_cloud_layer *layer = &desc->clouds->layers[k];
+        made->poses[k] = nb_cloud_pose_at(layer, desc->time);
+        made->low = fmin(made->low, layer->low);
+        made->high = fmax(made->high, layer->high);
+    }
+    if (desc->clouds->layer_count == 0) made->low = made->high = desc->clouds->atmosphere->airs.radius;
+    const double ratio = fmin(1, desc->clouds->atmosphere->airs.radius / made->high);
+    made->lowest_sun = -1.05 * sqrt((1 - ratio) * (1 + ratio)) - 0.2;
+    const nebel_result result = nb_cloud_light_make(made);
+    if (result == NEBEL_OK) {
+        *view = made;
+        return NEBEL_OK;
+    }
+    nebel_destroy_cloud_view(made);
+    return nb_fail(&desc->log, result, "clouds: out of memory");
+}
+
+void nebel_destroy_cloud_view(nebel_cloud_view *view)
+{
+    if (view == NULL) return;
+    const nebel_allocator allocator = view->allocator;
+    nb_release(&allocator, view->lights);
+    nb_release(&allocator, view);
+}
+
+nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cloud_workspace **workspace)
+{
+    if (workspace == NULL) return NEBEL_ERROR_ARGUMENT;
+    *workspace = NULL;
+    if (view == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_cloud_workspace *made = nb_allocate_zero(&view->allocator, 1, sizeof *made);
+    if (made == NULL) return NEBEL_ERROR_MEMORY;
+    made->view = view;
+    made->blocks = nb_allocate_zero(&view->allocator, NB_CLOUD_BLOCKS, sizeof *made->blocks);
+    made->points = nb_allocate_zero(&view->allocator, NB_CLOUD_POINTS, sizeof *made->points);
+    made->patches = nb_allocate_zero(&view->allocator, NB_CLOUD_PATCHES, sizeof *made->patches);
+    int is_whole = made->blocks != NULL && made->points != NULL && made->patches != NULL;
+    for (int i = 0; i < 2; i++) {
+        nb_cloud_lattice *lattice = &made->lattices[i];
+        lattice->nodes = nb_allocate_zero(&view->allocator, NB_CLOUD_NODES, sizeof *lattice->nodes);
+        lattice->cells = nb_allocate_zero(&view->allocator, NB_CLOUD_CELLS, sizeof *lattice->cells);
+        is_whole = is_whole && lattice->nodes != NULL && lattice->cells != NULL;
+    }
+    if (is_whole) {
+        *workspace = made;
+        return NEBEL_OK;
+    }
+    nebel_destroy_cloud_workspace(made);
+    return NEBEL_ERROR_MEMORY;
+}
+
+void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace)
+{
+    if (workspace == NULL) return;
+    const nebel_allocator allocator = workspace->view->allocator;
+    for (int i = 0; i < 2; i++) {
+        nb_release(&allocator, workspace->lattices[i].nodes);
+        nb_release(&allocator, workspace->lattices[i].cells);
+    }
+    nb_release(&allocator, workspace->points);
+    nb_release(&allocator, workspace->patches);
+    nb_release(&allocator, workspace->blocks);
+    nb_release(&allocator, workspace);
+}

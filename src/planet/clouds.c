@@ -1,0 +1,470 @@
+#include "clouds.h"
+
+#include "base/hash.h"
+#include "base/vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* Each scale of billows is so much smaller than the one before. */
+#define BILLOW_RATIO 6.1
+
+static const float billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
+
+/* ---- places ---------------------------------------------------------------------------------- */
+
+nb_cloud_pose nb_cloud_pose_at(const nb_cloud_layer *layer, double time)
+{
+    const double angle = -fmod(layer->per_time * time, 2 * PI), c = cos(angle), s = sin(angle);
+    const double *a = layer->axis;
+    const double skew[3][3] = {{0, -a[2], a[1]}, {a[2], 0, -a[0]}, {-a[1], a[0], 0}};
+    nb_cloud_pose pose;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) pose.turn[i][j] = (i == j ? c : 0) + (1 - c) * a[i] * a[j] + s * skew[i][j];
+    return pose;
+}
+
+static void turn(const double by[3][3], const double v[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = nb_vector_dot(by[i], v);
+}
+
+/* ---- columns --------------------------------------------------------------------------------- */
+
+/* The part of an octave that is seen where pixels are `width` wide. */
+static float share_of(float width, float cell)
+{
+    return fminf(1, fmaxf(0, 2 - 2 * width / cell));
+}
+
+static float octave_at(const nb_cloud_noise *noise, const nb_cloud_octave *octave, const double place[3])
+{
+    double at[3];
+    turn(octave->turn, place, at);
+    for (int i = 0; i < 3; i++) at[i] += octave->shift[i];
+    return nb_gradient_noise(noise, at);
+}
+
+/* Wisps: places are shoved about by noise of their own. */
+static void bend(const nb_cloud_noise *noise, const nb_cloud_layer *layer, double place[3])
+{
+    const nb_cloud_octave *octave = &layer->octaves[2];
+    double from[3], shove[3];
+    for (int i = 0; i < 3; i++) from[i] = 0.55 * place[i];
+    for (int i = 0; i < 3; i++) {
+        from[i] += 7.3 * (double)octave->cell;
+        shove[i] = (double)octave_at(noise, octave, from);
+    }
+    for (int i = 0; i < 3; i++) place[i] += 2.2 * (double)octave->cell * shove[i];
+}
+
+static float sum_octaves(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const double unit[3], float width,
+                         float *variance)
+{
+    double place[3];
+    float sum = 0;
+    *variance = 0;
+    for (int i = 0; i < 3; i++) place[i] = unit[i] * layer->low;
+    if (layer->kind == NEBEL_CLOUD_CIRRUS && width < layer->octaves[2].cell) bend(noise, layer, place);
+    for (int k = 0; k < NB_CLOUD_OCTAVES; k++) {
+        const nb_cloud_octave *octave = &layer->octaves[k];
+        const float share = share_of(width, octave->cell), weight = octave->weight;
+        if (!(weight > 0)) continue;
+        *variance += weight * weight * NB_GRADIENT_VARIANCE * (1 - share * share);
+        if (share > 0) sum += share * weight * octave_at(noise, octave, place);
+    }
+    return sum;
+}
+
+static float weather_at(const nb_cloud_layer *layer, const double unit[3], float width)
+{
+    double value;
+    if (layer->weather.level_count == 0) return layer->coverage;
+    const double u = atan2(unit[2], -unit[0]) / (2 * PI), v = acos(fmax(-1, fmin(1, unit[1]))) / PI;
+    const double texel = PI * layer->low / (double)layer->weather.height[0];
+    nb_layer_map_read(&layer->weather, u, v, log2(fmax(1, (double)width / texel)), 0, &value);
+    return layer->coverage * (float)value;
+}
+
+static float rank_of(const nb_cloud_layer *layer, float part)
+{
+    const float place = fminf(1, fmaxf(0, part)) * (NB_CLOUD_RANKS - 1);
+    const int low = place < NB_CLOUD_RANKS - 2 ? (int)place : NB_CLOUD_RANKS - 2;
+    return layer->ranks[low] + (place - (float)low) * (layer->ranks[low + 1] - layer->ranks[low]);
+}
+
+/* The middle of a heap is where a twentieth of all cloud is more so. */
+nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const double unit[3],
+                                   float width)
+{
+    const float coverage = weather_at(layer, unit, width);
+    nb_cloud_column column = {.rank = -1};
+    if (!(coverage > 0)) return column;
+    const float border = rank_of(layer, 1 - coverage), middle = rank_of(layer, 1 - 0.05f * coverage);
+    const float sum = sum_octaves(noise, layer, unit, width, &column.variance);
+    column.scale = 1 / (middle - border);
+    column.rank = (sum - border) * column.scale;
+    column.variance *= column.scale * column.scale;
+    return column;
+}
+
+/* ---- shapes ---------------------------------------------------------------------------------- */
+
+static float step_up(float x)
+{
+    const float u = fminf(1, fmaxf(0, x));
+    return u * u * (3 - 2 * u);
+}
+
+/* Heaps are domes: where their rank falls as a parabola from the middle, its root is a half ball. Sheets are thickest in
+ * the middle of their height. */
+float nb_cloud_least_rank(const nb_cloud_layer *layer, float height)
+{
+    const float from_middle = 2 * height - 1;
+    switch (layer->kind) {
+    case NEBEL_CLOUD_STRATUS:
+        return 0.5f * from_middle * from_middle;
+    case NEBEL_CLOUD_CIRRUS:
+        return 0.7f * from_middle * from_middle;
+    default:
+        return height * height;
+    }
+}
+
+/* Bases are flat, where vapour begins to condense, and thin there: drops grow on their way up. */
+static float thin_out(const nb_cloud_layer *layer, float height)
+{
+    const float end = step_up(10 * (1 - height));
+    if (layer->kind != NEBEL_CLOUD_CUMULUS) return end * step_up(6 * height);
+    return end * step_up(16 * height) * (0.45f + 0.55f * fminf(1, 2 * height));
+}
+
+/* Integral of x held within 0 and 1. */
+static float ramp_integral(float x)
+{
+    if (x <= 0) return 0;
+    return x < 1 ? 0.5f * x * x : x - 0.5f;
+}
+
+/* The mean of x held within 0 and 1 where x has a variance: as if all between -root(3 variance) and root(3 variance) were
+ * as likely. */
+static float mean_ramp(float x, float variance)
+{
+    const float wide = sqrtf(3 * variance);
+    if (wide < 1e-3f) return fminf(1, fmaxf(0, x));
+    return (ramp_integral(x + wide) - ramp_integral(x - wide)) / (2 * wide);
+}
+
+/* How often the table of a scale of billows is halved for a width. */
+static float level_of(const nb_cloud_layer *layer, int scale, float width)
+{
+    const float wide = width * NB_BILLOW_SIZE * (float)layer->per_billow[scale];
+    return wide > 1 ? log2f(wide) : 0;
+}
+
+static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int scale, const double place[3],
+                        float level)
+{
+    double at[3];
+    for (int i = 0; i < 3; i++) at[i] = place[(i + scale) % 3] * layer->per_billow[scale] + layer->billow_shift[i];
+    return nb_billows(noise, at, level);
+}
+
+static void set_missing(float missing[NB_CLOUD_BILLOWS + 1], int first, float value)
+{
+    for (int n = first; n <= NB_CLOUD_BILLOWS; n++) missing[n] = value;
+}
+
+/* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
+ * left of them can neither make cloud nor thin it. */
+float nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
+                         const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1])
+{
+    const float whole = column->rank - nb_cloud_least_rank(layer, height), softness = layer->softness;
+    set_missing(missing, 0, -whole - sqrtf(3 * column->variance));
+    if (missing[0] >= 0) return 0;
+    const float deep =
+        layer->kind == NEBEL_CLOUD_CUMULUS ? layer->detail * (0.5f + 0.5f * fminf(1, 3 * height)) : layer->detail;
+    float variance = column->variance, levels[NB_CLOUD_BILLOWS], cut = 0;
+    /* What is far within is whole. */
+    if (deep > 0 && whole - deep < softness + sqrtf(3 * variance)) {
+        float most = deep; /* with all that is not read */
+        for (int k = 0; k < NB_CLOUD_BILLOWS; k++) {
+            levels[k] = level_of(layer, k, width);
+            variance += deep * deep * billow_weights[k] * billow_weights[k] * nb_billows_lost(noise, levels[k]);
+        }
+        const float spread = sqrtf(3 * variance);
+        for (int k = 0; k < NB_CLOUD_BILLOWS && whole - most < softness + spread; k++) {
+            const float billows = billows_at(noise, layer, k, place, levels[k]);
+            cut += deep * billow_weights[k] * (1 - billows);
+            most -= deep * billow_weights[k] * billows;
+            set_missing(missing, k + 1, cut - whole - spread);
+            if (missing[k + 1] >= 0) return 0;
+        }
+    }
+    return layer->extinction * thin_out(layer, height) *
+           mean_ramp((whole - cut) / softness, variance / (softness * softness));
+}
+
+float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
+                  const double place[3], float width)
+{
+    const double radius = nb_vector_length(place);
+    if (!(radius > layer->low && radius < layer->high)) return 0;
+    double own[3], unit[3];
+    turn(pose->turn, place, own);
+    for (int i = 0; i < 3; i++) unit[i] = own[i] / radius;
+    float missing[NB_CLOUD_BILLOWS + 1];
+    const nb_cloud_column column = nb_cloud_column_at(noise, layer, unit, width);
+    return nb_cloud_in_column(noise, layer, &column, own, (float)(radius - layer->low) * layer->per_thickness, width,
+                              missing);
+}
+
+/* ---- descriptions ---------------------------------------------------------------------------- */
+
+static const struct {
+    double base, top, coverage, extinction, size, detail, variation, diameter;
+    float softness;
+} kinds[NEBEL_CLOUD_KIND_COUNT] = {
+    [NEBEL_CLOUD_CUMULUS] = {900, 2700, 0.4, 0.05, 2200, 0.8, 0.3, 20, 0.07f},
+    [NEBEL_CLOUD_STRATUS] = {300, 800, 0.85, 0.03, 2600, 0.35, 0.2, 14, 0.5f},
+    [NEBEL_CLOUD_CIRRUS] = {8000, 9500, 0.5, 4e-4, 9000, 0.5, 0.4, 40, 1.2f},
+};
+
+static void set_default(double *number, double value)
+{
+    if (*number == 0) *number = value;
+}
+
+static nebel_cloud_layer resolve(double thickness, const nebel_cloud_layer *desc)
+{
+    const double scale = fmin(1, thickness / 1e5);
+    nebel_cloud_layer whole = *desc;
+    set_default(&whole.base, scale * kinds[desc->kind].base);
+    set_default(&whole.top, scale * kinds[desc->kind].top);
+    set_default(&whole.coverage, kinds[desc->kind].coverage);
+    set_default(&whole.extinction, fmin(NEBEL_MAX_AIR_EXTINCTION, kinds[desc->kind].extinction / scale));
+    set_default(&whole.size, scale * kinds[desc->kind].size);
+    set_default(&whole.detail, kinds[desc->kind].detail);
+    set_default(&whole.variation, kinds[desc->kind].variation);
+    set_default(&whole.diameter, kinds[desc->kind].diameter);
+    return whole;
+}
+
+static int is_part(double number)
+{
+    return number == NEBEL_CLOUD_NONE || (number >= 0 && number <= 1);
+}
+
+static const char *find_fault(double thickness, const nebel_cloud_layer *layer)
+{
+    if (!(layer->base > 0)) return "base: must be above the ground";
+    if (!(layer->top > layer->base)) return "top: must be above the base";
+    if (!(layer->top <= thickness)) return "top: must be within the air";
+    if (!(layer->top - layer->base >= thickness / NEBEL_MAX_CLOUD_RATIO))
+        return "top: must be a millionth of the air's thickness above the base";
+    if (!(layer->coverage > 0 && layer->coverage <= 1)) return "coverage: must be more than 0, at most 1";
+    if (!(layer->extinction > 0 && layer->extinction <= NEBEL_MAX_AIR_EXTINCTION))
+        return "extinction: must be more than 0, at most 1e3";
+    if (!(layer->size >= 1e-3 && layer->size <= 1e9)) return "size: must be within 1e-3 and 1e9";
+    if (!is_part(layer->detail)) return "detail: must be within 0 and 1, or none";
+    if (!is_part(layer->variation)) return "variation: must be within 0 and 1, or none";
+    if (!(layer->diameter >= 5 && layer->diameter <= NEBEL_MAX_DROPLET)) return "diameter: must be within 5 and 50";
+    for (int i = 0; i < 2; i++)
+        if (!(fabs(layer->wind[i]) <= 1e12)) return "wind: must be within -1e12 and 1e12";
+    return nb_map_fault(&layer->weather, 1);
+}
+
+nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
+                                       nebel_cloud_layer *resolved)
+{
+    if (desc == NULL || resolved == NULL || !(thickness > 0)) return NEBEL_ERROR_ARGUMENT;
+    if ((int)desc->kind < 0 || desc->kind >= NEBEL_CLOUD_KIND_COUNT)
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: kind: is unknown");
+    const nebel_cloud_layer whole = resolve(thickness, desc);
+    const char *fault = find_fault(thickness, &whole);
+    if (fault != NULL) return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: %s", fault);
+    *resolved = whole;
+    return NEBEL_OK;
+}
+
+/* ---- making ---------------------------------------------------------------------------------- */
+
+/* A turn by 86 degrees about (1, 2, 3): the quaternion (1, 2, 3, 4) in whole numbers. */
+static void turn_further(const double last[3][3], double next[3][3])
+{
+    static const double by[3][3] = {{4, -20, 22}, {28, 10, 4}, {-10, 20, 20}};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double sum = 0;
+            for (int k = 0; k < 3; k++) sum += by[i][k] * last[k][j];
+            next[i][j] = sum / 30;
+        }
+}
+
+/* From the planet's weather, over groups of clouds, to heaps. */
+static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_layer *layer)
+{
+    static const double weights[NB_CLOUD_OCTAVES] = {1, 1, 1, 0.45, 0.14};
+    const double cells[NB_CLOUD_OCTAVES] = {fmax(radius / 5, 60 * desc->size), 9.7 * desc->size, desc->size,
+                                            desc->size / 2.1, desc->size / 4.3};
+    double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    uint32_t hash = nb_mix_bits(desc->seed + 1);
+    layer->slope = 0;
+    for (int k = 0; k < NB_CLOUD_OCTAVES; k++) {
+        nb_cloud_octave *octave = &layer->octaves[k];
+        double next[3][3];
+        turn_further((const double(*)[3])axes, next);
+        memcpy(axes, next, sizeof axes);
+        octave->cell = (float)cells[k];
+        octave->weight = (float)(weights[k] * (k < 2 ? fmax(0, desc->variation) : 1));
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) octave->turn[i][j] = axes[i][j] / cells[k];
+            hash = nb_mix_bits(hash + 1);
+            octave->shift[i] = (double)hash * 0x1p-32 * NB_CLOUD_LATTICE;
+        }
+        layer->slope += octave->weight * NB_GRADIENT_SLOPE / octave->cell;
+    }
+    for (int i = 0; i < 3; i++) layer->billow_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
+    double period = 0.9 * desc->size;
+    for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= BILLOW_RATIO) {
+        layer->per_billow[i] = 1 / period;
+        layer->billow_slopes[i] = billow_weights[i] * (float)fmax(0, desc->detail) * NB_BILLOW_SLOPE / (float)period;
+    }
+    layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
+    /* Wisps are bent, and that noise has a slope, too. */
+    if (desc->kind == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
+}
+
+static void sort(float *values, int count)
+{
+    for (int gap = count / 2; gap > 0; gap = gap == 2 ? 1 : gap * 5 / 11)
+        for (int i = gap; i < count; i++) {
+            const float value = values[i];
+            int k = i;
+            for (; k >= gap && values[k - gap] > value; k -= gap) values[k] = values[k - gap];
+            values[k] = value;
+        }
+}
+
+/* Directions spread evenly over the ball, in a spiral. */
+static void set_ranks(const nb_cloud_noise *noise, nb_cloud_layer *layer)
+{
+    enum { LOOKS = 16 * (NB_CLOUD_RANKS - 1) };
+    float sums[LOOKS], variance;
+    for (int i = 0; i < LOOKS; i++) {
+        const double y = 1 - (2 * i + 1.0) / LOOKS, level = sqrt(1 - y * y), turned = 2.399963229728653 * i;
+        const double unit[3] = {level * cos(turned), y, level * sin(turned)};
+        sums[i] = sum_octaves(noise, layer, unit, 0, &variance);
+    }
+    sort(sums, LOOKS);
+    for (int i = 0; i < NB_CLOUD_RANKS; i++) layer->ranks[i] = sums[i < NB_CLOUD_RANKS - 1 ? 16 * i : LOOKS - 1];
+}
+
+static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *desc, nb_cloud_layer *layer)
+{
+    const nebel_phase phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = desc->diameter};
+    const double radius = clouds->atmosphere->airs.radius, speed = hypot(desc->wind[0], desc->wind[1]);
+    layer->kind = desc->kind;
+    layer->low = radius + desc->base;
+    layer->high = radius + desc->top;
+    layer->per_thickness = (float)(1 / (desc->top - desc->base));
+    layer->extinction = (float)desc->extinction;
+    layer->detail = (float)fmax(0, desc->detail);
+    layer->softness = kinds[desc->kind].softness;
+    layer->coverage = (float)desc->coverage;
+    /* Up cross the wind: by that axis the ground place over the centre moves with it. */
+    layer->axis[0] = speed > 0 ? desc->wind[1] / speed : 1;
+    layer->axis[2] = speed > 0 ? -desc->wind[0] / speed : 0;
+    layer->per_time = speed / layer->low;
+    layer->phase = nb_phase_resolve(&phase);
+    layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
+    set_octaves(desc, radius, layer);
+    set_ranks(&clouds->noise, layer);
+    return desc->weather.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather, &layer->weather)
+                                        : NEBEL_OK;
+}
+
+static int overlap(const nebel_cloud_layer *a, const nebel_cloud_layer *b)
+{
+    return a->base < b->top && b->base < a->top;
+}
+
+/* Layers that overlap would have to be walked together; none of the kinds do. */
+static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *layers)
+{
+    const nb_airs *airs = &desc->atmosphere->airs;
+    if (desc->layer_count > NEBEL_MAX_CLOUD_LAYERS)
+        return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "clouds: %u layers; at most %d are possible",
+                       (unsigned)desc->layer_count, NEBEL_MAX_CLOUD_LAYERS);
+    for (uint32_t i = 0; i < desc->layer_count; i++) {
+        const nebel_result result =
+            nebel_resolve_cloud_layer(airs->top - airs->radius, &desc->layers[i], &desc->log, &layers[i]);
+        if (result != NEBEL_OK) return result;
+        for (uint32_t k = 0; k < i; k++)
+            if (overlap(&layers[k], &layers[i]))
+                return nb_fail(
+                    &desc->log, NEBEL_ERROR_VALUE,
+                    "clouds: layers[%u] (%g to %g m) and layers[%u] (%g to %g m) overlap; give each heights of its own",
+                    (unsigned)k, layers[k].base, layers[k].top, (unsigned)i, layers[i].base, layers[i].top);
+    }
+    return NEBEL_OK;
+}
+
+nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **clouds)
+{
+    nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
+    if (clouds == NULL) return NEBEL_ERROR_ARGUMENT;
+    *clouds = NULL;
+    if (desc == NULL || desc->atmosphere == NULL || !nb_allocator_is_valid(&desc->allocator))
+        return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check(desc, layers);
+    if (result != NEBEL_OK) return result;
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    nebel_clouds *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
+    made->allocator = allocator;
+    made->atmosphere = desc->atmosphere;
+    result = nb_cloud_noise_make(&allocator, &made->noise);
+    for (uint32_t i = 0; i < desc->layer_count && result == NEBEL_OK; i++) {
+        made->layer_count++;
+        result = set_layer(made, &layers[i], &made->layers[i]);
+    }
+    if (result == NEBEL_OK) {
+        *clouds = made;
+        return NEBEL_OK;
+    }
+    nebel_destroy_clouds(made);
+    return nb_fail(&desc->log, result, "clouds: out of memory");
+}
+
+void nebel_destroy_clouds(nebel_clouds *clouds)
+{
+    if (clouds == NULL) return;
+    const nebel_allocator allocator = clouds->allocator;
+    for (int i = 0; i < clouds->layer_count; i++) nb_layer_map_free(&allocator, &clouds->layers[i].weather);
+    nb_cloud_noise_free(&allocator, &clouds->noise);
+    nb_release(&allocator, clouds);
+}
+
+nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
+                                    const double (*places)[3], size_t place_stride, float *extinction)
+{
+    if (clouds == NULL || (n > 0 && (places == NULL || extinction == NULL)) || !(fabs(time) <= 1e12) ||
+        !(width >= 0 && width <= NEBEL_MAX_LENGTH))
+        return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++) {
+        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
+        double from[3];
+        if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
+        for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+        extinction[i] = 0;
+        for (int k = 0; k < clouds->layer_count; k++) {
+            const nb_cloud_pose pose = nb_cloud_pose_at(&clouds->layers[k], time);
+            extinction[i] += nb_cloud_at(&clouds->noise, &clouds->layers[k], &pose, from, (float)width);
+        }
+    }
+    return NEBEL_OK;
+}

@@ -1,0 +1,395 @@
+#include "base/base.h"
+#include "base/vector.h"
+#include "layer_map.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+#include "formulas/layers.inc"
+
+#define PI 3.14159265358979323846
+
+typedef struct nb_shell {
+    double radius, day, color[3], wrap[3], gain;
+    nb_layer_map map, detail; /* detail without levels: it is the map */
+} nb_shell;
+
+struct nebel_layers {
+    nebel_allocator allocator;
+    double center[3], frame[3][3]; /* the planet's axes in the scene */
+    double radius, day;
+    nb_layer_map ground;
+    uint32_t shell_count;
+    nb_shell shells[NEBEL_MAX_CLOUD_SHELLS];
+    nebel_air_shell air; /* its height is the radius */
+};
+
+/* ---- descriptions ---------------------------------------------------------------------------- */
+
+static int is_zero(const double *numbers, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (numbers[i] != 0) return 0;
+    return 1;
+}
+
+static int all_within(const double *numbers, int count, double least, double most)
+{
+    for (int i = 0; i < count; i++)
+        if (!(numbers[i] >= least && numbers[i] <= most)) return 0;
+    return 1;
+}
+
+static void resolve_shell(double radius, uint32_t number, nebel_cloud_shell *shell)
+{
+    static const double white[3] = {1, 1, 1}, wrap[3] = {3, 7, 13};
+    if (shell->height == 0) shell->height = radius * 0.01 * (number + 1);
+    if (is_zero(shell->color, 3)) memcpy(shell->color, white, sizeof white);
+    if (is_zero(shell->wrap, 3)) memcpy(shell->wrap, wrap, sizeof wrap);
+    if (shell->gain == 0) shell->gain = 0.6;
+    if (shell->seed == 0) shell->seed = number + 1;
+}
+
+static nebel_layers_desc resolve(const nebel_layers_desc *desc)
+{
+    static const double blue[3] = {0.25, 0.5, 1};
+    nebel_layers_desc whole = *desc;
+    if (whole.radius == 0) whole.radius = 6.36e6;
+    for (uint32_t i = 0; i < whole.cloud_count && i < NEBEL_MAX_CLOUD_SHELLS; i++)
+        resolve_shell(whole.radius, i, &whole.clouds[i]);
+    if (whole.air.height == 0) whole.air.height = whole.radius / 40;
+    if (whole.air.brightness == 0) whole.air.brightness = 1;
+    if (whole.air.ramp_count == 0) {
+        whole.air.ramp_count = 3;
+        memset(whole.air.ramp, 0, sizeof whole.air.ramp);
+        memcpy(whole.air.ramp[1], blue, sizeof blue);
+    }
+    return whole;
+}
+
+static const char *find_shell_fault(const nebel_cloud_shell *shell)
+{
+    const char *fault = nb_map_fault(&shell->map, 1);
+    if (fault == NULL) fault = nb_map_fault(&shell->detail, 1);
+    if (fault != NULL) return fault;
+    if (!(shell->height > 0 && shell->height <= 1e12)) return "height: must be more than 0, at most 1e12";
+    if (!(fabs(shell->day) <= 1e12)) return "day: must be within -1e12 and 1e12";
+    if (!all_within(shell->color, 3, 0, 1)) return "color: must be within 0 and 1";
+    if (!all_within(shell->wrap, 3, -1e3, 1e3)) return "wrap: must be within -1000 and 1000";
+    if (!(shell->gain >= 0 && shell->gain <= 1e3)) return "gain: must be within 0 and 1000";
+    if (!(shell->coverage >= 0 && shell->coverage <= 1)) return "coverage: must be within 0 and 1";
+    return NULL;
+}
+
+static const char *find_air_fault(const nebel_air_shell *air)
+{
+    if (!(air->height > 0 && air->height <= 1e12)) return "air.height: must be more than 0, at most 1e12";
+    if (!(air->brightness >= 0 && air->brightness <= 1e6)) return "air.brightness: must be within 0 and 1e6";
+    if (air->ramp_count > NEBEL_MAX_RAMP) return "air.ramp_count: must be at most 16";
+    for (uint32_t i = 0; i < air->ramp_count; i++)
+        if (!all_within(air->ramp[i], 3, 0, 1e6)) return "air.ramp: must be within 0 and 1e6";
+    return NULL;
+}
+
+static const char *find_fault(const nebel_layers_desc *desc)
+{
+    if (!all_within(desc->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH))
+        return "center: must be within -1e15 and 1e15";
+    if (!(desc->radius >= 1 && desc->radius <= 1e12)) return "radius: must be within 1 and 1e12";
+    if (!all_within(desc->rotation, 4, -1e6, 1e6)) return "rotation: must be within -1e6 and 1e6";
+    if (!(fabs(desc->day) <= 1e12)) return "day: must be within -1e12 and 1e12";
+    if (!(desc->coverage >= 0 && desc->coverage <= 1)) return "coverage: must be within 0 and 1";
+    if (desc->cloud_count > NEBEL_MAX_CLOUD_SHELLS) return "cloud_count: must be at most 8";
+    return nb_map_fault(&desc->ground, 3);
+}
+
+static nebel_result check(const nebel_layers_desc *desc)
+{
+    const char *fault = find_fault(desc);
+    if (fault == NULL && !desc->air.is_absent) fault = find_air_fault(&desc->air);
+    if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "planet: %s", fault);
+    for (uint32_t i = 0; i < desc->cloud_count; i++) {
+        fault = find_shell_fault(&desc->clouds[i]);
+        if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "planet: clouds[%u]: %s", (unsigned)i, fault);
+    }
+    return NEBEL_OK;
+}
+
+/* ---- making ---------------------------------------------------------------------------------- */
+
+/* The columns of the rotation are the planet's axes. */
+static void set_frame(const double q[4], double frame[3][3])
+{
+    const double x = q[0], y = q[1], z = q[2], w = q[3], n = x * x + y * y + z * z + w * w;
+    const double s = n > 0 ? 2 / n : 0;
+    const double axes[3][3] = {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)},
+                               {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
+                               {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}};
+    memcpy(frame, axes, sizeof axes);
+}
+
+static nebel_result paint_map(const nebel_allocator *allocator, const nebel_map_desc *desc, nb_layer_map *map)
+{
+    nebel_map painted = {.width = 0};
+    nebel_result result = nebel_size_map(desc, &painted);
+    if (result != NEBEL_OK) return result;
+    float *texels = nb_allocate(allocator, painted.width * painted.height, (size_t)painted.channels * sizeof *texels);
+    if (texels == NULL) return NEBEL_ERROR_MEMORY;
+    result = nebel_make_map(desc, texels);
+    painted.texels = texels;
+    if (result == NEBEL_OK) result = nb_layer_map_make(allocator, &painted, map);
+    nb_release(allocator, texels);
+    return result;
+}
+
+static nebel_result make_map(const nebel_allocator *allocator, const nebel_map *given, const nebel_map_desc *desc,
+                             nb_layer_map *map)
+{
+    return given->texels != NULL ? nb_layer_map_make(allocator, given, map) : paint_map(allocator, desc, map);
+}
+
+static nebel_result make_shell(const nebel_layers *layers, const nebel_cloud_shell *desc, nb_shell *shell)
+{
+    const nebel_allocator *allocator = &layers->allocator;
+    const nebel_map_desc clouds = {.kind = NEBEL_MAP_CLOUDS, .seed = desc->seed, .coverage = desc->coverage};
+    const nebel_map_desc detail = {.kind = NEBEL_MAP_DETAIL, .seed = desc->seed, .coverage = desc->coverage};
+    shell->radius = layers->radius + desc->height;
+    shell->day = desc->day;
+    shell->gain = desc->gain;
+    memcpy(shell->color, desc->color, sizeof shell->color);
+    memcpy(shell->wrap, desc->wrap, sizeof shell->wrap);
+    const nebel_result result = make_map(allocator, &desc->map, &clouds, &shell->map);
+    const int is_one = desc->map.texels != NULL && desc->detail.texels == NULL;
+    return result != NEBEL_OK || is_one ? result : make_map(allocator, &desc->detail, &detail, &shell->detail);
+}
+
+static nebel_result make_maps(const nebel_layers_desc *desc, nebel_layers *layers)
+{
+    const nebel_map_desc ground = {.kind = NEBEL_MAP_GROUND, .seed = desc->seed, .coverage = desc->coverage};
+    nebel_result result = make_map(&layers->allocator, &desc->ground, &ground, &layers->ground);
+    for (uint32_t i = 0; i < desc->cloud_count && result == NEBEL_OK; i++, layers->shell_count++)
+        result = make_shell(layers, &desc->clouds[i], &layers->shells[i]);
+    return result;
+}
+
+nebel_result nebel_create_layers(const nebel_layers_desc *desc, nebel_layers **layers)
+{
+    if (layers != NULL) *layers = NULL;
+    if (desc == NULL || layers == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    const nebel_layers_desc whole = resolve(desc);
+    nebel_result result = check(&whole);
+    if (result != NEBEL_OK) return result;
+    const nebel_allocator allocator = nb_resolve_allocator(&whole.allocator);
+    nebel_layers *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    if (made == NULL) return nb_fail(&whole.log, NEBEL_ERROR_MEMORY, "planet: out of memory");
+    made->allocator = allocator;
+    made->radius = whole.radius;
+    made->day = whole.day;
+    made->air = whole.air;
+    made->air.height = whole.radius + whole.air.height;
+    memcpy(made->center, whole.center, sizeof made->center);
+    set_frame(whole.rotation, made->frame);
+    result = make_maps(&whole, made);
+    if (result == NEBEL_OK) {
+        *layers = made;
+        return NEBEL_OK;
+    }
+    nebel_destroy_layers(made);
+    return nb_fail(&whole.log, result, "planet: out of memory");
+}
+
+void nebel_destroy_layers(nebel_layers *layers)
+{
+    if (layers == NULL) return;
+    const nebel_allocator allocator = layers->allocator;
+    nb_layer_map_free(&allocator, &layers->ground);
+    for (uint32_t i = 0; i < NEBEL_MAX_CLOUD_SHELLS; i++) {
+        nb_layer_map_free(&allocator, &layers->shells[i].map);
+        nb_layer_map_free(&allocator, &layers->shells[i].detail);
+    }
+    nb_release(&allocator, layers);
+}
+
+/* ---- what a ray meets ------------------------------------------------------------------------ */
+
+/* A ray from a planet's middle, and its light. */
+typedef struct nb_sight {
+    const nebel_layers *layers;
+    double from[3], to[3]; /* to: of length 1 */
+    double closest;        /* m along the ray, of the middle */
+    double aside;          /* square of how far it is there */
+    double t_max, time, spread;
+    double sun[3], ambient[3], irradiance[3];
+} nb_sight;
+
+/* The first side of a ball that is met; less than 0: none. */
+static double meet(const nb_sight *s, double radius)
+{
+    const double square = radius * radius - s->aside;
+    if (!(square >= 0)) return -1;
+    const double half = sqrt(square), near = s->closest - half;
+    return near >= 0 ? near : s->closest + half;
+}
+
+/* A place on a ball. */
+typedef struct nb_spot {
+    double normal[3], sun, view; /* cosines; view from either side */
+    double u, v, pole;           /* pole: the normal along the axis */
+    double level;                /* of a map that is as wide as the ball is around */
+} nb_spot;
+
+static double turn(double u, double day, double time)
+{
+    return day == 0 ? u : u - fmod(time / day, 1);
+}
+
+/* `days` are what the ball turns by: a shell of clouds turns with the ground, and against it. */
+static nb_spot spot_at(const nb_sight *s, double radius, double t, const double days[2])
+{
+    nb_spot spot;
+    double place[3], local[3];
+    for (int i = 0; i < 3; i++) place[i] = s->from[i] + t * s->to[i];
+    const double length = nb_vector_length(place);
+    for (int i = 0; i < 3; i++) spot.normal[i] = place[i] / length;
+    for (int i = 0; i < 3; i++) local[i] = nb_vector_dot(s->layers->frame[i], spot.normal);
+    spot.sun = nb_vector_dot(spot.normal, s->sun);
+    spot.view = fabs(nb_vector_dot(spot.normal, s->to));
+    spot.pole = fmin(fmax(local[1], -1), 1);
+    const double u = atan2(-local[2], local[0]) / (2 * PI) + 0.5;
+    spot.u = turn(turn(u, days[0], s->time), days[1], s->time);
+    spot.v = acos(spot.pole) / PI;
+    /* seen at a slant a pixel is longer than wide: its area counts */
+    spot.level = s->spread * t / (2 * PI * radius * sqrt(fmax(spot.view, 0.02)));
+    return spot;
+}
+
+static double read_map(const nb_layer_map *map, const nb_spot *spot, double wrap, int repeats)
+{
+    double value = 0;
+    const double texels = spot->level * fabs(wrap) * (double)map->width[0];
+    nb_layer_map_read(map, wrap * spot->u, wrap * spot->v, texels > 1 ? log2(texels) : 0, repeats, &value);
+    return value;
+}
+
+static double cover_at(const nb_shell *shell, const nb_spot *spot)
+{
+    const nb_layer_map *detail = shell->detail.level_count > 0 ? &shell->detail : &shell->map;
+    double parts[3];
+    for (int i = 0; i < 3; i++) parts[i] = read_map(detail, spot, shell->wrap[i], 1);
+    return nb_cloud_cover(read_map(&shell->map, spot, 1, 0), parts[0], parts[1], parts[2], spot->pole, shell->gain);
+}
+
+static void reflect(const nb_sight *s, double sun, const double color[3], double cover, double radiance[3])
+{
+    for (int c = 0; c < 3; c++) radiance[c] = cover * color[c] * (s->irradiance[c] * fmax(sun, 0) / PI + s->ambient[c]);
+}
+
+static void insert(nebel_layer_hits *hits, const nebel_layer_hit *hit)
+{
+    uint32_t i = hits->count++;
+    for (; i > 0 && hits->hits[i - 1].t > hit->t; i--) hits->hits[i] = hits->hits[i - 1];
+    hits->hits[i] = *hit;
+}
+
+static void add_ground(const nb_sight *s, double t, nebel_layer_hits *hits)
+{
+    const double days[2] = {s->layers->day, 0};
+    const nb_spot spot = spot_at(s, s->layers->radius, t, days);
+    const nb_layer_map *map = &s->layers->ground;
+    const double texels = spot.level * (double)map->width[0];
+    nebel_layer_hit hit = {.t = t, .cover = 1, .is_ground = 1};
+    double color[3];
+    nb_layer_map_read(map, spot.u, spot.v, texels > 1 ? log2(texels) : 0, 0, color);
+    reflect(s, spot.sun, color, 1, hit.radiance);
+    insert(hits, &hit);
+}
+
+static void add_clouds(const nb_sight *s, const nb_shell *shell, double t, nebel_layer_hits *hits)
+{
+    const double days[2] = {s->layers->day, shell->day};
+    const nb_spot spot = spot_at(s, shell->radius, t, days);
+    nebel_layer_hit hit = {.t = t, .cover = cover_at(shell, &spot)};
+    reflect(s, spot.sun, shell->color, hit.cover, hit.radiance);
+    insert(hits, &hit);
+}
+
+static void add_air(const nb_sight *s, double t, nebel_layer_hits *hits)
+{
+    static const double days[2] = {0, 0};
+    const nebel_air_shell *air = &s->layers->air;
+    const nb_spot spot = spot_at(s, air->height, t, days);
+    const nb_glow glow = nb_air_glow(spot.sun, spot.view);
+    const double place = glow.place * (double)(air->ramp_count - 1);
+    const uint32_t low = (uint32_t)place, high = low + 1 < air->ramp_count ? low + 1 : low;
+    nebel_layer_hit hit = {.t = t, .cover = 0};
+    for (int c = 0; c < 3; c++) {
+        const double color = air->ramp[low][c] + (place - low) * (air->ramp[high][c] - air->ramp[low][c]);
+        hit.radiance[c] = air->brightness * glow.amount * color;
+    }
+    insert(hits, &hit);
+}
+
+static void look(const nb_sight *s, nebel_layer_hits *hits)
+{
+    const nebel_layers *layers = s->layers;
+    const double ground = meet(s, layers->radius), end = ground >= 0 ? fmin(ground, s->t_max) : s->t_max;
+    hits->count = 0;
+    for (uint32_t i = 0; i < layers->shell_count; i++) {
+        const double t = meet(s, layers->shells[i].radius);
+        if (t >= 0 && t <= end) add_clouds(s, &layers->shells[i], t, hits);
+    }
+    const double t = layers->air.is_absent ? -1 : meet(s, layers->air.height);
+    if (t >= 0 && t <= end) add_air(s, t, hits);
+    if (ground >= 0 && ground <= s->t_max) add_ground(s, ground, hits);
+}
+
+/* ---- the face -------------------------------------------------------------------------------- */
+
+static int set_view(const nebel_layers *layers, const nebel_layer_view *view, nb_sight *s)
+{
+    *s = (nb_sight){.layers = layers, .time = view->time, .spread = view->spread};
+    if (!(fabs(view->time) <= 1e12 && view->spread >= 0 && view->spread <= 1e12)) return 0;
+    if (!all_within(view->ambient, 3, 0, 1e9) || !all_within(view->sun.irradiance, 3, 0, 1e9)) return 0;
+    memcpy(s->ambient, view->ambient, sizeof s->ambient);
+    memcpy(s->irradiance, view->sun.irradiance, sizeof s->irradiance);
+    memcpy(s->sun, view->sun.direction, sizeof s->sun);
+    return is_zero(s->sun, 3) || nb_vector_make_unit(s->sun);
+}
+
+static int set_ray(const nebel_ray *ray, nb_sight *s)
+{
+    if (!(ray->t_max >= 0)) return 0;
+    for (int i = 0; i < 3; i++) {
+        s->from[i] = ray->origin[i] - s->layers->center[i];
+        s->to[i] = ray->direction[i];
+        if (!isfinite(s->from[i])) return 0;
+    }
+    if (!nb_vector_make_unit(s->to)) return 0;
+    double beside[3];
+    s->closest = -nb_vector_dot(s->from, s->to);
+    nb_vector_cross(s->from, s->to, beside);
+    s->aside = nb_vector_dot(beside, beside);
+    s->t_max = ray->t_max;
+    return 1;
+}
+
+nebel_result nebel_trace_layers(const nebel_layers *layers, const nebel_layer_view *view, size_t n,
+                                const nebel_ray *rays, size_t ray_stride, nebel_layer_hits *hits, size_t hit_stride)
+{
+    nb_sight s;
+    if (layers == NULL || view == NULL || (n > 0 && (rays == NULL || hits == NULL))) return NEBEL_ERROR_ARGUMENT;
+    if (!set_view(layers, view, &s)) return NEBEL_ERROR_ARGUMENT;
+    if (ray_stride == 0) ray_stride = sizeof *rays;
+    if (hit_stride == 0) hit_stride = sizeof *hits;
+    for (size_t i = 0; i < n; i++) {
+        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
+        nebel_layer_hits *out = (nebel_layer_hits *)(void *)((char *)hits + i * hit_stride);
+        if (!set_ray(ray, &s)) return NEBEL_ERROR_ARGUMENT;
+        look(&s, out);
+    }
+    return NEBEL_OK;
+}

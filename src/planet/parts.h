@@ -1,0 +1,21 @@
+/* Work that a caller may split over threads. */
+#ifndef NB_PLANET_PARTS_H
+#define NB_PLANET_PARTS_H
+
+#include <nebel/planet.h>
+
+typedef struct nb_parts {
+    nebel_air_run_fn run; /* NULL: one part after the other */
+    void *user;
+} nb_parts;
+
+static inline void nb_parts_run(const nb_parts *parts, size_t count, void (*part)(void *data, size_t i), void *data)
+{
+    if (parts->run != NULL) {
+        parts->run(count, part, data, parts->user);
+        return;
+    }
+    for (size_t i = 0; i < count; i++) part(data, i);
+}
+
+#endif

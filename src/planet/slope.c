@@ -1,0 +1,46 @@
+#include "slope.h"
+
+#include <math.h>
+
+nb_outlook nb_outlook_make(const nb_airs *airs, double radius)
+{
+    const double height = radius - airs->radius, share = height / radius;
+    const double dip = sqrt(share * (1 + airs->radius / radius));
+    return (nb_outlook){.radius = radius,
+                        .ground = airs->radius,
+                        .thickness = airs->top - airs->radius,
+                        .height = height,
+                        .dip = dip,
+                        .ratio = airs->radius / radius,
+                        .horizon = sqrt(0.5 * (1 + dip)),
+                        .half_arc = sqrt(0.5 * share)};
+}
+
+/* To the place at `arc` from below. */
+static nb_slope fall_slope(const nb_outlook *outlook, double row)
+{
+    const double half = row * outlook->half_arc;
+    const double across = outlook->ground * 2 * half * sqrt((1 - half) * (1 + half));
+    const double down = outlook->height + 2 * outlook->ground * half * half;
+    const double way = sqrt(across * across + down * down);
+    return way > 0 ? (nb_slope){-down / way, across / way} : (nb_slope){-1, 0};
+}
+
+static nb_slope rise_slope(const nb_outlook *outlook, double row)
+{
+    if (outlook->height > outlook->thickness) {
+        const double sine = (outlook->ground + row * row * outlook->thickness) / outlook->radius;
+        return (nb_slope){-sqrt((1 - sine) * (1 + sine)), sine};
+    }
+    const double half = outlook->horizon * (1 - row * row);
+    return (nb_slope){1 - 2 * half * half, 2 * half * sqrt((1 - half) * (1 + half))};
+}
+
+nb_slope nb_outlook_slope(const nb_outlook *outlook, int falls, double row, nb_reach *reach)
+{
+    const nb_slope slope = falls ? fall_slope(outlook, row) : rise_slope(outlook, row);
+    *reach = falls ? nb_falling_reach(*outlook, slope.cosine, slope.sine)
+                   : nb_rising_reach(*outlook, slope.cosine, slope.sine);
+    reach->row = row;
+    return slope;
+}

@@ -1,0 +1,275 @@
+/* A table of what air does to the rays of one place.
+ *
+ * Its rows are slopes, its columns turns away from the sun, its levels shares of the way. Entries are means over the way so
+ * far, not sums: those hardly change near the eye, so that also the first metres are right. */
+#include "parts.h"
+#include "view.h"
+
+#include "base/vector.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { NODES = 4 }; /* of a piece of a ray: pieces are many */
+
+/* Estimates of errors from second differences are this often taken. */
+#define SAFETY 3
+
+static nb_slope row_slope(const nebel_air_view *view, int row, nb_reach *reach)
+{
+    if (row < NB_VIEW_FALLING) return nb_outlook_slope(&view->outlook, 1, row / (NB_VIEW_FALLING - 1.0), reach);
+    return nb_outlook_slope(&view->outlook, 0, (row - NB_VIEW_FALLING) / (NB_VIEW_RISING - 1.0), reach);
+}
+
+/* ---- making ---------------------------------------------------------------------------------- */
+
+/* Columns lie evenly over the sine of half the turn, in which light is smooth at both ends. */
+static double column_cosine(const nebel_air_view *view, int column)
+{
+    const double half = column / (view->columns - 1.0);
+    return 1 - 2 * half * half;
+}
+
+static void write_entry(const nebel_air_view *view, const nb_gathered *gathered, double per, float *entry)
+{
+    const nebel_atmosphere *atmosphere = view->atmosphere;
+    static const double none[3] = {0, 0, 0};
+    const int often = nb_view_often(view);
+    double off = 0;
+    for (int i = 0; i < view->scatterer_count; i++)
+        for (int c = 0; c < 3; c++) entry[3 * i + c] = (float)(per * gathered->once[view->scatterers[i]][c]);
+    for (int c = 0; c < 3; c++) {
+        entry[often + c] = (float)(per * gathered->often[c]);
+        off = fmax(off, view->sun.irradiance[c] * nb_gathered_off(atmosphere, gathered, none, c));
+    }
+    entry[often + 3] = (float)(per * off);
+}
+
+/* What is scattered just where the ray begins, per metre. */
+static void gather_start(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, nb_gathered *gathered)
+{
+    nb_path_node node = {.radius = track.radius, .weight = 1, .transmittance = {1, 1, 1}};
+    for (int k = 0; k < atmosphere->airs.count; k++)
+        node.density[k] = nb_air_density(&atmosphere->airs.airs[k], track.radius - atmosphere->airs.radius);
+    memset(gathered, 0, sizeof *gathered);
+    nb_gather_node(atmosphere, track, aspect, &node, gathered);
+}
+
+static void fill_column(nebel_air_view *view, int row, int column, nb_slope slope, nb_reach reach, nb_track track)
+{
+    const nebel_atmosphere *atmosphere = view->atmosphere;
+    nb_gathered gathered[NB_VIEW_LEVELS];
+    double ends[NB_VIEW_LEVELS];
+    const double sun =
+        slope.cosine * view->sun_slope.cosine + slope.sine * view->sun_slope.sine * column_cosine(view, column);
+    const double height_of_sun = (view->outlook.radius * view->sun_slope.cosine + reach.begin * sun) / track.radius;
+    const nb_aspect aspect = {fmax(-1, fmin(1, track.rise / track.radius)), fmax(-1, fmin(1, sun)),
+                              fmax(-1, fmin(1, height_of_sun))};
+    for (int level = 0; level < view->levels; level++) {
+        const double share = (level + 1.0) / view->levels;
+        ends[level] = reach.span * share * share;
+    }
+    nb_gathered start;
+    gather_start(atmosphere, track, aspect, &start);
+    write_entry(view, &start, 1, nb_view_entry(view, row, column, 0));
+    if (reach.span > 0) nb_gather(atmosphere, &view->rule, track, aspect, view->levels, ends, gathered);
+    for (int level = 0; level < view->levels; level++)
+        write_entry(view, reach.span > 0 ? &gathered[level] : &start, reach.span > 0 ? 1 / ends[level] : 1,
+                    nb_view_entry(view, row, column, level + 1));
+}
+
+static void fill_extinction(nebel_air_view *view, int row, nb_track track, double length)
+{
+    const nb_airs *airs = &view->atmosphere->airs;
+    for (int c = 0; c < 3; c++) nb_view_extinction(view, row, 0)[c] = 0;
+    for (int k = 0; k < airs->count; k++)
+        for (int c = 0; c < 3; c++)
+            nb_view_extinction(view, row, 0)[c] +=
+                airs->airs[k].extinction[c] * nb_air_density(&airs->airs[k], track.radius - airs->radius);
+    for (int level = 1; level <= view->levels; level++) {
+        const double share = (double)level / view->levels, way = length * share * share;
+        double *extinction = nb_view_extinction(view, row, level);
+        for (int c = 0; c < 3; c++) extinction[c] = nb_view_extinction(view, row, 0)[c];
+        if (!(way > 0)) continue;
+        nb_track_depth(airs, track, way, extinction);
+        for (int c = 0; c < 3; c++) extinction[c] /= way;
+    }
+}
+
+static void fill_row(void *data, size_t row)
+{
+    nebel_air_view *view = data;
+    nb_reach reach;
+    const nb_slope slope = row_slope(view, (int)row, &reach);
+    const double rise = view->outlook.radius * slope.cosine + reach.begin;
+    const nb_track track = {reach.begin > 0 ? view->atmosphere->airs.top : view->outlook.radius, rise};
+    fill_extinction(view, (int)row, track, reach.span);
+    for (int column = 0; column < view->columns; column++) fill_column(view, (int)row, column, slope, reach, track);
+}
+
+/* Of one colour, as if all scattered evenly. */
+static double brightness(const nebel_air_view *view, const float *entry, int c)
+{
+    const int often = nb_view_often(view);
+    double sum = (double)entry[often + c];
+    for (int i = 0; i < view->scatterer_count; i++) sum += 0.07957747154594767 * (double)entry[3 * i + c];
+    return view->sun.irradiance[c] * sum;
+}
+
+/* The second difference of three entries, of which the first and last may be missing. */
+static double bend(const nebel_air_view *view, const float *before, const float *entry, const float *behind, int c)
+{
+    if (before == NULL || behind == NULL) return 0;
+    return fabs(brightness(view, before, c) - 2 * brightness(view, entry, c) + brightness(view, behind, c));
+}
+
+/* Linear interpolation between values a step apart misses an eighth of the second difference. */
+static void estimate_extinction(nebel_air_view *view, int row)
+{
+    const int first = row == 0 || row == NB_VIEW_FALLING, last = row == NB_VIEW_FALLING - 1 || row == NB_VIEW_ROWS - 1;
+    for (int level = 0; level <= view->levels; level++) {
+        double worst = 0;
+        for (int c = 0; c < 3; c++) {
+            const double here = nb_view_extinction(view, row, level)[c];
+            double off = 0;
+            if (!first && !last)
+                off += fabs(nb_view_extinction(view, row - 1, level)[c] - 2 * here +
+                            nb_view_extinction(view, row + 1, level)[c]);
+            if (level > 0 && level < view->levels)
+                off += fabs(nb_view_extinction(view, row, level - 1)[c] - 2 * here +
+                            nb_view_extinction(view, row, level + 1)[c]);
+            worst = fmax(worst, off);
+        }
+        nb_view_extinction(view, row, level)[3] = SAFETY * worst / 8;
+    }
+}
+
+/* The same of light. */
+static void estimate_row(void *data, size_t number)
+{
+    nebel_air_view *view = data;
+    const int row = (int)number;
+    const int first = row == 0 || row == NB_VIEW_FALLING, last = row == NB_VIEW_FALLING - 1 || row == NB_VIEW_ROWS - 1;
+    estimate_extinction(view, row);
+    for (int column = 0; column < view->columns; column++)
+        for (int level = 0; level <= view->levels; level++) {
+            float *entry = nb_view_entry(view, row, column, level);
+            double most = 0, worst = 0;
+            for (int c = 0; c < 3; c++) {
+                const double off =
+                    bend(view, first ? NULL : nb_view_entry(view, row - 1, column, level), entry,
+                         last ? NULL : nb_view_entry(view, row + 1, column, level), c) +
+                    bend(view, column == 0 ? NULL : nb_view_entry(view, row, column - 1, level), entry,
+                         column == view->columns - 1 ? NULL : nb_view_entry(view, row, column + 1, level), c) +
+                    bend(view, level == 0 ? NULL : entry - view->size, entry,
+                         level == view->levels ? NULL : entry + view->size, c);
+                worst = fmax(worst, off / 8);
+                most = fmax(most, brightness(view, entry, c));
+            }
+            entry[nb_view_often(view) + 4] = (float)(most > 0 ? SAFETY * worst / most : 0);
+        }
+}
+
+static void set_sunlight(nebel_air_view *view)
+{
+    const nb_airs *airs = &view->atmosphere->airs;
+    for (int i = 0; i < NB_VIEW_SUNS; i++) {
+        const double root = i / (NB_VIEW_SUNS - 1.0);
+        nb_track_sunlight(airs, (nb_track){airs->radius, airs->radius * root * root}, view->sunlight[i]);
+    }
+}
+
+static double brightest_of(const nebel_air_view *view)
+{
+    double most = 0;
+    for (int row = 0; row < NB_VIEW_ROWS; row++) {
+        nb_reach reach;
+        row_slope(view, row, &reach);
+        for (int column = 0; column < view->columns; column++)
+            for (int c = 0; c < 3; c++)
+                most = fmax(most, reach.span * brightness(view, nb_view_entry(view, row, column, view->levels), c));
+    }
+    return most;
+}
+
+/* Up, and level towards the sun; anywhere level where the sun is in the zenith. */
+static void set_axes(nebel_air_view *view, const double place[3])
+{
+    static const double top[3] = {0, 1, 0};
+    memcpy(view->up, place, sizeof view->up);
+    if (!nb_vector_make_unit(view->up)) memcpy(view->up, top, sizeof view->up);
+    const double along = nb_vector_dot(view->up, view->sun.direction);
+    for (int c = 0; c < 3; c++) view->ahead[c] = view->sun.direction[c] - along * view->up[c];
+    const double sine = nb_vector_length(view->ahead);
+    view->sun_slope = (nb_slope){fmax(-1, fmin(1, along)), fmin(1, sine)};
+    if (!(sine > 1e-9)) {
+        const double x[3] = {fabs(view->up[0]) < 0.5, 0, !(fabs(view->up[0]) < 0.5)};
+        nb_vector_cross(view->up, x, view->ahead);
+    }
+    nb_vector_make_unit(view->ahead);
+    nb_vector_cross(view->up, view->ahead, view->aside);
+}
+
+static nebel_result allocate(nebel_air_view *view)
+{
+    const size_t count = (size_t)NB_VIEW_ROWS * (size_t)view->columns * ((size_t)view->levels + 1);
+    view->size = 3 * view->scatterer_count + 5;
+    view->entries = nb_allocate_zero(&view->allocator, count, (size_t)view->size * sizeof *view->entries);
+    view->extinction =
+        nb_allocate_zero(&view->allocator, (size_t)NB_VIEW_ROWS * ((size_t)view->levels + 1), sizeof *view->extinction);
+    return view->entries != NULL && view->extinction != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+}
+
+static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
+{
+    const nebel_atmosphere *atmosphere = desc->atmosphere;
+    double place[3];
+    for (int c = 0; c < 3; c++) place[c] = desc->position[c] - atmosphere->center[c];
+    set_axes(view, place);
+    view->outlook = nb_outlook_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
+    const int is_outside = view->outlook.height > view->outlook.thickness;
+    view->columns = is_outside ? NB_VIEW_SPACE_COLUMNS : NB_VIEW_COLUMNS;
+    view->levels = desc->has_distances ? NB_VIEW_LEVELS : 1;
+    view->rule = nb_rule_make(desc->has_distances ? NODES : NB_RULE_MOST);
+    for (int k = 0; k < atmosphere->airs.count; k++) {
+        const double *scattering = atmosphere->airs.airs[k].scattering;
+        if (scattering[0] + scattering[1] + scattering[2] > 0) view->scatterers[view->scatterer_count++] = k;
+    }
+}
+
+nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_view **view)
+{
+    nebel_sun sun;
+    if (view == NULL) return NEBEL_ERROR_ARGUMENT;
+    *view = NULL;
+    if (desc == NULL || desc->atmosphere == NULL || !nb_allocator_is_valid(&desc->allocator) ||
+        !nb_air_resolve_sun(&desc->sun, &sun) || !nb_air_is_place(desc->position))
+        return NEBEL_ERROR_ARGUMENT;
+    const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
+    nebel_air_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
+    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
+    made->allocator = allocator;
+    made->atmosphere = desc->atmosphere;
+    made->sun = sun;
+    set_up(made, desc);
+    if (allocate(made) != NEBEL_OK) {
+        nebel_destroy_air_view(made);
+        return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
+    }
+    const nb_parts parts = {desc->run, desc->run_user};
+    nb_parts_run(&parts, NB_VIEW_ROWS, fill_row, made);
+    nb_parts_run(&parts, NB_VIEW_ROWS, estimate_row, made);
+    made->brightest = brightest_of(made);
+    set_sunlight(made);
+    *view = made;
+    return NEBEL_OK;
+}
+
+void nebel_destroy_air_view(nebel_air_view *view)
+{
+    if (view == NULL) return;
+    const nebel_allocator allocator = view->allocator;
+    nb_release(&allocator, view->entries);
+    nb_release(&allocator, view->extinction);
+    nb_release(&allocator, view);
+}

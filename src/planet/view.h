@@ -1,0 +1,57 @@
+/* A table of what air does to the rays of one place: see view.c. */
+#ifndef NB_PLANET_VIEW_H
+#define NB_PLANET_VIEW_H
+
+#include "atmosphere.h"
+#include "slope.h"
+
+enum {
+    NB_VIEW_FALLING = 48, /* rows that end at the ground */
+    NB_VIEW_RISING = 64,  /* and others */
+    NB_VIEW_ROWS = NB_VIEW_FALLING + NB_VIEW_RISING,
+    NB_VIEW_COLUMNS = 25,       /* from within the air */
+    NB_VIEW_SPACE_COLUMNS = 73, /* from space day and night are seen at once */
+    NB_VIEW_LEVELS = 12,        /* beside the one at the start; at the squares of their number */
+    NB_VIEW_SUNS = 257,
+};
+
+struct nebel_air_view {
+    nebel_allocator allocator;
+    const nebel_atmosphere *atmosphere;
+    nebel_sun sun;
+    nb_outlook outlook;
+    double up[3], ahead[3], aside[3]; /* ahead: level, towards the sun */
+    nb_slope sun_slope;
+    int columns;
+    int levels; /* NB_VIEW_LEVELS, or 1: the ends alone */
+    int scatterers[NEBEL_MAX_AIRS], scatterer_count;
+    int size;                /* of an entry: see below */
+    float *entries;          /* [row][column][level 0..levels] */
+    double (*extinction)[4]; /* [row][level 0..levels], 1/m, and what interpolation may miss of it */
+    double brightest;        /* light of a whole ray, as if all scattered evenly */
+    nb_rule rule;
+    double sunlight[NB_VIEW_SUNS][3]; /* what air leaves of the sun on the ground, evenly over the root of the cosine of
+                                         its angle to the zenith */
+};
+
+/* In an entry, all per metre and for a sun of irradiance 1 but for the last two: what was scattered once by each kind of
+ * air that scatters, for a phase function of 1; more often; how much of that is in doubt, of the brightest colour under
+ * the view's sun; and what part of the light interpolation may miss. */
+static inline int nb_view_often(const nebel_air_view *view)
+{
+    return 3 * view->scatterer_count;
+}
+
+static inline float *nb_view_entry(const nebel_air_view *view, int row, int column, int level)
+{
+    const size_t place =
+        ((size_t)row * (size_t)view->columns + (size_t)column) * ((size_t)view->levels + 1) + (size_t)level;
+    return view->entries + place * (size_t)view->size;
+}
+
+static inline double *nb_view_extinction(const nebel_air_view *view, int row, int level)
+{
+    return view->extinction[row * (view->levels + 1) + level];
+}
+
+#endif
