@@ -436,10 +436,10 @@ static void test_what_diffusion_cannot_do_is_refused(void **unused)
     nebel_volume_desc volume = ball(&white, 1);
     assert_refused(&volume, .5, "max_opacity");
     volume.cutoff = 9;
-    assert_refused(&volume, 0, "cutoff");
+    assert_refused(&volume, 0, "fog[0].start, cutoff");
     volume = volume_of(&white, 1);
     volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .normal = {1, 1, 0}};
-    assert_refused(&volume, 0, "endless");
+    assert_refused(&volume, 0, "fog[0]: is endless along x");
 }
 
 /* Fog that no light comes out of, or no light gets into, is no error. */

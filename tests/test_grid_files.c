@@ -237,10 +237,15 @@ static void numbers_are_x_first(void **state)
     }
 }
 
+static void write_png(const char *name, uint32_t width, uint32_t height, uint32_t format, const uint8_t *pixels)
+{
+    png_image image = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = format};
+    assert_true(png_image_write_to_file(&image, in_folder(name), 0, pixels, 0, NULL));
+}
+
 static void write_slice(const char *name, uint32_t width, uint32_t height, const uint8_t *pixels)
 {
-    png_image image = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = PNG_FORMAT_GRAY};
-    assert_true(png_image_write_to_file(&image, in_folder(name), 0, pixels, 0, NULL));
+    write_png(name, width, height, PNG_FORMAT_GRAY, pixels);
 }
 
 /* Rows go down, y up; slices go along z. */
@@ -272,6 +277,7 @@ static void scenes_say_what_is_wrong(void **state)
     static const wrong cases[] = {
         {"\"type\": \"grid\"", "fog[0].density: the key \"file\" is missing"},
         {"\"type\": \"grid\", \"file\": \"\"", "missing"},
+        {"\"type\": \"grid\", \"file\": 5", "fog[0].density.file: is a number; must be the path of a file"},
         {"\"type\": \"grid\", \"file\": \"none.nvdb\"", "fog[0].density.file: "},
         {"\"type\": \"grid\", \"file\": \"none.nvdb\", \"slices\": 3", "fog[0].density.slices: unknown key"},
         {"\"type\": \"grid\", \"file\": \"none.raw\"", "the key \"size\" is missing"},
@@ -288,6 +294,8 @@ static void scenes_say_what_is_wrong(void **state)
         {"\"type\": \"grid\", \"file\": \"s_00.png\", \"slices\": 1", "needs a run of 1 to 9 #"},
         {"\"type\": \"grid\", \"file\": \"odd_##.png\", \"slices\": 2", "odd_01.png: is 1 x 1 pixels of 8 bits; the"},
         {"\"type\": \"grid\", \"file\": \"text_#.png\", \"slices\": 1", "text_0.png: is not a PNG picture"},
+        {"\"type\": \"grid\", \"file\": \"red_#.png\", \"slices\": 1",
+         "red_0.png: not a good PNG picture: a slice of voxels must be grey, 8 or 16 bit, without alpha; convert it"},
         {"\"type\": \"grid\", \"file\": \"numbers.raw\", \"filter\": \"cubic\", \"size\": [3, 2, 1], "
          "\"voxels\": \"uint16\"",
          "filter: "},
@@ -300,6 +308,7 @@ static void scenes_say_what_is_wrong(void **state)
     write_bytes("text_0.png", "hello", 5);
     write_slice("odd_00.png", 2, 3, black);
     write_slice("odd_01.png", 1, 1, black);
+    write_png("red_0.png", 2, 1, PNG_FORMAT_RGB, black);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char text[512];
         journal kept = {0};
@@ -359,17 +368,113 @@ static void noise_moves_from_frame_to_frame(void **state)
                              .edge = {.1, 0, 0},
                              .seed = 4};
     assert_int_equal(nebel_scene_contents(scene)->moving_volume_count, 1);
+    assert_true(nebel_scene_contents(scene)->moves_on);
     for (int frame = 0; frame < 8; frame += 3) {
         nebel_grid *grid = NULL;
         desc.offset[0] = .5 * frame;
         desc.time = .25 * frame;
         assert_int_equal(nebel_create_noise(&desc, &grid), NEBEL_OK);
         assert_true(light_at_frame(scene, frame) == through(grid, 0, .4, .6));
+        nebel_grid *at = NULL;
+        assert_int_equal(nebel_scene_grid(scene, nebel_scene_contents(scene)->volumes[0].density.grid, frame, &at),
+                         NEBEL_OK);
+        assert_true(through(at, 0, .4, .6) == through(grid, 0, .4, .6));
+        nebel_release_grid(at);
         nebel_release_grid(grid);
     }
     assert_true(fabs(light_at_frame(scene, 0) - light_at_frame(scene, 3)) > 1e-4);
+    nebel_grid *none = NULL;
+    assert_int_equal(nebel_scene_grid(scene, NULL, 3, &none), NEBEL_OK);
+    assert_null(none);
     nebel_destroy_scene(scene);
     parse_without_memory(NOISE);
+}
+
+static nebel_grid *grid_of(const nebel_scene *scene)
+{
+    return nebel_scene_contents(scene)->volumes[0].density.grid;
+}
+
+/* Noise with other numbers is that of a file that has them, and its words stay. */
+static void noise_is_given_other_numbers(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(NOISE);
+    nebel_scene_noise noise, again;
+    nebel_grid *changed = NULL, *here = NULL, *there = NULL;
+    assert_true(nebel_find_scene_noise(scene, grid_of(scene), &noise));
+    assert_int_equal(noise.desc.size[2], 12);
+    assert_true(noise.desc.gain == .6 && noise.drift[0] == .5 && noise.change == .25 && noise.desc.seed == 4);
+    noise.desc.cells[1] = 4;
+    noise.drift[2] = -1;
+    noise.desc.octaves = 3;
+    assert_int_equal(nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_OK);
+    assert_true(nebel_find_scene_noise(scene, changed, &again));
+    assert_memory_equal(noise.desc.cells, again.desc.cells, sizeof noise.desc.cells);
+    assert_true(again.drift[2] == -1 && again.desc.octaves == 3 && again.desc.coverage == .8);
+    assert_non_null(strstr(nebel_grid_name(changed), "\"cells\": [2, 4, 2], \"octaves\": 3, \"gain\": 0.6"));
+    noise.desc.offset[0] = 1;
+    noise.desc.offset[2] = -2;
+    noise.desc.time = .5;
+    assert_int_equal(nebel_create_noise(&noise.desc, &there), NEBEL_OK);
+    assert_int_equal(nebel_scene_grid(scene, changed, 2, &here), NEBEL_OK);
+    assert_true(through(here, 0, .4, .6) == through(there, 0, .4, .6));
+    assert_false(through(here, 0, .4, .6) == through(changed, 0, .4, .6));
+    nebel_release_grid(there);
+    nebel_release_grid(here);
+    nebel_release_grid(changed);
+    nebel_destroy_scene(scene);
+}
+
+static void what_is_no_noise_stays(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(NOISE), *of_file = parse_good(WEDGE);
+    nebel_scene_noise noise;
+    nebel_grid *changed = NULL;
+    assert_false(nebel_find_scene_noise(of_file, grid_of(of_file), &noise));
+    assert_false(nebel_find_scene_noise(scene, NULL, &noise));
+    assert_true(nebel_find_scene_noise(scene, grid_of(scene), &noise));
+    assert_int_equal(nebel_change_scene_noise(of_file, grid_of(of_file), &noise, &changed), NEBEL_ERROR_ARGUMENT);
+    noise.desc.gain = 2;
+    assert_int_equal(nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_ERROR_FORMAT);
+    noise.desc.gain = .5;
+    noise.desc.cells[0] = 7;
+    assert_int_equal(nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed), NEBEL_ERROR_VALUE);
+    assert_null(changed);
+    nebel_destroy_scene(of_file);
+    nebel_destroy_scene(scene);
+}
+
+/* Every allocation fails once, with all that come after it. */
+static void memory_runs_out_while_noise_is_changed(void **state)
+{
+    (void)state;
+    meter m;
+    journal kept;
+    const nebel_scene_desc desc = metered_desc(&m, &kept);
+    nebel_scene *scene = NULL;
+    nebel_scene_noise noise;
+    assert_int_equal(nebel_parse_scene(NOISE, strlen(NOISE), "s.json", &desc, &scene), NEBEL_OK);
+    assert_true(nebel_find_scene_noise(scene, grid_of(scene), &noise));
+    noise.change = 2;
+    nebel_result changing = NEBEL_ERROR_MEMORY, moving = NEBEL_ERROR_MEMORY;
+    const long live = m.live;
+    for (long k = 0; changing != NEBEL_OK || moving != NEBEL_OK; k++) {
+        nebel_grid *changed = NULL, *at = NULL;
+        m.fail_at = m.made + k;
+        changing = nebel_change_scene_noise(scene, grid_of(scene), &noise, &changed);
+        m.fail_at = m.made + k;
+        moving = nebel_scene_grid(scene, grid_of(scene), 3, &at);
+        if (changing != NEBEL_OK) assert_int_equal(changing, NEBEL_ERROR_MEMORY);
+        if (moving != NEBEL_OK) assert_int_equal(moving, NEBEL_ERROR_MEMORY);
+        nebel_release_grid(changed);
+        nebel_release_grid(at);
+        assert_int_equal(m.live, live);
+        assert_true(k < 2000);
+    }
+    nebel_destroy_scene(scene);
+    assert_int_equal(m.live, 0);
 }
 
 /* A copy of the volume, moved, has the file of the first. */
@@ -414,8 +519,8 @@ static int make_folder(void **state)
 
 static int remove_folder(void **state)
 {
-    static const char *const names[] = {"plain.nvdb", "numbers.raw", "s_00.png",   "s_01.png",   "bad.raw",
-                                        "text_0.png", "odd_00.png",  "odd_01.png", "copies.json"};
+    static const char *const names[] = {"plain.nvdb", "numbers.raw", "s_00.png",   "s_01.png",    "bad.raw",
+                                        "text_0.png", "odd_00.png",  "odd_01.png", "copies.json", "red_0.png"};
     (void)state;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) unlink(in_folder(names[i]));
     return rmdir(folder);
@@ -435,6 +540,9 @@ int main(void)
         cmocka_unit_test(scenes_give_back_all_memory),
         cmocka_unit_test(copies_are_saved),
         cmocka_unit_test(noise_moves_from_frame_to_frame),
+        cmocka_unit_test(noise_is_given_other_numbers),
+        cmocka_unit_test(what_is_no_noise_stays),
+        cmocka_unit_test(memory_runs_out_while_noise_is_changed),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

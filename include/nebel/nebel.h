@@ -211,8 +211,8 @@ typedef struct nebel_grid_desc {
  * Errors: ARGUMENT, VALUE (NaN, infinite or negative density), LIMIT, MEMORY. */
 nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid);
 
-/* Noise: a grid that is made, for wisps and clouds. Value noise on a lattice of `cells` across the box, in `octaves` each
- * of half the size and `gain` times the weight of the one before; octaves whose cells would be smaller than two voxels
+/* Noise: a grid that is made, for wisps and clouds. Simplex noise with `cells` across the box, whose waves are two cells
+ * long, in `octaves` each of half the size and `gain` times the weight of the one before; octaves whose cells would be smaller than two voxels
  * are left out, so that voxels have all there is of it. Of the sum, 0 to 1, what is above 1 - coverage is density, again
  * 0 to 1 and in steps of 1 / 65535. The same everywhere for the same numbers. */
 typedef struct nebel_noise_desc {
@@ -309,12 +309,13 @@ typedef enum nebel_phase_type {
 } nebel_phase_type;
 
 #define NEBEL_MAX_G 0.9999
+#define NEBEL_MAX_ALPHA 1e9
 #define NEBEL_MAX_DROPLET 50
 
 typedef struct nebel_phase {
     nebel_phase_type type;
     double g;        /* -NEBEL_MAX_G to NEBEL_MAX_G; < 0: backwards */
-    double alpha;    /* 0 to 1e9 */
+    double alpha;    /* 0 to NEBEL_MAX_ALPHA */
     double diameter; /* micrometres, 1e-6 to NEBEL_MAX_DROPLET */
 } nebel_phase;
 
@@ -541,8 +542,8 @@ typedef struct nebel_light {
                      depth is in the thousands one of fourteen has up to 3e-3. Transmittance below the smallest normal
                      number of the precision is 0, and the error that number at least. 1e30: nothing is known of
                      light from height fog that grows beyond 1e18 times its extinction and lets light through.
-                     Voxels that the sun lights: an estimate, in float up to 2.7 times too small for some 2 of a
-                     thousand rays where dense voxels end at the faces of their box */
+                     Voxels that the sun lights: an estimate, which none of 13,700 rays through random voxels exceeded;
+                     light that reaches between cells of many optical depths each may escape it */
 } nebel_light;
 
 typedef enum nebel_precision {

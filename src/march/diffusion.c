@@ -101,6 +101,12 @@ static double width_of(double turned, double n)
     return g > 0 && g < 1 ? nb_exp(n / 2 * nb_log(2 * g / (1 + g))) : 0;
 }
 
+/* Where there is no light the least that is told. */
+static double log_of(double light)
+{
+    return nb_log(fmax(light, 1e-30));
+}
+
 /* `light`: fluence and flux. */
 static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const double light[4], float *out)
 {
@@ -113,8 +119,8 @@ static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const
     const double times = mean > 1e-6 ? mean / nb_one_minus_exp(mean) : 1;
     out[NB_NODE_DIFFUSE] = (float)(turned * light[0] / (4 * PI));
     for (int a = 0; a < 3; a++) out[NB_NODE_FLUX + a] = (float)(cosine * turned * light[1 + a] / (4 * PI));
-    out[NB_NODE_TURNED] = (float)(turned * sun->scaled[c]);
-    out[NB_NODE_ONCE] = (float)(share(t->turned[c], t->extinction[c]) * sun->whole[c]);
+    out[NB_NODE_TURNED] = (float)log_of(turned * sun->scaled[c]);
+    out[NB_NODE_ONCE] = (float)log_of(share(t->turned[c], t->extinction[c]) * sun->whole[c]);
     out[NB_NODE_GLOW] = (float)(ahead * straight);
     out[NB_NODE_WIDTH] = (float)width_of(cosine, times + 1);
 }

@@ -29,7 +29,8 @@ typedef struct nb_lattice {
 enum {
     NB_NODE_DIFFUSE, /* source radiance of diffuse light, that of extinction after scaling: mean over directions, */
     NB_NODE_FLUX,    /* and its first moments along x, y and z: three numbers */
-    NB_NODE_TURNED = NB_NODE_FLUX + 3, /* sunlight through scaled fog, times what is turned of it; no phase function */
+    NB_NODE_TURNED = NB_NODE_FLUX + 3, /* logarithm of sunlight through scaled fog, times what is turned of it; no phase
+                                          function. Between nodes it is linear, as optical depth is in even fog */
     NB_NODE_ONCE,  /* the same through the fog as it is, of its extinction: in NB_NODE_TURNED, and in the exact light */
     NB_NODE_GLOW,  /* sunlight that went almost straight on and does so again, of the fog's extinction */
     NB_NODE_WIDTH, /* g of the lobe that this makes */
@@ -80,6 +81,7 @@ void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, 
 typedef struct nb_diffuse_light {
     double *nodes;        /* fluence and flux, four numbers each */
     double leaving[3][2]; /* power through the lattice's ends [m^2] */
+    double lost;          /* what leaves on its way there, through cells without fog: nobody knows by which end */
     double ground;        /* mean radiance of the ground */
 } nb_diffuse_light;
 

@@ -130,20 +130,23 @@ static double find_gain(double leaving, double rest, double diffuse, double leas
 /* `ends`: of each axis and side; nothing where they are not open. */
 static void balance_channel(nb_diffusion *d, int c, const nb_diffuse_light *light, const power ends[6])
 {
-    double leaving = 0, diffuse = 0, rest = 0;
+    double leaving = light->lost, diffuse = 0, rest = 0;
     for (int i = 0; i < 6; i++) {
         if (d->lattice.ends[i / 2][i % 2] != NB_END_OPEN) continue;
         leaving += light->leaving[i / 2][i % 2];
         diffuse += ends[i].diffuse[c];
         rest += ends[i].rest[c];
     }
+    /* What is lost counts for every end as rays say. */
+    const double part = diffuse + rest > 0 ? light->lost / (diffuse + rest) : 0;
     const double all = find_gain(leaving, rest, diffuse, LEAST_GAIN, MOST_GAIN);
     for (int i = 0; i < 6; i++) {
         const int axis = i / 2, side = i % 2;
         d->gain[c][axis][side] = all;
         if (d->lattice.ends[axis][side] != NB_END_OPEN) continue;
-        d->gain[c][axis][side] = find_gain(light->leaving[axis][side], ends[i].rest[c], ends[i].diffuse[c],
-                                           all / GAIN_OF_SIDE, all * GAIN_OF_SIDE);
+        const double through = light->leaving[axis][side] + part * (ends[i].diffuse[c] + ends[i].rest[c]);
+        d->gain[c][axis][side] =
+            find_gain(through, ends[i].rest[c], ends[i].diffuse[c], all / GAIN_OF_SIDE, all * GAIN_OF_SIDE);
     }
 }
 

@@ -57,8 +57,8 @@ static int is_level(const nb_medium *medium, int axis)
     return density->type == NEBEL_DENSITY_CONSTANT || density->type == NEBEL_DENSITY_HEIGHT;
 }
 
-/* The span of all sunlit fog that ends, and whether there is any that does not. 0: some goes on, and changes. */
-static int gather(const nebel_snapshot *snapshot, int axis, span *all)
+/* The span of all sunlit fog that ends, and whether there is any that does not. NULL, or what goes on and changes. */
+static const nb_medium *gather(const nebel_snapshot *snapshot, int axis, span *all)
 {
     *all = (span){HUGE_VAL, -HUGE_VAL, {0, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
@@ -66,12 +66,12 @@ static int gather(const nebel_snapshot *snapshot, int axis, span *all)
         if (!medium->is_sunlit) continue;
         const span s = span_of(medium, axis);
         const int goes_on = s.is_endless[0] || s.is_endless[1];
-        if (goes_on && axis != 1 && !is_level(medium, axis)) return 0;
+        if (goes_on && axis != 1 && !is_level(medium, axis)) return medium;
         for (int side = 0; side < 2; side++) all->is_endless[side] |= axis != 1 ? goes_on : s.is_endless[side];
         if (!s.is_endless[0]) all->low = fmin(all->low, s.low);
         if (!s.is_endless[1]) all->high = fmax(all->high, s.high);
     }
-    return 1;
+    return NULL;
 }
 
 static double vertical_depth(const nebel_snapshot *scaled, double x, double y, double z)
@@ -174,10 +174,14 @@ nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapsh
     span spans[3];
     memset(lattice, 0, sizeof *lattice);
     *lit = 0;
-    for (int a = 0; a < 3; a++)
-        if (!gather(snapshot, a, &spans[a]))
+    for (int a = 0; a < 3; a++) {
+        const nb_medium *uneven = gather(snapshot, a, &spans[a]);
+        if (uneven != NULL)
             return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
-                           "diffusion: endless fog must be the same all along x and z, or end");
+                           "fog[%zu]: is endless along %c, but not the same all along, which diffusion (multiple "
+                           "scattering) needs; let it end, or leave out diffusion",
+                           uneven->slot, "xyz"[a]);
+    }
     for (int a = 0; a < 3; a += 2) {
         lattice->low[a] = spans[a].low;
         lattice->high[a] = spans[a].high;

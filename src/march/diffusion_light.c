@@ -37,6 +37,7 @@ typedef struct walker {
     double diffuse[3];              /* of the former: what is diffuse */
     double light[3], spread[3];     /* what was gathered, and what of it is diffuse */
     int halvings;                   /* of steps, where fog is thick */
+    const nb_diffusion *in;         /* whose nodes `source` and the others are of; NULL: not looked up */
 } walker;
 
 typedef struct block {
@@ -114,12 +115,13 @@ static double gain_of(const nb_diffusion *d, int c, const double direction[3])
     return gain;
 }
 
+/* In the lattice that the piece is in. */
 static void look(const block *b, walker *w)
 {
     size_t nodes[8];
     double place[3], weights[8];
     for (int a = 0; a < 3; a++) place[a] = b->middle[a] + w->origin[a] + w->t * w->direction[a];
-    const nb_diffusion *d = diffusion_at(b->diffusion, place);
+    const nb_diffusion *d = w->in;
     find_nodes(&d->lattice, place, nodes, weights);
     const double g = mix(d, nodes, weights, d->node_numbers - 1), turned = lobe(g, w->cosine);
     for (int c = 0; c < b->diffusion->channel_count; c++) {
@@ -128,9 +130,9 @@ static void look(const block *b, walker *w)
         double numbers[4];
         for (size_t k = 0; k < 4; k++) numbers[k] = mix(d, nodes, weights, first + NB_NODE_DIFFUSE + k);
         w->diffuse[c] = gain_of(d, own, w->direction) * diffuse_source(numbers, fmax(g, 0), w->direction);
-        w->source[c] = w->diffuse[c] + turned * mix(d, nodes, weights, first + NB_NODE_TURNED);
+        w->source[c] = w->diffuse[c] + turned * nb_exp(mix(d, nodes, weights, first + NB_NODE_TURNED));
         if (!b->is_rest) continue;
-        w->once[c] = -turned * mix(d, nodes, weights, first + NB_NODE_ONCE);
+        w->once[c] = -turned * nb_exp(mix(d, nodes, weights, first + NB_NODE_ONCE));
         if (d->has_peaks)
             w->once[c] += mix(d, nodes, weights, first + NB_NODE_GLOW) *
                           lobe(mix(d, nodes, weights, first + NB_NODE_WIDTH), w->cosine);
@@ -195,7 +197,6 @@ static void start(block *b, size_t i, const nebel_ray *ray)
     for (int c = 0; c < 3; c++) w->scaled[c] = w->whole[c] = 1;
     w->cosine = fmin(fmax(w->cosine, -1), 1);
     if (w->end > 0) clip(&d->lattice, b->middle, w);
-    if (w->t < w->end) look(b, w);
 }
 
 /* The weights of both ends of a step that leaves `transmittance`: the source is linear between them, the fog even. */
@@ -219,12 +220,41 @@ static int is_fine(const block *b, size_t i)
     return !is_thick || w->halvings == MOST_HALVINGS || isinf(b->step[i]);
 }
 
+/* Which lattice a piece is in, and its nodes at where it begins. Bodies end at the faces of their lattice, as pieces do. */
+static void enter(const block *b, walker *w, double step)
+{
+    double place[3];
+    const double half = fmin(step, FAR) / 2;
+    for (int a = 0; a < 3; a++) place[a] = b->middle[a] + w->origin[a] + (w->t + half) * w->direction[a];
+    const nb_diffusion *in = diffusion_at(b->diffusion, place);
+    if (in == w->in) return;
+    w->in = in;
+    look(b, w);
+}
+
+/* Without fog a piece has no light, whatever its ends have. */
+static int is_empty(const block *b, size_t i)
+{
+    int is = 1;
+    for (int c = 0; c < b->diffusion->channel_count; c++)
+        is &= b->scaled[c][i] >= 1 && (!b->diffusion->has_peaks || b->whole[c][i] >= 1);
+    return is;
+}
+
 /* From t to the end of its step. */
 static void advance(block *b, size_t i)
 {
-    walker *w = &b->walkers[i], before = *w;
+    walker *w = &b->walkers[i];
     const nb_diffusion *d = b->diffusion;
     int is_dark = 1, is_thin = 1;
+    if (is_empty(b, i)) {
+        w->t += b->step[i];
+        w->in = NULL;
+        if (w->halvings > 0) w->halvings--;
+        return;
+    }
+    enter(b, w, b->step[i]);
+    const walker before = *w;
     w->t += b->step[i];
     if (isfinite(w->t)) look(b, w);
     for (int c = 0; c < d->channel_count; c++) {

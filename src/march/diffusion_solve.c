@@ -19,10 +19,12 @@
 #define RESIDUAL 1e-14
 enum { MOST_STEPS = 20000 };
 
-/* A cell without fog is no vacuum but carries light, as far as diffusion can, about as freely as light travels: of a
- * ball in a lattice that just holds it, as much leaves through its corners as Marshak's condition on the ball would
- * let out. In terms of the lattice's least extent. Fog that is thinner than this part of the mean counts as none. */
-#define CLEAR_WAY 0.1
+/* A cell without fog is no vacuum but carries light, as far as diffusion can, about as freely as light travels, in terms
+ * of the lattice's least extent; and light gets lost there on its way out, so that not all of it creeps around a body to
+ * the dark side. D phi'' = k phi with 4 D k = 1 has the flux phi / 2 outwards at every place, as Marshak's condition and
+ * so the lattice's ends have: right for a lone ball, but clouds light each other across gaps. Half of that k is between
+ * both. Fog that is thinner than this part of the mean counts as none. */
+#define CLEAR_WAY 0.06
 #define CLEAR_DENSITY 0.1
 
 /* That of half a cell of transport depth 4. */
@@ -42,6 +44,7 @@ typedef struct solver {
     size_t cell_count;
     double area[3];
     double *diffusivity, *ahead; /* of cells: 1 / (3 transport extinction); g w over transport extinction */
+    double *lost;                /* of cells: what goes away where there is no fog, by phi [1/m] */
     double *diagonal, *phi, *residual, *way, *product;
     faces faces[3];
 } solver;
@@ -212,6 +215,7 @@ static void set_cells(solver *s, const nb_transport *cells)
         const double resisting = transport + clear / (3 * CLEAR_WAY * least);
         s->diffusivity[i] = 1 / (3 * fmax(resisting, 1e-12));
         s->ahead[i] = cells[i].forward[c] / fmax(resisting, 1e-12);
+        s->lost[i] = clear / (8 * CLEAR_WAY * least);
     }
 }
 
@@ -226,7 +230,7 @@ static void set_balance(solver *s, const nb_transport *cells)
         const size_t i = cell_index(l, &cell);
         const double extinction = scaled_extinction(&cells[i], c);
         const double turned = extinction > 0 ? cells[i].turned[c] / extinction : 0;
-        s->diagonal[i] = volume * fmax(cells[i].extinction[c] - cells[i].scattering[c], 0);
+        s->diagonal[i] = volume * (fmax(cells[i].extinction[c] - cells[i].scattering[c], 0) + s->lost[i]);
         for (int axis = 0; axis < 3; axis++) {
             const index3 next = shifted(&cell, axis, 1);
             s->diagonal[i] += s->faces[axis].conductance[face_index(l, axis, &cell)] +
@@ -393,6 +397,14 @@ static void set_leaving(const solver *s, nb_diffuse_light *light)
     }
 }
 
+static double find_lost(const solver *s)
+{
+    const nb_lattice *l = s->lattice;
+    double sum = 0;
+    for (size_t i = 0; i < s->cell_count; i++) sum += s->lost[i] * s->phi[i];
+    return sum * l->spacing[0] * l->spacing[1] * l->spacing[2];
+}
+
 static void set_nodes(const solver *s, double *light)
 {
     const nb_lattice *l = s->lattice;
@@ -422,7 +434,8 @@ static double find_ground(const nb_lattice *l, const double *nodes)
 
 static int allocate(const nebel_allocator *allocator, solver *s)
 {
-    double **const of_cells[] = {&s->diffusivity, &s->ahead, &s->diagonal, &s->phi, &s->residual, &s->way, &s->product};
+    double **const of_cells[] = {&s->diffusivity, &s->ahead,    &s->lost, &s->diagonal,
+                                 &s->phi,         &s->residual, &s->way,  &s->product};
     int all = 1;
     for (size_t i = 0; i < sizeof of_cells / sizeof *of_cells; i++) {
         *of_cells[i] = nb_allocate(allocator, s->cell_count, sizeof(double));
@@ -438,7 +451,8 @@ static int allocate(const nebel_allocator *allocator, solver *s)
 
 static void release(const nebel_allocator *allocator, const solver *s)
 {
-    double *const of_cells[] = {s->diffusivity, s->ahead, s->diagonal, s->phi, s->residual, s->way, s->product};
+    double *const of_cells[] = {s->diffusivity, s->ahead,    s->lost, s->diagonal,
+                                s->phi,         s->residual, s->way,  s->product};
     for (size_t i = 0; i < sizeof of_cells / sizeof *of_cells; i++) nb_release(allocator, of_cells[i]);
     for (int a = 0; a < 3; a++) {
         nb_release(allocator, s->faces[a].conductance);
@@ -465,6 +479,7 @@ int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *latti
         find_fluence(&s);
         set_nodes(&s, light->nodes);
         set_leaving(&s, light);
+        light->lost = find_lost(&s);
         light->ground = find_ground(lattice, light->nodes);
     }
     release(allocator, &s);

@@ -276,8 +276,7 @@ static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
 
 /* ---- lattices -------------------------------------------------------------------------------- */
 
-/* Cells per metre of the way to the sun through voxels. */
-static void way_in_cells(const nebel_snapshot *s, const nb_volume *body, double way[3])
+void nb_way_in_cells(const nebel_snapshot *s, const nb_volume *body, double way[3])
 {
     const nb_leaf *leaf = &body->leaves[0];
     double rate[3];
@@ -294,16 +293,19 @@ static int needs_lattice(const nebel_snapshot *s)
     return s->way_to_sun == NB_WAY_GRID && nb_grid_is_linear(s->media[0].body.density.grid);
 }
 
+/* Two columns per cell where they come to no more than 64 MiB. */
+static const nb_lattice_limit lattice_limit = {2, (size_t)1 << 25};
+
 /* The one of the commit before where it still serves. 0 when memory is out. */
 static int take_lattice(const nebel_fog *fog, const nebel_snapshot *s, nb_medium *medium)
 {
     nb_slot *slot = &fog->slots[medium->slot];
     nebel_grid *grid = medium->body.density.grid;
     double way[3];
-    way_in_cells(s, &medium->body, way);
+    nb_way_in_cells(s, &medium->body, way);
     if (slot->lattice == NULL || !nb_grid_lattice_is_of(slot->lattice, grid, way)) {
         nb_grid_lattice_release(slot->lattice);
-        slot->lattice = nb_grid_lattice_make(grid, &s->allocator, way);
+        slot->lattice = nb_grid_lattice_make(grid, &s->allocator, way, lattice_limit);
     }
     medium->lattice = nb_grid_lattice_retain(slot->lattice);
     return medium->lattice != NULL;
@@ -341,11 +343,21 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
     return result;
 }
 
-static int has_distances(const nebel_snapshot *s)
+/* Looks that no light has. */
+static nebel_result refuse_looks(const nebel_fog *fog, const nebel_snapshot *s)
 {
-    int has = 0;
-    for (size_t i = 0; i < s->medium_count; i++) has |= nb_volume_has_distances(&s->media[i].body);
-    return has;
+    if (s->max_opacity < 1)
+        return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
+                       "max_opacity: no light is like that, so that diffusion (multiple scattering) cannot follow it; "
+                       "leave out max_opacity %g, or diffusion",
+                       s->max_opacity);
+    for (size_t i = 0; i < s->medium_count; i++)
+        if (nb_volume_has_distances(&s->media[i].body))
+            return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
+                           "fog[%zu].start, cutoff: no light is like that, so that diffusion (multiple scattering) "
+                           "cannot follow it; leave out both, or diffusion",
+                           s->media[i].slot);
+    return NEBEL_OK;
 }
 
 static nebel_result diffuse_selected(const nebel_fog *fog, const nebel_snapshot *s, int level, nb_diffusion **made)
@@ -368,10 +380,8 @@ static nebel_result diffuse_level(const nebel_fog *fog, nb_diffusion **made)
 
 static nebel_result diffuse(const nebel_fog *fog, nebel_snapshot *s)
 {
-    if (s->max_opacity < 1 || has_distances(s))
-        return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
-                       "diffusion: max_opacity, start and cutoff are looks that no light has; leave them out");
-    const nebel_result result = diffuse_selected(fog, s, 0, &s->diffusion);
+    nebel_result result = refuse_looks(fog, s);
+    if (result == NEBEL_OK) result = diffuse_selected(fog, s, 0, &s->diffusion);
     if (result != NEBEL_OK || s->diffusion == NULL || !nb_lattice_has_bodies(&s->diffusion->lattice)) return result;
     return diffuse_level(fog, &s->diffusion->beside);
 }

@@ -78,4 +78,7 @@ struct nebel_snapshot {
     size_t bounded_count;
 };
 
+/* Cells per metre of the way to the sun through the voxels that are the body's density. */
+void nb_way_in_cells(const nebel_snapshot *snapshot, const nb_volume *body, double way[3]);
+
 #endif

@@ -132,8 +132,9 @@ static void step_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass,
     const nb_wide end = nb_wselect(to_stop, stop, within);
     const nb_wmask turns = nb_wand(to_stop, stop < bright);
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
-    transmittance_until(m, along->p, &along->before, end, s.behind);
-    sum_light_nodes(sun, m, along->p, &along->before, w->lanes, &s);
+    const sun_origin from = origin_of(along, w);
+    end_step(m, &from.p, &from.before, end, &s);
+    sum_light_nodes(sun, m, &from.p, &from.before, w->lanes, &s);
     limit_lamp_step(pass, w->before, end, &s);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
     const nb_real length = nb_narrow(end - w->t) / along->whole;
@@ -196,7 +197,7 @@ static void gather_lamplight(sunlight *sun, const march *m, const piece *p, gath
     const nb_mask lit = lamplit_lanes(m, p, &scatter);
     if (!nb_any(lit)) return;
     const nebel_snapshot *snapshot = sun->snapshot;
-    const sun_piece s = {p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0)};
+    const sun_piece s = sun_piece_of(m, p, g, has_voxels(m));
     transmittance_until(m, p, &s.before, p->end, behind);
     nb_real drop = NB_F(0.0);
     for (int c = 0; c < 3; c++) drop = nb_max(drop, s.before.transmittance[c] - behind[c]);

@@ -279,10 +279,11 @@ struct lamp_pass;
 typedef struct sun_step {
     const struct lamp_pass *lamp; /* NULL: of the sun */
     nb_wide start;
-    nb_swing swing;    /* of a lamp alone */
-    nb_real length;    /* m; of a lamp in the counting of its swing */
-    nb_real scale[3];  /* of the step: x = s (scale[0] + s (scale[1] + s scale[2])) */
-    nb_real behind[3]; /* transmittance at its end */
+    nb_swing swing;                   /* of a lamp alone */
+    nb_real length;                   /* m; of a lamp in the counting of its swing */
+    nb_real scale[3];                 /* of the step: x = s (scale[0] + s (scale[1] + s scale[2])) */
+    nb_real depth[3], depth_error[3]; /* from the ray's origin to its end */
+    nb_real behind[3];                /* transmittance at its end */
     nb_real light[3];
     nb_real taken[3]; /* loss of transmittance by the rule, which is known without it */
     nb_real error;    /* of the rule, worst channel */
@@ -466,10 +467,55 @@ static void limit_step(const march *m, const nb_real before[3], sun_step *s)
 typedef struct sun_walk {
     nb_wide t;
     nb_wmask lanes, at_turn;
-    nb_real left;               /* steps that the lane may still try before its next toggle */
-    nb_real guess, before[3];   /* length of the next step; transmittance up to here */
+    nb_real left;             /* steps that the lane may still try before its next toggle */
+    nb_real guess, before[3]; /* length of the next step; transmittance up to here */
+    nb_real depth[3], depth_error[3];
     nb_wide along, along_error; /* of a grid: the integral of its density from the start of the piece up to here */
 } sun_walk;
+
+/* What steps of a piece share. */
+typedef struct sun_piece {
+    const piece *p;
+    gathered before;       /* what was gathered before it */
+    nb_real whole, pieces; /* its length; how many there may be */
+    int is_rough; /* it has voxels, which are integrated from step to step: a walk to every node would be long */
+} sun_piece;
+
+static int has_voxels(const march *m)
+{
+    for (size_t i = m->present_first; i < m->present_end; i++)
+        if (present(m, i)->medium->body.density.type == NEBEL_DENSITY_GRID) return 1;
+    return 0;
+}
+
+static sun_piece sun_piece_of(const march *m, const piece *p, const gathered *g, int is_rough)
+{
+    return (sun_piece){p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0), is_rough};
+}
+
+/* From where depth is integrated, and what there is before that. */
+typedef struct sun_origin {
+    piece p;
+    gathered before;
+} sun_origin;
+
+static sun_origin origin_of(const sun_piece *s, const sun_walk *w)
+{
+    sun_origin from = {*s->p, s->before};
+    if (!s->is_rough) return from;
+    from.p.start = w->t;
+    for (int c = 0; c < 3; c++) {
+        from.before.depth[c] = w->depth[c];
+        from.before.depth_error[c] = w->depth_error[c];
+    }
+    return from;
+}
+
+static void end_step(const march *m, const piece *p, const gathered *g, nb_wide end, sun_step *s)
+{
+    depth_until(m, p, g, end, s->depth, s->depth_error);
+    map_channels(m->sun->snapshot, transmitted, s->depth, s->behind);
+}
 
 #include "trace_sun_ball.h"
 #include "trace_sun_closed.h"
@@ -486,7 +532,7 @@ static sun_step try_step(sunlight *sun, const march *m, const piece *p, const ga
     }
     sun_step s = {.start = w->t, .length = length, .amount = NB_W(0.0), .amount_error = NB_F(0.0)};
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
-    transmittance_until(m, p, g, end, s.behind);
+    end_step(m, p, g, end, &s);
     sum_light_nodes(sun, m, p, g, w->lanes, &s);
     limit_step(m, w->before, &s);
     return s;
@@ -518,7 +564,11 @@ static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb
     depth_until(m, p, g, p->end, depth, error);
     const nb_real within = nb_max(largest(depth) - largest(g->depth), NB_F(4.0));
     w.guess = p->length * (NB_F(4.0) / within);
-    for (int c = 0; c < 3; c++) w.before[c] = g->transmittance[c];
+    for (int c = 0; c < 3; c++) {
+        w.before[c] = g->transmittance[c];
+        w.depth[c] = g->depth[c];
+        w.depth_error[c] = g->depth_error[c];
+    }
     return w;
 }
 
@@ -527,6 +577,8 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     for (int c = 0; c < 3; c++) {
         g->radiance[c] = g->radiance[c] + nb_select(taken, s->light[c], NB_F(0.0));
         w->before[c] = nb_select(taken, s->behind[c], w->before[c]);
+        w->depth[c] = nb_select(taken, s->depth[c], w->depth[c]);
+        w->depth_error[c] = nb_select(taken, s->depth_error[c], w->depth_error[c]);
     }
     const nb_real sum = largest(g->radiance) * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(taken, s->error + s->rounding + sum, NB_F(0.0));
@@ -539,13 +591,6 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     w->guess = nb_select(taken, nb_max(w->guess, s->length + s->length), NB_F(0.5) * s->length);
 }
 
-/* What steps of a piece share. */
-typedef struct sun_piece {
-    const piece *p;
-    gathered before;       /* what was gathered before it */
-    nb_real whole, pieces; /* its length; how many there may be */
-} sun_piece;
-
 static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
 {
     const nb_mask last = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
@@ -557,7 +602,8 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
     const nb_wmask to_stop = nb_widen_mask(length >= rest);
     const nb_wide end = nb_wselect(to_stop, stop, w->t + nb_widen(length));
     const nb_wmask turns = nb_wand(to_stop, stop < bright);
-    const sun_step tried = try_step(sun, m, s->p, &s->before, w, length, end, turns);
+    const sun_origin from = origin_of(s, w);
+    const sun_step tried = try_step(sun, m, &from.p, &from.before, w, length, end, turns);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(tried.light); /* what no halving makes less */
     const nb_real share = is_grid_alone(sun) ? GRID_SHARE * REAL(sun->share) : REAL(sun->share);
     const nb_real allowed = least + share * (NB_F(0.5) * tried.drop + NB_F(0.25) * (length / s->whole) / s->pieces +
@@ -572,9 +618,14 @@ static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s,
 {
     const nb_wide end = nb_wmin(shadow->toggle, s->p->end);
     const nb_mask lanes = nb_narrow_mask(dark);
-    nb_real before[3];
-    transmittance_until(m, s->p, &s->before, end, before);
-    for (int c = 0; c < 3; c++) w->before[c] = nb_select(lanes, before[c], w->before[c]);
+    const sun_origin from = origin_of(s, w);
+    sun_step passed;
+    end_step(m, &from.p, &from.before, end, &passed);
+    for (int c = 0; c < 3; c++) {
+        w->before[c] = nb_select(lanes, passed.behind[c], w->before[c]);
+        w->depth[c] = nb_select(lanes, passed.depth[c], w->depth[c]);
+        w->depth_error[c] = nb_select(lanes, passed.depth_error[c], w->depth_error[c]);
+    }
     w->left = nb_select(lanes, NB_F(1.0) * MOST_SUN_STEPS, w->left);
     w->at_turn = nb_wand(w->at_turn, nb_wnot(dark));
     w->t = nb_wselect(dark, end, w->t);
@@ -590,7 +641,7 @@ static void gather_sunlight(sunlight *sun, const march *m, const piece *p, nb_ma
         gather_in_closed_form(sun, m, p, lit, g);
         return;
     }
-    const sun_piece s = {p, *g, nb_max(p->length, NB_TINY), m->event_count + NB_F(1.0)};
+    const sun_piece s = sun_piece_of(m, p, g, has_voxels(m) && !is_grid_alone(sun));
     sun_walk w = begin_walk(m, p, g, lit);
     while (nb_wany(w.lanes)) {
         pass_toggles(&sun->shade, w.t, w.lanes);

@@ -32,56 +32,71 @@ typedef struct sun_place {
     light_depth to_sun;
 } sun_place;
 
-static sun_place place_on_rays(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wide t,
-                               nb_wmask lanes)
-{
-    sun_place place = {.t = t, .to_sun = depth_to_sun(sun, m, t, lanes)};
-    depth_until(m, p, g, t, place.depth, place.error);
-    return place;
-}
+/* Between two places: optical depth, the longest of extinction 1, and what full sunlight would add. */
+typedef struct sun_stretch {
+    nb_real depth[3], depth_error[3], light[3], light_error[3], length;
+} sun_stretch;
 
-/* What full sunlight would add between two places, and the longest optical depth of extinction 1. */
-typedef struct sun_glow {
-    nb_real light[3], error[3], length;
-} sun_glow;
-
-static sun_glow glow_between(const march *m, nb_wide start, nb_wide end)
+static sun_stretch stretch_between(const march *m, nb_wide start, nb_wide end)
 {
     const nb_real zero = NB_F(0.0), h = nb_narrow(end - start);
-    sun_glow glow = {{zero, zero, zero}, {zero, zero, zero}, zero};
+    sun_stretch s = {{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_estimate along = contact_integral(k, start, end, h);
-        glow.length = nb_max(glow.length, nb_select(k->inside, along.value, zero));
+        const nb_real value = nb_select(k->inside, along.value, zero), error = nb_select(k->inside, along.error, zero);
+        s.length = nb_max(s.length, value);
         for (int c = 0; c < 3; c++) {
-            glow.light[c] = glow.light[c] + nb_select(k->inside, k->glow[c] * along.value, zero);
-            glow.error[c] = glow.error[c] + nb_select(k->inside, k->glow[c] * along.error, zero);
+            s.depth[c] = s.depth[c] + k->extinction[c] * value;
+            s.depth_error[c] = s.depth_error[c] + k->extinction[c] * error;
+            s.light[c] = s.light[c] + k->glow[c] * value;
+            s.light_error[c] = s.light_error[c] + k->glow[c] * error;
         }
     }
-    return glow;
+    return s;
+}
+
+static sun_place first_place(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes)
+{
+    sun_place place = {.t = p->start, .to_sun = depth_to_sun(sun, m, p->start, lanes)};
+    for (int c = 0; c < 3; c++) {
+        place.depth[c] = g->depth[c];
+        place.error[c] = g->depth_error[c];
+    }
+    return place;
+}
+
+static sun_place next_place(sunlight *sun, const march *m, const sun_place *from, const sun_stretch *s, nb_wide t,
+                            nb_wmask lanes)
+{
+    sun_place place = {.t = t, .to_sun = depth_to_sun(sun, m, t, lanes)};
+    for (int c = 0; c < 3; c++) {
+        place.depth[c] = from->depth[c] + s->depth[c];
+        place.error[c] = from->error[c] + s->depth_error[c] + place.depth[c] * NB_EPSILON;
+    }
+    return place;
 }
 
 /* Adds what is scattered between two places. */
 static void add_closed_step(const sunlight *sun, const march *m, const sun_place *from, const sun_place *to,
-                            nb_mask lanes, gathered *g)
+                            const sun_stretch *s, nb_mask lanes, gathered *g)
 {
-    const sun_glow glow = glow_between(m, from->t, to->t);
     nb_real least[3], change[3], most_seen[3], ratio[3], rounding = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real first = from->depth[c] + from->to_sun.depth[c], last = to->depth[c] + to->to_sun.depth[c];
         least[c] = nb_min(first, last);
-        change[c] = change_of_depth(sun, m, present(m, m->present_first), c, glow.length, last - first);
+        change[c] = change_of_depth(sun, m, present(m, m->present_first), c, s->length, last - first);
     }
     map_channels(sun->snapshot, transmitted, least, most_seen);
     map_channels(sun->snapshot, nb_exp_ratio, change, ratio);
     for (int c = 0; c < 3; c++) {
         const nb_real first = from->depth[c] + from->to_sun.depth[c], last = to->depth[c] + to->to_sun.depth[c];
-        const nb_real seen = most_seen[c] * ratio[c], light = glow.light[c] * seen;
+        const nb_real seen = most_seen[c] * ratio[c], light = s->light[c] * seen;
         const nb_real doubt = doubt_of_end(from->error[c] + from->to_sun.error[c], first - last) +
                               doubt_of_end(to->error[c] + to->to_sun.error[c], last - first) +
                               (least[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
         g->radiance[c] = g->radiance[c] + nb_select(lanes, light, NB_F(0.0));
-        rounding = nb_max(rounding, light * doubt + glow.error[c] * seen);
+        rounding = nb_max(rounding, light * doubt + s->light_error[c] * seen);
     }
     rounding = rounding + largest(g->radiance) * NB_EPSILON;
     g->radiance_error = g->radiance_error + nb_select(lanes, rounding, NB_F(0.0));
@@ -90,18 +105,18 @@ static void add_closed_step(const sunlight *sun, const march *m, const sun_place
 /* From toggle to toggle, and where the sun shines from turn to turn; all lanes go on at once, those in shadow, too. */
 static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p, nb_mask lit, gathered *g)
 {
-    const gathered before = *g;
     nb_wmask lanes = nb_widen_mask(lit);
-    sun_place from = place_on_rays(sun, m, p, &before, p->start, lanes);
+    sun_place from = first_place(sun, m, p, g, lanes);
     while (nb_wany(lanes)) {
         pass_toggles(&sun->shade, from.t, lanes);
         const nb_wmask dark = nb_wand(lanes, sun->shade.is_dark);
         const nb_wide bright = nb_wmin(sun->shade.toggle, p->end);
         const nb_wide turn = nb_wmin(next_turn(sun, from.t, bright), nearest_kink(m, from.t, bright));
         const nb_wide end = nb_wselect(lanes, nb_wselect(dark, bright, turn), from.t);
-        const sun_place to = place_on_rays(sun, m, p, &before, end, lanes);
+        const sun_stretch between = stretch_between(m, from.t, end);
+        const sun_place to = next_place(sun, m, &from, &between, end, lanes);
         const nb_mask shines = nb_narrow_mask(nb_wand(lanes, nb_wnot(dark)));
-        if (nb_any(shines)) add_closed_step(sun, m, &from, &to, shines, g);
+        if (nb_any(shines)) add_closed_step(sun, m, &from, &to, &between, shines, g);
         from = to;
         lanes = nb_wand(lanes, from.t < p->end);
     }

@@ -48,11 +48,11 @@ static void depth_after(const contact *k, const gathered *g, nb_wide along, nb_r
     for (int c = 0; c < 3; c++) depth[c] = g->depth[c] + k->extinction[c] * nb_narrow(along);
 }
 
-/* The integral of the density behind which no sunlight matters, in any channel: less than a hundredth of what steps may
- * add to the error, which the node then tells. */
-static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb_real depth[3])
+/* The integral of the density behind which no sunlight matters, in any channel: less than `least` of what steps may add
+ * to the error. */
+static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb_real depth[3], double least)
 {
-    const nb_real dark = -nb_log(nb_max(REAL(0.01 * sun->share), NB_TINY));
+    const nb_real dark = -nb_log(nb_max(REAL(least * sun->share), NB_TINY));
     nb_real most = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real amount = (dark - depth[c]) / nb_max(k->extinction[c], NB_TINY);
@@ -61,13 +61,17 @@ static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb
     return nb_min(most, NB_HUGE);
 }
 
+/* What a node leaves out, which it tells. */
+#define HIDDEN_PART 0.01
+
 static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, const grid_nodes *nodes,
                           nb_mask lanes, int n)
 {
     const contact *k = present(m, m->present_first);
     nb_real depth[3], all[3], seen[3], behind[3];
     depth_after(k, g, w->along + nb_widen(nodes->amount * REAL(sun_nodes[n])), depth);
-    const light_depth to_sun = depth_of_grid(sun, m, nodes->place[n], lanes, amount_that_hides(sun, k, depth));
+    const light_depth to_sun =
+        depth_of_grid(sun, m, nodes->place[n], lanes, amount_that_hides(sun, k, depth, HIDDEN_PART));
     for (int c = 0; c < 3; c++) all[c] = depth[c] + to_sun.depth[c];
     map_channels(sun->snapshot, transmitted, all, seen);
     map_channels(sun->snapshot, transmitted, depth, behind);
@@ -84,7 +88,7 @@ static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, cons
 
 /* The error that is told, as a multiple of what the nodes are off a parabola: light from voxels is not as smooth as
  * rules want it. */
-#define GRID_CAUTION NB_F(2.0)
+#define GRID_CAUTION NB_F(4.0)
 
 /* Nothing but lights spends the budget in fog of one medium. */
 #define GRID_SHARE NB_F(3.0)

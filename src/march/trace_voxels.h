@@ -1,6 +1,6 @@
 /* Voxels crossed by all rays of a packet at once, in float: each lane goes from cell to cell, past bricks without fog
  * in one step. Places are wide, so that rays that come from far away keep the digits of their cells. Included by
- * trace_packet.h in float kernels. */
+ * trace_profile.h in float kernels. */
 
 /* The rays in cells. */
 typedef struct voxel_rays {
@@ -113,16 +113,25 @@ static inline void pass_clear(const voxel_rays *r, voxel_walk *w, nb_wide end, n
 
 /* ---- in a cell ------------------------------------------------------------------------------- */
 
-static inline nb_real voxel_at(const nebel_grid *grid, nb_wide index)
+/* A voxel, and the one behind it, which may lie behind the last. */
+static inline nb_real voxels_at(const nebel_grid *grid, nb_wide index, nb_wide behind, nb_real *second)
 {
+    const nb_mask is_same = nb_narrow_mask(behind <= index);
+    nb_real first, next;
     switch (grid->type) {
     case NEBEL_VOXEL_UINT8:
-        return nb_gather_bytes(grid->voxels, index);
+        first = nb_gather_byte_pairs(grid->voxels, index, &next);
+        break;
     case NEBEL_VOXEL_UINT16:
-        return nb_gather_shorts(grid->voxels, index);
+        first = nb_gather_pairs(grid->voxels, index, &next);
+        break;
     default:
-        return nb_gather(grid->voxels, index);
+        first = nb_gather(grid->voxels, index);
+        next = nb_gather(grid->voxels, behind);
+        break;
     }
+    *second = nb_select(is_same, first, next);
+    return first;
 }
 
 /* What a voxel as it is gathered is multiplied by. */
@@ -160,8 +169,7 @@ static inline void corners_of_cell(const nebel_grid *grid, const nb_wide cell[3]
     }
     for (int n = 0; n < 4; n++) {
         const nb_wide row = (n & 1 ? high[1] : low[1]) + (n & 2 ? high[2] : low[2]);
-        v[2 * n] = voxel_at(grid, row + low[0]);
-        v[2 * n + 1] = voxel_at(grid, row + high[0]);
+        v[2 * n] = voxels_at(grid, row + low[0], row + high[0], &v[2 * n + 1]);
     }
 }
 
@@ -187,8 +195,9 @@ static inline cell_voxels voxels_of_cell(const voxel_rays *r, const voxel_walk *
     return (cell_voxels){NB_F(0.5) * (a + b), NB_F(1.7320508075688772) * (b - a)};
 }
 
-/* To the end of the cell, or to `end`. */
-static inline nb_wide step_voxel(const voxel_rays *r, voxel_walk *w, nb_wide end, nb_wmask lanes, cell_voxels *voxels)
+/* To the end of the cell, or to `end`. Always in line: a call keeps the walk of all lanes in memory. */
+static inline __attribute__((always_inline)) nb_wide step_voxel(const voxel_rays *r, voxel_walk *w, nb_wide end,
+                                                                nb_wmask lanes, cell_voxels *voxels)
 {
     nb_wide crossing[3];
     nb_wmask is_axis[3];

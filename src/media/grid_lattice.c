@@ -16,16 +16,19 @@ typedef struct body {
     double to_sun[3];
 } body;
 
-/* Two columns per cell where they are no more nodes than this, else one; then half as many, until they fit. */
-#define MOST_NODES ((size_t)1 << 25)
-
 /* ---- placing --------------------------------------------------------------------------------- */
 
-static void set_axes(nb_grid_lattice *l, const double to_sun[3])
+static int steepest_axis(const double to_sun[3])
 {
-    l->axis = 0;
+    int axis = 0;
     for (int i = 1; i < 3; i++)
-        if (fabs(to_sun[i]) > fabs(to_sun[l->axis])) l->axis = i;
+        if (fabs(to_sun[i]) > fabs(to_sun[axis])) axis = i;
+    return axis;
+}
+
+static void set_axes(nb_grid_lattice *l, int axis, const double to_sun[3])
+{
+    l->axis = axis;
     for (int s = 0; s < 2; s++) {
         l->side[s] = (l->axis + 1 + s) % 3;
         l->lean[s] = to_sun[l->side[s]] / to_sun[l->axis];
@@ -57,11 +60,25 @@ static size_t block_count(const nb_grid_lattice *l)
     return (size_t)l->blocks[0] * (size_t)l->blocks[1] * (size_t)l->blocks[2];
 }
 
-static void choose_counts(nb_grid_lattice *l, const nebel_grid *grid)
+static void lay_along(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], int axis, double per_cell)
 {
-    l->per_cell = 2;
+    set_axes(l, axis, to_sun);
+    l->per_cell = per_cell;
     set_counts(l, grid);
-    while (node_count(l) > MOST_NODES && l->count[0] > 8 && l->count[1] > 8) {
+}
+
+void nb_grid_lattice_lay(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], nb_lattice_limit limit)
+{
+    const int steepest = steepest_axis(to_sun);
+    lay_along(l, grid, to_sun, steepest, limit.per_cell);
+    /* Too many nodes: flat grids have fewer layers across, in which columns lean more. */
+    for (int axis = 0; axis < 3 && node_count(l) > limit.most_nodes; axis++) {
+        nb_grid_lattice other = *l;
+        if (2 * fabs(to_sun[axis]) < fabs(to_sun[steepest])) continue;
+        lay_along(&other, grid, to_sun, axis, limit.per_cell);
+        if (node_count(&other) < node_count(l)) *l = other;
+    }
+    while (node_count(l) > limit.most_nodes && l->count[0] > 8 && l->count[1] > 8) {
         l->per_cell /= 2;
         set_counts(l, grid);
     }
@@ -69,65 +86,84 @@ static void choose_counts(nb_grid_lattice *l, const nebel_grid *grid)
 
 /* ---- columns --------------------------------------------------------------------------------- */
 
-/* Where a column is within the box, in layers, and across which axes the faces are that it ends at. */
-typedef struct part {
-    double low, high;
-    int low_axis, high_axis;
-} part;
+/* From the sides outwards the density is as at the sides, as it is between them and the outermost middles of voxels;
+ * half way between those the coordinates are held, where rounding cannot make them pass either. */
+#define HELD 0.25
 
-/* Ways that lean less run along the faces. */
-#define LEAST_LEAN 1e-12
-
-/* Along a side, of a column at a layer. Level columns beside the box are taken to its faces. */
-static double place_of(const nb_grid_lattice *l, const nebel_grid *grid, int s, int column, double layer)
+/* Along a side, of a column at a layer. */
+static double place_of(const nb_grid_lattice *l, int s, int column, double layer)
 {
-    const double place = (l->first[s] + column) / l->per_cell;
-    if (fabs(l->lean[s]) >= LEAST_LEAN) return place + l->lean[s] * layer;
-    return fmin(fmax(place, nb_grid_margin(grid)), nb_grid_end(grid, l->side[s]));
+    return (l->first[s] + column) / l->per_cell + l->lean[s] * layer;
 }
 
-static part within_box(const nb_grid_lattice *l, const nebel_grid *grid, const int column[2])
+/* Where a column is beside the box, the density is that at its side: there it is a line along the side. */
+enum { MOST_PARTS = 5 };
+
+/* Layers at which parts of a column begin and end, ascending; returns how many parts there are. */
+static int part_column(const nb_grid_lattice *l, const nebel_grid *grid, const int column[2],
+                       double layer[MOST_PARTS + 1])
 {
-    const double margin = nb_grid_margin(grid);
-    part p = {margin, nb_grid_end(grid, l->axis), l->axis, l->axis};
-    for (int s = 0; s < 2; s++) {
-        const double from = place_of(l, grid, s, column[s], 0), end = nb_grid_end(grid, l->side[s]);
-        if (fabs(l->lean[s]) < LEAST_LEAN) continue;
-        const double a = (margin - from) / l->lean[s], b = (end - from) / l->lean[s];
-        const double low = fmin(a, b), high = fmax(a, b);
-        if (low > p.low) p.low_axis = l->side[s];
-        if (high < p.high) p.high_axis = l->side[s];
-        p.low = fmax(p.low, low);
-        p.high = fmin(p.high, high);
-    }
-    return p;
+    const double last = l->count[2] - 1;
+    int count = 0;
+    layer[0] = 0;
+    for (int s = 0; s < 2; s++)
+        for (int far = 0; far < 2; far++) {
+            const double held = far ? nb_grid_end(grid, l->side[s]) - HELD : nb_grid_margin(grid) + HELD;
+            const double at = (held - place_of(l, s, column[s], 0)) / l->lean[s];
+            if (!(at > 0 && at < last)) continue; /* nor where the column is level */
+            int i = ++count;
+            for (; layer[i - 1] > at; i--) layer[i] = layer[i - 1];
+            layer[i] = at;
+        }
+    layer[++count] = last;
+    return count;
 }
 
-/* Room for the nodes of a column: places along the walk, and what the walk says. */
+/* Room for the nodes of a column: places along a part, what its walk says, and the sums so far. */
 typedef struct column_space {
-    double *place, *sum;
+    double *place, *part, *sum;
 } column_space;
 
-/* From the sun down, so that the integral from a node to the sun is that of the walk so far. Nodes in front of the box
- * have nothing before the sun; those behind it have all. */
-static void walk_column(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
-                        const part *p, const column_space *space)
+/* The line from layer `start` towards `end`, away from the sun. Returns 0 where it is beside a box without fog at its
+ * sides. */
+static int set_line(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
+                    double start, double end, nb_grid_line *line)
 {
-    const int up = to_sun[l->axis] > 0, layers = l->count[2];
-    const double top = up ? p->high : p->low, metres = 1 / fabs(to_sun[l->axis]);
-    const double length = (p->high - p->low) * metres;
-    nb_grid_line line;
-    line.from[l->axis] = top;
-    line.slope[l->axis] = -to_sun[l->axis];
+    int is_beside = 0;
+    line->from[l->axis] = start;
+    line->slope[l->axis] = -to_sun[l->axis];
     for (int s = 0; s < 2; s++) {
-        line.from[l->side[s]] = place_of(l, grid, s, column[s], top);
-        line.slope[l->side[s]] = -to_sun[l->side[s]];
+        const int side = l->side[s];
+        const double least = nb_grid_margin(grid) + HELD, most = nb_grid_end(grid, side) - HELD;
+        const double from = place_of(l, s, column[s], start), middle = place_of(l, s, column[s], 0.5 * (start + end));
+        const int is_held = middle < least || middle > most;
+        line->from[side] = fmin(fmax(from, least), most);
+        line->slope[side] = is_held ? 0 : -to_sun[side];
+        is_beside = is_beside || is_held;
     }
-    for (int n = 0; n < layers; n++) {
-        const double below = up ? top - (layers - 1 - n) : n - top;
-        space->place[n] = fmin(fmax(below, 0) * metres, length);
+    return !is_beside || l->ends_in_fog;
+}
+
+/* From the sun down, so that the integral from a node to the sun is that of the walk so far. */
+static void walk_column(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
+                        const column_space *space)
+{
+    double layer[MOST_PARTS + 1];
+    const int nodes = l->count[2], parts = part_column(l, grid, column, layer);
+    const double metres = 1 / fabs(to_sun[l->axis]);
+    memset(space->sum, 0, (size_t)nodes * sizeof *space->sum);
+    for (int i = 0; i < parts; i++) {
+        const double start = layer[l->up ? parts - i : i], end = layer[l->up ? parts - i - 1 : i + 1];
+        const double length = fabs(end - start) * metres;
+        nb_grid_line line;
+        if (!(length > 0) || !set_line(l, grid, to_sun, column, start, end, &line)) continue;
+        for (int n = 0; n < nodes; n++) {
+            const double below = l->up ? start - (nodes - 1 - n) : n - start;
+            space->place[n] = fmin(fmax(below, 0) * metres, length);
+        }
+        nb_grid_sums(grid, &line, length, nodes, space->place, space->part);
+        for (int n = 0; n < nodes; n++) space->sum[n] += space->part[n];
     }
-    nb_grid_sums(grid, &line, length, layers, space->place, space->sum);
 }
 
 static uint16_t number_of(double amount)
@@ -140,36 +176,55 @@ static void fill_column(nb_grid_lattice *l, const nebel_grid *grid, const double
 {
     uint16_t *node = l->amount + (size_t)column[1] * (size_t)l->count[0] + (size_t)column[0];
     const size_t layer = (size_t)l->count[0] * (size_t)l->count[1];
-    const part p = within_box(l, grid, column);
-    const int is_met = p.low<p.high, up = to_sun[l->axis]> 0;
-    if (is_met) walk_column(l, grid, to_sun, column, &p, space);
+    walk_column(l, grid, to_sun, column, space);
     for (int n = 0; n < l->count[2]; n++) {
-        const size_t k = (size_t)(up ? l->count[2] - 1 - n : n);
-        node[k * layer] = is_met ? number_of(space->sum[n] / l->step) : 0;
+        const size_t k = (size_t)(l->up ? l->count[2] - 1 - n : n);
+        node[k * layer] = number_of(space->sum[n] / l->step);
     }
 }
 
 static int fill_columns(nb_grid_lattice *l, const nebel_grid *grid, const nebel_allocator *allocator,
                         const double to_sun[3])
 {
-    double *memory = nb_allocate(allocator, 2 * (size_t)l->count[2], sizeof *memory);
+    const size_t nodes = (size_t)l->count[2];
+    double *memory = nb_allocate(allocator, 3 * nodes, sizeof *memory);
     if (memory == NULL) return 0;
-    const column_space space = {memory, memory + l->count[2]};
+    const column_space space = {memory, memory + nodes, memory + 2 * nodes};
     for (int v = 0; v < l->count[1]; v++)
         for (int u = 0; u < l->count[0]; u++) fill_column(l, grid, to_sun, (const int[2]){u, v}, &space);
     nb_release(allocator, memory);
     return 1;
 }
 
-/* No way through the box is longer than it is along any axis. */
 static double longest_amount(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3])
 {
-    double length = 1 / fabs(to_sun[l->axis]) * nb_grid_cells(grid, l->axis);
-    for (int s = 0; s < 2; s++) {
-        const double speed = fabs(to_sun[l->side[s]]);
-        if (speed > 0) length = fmin(length, nb_grid_cells(grid, l->side[s]) / speed);
+    return fmax((l->count[2] - 1) / fabs(to_sun[l->axis]) * nb_grid_peak(grid), 1e-30);
+}
+
+/* Whether there is fog at any face of linear voxels: level with the axis `across`, of which it asks the middles of voxels. */
+static int has_fog_at(const nebel_grid *grid, int across)
+{
+    const int a = (across + 1) % 3, b = (across + 2) % 3;
+    double place[3];
+    for (int far = 0; far < 2; far++)
+        for (int i = 1; i < nb_grid_cells(grid, a); i++)
+            for (int j = 1; j < nb_grid_cells(grid, b); j++) {
+                place[across] = far ? nb_grid_end(grid, across) : nb_grid_margin(grid);
+                place[a] = i;
+                place[b] = j;
+                if (nb_grid_density(grid, place) > 0) return 1;
+            }
+    return 0;
+}
+
+static void set_ends(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3])
+{
+    l->up = to_sun[l->axis] > 0;
+    l->ends_in_fog = !nb_grid_is_linear(grid) || has_fog_at(grid, 0) || has_fog_at(grid, 1) || has_fog_at(grid, 2);
+    for (int i = 0; i < 3; i++) {
+        const int axis = i < 2 ? l->side[i] : l->axis;
+        l->end[i] = to_sun[axis] > 0 ? nb_grid_end(grid, axis) : nb_grid_margin(grid);
     }
-    return fmax(length * nb_grid_peak(grid), 1e-30);
 }
 
 /* ---- second differences ---------------------------------------------------------------------- */
@@ -196,68 +251,6 @@ static void note_deviation(nb_grid_lattice *l, int i, int j, int k, uint16_t off
                     &l->deviation[((size_t)z * (size_t)l->blocks[1] + (size_t)y) * (size_t)l->blocks[0] + (size_t)x];
                 if (off > *most) *most = off;
             }
-}
-
-static void add_deviation(nb_grid_lattice *l, int i, int j, int k, double off)
-{
-    const uint16_t number = number_of(off / l->step);
-    if (number > 0) note_deviation(l, i, j, k, number);
-}
-
-/* The density at a place of a column. */
-static double density_at_end(const nb_grid_lattice *l, const nebel_grid *grid, const int column[2], double layer)
-{
-    double place[3];
-    place[l->axis] = layer;
-    for (int s = 0; s < 2; s++) place[l->side[s]] = place_of(l, grid, s, column[s], layer);
-    return nb_grid_density(grid, place);
-}
-
-/* Where a column meets a face of the box the depth bends, by the density there times the metres of the way from node to
- * node: linear interpolation is off by a quarter of that at most. */
-static void note_face(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
-                      double layer, int axis)
-{
-    const double nodes = fabs(to_sun[axis]) * (axis == l->axis ? 1 : l->per_cell);
-    const double bend = density_at_end(l, grid, column, layer) / nodes;
-    const int k = (int)fmin(fmax(floor(layer), 0), l->count[2] - 2);
-    for (int side = 0; side < 2 && bend > 0; side++) add_deviation(l, column[0], column[1], k + side, bend / 4);
-}
-
-/* Ways beside each other that leave the box by different faces: behind the edge between them the depth bends, all the
- * way down. Beside a side of the box the way changes by 1 / |to_sun| of its axis. */
-static void note_edge(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
-                      const part *p)
-{
-    const int up = to_sun[l->axis] > 0, end = up ? p->high_axis : p->low_axis;
-    double steepest = 0;
-    int differs = 0;
-    for (int s = 0; s < 2; s++) {
-        const double speed = fabs(to_sun[l->side[s]]) * l->per_cell;
-        if (fabs(l->lean[s]) >= LEAST_LEAN) steepest = fmax(steepest, 1 / speed);
-        for (int way = -1; way <= 1; way += 2) {
-            int next[2] = {column[0], column[1]};
-            next[s] += way;
-            const part beside = within_box(l, grid, next);
-            differs = differs || (up ? beside.high_axis : beside.low_axis) != end || !(beside.low < beside.high);
-        }
-    }
-    if (!differs || !(steepest > 0)) return;
-    const double bend = density_at_end(l, grid, column, up ? p->high : p->low) * steepest;
-    for (int k = 0; k < l->count[2] && bend > 0; k++) add_deviation(l, column[0], column[1], k, bend / 4);
-}
-
-static void note_ends(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3])
-{
-    for (int v = 0; v < l->count[1]; v++)
-        for (int u = 0; u < l->count[0]; u++) {
-            const int column[2] = {u, v};
-            const part p = within_box(l, grid, column);
-            if (!(p.low < p.high)) continue;
-            note_face(l, grid, to_sun, column, p.low, p.low_axis);
-            note_face(l, grid, to_sun, column, p.high, p.high_axis);
-            note_edge(l, grid, to_sun, column, &p);
-        }
 }
 
 /* Half way between nodes linear interpolation is off by an eighth of the second difference, on the average by a twelfth.
@@ -314,19 +307,17 @@ static void free_body(body *b)
 static int fill_lattice(nb_grid_lattice *l, const nebel_grid *grid, const nebel_allocator *allocator,
                         const double to_sun[3])
 {
-    set_axes(l, to_sun);
-    choose_counts(l, grid);
+    set_ends(l, grid, to_sun);
     l->step = longest_amount(l, grid, to_sun) / UINT16_MAX;
     l->bytes = (node_count(l) + block_count(l)) * sizeof *l->amount;
     l->amount = nb_allocate(allocator, node_count(l) + 1, sizeof *l->amount); /* gathers read one more */
     l->deviation = nb_allocate(allocator, block_count(l) + 1, sizeof *l->deviation);
     if (l->amount == NULL || l->deviation == NULL || !fill_columns(l, grid, allocator, to_sun)) return 0;
-    if (!finish_layers(l, allocator)) return 0;
-    note_ends(l, grid, to_sun);
-    return 1;
+    return finish_layers(l, allocator);
 }
 
-nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3])
+nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
+                                      nb_lattice_limit limit)
 {
     body *b = nb_allocate_zero(allocator, 1, sizeof *b);
     if (b == NULL) return NULL;
@@ -334,6 +325,7 @@ nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *a
     atomic_init(&b->owners, 1);
     b->grid = nebel_retain_grid(grid);
     memcpy(b->to_sun, to_sun, sizeof b->to_sun);
+    nb_grid_lattice_lay(&b->lattice, grid, to_sun, limit);
     if (fill_lattice(&b->lattice, grid, allocator, to_sun)) return &b->lattice;
     free_body(b);
     return NULL;

@@ -1,9 +1,12 @@
 /* How much fog lies between any place in voxels and the sun, on a lattice.
  *
  * The lattice is sheared: its columns run along the way to the sun, and its layers are the faces of cells across the
- * axis that this way follows most. So the integral at every node of a column is had in one walk, exactly; beside the
- * box, where the way to the sun is the same, it is that where the way meets the box. Between nodes it is interpolated,
- * whose error is estimated by second differences. */
+ * axis that this way follows most. So the integral at every node of a column is had in one walk, exactly. Between nodes
+ * it is interpolated, whose error is estimated by second differences.
+ *
+ * Where the box ends within fog, at one face here and at another one there, the depth has bends that no node sees. So
+ * columns do not end there: beside the box the density goes on as it is at its faces. What lies outside is taken off
+ * again: it is the integral at the place where the way to the sun leaves the box, on the same column. */
 #ifndef NB_MEDIA_GRID_LATTICE_H
 #define NB_MEDIA_GRID_LATTICE_H
 
@@ -21,21 +24,36 @@
  * which count columns along both sides and layers. */
 typedef struct nb_grid_lattice {
     int axis, side[2];
-    double lean[2]; /* cells that the way moves aside from one layer to the next */
+    double lean[2];  /* cells that the way moves aside from one layer to the next */
+    int up;          /* whether the sun is where layers have larger numbers */
+    int ends_in_fog; /* whether there is any at the faces of the box; 0: nothing lies outside */
+    double end[3];   /* the faces towards the sun, in cells along both sides and the axis */
     double first[2];
     double per_cell;
-    int count[3];     /* nodes: columns along both sides, layers; two at least */
-    int blocks[3];    /* of nodes */
-    double step;      /* what numbers of nodes are multiples of [m] */
-    uint16_t *amount; /* integral of the density from the node to the sun; columns along side[0] in turn. Less a twelfth
+    int count[3];  /* nodes: columns along both sides, layers; two at least */
+    int blocks[3]; /* of nodes */
+    double step;   /* what numbers of nodes are multiples of [m] */
+    uint16_t *
+        amount; /* integral of the density from the node to the last layer; columns along side[0] in turn. Less a twelfth
                             of its second differences, by which linear interpolation of a parabola is too large on average
                             */
     uint16_t *deviation; /* of each block: what interpolation may be off by in its cells, with one more node */
     size_t bytes;
 } nb_grid_lattice;
 
-/* `to_sun`: cells per metre of the way to the sun, not all 0. The lattice keeps the grid. NULL where memory is out. */
-nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3]);
+/* How fine a lattice is at most. */
+typedef struct nb_lattice_limit {
+    double per_cell;   /* columns */
+    size_t most_nodes; /* columns are halved in number until they are no more */
+} nb_lattice_limit;
+
+/* Lays a lattice out: axes and counts, without nodes. `to_sun`: cells per metre of the way to the sun, not all 0. */
+void nb_grid_lattice_lay(nb_grid_lattice *lattice, const nebel_grid *grid, const double to_sun[3],
+                         nb_lattice_limit limit);
+
+/* Lays it out and finds its nodes. The lattice keeps the grid. NULL where memory is out. */
+nb_grid_lattice *nb_grid_lattice_make(nebel_grid *grid, const nebel_allocator *allocator, const double to_sun[3],
+                                      nb_lattice_limit limit);
 
 nb_grid_lattice *nb_grid_lattice_retain(nb_grid_lattice *lattice);
 

@@ -1,11 +1,12 @@
 #include "lamp.h"
 
+#include "base/bulb.h"
+
 #include <math.h>
 
 #define PI 3.14159265358979323846
 
-/* Of lamps that are given none: what a ray through the lamp sees has no bound without it. */
-static const double least_radius = 1e-3, largest_radius = 1e6;
+static const double largest_radius = 1e6;
 
 static int is_within(const double v[3], double low, double high)
 {
@@ -39,7 +40,7 @@ static const char *fault_of_lamp(const nebel_lamp *lamp)
         return "position: must be three finite numbers, at most " NB_TEXT(NEBEL_MAX_LENGTH) " m from the origin";
     if (!is_within(lamp->intensity, 0, NEBEL_MAX_AMOUNT))
         return "intensity: every channel must be within 0 and " NB_TEXT(NEBEL_MAX_AMOUNT);
-    if (lamp->radius != 0 && !(lamp->radius >= least_radius && lamp->radius <= largest_radius))
+    if (lamp->radius != 0 && !(lamp->radius >= NB_LEAST_BULB && lamp->radius <= largest_radius))
         return "radius: must be 0 or a length from 1e-3 to 1e6 m";
     return lamp->type == NEBEL_LAMP_SPOT ? fault_of_cone(lamp) : NULL;
 }
@@ -66,7 +67,7 @@ static void set_cone(const nebel_lamp *lamp, nb_lamp *made)
 
 nb_lamp nb_lamp_resolve(const nebel_lamp *lamp)
 {
-    const double radius = fmax(lamp->radius, least_radius);
+    const double radius = nb_bulb(lamp->radius);
     nb_lamp made = {.radius2 = radius * radius, .clear = lamp->radius};
     for (int i = 0; i < 3; i++) {
         made.place[i] = lamp->position[i] + 0;

@@ -17,7 +17,7 @@ const char *nb_phase_fault(const nebel_phase *phase)
     case NEBEL_PHASE_RAYLEIGH:
         return NULL;
     case NEBEL_PHASE_DRAINE:
-        if (!(phase->alpha >= 0 && phase->alpha <= 1e9)) return "phase alpha: must be within 0 and 1e9";
+        if (!(phase->alpha >= 0 && phase->alpha <= NEBEL_MAX_ALPHA)) return "phase alpha: must be within 0 and 1e9";
         /* fall through */
     case NEBEL_PHASE_HENYEY_GREENSTEIN:
     case NEBEL_PHASE_CORNETTE_SHANKS:

@@ -518,6 +518,18 @@ void nb_sky_map_radiance(const nebel_environment_map *map, const double directio
     }
 }
 
+const nb_sky_table *nb_sky_map_reflection(const nebel_environment_map *map)
+{
+    return &map->reflected;
+}
+
+const float *nb_sky_map_pixels(const nebel_environment_map *map, size_t *width, size_t *height)
+{
+    *width = map->width;
+    *height = map->height;
+    return map->pixels;
+}
+
 void nb_sky_map_most(const nebel_environment_map *map, double most[3])
 {
     memcpy(most, map->most, sizeof map->most);

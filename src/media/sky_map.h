@@ -36,6 +36,10 @@ void nb_sky_map_radiance(const nebel_environment_map *map, const double directio
 void nb_sky_map_reflected(const nebel_environment_map *map, const double normal[3], double radiance[3]);
 void nb_sky_map_scattered(const nb_sky_table *table, const double direction[3], double radiance[3]);
 
+/* What a white surface reflects, and the pixels: as above. */
+const nb_sky_table *nb_sky_map_reflection(const nebel_environment_map *map);
+const float *nb_sky_map_pixels(const nebel_environment_map *map, size_t *width, size_t *height);
+
 /* The largest of all pixels. */
 void nb_sky_map_most(const nebel_environment_map *map, double most[3]);
 
