@@ -70,7 +70,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     witness seen = {0};
     nebel_scene *scene = NULL;
-    const nebel_scene_desc desc = {{allocate, release, &seen}, {count_message, &seen}};
+    const nebel_scene_desc desc = {.allocator = {allocate, release, &seen}, .log = {count_message, &seen}};
     const nebel_result result = nebel_parse_scene((const char *)data, size, "fuzz.json", &desc, &scene);
     if ((result == NEBEL_OK) != (scene != NULL)) abort();
     if ((result == NEBEL_OK) != (seen.messages == 0)) abort();

@@ -49,7 +49,7 @@ static inline nebel_scene_desc metered_desc(meter *m, journal *kept)
 {
     *m = (meter){.fail_at = 1L << 40};
     *kept = (journal){0};
-    return (nebel_scene_desc){{metered_allocate, metered_release, m}, {remember, kept}};
+    return (nebel_scene_desc){.allocator = {metered_allocate, metered_release, m}, .log = {remember, kept}};
 }
 
 /* Takes the mark ` out of a text; its line and column go to `place` as "LINE:COLUMN", "" where there is none. */

@@ -356,6 +356,8 @@ static void same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)
     SAME(&a->albedo, &b->albedo);
     WHOLE(a->phase.type, b->phase.type);
     SAME(&a->phase.g, &b->phase.g);
+    SAME(&a->phase.alpha, &b->phase.alpha);
+    SAME(&a->phase.diameter, &b->phase.diameter);
     SAME(&a->emission, &b->emission);
     SAME(&a->start, &b->start);
     SAME(&a->cutoff, &b->cutoff);

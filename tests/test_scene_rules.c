@@ -29,11 +29,11 @@ static void test_what_no_scene_has(void **state)
         {FORMAT, SCENE("`\"ambiant\": 0"),
          "ambiant: unknown key; a scene has: nebel, up, unit, camera, background, sun, ambient, max_opacity, lights, "
          "models, fog, "
-         "nebula, cells, classic, multiple_scattering; did "
+         "nebula, cells, classic, multiple_scattering, planet; did "
          "you "
          "mean "
          "\"ambient\"?"},
-        {FORMAT, SCENE("`\"planet\": {}"), "planet: unknown key"},
+        {FORMAT, SCENE("`\"planets\": {}"), "planets: unknown key"},
         {FORMAT, "{\"camera\": {\"position\": [0, `-1.1e-3, 0]}, \"unit\": 1e18}",
          "camera.position[1]: is -0.0011; must be"},
         {FORMAT, "{\"camera\": {}, \"unit\": `0}", "unit: is 0; must be a number of metres from 1e-9 to 1e18"},
@@ -126,8 +126,12 @@ static void test_lights_are_checked(void **state)
     const rule rules[] = {
         {FORMAT, BAD_LIGHT(POINT ", \"radius\": `1e-4"), "lights[0].radius: is 0.0001; must be a length from 0.001 to"},
         {FORMAT, BAD_LIGHT(SPOT "\"inner_angle\": `31, \"outer_angle\": 30"), "lights[0].inner_angle: is 31; must be"},
-        {FORMAT, BAD_LIGHT(SPOT "\"outer_angle\": `180"), "lights[0].outer_angle: is 180; must be"},
+        {FORMAT, BAD_LIGHT(SPOT "\"outer_angle\": `180.5"), "lights[0].outer_angle: is 180.5; must be"},
+        {FORMAT, BAD_LIGHT(SPOT "\"outer_angle\": `0"),
+         "lights[0].outer_angle: is 0; must be a number of degrees from the axis, > 0 and <= 180"},
         {FORMAT, BAD_LIGHT(POINT ", `\"direction\": [1, 0, 0]"), "lights[0].direction: unknown key; a point light has"},
+        {FORMAT, BAD_LIGHT("\"type\": `\"sphere\", \"position\": [0, 3, 0]"),
+         "lights[0].type: unknown; must be one of: point, spot; a ball that shines is a point with a \"radius\""},
         {FORMAT, BAD_LIGHT("\"type\": `\"laser\""), "lights[0].type: unknown; must be one of: point, spot"},
         {FORMAT, BAD_LIGHT("\"type\": \"point\", \"position\": [0, 3, 0], \"intensity\": `-1"),
          "lights[0].intensity: is -1"},
@@ -310,13 +314,17 @@ static void test_what_no_volume_has(void **state)
          "fog[0].keys[0].source: does not go with the volume's \"albedo\""},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": `\"mie\"}"),
          "fog[0].phase.type: unknown; must be one of: isotropic, "
-         "henyey_greenstein, rayleigh, cornette_shanks, droplets"},
+         "henyey_greenstein, rayleigh, cornette_shanks, draine, droplets"},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"henyey_greenstein\", \"g\": `1}"),
          "fog[0].phase.g: is 1; must be"},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"cornette_shanks\", \"g\": `-1}"),
          "fog[0].phase.g: is -1; must be"},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": `{\"type\": \"cornette_shanks\"}"),
          "fog[0].phase: the key \"g\" is missing"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"draine\", \"g\": 0, \"alpha\": `-1}"),
+         "fog[0].phase.alpha: is -1; must be a number from 0 to 1e9"},
+        {FORMAT, LIT("\"albedo\": 1, \"phase\": `{\"type\": \"draine\", \"g\": 0}"),
+         "fog[0].phase: the key \"alpha\" is missing"},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"droplets\", \"diameter\": `0}"),
          "fog[0].phase.diameter: is 0"},
         {FORMAT, LIT("\"albedo\": 1, \"phase\": {\"type\": \"rayleigh\", `\"g\": 0}"), "fog[0].phase.g: unknown key"},

@@ -274,12 +274,15 @@ static void test_models(void **state)
 static void test_contrast_and_phase(void **state)
 {
     (void)state;
-    draft d =
-        open_draft(SCENE("\"fog\": [{" BOX ", \"visibility\": 5}, {" BOX ", \"extinction\": 1, \"albedo\": 0.5}, {" BOX
-                         ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"rayleigh\"}}]"));
-    nebel_volume_entry entries[3];
-    for (int i = 0; i < 3; i++) entries[i] = d.data.volume_entries[i];
+    draft d = open_draft(
+        SCENE("\"fog\": [{" BOX ", \"visibility\": 5}, {" BOX ", \"extinction\": 1, \"albedo\": 0.5}, {" BOX
+              ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"rayleigh\"}}, {" BOX
+              ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": {\"type\": \"draine\", \"g\": 0.1, \"alpha\": 2}}]"));
+    nebel_volume_entry entries[4];
+    for (int i = 0; i < 4; i++) entries[i] = d.data.volume_entries[i];
     assert_int_equal(d.volumes[2].phase.type, NEBEL_PHASE_RAYLEIGH);
+    assert_int_equal(d.volumes[3].phase.type, NEBEL_PHASE_DRAINE);
+    assert_true(d.volumes[3].phase.g == .1 && d.volumes[3].phase.alpha == 2);
     for (int c = 0; c < 3; c++) {
         d.volumes[0].extinction[c] = nebel_extinction_from_visibility(5, .02);
         d.volumes[1].extinction[c] = nebel_extinction_from_visibility(8, .1);
@@ -288,12 +291,15 @@ static void test_contrast_and_phase(void **state)
     entries[1].contrast = .1;
     d.volumes[1].phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .75};
     d.volumes[2].phase = (nebel_phase){.type = NEBEL_PHASE_DROPLETS, .diameter = 12.5};
+    d.volumes[3].phase = (nebel_phase){.type = NEBEL_PHASE_DRAINE, .g = -1. / 3, .alpha = 1e9 / 7};
     d.entries = entries;
     check_saved(
         &d, SCENE("\"fog\": [{" BOX ", \"visibility\": 5, \"contrast\": 0.02}, {" BOX
                   ", \"visibility\": 8, \"albedo\": 0.5, \"phase\": { \"type\": \"henyey_greenstein\", \"g\": 0.75 }, "
                   "\"contrast\": 0.1}, {" BOX ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": { \"type\": "
-                  "\"droplets\", \"diameter\": 12.5 }}]"));
+                  "\"droplets\", \"diameter\": 12.5 }}, {" BOX
+                  ", \"extinction\": 1, \"albedo\": 0.5, \"phase\": { \"type\": "
+                  "\"draine\", \"g\": -0.333333333333333, \"alpha\": 142857142.857143 }}]"));
 }
 
 static void test_keys_come_change_and_go(void **state)

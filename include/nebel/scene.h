@@ -17,8 +17,11 @@
 #include <nebel/classic.h>
 #include <nebel/diffusion.h>
 #include <nebel/environment.h>
+#include <nebel/layers.h>
 #include <nebel/nebel.h>
 #include <nebel/nebula.h>
+#include <nebel/clouds.h>
+#include <nebel/planet.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -97,6 +100,35 @@ typedef struct nebel_model {
     double color[3]; /* 0 to 1: in place of its own */
 } nebel_model;
 
+typedef enum nebel_planet_model {
+    NEBEL_PLANET_PHYSICAL = 0,
+    NEBEL_PLANET_LAYERS,
+    NEBEL_PLANET_MODEL_COUNT
+} nebel_planet_model;
+
+/* The section "planet". */
+typedef struct nebel_planet {
+    nebel_planet_model model;
+    nebel_atmosphere_desc air; /* resolved; allocator and log are not set */
+    double sun_diameter;       /* degrees; 0: the sun is not seen */
+
+    const nebel_atmosphere *atmosphere; /* the scene's; NULL until nebel_load_scene_planet */
+    double sun_left[3];                 /* what it leaves of sunlight at the scene's origin */
+
+    nebel_cloud_layer cloud_layers[NEBEL_MAX_CLOUD_LAYERS]; /* PHYSICAL: wind in m per frame; maps are the scene's */
+    uint32_t cloud_layer_count;
+    const nebel_clouds *clouds; /* the scene's; NULL until nebel_load_scene_planet, and where there are no layers */
+
+    nebel_layers_desc shells;   /* LAYERS: a day is counted in frames; maps are the scene's; no allocator and log */
+    const nebel_layers *layers; /* the scene's; NULL until nebel_load_scene_planet */
+} nebel_planet;
+
+/* The sun at a frame. */
+typedef struct nebel_sun_key {
+    double frame;
+    nebel_sun sun; /* its direction of unit length */
+} nebel_sun_key;
+
 /* Everything the file says, resolved: defaults filled in, directions normalised. Owned by the scene. */
 typedef struct nebel_scene_data {
     nebel_camera camera;
@@ -109,6 +141,8 @@ typedef struct nebel_scene_data {
     int has_sun;
     double sun_direction[3];       /* towards the sun, unit length */
     double sun_irradiance[3];      /* on a surface that faces it, before any fog */
+    size_t sun_key_count;          /* 0: the sun stands still */
+    const nebel_sun_key *sun_keys; /* ascending frames; the sun above is the section's own until nebel_light_scene_at */
     double ambient[3];             /* radiance, the same from everywhere, */
     nebel_environment environment; /* or where it is not CONSTANT this in its place; a map is the scene's */
     const char *environment_file;  /* of a map, as it is opened; NULL: none */
@@ -124,6 +158,7 @@ typedef struct nebel_scene_data {
     const nebel_volume_entry *volume_entries; /* of the same volumes */
 
     size_t moving_volume_count; /* that have keys, or noise that moves; 0: the fog is the same at every frame */
+    int moves_on;               /* something moves from frame to frame without end: noise, or a planet that turns */
 
     size_t nebula_count; /* strewn by nebel_make_scene_particles; allocator and log are not set */
     const nebel_nebula_desc *nebulae;
@@ -138,6 +173,9 @@ typedef struct nebel_scene_data {
     nebel_curve_type classic_curve;     /* and what the same section says of other methods */
     const float *classic_table;         /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
     const nebel_d3d9_fog *classic_d3d9; /* switched on. NULL: none */
+
+    size_t planet_count; /* 0 or 1 */
+    const nebel_planet *planets;
 
     const nebel_diffusion_desc *diffusion; /* the section "multiple_scattering"; NULL: none */
 
@@ -157,7 +195,9 @@ typedef struct nebel_scene nebel_scene;
 
 typedef struct nebel_scene_desc {
     nebel_allocator allocator;
-    nebel_log log; /* errors as "FILE:LINE:COLUMN: key: what is wrong; what is allowed" */
+    nebel_log log;        /* errors as "FILE:LINE:COLUMN: key: what is wrong; what is allowed" */
+    nebel_air_run_fn run; /* for threads that make the air of the scene's planet; NULL: one part after the other */
+    void *run_user;
 } nebel_scene_desc;
 
 /* Reads and checks a scene file. Models named in it are not loaded yet. "-" is a file name like any other.
@@ -172,6 +212,12 @@ nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, 
 /* Loads the models and height fields that the scene names. Idempotent. Not thread safe against readers of the same
  * scene. Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
 nebel_result nebel_load_scene_models(nebel_scene *scene);
+
+/* Makes the scene's planet: its layers, or its air. Fog of snapshots from now on is lit by what that air leaves of the sun at the scene's
+ * origin and, where the file has no ambient light, by the sky there: `environment` becomes a map of it. Without this call, and for the light of
+ * fog before it, there is no air. Idempotent. Some 0.25 s on one thread, 1 s with quality "precise". Not thread safe against readers of
+ * the same scene. Errors: MEMORY; there is no air then. */
+nebel_result nebel_load_scene_planet(nebel_scene *scene);
 
 /* Loads models again, placed and coloured as `models` says; those of the file that are not among them are left out.
  * Contents have meshes and textures of these then, and what they pointed to before is gone, as nodes with fog are where
@@ -189,6 +235,19 @@ nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame);
 /* The same of any 1 or more keys. */
 nebel_camera nebel_camera_between_keys(const nebel_camera_key *keys, size_t count, double frame);
 
+/* The sun at a frame: standing, or between its keys, on a cubic through their directions, made unit ones, and within the
+ * range of their irradiances; still before the first and after the last. Without a sun one of no light. */
+nebel_sun nebel_scene_sun(const nebel_scene *scene, double frame);
+
+/* The same of any 1 or more keys. */
+nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double frame);
+
+/* Lights the scene by the sun of a frame, where it has keys: the sun of the contents becomes that, and what the air of a
+ * planet leaves of it at the scene's origin, with the sky there, is made anew (0.1 s), as far as nebel_load_scene_planet has
+ * made it before. Frames and snapshots from now on have that light. Not thread safe against readers of the same scene, nor
+ * while a frame of it is rendered. Errors: ARGUMENT (NULL), MEMORY; the sky is then as it was. */
+nebel_result nebel_light_scene_at(nebel_scene *scene, double frame);
+
 /* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
 nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);
@@ -200,6 +259,28 @@ nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, dou
 
 /* The same of any 1 or more keys of one volume. */
 nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t count, double frame);
+
+/* What the grid of a volume is at a frame, with one more owner, who releases it: noise that moves is made anew, at the
+ * cost of nebel_create_noise; any other grid is itself. `grid` NULL: NULL. On an error *at is NULL. Errors: LIMIT, VALUE
+ * (drifted too far), MEMORY. */
+nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double frame, nebel_grid **at);
+
+/* What a scene file says of noise. */
+typedef struct nebel_scene_noise {
+    nebel_noise_desc desc;   /* its offset, time, name, allocator and log are none */
+    double drift[3], change; /* of its offset and its time, per frame */
+} nebel_scene_noise;
+
+/* Whether a grid is noise of the scene, or of nebel_change_scene_noise; then *noise is what the file says of it, with the
+ * defaults of what it leaves out. Its name tells. 0 also where memory is out. Any thread. */
+int nebel_find_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise);
+
+/* Such a grid with other numbers, in *changed with one owner; on an error *changed is NULL. Offset, time, name, allocator
+ * and log of *noise do not count. It moves with nebel_scene_grid, and nebel_save_scene writes it. The scene's allocator
+ * must be usable as long as the grid lives. Cost: that of nebel_create_noise. Any thread. Errors: ARGUMENT (no such grid),
+ * FORMAT (out of range), VALUE (cells of less than two voxels), LIMIT, MEMORY. */
+nebel_result nebel_change_scene_noise(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *noise,
+                                      nebel_grid **changed);
 
 /* What a volume comes from. */
 typedef enum nebel_volume_origin {
@@ -233,7 +314,7 @@ void nebel_destroy_scene(nebel_scene *scene);
 
 /* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
  * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that the file names, or of none), max_opacity, the
- * classic fog, the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
+ * classic fog, noise (by nebel_change_scene_noise), the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
  * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), and with
  * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and
  * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
@@ -290,15 +371,49 @@ nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, c
  * does not change. Thread safe. Errors: ARGUMENT, FILE, FORMAT (unknown ending), MEMORY. */
 nebel_result nebel_check_image_path(const char *path, const nebel_scene_desc *desc);
 
+/* ---- films ----------------------------------------------------------------------------------- */
+
+/* Pictures one after the other in one file: an animated WebP that begins again at its end. Each is compressed when it
+ * is added; what is compressed stays in memory, libwebp's own, until the film is finished. Films are independent of
+ * each other; one belongs to one thread at a time. nebel may be built without libwebp: nebel_scene_libraries tells. */
+typedef struct nebel_film nebel_film;
+
+enum { NEBEL_MAX_FILM_RATE = 100, NEBEL_DEFAULT_FILM_RATE = 24, NEBEL_DEFAULT_FILM_QUALITY = 85 };
+
+typedef struct nebel_film_desc {
+    nebel_allocator allocator;
+    nebel_log log;
+    double frames_per_second; /* 1 to NEBEL_MAX_FILM_RATE, 0: 24; each picture begins at the nearest millisecond */
+    int quality;              /* 1 to 99: more is larger and better; 100: the bytes of a PNG, without loss; 0: 85 */
+} nebel_film_desc;
+
+/* Whether a name is one of a film: it ends in .webp, in any case. Thread safe. */
+int nebel_is_film_path(const char *path);
+
+/* Nothing is at `path` before the film is finished, but whether it can be written is tried, as by
+ * nebel_check_image_path. Errors: ARGUMENT, VALUE, FORMAT (unknown ending), FILE, MEMORY, UNSUPPORTED (built without). */
+nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, nebel_film **film);
+
+/* Channels R, G, B in 0..1, already in sRGB, become the bytes that nebel_write_image gives a PNG. All pictures of a
+ * film have one size, at most 16383 x 16383. On an error the film is as it was. Errors: ARGUMENT, LIMIT, MEMORY. */
+nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image);
+
+/* Writes the file, once, as nebel_write_image does: as a whole or not at all. Pictures that
+ * follow each other and are equal, or nearly so below a quality of 100, become one that lasts longer. Errors: ARGUMENT (no pictures), FILE, MEMORY. */
+nebel_result nebel_finish_film(nebel_film *film);
+
+/* A film that was not finished is given up, without a trace. NULL is fine. */
+void nebel_destroy_film(nebel_film *film);
+
 /* ---- grids ----------------------------------------------------------------------------------- */
 
-/* Voxels in files. Which kind a file is says its name: .nvdb NanoVDB, .png one picture for each slice, anything else
- * numbers one after the other. */
+/* Voxels in files. Which kind a file is says its name: .nvdb NanoVDB, .vdb OpenVDB (builds that have it: see
+ * nebel_scene_libraries), .png one picture for each slice, anything else numbers one after the other. */
 typedef struct nebel_grid_file {
     const char *file; /* PNG: with a run of # in its name, in whose place the number of a slice stands, from 0, as wide
                          as the run */
     nebel_filter filter;
-    const char *grid;      /* NanoVDB: the name of the grid among those in the file; NULL: the first */
+    const char *grid;      /* NanoVDB, OpenVDB: the name of the grid among those in the file; NULL: the first */
     size_t slices;         /* PNG: how many, 1 to NEBEL_MAX_GRID_SIZE; slice k is the k-th layer along z */
     size_t size[3];        /* numbers: voxels along x, y and z; x fastest, least significant byte first */
     nebel_voxel_type type; /* numbers */

@@ -31,10 +31,11 @@ bool nb_png_is(const nb_bytes *bytes);
 bool nb_exr_is(const nb_bytes *bytes);
 bool nb_jpeg_is(const nb_bytes *bytes);
 
-/* Errors: FORMAT, LIMIT, MEMORY, UNSUPPORTED; on an error the target is empty. */
+/* Errors: FORMAT, LIMIT, MEMORY, UNSUPPORTED; on an error the target is empty. `what` names heights in messages: "a
+ * height map". */
 nebel_result nb_png_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
 nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
-nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, nb_heights *heights);
+nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, const char *what, nb_heights *heights);
 nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, nebel_texture *texture);
 nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image);
 
@@ -49,6 +50,12 @@ nebel_result nb_image_read(const nb_codec *codec, nebel_image *image);
 nebel_result nb_image_allocate(const nb_codec *codec, uint64_t width, uint64_t height, size_t channel_count,
                                const char *const *names, nebel_image *image);
 void nb_image_release(const nebel_allocator *allocator, nebel_image *image);
+
+/* Whether a name ends so, in capitals or not. */
+bool nb_image_ends_in(const char *path, const char *ending);
+
+/* Whether a picture of the caller's can be written. Errors: ARGUMENT, LIMIT. */
+nebel_result nb_image_check(const nb_codec *codec, const nebel_image *image);
 
 /* The index of a channel, or -1. */
 int nb_image_channel(const nebel_image *image, const char *name);

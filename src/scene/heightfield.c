@@ -91,7 +91,7 @@ static nebel_result read_map(const nb_model_load *load, nb_heights *map)
     if (result != NEBEL_OK) return result;
     if (!nb_png_is(&bytes))
         result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" is not a PNG picture", file);
-    else if ((result = nb_png_read_heights(&codec, &bytes, map)) != NEBEL_OK)
+    else if ((result = nb_png_read_heights(&codec, &bytes, "a height map", map)) != NEBEL_OK)
         nb_model_fail(load, result, "%s", note.text);
     nb_release(&load->allocator, bytes.data);
     return result;

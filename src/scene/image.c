@@ -118,7 +118,7 @@ void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image)
 
 /* ---- writing --------------------------------------------------------------------------------- */
 
-static bool ends_in(const char *path, const char *ending)
+bool nb_image_ends_in(const char *path, const char *ending)
 {
     const size_t size = strlen(path), length = strlen(ending);
     return size > length && strcasecmp(path + size - length, ending) == 0;
@@ -127,8 +127,8 @@ static bool ends_in(const char *path, const char *ending)
 nebel_image_format nebel_find_image_format(const char *path)
 {
     if (path == NULL) return NEBEL_IMAGE_NONE;
-    if (ends_in(path, ".png")) return NEBEL_IMAGE_PNG;
-    if (ends_in(path, ".exr")) return NEBEL_IMAGE_EXR;
+    if (nb_image_ends_in(path, ".png")) return NEBEL_IMAGE_PNG;
+    if (nb_image_ends_in(path, ".exr")) return NEBEL_IMAGE_EXR;
     return nb_file_is_direct(path) ? NEBEL_IMAGE_PNG : NEBEL_IMAGE_NONE;
 }
 
@@ -146,7 +146,7 @@ static const char *find_fault(const nebel_image *image)
     return NULL;
 }
 
-static nebel_result check_image(const nb_codec *codec, const nebel_image *image)
+nebel_result nb_image_check(const nb_codec *codec, const nebel_image *image)
 {
     const char *fault = find_fault(image);
     if (fault != NULL)
@@ -189,7 +189,7 @@ nebel_result nebel_write_image(const char *path, const nebel_scene_desc *desc, c
     if (result != NEBEL_OK) return result;
     const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     nb_bytes bytes = {0};
-    result = check_image(&codec, image);
+    result = nb_image_check(&codec, image);
     if (result == NEBEL_OK) result = encode(&codec, image, &bytes);
     if (result == NEBEL_OK) result = nb_file_write(&codec.allocator, &codec.log, path, &bytes);
     nb_release(&codec.allocator, bytes.data);

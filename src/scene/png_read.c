@@ -17,6 +17,7 @@ typedef struct decoder {
     png_uint_32 width, height;
     int bits, channel_count;
     size_t row_size;
+    const char *what; /* heights */
     unsigned char *pixels;
     bool out_of_memory; /* libpng was refused some: then that is why it fails */
     nebel_result result;
@@ -77,8 +78,11 @@ static void stop(decoder *in, nebel_result result, const char *message)
 static void choose_transforms(decoder *in)
 {
     const int type = png_get_color_type(in->png, in->info);
-    if (in->target == TARGET_HEIGHTS && type != PNG_COLOR_TYPE_GRAY)
-        stop(in, NEBEL_ERROR_FORMAT, "a height map must be grey, 8 or 16 bit, without alpha; convert it");
+    if (in->target == TARGET_HEIGHTS && type != PNG_COLOR_TYPE_GRAY) {
+        char message[100];
+        snprintf(message, sizeof message, "%s must be grey, 8 or 16 bit, without alpha; convert it", in->what);
+        stop(in, NEBEL_ERROR_FORMAT, message);
+    }
     png_set_expand(in->png);
     if (in->target != TARGET_TEXTURE) return;
     png_set_scale_16(in->png);
@@ -176,9 +180,9 @@ nebel_result nb_png_read_texture(const nb_codec *codec, const nb_bytes *bytes, n
     return result;
 }
 
-nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, nb_heights *heights)
+nebel_result nb_png_read_heights(const nb_codec *codec, const nb_bytes *bytes, const char *what, nb_heights *heights)
 {
-    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_HEIGHTS};
+    decoder in = {.codec = codec, .bytes = bytes, .target = TARGET_HEIGHTS, .what = what};
     *heights = (nb_heights){0};
     const nebel_result result = decode(&in);
     if (result != NEBEL_OK) return result;

@@ -1,5 +1,5 @@
-/* PNG out: 8 bit, with an ordered rounding that keeps slow gradients of fog free of bands. */
-#include "scene/codec.h"
+/* PNG out: 8 bit. */
+#include "scene/rounding.h"
 
 #include <png.h>
 #include <stdio.h>
@@ -56,34 +56,6 @@ static void on_flush(png_structp png)
 
 /* ---- encoding -------------------------------------------------------------------------------- */
 
-/* B. Bayer's matrix of 8 x 8 (1973): the bits of x ^ y and y, interleaved and reversed. Within (0, 1), so that a value
- * that is a multiple of 1/255 keeps its number. */
-static float threshold(uint32_t x, uint32_t y)
-{
-    const uint32_t a = x ^ y;
-    uint32_t rank = 0;
-    for (uint32_t bit = 0; bit < 3; bit++) rank = rank << 2 | ((a >> bit & 1) << 1) | (y >> bit & 1);
-    return ((float)rank + 0.5f) / 64.0f;
-}
-
-static unsigned char quantize(float value, float rounding)
-{
-    if (!(value > 0)) return 0;
-    const float scaled = (value < 1 ? value : 1) * 255.0f + rounding;
-    return (unsigned char)(scaled < 255.0f ? scaled : 255.0f);
-}
-
-static void fill_row(const encoder *out, uint32_t y)
-{
-    const nebel_image *image = out->image;
-    const float *samples = image->samples + (size_t)y * image->width * image->channel_count;
-    for (uint32_t x = 0; x < image->width; x++) {
-        const float rounding = threshold(x, y);
-        for (int c = 0; c < 3; c++) out->row[3 * (size_t)x + (size_t)c] = quantize(samples[out->channels[c]], rounding);
-        samples += image->channel_count;
-    }
-}
-
 /* One filter and a low level: against libpng's defaults 8 % more bytes in less than half the time. */
 static void run(encoder *out)
 {
@@ -97,28 +69,16 @@ static void run(encoder *out)
     png_set_compression_level(out->png, 3);
     png_write_info(out->png, out->info);
     for (uint32_t y = 0; y < out->image->height; y++) {
-        fill_row(out, y);
+        nb_rounding_fill_row(out->image, out->channels, y, out->row);
         png_write_row(out->png, out->row);
     }
     png_write_end(out->png, out->info);
 }
 
-static nebel_result find_channels(encoder *out)
-{
-    static const char *const names[] = {"R", "G", "B"};
-    for (int c = 0; c < 3; c++) {
-        out->channels[c] = nb_image_channel(out->image, names[c]);
-        if (out->channels[c] < 0)
-            return nb_fail(&out->codec->log, NEBEL_ERROR_ARGUMENT,
-                           "%s: a PNG needs the channels R, G and B; %s is absent", out->codec->name, names[c]);
-    }
-    return NEBEL_OK;
-}
-
 nebel_result nb_png_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes)
 {
     encoder out = {.codec = codec, .image = image, .bytes = bytes, .message = "out of memory"};
-    const nebel_result result = find_channels(&out);
+    const nebel_result result = nb_rounding_find_channels(codec, image, "a PNG", out.channels);
     if (result != NEBEL_OK) return result;
     out.row = nb_allocate(&codec->allocator, image->width, 3);
     if (out.row != NULL)

@@ -123,28 +123,33 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
 
 bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *phase)
 {
-    enum { PHASE_TYPE, G, DIAMETER, COUNT };
-    static const char *const names[] = {"type", "g", "diameter"};
+    enum { PHASE_TYPE, G, ALPHA, DIAMETER, COUNT };
+    static const char *const names[] = {"type", "g", "alpha", "diameter"};
     static const char *const phase_names[] = {"isotropic", "henyey_greenstein", "rayleigh", "cornette_shanks",
-                                              "droplets"};
-    static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN, NEBEL_PHASE_RAYLEIGH,
-                                             NEBEL_PHASE_CORNETTE_SHANKS, NEBEL_PHASE_DROPLETS};
+                                              "draine",    "droplets"};
+    static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN,
+                                             NEBEL_PHASE_RAYLEIGH,  NEBEL_PHASE_CORNETTE_SHANKS,
+                                             NEBEL_PHASE_DRAINE,    NEBEL_PHASE_DROPLETS};
     static const nb_keys keys[] = {
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "an isotropic phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a henyey_greenstein phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE), 0, "a rayleigh phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G), NB_BIT(G), "a cornette_shanks phase function"},
+        {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G) | NB_BIT(ALPHA), NB_BIT(G) | NB_BIT(ALPHA),
+         "a draine phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
     static const nb_range g_range = {
         .low = -NEBEL_MAX_G, .high = NEBEL_MAX_G, .text = "a number within -0.9999 and 0.9999"};
+    static const nb_range alpha_range = {.low = 0, .high = NEBEL_MAX_ALPHA, .text = "a number from 0 to 1e9"};
     static const nb_range diameter_range = {
         .low = 1e-6, .high = NEBEL_MAX_DROPLET, .text = "a diameter within 1e-6 and 50 micrometres"};
     const nb_json_node *found[COUNT];
     if (node == NULL) return true;
-    const int type = nb_value_type(in->json, node, phase_names, 5);
+    const int type = nb_value_type(in->json, node, phase_names, (int)(sizeof types / sizeof *types));
     if (type < 0) return false;
     phase->type = types[type];
     return nb_value_members(in->json, node, &keys[type], found) &&
            nb_value_number(in->json, found[G], &g_range, &phase->g) &&
+           nb_value_number(in->json, found[ALPHA], &alpha_range, &phase->alpha) &&
            nb_value_number(in->json, found[DIAMETER], &diameter_range, &phase->diameter);
 }

@@ -18,7 +18,8 @@ static const nb_keys grid_keys[] = {
     {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SIZE) | NB_BIT(VOXELS),
      NB_BIT(FILE_KEY) | NB_BIT(SIZE) | NB_BIT(VOXELS), "a grid of numbers"},
     {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID), NB_BIT(FILE_KEY), "a grid of NanoVDB"},
-    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SLICES), NB_BIT(FILE_KEY) | NB_BIT(SLICES), "a grid of pictures"}};
+    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(SLICES), NB_BIT(FILE_KEY) | NB_BIT(SLICES), "a grid of pictures"},
+    {key_names, GRID_KEY_COUNT, ANY_FILE | NB_BIT(GRID), NB_BIT(FILE_KEY), "a grid of OpenVDB"}};
 
 static nb_voxel_file kind_of(const nb_json *json, const nb_json_node *object)
 {
@@ -26,6 +27,15 @@ static nb_voxel_file kind_of(const nb_json *json, const nb_json_node *object)
         if (nb_json_has_key(node, "file") && node->type == NB_JSON_STRING)
             return nb_voxel_file_kind(node->string, node->string_size);
     return NB_VOXELS_NUMBERS;
+}
+
+/* Before the kind of file says which keys there must be. */
+static bool names_file(nb_json *json, const nb_json_node *object)
+{
+    for (const nb_json_node *node = nb_json_first(json, object); node != NULL; node = nb_json_next(json, node))
+        if (nb_json_has_key(node, "file") && !nb_value_is(json, node, NB_JSON_STRING, "the path of a file"))
+            return false;
+    return true;
 }
 
 static bool read_choices(nb_json *json, const nb_json_node *const *found, nebel_grid_file *file)
@@ -90,7 +100,8 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
     nebel_grid_file file = {.filter = NEBEL_FILTER_LINEAR};
     nb_note note = {""};
     const nebel_scene_desc desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)};
-    if (!nb_value_members(json, node, &grid_keys[kind_of(json, node)], found) || !read_file(in, found, &file))
+    if (!names_file(json, node) || !nb_value_members(json, node, &grid_keys[kind_of(json, node)], found) ||
+        !read_file(in, found, &file))
         return false;
     file.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);
     if (file.name == NULL || !nb_scene_keep_file(in->scene, file.file))

@@ -1,19 +1,69 @@
 /* The sections "sun" and "lights". */
 #include "scene/scene_internal.h"
 
+#include <float.h>
+#include <string.h>
+
+enum { SUN_FRAME, SUN_DIRECTION, SUN_IRRADIANCE, SUN_KEYS, SUN_KEY_COUNT };
+
+static const char *const sun_names[] = {"frame", "direction", "irradiance", "keys"};
+
+#define SUN_LIGHT (NB_BIT(SUN_DIRECTION) | NB_BIT(SUN_IRRADIANCE))
+
+/* What is not there stays as it is. */
+static bool read_sunlight(const nb_scene_reader *in, const nb_json_node *const *found, nebel_sun *sun)
+{
+    if (!nb_value_color(in->json, found[SUN_IRRADIANCE], &nb_range_light, sun->irradiance)) return false;
+    if (found[SUN_DIRECTION] == NULL) return true;
+    if (!nb_value_direction(in->json, found[SUN_DIRECTION], sun->direction)) return false;
+    nb_space_convert_direction(&in->space, sun->direction);
+    nb_vector_normalize(sun->direction, 3);
+    return true;
+}
+
+static bool read_sun_key(const nb_scene_reader *in, const nb_json_node *node, nebel_sun_key *key)
+{
+    static const nb_keys keys = {sun_names, SUN_KEY_COUNT, NB_BIT(SUN_FRAME) | SUN_LIGHT, NB_BIT(SUN_FRAME),
+                                 "a key of the sun"};
+    const nb_json_node *found[SUN_KEY_COUNT];
+    return nb_value_members(in->json, node, &keys, found) &&
+           nb_value_number(in->json, found[SUN_FRAME], &nb_range_frame, &key->frame) &&
+           read_sunlight(in, found, &key->sun);
+}
+
+static bool read_sun_keys(nb_scene_reader *in, const nb_json_node *node, const nebel_sun *sun)
+{
+    nebel_scene_data *data = &in->scene->data;
+    if (node == NULL) return true;
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of keys of the sun")) return false;
+    if (node->count == 0) return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "holds no key; give one or more");
+    nebel_sun_key *keys = nb_arena_allocate(&in->scene->arena, node->count, sizeof *keys);
+    if (keys == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    size_t i = 0;
+    for (const nb_json_node *at = nb_json_first(in->json, node); at != NULL; at = nb_json_next(in->json, at), i++) {
+        keys[i].sun = *sun;
+        if (!read_sun_key(in, at, &keys[i])) return false;
+        if (i > 0 && keys[i].frame <= keys[i - 1].frame)
+            return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, at,
+                                "its frame %.15g is not after the key before it, %.15g; frames must ascend",
+                                keys[i].frame, keys[i - 1].frame);
+    }
+    data->sun_keys = keys;
+    data->sun_key_count = node->count;
+    return true;
+}
+
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node)
 {
-    enum { DIRECTION, IRRADIANCE, COUNT };
-    static const char *const names[] = {"direction", "irradiance"};
-    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(COUNT) - 1, "a sun"};
-    const nb_json_node *found[COUNT];
+    static const nb_keys keys = {sun_names, SUN_KEY_COUNT, SUN_LIGHT | NB_BIT(SUN_KEYS), SUN_LIGHT, "a sun"};
+    const nb_json_node *found[SUN_KEY_COUNT];
     nebel_scene_data *data = &in->scene->data;
-    if (!nb_value_members(in->json, node, &keys, found) ||
-        !nb_value_direction(in->json, found[DIRECTION], data->sun_direction) ||
-        !nb_value_color(in->json, found[IRRADIANCE], &nb_range_light, data->sun_irradiance))
+    nebel_sun sun;
+    if (!nb_value_members(in->json, node, &keys, found) || !read_sunlight(in, found, &sun) ||
+        !read_sun_keys(in, found[SUN_KEYS], &sun))
         return false;
-    nb_space_convert_direction(&in->space, data->sun_direction);
-    nb_vector_normalize(data->sun_direction, 3);
+    memcpy(data->sun_direction, sun.direction, sizeof sun.direction);
+    memcpy(data->sun_irradiance, sun.irradiance, sizeof sun.irradiance);
     data->has_sun = 1;
     return true;
 }
@@ -34,7 +84,7 @@ static const nb_keys light_keys[] = {
 static bool read_cone(nb_json *json, const nb_json_node *const *found, nebel_lamp *lamp)
 {
     static const nb_range outer_range = {
-        .low = 0, .high = 180, .open = true, .text = "a number of degrees from the axis, > 0 and < 180"};
+        .low = DBL_TRUE_MIN, .high = 180, .text = "a number of degrees from the axis, > 0 and <= 180"};
     static const nb_range inner_range = {
         .low = 0, .high = 180, .text = "a number of degrees from the axis, from 0 to outer_angle"};
     if (!nb_value_direction(json, found[DIRECTION], lamp->direction) ||
@@ -63,6 +113,18 @@ static bool keep_lamp(nb_scene_reader *in, const nb_json_node *node, const nebel
     return true;
 }
 
+/* The other word for what a point with a radius is: a list of the words that there are would not help. */
+static const nb_json_node *find_sphere(const nb_json *json, const nb_json_node *node)
+{
+    static const char word[] = "sphere";
+    if (node->type != NB_JSON_OBJECT) return NULL;
+    for (const nb_json_node *child = nb_json_first(json, node); child != NULL; child = nb_json_next(json, child))
+        if (nb_json_has_key(child, "type") && child->type == NB_JSON_STRING && child->string_size == strlen(word) &&
+            memcmp(child->string, word, strlen(word)) == 0)
+            return child;
+    return NULL;
+}
+
 bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
 {
     static const char *const types[] = {"point", "spot"};
@@ -70,6 +132,10 @@ bool nb_read_light(nb_scene_reader *in, const nb_json_node *node)
     const nb_json_node *found[LIGHT_KEY_COUNT];
     const char *name = "";
     nebel_lamp lamp = {0};
+    const nb_json_node *sphere = find_sphere(in->json, node);
+    if (sphere != NULL)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, sphere,
+                            "unknown; must be one of: point, spot; a ball that shines is a point with a \"radius\"");
     const int type = nb_value_type(in->json, node, types, 2);
     if (type < 0 || !nb_value_members(in->json, node, &light_keys[type], found) ||
         !nb_value_text(in->json, found[NAME], &in->scene->arena, &name) ||

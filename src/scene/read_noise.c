@@ -1,4 +1,4 @@
-/* A density of noise: its voxels are made at once, and anew at every frame where it moves. */
+/* A density of noise: its voxels are made at once. */
 #include "scene/model.h"
 
 #include <limits.h>
@@ -15,7 +15,7 @@ static const nb_keys noise_keys = {key_names, NOISE_KEY_COUNT, NB_BIT(NOISE_KEY_
 /* Further than this per frame nothing is left of the frame before. */
 #define MOST_MOTION 1000
 
-static bool read_numbers(nb_json *json, const nb_json_node *const *found, nb_noise *noise)
+static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_scene_noise *noise)
 {
     static const nb_range part = {.low = 1e-6, .high = 1, .text = "a number from 1e-6 to 1"};
     static const nb_range half = {.low = 0, .high = 0.5, .text = "a number from 0 to 0.5"};
@@ -37,53 +37,35 @@ static bool read_numbers(nb_json *json, const nb_json_node *const *found, nb_noi
     return true;
 }
 
-/* The scene owns the grid already. */
-static bool keep_noise(nb_scene_reader *in, const nb_json_node *node, const nb_noise *noise)
+bool nb_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_noise *noise)
 {
-    nebel_scene *scene = in->scene;
-    void *noises = scene->noises;
-    const size_t count = scene->noise_count;
-    const bool room = nb_grow(&scene->allocator, &noises, sizeof *noise, count, &scene->noise_capacity, count + 1);
-    scene->noises = noises;
-    if (!room) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    scene->noises[scene->noise_count++] = *noise;
-    scene->data.moving_volume_count++;
-    return true;
+    const nb_json_node *found[NOISE_KEY_COUNT];
+    noise->desc.octaves = 1;
+    noise->desc.gain = 0.5;
+    noise->desc.coverage = 1;
+    return nb_value_members(json, node, &noise_keys, found) && read_members(json, found, noise);
 }
 
-static bool moves(const nb_noise *noise)
+bool nb_noise_moves(const nebel_scene_noise *noise)
 {
     return noise->change != 0 || noise->drift[0] != 0 || noise->drift[1] != 0 || noise->drift[2] != 0;
 }
 
 bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
 {
-    const nb_json_node *found[NOISE_KEY_COUNT];
     nb_json *json = in->json;
     nb_note note = {""};
-    nb_noise noise = {.desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}};
-    if (!nb_value_members(json, node, &noise_keys, found) || !read_numbers(json, found, &noise)) return false;
+    nebel_scene_noise noise = {.desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}};
+    if (!nb_read_noise_numbers(json, node, &noise)) return false;
     noise.desc.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);
     if (noise.desc.name == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
     const nebel_result result = nebel_create_noise(&noise.desc, &density->grid);
     if (result != NEBEL_OK)
         return nb_json_fail(json, result == NEBEL_ERROR_VALUE ? NEBEL_ERROR_FORMAT : result, node, "%s", note.text);
-    noise.grid = density->grid;
-    noise.desc.log = in->scene->log;
-    return nb_scene_keep_grid(in, node, density->grid) && (!moves(&noise) || keep_noise(in, node, &noise));
-}
-
-nebel_result nb_scene_noise_at(const nebel_scene *scene, const nebel_grid *grid, double frame, nebel_grid **made)
-{
-    *made = NULL;
-    for (size_t i = 0; i < scene->noise_count && grid != NULL && frame != 0; i++) {
-        const nb_noise *noise = &scene->noises[i];
-        if (noise->grid != grid) continue;
-        nebel_noise_desc desc = noise->desc;
-        for (int k = 0; k < 3; k++) desc.offset[k] = noise->drift[k] * frame;
-        desc.time = noise->change * frame;
-        return nebel_create_noise(&desc, made);
+    if (nb_noise_moves(&noise)) {
+        in->scene->data.moving_volume_count++;
+        in->scene->data.moves_on = 1;
     }
-    return NEBEL_OK;
+    return nb_scene_keep_grid(in, node, density->grid);
 }

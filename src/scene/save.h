@@ -42,6 +42,12 @@ void nb_save_shape(nb_save *save, const nb_scene_reader *in, const nb_json_node 
 void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_density *was,
                      const nebel_density *now);
 
+/* The same for noise, and for that of two grids, whatever they hold. */
+void nb_save_noise(nb_edit *edit, const nb_json *json, const nb_edit_object *object, const nebel_scene_noise *was,
+                   const nebel_scene_noise *now);
+void nb_save_noise_grid(nb_save *save, const nb_json *json, const nb_edit_object *object, const nebel_grid *was,
+                        const nebel_grid *now);
+
 /* Words to be put together. Once memory is out, which the edit notes, nothing more is added. */
 typedef struct nb_words {
     nb_save *save;

@@ -125,17 +125,22 @@ static unsigned find_mask(const nb_lost_keys *lost)
     return mask;
 }
 
+static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
+{
+    return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
+}
+
 static void save_phase(nb_save *save, const nb_json *json, const nb_edit_object *volume, const nb_written_volume *was,
                        const nb_written_volume *now)
 {
-    const nebel_phase *from = &was->volume.phase, *to = &now->volume.phase;
+    const nebel_phase *to = &now->volume.phase;
     const nb_json_node *node = nb_edit_member(json, volume->node, "phase");
     /* A preset's own comes to light when its source goes. */
     const bool has_hidden =
         nb_edit_member(json, volume->node, "preset") != NULL && nb_edit_member(json, volume->node, "source") != NULL;
     char words[NB_EDIT_NUMBERS];
     if (is_zero(now->volume.albedo)) return;
-    if (!has_hidden && from->type == to->type && from->g == to->g && from->diameter == to->diameter) return;
+    if (!has_hidden && is_same_phase(&was->volume.phase, to)) return;
     nb_save_write_phase(to, words);
     if (node != NULL)
         nb_edit_replace(&save->edit, node, words);

@@ -175,10 +175,13 @@ static bool check_counts(const nb_scene_reader *in, const nb_save *save, const n
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "has %zu models where %zu were; the file has changed, load it again",
                             in->scene->model_count, before->model_count);
-    if (now->environment.type != before->environment.type)
+    /* The sky of a planet is in no file. */
+    const bool is_sky = before->environment.type == NEBEL_ENVIRONMENT_MAP && before->environment_file == NULL;
+    if (now->environment.type != before->environment.type && !is_sky)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "has not the ambient light that it had; the file has changed, load it again");
-    if (now->environment.type != changed->environment.type && changed->environment.type == NEBEL_ENVIRONMENT_MAP)
+    if (now->environment.type != changed->environment.type && changed->environment.type == NEBEL_ENVIRONMENT_MAP &&
+        !is_sky)
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "names no picture of its ambient light; write one into the file");
     if ((now->cells == NULL) == (before->cells == NULL) && (now->classic == NULL) == (before->classic == NULL) &&

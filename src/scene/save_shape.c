@@ -105,6 +105,7 @@ void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *nod
 {
     const nb_edit_object density = nb_edit_find(json, nb_edit_member(json, node, "density"));
     if (density.node == NULL) return;
+    if (now->type == NEBEL_DENSITY_GRID) nb_save_noise_grid(save, json, &density, was->grid, now->grid);
     nb_save_places(save, json, &density, nb_density_places, nb_density_masks[now->type], was, now);
     if (now->type == NEBEL_DENSITY_RADIAL) nb_save_integer(save, json, &density, "power", was->power, now->power);
     if (now->type == NEBEL_DENSITY_HEIGHT && was->below != now->below)

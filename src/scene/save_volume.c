@@ -146,12 +146,15 @@ static void put_density(writer *out, const nebel_density *density)
 
 void nb_save_write_phase(const nebel_phase *phase, char text[NB_EDIT_NUMBERS])
 {
-    const bool has_g = phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS;
-    char number[NB_EDIT_NUMBERS], member[NB_EDIT_NUMBERS] = "";
+    const bool is_draine = phase->type == NEBEL_PHASE_DRAINE, is_droplets = phase->type == NEBEL_PHASE_DROPLETS;
+    const bool has_g =
+        is_draine || phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS;
+    char number[NB_EDIT_NUMBERS], first[40] = "", second[40] = "";
     nb_edit_write_numbers(1, has_g ? &phase->g : &phase->diameter, NB_EDIT_EACH, number);
-    if (has_g) snprintf(member, sizeof member, ", \"g\": %.40s", number);
-    if (phase->type == NEBEL_PHASE_DROPLETS) snprintf(member, sizeof member, ", \"diameter\": %.40s", number);
-    snprintf(text, NB_EDIT_NUMBERS, "{ \"type\": \"%s\"%.60s }", nb_phase_names[phase->type], member);
+    if (has_g || is_droplets) snprintf(first, sizeof first, ", \"%s\": %.24s", has_g ? "g" : "diameter", number);
+    nb_edit_write_numbers(1, &phase->alpha, NB_EDIT_EACH, number);
+    if (is_draine) snprintf(second, sizeof second, ", \"alpha\": %.24s", number);
+    snprintf(text, NB_EDIT_NUMBERS, "{ \"type\": \"%.20s\"%s%s }", nb_phase_names[phase->type], first, second);
 }
 
 static bool is_zero(const double rgb[3])

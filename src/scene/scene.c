@@ -1,4 +1,5 @@
 /* Scenes: read, kept, given back. */
+#include "scene/codec.h"
 #include "scene/file.h"
 #include "scene/path.h"
 #include "scene/save.h"
@@ -23,12 +24,13 @@ enum {
     CELLS,
     CLASSIC,
     MULTIPLE_SCATTERING,
+    PLANET,
     SECTION_COUNT = NB_SCENE_SECTIONS
 };
 
-static const char *const section_names[] = {"nebel", "up",      "unit",        "camera",  "background",
-                                            "sun",   "ambient", "max_opacity", "lights",  "models",
-                                            "fog",   "nebula",  "cells",       "classic", "multiple_scattering"};
+static const char *const section_names[] = {
+    "nebel", "up",     "unit",  "camera",  "background",          "sun",   "ambient", "max_opacity", "lights", "models",
+    "fog",   "nebula", "cells", "classic", "multiple_scattering", "planet"};
 static const char *const streamed_names[] = {"lights", "models", "fog", "nebula", NULL};
 static const nb_keys section_keys = {section_names, SECTION_COUNT, NB_BIT(SECTION_COUNT) - 1,
                                      NB_BIT(NEBEL) | NB_BIT(FOG), "a scene"};
@@ -70,6 +72,7 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     case SUN:
         return nb_read_sun(in, node);
     case AMBIENT:
+        in->scene->has_ambient = true;
         return nb_read_ambient(in, node);
     case MAX_OPACITY:
         return nb_value_number(in->json, node, &nb_range_fraction, &data->max_opacity);
@@ -79,6 +82,8 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
         return nb_read_classic(in, node);
     case MULTIPLE_SCATTERING:
         return nb_read_multiple_scattering(in, node);
+    case PLANET:
+        return nb_read_planet(in, node);
     default:
         return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }
@@ -205,6 +210,8 @@ static nebel_scene *create_scene(const nebel_scene_desc *desc)
     if (scene == NULL) return NULL;
     scene->allocator = scene->arena.allocator = allocator;
     scene->log = desc->log;
+    scene->run = desc->run;
+    scene->run_user = desc->run_user;
     scene->data.camera = nb_camera_default();
     return scene;
 }
@@ -321,12 +328,10 @@ static nebel_result add_volumes(nebel_fog *fog, const nebel_scene *scene, double
     const nebel_scene_data *data = &scene->data;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < data->volume_count && result == NEBEL_OK; i++) {
-        nebel_grid *noise;
         nebel_volume_desc volume = nebel_scene_volume(scene, i, frame);
-        result = nb_scene_noise_at(scene, volume.density.grid, frame, &noise);
-        if (noise != NULL) volume.density.grid = noise;
+        result = nebel_scene_grid(scene, volume.density.grid, frame, &volume.density.grid);
         if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, NULL);
-        nebel_release_grid(noise);
+        nebel_release_grid(volume.density.grid);
     }
     return result;
 }
@@ -361,8 +366,12 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
     memcpy(desc.sun.direction, scene->data.sun_direction, sizeof desc.sun.direction);
     memcpy(desc.sun.irradiance, scene->data.sun_irradiance, sizeof desc.sun.irradiance);
+    double left[3];
+    nebel_result result = nb_planet_sun_left(scene, frame, left);
+    if (result != NEBEL_OK) return result;
+    for (int c = 0; c < 3; c++) desc.sun.irradiance[c] *= left[c];
     desc.max_opacity = scene->data.max_opacity;
-    nebel_result result = nebel_create_fog(&desc, &fog);
+    result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK && scene->data.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
         result = nebel_set_environment(fog, &scene->data.environment);
     if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
@@ -409,8 +418,11 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, scene->placements);
     nb_release(&allocator, (void *)scene->files);
     nebel_release_environment_map(scene->environment_map);
+    nebel_destroy_clouds(scene->clouds);
+    nebel_destroy_atmosphere(scene->atmosphere);
+    nebel_destroy_layers(scene->layers);
+    for (size_t i = 0; i < scene->map_count; i++) nb_image_release(&allocator, &scene->maps[i]);
     for (size_t i = 0; i < scene->grid_count; i++) nebel_release_grid(scene->grids[i]);
     nb_release(&allocator, (void *)scene->grids);
-    nb_release(&allocator, scene->noises);
     nb_release(&allocator, scene);
 }

@@ -30,16 +30,14 @@ typedef struct nb_model_set {
     uint64_t triangle_count;
 } nb_model_set;
 
-/* Noise that moves, as it is at frame 0. */
-typedef struct nb_noise {
-    const nebel_grid *grid;
-    nebel_noise_desc desc;
-    double drift[3], change; /* of its offset and its time, per frame */
-} nb_noise;
+/* Of a planet: its ground's, and two of each shell of clouds. */
+enum { NB_MOST_MAPS = 1 + 2 * NEBEL_MAX_CLOUD_SHELLS };
 
 struct nebel_scene {
     nebel_allocator allocator;
     nebel_log log;
+    nebel_air_run_fn run; /* NULL: none */
+    void *run_user;
     nb_arena arena;
     const char *folder; /* of the file, ending in a slash; "" is the current one */
     nebel_scene_data data;
@@ -64,12 +62,17 @@ struct nebel_scene {
     size_t file_capacity;
 
     nebel_environment_map *environment_map; /* NULL: none */
+    bool has_ambient;                       /* the file says what it is */
+
+    nebel_planet *planet; /* NULL: none */
+    nebel_atmosphere *atmosphere;
+    nebel_layers *layers;
+    nebel_clouds *clouds;
+    nebel_image maps[NB_MOST_MAPS]; /* that the planet's layers were read from */
+    size_t map_count;
 
     nebel_grid **grids;
     size_t grid_count, grid_capacity;
-
-    nb_noise *noises;
-    size_t noise_count, noise_capacity;
 
     nb_model_source *models;
     nebel_model *placements; /* of the models, in the words of the public face */
@@ -88,7 +91,7 @@ typedef struct nb_fog_node {
 } nb_fog_node;
 
 /* The keys that a scene may have. */
-enum { NB_SCENE_SECTIONS = 15 };
+enum { NB_SCENE_SECTIONS = 16 };
 
 /* The longest scene file. */
 #define NB_SCENE_TEXT_LIMIT ((size_t)1 << 30)
@@ -116,6 +119,9 @@ nebel_result nb_scene_parse(const char *text, size_t size, const char *name, con
 bool nb_read_camera(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_background(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_ambient(nb_scene_reader *in, const nb_json_node *node);
+/* The light of the planet's air at the scene's origin, for the sun of the contents. Errors: MEMORY. */
+nebel_result nb_planet_light(nebel_scene *scene);
+
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_model(nb_scene_reader *in, const nb_json_node *node);
@@ -123,6 +129,16 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node);
+bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc);
+/* What the planet's air and clouds leave of the sun at the scene's origin. Errors: MEMORY, VALUE (frame). */
+nebel_result nb_planet_sun_left(const nebel_scene *scene, double frame, double left[3]);
+
+bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet);
+
+/* A picture as a map of 1 or 3 channels, which the scene owns; and the seed of noise. */
+bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_map *map);
+bool nb_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed);
 bool nb_read_multiple_scattering(nb_scene_reader *in, const nb_json_node *node);
 /* Points, their number and their place, from a model file. NULL: none. */
 bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit, nebel_nebula_desc *nebula,
@@ -151,12 +167,14 @@ bool nb_read_grid_size(nb_json *json, const nb_json_node *node, size_t size[3]);
 /* The scene becomes the grid's owner, also where it fails. */
 bool nb_scene_keep_grid(nb_scene_reader *in, const nb_json_node *node, nebel_grid *grid);
 
+/* What a density of the type "noise" says, with its defaults; allocator, log and name are left alone. */
+bool nb_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_noise *noise);
+
+/* Whether it changes from frame to frame. */
+bool nb_noise_moves(const nebel_scene_noise *noise);
+
 /* The voxels of a density of the type "noise". */
 bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);
-
-/* What noise that moves has become at a frame, in *made, with one owner; NULL where the grid is none, or the same.
- * Errors: LIMIT, VALUE (drifted too far), MEMORY. */
-nebel_result nb_scene_noise_at(const nebel_scene *scene, const nebel_grid *grid, double frame, nebel_grid **made);
 
 /* The voxels of a density of the type "grid". */
 bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);

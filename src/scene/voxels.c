@@ -138,7 +138,7 @@ static nebel_result read_slice(const nb_codec *codec, size_t slice, nb_voxels *v
     if (!nb_png_is(&bytes))
         result = nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: is not a PNG picture", codec->name);
     else
-        result = nb_png_read_heights(codec, &bytes, &picture);
+        result = nb_png_read_heights(codec, &bytes, "a slice of voxels", &picture);
     if (result == NEBEL_OK) result = take_slice(codec, &picture, slice, voxels);
     nb_release(&codec->allocator, picture.values);
     nb_release(&codec->allocator, bytes.data);
@@ -175,6 +175,7 @@ static bool ends_in(const char *path, size_t size, const char *ending)
 nb_voxel_file nb_voxel_file_kind(const char *path, size_t size)
 {
     if (ends_in(path, size, ".nvdb")) return NB_VOXELS_NANOVDB;
+    if (ends_in(path, size, ".vdb")) return NB_VOXELS_OPENVDB;
     return ends_in(path, size, ".png") ? NB_VOXELS_SLICES : NB_VOXELS_NUMBERS;
 }
 
@@ -183,6 +184,8 @@ static nebel_result read_voxels(const nb_codec *codec, const nebel_grid_file *fi
     switch (nb_voxel_file_kind(file->file, strlen(file->file))) {
     case NB_VOXELS_NANOVDB:
         return read_nanovdb(codec, file, voxels);
+    case NB_VOXELS_OPENVDB:
+        return nb_vdb_read(codec, file->grid, voxels);
     case NB_VOXELS_SLICES:
         return read_slices(codec, file, voxels);
     default:

@@ -12,7 +12,7 @@ typedef struct nb_voxels {
 } nb_voxels;
 
 /* Which kind of file has a name. */
-typedef enum nb_voxel_file { NB_VOXELS_NUMBERS, NB_VOXELS_NANOVDB, NB_VOXELS_SLICES } nb_voxel_file;
+typedef enum nb_voxel_file { NB_VOXELS_NUMBERS, NB_VOXELS_NANOVDB, NB_VOXELS_SLICES, NB_VOXELS_OPENVDB } nb_voxel_file;
 
 nb_voxel_file nb_voxel_file_kind(const char *path, size_t size);
 
@@ -22,5 +22,9 @@ nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels);
 /* The grid named `name`, NULL: the first, of a NanoVDB file. On an error voxels->data is NULL. Errors: FORMAT, LIMIT,
  * UNSUPPORTED, MEMORY. */
 nebel_result nb_nanovdb_read(const nb_codec *codec, const nb_bytes *bytes, const char *name, nb_voxels *voxels);
+
+/* The same of the OpenVDB file codec->name; the first by name that is of float or double. A damaged file may do to
+ * OpenVDB what it likes: only its exceptions are caught. Errors: FILE, too; UNSUPPORTED also in builds without OpenVDB. */
+nebel_result nb_vdb_read(const nb_codec *codec, const char *name, nb_voxels *voxels);
 
 #endif

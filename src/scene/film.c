@@ -1,0 +1,120 @@
+/* Films: where they go, and when each picture is seen. */
+#include "scene/film.h"
+
+#include <limits.h>
+#include <math.h>
+#include <string.h>
+
+struct nebel_film {
+    nb_codec codec;
+    char *path;
+    double rate;
+    int quality;
+    uint32_t width, height; /* of the first picture */
+    uint64_t count;
+    nb_webp *webp; /* NULL before the first picture */
+    bool is_finished;
+};
+
+int nebel_is_film_path(const char *path)
+{
+    return path != NULL && nb_image_ends_in(path, ".webp");
+}
+
+static nebel_result check_desc(const nb_codec *codec, const nebel_film_desc *desc)
+{
+    const double rate = desc->frames_per_second;
+    if (!nb_allocator_is_valid(&desc->allocator))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "an allocator needs both its functions; one is NULL");
+    if (rate != 0 && !(rate >= 1 && rate <= NEBEL_MAX_FILM_RATE))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "%s: %g pictures a second; must be 1 to %d", codec->name, rate,
+                       NEBEL_MAX_FILM_RATE);
+    if (desc->quality < 0 || desc->quality > 100)
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "%s: a quality of %d; must be 1 to 100", codec->name,
+                       desc->quality);
+    if (!nebel_is_film_path(codec->name))
+        return nb_fail(&desc->log, NEBEL_ERROR_FORMAT, "%s: unknown film format; the name must end in .webp",
+                       codec->name);
+    if (!nb_webp_is_built())
+        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED,
+                       "%s: this nebel was built without WebP; build it with libwebp (Debian: libwebp-dev), or write "
+                       "numbered PNG pictures",
+                       codec->name);
+    return NEBEL_OK;
+}
+
+nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, nebel_film **film)
+{
+    if (film != NULL) *film = NULL;
+    if (path == NULL || desc == NULL || film == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
+    nebel_result result = check_desc(&codec, desc);
+    if (result == NEBEL_OK) result = nb_file_try(&codec.allocator, &codec.log, path);
+    if (result != NEBEL_OK) return result;
+    nebel_film *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
+    if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
+    made->path = strcpy((char *)(made + 1), path);
+    made->codec = codec;
+    made->codec.name = made->path;
+    made->rate = desc->frames_per_second == 0 ? NEBEL_DEFAULT_FILM_RATE : desc->frames_per_second;
+    made->quality = desc->quality == 0 ? NEBEL_DEFAULT_FILM_QUALITY : desc->quality;
+    *film = made;
+    return NEBEL_OK;
+}
+
+/* Milliseconds are whole in the file; rounded so, pictures do not drift from their time. */
+static double start_of(const nebel_film *film, uint64_t number)
+{
+    return floor(1000 * (double)number / film->rate + 0.5);
+}
+
+static nebel_result check_picture(nebel_film *film, const nebel_image *image)
+{
+    const nb_codec *codec = &film->codec;
+    if (film->is_finished)
+        return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: the film is finished already", codec->name);
+    const nebel_result result = nb_image_check(codec, image);
+    if (result != NEBEL_OK) return result;
+    if (film->count > 0 && (image->width != film->width || image->height != film->height))
+        return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT,
+                       "%s: a picture of %u x %u pixels; those before it have %u x %u", codec->name,
+                       (unsigned)image->width, (unsigned)image->height, (unsigned)film->width, (unsigned)film->height);
+    if (start_of(film, film->count + 1) > INT_MAX)
+        return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: a WebP lasts at most %d ms", codec->name, INT_MAX);
+    return NEBEL_OK;
+}
+
+nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image)
+{
+    if (film == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check_picture(film, image);
+    if (result == NEBEL_OK && film->webp == NULL) {
+        film->width = image->width;
+        film->height = image->height;
+        result = nb_webp_begin(&film->codec, image->width, image->height, film->quality, &film->webp);
+    }
+    if (result == NEBEL_OK) result = nb_webp_add(film->webp, image, (int)start_of(film, film->count));
+    if (result == NEBEL_OK) film->count++;
+    return result;
+}
+
+nebel_result nebel_finish_film(nebel_film *film)
+{
+    nb_bytes bytes;
+    if (film == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nb_codec *codec = &film->codec;
+    if (film->count == 0 || film->is_finished)
+        return nb_fail(&codec->log, NEBEL_ERROR_ARGUMENT, "%s: the film %s", codec->name,
+                       film->is_finished ? "is finished already" : "has no pictures");
+    film->is_finished = true;
+    const nebel_result result = nb_webp_end(film->webp, (int)start_of(film, film->count), &bytes);
+    return result == NEBEL_OK ? nb_file_write(&codec->allocator, &codec->log, film->path, &bytes) : result;
+}
+
+void nebel_destroy_film(nebel_film *film)
+{
+    if (film == NULL) return;
+    const nebel_allocator allocator = film->codec.allocator;
+    nb_webp_free(film->webp);
+    nb_release(&allocator, film);
+}

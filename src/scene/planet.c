@@ -1,0 +1,203 @@
+/* The planet of a scene: its layers; or its air, and what that does to the light at the scene's origin. */
+#include "scene/scene_internal.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The sky of the origin as a map: pixels, each the mean of a few directions. */
+enum { WIDTH = 64, HEIGHT = WIDTH / 2, WITHIN = 4, LOOKS = WIDTH * WITHIN * WITHIN };
+
+static const double pi = 3.14159265358979323846;
+
+static nebel_sun sun_of(const nebel_scene_data *data)
+{
+    nebel_sun sun = {.direction = {0, 1, 0}};
+    if (!data->has_sun) return sun;
+    memcpy(sun.direction, data->sun_direction, sizeof sun.direction);
+    memcpy(sun.irradiance, data->sun_irradiance, sizeof sun.irradiance);
+    return sun;
+}
+
+/* One row of pixels, as nebel_environment_map_desc has them. */
+typedef struct nb_sky_row {
+    double direction[3][LOOKS];
+    float transmittance[3][LOOKS], light[3][LOOKS], distance[LOOKS], normal[3][LOOKS], sun[3][LOOKS], sky[3][LOOKS];
+} nb_sky_row;
+
+static void aim(int row, nb_sky_row *looks)
+{
+    for (int i = 0; i < LOOKS; i++) {
+        const int column = i % (WIDTH * WITHIN), line = row * WITHIN + i / (WIDTH * WITHIN);
+        const double longitude = 2 * pi * ((column + 0.5) / (WIDTH * WITHIN) - 0.5);
+        const double latitude = pi * (0.5 - (line + 0.5) / (HEIGHT * WITHIN));
+        looks->direction[0][i] = cos(latitude) * sin(longitude);
+        looks->direction[1][i] = sin(latitude);
+        looks->direction[2][i] = -cos(latitude) * cos(longitude);
+    }
+}
+
+static void look(const nebel_air_view *view, nb_sky_row *looks)
+{
+    const double *const direction[3] = {looks->direction[0], looks->direction[1], looks->direction[2]};
+    const nebel_light_planes lights = {
+        .transmittance = {looks->transmittance[0], looks->transmittance[1], looks->transmittance[2]},
+        .in_scattering = {looks->light[0], looks->light[1], looks->light[2]}};
+    const nebel_ground_planes ground = {.distance = looks->distance,
+                                        .normal = {looks->normal[0], looks->normal[1], looks->normal[2]},
+                                        .sun = {looks->sun[0], looks->sun[1], looks->sun[2]},
+                                        .sky = {looks->sky[0], looks->sky[1], looks->sky[2]}};
+    nebel_trace_air_view(view, LOOKS, direction, NULL, &lights);
+    nebel_find_ground(view, LOOKS, direction, &ground);
+}
+
+/* Radiance of a look, with Lambert's ground behind the air. */
+static double radiance(const nb_sky_row *looks, const nebel_planet *planet, const double sun[3], int i, int c)
+{
+    double light = (double)looks->light[c][i];
+    if (!((double)looks->distance[i] < HUGE_VAL)) return light;
+    double cosine = 0;
+    for (int k = 0; k < 3; k++) cosine += sun[k] * (double)looks->normal[k][i];
+    const double arrives = fmax(0, cosine) * (double)looks->sun[c][i] + (double)looks->sky[c][i];
+    return light + (double)looks->transmittance[c][i] * planet->air.ground_albedo[c] / pi * arrives;
+}
+
+static nebel_result make_map(nebel_scene *scene, const nebel_planet *planet, const nebel_air_view *view,
+                             nebel_environment_map **map)
+{
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    nb_sky_row *looks = nb_allocate(&scene->allocator, 1, sizeof *looks);
+    float *pixels = nb_allocate_zero(&scene->allocator, (size_t)WIDTH * HEIGHT * 3, sizeof *pixels);
+    for (int row = 0; row < HEIGHT && looks != NULL && pixels != NULL; row++) {
+        aim(row, looks);
+        look(view, looks);
+        for (int i = 0; i < LOOKS; i++)
+            for (int c = 0; c < 3; c++)
+                pixels[3 * (row * WIDTH + i % (WIDTH * WITHIN) / WITHIN) + c] +=
+                    (float)(radiance(looks, planet, scene->data.sun_direction, i, c) / (WITHIN * WITHIN));
+    }
+    const nebel_environment_map_desc desc = {
+        .allocator = scene->allocator, .log = scene->log, .width = WIDTH, .height = HEIGHT, .pixels = pixels};
+    if (looks != NULL && pixels != NULL) result = nebel_create_environment_map(&desc, map);
+    nb_release(&scene->allocator, looks);
+    nb_release(&scene->allocator, pixels);
+    return result;
+}
+
+/* The sky becomes ambient light where the file has none of its own. */
+static nebel_result set_environment(nebel_scene *scene, const nebel_planet *planet, const nebel_sun *sun)
+{
+    nebel_air_view *view;
+    const nebel_air_view_desc desc = {.atmosphere = planet->atmosphere,
+                                      .sun = *sun,
+                                      .run = scene->run,
+                                      .run_user = scene->run_user,
+                                      .allocator = scene->allocator,
+                                      .log = scene->log};
+    nebel_result result = nebel_create_air_view(&desc, &view);
+    if (result != NEBEL_OK) return result;
+    nebel_environment_map *map = NULL;
+    result = make_map(scene, planet, view, &map);
+    nebel_destroy_air_view(view);
+    if (result != NEBEL_OK) return result;
+    nebel_release_environment_map(scene->environment_map);
+    scene->environment_map = map;
+    scene->data.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
+    return NEBEL_OK;
+}
+
+nebel_result nb_planet_light(nebel_scene *scene)
+{
+    static const double origin[1][3] = {{0, 0, 0}};
+    nebel_planet *planet = scene->planet;
+    if (planet == NULL || planet->atmosphere == NULL) return NEBEL_OK;
+    const nebel_sun sun = sun_of(&scene->data),
+                    white = {{sun.direction[0], sun.direction[1], sun.direction[2]}, {1, 1, 1}};
+    nebel_air_light light;
+    nebel_result result = nebel_light_air(planet->atmosphere, &white, 1, origin, 0, &light, 0);
+    if (result == NEBEL_OK && !scene->has_ambient) result = set_environment(scene, planet, &sun);
+    if (result == NEBEL_OK) memcpy(planet->sun_left, light.sun, sizeof planet->sun_left);
+    return result;
+}
+
+static nebel_result set_air(nebel_scene *scene, nebel_planet *planet)
+{
+    nebel_atmosphere_desc desc = planet->air;
+    desc.run = scene->run;
+    desc.run_user = scene->run_user;
+    desc.allocator = scene->allocator;
+    desc.log = scene->log;
+    const nebel_result result = nebel_create_atmosphere(&desc, &scene->atmosphere);
+    if (result != NEBEL_OK) return result;
+    planet->atmosphere = scene->atmosphere;
+    return nb_planet_light(scene);
+}
+
+static nebel_result set_clouds(nebel_scene *scene, nebel_planet *planet)
+{
+    nebel_clouds_desc desc = {.atmosphere = scene->atmosphere,
+                              .layer_count = planet->cloud_layer_count,
+                              .allocator = scene->allocator,
+                              .log = scene->log};
+    if (planet->cloud_layer_count == 0) return NEBEL_OK;
+    memcpy(desc.layers, planet->cloud_layers, sizeof desc.layers);
+    const nebel_result result = nebel_create_clouds(&desc, &scene->clouds);
+    planet->clouds = scene->clouds;
+    return result;
+}
+
+/* The shadow is as wide as scenes are in which fog stands. */
+static nebel_result shade_origin(const nebel_scene *scene, double frame, float *part)
+{
+    enum { WIDE = 200 };
+    static const double origin[1][3] = {{0, 0, 0}};
+    const nebel_cloud_view_desc desc = {.clouds = scene->clouds,
+                                        .sun = sun_of(&scene->data),
+                                        .time = frame,
+                                        .allocator = scene->allocator,
+                                        .log = scene->log};
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace = NULL;
+    nebel_result result = nebel_create_cloud_view(&desc, &view);
+    if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
+    if (result == NEBEL_OK) result = nebel_shade_clouds(workspace, WIDE, 1, origin, 0, part);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    return result;
+}
+
+nebel_result nb_planet_sun_left(const nebel_scene *scene, double frame, double left[3])
+{
+    float part = 1;
+    nebel_result result = NEBEL_OK;
+    if (scene->clouds != NULL) result = shade_origin(scene, frame, &part);
+    for (int c = 0; c < 3; c++) left[c] = scene->atmosphere != NULL ? (double)part * scene->planet->sun_left[c] : 1;
+    return result;
+}
+
+static nebel_result load_layers(nebel_scene *scene)
+{
+    nebel_layers_desc desc = scene->planet->shells;
+    desc.allocator = scene->allocator;
+    desc.log = scene->log;
+    if (scene->layers != NULL) return NEBEL_OK;
+    const nebel_result result = nebel_create_layers(&desc, &scene->layers);
+    scene->planet->layers = scene->layers;
+    return result;
+}
+
+nebel_result nebel_load_scene_planet(nebel_scene *scene)
+{
+    if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (scene->planet != NULL && scene->planet->model == NEBEL_PLANET_LAYERS) return load_layers(scene);
+    if (scene->planet == NULL || scene->planet->atmosphere != NULL) return NEBEL_OK;
+    nebel_result result = set_air(scene, scene->planet);
+    if (result == NEBEL_OK) result = set_clouds(scene, scene->planet);
+    if (result == NEBEL_OK) return NEBEL_OK;
+    nebel_destroy_clouds(scene->clouds);
+    nebel_destroy_atmosphere(scene->atmosphere);
+    scene->clouds = NULL;
+    scene->planet->clouds = NULL;
+    scene->atmosphere = NULL;
+    scene->planet->atmosphere = NULL;
+    return nb_fail(&scene->log, result, "the air of the scene's planet: %s", nebel_result_text(result));
+}

@@ -1,0 +1,113 @@
+/* The clouds of a physical planet. */
+#include "scene/scene_internal.h"
+
+#include <string.h>
+
+enum { KIND, BASE, TOP, COVERAGE, EXTINCTION, SIZE, DETAIL, VARIATION, DIAMETER, SEED, WIND, WEATHER, KEY_COUNT };
+
+static const char *const names[] = {"kind",   "base",      "top",      "coverage", "extinction", "size",
+                                    "detail", "variation", "diameter", "seed",     "wind",       "weather"};
+static const nb_keys keys = {names, KEY_COUNT, NB_BIT(KEY_COUNT) - 1, 0, "a layer of clouds"};
+
+/* A part that 0 leaves nothing of. */
+static bool read_part(nb_json *json, const nb_json_node *node, double *value)
+{
+    if (!nb_value_number(json, node, &nb_range_fraction, value)) return false;
+    if (node != NULL && *value == 0) *value = NEBEL_CLOUD_NONE;
+    return true;
+}
+
+static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, nebel_cloud_layer *layer)
+{
+    static const nb_range height_range = {
+        .low = 0, .high = 1e12, .open = true, .dimension = NB_LENGTH, .text = "a height above the ground"};
+    static const nb_range size_range = {.low = 1e-3, .high = 1e9, .dimension = NB_LENGTH, .text = "a length"};
+    static const nb_range amount_range = {
+        .low = 1e-12, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
+    static const nb_range diameter_range = {
+        .low = 5, .high = NEBEL_MAX_DROPLET, .text = "a number of micrometres from 5 to 50"};
+    static const nb_range wind_range = {.low = -1e12, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
+    nb_json *json = in->json;
+    if (!nb_value_number(json, found[BASE], &height_range, &layer->base) ||
+        !nb_value_number(json, found[TOP], &height_range, &layer->top) ||
+        !nb_value_number(json, found[COVERAGE], &nb_range_fraction, &layer->coverage) ||
+        !nb_value_number(json, found[EXTINCTION], &amount_range, &layer->extinction) ||
+        !nb_value_number(json, found[SIZE], &size_range, &layer->size) ||
+        !read_part(json, found[DETAIL], &layer->detail) || !read_part(json, found[VARIATION], &layer->variation) ||
+        !nb_value_number(json, found[DIAMETER], &diameter_range, &layer->diameter) ||
+        !nb_value_numbers(json, found[WIND], &wind_range, 2, layer->wind))
+        return false;
+    const double unit = in->space.unit;
+    layer->base *= unit;
+    layer->top *= unit;
+    layer->size *= unit;
+    layer->extinction /= unit;
+    /* Level axes of the file: x and z, or x and y where z is up. */
+    for (int i = 0; i < 2; i++) layer->wind[i] *= i == 1 && in->space.z_up ? -unit : unit;
+    return true;
+}
+
+/* Says what the core finds wrong with numbers that do not go with each other. */
+static bool try_layer(nb_scene_reader *in, const nb_json_node *node, double thickness, const nebel_cloud_layer *layer,
+                      nebel_cloud_layer *resolved)
+{
+    static const char subject[] = "cloud layer: ";
+    const nebel_log log = {nb_read_keep_message, in};
+    const nebel_result result = nebel_resolve_cloud_layer(thickness, layer, &log, resolved);
+    if (result == NEBEL_OK) return true;
+    const char *message = in->core_message;
+    if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
+    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s", message);
+}
+
+static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet,
+                        const nebel_cloud_layer *layer)
+{
+    for (uint32_t i = 0; i < planet->cloud_layer_count; i++) {
+        nebel_cloud_layer other;
+        (void)nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[i], NULL, &other);
+        if (layer->base >= other.top || other.base >= layer->top) continue;
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
+                            "lies from %g to %g m and overlaps another, from %g to %g m; give each heights of its own",
+                            layer->base, layer->top, other.base, other.top);
+    }
+    return true;
+}
+
+/* Of no coverage: no layer. */
+static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+{
+    static const char *const kind_names[] = {"cumulus", "stratus", "cirrus"};
+    const nb_json_node *found[KEY_COUNT];
+    nb_json *json = in->json;
+    nebel_cloud_layer *layer = &planet->cloud_layers[planet->cloud_layer_count];
+    *layer = (nebel_cloud_layer){.seed = 1 + planet->cloud_layer_count};
+    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found))
+        return false;
+    const int kind = found[KIND] != NULL ? nb_value_choice(json, found[KIND], kind_names, NEBEL_CLOUD_KIND_COUNT) : 0;
+    if (kind < 0 || !read_numbers(in, found, layer) || !nb_read_seed(in, found[SEED], &layer->seed) ||
+        !nb_read_map(in, found[WEATHER], 1, &layer->weather))
+        return false;
+    layer->kind = (nebel_cloud_kind)kind;
+    nebel_cloud_layer resolved;
+    if (!try_layer(in, node, planet->air.thickness, layer, &resolved)) return false;
+    if (found[COVERAGE] != NULL && layer->coverage == 0) return true;
+    if (!check_apart(in, node, planet, &resolved)) return false;
+    planet->cloud_layer_count++;
+    in->scene->data.moves_on |= layer->wind[0] != 0 || layer->wind[1] != 0;
+    return true;
+}
+
+bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+{
+    int count = 0;
+    if (node == NULL) return true;
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds")) return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
+        if (count++ == NEBEL_MAX_CLOUD_LAYERS)
+            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one,
+                                "is one too many; a planet has at most %d layers of clouds", NEBEL_MAX_CLOUD_LAYERS);
+        if (!read_layer(in, one, planet)) return false;
+    }
+    return true;
+}

@@ -1,0 +1,192 @@
+/* A planet of the model "layers": a ball, shells of clouds, a shell of air. */
+#include "scene/codec.h"
+#include "scene/model.h"
+#include "scene/path.h"
+#include "scene/scene_internal.h"
+
+#include <string.h>
+
+static const nb_range radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
+static const nb_range height_range = {
+    .low = 0, .high = 1e12, .open = true, .dimension = NB_LENGTH, .text = "a height above the ground"};
+static const nb_range day_range = {.low = -1e12, .high = 1e12, .text = "a number of frames from -1e12 to 1e12"};
+static const nb_range part_range = {
+    .low = 0, .high = 1, .open = true, .text = "a number between 0 and 1, without them"};
+
+/* ---- maps ------------------------------------------------------------------------------------ */
+
+/* In place: one channel of grey pictures and of the mean of others, or three, linear where the file's are not. */
+static void keep_channels(const nebel_image *image, const int first[3], int channels, bool is_linear)
+{
+    const size_t count = (size_t)image->width * image->height, n = image->channel_count;
+    for (size_t i = 0; i < count; i++) {
+        float color[3];
+        for (int c = 0; c < 3; c++) {
+            const float value = image->samples[i * n + (size_t)first[c]];
+            color[c] = is_linear || channels == 1 ? value : (float)nb_value_linear_from_srgb((double)value);
+        }
+        if (channels == 1) color[0] = (color[0] + color[1] + color[2]) / 3;
+        memcpy(&image->samples[(size_t)channels * i], color, (size_t)channels * sizeof *color);
+    }
+}
+
+static nebel_result set_map(const nb_codec *codec, nebel_image *image, int channels, nebel_map *map)
+{
+    static const char *const colors[3] = {"R", "G", "B"};
+    int first[3];
+    if (image->width > NEBEL_MAX_MAP_SIZE || image->height > NEBEL_MAX_MAP_SIZE)
+        return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: has %u x %u pixels; a map has at most %d on each side",
+                       codec->name, (unsigned)image->width, (unsigned)image->height, NEBEL_MAX_MAP_SIZE);
+    for (int c = 0; c < 3; c++) {
+        first[c] = nb_image_channel(image, colors[c]);
+        if (first[c] < 0) first[c] = nb_image_channel(image, "Y");
+        if (first[c] < 0)
+            return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: has neither channels R, G and B nor Y", codec->name);
+    }
+    if (image->channel_count < (size_t)channels && first[0] == first[1])
+        return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: is grey; the ground's map must have colours", codec->name);
+    keep_channels(image, first, channels, nebel_find_image_format(codec->name) == NEBEL_IMAGE_EXR);
+    *map = (nebel_map){image->width, image->height, channels, image->samples};
+    for (size_t i = 0; i < (size_t)image->width * image->height * (size_t)channels; i++)
+        if (!(image->samples[i] >= 0 && image->samples[i] <= 1))
+            return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: holds %g; a map holds numbers from 0 to 1",
+                           codec->name, (double)image->samples[i]);
+    return NEBEL_OK;
+}
+
+bool nb_read_map(nb_scene_reader *in, const nb_json_node *node, int channels, nebel_map *map)
+{
+    nebel_scene *scene = in->scene;
+    const char *path = "";
+    nb_note note = {""};
+    if (node == NULL) return true;
+    if (!nb_value_text(in->json, node, &scene->arena, &path)) return false;
+    if (nebel_find_image_format(path) == NEBEL_IMAGE_NONE)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
+                            "is \"%s\"; must be the path of a picture, .png or .exr", path);
+    const char *file = nb_path_join(&scene->arena, scene->folder, path);
+    if (file == NULL || !nb_scene_keep_file(scene, file))
+        return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    const nb_codec codec = {.allocator = scene->allocator, .log = nb_note_log(&note), .name = file};
+    nebel_image *image = &scene->maps[scene->map_count];
+    nebel_result result = nb_image_read(&codec, image);
+    if (result == NEBEL_OK) {
+        scene->map_count++;
+        result = set_map(&codec, image, channels, map);
+    }
+    return result == NEBEL_OK || nb_json_fail(in->json, result, node, "%s", note.text);
+}
+
+bool nb_read_seed(nb_scene_reader *in, const nb_json_node *node, uint32_t *seed)
+{
+    int number = (int)*seed;
+    if (node == NULL) return true;
+    if (!nb_value_integer(in->json, node, 0, INT32_MAX, &number)) return false;
+    *seed = (uint32_t)number;
+    return true;
+}
+
+/* ---- shells ---------------------------------------------------------------------------------- */
+
+static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_cloud_shell *shell)
+{
+    enum { HEIGHT, DAY, COLOR, MAP, DETAIL, WRAP, GAIN, COVERAGE, SEED, COUNT };
+    static const char *const names[] = {"height", "day", "color", "map", "detail", "wrap", "gain", "coverage", "seed"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of clouds"};
+    static const nb_range wrap_range = {.low = -1e3, .high = 1e3, .text = "a number from -1000 to 1000"};
+    static const nb_range gain_range = {
+        .low = 0, .high = 1e3, .open = true, .text = "a number between 0 and 1000, without them"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found) ||
+        !nb_value_number(json, found[HEIGHT], &height_range, &shell->height) ||
+        !nb_value_number(json, found[DAY], &day_range, &shell->day) ||
+        !nb_value_color(json, found[COLOR], &nb_range_fraction, shell->color) ||
+        !nb_read_map(in, found[MAP], 1, &shell->map) || !nb_read_map(in, found[DETAIL], 1, &shell->detail) ||
+        !nb_value_numbers(json, found[WRAP], &wrap_range, 3, shell->wrap) ||
+        !nb_value_number(json, found[GAIN], &gain_range, &shell->gain) ||
+        !nb_value_number(json, found[COVERAGE], &part_range, &shell->coverage) ||
+        !nb_read_seed(in, found[SEED], &shell->seed))
+        return false;
+    shell->height *= in->space.unit;
+    return true;
+}
+
+static bool read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc)
+{
+    if (node == NULL) return true;
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of shells of clouds")) return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
+        if (desc->cloud_count == NEBEL_MAX_CLOUD_SHELLS)
+            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one,
+                                "is one too many; a planet has at most %d shells of clouds", NEBEL_MAX_CLOUD_SHELLS);
+        if (!read_cloud(in, one, &desc->clouds[desc->cloud_count++])) return false;
+    }
+    return true;
+}
+
+static bool read_ramp(nb_json *json, const nb_json_node *node, nebel_air_shell *air)
+{
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colours")) return false;
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one)) {
+        if (air->ramp_count == NEBEL_MAX_RAMP)
+            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one, "is one too many; a ramp has at most %d colours",
+                                NEBEL_MAX_RAMP);
+        if (!nb_value_color(json, one, &nb_range_fraction, air->ramp[air->ramp_count++])) return false;
+    }
+    return air->ramp_count > 0 || nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for a blue one");
+}
+
+static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air_shell *air)
+{
+    enum { HEIGHT, BRIGHTNESS, RAMP, COUNT };
+    static const char *const names[] = {"height", "brightness", "ramp"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a shell of air"};
+    static const nb_range brightness_range = {.low = 0, .high = 1e6, .text = "a number from 0 to 1e6"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    if (node == NULL) return true;
+    if (!nb_value_is(json, node, NB_JSON_OBJECT, "an object {...}") || !nb_value_members(json, node, &keys, found) ||
+        !nb_value_number(json, found[HEIGHT], &height_range, &air->height) ||
+        !nb_value_number(json, found[BRIGHTNESS], &brightness_range, &air->brightness) ||
+        !read_ramp(json, found[RAMP], air))
+        return false;
+    air->height *= in->space.unit;
+    air->is_absent = found[BRIGHTNESS] != NULL && air->brightness == 0;
+    return true;
+}
+
+/* ---- planets --------------------------------------------------------------------------------- */
+
+static bool turns(const nebel_layers_desc *planet)
+{
+    bool does = planet->day != 0;
+    for (uint32_t i = 0; i < planet->cloud_count; i++) does = does || planet->clouds[i].day != 0;
+    return does;
+}
+
+bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc)
+{
+    enum { MODEL, CENTER, RADIUS, ROTATION, DAY, MAP, COVERAGE, SEED, CLOUDS, AIR, COUNT };
+    static const char *const names[] = {"model", "center",   "radius", "rotation", "day",
+                                        "map",   "coverage", "seed",   "clouds",   "air"};
+    static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, NB_BIT(MODEL), "a planet of layers"};
+    const nb_json_node *found[COUNT];
+    nb_json *json = in->json;
+    double radius = 6.36e6 / in->space.unit, scale[3] = {1, 1, 1};
+    *desc = (nebel_layers_desc){.rotation = {0, 0, 0, 1}};
+    if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[RADIUS], &radius_range, &radius) ||
+        !nb_value_place(json, found[CENTER], desc->center) ||
+        !nb_value_rotation(json, found[ROTATION], desc->rotation) ||
+        !nb_value_number(json, found[DAY], &day_range, &desc->day) || !nb_read_map(in, found[MAP], 3, &desc->ground) ||
+        !nb_value_number(json, found[COVERAGE], &part_range, &desc->coverage) ||
+        !nb_read_seed(in, found[SEED], &desc->seed) || !read_clouds(in, found[CLOUDS], desc) ||
+        !read_air(in, found[AIR], &desc->air))
+        return false;
+    desc->radius = radius * in->space.unit;
+    nb_space_convert_placement(&in->space, desc->center, desc->rotation, scale);
+    if (found[CENTER] == NULL) desc->center[1] = -desc->radius;
+    in->scene->data.moves_on |= turns(desc);
+    return true;
+}

@@ -1,0 +1,174 @@
+/* The section "planet". */
+#include "scene/scene_internal.h"
+
+#include <string.h>
+
+static const nb_range length_range = {
+    .low = 1e-9, .high = NEBEL_MAX_LENGTH, .dimension = NB_LENGTH, .text = "a length"};
+
+/* ---- kinds of air ---------------------------------------------------------------------------- */
+
+enum { TYPE, SCATTERING, ABSORPTION, PHASE, SCALE_HEIGHT, MIDDLE, WIDTH, AIR_KEY_COUNT };
+
+static const char *const air_names[] = {"type", "scattering", "absorption", "phase", "scale_height", "middle", "width"};
+
+#define AIR_KEYS (NB_BIT(TYPE) | NB_BIT(SCATTERING) | NB_BIT(ABSORPTION) | NB_BIT(PHASE))
+
+static const nb_keys air_keys[NEBEL_AIR_PROFILE_COUNT] = {
+    [NEBEL_AIR_EXPONENTIAL] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(SCALE_HEIGHT),
+                               NB_BIT(TYPE) | NB_BIT(SCALE_HEIGHT), "air that thins out"},
+    [NEBEL_AIR_LAYER] = {air_names, AIR_KEY_COUNT, AIR_KEYS | NB_BIT(MIDDLE) | NB_BIT(WIDTH),
+                         NB_BIT(TYPE) | NB_BIT(MIDDLE) | NB_BIT(WIDTH), "a layer of air"}};
+
+static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air *air)
+{
+    static const char *const types[] = {"exponential", "layer"};
+    static const nb_range amount_range = {
+        .low = 0, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
+    static const nb_range middle_range = {.low = 0, .high = 1e12, .dimension = NB_LENGTH, .text = "a height"};
+    const nb_json_node *found[AIR_KEY_COUNT];
+    nb_json *json = in->json;
+    *air = (nebel_air){.scale_height = 0};
+    const int type = nb_value_type(json, node, types, NEBEL_AIR_PROFILE_COUNT);
+    if (type < 0 || !nb_value_members(json, node, &air_keys[type], found) ||
+        !nb_value_amount(json, found[SCATTERING], &amount_range, air->scattering) ||
+        !nb_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||
+        !nb_read_phase(in, found[PHASE], &air->phase) ||
+        !nb_value_number(json, found[SCALE_HEIGHT], &length_range, &air->scale_height) ||
+        !nb_value_number(json, found[MIDDLE], &middle_range, &air->center) ||
+        !nb_value_number(json, found[WIDTH], &length_range, &air->width))
+        return false;
+    air->profile = (nebel_air_profile)type;
+    for (int c = 0; c < 3; c++) {
+        air->scattering[c] /= in->space.unit;
+        air->absorption[c] /= in->space.unit;
+    }
+    air->scale_height *= in->space.unit;
+    air->center *= in->space.unit;
+    air->width *= in->space.unit;
+    return true;
+}
+
+static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmosphere_desc *desc)
+{
+    uint32_t count = 0;
+    if (node == NULL) return true;
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of kinds of air")) return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
+        if (count == NEBEL_MAX_AIRS)
+            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one,
+                                "is one too many; a planet has at most %d kinds of air", NEBEL_MAX_AIRS);
+        if (!read_air(in, one, &desc->airs[count++])) return false;
+    }
+    if (count == 0)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for the air of the preset");
+    desc->air_count = count;
+    return true;
+}
+
+/* ---- planets --------------------------------------------------------------------------------- */
+
+enum { MODEL, PRESET, CENTER, RADIUS, THICKNESS, AIRS, GROUND_ALBEDO, QUALITY, SUN_DIAMETER, CLOUDS, PLANET_KEY_COUNT };
+
+static const char *const planet_names[] = {"model", "preset",        "center",  "radius",       "thickness",
+                                           "airs",  "ground_albedo", "quality", "sun_diameter", "clouds"};
+static const nb_keys planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANET_KEY_COUNT) - 1, NB_BIT(MODEL),
+                                    "a physical planet"};
+
+/* Degrees, as seen from there: Earth's and Mars's mean distances from the sun, whose diameter is 1.3927e9 m. */
+static const struct {
+    const char *name;
+    double sun_diameter;
+} presets[] = {{"earth", 0.5334}, {"mars", 0.3501}, {"toy", 0.5334}};
+
+static bool read_preset(nb_json *json, const nb_json_node *node, nebel_planet *planet)
+{
+    static const char *const preset_names[] = {"earth", "mars", "toy"};
+    const int preset = node != NULL ? nb_value_choice(json, node, preset_names, 3) : 0;
+    if (preset < 0) return false;
+    planet->air = *nebel_find_atmosphere(presets[preset].name);
+    planet->sun_diameter = presets[preset].sun_diameter;
+    return true;
+}
+
+static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, nebel_planet *planet)
+{
+    static const nb_range radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
+    static const nb_range thickness_range = {.low = 1e-6, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
+    static const nb_range diameter_range = {.low = 0, .high = 10, .text = "a number of degrees from 0 to 10"};
+    nebel_atmosphere_desc *desc = &planet->air;
+    double radius = desc->radius / in->space.unit, thickness = desc->thickness / in->space.unit, center[3];
+    if (!nb_value_number(in->json, found[RADIUS], &radius_range, &radius) ||
+        !nb_value_number(in->json, found[THICKNESS], &thickness_range, &thickness) ||
+        !nb_value_place(in->json, found[CENTER], center) ||
+        !nb_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_diameter))
+        return false;
+    if (found[RADIUS] != NULL) desc->radius = radius * in->space.unit;
+    if (found[THICKNESS] != NULL) desc->thickness = thickness * in->space.unit;
+    if (found[CENTER] == NULL) return true;
+    nb_space_convert_place(&in->space, center);
+    memcpy(desc->ground, center, sizeof center);
+    desc->ground[1] += desc->radius;
+    return true;
+}
+
+/* The core knows what numbers do not go with each other. */
+static bool try_planet(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+{
+    static const char subject[] = "atmosphere: ";
+    planet->air.log = (nebel_log){nb_read_keep_message, in};
+    const nebel_result result = nebel_resolve_atmosphere(&planet->air, &planet->air);
+    planet->air.log = (nebel_log){NULL, NULL};
+    if (result == NEBEL_OK) return true;
+    const char *message = in->core_message;
+    if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
+    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s", message);
+}
+
+static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+{
+    static const char *const quality_names[] = {"fast", "precise"};
+    const nb_json_node *found[PLANET_KEY_COUNT];
+    nb_json *json = in->json;
+    if (!nb_value_members(json, node, &planet_keys, found) || !read_preset(json, found[PRESET], planet) ||
+        !read_sizes(in, found, planet) || !read_airs(in, found[AIRS], &planet->air) ||
+        !nb_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->air.ground_albedo))
+        return false;
+    const int quality = found[QUALITY] != NULL ? nb_value_choice(json, found[QUALITY], quality_names, 2) : 0;
+    if (quality < 0) return false;
+    planet->air.quality = (nebel_air_quality)quality;
+    return try_planet(in, node, planet) && nb_read_clouds(in, found[CLOUDS], planet);
+}
+
+/* The model says which keys there may be. */
+static int read_model(nb_json *json, const nb_json_node *node)
+{
+    static const char *const model_names[] = {"physical", "layers"};
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
+        if (nb_value_is_key(one, "", "model")) return nb_value_choice(json, one, model_names, NEBEL_PLANET_MODEL_COUNT);
+    (void)nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                       "the key \"model\" is missing; must be one of: physical, layers");
+    return -1;
+}
+
+static bool read_planet(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+{
+    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"model\": ...}")) return false;
+    const int model = read_model(in->json, node);
+    if (model < 0) return false;
+    planet->model = (nebel_planet_model)model;
+    for (int c = 0; c < 3; c++) planet->sun_left[c] = 1;
+    return model == NEBEL_PLANET_LAYERS ? nb_read_layers(in, node, &planet->shells) : read_physical(in, node, planet);
+}
+
+bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node)
+{
+    nebel_planet *planet = nb_arena_allocate(&in->scene->arena, 1, sizeof *planet);
+    if (planet == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    *planet = (nebel_planet){.model = NEBEL_PLANET_PHYSICAL};
+    if (!read_planet(in, node, planet)) return false;
+    in->scene->planet = planet;
+    in->scene->data.planets = planet;
+    in->scene->data.planet_count = 1;
+    return true;
+}

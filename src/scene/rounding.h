@@ -1,0 +1,14 @@
+/* Samples from 0 to 1 as bytes, with an ordered rounding that keeps slow gradients of fog free of bands. */
+#ifndef NB_SCENE_ROUNDING_H
+#define NB_SCENE_ROUNDING_H
+
+#include "scene/codec.h"
+
+/* The places of R, G and B among the channels; `what` needs them ("a PNG"). Errors: ARGUMENT. */
+nebel_result nb_rounding_find_channels(const nb_codec *codec, const nebel_image *image, const char *what,
+                                       int channels[3]);
+
+/* Row y of the picture as 3 bytes a pixel. What lies outside 0..1 is clamped, NaN is 0. */
+void nb_rounding_fill_row(const nebel_image *image, const int channels[3], uint32_t y, unsigned char *row);
+
+#endif

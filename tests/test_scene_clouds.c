@@ -1,0 +1,137 @@
+/* The clouds of a planet in scene files: what they become, and what is wrong. */
+#include "near.h"
+#include "scene_help.h"
+
+#include <math.h>
+
+#define PLANET(top, clouds)                                                                                            \
+    "{\"nebel\": 1, " top "\"fog\": [], \"planet\": {\"model\": \"physical\", \"clouds\": " clouds "}}"
+
+static void test_an_empty_layer_is_a_good_one(void **state)
+{
+    (void)state;
+    nebel_cloud_layer layer;
+    nebel_scene *scene = parse_good(PLANET("", "[{}, {\"kind\": \"cirrus\"}]"));
+    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    assert_int_equal(planet->cloud_layer_count, 2);
+    assert_int_equal(planet->cloud_layers[1].kind, NEBEL_CLOUD_CIRRUS);
+    assert_int_equal(planet->cloud_layers[1].seed, 2);
+    assert_int_equal(nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[0], NULL, &layer),
+                     NEBEL_OK);
+    assert_number(layer.base, 900);
+    assert_number(layer.top, 2700);
+    assert_number(layer.coverage, .4);
+    /* On small planets they shrink. */
+    assert_int_equal(nebel_resolve_cloud_layer(1e4, &planet->cloud_layers[0], NULL, &layer), NEBEL_OK);
+    assert_number(layer.top, 270);
+    assert_number(layer.extinction, .5);
+    assert_null(planet->clouds);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_non_null(planet->clouds);
+    const nebel_clouds *clouds = planet->clouds;
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_ptr_equal(planet->clouds, clouds);
+    nebel_destroy_scene(scene);
+}
+
+static void test_everything_they_may_say(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(PLANET(
+        "\"up\": \"z\", \"unit\": 1000, ",
+        "[{\"kind\": \"stratus\", \"base\": 1, \"top\": 2, \"coverage\": 0.25, \"extinction\": 5, \"size\": 3, "
+        "\"detail\": 0, \"variation\": 1, \"diameter\": 12, \"seed\": 7, \"wind\": [2, 3]}, {\"coverage\": 0}]"));
+    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    const nebel_cloud_layer *layer = planet->cloud_layers;
+    assert_int_equal(planet->cloud_layer_count, 1);
+    assert_int_equal(layer->kind, NEBEL_CLOUD_STRATUS);
+    assert_number(layer->base, 1000);
+    assert_number(layer->top, 2000);
+    assert_number(layer->coverage, .25);
+    assert_number(layer->extinction, 5e-3);
+    assert_number(layer->size, 3000);
+    assert_number(layer->detail, NEBEL_CLOUD_NONE);
+    assert_number(layer->variation, 1);
+    assert_number(layer->diameter, 12);
+    assert_int_equal(layer->seed, 7);
+    assert_number(layer->wind[0], 2000);
+    assert_number(layer->wind[1], -3000);
+    nebel_destroy_scene(scene);
+}
+
+#define ONE(members) PLANET("", "[{" members "}]")
+
+static void test_what_is_wrong(void **state)
+{
+    (void)state;
+    const rule rules[] = {
+        {FORMAT, PLANET("", "`{}"), "planet.clouds: is an object; must be an array of layers of clouds"},
+        {FORMAT, PLANET("", "[`3]"), "planet.clouds[0]: is a number"},
+        {FORMAT, PLANET("", "[{}, `{}]"), "planet.clouds[1]: lies from 900 to 2700 m and overlaps another"},
+        {LIMIT, PLANET("", "[{\"coverage\": 0}, {\"coverage\": 0}, {\"coverage\": 0}, {\"coverage\": 0}, `{}]"),
+         "planet.clouds[4]: is one too many"},
+        {FORMAT, ONE("\"kind\": `\"fluffy\""),
+         "planet.clouds[0].kind: unknown; must be one of: cumulus, stratus, cirrus"},
+        {FORMAT, ONE("\"base\": `0"), "planet.clouds[0].base: is 0"},
+        {FORMAT, ONE("\"base\": `-100"), "planet.clouds[0].base: is -100"},
+        {FORMAT, PLANET("", "[`{\"base\": 3000}]"), "planet.clouds[0]: top: must be above the base"},
+        {FORMAT, PLANET("", "[`{\"base\": 1000, \"top\": 1000}]"), "planet.clouds[0]: top: must be above the base"},
+        {FORMAT, PLANET("", "[`{\"top\": 2e5}]"), "planet.clouds[0]: top: must be within the air"},
+        {FORMAT, PLANET("", "[`{\"base\": 1000, \"top\": 1000.01}]"), "planet.clouds[0]: top: must be a millionth"},
+        {FORMAT, ONE("\"coverage\": `1.5"), "planet.clouds[0].coverage: is 1.5"},
+        {FORMAT, ONE("\"coverage\": `-0.1"), "planet.clouds[0].coverage: is -0.1"},
+        {FORMAT, ONE("\"extinction\": `0"), "planet.clouds[0].extinction: is 0"},
+        {FORMAT, ONE("\"size\": `0"), "planet.clouds[0].size: is 0"},
+        {FORMAT, ONE("\"detail\": `2"), "planet.clouds[0].detail: is 2"},
+        {FORMAT, ONE("\"diameter\": `100"), "planet.clouds[0].diameter: is 100"},
+        {FORMAT, ONE("\"seed\": `0.5"), "planet.clouds[0].seed: is 0.5"},
+        {FORMAT, ONE("\"wind\": `[1]"), "planet.clouds[0].wind: "},
+        {FORMAT, ONE("\"weather\": `\"w.txt\""),
+         "planet.clouds[0].weather: is \"w.txt\"; must be the path of a picture"},
+        {FORMAT, ONE("`\"hight\": 3"), "planet.clouds[0].hight: unknown key"},
+    };
+    CHECK(rules);
+}
+
+static void test_without_memory(void **state)
+{
+    (void)state;
+    parse_without_memory(ONE("\"seed\": 3"));
+}
+
+/* Fog at the origin stands in the clouds' shadow, which moves with the wind. */
+static void test_fog_has_their_shadow(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(
+        "{\"nebel\": 1, \"sun\": {\"direction\": [0, 1, 0.2], \"irradiance\": 3}, \"ambient\": 0, \"planet\": "
+        "{\"model\": "
+        "\"physical\", \"clouds\": [{\"wind\": [500, 0]}]}, \"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": "
+        "[0, 10, 0], \"radius\": 5}, \"extinction\": 0.01, \"albedo\": 1}]}");
+    const nebel_ray ray = {{0, 10, 9}, {0, 0, -1}, 20};
+    double darkest = HUGE_VAL, brightest = 0;
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    for (int frame = 0; frame < 24; frame++) {
+        nebel_snapshot *fog;
+        nebel_light light;
+        assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
+        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+        darkest = fmin(darkest, light.in_scattering[1]);
+        brightest = fmax(brightest, light.in_scattering[1]);
+        nebel_release_snapshot(fog);
+    }
+    assert_true(darkest > 0 && brightest > 2.5 * darkest);
+    nebel_destroy_scene(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_an_empty_layer_is_a_good_one),
+        cmocka_unit_test(test_everything_they_may_say),
+        cmocka_unit_test(test_what_is_wrong),
+        cmocka_unit_test(test_without_memory),
+        cmocka_unit_test(test_fog_has_their_shadow),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

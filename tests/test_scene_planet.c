@@ -1,0 +1,214 @@
+/* The section "planet" of scene files: what it becomes, what its air does to the scene's light, and what is wrong. */
+#include "near.h"
+#include "scene_help.h"
+
+#include <stdio.h>
+
+#define SCENE(top, members) "{\"nebel\": 1, " top "\"fog\": [], \"planet\": " members "}"
+#define SUN "\"sun\": {\"direction\": [1, 1, 0], \"irradiance\": [4, 3, 2]}, "
+
+static void test_defaults(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good("{\"nebel\": 1, \"fog\": []}");
+    assert_int_equal(nebel_scene_contents(scene)->planet_count, 0);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    nebel_destroy_scene(scene);
+    scene = parse_good(SCENE("", "{\"model\": \"physical\"}"));
+    assert_int_equal(nebel_scene_contents(scene)->planet_count, 1);
+    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    assert_int_equal(planet->model, NEBEL_PLANET_PHYSICAL);
+    assert_number(planet->air.radius, 6.36e6);
+    assert_number(planet->air.ground[1], 0);
+    assert_int_equal(planet->air.air_count, 3);
+    assert_int_equal(planet->air.quality, NEBEL_AIR_FAST);
+    assert_near(planet->sun_diameter, .533, 1e-3);
+    assert_null(planet->atmosphere);
+    nebel_destroy_scene(scene);
+    scene = parse_good(SCENE("", "{\"model\": \"physical\", \"preset\": \"mars\"}"));
+    assert_number(nebel_scene_contents(scene)->planets[0].air.radius, 3.3895e6);
+    nebel_destroy_scene(scene);
+}
+
+static void test_everything_it_may_say(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(SCENE(
+        "\"up\": \"z\", \"unit\": 1000, ",
+        "{\"model\": \"physical\", \"preset\": \"toy\", \"center\": [1, 2, -30], \"radius\": 20, \"thickness\": 5, "
+        "\"ground_albedo\": [0.1, 0.2, 0.3], \"quality\": \"precise\", \"sun_diameter\": 2, \"airs\": [{\"type\": "
+        "\"exponential\", \"scattering\": [1, 2, 3], \"phase\": {\"type\": \"henyey_greenstein\", \"g\": 0.5}, "
+        "\"scale_height\": 0.5}, {\"type\": \"layer\", \"absorption\": 4, \"middle\": 3, \"width\": 1}]}"));
+    const nebel_planet *planet = nebel_scene_contents(scene)->planets;
+    const nebel_air *air = planet->air.airs;
+    assert_number(planet->air.ground[0], 1000);
+    assert_number(planet->air.ground[1], -30000 + 20000);
+    assert_number(planet->air.ground[2], -2000);
+    assert_number(planet->air.radius, 20000);
+    assert_number(planet->air.thickness, 5000);
+    assert_number(planet->air.ground_albedo[2], .3);
+    assert_int_equal(planet->air.quality, NEBEL_AIR_PRECISE);
+    assert_number(planet->sun_diameter, 2);
+    assert_int_equal(planet->air.air_count, 2);
+    assert_int_equal(air[0].profile, NEBEL_AIR_EXPONENTIAL);
+    assert_number(air[0].scattering[2], 3e-3);
+    assert_number(air[0].absorption[2], 0);
+    assert_number(air[0].phase.g, .5);
+    assert_number(air[0].scale_height, 500);
+    assert_int_equal(air[1].profile, NEBEL_AIR_LAYER);
+    assert_number(air[1].absorption[0], 4e-3);
+    assert_number(air[1].center, 3000);
+    assert_number(air[1].width, 1000);
+    nebel_destroy_scene(scene);
+}
+
+static const char lit_fog[] =
+    "{\"nebel\": 1, " SUN
+    "%s \"planet\": {\"model\": \"physical\", \"preset\": \"toy\"}, \"fog\": [{\"shape\": {\"type\": "
+    "\"sphere\", \"center\": [0, 10, 0], \"radius\": 5}, \"extinction\": 0.1, \"albedo\": 1}]}";
+
+/* What a ray through the ball sees. */
+static nebel_light light_of(const nebel_scene *scene)
+{
+    nebel_snapshot *fog = NULL;
+    nebel_light light;
+    const nebel_ray ray = {{0, 10, 9}, {0, 0, -1}, 20};
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
+    nebel_release_snapshot(fog);
+    return light;
+}
+
+/* With ambient light of its own, 0, fog is lit by what the air leaves of the sun; without, by the sky as well. */
+static void test_air_lights_fog(void **state)
+{
+    (void)state;
+    char text[600];
+    nebel_light dimmed = {.error = 0};
+    for (int with_sky = 0; with_sky < 2; with_sky++) {
+        (void)snprintf(text, sizeof text, lit_fog, with_sky ? "" : "\"ambient\": 0,");
+        nebel_scene *scene = parse_good(text);
+        const nebel_scene_data *data = nebel_scene_contents(scene);
+        const nebel_light clear = light_of(scene);
+        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+        const nebel_light light = light_of(scene);
+        assert_non_null(data->planets[0].atmosphere);
+        assert_number(data->sun_irradiance[0], 4);
+        assert_int_equal(data->environment.type, with_sky ? NEBEL_ENVIRONMENT_MAP : NEBEL_ENVIRONMENT_CONSTANT);
+        for (int c = 0; c < 3; c++) {
+            const double left = data->planets[0].sun_left[c];
+            assert_true(left > .3 && left < 1);
+            if (!with_sky) assert_near(light.in_scattering[c], clear.in_scattering[c] * left, 1e-6);
+            if (with_sky) assert_true(light.in_scattering[c] > 1.02 * dimmed.in_scattering[c]);
+        }
+        dimmed = light;
+        nebel_destroy_scene(scene);
+    }
+    assert_int_equal(nebel_load_scene_planet(NULL), NEBEL_ERROR_ARGUMENT);
+}
+
+/* The map holds what nebel_trace_air sees, and the ground below. */
+static void test_sky_is_that_of_the_air(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(
+        SCENE(SUN, "{\"model\": \"physical\", \"ground_albedo\": 0.5, \"airs\": [{\"type\": \"exponential\", "
+                   "\"scattering\": 2e-5, \"phase\": {\"type\": \"rayleigh\"}, \"scale_height\": 8000}]}"));
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    nebel_sun sun = {.irradiance = {4, 3, 2}};
+    memcpy(sun.direction, data->sun_direction, sizeof sun.direction);
+    static const double ways[][3] = {{0, 1, 0}, {1, 1, 0}, {-1, .5, .3}, {0, .3, -1}, {.2, .6, 1}};
+    for (int i = 0; i < 5; i++) {
+        const nebel_ray ray = {{0, 0, 0}, {ways[i][0], ways[i][1], ways[i][2]}, (double)INFINITY};
+        nebel_light light;
+        double seen[3];
+        assert_int_equal(nebel_trace_air(data->planets[0].atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+        nebel_environment_radiance(&data->environment, ways[i], seen);
+        for (int c = 0; c < 3; c++) assert_near(seen[c] / light.in_scattering[c], 1, .03);
+    }
+    static const double origin[1][3] = {{0, 0, 0}}, down[3] = {0, -1, 0};
+    nebel_air_light arrives;
+    double ground[3];
+    assert_int_equal(nebel_light_air(data->planets[0].atmosphere, &sun, 1, origin, 0, &arrives, 0), NEBEL_OK);
+    nebel_environment_radiance(&data->environment, down, ground);
+    for (int c = 0; c < 3; c++)
+        assert_near(ground[c], .5 / acos(-1) * (sqrt(.5) * arrives.sun[c] + arrives.sky[c]), 2e-3);
+    nebel_destroy_scene(scene);
+}
+
+static void test_what_is_wrong(void **state)
+{
+    (void)state;
+#define PHYSICAL(members) SCENE("", "{\"model\": \"physical\", " members "}")
+#define AIR(members) PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000, " members "}]")
+    const rule rules[] = {
+        {FORMAT, SCENE("", "`\"earth\""), "planet: is a string; must be an object"},
+        {FORMAT, SCENE("", "`{}"), "planet: the key \"model\" is missing"},
+        {FORMAT, SCENE("", "{\"model\": `\"shells\"}"), "planet.model: unknown; must be one of: physical, layers"},
+        {FORMAT, PHYSICAL("\"preset\": `\"venus\""), "planet.preset: unknown; must be one of: earth, mars, toy"},
+        {FORMAT, PHYSICAL("`\"ozone\": 1"), "planet.ozone: unknown key; a physical planet has: model, preset"},
+        {FORMAT, PHYSICAL("\"radius\": `0"), "planet.radius: is 0; must be a length from 1 to 1e12 m"},
+        {FORMAT, PHYSICAL("\"radius\": `-6e6"), "planet.radius: is -6000000; must be"},
+        {FORMAT, PHYSICAL("\"thickness\": `0"), "planet.thickness: is 0; must be"},
+        {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 6}"),
+         "planet: thickness: must be within a millionth of the radius and 1e12"},
+        {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 1e8}"),
+         "planet: airs[0] scale_height: must be within a thousandth of the thickness"},
+        {FORMAT, PHYSICAL("\"center\": [0, `2e15, 0]"), "planet.center[1]: is 2e+15"},
+        {FORMAT, PHYSICAL("\"center\": `[0, 0]"), "planet.center: has 2 elements"},
+        {FORMAT, PHYSICAL("\"ground_albedo\": `1.5"), "planet.ground_albedo: is 1.5"},
+        {FORMAT, PHYSICAL("\"quality\": `\"best\""), "planet.quality: unknown; must be one of: fast, precise"},
+        {FORMAT, PHYSICAL("\"sun_diameter\": `11"), "planet.sun_diameter: is 11"},
+        {FORMAT, PHYSICAL("\"airs\": `[]"), "planet.airs: is empty"},
+        {FORMAT, PHYSICAL("\"airs\": `{}"), "planet.airs: is an object; must be an array"},
+        {FORMAT, PHYSICAL("\"airs\": [{\"type\": `\"vacuum\"}]"),
+         "planet.airs[0].type: unknown; must be one of: exponential, layer"},
+        {FORMAT, AIR("\"scattering\": `2000"), "planet.airs[0].scattering: is 2000"},
+        {FORMAT, AIR("\"absorption\": [0, `-1, 0]"), "planet.airs[0].absorption[1]: is -1"},
+        {FORMAT, AIR("`\"width\": 5"), "planet.airs[0].width: unknown key"},
+        {FORMAT, AIR("\"phase\": {\"type\": `\"mie\"}"), "planet.airs[0].phase.type: unknown"},
+        {LIMIT,
+         PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": \"exponential\", "
+                  "\"scale_height\": 8000}, {\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": "
+                  "\"exponential\", \"scale_height\": 8000}, `{\"type\": \"exponential\", \"scale_height\": 1}]"),
+         "planet.airs[4]: is one too many"}};
+    CHECK(rules);
+}
+
+static void test_without_memory(void **state)
+{
+    (void)state;
+    parse_without_memory(SCENE("", "{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": "
+                                   "8000}]}"));
+    const char *text = SCENE(SUN, "{\"model\": \"physical\", \"preset\": \"toy\"}");
+    for (long calls = 0;; calls += 2) {
+        meter m;
+        journal kept;
+        nebel_scene *scene = NULL;
+        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
+        m.fail_at = m.made + calls;
+        const nebel_result result = nebel_load_scene_planet(scene);
+        if (result != NEBEL_OK) {
+            assert_int_equal(result, NEBEL_ERROR_MEMORY);
+            assert_null(nebel_scene_contents(scene)->planets[0].atmosphere);
+            assert_int_equal(nebel_scene_contents(scene)->environment.type, NEBEL_ENVIRONMENT_CONSTANT);
+        }
+        nebel_destroy_scene(scene);
+        assert_int_equal(m.live, 0);
+        if (result == NEBEL_OK) break;
+        assert_true(calls < 60);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_defaults),       cmocka_unit_test(test_everything_it_may_say),
+        cmocka_unit_test(test_air_lights_fog), cmocka_unit_test(test_sky_is_that_of_the_air),
+        cmocka_unit_test(test_what_is_wrong),  cmocka_unit_test(test_without_memory),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,169 @@
+/* The sun on its way from key to key, and what it lights. */
+#include "near.h"
+#include "scene_help.h"
+
+#include <math.h>
+
+#define SCENE(keys, more)                                                                                              \
+    "{\"nebel\": 1, \"sun\": {\"direction\": [0, 3, 0], \"irradiance\": [4, 3, 2]" keys "}" more "}"
+#define EMPTY ", \"fog\": []"
+#define TOY ", \"planet\": {\"model\": \"physical\", \"preset\": \"toy\"}"
+#define TWO ", \"keys\": [{\"frame\": 10}, {\"frame\": 30, \"direction\": [2, 0, 0], \"irradiance\": [0, 3, 6]}]"
+
+static void test_what_a_key_leaves_out_it_takes_from_the_sun(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(SCENE(TWO, EMPTY));
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(data->sun_key_count, 2);
+    assert_vector(data->sun_direction, 0, 1, 0);
+    const nebel_sun first = nebel_scene_sun(scene, -1e9), middle = nebel_scene_sun(scene, 20),
+                    last = nebel_scene_sun(scene, HUGE_VAL);
+    assert_vector(first.direction, 0, 1, 0);
+    assert_vector(first.irradiance, 4, 3, 2);
+    assert_vector(middle.direction, sqrt(.5), sqrt(.5), 0);
+    assert_vector(middle.irradiance, 2, 3, 4);
+    assert_vector(last.direction, 1, 0, 0);
+    assert_vector(last.irradiance, 0, 3, 6);
+    nebel_destroy_scene(scene);
+}
+
+static void test_it_is_somewhere_at_every_frame(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(SCENE(
+        ", \"keys\": [{\"frame\": 0}, {\"frame\": 1, \"direction\": [0, -1, 0], \"irradiance\": 0}, {\"frame\": 2, "
+        "\"direction\": [0, 0, 1]}, {\"frame\": 9, \"direction\": [1e-9, 0, -1]}]",
+        EMPTY));
+    for (int i = -10; i <= 100; i++) {
+        const nebel_sun sun = nebel_scene_sun(scene, i / 10.);
+        assert_near(sqrt(pow(sun.direction[0], 2) + pow(sun.direction[1], 2) + pow(sun.direction[2], 2)), 1, 1e-12);
+        assert_true(sun.irradiance[0] >= 0 && sun.irradiance[0] <= 4);
+    }
+    nebel_destroy_scene(scene);
+    scene = parse_good("{\"nebel\": 1, \"fog\": []}");
+    assert_vector(nebel_scene_sun(scene, 3).irradiance, 0, 0, 0);
+    assert_int_equal(nebel_light_scene_at(scene, 3), NEBEL_OK);
+    assert_int_equal(nebel_scene_contents(scene)->has_sun, 0);
+    assert_int_equal(nebel_light_scene_at(NULL, 3), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_scene(scene);
+}
+
+static void test_it_lights_fog(void **state)
+{
+    (void)state;
+    nebel_scene *scene =
+        parse_good(SCENE(TWO, ", \"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1}, "
+                              "\"extinction\": 1, \"albedo\": 1}]"));
+    for (int i = 0; i < 3; i++) {
+        nebel_snapshot *moved, *standing;
+        const nebel_sun sun = nebel_scene_sun(scene, 10 + 10 * i);
+        char text[400];
+        (void)snprintf(text, sizeof text,
+                       "{\"nebel\": 1, \"sun\": {\"direction\": [%.17g, %.17g, 0], \"irradiance\": [%.17g, 3, %.17g]}, "
+                       "\"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": 1}, "
+                       "\"extinction\": 1, \"albedo\": 1}]}",
+                       sun.direction[0], sun.direction[1], sun.irradiance[0], sun.irradiance[2]);
+        nebel_scene *other = parse_good(text);
+        assert_int_equal(nebel_light_scene_at(scene, 10 + 10 * i), NEBEL_OK);
+        assert_int_equal(nebel_commit_scene_fog(scene, &moved), NEBEL_OK);
+        assert_int_equal(nebel_commit_scene_fog(other, &standing), NEBEL_OK);
+        const nebel_ray ray = {{.3, 0, 5}, {0, .05, -1}, (double)INFINITY};
+        nebel_light a, b;
+        assert_int_equal(nebel_trace(moved, &(nebel_trace_desc){0}, 1, &ray, 0, &a, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace(standing, &(nebel_trace_desc){0}, 1, &ray, 0, &b, 0), NEBEL_OK);
+        assert_true(b.in_scattering[2] > 0);
+        for (int c = 0; c < 3; c++) assert_near(a.in_scattering[c], b.in_scattering[c], 1e-9);
+        nebel_release_snapshot(moved);
+        nebel_release_snapshot(standing);
+        nebel_destroy_scene(other);
+    }
+    nebel_destroy_scene(scene);
+}
+
+/* The sky that a snapshot was lit by outlives the next one. */
+static void test_it_lights_the_air_of_a_planet(void **state)
+{
+    (void)state;
+    nebel_scene *scene = parse_good(SCENE(TWO, EMPTY TOY)),
+                *low = parse_good("{\"nebel\": 1, \"fog\": [], \"sun\": {\"direction\": [1, 0, 0], \"irradiance\": [0, "
+                                  "3, 6]}" TOY "}");
+    const double up[3] = {0, 1, 0};
+    double noon[3], dusk[3], wanted[3];
+    nebel_snapshot *before;
+    assert_int_equal(nebel_light_scene_at(scene, 10), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planet(low), NEBEL_OK);
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    const double left = data->planets[0].sun_left[2];
+    nebel_environment_radiance(&data->environment, up, noon);
+    assert_int_equal(nebel_commit_scene_fog(scene, &before), NEBEL_OK);
+    assert_int_equal(nebel_light_scene_at(scene, 30), NEBEL_OK);
+    nebel_environment_radiance(&data->environment, up, dusk);
+    nebel_environment_radiance(&nebel_scene_contents(low)->environment, up, wanted);
+    assert_true(data->planets[0].sun_left[2] < .5 * left);
+    for (int c = 0; c < 3; c++) {
+        assert_near(data->planets[0].sun_left[c], nebel_scene_contents(low)->planets[0].sun_left[c], 1e-12);
+        assert_near(dusk[c], wanted[c], 1e-12);
+    }
+    assert_true(fabs(dusk[1] - noon[1]) > .1 * noon[1]);
+    nebel_release_snapshot(before);
+    nebel_destroy_scene(low);
+    nebel_destroy_scene(scene);
+}
+
+static void test_what_is_wrong(void **state)
+{
+    (void)state;
+    static const rule rules[] = {
+        {FORMAT, SCENE(", \"keys\": `[]", EMPTY), "sun.keys: holds no key"},
+        {FORMAT, SCENE(", \"keys\": `{}", EMPTY), "sun.keys: is an object; must be an array"},
+        {FORMAT, SCENE(", \"keys\": [`{}]", EMPTY), "sun.keys[0]: the key \"frame\" is missing"},
+        {FORMAT, SCENE(", \"keys\": [{\"frame\": `1e10}]", EMPTY), "sun.keys[0].frame: is 10000000000"},
+        {FORMAT, SCENE(", \"keys\": [{\"frame\": 1}, `{\"frame\": 1}]", EMPTY),
+         "sun.keys[1]: its frame 1 is not after"},
+        {FORMAT, SCENE(", \"keys\": [{\"frame\": 1, `\"keys\": []}]", EMPTY),
+         "sun.keys[0].keys: unknown key; a key of the sun"},
+        {FORMAT, SCENE(", \"keys\": [{\"frame\": 1, \"direction\": `[0, 0, 0]}]", EMPTY), "sun.keys[0].direction: "},
+        {FORMAT, SCENE(", \"keys\": [{\"frame\": 1, \"irradiance\": `-1}]", EMPTY), "sun.keys[0].irradiance: is -1"},
+        {FORMAT, SCENE(", `\"frame\": 1", EMPTY), "sun.frame: unknown key"}};
+    CHECK(rules);
+}
+
+static void test_without_memory(void **state)
+{
+    (void)state;
+    parse_without_memory(SCENE(TWO, EMPTY));
+    const char *text = SCENE(TWO, EMPTY TOY);
+    meter m;
+    journal kept;
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = metered_desc(&m, &kept);
+    assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    const nebel_environment_map *map = nebel_scene_contents(scene)->environment.map;
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (long calls = 0; result != NEBEL_OK; calls++) {
+        assert_true(calls < 40);
+        m.fail_at = m.made + calls;
+        result = nebel_light_scene_at(scene, 20);
+        if (result == NEBEL_OK) break;
+        assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        assert_ptr_equal(nebel_scene_contents(scene)->environment.map, map);
+    }
+    nebel_destroy_scene(scene);
+    assert_int_equal(m.live, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_what_a_key_leaves_out_it_takes_from_the_sun),
+        cmocka_unit_test(test_it_is_somewhere_at_every_frame),
+        cmocka_unit_test(test_it_lights_fog),
+        cmocka_unit_test(test_it_lights_the_air_of_a_planet),
+        cmocka_unit_test(test_what_is_wrong),
+        cmocka_unit_test(test_without_memory),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
