@@ -111,12 +111,78 @@ static void odd_lamps_are_answered(void **state)
     test_picture_free(&picture);
 }
 
+static const float wall_positions[] = {-50, -50, -3, 50, -50, -3, 50, 50, -3, -50, 50, -3};
+
+static nebel_snapshot *lit_fog(const nebel_volume_desc *volume, const nebel_lamp *lamp)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, 1, lamp), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Level at a wall 3 m behind the lamp, through fog about it; the floor is seen from its edge. */
+static void render_wall(const nebel_lamp *lamp, int has_floor, nebel_method method, test_picture *picture)
+{
+    static const uint32_t upright[] = {0, 1, 2, 0, 2, 3};
+    nebel_mesh meshes[] = {make_square(wall_positions), make_square(floor_positions)};
+    meshes[0].indices = upright;
+    const nebel_scene_data scene = {.mesh_count = has_floor ? 2 : 1, .meshes = meshes, .lamp_count = 1, .lamps = lamp};
+    const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-4, -4, -2.9}, .max = {4, 4, 3}},
+                                   .extinction = {.1, .1, .1},
+                                   .albedo = {1, 1, 1}};
+    nebel_snapshot *fog = lit_fog(&box, lamp);
+    nebel_renderer *renderer = NULL;
+    assert_int_equal(nebel_create_renderer(&scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, method, NULL), NEBEL_OK);
+    nebel_frame_desc desc = {.camera = test_camera(0, 2, 10, 0, 2, 0), .width = SIZE, .height = SIZE};
+    desc.samples = desc.bounces = 1;
+    desc.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    desc.camera.view_height = 3.9;
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture->planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    nebel_release_snapshot(fog);
+}
+
+/* On a floor, in it, and deeper in it by less than 1 mm, a lamp lights what is above as if there were no floor; but for
+ * the last one's light that leaves the floor farther from it than that: below 5.8 degrees. */
+static void floors_do_not_hide_lamps_in_them(void **state)
+{
+    const nebel_lamp lamps[] = {{.position = {0, 0, 0}, .intensity = {10, 10, 10}},
+                                {.position = {0.3, 0, 0.2}, .intensity = {10, 10, 10}},
+                                {.position = {0.3, -1e-4, 0.2}, .intensity = {10, 10, 10}}};
+    const nebel_method methods[] = {NEBEL_METHOD_EXACT, NEBEL_METHOD_REFERENCE};
+    test_picture with = test_picture_make(SIZE, SIZE), without = test_picture_make(SIZE, SIZE);
+    (void)state;
+    for (size_t i = 0; i < 2 * sizeof lamps / sizeof lamps[0]; i++) {
+        const nebel_lamp *lamp = &lamps[i / 2];
+        const uint32_t rows = lamp->position[1] < 0 ? SIZE * 3 / 4 : SIZE; /* from 1.02 m or 0.11 m up */
+        uint32_t lit = 0;
+        render_wall(lamp, 1, methods[i % 2], &with);
+        render_wall(lamp, 0, methods[i % 2], &without);
+        for (uint32_t y = 0; y < rows; y++)
+            for (uint32_t x = 0; x < SIZE; x++) {
+                const double seen = (double)test_color(&with, x, y)[0], all = (double)test_color(&without, x, y)[0];
+                assert_true(fabs(seen - all) <= 1e-4 * all);
+                lit += seen > 0;
+            }
+        assert_true(lit > rows * SIZE / 2); /* of the reference's paths some meet no light */
+    }
+    test_picture_free(&with);
+    test_picture_free(&without);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_floor_is_lit),
         cmocka_unit_test(shadows_and_cones_have_edges),
         cmocka_unit_test(odd_lamps_are_answered),
+        cmocka_unit_test(floors_do_not_hide_lamps_in_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,6 @@
 /* Shadows of surfaces in fog that the sun or lamps light: ends against Embree's visibility, light against closed forms
  * and fine steps. */
-#include "test_render_scene.h"
+#include "test_shadows.h"
 
 #include "cpu/renderer.h"
 #include "dice.h"
@@ -8,44 +8,6 @@
 /* ---- ends of shadows ------------------------------------------------------------------------- */
 
 enum { TRIANGLES = 700, PLACES = 40 };
-
-/* Whether something is between the place and `reach` m from it in this direction. */
-static int is_hidden(const nb_geometry *geometry, const float place[3], const double way[3], float reach)
-{
-    struct RTCIntersectContext context;
-    struct RTCRay ray = {.org_x = place[0],
-                         .org_y = place[1],
-                         .org_z = place[2],
-                         .dir_x = (float)way[0],
-                         .dir_y = (float)way[1],
-                         .dir_z = (float)way[2],
-                         .tfar = reach,
-                         .mask = UINT32_MAX};
-    rtcInitIntersectContext(&context);
-    rtcOccluded1(geometry->scene, &context, &ray);
-    return ray.tfar < 0;
-}
-
-static int is_in_shadow(const nb_geometry *geometry, const float place[3], const double sun[3])
-{
-    return is_hidden(geometry, place, sun, INFINITY);
-}
-
-/* Of the lamp, relative to the place; its length. */
-static double way_to_lamp(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp, double way[3])
-{
-    for (int i = 0; i < 3; i++) way[i] = lamp->position[i] - geometry->origin[i] - (double)place[i];
-    const double distance = nb_vector_length(way);
-    nb_vector_make_unit(way);
-    return distance;
-}
-
-static int is_in_shadow_of_lamp(const nb_geometry *geometry, const float place[3], const nebel_lamp *lamp)
-{
-    double way[3];
-    const double distance = way_to_lamp(geometry, place, lamp, way);
-    return distance > lamp->radius && is_hidden(geometry, place, way, (float)(distance - lamp->radius));
-}
 
 /* Triangles of all sizes, long ones and needles among them. */
 static void draw_triangles(uint64_t *numbers, float (*positions)[3])
@@ -106,6 +68,7 @@ typedef struct trial {
     nb_rays rays;
     nb_view view;
     float distance[NB_BATCH];
+    nb_eye eye;
     size_t toggles, shadows, wrong;
 } trial;
 
@@ -124,9 +87,10 @@ static float shadow_at(const nebel_lit_pieces *lit, int ray, float t)
 static void compare_places(trial *run, const nb_geometry *geometry, const nebel_lit_pieces *lit, const double sun[3],
                            const nebel_lamp *lamp, int ray, uint64_t *numbers)
 {
-    const float skipped = (float)run->view.advance * run->rays.length[ray], far = fminf(run->distance[ray], 60);
-    for (int k = 0; k < PLACES; k++) {
-        const float t = (float)dice(numbers, 0, (double)far), expected = shadow_at(lit, ray, t);
+    const float skipped = (float)run->view.advance * run->rays.length[ray],
+                far = fminf(run->distance[ray], skipped + 60);
+    for (int k = 0; k < PLACES && skipped < far; k++) {
+        const float t = (float)dice(numbers, (double)skipped, (double)far), expected = shadow_at(lit, ray, t);
         float place[3];
         if (isnan(expected)) continue;
         for (int i = 0; i < 3; i++) place[i] = run->rays.start[i][ray] + (t - skipped) * run->rays.unit[i][ray];
@@ -172,8 +136,26 @@ static void report_trial(const trial *run)
     assert_true(run->wrong <= run->shadows / 10000);
 }
 
-/* With the sun from different sides, level and straight above among them. */
-static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t numbers, trial *run)
+/* Up to the surfaces that the rays meet. */
+static void end_at_surfaces(const nb_geometry *geometry, trial *run)
+{
+    for (int i = 0; i < NB_BATCH; i++) {
+        struct RTCIntersectContext context;
+        struct RTCRayHit ray = {.ray = {.tfar = INFINITY, .mask = UINT32_MAX}, .hit = {.geomID = NB_NONE}};
+        ray.ray.org_x = run->rays.start[0][i];
+        ray.ray.org_y = run->rays.start[1][i];
+        ray.ray.org_z = run->rays.start[2][i];
+        ray.ray.dir_x = run->rays.unit[0][i];
+        ray.ray.dir_y = run->rays.unit[1][i];
+        ray.ray.dir_z = run->rays.unit[2][i];
+        rtcInitIntersectContext(&context);
+        rtcIntersect1(geometry->scene, &context, &ray);
+        run->distance[i] = (float)run->view.advance * run->rays.length[i] + ray.ray.tfar;
+    }
+}
+
+/* With the sun from different sides, level and straight above among them. `is_seen` asks for what the eye sees only. */
+static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t numbers, int is_seen, trial *run)
 {
     double sun[3] = {dice(&numbers, -1, 1), seed == 3 ? 0 : dice(&numbers, 0, 1), seed == 4 ? 0 : 1};
     if (seed == 5) sun[0] = sun[1] = 0;
@@ -181,15 +163,17 @@ static void try_scene(const nebel_scene_data *scene, uint64_t seed, uint64_t num
     const nebel_camera camera = trial_camera(seed);
     nb_geometry geometry = place_triangles(scene, &camera, &run->view);
     assert_int_equal(nb_sun_cells_set(&run->cells, &geometry, sun), NEBEL_OK);
+    run->eye = is_seen ? nb_shafts_eye(&run->cells, &geometry, &run->view) : NB_EYE_UNKNOWN;
     nb_region_points points;
     nb_sample_region(0, 1, &points);
     for (int first = 0; first < NB_PIXELS; first += 4 * NB_BATCH) {
         const nb_lit_box box = {{-12, -12, -12}, {12, seed == 2 ? 3 : 12, 12}};
         nb_view_rays(&run->view, 0, 0, points.x + first, points.y + first, &run->rays);
         for (int i = 0; i < NB_BATCH; i++) run->distance[i] = i % 5 == 0 ? 20 : INFINITY;
+        if (is_seen) end_at_surfaces(&geometry, run);
         const nb_lit_box all = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
         assert_int_equal(nb_shafts_find(&run->shafts, &geometry.allocator, &run->cells, seed == 2 ? &box : &all,
-                                        &run->rays, run->view.advance, run->distance),
+                                        &run->rays, run->view.advance, run->distance, run->eye),
                          NEBEL_OK);
         run->toggles += run->shafts.toggle_count;
         const nebel_lit_pieces lit = {run->shafts.first, run->shafts.toggles};
@@ -208,14 +192,11 @@ static void end_trial(trial *run)
     report_trial(run);
 }
 
-/* One in 10,000 places may be within rounding of a needle. */
-static void ends_are_those_of_visibility(void **state)
+static void try_triangles(int is_seen, trial *run)
 {
     static float positions[3 * TRIANGLES][3];
     static holed h;
-    static trial run;
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
-    (void)state;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 31 * seed + 7;
         if (seed == 8)
@@ -224,9 +205,34 @@ static void ends_are_those_of_visibility(void **state)
             draw_triangles(&numbers, positions);
         positions[5][1] = NAN;
         set_holed(&h, seed, positions);
-        try_scene(&h.scene, seed, numbers, &run);
-        nb_sun_cells_free(&run.cells, &allocator);
+        try_scene(&h.scene, seed, numbers, is_seen, run);
+        nb_sun_cells_free(&run->cells, &allocator);
     }
+}
+
+/* One in 10,000 places may be within rounding of a needle. */
+static void ends_are_those_of_visibility(void **state)
+{
+    static trial run;
+    (void)state;
+    try_triangles(0, &run);
+    assert_int_equal(run.shafts.by_walls, 0);
+    end_trial(&run);
+}
+
+static void report_walls(const trial *run)
+{
+    print_message("%zu packets by walls, %zu by prisms\n", run->shafts.by_walls, run->shafts.by_prisms);
+}
+
+/* Triangles through each other, of which some pictures have holes, and some no eye. */
+static void ends_before_surfaces_are_those_of_visibility(void **state)
+{
+    static trial run;
+    (void)state;
+    try_triangles(1, &run);
+    report_walls(&run);
+    assert_true(run.shafts.by_walls > 100);
     end_trial(&run);
 }
 
@@ -262,16 +268,14 @@ static size_t count_covered(const nb_sun_cells *cells)
     return count;
 }
 
-/* Where a landscape covers cells, and where it does not quite. */
-static void ends_behind_hills_are_those_of_visibility(void **state)
+/* Returns how many cells are covered. */
+static size_t try_hills(int is_seen, trial *run)
 {
     static float positions[FIELD_POINTS][3];
     static uint32_t indices[6 * FIELDS * FIELDS];
     static holed h;
-    static trial run;
     size_t covered = 0;
     const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
-    (void)state;
     for (uint64_t seed = 0; seed < 12; seed++) {
         uint64_t numbers = 41 * seed + 3;
         const uint32_t count = draw_hills(&numbers, seed % 2 == 1, positions, indices);
@@ -283,12 +287,66 @@ static void ends_behind_hills_are_those_of_visibility(void **state)
                               .triangle_count = count / 3,
                               .texture = -1,
                               .alpha_cutoff = seed % 4 == 2 ? 0.4f : 0};
-        try_scene(&h.scene, seed, numbers, &run);
-        covered += count_covered(&run.cells);
-        nb_sun_cells_free(&run.cells, &allocator);
+        try_scene(&h.scene, seed, numbers, is_seen, run);
+        covered += count_covered(&run->cells);
+        nb_sun_cells_free(&run->cells, &allocator);
     }
+    return covered;
+}
+
+/* Where a landscape covers cells, and where it does not quite. */
+static void ends_behind_hills_are_those_of_visibility(void **state)
+{
+    static trial run;
+    (void)state;
+    const size_t covered = try_hills(0, &run);
     print_message("%zu cells are covered\n", covered);
     assert_true(covered > 1000);
+    end_trial(&run);
+}
+
+static void ends_before_hills_are_those_of_visibility(void **state)
+{
+    static trial run;
+    (void)state;
+    (void)try_hills(1, &run);
+    report_walls(&run);
+    assert_true(run.shafts.by_walls > 370);
+    end_trial(&run);
+}
+
+enum { LEAVES = 20000 };
+
+/* Few leaves have walls; where there are many with others over each it ends before all walls are found, and prisms are
+ * cut. */
+static void ends_among_leaves_are_those_of_visibility(void **state)
+{
+    static trial run;
+    static float positions[3 * LEAVES][3];
+    static uint32_t indices[3 * LEAVES];
+    const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){0});
+    uint64_t numbers = 11;
+    (void)state;
+    for (uint32_t i = 0; i < 3 * LEAVES; i++) {
+        indices[i] = i;
+        for (int c = 0; c < 3; c++)
+            positions[i][c] = (float)(i % 3 == 0 ? dice(&numbers, -9, 9)
+                                                 : (double)positions[i - i % 3][c] + dice(&numbers, -0.7, 0.7));
+    }
+    for (uint64_t turn = 0; turn < 8; turn++) {
+        const uint32_t count = turn % 2 == 0 ? LEAVES / 20 : LEAVES;
+        const size_t before = run.shafts.by_walls;
+        nebel_mesh mesh = {.positions = positions[0],
+                           .indices = indices,
+                           .vertex_count = 3 * count,
+                           .triangle_count = count,
+                           .texture = -1};
+        try_scene(&(nebel_scene_data){.mesh_count = 1, .meshes = &mesh}, turn / 2 * 3, numbers, 1, &run);
+        assert_true(run.eye != NB_EYE_UNKNOWN);
+        assert_int_equal(run.shafts.by_walls > before, count < LEAVES);
+        nb_sun_cells_free(&run.cells, &allocator);
+    }
+    report_walls(&run);
     end_trial(&run);
 }
 
@@ -700,6 +758,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ends_are_those_of_visibility),
         cmocka_unit_test(ends_behind_hills_are_those_of_visibility),
+        cmocka_unit_test(ends_before_surfaces_are_those_of_visibility),
+        cmocka_unit_test(ends_before_hills_are_those_of_visibility),
+        cmocka_unit_test(ends_among_leaves_are_those_of_visibility),
         cmocka_unit_test(ends_of_lamplight_are_those_of_visibility),
         cmocka_unit_test(the_shadow_of_a_box_is_cut_out),
         cmocka_unit_test(shafts_are_those_of_small_steps),

@@ -110,6 +110,8 @@ typedef struct nebel_frame_desc {
     /* Of REFERENCE: how often light is scattered or reflected at most. 1 is what EXACT shows; 0: until paths end by
      * themselves, at most 10000 times. Other seeds give independent pictures. */
     uint32_t bounces, seed;
+    double
+        time; /* of a planet of layers, whose balls turn: within 1e12, in the unit of its days, which is frames in scenes */
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not
@@ -134,6 +136,10 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
  * pixels of 3 floats, out may be in. Black stays 0, middle grey 0.18 stays 0.18, 1 comes out as 0.70 before the
  * transfer function, the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
 void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
+
+/* Runs parts on threads of OpenMP: for the `run` of descriptions of scenes and of air. `user` is a const int *, how many
+ * threads there are, 1 to 1024; NULL: as many as processors. Any thread. */
+void nebel_run_parts(size_t parts, void (*part)(void *data, size_t i), void *data, void *user);
 
 /* The Embree version this build uses, "Embree 3.13.5". Never NULL. */
 const char *nebel_renderer_libraries(void);

@@ -1,5 +1,8 @@
 /* One sample of 64 x 4 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
 #include "classic_fog.h"
+#include "cloudscape.h"
+#include "haze.h"
+#include "shells.h"
 
 #include <math.h>
 
@@ -76,7 +79,7 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
     nebel_result result = NEBEL_OK;
     if (frame->has_shafts) {
         result = nb_shafts_find(&scratch->shafts, &renderer->allocator, &renderer->sun_cells, &frame->sunlit_box,
-                                &scratch->rays, frame->view.advance, scratch->distance);
+                                &scratch->rays, frame->view.advance, scratch->distance, frame->eye);
         *sunlit = (nebel_lit_pieces){scratch->shafts.first, scratch->shafts.toggles};
         trace->sunlit = sunlit;
     }
@@ -88,25 +91,53 @@ static nebel_result find_shafts(const nb_frame *frame, nb_scratch *scratch, nebe
     return result;
 }
 
+/* Rays end at the planet's ground, too. */
+static void end_at_ground(const float *ground, float *distance)
+{
+    for (int i = 0; i < NB_BATCH; i++) distance[i] = fminf(distance[i], ground[i]);
+}
+
+/* Fog and air up to scratch->distance. */
+static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
+{
+    nb_light_samples *samples = &scratch->samples;
+    set_clear(samples);
+    if (!frame->air.has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
+    const nebel_ray_planes rays = camera_rays(frame, scratch);
+    const nebel_light_planes lights = light_samples(frame, samples);
+    nebel_trace_desc trace = frame->trace;
+    nebel_lit_pieces pieces;
+    nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
+    if (result == NEBEL_OK) result = nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    return result == NEBEL_OK ? nb_haze_add(frame, &rays, &trace, scratch) : result;
+}
+
 static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_light_samples *samples = &scratch->samples;
+    const int has_air = frame->air.planet != NULL;
     if (frame->renderer->method != NEBEL_METHOD_EXACT) {
         nb_classic_fog_trace(frame, scratch);
         return NEBEL_OK;
     }
-    if (frame->renderer->fog == NULL) {
-        set_clear(samples);
-        return NEBEL_OK;
-    }
+    const int has_fog = frame->renderer->fog != NULL && !(has_air && !frame->air.has_fog);
+    const int has_shells = frame->layers != NULL;
+    if (!has_fog || has_air) set_clear(samples);
+    if (!has_fog && has_shells) return nb_shells_trace(frame, NULL, NULL, scratch);
+    if (!has_fog && !has_air) return NEBEL_OK;
     set_distances(frame->view.advance, &scratch->rays, &scratch->hits, scratch->inside, scratch->distance);
+    if (has_air) end_at_ground(scratch->air.distance, scratch->distance);
+    if (has_shells) end_at_ground(scratch->shells.ground, scratch->distance);
+    if (!has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
     const nebel_light_planes lights = light_samples(frame, samples);
     nebel_trace_desc trace = frame->trace;
     nebel_lit_pieces pieces;
     const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
     if (result != NEBEL_OK) return result;
-    return nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    const nebel_result traced = nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    if (traced == NEBEL_OK && has_air) return nb_haze_add(frame, &rays, &trace, scratch);
+    return traced == NEBEL_OK && has_shells ? nb_shells_trace(frame, &rays, &trace, scratch) : traced;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
@@ -178,8 +209,12 @@ static int dims_sun(const nebel_renderer *renderer)
 static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
     set_clear_sunlight(frame->lighting.sunlight, scratch);
-    if (!dims_sun(frame->renderer) || !frame->lighting.has_sun) return NEBEL_OK;
-    const nebel_result result = trace_sun_fog(frame, scratch, scratch->light_transmittance);
+    if (frame->air.planet != NULL)
+        nb_air_dim_sun(frame->lighting.sunlight, &scratch->hits, &scratch->air, scratch->samples.color);
+    nebel_result result = NEBEL_OK;
+    if (frame->cloud_view != NULL) result = nb_cloudscape_shade(frame, scratch, scratch->samples.color);
+    if (result != NEBEL_OK || !dims_sun(frame->renderer) || !frame->lighting.has_sun) return result;
+    result = trace_sun_fog(frame, scratch, scratch->light_transmittance);
     if (result == NEBEL_OK) dim((const float(*)[NB_BATCH])scratch->light_transmittance, scratch->samples.color);
     return result;
 }
@@ -283,6 +318,34 @@ static void set_colors_by_direction(const nb_lighting *lighting, nb_scratch *scr
     }
 }
 
+/* The same on a planet: ambient light of the ground is the sky's there, and the sun is behind everything. */
+static void set_colors_in_air(const nb_frame *frame, nb_scratch *scratch)
+{
+    const nb_light_samples *samples = &scratch->samples;
+    for (int i = 0; i < NB_BATCH; i++) {
+        const uint32_t surface = scratch->hits.surface[i];
+        double behind[3] = {0, 0, 0};
+        if (surface == NB_NONE) {
+            nb_air_background(&frame->air, &frame->lighting, &scratch->rays, i, behind);
+        } else {
+            double normal[3], ambient[3];
+            for (int c = 0; c < 3; c++) {
+                normal[c] = (double)scratch->points.normal[c][i];
+                ambient[c] = 0.31830988618379067 * (double)scratch->air.sky[c][i];
+            }
+            if (surface != NB_GROUND) {
+                nebel_environment_reflected(&frame->lighting.environment, normal, ambient);
+                for (int c = 0; c < 3; c++) ambient[c] *= (double)scratch->air.sky_there[c][i];
+            }
+            for (int c = 0; c < 3; c++)
+                behind[c] = (double)scratch->points.reflectance[c][i] * ((double)samples->color[c][i] + ambient[c]);
+        }
+        for (int c = 0; c < 3; c++)
+            scratch->samples.color[c][i] =
+                samples->transmittance[c][i] * (float)behind[c] + samples->in_scattering[c][i];
+    }
+}
+
 static int has_one_light(const nb_lighting *lighting)
 {
     return lighting->environment.type == NEBEL_ENVIRONMENT_CONSTANT;
@@ -308,6 +371,11 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     const nb_lighting *lighting = &frame->lighting;
     nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,
                       &scratch->points);
+    if (frame->air.planet != NULL)
+        nb_air_set_points(&frame->air, frame->view.advance, frame->view.start, lighting->sun, &scratch->rays,
+                          &scratch->air, &scratch->hits, &scratch->points);
+    if (frame->air.planet != NULL)
+        nb_air_set_daylight(&frame->air, geometry->origin, &scratch->hits, &scratch->points, &scratch->air);
     if (lighting->has_sun) {
         nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
     }
@@ -315,17 +383,51 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     return result == NEBEL_OK ? add_lamplight(frame, scratch) : result;
 }
 
-nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
+static void find_ground(const nb_frame *frame, nb_scratch *scratch)
+{
+    if (frame->air.planet != NULL)
+        nb_air_find_ground(&frame->air, frame->view.advance, &scratch->rays, scratch->inside, &scratch->hits,
+                           &scratch->air);
+}
+
+void nb_batch_find(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
 {
     set_inside(frame, place, scratch->inside);
     find_hits(frame, place, sample, scratch);
-    if (frame->renderer->method == NEBEL_METHOD_REFERENCE) return nb_reference_trace(frame, place, scratch);
-    nebel_result result = trace_camera_fog(frame, scratch);
-    if (result == NEBEL_OK && nb_hits_any(&scratch->hits)) result = light_surfaces(frame, scratch);
+}
+
+void nb_batch_find_centers(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+{
+    set_inside(frame, place, scratch->inside);
+    nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
+                 scratch->centers.y + place->first, &scratch->rays);
+    for (int i = 0; i < NB_BATCH; i++) scratch->hits.surface[i] = NB_NONE;
+    find_ground(frame, scratch);
+}
+
+nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch)
+{
+    const int has_air = frame->air.planet != NULL;
+    nebel_result result = frame->layers != NULL ? nb_shells_find(frame, scratch) : NEBEL_OK;
+    if (result == NEBEL_OK) result = trace_camera_fog(frame, scratch);
+    if (result == NEBEL_OK && frame->cloud_view != NULL) result = nb_cloudscape_add(frame, trace_haze, scratch);
+    const int has_surface = nb_hits_any(&scratch->hits) || (has_air && nb_air_sees_ground(&scratch->air));
+    if (result == NEBEL_OK && has_surface) result = light_surfaces(frame, scratch);
     if (result != NEBEL_OK) return result;
-    if (has_one_light(&frame->lighting))
+    if (has_air)
+        set_colors_in_air(frame, scratch);
+    else if (has_one_light(&frame->lighting))
         set_colors(&frame->lighting, scratch);
     else
         set_colors_by_direction(&frame->lighting, scratch);
+    if (frame->layers != NULL) nb_shells_blend(frame, scratch);
     return result;
+}
+
+nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
+{
+    nb_batch_find(frame, place, sample, scratch);
+    if (frame->renderer->method == NEBEL_METHOD_REFERENCE) return nb_reference_trace(frame, place, scratch);
+    find_ground(frame, scratch);
+    return nb_batch_light(frame, scratch);
 }

@@ -44,14 +44,6 @@ nb_depths nb_depths_in(const nb_caster *t, const nb_cell *bounds, const nb_cell 
 
 /* ---- edges ----------------------------------------------------------------------------------- */
 
-/* Of two places in the plane, in an order that does not depend on how they are given. */
-static int comes_first(const float a[3], const float b[3])
-{
-    for (int i = 0; i < 2; i++)
-        if (a[i] != b[i]) return a[i] < b[i];
-    return a[2] < b[2];
-}
-
 /* Steele, Lea and Flood, Fast Splittable Pseudorandom Number Generators, 2014: every bit of the input reaches every bit
  * of the result. */
 static uint64_t mixed(uint64_t bits)
@@ -81,7 +73,7 @@ typedef struct nb_passage {
  * cell, `place` is its middle. */
 static nb_passage pass_edge(const float a[3], const float b[3], const double place[2], const double reach[2])
 {
-    const int forward = comes_first(a, b);
+    const int forward = nb_comes_first(a, b);
     const float *p = forward ? a : b, *q = forward ? b : a;
     const double x = (double)q[0] - (double)p[0], y = (double)q[1] - (double)p[1];
     const double to_x = place[0] - (double)p[0], to_y = place[1] - (double)p[1];
@@ -106,7 +98,7 @@ static void add_triangle(const nb_caster *t, const double place[2], const double
         const nb_passage edge = pass_edge(a, b, place, reach);
         left += edge.is_left;
         if (!edge.touches) continue;
-        const int forward = comes_first(a, b);
+        const int forward = nb_comes_first(a, b);
         const uint64_t hash = forward ? hash_of(b, hash_of(a, 0)) : hash_of(a, hash_of(b, 0));
         layer->edges += forward ? hash : 0 - hash;
     }

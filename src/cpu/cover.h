@@ -16,6 +16,14 @@ typedef struct nb_depths {
     float nearest, farthest;
 } nb_depths;
 
+/* Of two places in the plane, in an order that does not depend on how they are given. */
+static inline int nb_comes_first(const float a[3], const float b[3])
+{
+    for (int i = 0; i < 2; i++)
+        if (a[i] != b[i]) return a[i] < b[i];
+    return a[2] < b[2];
+}
+
 nb_depths nb_depths_in(const nb_caster *triangle, const nb_cell *bounds, const nb_cell *cell);
 
 /* The depth from which on all of the cell is in shadow, INFINITY where that is not known. `list` has all triangles whose

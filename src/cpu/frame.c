@@ -1,4 +1,7 @@
 #include "classic_fog.h"
+#include "cloudscape.h"
+#include "even.h"
+#include "shells.h"
 
 #include <math.h>
 #include <omp.h>
@@ -55,6 +58,7 @@ static nebel_result set_shafts(nb_frame *frame)
     if (frame->has_shafts) {
         frame->sunlit_box = box_of(geometry, fog.min, fog.max);
         result = nb_sun_cells_set(&renderer->sun_cells, geometry, fog.direction);
+        frame->eye = nb_shafts_eye(&renderer->sun_cells, geometry, &frame->view);
     }
     if (frame->has_lamp_shafts && result == NEBEL_OK) {
         frame->lamplit_box = box_of(geometry, min, max);
@@ -62,6 +66,26 @@ static nebel_result set_shafts(nb_frame *frame)
     }
     if (result == NEBEL_OK) return NEBEL_OK;
     return nb_fail(&renderer->log, result, "frame: out of memory for the shadows that surfaces cast into fog");
+}
+
+/* What cannot be drawn with air is refused, not left out. */
+static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
+{
+    nebel_renderer *renderer = frame->renderer;
+    const nebel_scene_data *scene = renderer->scene;
+    if (scene->planet_count == 0 || scene->planets[0].atmosphere == NULL) return NEBEL_OK;
+    if (renderer->method != NEBEL_METHOD_EXACT)
+        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
+    if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
+        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
+                       "frame: orthographic cameras see no planets; take a perspective one");
+    const double tolerance = desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE;
+    frame->air.tolerance = (float)tolerance;
+    frame->air.pixel = nb_view_pixel(&frame->view, frame->height);
+    frame->air.has_fog = renderer->fog != NULL && nebel_snapshot_volume_count(renderer->fog) > 0;
+    return nb_air_set(
+        &frame->air, scene, &renderer->allocator, &renderer->log, frame->view.position, frame->lighting.sun_direction,
+        frame->air.has_fog || scene->planets[0].clouds != NULL || renderer->geometry.scene != NULL, renderer->threads);
 }
 
 static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
@@ -90,7 +114,10 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     if (result != NEBEL_OK)
         return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
     result = nb_reference_set(frame, desc);
-    return result == NEBEL_OK ? set_shafts(frame) : result;
+    if (result == NEBEL_OK) result = set_shafts(frame);
+    if (result == NEBEL_OK) result = set_air(frame, desc);
+    if (result == NEBEL_OK) result = nb_cloudscape_set(frame, desc);
+    return result == NEBEL_OK ? nb_shells_set(frame, desc) : result;
 }
 
 /* ---- regions --------------------------------------------------------------------------------- */
@@ -99,13 +126,16 @@ static nebel_result render_batch(const nb_frame *frame, const nb_place *place, u
                                  nb_scratch *scratch)
 {
     nb_place now = *place;
-    for (uint32_t s = 0; s < count; s++) {
+    int is_even = 0;
+    if (frame->cloud_view != NULL) nb_cloudscape_start(frame, place, scratch);
+    nebel_result result = nb_even_may_be(frame) ? nb_even_render(frame, place, count, scratch, &is_even) : NEBEL_OK;
+    for (uint32_t s = 0; s < count && result == NEBEL_OK; s++) {
         now.sample = first + s;
-        const nebel_result result = nb_batch_render(frame, &now, s, scratch);
+        if (!is_even) result = nb_batch_render(frame, &now, s, scratch);
         if (result != NEBEL_OK) return result;
         nb_planes_add(frame, &now, now.sample == 0, scratch);
     }
-    return NEBEL_OK;
+    return result;
 }
 
 /* Samples first to first + count - 1. */
@@ -115,6 +145,7 @@ static nebel_result render_samples(const nb_frame *frame, uint32_t left, uint32_
     for (uint32_t s = 0; s < count; s++) {
         nb_sample_region(first + s, frame->samples, &scratch->points_of_region[s]);
     }
+    if (nb_even_may_be(frame) || frame->cloud_view != NULL) nb_sample_region(0, 1, &scratch->centers);
     if (frame->rasters) {
         nb_raster_region(&frame->raster, left, top, count, scratch->points_of_region, scratch->seen);
     }
@@ -190,11 +221,17 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
     if (renderer == NULL || desc == NULL || frame == NULL) return NEBEL_ERROR_ARGUMENT;
     nb_frame made = {.renderer = renderer, .planes = frame};
     const nebel_result result = set_frame(&made, desc);
-    if (result != NEBEL_OK) return result;
+    if (result != NEBEL_OK) {
+        nb_cloudscape_free(&made);
+        nb_air_free(&made.air);
+        return result;
+    }
     const size_t columns = (made.width + NB_REGION - 1) / NB_REGION, rows = (made.height + NB_REGION - 1) / NB_REGION;
     const size_t parts = columns * rows * count_groups(&made);
     nb_state state = {.desc = desc, .total = parts, .step = (parts + 99) / 100};
     render_regions(&made, columns * rows, &state);
+    nb_cloudscape_free(&made);
+    nb_air_free(&made.air);
     if (state.result == NEBEL_ERROR_LIMIT) return nb_fail(&renderer->log, state.result, "frame: stopped");
     if (state.result != NEBEL_OK) {
         return nb_fail(&renderer->log, state.result, "frame: fog along a ray: %s", nebel_result_text(state.result));

@@ -85,6 +85,7 @@ static void set_starts(struct RTCRay16 *ray, float (*start)[NB_BATCH], int first
 static void find_shadows(RTCScene scene, struct RTCRay16 *ray, int *active)
 {
     struct RTCIntersectContext context = coherent_context();
+    if (scene == NULL) return;
     for (int i = 0; i < NB_PACKET; i++) ray->tfar[i] = active[i] ? ray->tfar[i] : -1;
     rtcOccluded16(active, scene, &context, ray);
     for (int i = 0; i < NB_PACKET; i++)

@@ -2,6 +2,7 @@
 
 #include "sheet.h"
 
+#include "base/bulb.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -359,6 +360,7 @@ static nb_lamp_place place_lamp(const nebel_snapshot *fog, size_t number, const 
     nb_lamp_place lamp;
     nebel_snapshot_lamp(fog, number, lamp.place, &lamp.radius);
     for (int c = 0; c < 3; c++) lamp.place[c] -= origin[c];
+    lamp.radius = nb_bulb(lamp.radius);
     return lamp;
 }
 

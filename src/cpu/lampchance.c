@@ -1,15 +1,9 @@
 #include "lampchance.h"
 
+#include "base/bulb.h"
 #include "base/vector.h"
 
 #define PI 3.14159265358979323846
-
-static const double least_radius = 1e-3;
-
-static double radius_of(const nebel_lamp *lamp)
-{
-    return fmax(lamp->radius, least_radius);
-}
 
 static double largest(const double rgb[3])
 {
@@ -36,10 +30,11 @@ nb_lamp_sight nb_lamp_sight_from(const nebel_lamp *lamp, const double place[3])
 {
     nb_lamp_sight sight;
     for (int i = 0; i < 3; i++) sight.direction[i] = lamp->position[i] - place[i];
-    const double distance = nb_vector_length(sight.direction), radius = radius_of(lamp);
+    const double distance = nb_vector_length(sight.direction), radius = nb_bulb(lamp->radius);
     for (int i = 0; i < 3 && distance > 0; i++) sight.direction[i] /= distance;
     const double nearest = fmax(distance, radius), part = radius / nearest;
     sight.reach = fmax(distance - lamp->radius, 0);
+    sight.shadowed = fmax(distance - radius, 0);
     sight.beam = cone_of(lamp, sight.direction) / (nearest * nearest);
     sight.fluence = sight.beam * 2 / (1 + sqrt(1 - part * part));
     return sight;
@@ -53,7 +48,7 @@ nb_passing nb_passing_of(const nebel_lamp *lamp, const nebel_ray *ray)
     for (int i = 0; i < 3; i++) to_lamp[i] = lamp->position[i] - ray->origin[i];
     nb_passing p = {.start = -nb_vector_dot(to_lamp, ray->direction), .t_max = ray->t_max};
     for (int i = 0; i < 3; i++) aside[i] = to_lamp[i] + p.start * ray->direction[i];
-    p.aside = fmax(nb_vector_length(aside), radius_of(lamp));
+    p.aside = fmax(nb_vector_length(aside), nb_bulb(lamp->radius));
     /* One angle between two places; as the difference of two it would be lost to rounding far from the lamp. */
     p.angle = atan2(p.aside * p.t_max, p.aside * p.aside + p.start * (p.start + p.t_max));
     return p;

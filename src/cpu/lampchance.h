@@ -8,6 +8,7 @@
 typedef struct nb_lamp_sight {
     double direction[3]; /* towards the lamp, of length 1; 0 in its very place */
     double reach;        /* m, to its surface */
+    double shadowed;     /* m, to where nothing casts a shadow any more */
     double beam;         /* 1/m^2: irradiance of what faces a lamp of 1 W/sr, within its cone */
     double fluence;      /* 1/m^2: the same from all sides, for fog */
 } nb_lamp_sight;

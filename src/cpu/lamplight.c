@@ -1,11 +1,10 @@
 #include "lamplight.h"
 
+#include "base/bulb.h"
+
 #include <math.h>
 
 #define PI 3.14159265358979323846
-
-/* What lamps without a radius have in the fog. */
-static const double least_radius = 1e-3;
 
 /* As formulas/lamp.inc has it: full within the inner angle, nothing beyond the outer one. */
 typedef struct cone {
@@ -44,6 +43,7 @@ NB_CLONES static void set_ways(const cone *within, float radius, float clear, co
         ways->direction[1][i] = dy;
         ways->direction[2][i] = dz;
         ways->reach[i] = reach > 0 ? reach : 0;
+        ways->shadowed[i] = distance > radius ? distance - radius : 0;
         ways->strength[i] = strength;
         ways->lit[i] = -((hits->surface[i] != NB_NONE) & (cosine > 0) & (above > 0) & (strength > 0));
     }
@@ -53,10 +53,10 @@ void nb_lamp_ways_set(const nebel_lamp *lamp, const float place[3], const nb_hit
                       nb_lamp_ways *ways)
 {
     const cone within = cone_of(lamp);
-    set_ways(&within, (float)fmax(lamp->radius, least_radius), (float)lamp->radius, place, hits, points, ways);
+    set_ways(&within, (float)nb_bulb(lamp->radius), (float)lamp->radius, place, hits, points, ways);
 }
 
 void nb_lamp_ways_shadow(RTCScene scene, nb_points *points, nb_lamp_ways *ways, nb_packets *packets)
 {
-    nb_hits_between(scene, points->start, ways->direction, ways->reach, ways->lit, packets);
+    nb_hits_between(scene, points->start, ways->direction, ways->shadowed, ways->lit, packets);
 }

@@ -8,6 +8,7 @@
 typedef struct nb_lamp_ways {
     float direction[3][NB_BATCH]; /* unit length */
     float reach[NB_BATCH];        /* m, to the surface of the lamp */
+    float shadowed[NB_BATCH];     /* m, to where nothing casts a shadow any more */
     float strength[NB_BATCH];     /* irradiance over pi, of a lamp of 1 W/sr, before any fog */
     _Alignas(64) int lit[NB_BATCH];
 } nb_lamp_ways;

@@ -146,12 +146,13 @@ static void add(path *p, const double light[3], double share)
     for (int c = 0; c < 3; c++) p->radiance[c] += p->throughput[c] * light[c] * share;
 }
 
-/* Adds `share` of the light that comes to a place from a direction, from `reach` away, and gets there. */
+/* Adds `share` of the light that comes to a place from a direction, from `reach` away, and gets there past what casts
+ * shadows on the first `shadowed` metres of its way. */
 static nebel_result add_arriving(path *p, const double origin[3], const double direction[3], double reach,
-                                 const double light[3], double share)
+                                 double shadowed, const double light[3], double share)
 {
     const nb_path_world *world = p->world;
-    if (!(share > 0) || is_shadowed(world->geometry, origin, direction, reach)) return NEBEL_OK;
+    if (!(share > 0) || is_shadowed(world->geometry, origin, direction, shadowed)) return NEBEL_OK;
     nb_track way = {.fog = world->fog, .ray.t_max = reach, .ignore_distances = 1, .channel = p->channel};
     memcpy(way.ray.origin, origin, sizeof way.ray.origin);
     memcpy(way.ray.direction, direction, sizeof way.ray.direction);
@@ -166,7 +167,7 @@ static nebel_result add_arriving(path *p, const double origin[3], const double d
 static nebel_result add_sunlight(path *p, const double origin[3], double share)
 {
     const nb_path_world *world = p->world;
-    return world->has_sun ? add_arriving(p, origin, world->to_sun, HUGE_VAL, world->sun, share) : NEBEL_OK;
+    return world->has_sun ? add_arriving(p, origin, world->to_sun, HUGE_VAL, HUGE_VAL, world->sun, share) : NEBEL_OK;
 }
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
@@ -213,7 +214,7 @@ static nebel_result add_scattered(path *p, const double place[3], const nebel_ph
     const double value = nebel_phase_value(phase, cosine) * sight->fluence / chosen.probability;
     double light[3];
     for (int c = 0; c < 3; c++) light[c] = chosen.lamp->intensity[c] * share[c];
-    return add_arriving(p, place, sight->direction, sight->reach, light, value);
+    return add_arriving(p, place, sight->direction, sight->reach, sight->shadowed, light, value);
 }
 
 /* A volume that scatters at a place, by chance. */
@@ -277,7 +278,8 @@ static nebel_result add_reflected(path *p, const nb_meeting *at)
     const nb_lamp_sight *sight = &chosen.sight;
     if (chosen.lamp == NULL || nb_vector_dot(side, sight->direction) <= 0) return NEBEL_OK;
     const double share = nb_vector_dot(normal, sight->direction) * sight->beam / (PI * chosen.probability);
-    return add_arriving(p, p->ray.origin, sight->direction, sight->reach, chosen.lamp->intensity, share);
+    return add_arriving(p, p->ray.origin, sight->direction, sight->reach, sight->shadowed, chosen.lamp->intensity,
+                        share);
 }
 
 /* Ambient light from where the path goes on. */

@@ -35,6 +35,14 @@ static int count_threads(int wanted)
     return all < MOST_THREADS ? all : MOST_THREADS;
 }
 
+void nebel_run_parts(size_t parts, void (*part)(void *data, size_t i), void *data, void *user)
+{
+    const int *wanted = user;
+    const int threads = count_threads(wanted != NULL ? *wanted : 0);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+    for (size_t i = 0; i < parts; i++) part(data, i);
+}
+
 /* The allocator aligns for C's own types only; Embree's packets want more. */
 static nebel_result allocate_scratch(nebel_renderer *renderer)
 {
@@ -47,6 +55,7 @@ static nebel_result allocate_scratch(nebel_renderer *renderer)
     for (int i = 0; i < renderer->threads; i++) {
         renderer->scratch[i].shafts = (nb_shafts){.shadows = NULL};
         renderer->scratch[i].lamp_shafts = (nb_lamp_shafts){.numbers = NULL};
+        renderer->scratch[i].clouds.workspace = NULL;
     }
     return NEBEL_OK;
 }

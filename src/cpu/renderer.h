@@ -2,6 +2,7 @@
 #ifndef NB_CPU_RENDERER_H
 #define NB_CPU_RENDERER_H
 
+#include "air.h"
 #include "geometry.h"
 #include "hits.h"
 #include "lamp_shafts.h"
@@ -31,9 +32,33 @@ typedef struct nb_sums {
 } nb_sums;
 
 /* What a thread works in: allocated once, aligned to 64 bytes. */
+/* Shells of a planet, ray by ray, and what is laid over each other. */
+typedef struct nb_shell_scratch {
+    nebel_layer_hits hits[NB_BATCH];
+    uint32_t most;                          /* of their counts, without the ground */
+    float ground[NB_BATCH];                 /* its distance; INFINITY where it is not seen */
+    float left[NB_BATCH], sum[3][NB_BATCH]; /* what the shells so far leave, and their light */
+    float distance[NB_BATCH];               /* of a shell */
+    float fog_left[3][NB_BATCH], light[3][NB_BATCH], light_before[3][NB_BATCH]; /* of fog up to there */
+} nb_shell_scratch;
+
+/* Clouds through the middles of pixels. */
+typedef struct nb_cloud_scratch {
+    nebel_cloud_workspace *workspace; /* for a frame with clouds */
+    nb_rays rays;
+    float reach[NB_BATCH]; /* m, how far they are known */
+    int is_new[NB_BATCH];
+    nebel_cloud_knots knots[NB_BATCH];
+    float over[NEBEL_MAX_CLOUD_KNOTS][3][NB_BATCH]; /* what a knot adds to light that came from behind */
+    float left[2][3][NB_BATCH], light[2][3][NB_BATCH],
+        end[NB_BATCH]; /* of fog and air before the first knot and the last */
+    nb_light_samples samples;
+} nb_cloud_scratch;
+
 typedef struct nb_scratch {
     nb_packets packets;
-    nb_region_points points_of_region[NB_TOGETHER];
+    nb_region_points points_of_region[NB_TOGETHER],
+        centers; /* centers: of frames with clouds, or whose batches may be even */
     nb_seen seen[NB_TOGETHER];
     _Alignas(64) int inside[NB_BATCH]; /* -1 within the picture, else 0 */
     nb_rays rays;
@@ -47,6 +72,9 @@ typedef struct nb_scratch {
     nb_shafts shafts;
     nb_lamp_shafts lamp_shafts;
     nb_lamp_ways lamp;
+    nb_air_scratch air;
+    nb_shell_scratch shells;
+    nb_cloud_scratch clouds;
     nb_lone_ray lone; /* of a path behind its first surface */
     nb_sums sums;
 } nb_scratch;
@@ -89,9 +117,14 @@ typedef struct nb_frame {
     nebel_trace_desc trace;
     int has_shafts; /* surfaces cast shadows into fog that the sun lights, which is in */
     nb_lit_box sunlit_box;
+    nb_eye eye;          /* in sunlight or not */
     int has_lamp_shafts; /* the same of lamps */
     nb_lit_box lamplit_box;
     uint32_t width, height, samples;
+    nb_air air;
+    const nebel_layers *layers;   /* NULL: none */
+    nebel_cloud_view *cloud_view; /* the same */
+    nebel_layer_view layer_view;
     nb_path_world world; /* of the method REFERENCE */
     uint32_t seed;
 } nb_frame;
@@ -106,6 +139,12 @@ typedef struct nb_place {
 /* Renders a sample of a batch into scratch->samples. The members `sample` of scratch->points_of_region and, where the
  * frame is rasterized, of scratch->seen belong to its region. */
 nebel_result nb_batch_render(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch);
+
+/* Steps of the same: rays, and the models that they meet; or the rays of pixels' centres, and the ground of a planet with
+ * air, as if there were no models; light, with methods but REFERENCE, where the ground has been found. */
+void nb_batch_find(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch);
+void nb_batch_find_centers(const nb_frame *frame, const nb_place *place, nb_scratch *scratch);
+nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch);
 
 /* The reference in nb_batch_render's place: after first hits are found. Errors: VALUE, UNSUPPORTED; UNBOUNDED. */
 nebel_result nb_reference_set(nb_frame *frame, const nebel_frame_desc *desc);

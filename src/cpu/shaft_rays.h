@@ -12,6 +12,14 @@
  * common edges, but their shadows meet to rounding only. */
 static const float nb_closeness = 0x1p-18f;
 
+/* Never 0, so that nothing is divided into NaN. */
+NB_ALWAYS_INLINE float nb_reciprocal(float x)
+{
+    const float size = x < 0 ? -x : x;
+    const float least = x < 0 ? -1e-30f : 1e-30f;
+    return 1 / (size < 1e-30f ? least : x);
+}
+
 /* A packet of rays in the sun's frame, or relative to a lamp. */
 typedef struct nb_shaft_rays {
     float start[3][NB_PACKET], way[3][NB_PACKET], inverse[3][NB_PACKET];

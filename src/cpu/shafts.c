@@ -1,3 +1,4 @@
+#include "passages.h"
 #include "sheet.h"
 
 #include <math.h>
@@ -7,14 +8,6 @@
 static const float far_away = 1e18f;
 
 /* ---- rays ------------------------------------------------------------------------------------ */
-
-/* Never 0, so that nothing is divided into NaN. */
-NB_ALWAYS_INLINE float reciprocal(float x)
-{
-    const float size = x < 0 ? -x : x;
-    const float least = x < 0 ? -1e-30f : 1e-30f;
-    return 1 / (size < 1e-30f ? least : x);
-}
 
 /* What of each ray is within the box. */
 NB_CLONES static void clip(const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
@@ -26,7 +19,7 @@ NB_CLONES static void clip(const nb_lit_box *box, const nb_rays *rays, double ad
         float first = -skipped, last = distance[i] - skipped;
         last = last < far_away ? last : far_away;
         for (int c = 0; c < 3; c++) {
-            const float inverse = reciprocal(rays->unit[c][i]);
+            const float inverse = nb_reciprocal(rays->unit[c][i]);
             const float a = (box->low[c] - rays->start[c][i]) * inverse;
             const float b = (box->high[c] - rays->start[c][i]) * inverse;
             const float near = a < b ? a : b, far = a < b ? b : a;
@@ -54,9 +47,36 @@ NB_CLONES static void turn(const nb_sun_cells *cells, const nb_rays *rays, int f
             const float way = x * rays->unit[0][k] + y * rays->unit[1][k] + z * rays->unit[2][k];
             packet->start[a][i] = x * rays->start[0][k] + y * rays->start[1][k] + z * rays->start[2][k];
             packet->way[a][i] = way;
-            packet->inverse[a][i] = reciprocal(way);
+            packet->inverse[a][i] = nb_reciprocal(way);
         }
     }
+}
+
+/* ---- the eye --------------------------------------------------------------------------------- */
+
+nb_eye nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view)
+{
+    struct RTCIntersectContext context;
+    float eye[3], turned[3], margin = 0;
+    if (view->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) return NB_EYE_UNKNOWN;
+    for (int i = 0; i < 3; i++) eye[i] = nb_clamp_coordinate((float)view->start[i]);
+    for (int a = 0; a < 3; a++) {
+        const float *axis = cells->axes[a];
+        turned[a] = axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2];
+        margin = nb_most(margin, 4 * nb_closeness * fabsf(eye[a]));
+    }
+    if (nb_walls_meet(&cells->walls, turned, margin)) return NB_EYE_UNKNOWN;
+    struct RTCRay ray = {.org_x = eye[0],
+                         .org_y = eye[1],
+                         .org_z = eye[2],
+                         .dir_x = -cells->axes[2][0],
+                         .dir_y = -cells->axes[2][1],
+                         .dir_z = -cells->axes[2][2],
+                         .tfar = INFINITY,
+                         .mask = UINT32_MAX};
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(geometry->scene, &context, &ray);
+    return ray.tfar < 0 ? NB_EYE_IN_SHADOW : NB_EYE_IN_LIGHT;
 }
 
 /* ---- shadows --------------------------------------------------------------------------------- */
@@ -91,74 +111,6 @@ int nb_shafts_keep(nb_shafts *shafts, const nebel_allocator *allocator, uint32_t
 
 /* ---- cells ----------------------------------------------------------------------------------- */
 
-/* A border that a beam comes to at `scale` (border - at) m from its beginning, or later by `never`. */
-typedef struct nb_border {
-    float at, scale, never;
-} nb_border;
-
-/* A packet as one ray that has a width. Of each axis of the plane, where the first of its rays may enter a child and the
- * last may leave it; and the depth of the deepest ray. */
-typedef struct nb_beam {
-    float from, length; /* m along the rays */
-    int falls[2];       /* it comes to the high border first */
-    nb_border enter[2], leave[2], depth;
-    int rises;               /* towards where shadows are */
-    float least, least_rise; /* depth of the ray that is least deep */
-} nb_beam;
-
-/* What rays do along an axis. */
-typedef struct nb_spread {
-    float low, high, way_low, way_high; /* places where the beam begins; changes of them for each m */
-} nb_spread;
-
-static nb_spread spread_along(const nb_shaft_rays *rays, int axis, float from)
-{
-    nb_spread s = {INFINITY, -INFINITY, INFINITY, -INFINITY};
-    for (int i = 0; i < NB_PACKET; i++) {
-        if (!(rays->from[i] < rays->to[i])) continue;
-        const float way = rays->way[axis][i], start = rays->start[axis][i] + way * from;
-        s.low = start < s.low ? start : s.low;
-        s.high = start > s.high ? start : s.high;
-        s.way_low = way < s.way_low ? way : s.way_low;
-        s.way_high = way > s.way_high ? way : s.way_high;
-    }
-    const float rounding = 0x1p-21f * (s.high > -s.low ? s.high : -s.low);
-    s.low -= rounding;
-    s.high += rounding;
-    return s;
-}
-
-/* Where rays part, some rising and some falling, they enter by the low border if at all, and never leave. */
-static void set_axis(nb_beam *beam, int axis, const nb_spread *s)
-{
-    const nb_border low = {s->high, reciprocal(s->way_high), 0}, high = {s->low, reciprocal(s->way_low), 0};
-    beam->falls[axis] = s->way_high < 0;
-    beam->enter[axis] = beam->falls[axis] ? high : low;
-    beam->leave[axis] = beam->falls[axis] ? low : high;
-    if (s->way_low < 0 && s->way_high >= 0) beam->leave[axis] = (nb_border){0, 0, INFINITY};
-}
-
-static void set_beam(const nb_shaft_rays *rays, nb_beam *beam)
-{
-    float from = INFINITY, to = -INFINITY;
-    for (int i = 0; i < NB_PACKET; i++) {
-        const int counts = rays->from[i] < rays->to[i];
-        from = counts && rays->from[i] < from ? rays->from[i] : from;
-        to = counts && rays->to[i] > to ? rays->to[i] : to;
-    }
-    beam->from = from;
-    beam->length = to - from;
-    for (int axis = 0; axis < 2; axis++) {
-        const nb_spread s = spread_along(rays, axis, from);
-        set_axis(beam, axis, &s);
-    }
-    const nb_spread s = spread_along(rays, 2, from);
-    beam->rises = s.way_high >= 0;
-    beam->depth = (nb_border){s.high, reciprocal(s.way_high), 0};
-    beam->least = s.low;
-    beam->least_rise = s.way_low;
-}
-
 /* Children as bits of a number: those in whose shadows the beam may come, and, 16 bits above them, those in which it is
  * in shadow all along. */
 typedef struct nb_met {
@@ -172,22 +124,18 @@ NB_ALWAYS_INLINE void meet_children(const nb_cell_node *node, const nb_beam *bea
     const float *restrict last_x = beam->falls[0] ? node->low[0] : node->high[0];
     const float *restrict first_y = beam->falls[1] ? node->high[1] : node->low[1];
     const float *restrict last_y = beam->falls[1] ? node->low[1] : node->high[1];
-    const nb_border x0 = beam->enter[0], y0 = beam->enter[1], x1 = beam->leave[0], y1 = beam->leave[1];
     const nb_border z = beam->depth;
     const float soonest = beam->rises ? 0 : -INFINITY, latest = beam->rises ? INFINITY : 0;
-    const float length = beam->length, least = beam->least, rise = beam->least_rise;
+    const float least = beam->least, rise = beam->least_rise;
+    const nb_beam b = *beam;
     uint32_t children = 0;
     NB_SIMD
     for (int i = 0; i < NB_CELL_FAN; i++) {
-        const float in_x = (first_x[i] - x0.at) * x0.scale, in_y = (first_y[i] - y0.at) * y0.scale;
-        const float out_x = (last_x[i] - x1.at) * x1.scale + x1.never;
-        const float out_y = (last_y[i] - y1.at) * y1.scale + y1.never;
+        float enter, leave;
+        NB_BEAM_CROSS(&b, first_x[i], last_x[i], first_y[i], last_y[i], enter, leave);
         const float deep = (node->nearest[i] - z.at) * z.scale;
-        float enter = in_x > in_y ? in_x : in_y, leave = out_x < out_y ? out_x : out_y;
         const float in_z = deep + soonest, out_z = deep + latest;
-        enter = enter > 0 ? enter : 0;
         enter = enter > in_z ? enter : in_z;
-        leave = leave < length ? leave : length;
         leave = leave < out_z ? leave : out_z;
         const float depth = least + rise * (rise >= 0 ? enter : leave);
         met->begin[i] = enter;
@@ -387,16 +335,22 @@ static void join(nb_shafts *shafts, const nb_shadow *shadows, size_t count, floa
     toggle(shafts, leave + skipped);
 }
 
+static int reserve_toggles(nb_shafts *shafts, const nebel_allocator *allocator, size_t more)
+{
+    void *toggles = shafts->toggles;
+    const int grown = nb_grow(allocator, &toggles, sizeof *shafts->toggles, shafts->toggle_count,
+                              &shafts->toggle_capacity, shafts->toggle_count + more);
+    shafts->toggles = toggles;
+    return grown;
+}
+
 static int make_room(nb_shafts *shafts, const nebel_allocator *allocator)
 {
-    void *toggles = shafts->toggles, *sorted = shafts->sorted;
+    void *sorted = shafts->sorted;
     const int grown =
-        nb_grow(allocator, &toggles, sizeof *shafts->toggles, shafts->toggle_count, &shafts->toggle_capacity,
-                shafts->toggle_count + 2 * shafts->shadow_count) &&
         nb_grow(allocator, &sorted, sizeof *shafts->sorted, 0, &shafts->sorted_capacity, shafts->shadow_count);
-    shafts->toggles = toggles;
     shafts->sorted = sorted;
-    return grown;
+    return grown && reserve_toggles(shafts, allocator, 2 * shafts->shadow_count);
 }
 
 int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_shaft_rays *rays, const float *length,
@@ -416,8 +370,9 @@ int nb_shafts_finish(nb_shafts *shafts, const nebel_allocator *allocator, nb_sha
     return 1;
 }
 
-static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                       const nb_rays *rays, double advance, int first, nb_shaft_rays *packet)
+/* By the prisms behind triangles. Returns 0 when memory is out. */
+static int find_by_prisms(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                          const float *length, double advance, uint32_t *first, nb_shaft_rays *packet)
 {
     for (int i = 0; i < NB_PACKET; i++) {
         packet->enter[i] = INFINITY;
@@ -425,15 +380,62 @@ static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, cons
         packet->kept[i] = 0;
     }
     nb_beam beam;
-    turn(cells, rays, first, packet);
-    set_beam(packet, &beam);
+    nb_beam_set(&beam, packet);
     shafts->shadow_count = 0;
     return walk(shafts, allocator, cells, &beam, packet) &&
-           nb_shafts_finish(shafts, allocator, packet, rays->length + first, advance, shafts->first + first);
+           nb_shafts_finish(shafts, allocator, packet, length, advance, first);
+}
+
+/* What of the passages of a ray is asked for, as toggles. There is room for them. */
+static void toggle_passages(nb_shafts *shafts, const nb_passages *passages, int ray, int is_dark, float from, float to,
+                            float skipped)
+{
+    int k = 0;
+    for (; k < passages->count && passages->rows[k][ray] <= from; k++) is_dark = nb_enters(passages->rows[k][ray]);
+    if (is_dark) toggle(shafts, from + skipped);
+    for (; k < passages->count && passages->rows[k][ray] < to; k++) {
+        is_dark = nb_enters(passages->rows[k][ray]);
+        toggle(shafts, passages->rows[k][ray] + skipped);
+    }
+    if (is_dark) toggle(shafts, to + skipped);
+}
+
+/* By walls, from the eye on. Returns 0 where that is not possible. */
+static int find_passages_from_eye(const nb_walls *walls, const nb_shaft_rays *packet, const float *skipped, int is_dark,
+                                  nb_passages *passages)
+{
+    nb_shaft_rays rays = *packet;
+    nb_beam beam;
+    for (int i = 0; i < NB_PACKET; i++) rays.from[i] = packet->from[i] < packet->to[i] ? -skipped[i] : INFINITY;
+    nb_beam_set(&beam, &rays);
+    return nb_passages_find(walls, &beam, &rays, is_dark, passages);
+}
+
+static int find_packet(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
+                       const nb_rays *rays, double advance, nb_eye eye, int first, nb_shaft_rays *packet)
+{
+    nb_passages passages;
+    float skipped[NB_PACKET];
+    turn(cells, rays, first, packet);
+    for (int i = 0; i < NB_PACKET; i++) skipped[i] = (float)(advance * (double)rays->length[first + i]);
+    const int by_walls = eye != NB_EYE_UNKNOWN && cells->walls.level_count > 0 &&
+                         find_passages_from_eye(&cells->walls, packet, skipped, eye == NB_EYE_IN_SHADOW, &passages);
+    shafts->by_walls += (size_t)by_walls;
+    shafts->by_prisms += (size_t)!by_walls;
+    if (!by_walls)
+        return find_by_prisms(shafts, allocator, cells, rays->length + first, advance, shafts->first + first, packet);
+    if (!reserve_toggles(shafts, allocator, (size_t)(passages.count + 2) * NB_PACKET)) return 0;
+    for (int i = 0; i < NB_PACKET; i++) {
+        shafts->first[first + i] = (uint32_t)shafts->toggle_count;
+        if (packet->from[i] < packet->to[i])
+            toggle_passages(shafts, &passages, i, eye == NB_EYE_IN_SHADOW, packet->from[i], packet->to[i], skipped[i]);
+    }
+    return 1;
 }
 
 nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance)
+                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
+                            nb_eye eye)
 {
     float from[NB_BATCH], to[NB_BATCH];
     clip(box, rays, advance, distance, from, to);
@@ -446,7 +448,7 @@ nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator,
             packet.from[i] = from[p + i];
             packet.to[i] = to[p + i];
         }
-        if (!find_packet(shafts, allocator, cells, rays, advance, p, &packet)) return NEBEL_ERROR_MEMORY;
+        if (!find_packet(shafts, allocator, cells, rays, advance, eye, p, &packet)) return NEBEL_ERROR_MEMORY;
     }
     shafts->first[NB_BATCH] = (uint32_t)shafts->toggle_count;
     return NEBEL_OK;

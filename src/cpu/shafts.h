@@ -10,6 +10,13 @@ typedef struct nb_lit_box {
     float low[3], high[3];
 } nb_lit_box;
 
+/* Where rays begin. */
+typedef enum nb_eye {
+    NB_EYE_UNKNOWN = 0, /* or each at another place */
+    NB_EYE_IN_LIGHT,
+    NB_EYE_IN_SHADOW
+} nb_eye;
+
 /* A stretch of a packet's ray in shadow. */
 typedef struct nb_shadow {
     uint32_t lane;
@@ -25,12 +32,19 @@ typedef struct nb_shafts {
     float *toggles; /* m from where fog begins to count, which is before a ray is advanced */
     size_t toggle_count, toggle_capacity;
     uint32_t first[NB_BATCH + 1]; /* see nebel_lit_pieces */
+    size_t by_walls, by_prisms;   /* packets, up to now */
 } nb_shafts;
 
-/* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Errors:
+/* Whether the eye of the view is in shadow, in the sun that cells are made for. UNKNOWN, too, where it is so near the
+ * border of a shadow that rounding would say. */
+nb_eye nb_shafts_eye(const nb_sun_cells *cells, const nb_geometry *geometry, const nb_view *view);
+
+/* `distance` is how far fog is asked for along each ray, 0 where it is not, and `advance` as in nb_view. Where the eye is
+ * known rays must end before they pass a surface; the ends of shadows are found with far less work then. Errors:
  * MEMORY. */
 nebel_result nb_shafts_find(nb_shafts *shafts, const nebel_allocator *allocator, const nb_sun_cells *cells,
-                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance);
+                            const nb_lit_box *box, const nb_rays *rays, double advance, const float *distance,
+                            nb_eye eye);
 
 void nb_shafts_free(nb_shafts *shafts, const nebel_allocator *allocator);
 

@@ -1,7 +1,6 @@
 #include "sun_cells.h"
 
 #include "base/vector.h"
-#include "cover.h"
 
 #include <math.h>
 #include <string.h>
@@ -17,6 +16,7 @@ typedef struct nb_division {
     uint32_t *prism_of; /* of each triangle; UINT32_MAX: none yet */
     uint32_t *list;     /* numbers of triangles, those of a cell after those of the cells that it is part of */
     size_t list_count, list_capacity;
+    nb_cell all; /* of the plane */
 } nb_division;
 
 /* A cell that is to be a child, and where its triangles are in the list. */
@@ -154,7 +154,8 @@ static int finish_cell(nb_division *d, const nb_part *part, nb_depths *child, ui
         depths[kept] = depths[i];
         list[kept++] = list[i];
     }
-    const int added = add_leaf(d, &part->cell, list, depths, kept, number);
+    const int added = add_leaf(d, &part->cell, list, depths, kept, number) &&
+                      nb_walls_add(&d->cells->walls, d->allocator, &d->casters, list, kept, &part->cell, &d->all);
     nb_release(d->allocator, depths);
     return added;
 }
@@ -293,7 +294,10 @@ static nebel_result build(nb_division *d, const nb_geometry *geometry, const dou
     const nb_part all = list_all(d, count);
     nb_depths depths;
     uint32_t number;
-    return divide(d, &all, 0, &depths, &number) ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    d->all = all.cell;
+    return divide(d, &all, 0, &depths, &number) && nb_walls_finish(&d->cells->walls, d->allocator, &d->all)
+               ? NEBEL_OK
+               : NEBEL_ERROR_MEMORY;
 }
 
 nebel_result nb_sun_cells_set(nb_sun_cells *cells, const nb_geometry *geometry, const double sun[3])
@@ -328,5 +332,6 @@ void nb_sun_cells_free(nb_sun_cells *cells, const nebel_allocator *allocator)
     nb_release(allocator, cells->numbers);
     nb_release(allocator, cells->sheets);
     nb_release(allocator, cells->nodes);
+    nb_walls_free(&cells->walls, allocator);
     *cells = (nb_sun_cells){.is_built = 0};
 }

@@ -11,7 +11,7 @@
 #ifndef NB_CPU_SUN_CELLS_H
 #define NB_CPU_SUN_CELLS_H
 
-#include "casters.h"
+#include "walls.h"
 
 enum {
     NB_CELL_FAN = 16,    /* children of a node */
@@ -46,6 +46,7 @@ typedef struct nb_sun_cells {
     size_t number_capacity;
     nb_cell_node *nodes; /* the first is above all; none: there are no shadows */
     size_t node_count, node_capacity;
+    nb_walls walls;
 } nb_sun_cells;
 
 /* Builds for a sun in this direction, of length 1, or keeps what is built where that is for the same sun and place.

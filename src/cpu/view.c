@@ -1,5 +1,7 @@
 #include "view.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -137,6 +139,11 @@ NB_CLONES static void set_starts(const nb_view *view, nb_rays *rays)
             }
         }
     }
+}
+
+double nb_view_pixel(const nb_view *view, uint32_t height)
+{
+    return view->projection == NEBEL_PROJECTION_PANORAMA ? pi / height : nb_vector_length(view->step_y);
 }
 
 void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays)

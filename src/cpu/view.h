@@ -39,6 +39,9 @@ nebel_result nb_view_set(nb_view *view, const nebel_camera *camera, uint32_t wid
  * coordinates and not those of the long way. */
 void nb_view_place(nb_view *view, const double origin[3], const float bounds_min[3], const float bounds_max[3]);
 
+/* The width of a pixel in the middle of a picture of so many rows: radians of a panorama, else metres at depth 1. */
+double nb_view_pixel(const nb_view *view, uint32_t height);
+
 /* The rays through the points left + x, top + y. */
 void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays);
 

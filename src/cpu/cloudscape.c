@@ -1,0 +1,221 @@
+#include "cloudscape.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ---- the frame ------------------------------------------------------------------------------- */
+
+nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
+{
+    nebel_renderer *renderer = frame->renderer;
+    const nebel_scene_data *scene = renderer->scene;
+    if (frame->air.planet == NULL || scene->planets[0].clouds == NULL) return NEBEL_OK;
+    nebel_cloud_view_desc view = {.clouds = scene->planets[0].clouds,
+                                  .sun = {.direction = {0, 1, 0}},
+                                  .time = desc->time,
+                                  .tolerance = fmin(1, desc->tolerance),
+                                  .allocator = renderer->allocator,
+                                  .log = renderer->log};
+    if (scene->has_sun) {
+        memcpy(view.sun.direction, scene->sun_direction, sizeof view.sun.direction);
+        memcpy(view.sun.irradiance, scene->sun_irradiance, sizeof view.sun.irradiance);
+    }
+    nebel_result result = nebel_create_cloud_view(&view, &frame->cloud_view);
+    for (int i = 0; i < renderer->threads && result == NEBEL_OK; i++)
+        result = nebel_create_cloud_workspace(frame->cloud_view, &renderer->scratch[i].clouds.workspace);
+    return result;
+}
+
+void nb_cloudscape_free(nb_frame *frame)
+{
+    if (frame->cloud_view == NULL) return;
+    for (int i = 0; i < frame->renderer->threads; i++) {
+        nebel_destroy_cloud_workspace(frame->renderer->scratch[i].clouds.workspace);
+        frame->renderer->scratch[i].clouds.workspace = NULL;
+    }
+    nebel_destroy_cloud_view(frame->cloud_view);
+}
+
+/* ---- along the middles of pixels ------------------------------------------------------------- */
+
+void nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+{
+    nb_cloud_scratch *clouds = &scratch->clouds;
+    nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
+                 scratch->centers.y + place->first, &clouds->rays);
+    memset(clouds->reach, 0, sizeof clouds->reach);
+    for (int i = 0; i < NB_BATCH; i++) clouds->knots[i].count = 0;
+}
+
+/* As far as the sample goes, and somewhat farther for those to come. Returns whether there are clouds. */
+static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
+{
+    nb_cloud_scratch *clouds = &scratch->clouds;
+    nebel_result result = NEBEL_OK;
+    *any = 0;
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        clouds->is_new[i] = 0;
+        if (!scratch->inside[i] || !(scratch->distance[i] > clouds->reach[i])) continue;
+        nebel_ray ray = {.t_max = 1.25 * (double)scratch->distance[i]};
+        for (int c = 0; c < 3; c++) {
+            ray.origin[c] = frame->view.position[c];
+            ray.direction[c] = clouds->rays.direction[c][i];
+        }
+        result = nebel_trace_clouds(clouds->workspace, 1, &ray, 0, frame->air.pixel / (double)clouds->rays.length[i],
+                                    &clouds->knots[i], 0);
+        clouds->reach[i] = (float)ray.t_max;
+        clouds->is_new[i] = clouds->knots[i].count > 0;
+        *any |= clouds->is_new[i];
+    }
+    return result;
+}
+
+/* ---- among air and fog ----------------------------------------------------------------------- */
+
+/* What is before the first knot, or the last one. */
+static nebel_result find_haze(const nb_frame *frame, int is_last, nb_haze_fn haze, nb_scratch *scratch,
+                              float (*left)[NB_BATCH], float (*light)[NB_BATCH])
+{
+    const nb_cloud_scratch *clouds = &scratch->clouds;
+    for (int i = 0; i < NB_BATCH; i++) {
+        const nebel_cloud_knots *knots = &clouds->knots[i];
+        scratch->distance[i] = clouds->is_new[i] ? knots->t[is_last ? knots->count - 1 : 0] : 0;
+    }
+    const nebel_result result = haze(frame, scratch);
+    memcpy(left, scratch->samples.transmittance, sizeof scratch->samples.transmittance);
+    memcpy(light, scratch->samples.in_scattering, sizeof scratch->samples.in_scattering);
+    return result;
+}
+
+/* Of one ray, at its knots. */
+typedef struct nb_haze_knots {
+    float left[3][NEBEL_MAX_CLOUD_KNOTS], light[3][NEBEL_MAX_CLOUD_KNOTS];
+} nb_haze_knots;
+
+static void find_air(const nb_frame *frame, const nb_cloud_scratch *clouds, int lane, nb_haze_knots *haze)
+{
+    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    double direction[3][NEBEL_MAX_CLOUD_KNOTS];
+    nebel_light_planes lights = {.error = NULL};
+    for (int c = 0; c < 3; c++) {
+        for (uint32_t k = 0; k < knots->count; k++) direction[c][k] = clouds->rays.direction[c][lane];
+        lights.transmittance[c] = haze->left[c];
+        lights.in_scattering[c] = haze->light[c];
+    }
+    const double *const directions[3] = {direction[0], direction[1], direction[2]};
+    nebel_trace_air_view(frame->air.view, knots->count, directions, knots->t, &lights);
+}
+
+/* Fog is mostly before all clouds: what is not counts as spread evenly over the way between the first knot and the last. */
+static void add_fog(const nb_cloud_scratch *clouds, int lane, nb_haze_knots *haze)
+{
+    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    const uint32_t last = knots->count - 1;
+    const float begin = knots->t[0], way = knots->t[last] - begin;
+    for (int c = 0; c < 3; c++) {
+        const float air_light = haze->light[c][0];
+        const float from = haze->left[c][0] > 0 ? clouds->left[0][c][lane] / haze->left[c][0] : 0;
+        const float to = haze->left[c][last] > 0 ? clouds->left[1][c][lane] / haze->left[c][last] : 0;
+        const float rest =
+            clouds->light[1][c][lane] - clouds->light[0][c][lane] - from * (haze->light[c][last] - air_light);
+        for (uint32_t k = 0; k <= last; k++) {
+            const float part = way > 0 ? (knots->t[k] - begin) / way : 0;
+            haze->left[c][k] *= from + part * (to - from);
+            haze->light[c][k] = clouds->light[0][c][lane] + from * (haze->light[c][k] - air_light) + part * rest;
+        }
+    }
+}
+
+/* Light up to each knot, without what of the haze before it clouds leave. */
+static void sum_up(nb_cloud_scratch *clouds, int lane, const nb_haze_knots *haze)
+{
+    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    for (int c = 0; c < 3; c++) {
+        float sum = haze->light[c][0];
+        clouds->over[0][c][lane] = 0;
+        for (uint32_t k = 1; k < knots->count; k++) {
+            sum += 0.5f * (haze->left[c][k] + haze->left[c][k - 1]) *
+                   (knots->in_scattering[k][c] - knots->in_scattering[k - 1][c]);
+            sum += 0.5f * (knots->transmittance[k] + knots->transmittance[k - 1]) *
+                   (haze->light[c][k] - haze->light[c][k - 1]);
+            clouds->over[k][c][lane] = sum - knots->transmittance[k] * haze->light[c][k];
+        }
+    }
+}
+
+static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+{
+    nb_cloud_scratch *clouds = &scratch->clouds;
+    nebel_result result = NEBEL_OK;
+    if (frame->air.has_fog) {
+        memcpy(clouds->end, scratch->distance, sizeof clouds->end);
+        clouds->samples = scratch->samples;
+        for (int i = 0; i < 2 && result == NEBEL_OK; i++)
+            result = find_haze(frame, i, haze, scratch, clouds->left[i], clouds->light[i]);
+        scratch->samples = clouds->samples;
+        memcpy(scratch->distance, clouds->end, sizeof clouds->end);
+    }
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        nb_haze_knots knots;
+        if (!clouds->is_new[i]) continue;
+        find_air(frame, clouds, i, &knots);
+        if (frame->air.has_fog) add_fog(clouds, i, &knots);
+        sum_up(clouds, i, &knots);
+    }
+    return result;
+}
+
+/* Before a surface within the clouds they are as between the knots around it. */
+static void lay_over(nb_scratch *scratch, int lane)
+{
+    const nb_cloud_scratch *clouds = &scratch->clouds;
+    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    nb_light_samples *samples = &scratch->samples;
+    const float end = scratch->distance[lane];
+    uint32_t k = knots->count - 1;
+    float part = 0;
+    if (!(end > knots->t[0])) return;
+    if (end < knots->t[k]) {
+        while (k > 0 && knots->t[k] > end) k--;
+        part = (end - knots->t[k]) / (knots->t[k + 1] - knots->t[k]);
+    }
+    const uint32_t next = part > 0 ? k + 1 : k;
+    const float left = (1 - part) * knots->transmittance[k] + part * knots->transmittance[next];
+    for (int c = 0; c < 3; c++) {
+        const float over = (1 - part) * clouds->over[k][c][lane] + part * clouds->over[next][c][lane];
+        samples->in_scattering[c][lane] = fmaxf(0, left * samples->in_scattering[c][lane] + over);
+        samples->transmittance[c][lane] *= left;
+    }
+    samples->error[lane] += knots->error;
+}
+
+nebel_result nb_cloudscape_add(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+{
+    int any;
+    nebel_result result = trace(frame, scratch, &any);
+    if (result == NEBEL_OK && any) result = mix(frame, haze, scratch);
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++)
+        if (scratch->clouds.knots[i].count > 0) lay_over(scratch, i);
+    return result;
+}
+
+/* ---- shadows --------------------------------------------------------------------------------- */
+
+nebel_result nb_cloudscape_shade(const nb_frame *frame, nb_scratch *scratch, float (*color)[NB_BATCH])
+{
+    const nb_geometry *geometry = &frame->renderer->geometry;
+    for (int i = 0; i < NB_BATCH; i++) {
+        double place[1][3], square = 0;
+        float part;
+        if (!scratch->points.lit[i]) continue;
+        for (int c = 0; c < 3; c++) {
+            place[0][c] = geometry->origin[c] + (double)scratch->points.start[c][i];
+            square += pow(place[0][c] - frame->view.position[c], 2);
+        }
+        const nebel_result result = nebel_shade_clouds(scratch->clouds.workspace, 4 * frame->air.pixel * sqrt(square),
+                                                       1, (const double(*)[3])place, 0, &part);
+        if (result != NEBEL_OK) return result;
+        for (int c = 0; c < 3; c++) color[c][i] *= part;
+    }
+    return NEBEL_OK;
+}

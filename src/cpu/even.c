@@ -1,0 +1,93 @@
+#include "even.h"
+
+#include <math.h>
+
+/* What the centre of a pixel may be off the mean over it: a part of its light, and of 1 of transmittance. */
+#define MOST_OFF 1e-3f
+
+int nb_even_may_be(const nb_frame *frame)
+{
+    return frame->air.planet != NULL && !frame->air.has_fog && frame->samples > 1 && !frame->lighting.shows_ambient &&
+           frame->renderer->method == NEBEL_METHOD_EXACT;
+}
+
+/* ---- what has an edge ------------------------------------------------------------------------ */
+
+static int sees_models(const nb_frame *frame, const nb_place *place, uint32_t count, nb_scratch *scratch)
+{
+    if (frame->renderer->geometry.scene == NULL) return 0;
+    for (uint32_t s = 0; s < count; s++) {
+        nb_batch_find(frame, place, s, scratch);
+        if (nb_hits_any(&scratch->hits)) return 1;
+    }
+    return 0;
+}
+
+/* The ground and the sky at once; or ground on which models may cast shadows. */
+static int sees_borders(const nb_frame *frame, const nb_scratch *scratch)
+{
+    int ground = 0, sky = 0;
+    for (int i = 0; i < NB_BATCH; i++) {
+        const int is_ground = scratch->air.distance[i] < HUGE_VALF;
+        ground |= scratch->inside[i] && is_ground;
+        sky |= scratch->inside[i] && !is_ground;
+    }
+    return ground && (sky || frame->renderer->geometry.scene != NULL);
+}
+
+/* ---- how light bends ------------------------------------------------------------------------- */
+
+/* Lane of a pixel of the batch. */
+static uint32_t lane_of(uint32_t x, uint32_t y)
+{
+    return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
+}
+
+static uint32_t clamp(uint32_t i, uint32_t count)
+{
+    return i < 1 ? 1 : i > count - 2 ? count - 2 : i;
+}
+
+/* The mean over a pixel of a parabola is off its centre by a 24th of each second difference. Pixels at the batch's border
+ * take that of their neighbours. */
+static float bend(const float *values, uint32_t x, uint32_t y, uint32_t columns, uint32_t rows)
+{
+    const uint32_t u = clamp(x, columns), v = clamp(y, rows);
+    const float across = values[lane_of(u - 1, y)] - 2 * values[lane_of(u, y)] + values[lane_of(u + 1, y)];
+    const float down = values[lane_of(x, v - 1)] - 2 * values[lane_of(x, v)] + values[lane_of(x, v + 1)];
+    return (fabsf(across) + fabsf(down)) / 24;
+}
+
+/* What light may be off is added to the error. */
+static int is_smooth(uint32_t columns, uint32_t rows, nb_light_samples *samples)
+{
+    for (uint32_t y = 0; y < rows; y++)
+        for (uint32_t x = 0; x < columns; x++) {
+            const uint32_t i = lane_of(x, y);
+            float off = 0, most = 0, left = 0;
+            for (int c = 0; c < 3; c++) {
+                most = fmaxf(most, samples->color[c][i]);
+                off = fmaxf(off, bend(samples->color[c], x, y, columns, rows));
+                off = fmaxf(off, bend(samples->in_scattering[c], x, y, columns, rows));
+                left = fmaxf(left, bend(samples->transmittance[c], x, y, columns, rows));
+            }
+            if (!(off <= MOST_OFF * most && left <= MOST_OFF)) return 0;
+            samples->error[i] += off;
+        }
+    return 1;
+}
+
+nebel_result nb_even_render(const nb_frame *frame, const nb_place *place, uint32_t count, nb_scratch *scratch,
+                            int *is_even)
+{
+    const uint32_t right = frame->width - place->left, below = frame->height - place->top - nb_lane_y(place->first);
+    const uint32_t columns = right < NB_REGION ? right : NB_REGION, rows = below < NB_BLOCK ? below : NB_BLOCK;
+    *is_even = 0;
+    if (columns < 3 || rows < 3 || sees_models(frame, place, count, scratch)) return NEBEL_OK;
+    nb_batch_find_centers(frame, place, scratch);
+    if (sees_borders(frame, scratch) || nb_air_sees_sun(&frame->air, &frame->lighting, &scratch->rays)) return NEBEL_OK;
+    const nebel_result result = nb_batch_light(frame, scratch);
+    /* Clouds and their shadows are means over pixels already. */
+    *is_even = result == NEBEL_OK && (frame->cloud_view != NULL || is_smooth(columns, rows, &scratch->samples));
+    return result;
+}

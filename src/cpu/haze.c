@@ -1,0 +1,194 @@
+#include "haze.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The knot 0 of a lane is where its ray ends. The start is none: nothing is before it. */
+typedef struct nb_knot {
+    float at, fog_left[3], fog_light[3], air_left[3], air_light[3];
+} nb_knot;
+
+static nb_knot knot_of(const nb_air_scratch *scratch, int lane, int place)
+{
+    nb_knot knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}};
+    if (place < 0) return knot;
+    const nb_air_knots *knots = &scratch->knots[scratch->order[lane][place]];
+    knot.at = knots->at[lane];
+    for (int c = 0; c < 3; c++) {
+        knot.fog_left[c] = knots->fog_left[c][lane];
+        knot.fog_light[c] = knots->fog_light[c][lane];
+        knot.air_left[c] = knots->air_left[c][lane];
+        knot.air_light[c] = knots->air_light[c][lane];
+    }
+    return knot;
+}
+
+/* What is in doubt of the light between two knots. */
+static float doubt(const nb_knot *a, const nb_knot *b)
+{
+    float most = 0;
+    for (int c = 0; c < 3; c++)
+        most = fmaxf(most, 0.5f * fabsf((a->fog_left[c] - b->fog_left[c]) * (b->air_light[c] - a->air_light[c])) +
+                               0.5f * fabsf((a->air_left[c] - b->air_left[c]) * (b->fog_light[c] - a->fog_light[c])));
+    return most;
+}
+
+/* The piece of a lane that is in doubt most, and all doubts. */
+static int find_worst(const nb_air_scratch *scratch, int lane, float *all)
+{
+    int worst = 0;
+    float most = -1;
+    nb_knot before = knot_of(scratch, lane, -1);
+    *all = 0;
+    for (int i = 0; i < scratch->count[lane]; i++) {
+        const nb_knot here = knot_of(scratch, lane, i);
+        const float is = doubt(&before, &here);
+        *all += is;
+        if (is > most) {
+            most = is;
+            worst = i;
+        }
+        before = here;
+    }
+    return worst;
+}
+
+/* Fog is mostly near and air far: what begins at the eye is cut where air begins to count, other long pieces nearer to
+ * their start. */
+static float cut(const nb_knot *a, const nb_knot *b, float tolerance)
+{
+    if (a->at > 0) return b->at > 8 * a->at ? 4 * a->at : 0.5f * (a->at + b->at);
+    float light = 0, gone = 0;
+    for (int c = 0; c < 3; c++) {
+        light = fmaxf(light, b->air_light[c]);
+        gone = fmaxf(gone, 1 - b->air_left[c]);
+    }
+    return b->at * fminf(0.5f, fmaxf(1e-6f, tolerance / fmaxf(light, gone)));
+}
+
+static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
+{
+    uint8_t *order = scratch->order[lane];
+    memmove(order + place + 1, order + place, (size_t)(scratch->count[lane] - place));
+    order[place] = (uint8_t)knot;
+    scratch->count[lane]++;
+}
+
+static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
+                               nb_scratch *scratch, nb_air_knots *knot)
+{
+    const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
+                                        scratch->rays.direction[2]};
+    nebel_ray_planes rays = *fog;
+    nebel_light_planes lights = {.error = NULL}, air = {.error = knot->air_error};
+    rays.t_max = knot->at;
+    for (int c = 0; c < 3; c++) {
+        lights.transmittance[c] = knot->fog_left[c];
+        lights.in_scattering[c] = knot->fog_light[c];
+        air.transmittance[c] = knot->air_left[c];
+        air.in_scattering[c] = knot->air_light[c];
+    }
+    const nebel_result result = nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &lights);
+    return result == NEBEL_OK ? nebel_trace_air_view(frame->air.view, NB_BATCH, direction, knot->at, &air) : result;
+}
+
+/* Of light, which is as uncertain as it is bright where that is more than 1. */
+static float tolerance_of(const nb_frame *frame, const nb_air_scratch *air, int lane)
+{
+    float brightest = 1;
+    for (int c = 0; c < 3; c++) brightest = fmaxf(brightest, air->knots[0].air_light[c][lane]);
+    return frame->air.tolerance * brightest;
+}
+
+/* One more knot for each lane that needs it; returns whether any did. */
+static int choose(const nb_frame *frame, nb_scratch *scratch, int number)
+{
+    nb_air_scratch *air = &scratch->air;
+    int any = 0;
+    for (int i = 0; i < NB_BATCH; i++) {
+        float all, *at = &air->knots[number].at[i];
+        *at = 0;
+        if (!scratch->inside[i]) continue;
+        const int worst = find_worst(air, i, &all);
+        const float tolerance = tolerance_of(frame, air, i);
+        if (all <= tolerance) continue;
+        const nb_knot a = knot_of(air, i, worst - 1), b = knot_of(air, i, worst);
+        const float place = cut(&a, &b, tolerance);
+        if (!(place > a.at && place < b.at)) continue;
+        *at = place;
+        insert(air, i, worst, number);
+        any = 1;
+    }
+    return any;
+}
+
+/* Of rays without fog. */
+static void take_air(nb_scratch *scratch)
+{
+    const nb_air_knots *all = &scratch->air.knots[0];
+    for (int c = 0; c < 3; c++) {
+        memcpy(scratch->samples.transmittance[c], all->air_left[c], sizeof all->air_left[c]);
+        memcpy(scratch->samples.in_scattering[c], all->air_light[c], sizeof all->air_light[c]);
+    }
+    memcpy(scratch->samples.error, all->air_error, sizeof all->air_error);
+}
+
+static void sum_up(nb_scratch *scratch, int lane)
+{
+    const nb_air_scratch *air = &scratch->air;
+    nb_light_samples *samples = &scratch->samples;
+    nb_knot before = knot_of(air, lane, -1);
+    float light[3] = {0, 0, 0}, all = 0;
+    (void)find_worst(air, lane, &all);
+    for (int i = 0; i < air->count[lane]; i++) {
+        const nb_knot here = knot_of(air, lane, i);
+        for (int c = 0; c < 3; c++)
+            light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
+                        0.5f * (before.air_left[c] + here.air_left[c]) * (here.fog_light[c] - before.fog_light[c]);
+        before = here;
+    }
+    for (int c = 0; c < 3; c++) {
+        samples->transmittance[c][lane] *= air->knots[0].air_left[c][lane];
+        samples->in_scattering[c][lane] = fmaxf(light[c], 0);
+    }
+    samples->error[lane] += air->knots[0].air_error[lane] + all;
+}
+
+/* Air has an end, rays need not: beyond it neither adds anything to the other. */
+static void set_first(const nb_frame *frame, nb_scratch *scratch)
+{
+    nb_air_scratch *air = &scratch->air;
+    for (int i = 0; i < NB_BATCH; i++) {
+        air->knots[0].at[i] = scratch->inside[i] ? fminf(scratch->distance[i], (float)frame->air.reach) : 0;
+        air->order[i][0] = 0;
+        air->count[i] = 1;
+    }
+    for (int c = 0; c < 3; c++) {
+        memcpy(air->knots[0].fog_left[c], scratch->samples.transmittance[c], sizeof air->knots[0].fog_left[c]);
+        memcpy(air->knots[0].fog_light[c], scratch->samples.in_scattering[c], sizeof air->knots[0].fog_light[c]);
+    }
+}
+
+nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
+                         nb_scratch *scratch)
+{
+    nb_air_knots *first = &scratch->air.knots[0];
+    const double *const direction[3] = {scratch->rays.direction[0], scratch->rays.direction[1],
+                                        scratch->rays.direction[2]};
+    nebel_light_planes lights = {.error = first->air_error};
+    for (int c = 0; c < 3; c++) {
+        lights.transmittance[c] = first->air_left[c];
+        lights.in_scattering[c] = first->air_light[c];
+    }
+    set_first(frame, scratch);
+    nebel_result result =
+        nebel_trace_air_view(frame->air.view, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &lights);
+    if (fog == NULL) {
+        take_air(scratch);
+        return result;
+    }
+    for (int k = 1; k < NB_AIR_KNOTS && result == NEBEL_OK && choose(frame, scratch, k); k++)
+        result = trace_knot(frame, fog, trace, scratch, &scratch->air.knots[k]);
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(scratch, i);
+    return result;
+}

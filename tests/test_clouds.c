@@ -1,0 +1,532 @@
+/* Clouds with volume: their density, what quadrature makes of it, the model of their light, and bad input. */
+#include "planet/cloud_view.h"
+
+#include "dice.h"
+#include "near.h"
+#include "scarce_memory.h"
+#include "unit.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+#define RADIUS 6.36e6
+
+static nebel_atmosphere *air;
+
+static int make_air(void **state)
+{
+    (void)state;
+    return nebel_create_atmosphere(&(nebel_atmosphere_desc){.ground_albedo = {.1, .1, .1}}, &air) == NEBEL_OK ? 0 : -1;
+}
+
+static int free_air(void **state)
+{
+    (void)state;
+    nebel_destroy_atmosphere(air);
+    return 0;
+}
+
+static nebel_clouds *make(uint32_t count, const nebel_cloud_layer *layers)
+{
+    nebel_clouds *clouds;
+    nebel_clouds_desc desc = {.atmosphere = air, .layer_count = count};
+    memcpy(desc.layers, layers, count * sizeof *layers);
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
+    return clouds;
+}
+
+static float extinction_at(const nebel_clouds *clouds, double time, double width, double x, double y, double z)
+{
+    const double place[1][3] = {{x, y, z}};
+    float extinction;
+    assert_int_equal(nebel_cloud_extinction(clouds, time, width, 1, place, 0, &extinction), NEBEL_OK);
+    return extinction;
+}
+
+/* A place so far above the ground, in a direction from the planet's centre. */
+static float above(const nebel_clouds *clouds, double height, double x, double y, double z, double width)
+{
+    const double scale = (RADIUS + height) / sqrt(x * x + y * y + z * z);
+    return extinction_at(clouds, 0, width, x * scale, y * scale - RADIUS, z * scale);
+}
+
+/* ---- density --------------------------------------------------------------------------------- */
+
+static void test_noise_is_what_its_constants_say(void **state)
+{
+    (void)state;
+    enum { COUNT = 200000 };
+    nebel_clouds *clouds =
+        make(3, (const nebel_cloud_layer[]){{.seed = 5}, {.kind = NEBEL_CLOUD_STRATUS}, {.kind = NEBEL_CLOUD_CIRRUS}});
+    uint64_t numbers = 1;
+    double square = 0, steepest = 0;
+    for (int i = 0; i < COUNT; i++) {
+        double place[3], slope = 0;
+        for (int k = 0; k < 3; k++) place[k] = dice(&numbers, -100, 100);
+        const double here = (double)nb_gradient_noise(&clouds->noise, place);
+        for (int k = 0; k < 3; k++) {
+            double near[3] = {place[0], place[1], place[2]};
+            near[k] += 1e-3;
+            slope += pow(((double)nb_gradient_noise(&clouds->noise, near) - here) / 1e-3, 2);
+        }
+        square += here * here;
+        steepest = fmax(steepest, sqrt(slope));
+    }
+    assert_near(square / COUNT, (double)NB_GRADIENT_VARIANCE, 5e-4);
+    assert_true(steepest > 2);
+    /* A part of the planet is above the rank that a part of it is above of. */
+    for (int k = 0; k < 3; k++) {
+        const nb_cloud_layer *layer = &clouds->layers[k];
+        int under = 0;
+        for (int i = 0; i < COUNT / 10; i++) {
+            double unit[3];
+            do {
+                for (int c = 0; c < 3; c++) unit[c] = dice(&numbers, -1, 1);
+                square = unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2];
+            } while (!(square > .1 && square < 1));
+            for (int c = 0; c < 3; c++) unit[c] /= sqrt(square);
+            under += nb_cloud_column_at(&clouds->noise, layer, unit, 0).rank > 0;
+        }
+        assert_near(under / (COUNT / 10.), (double)layer->coverage, .03);
+    }
+    nebel_destroy_clouds(clouds);
+}
+
+/* The date line (x < 0, z = 0) and the poles are places like others: over a centimetre density changes as little. */
+static void test_there_is_no_seam_and_no_pole(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .8}});
+    uint64_t numbers = 7;
+    double worst[2] = {0, 0};
+    int cloudy[2] = {0, 0};
+    for (int i = 0; i < 20000; i++) {
+        const double latitude = dice(&numbers, -.5, .5) * PI, height = dice(&numbers, 950, 2600), step = 1e-2 / RADIUS;
+        const int is_seam = i % 2;
+        const double longitude = is_seam ? PI : dice(&numbers, 0, 2 * PI), pole = is_seam && i % 4 == 1 ? 1 : 0;
+        const double y = pole > 0 ? copysign(1, latitude) : sin(latitude), level = pole > 0 ? 0 : cos(latitude);
+        const double x = level * cos(longitude), z = level * sin(longitude);
+        const double a = (double)above(clouds, height, x, y, z - step, 0),
+                     b = (double)above(clouds, height, x, y, z + step, 0);
+        worst[is_seam] = fmax(worst[is_seam], fabs(a - b));
+        cloudy[is_seam] += a > 0;
+        assert_true(a >= 0 && a <= .05 * (1 + 1e-6));
+    }
+    assert_true(cloudy[0] > 500 && cloudy[1] > 500);
+    assert_true(worst[1] < 2 * worst[0] && worst[0] < 5e-4);
+    assert_true(extinction_at(clouds, 0, 0, 0, 899, 0) == 0 && extinction_at(clouds, 0, 0, 0, 2701, 0) == 0);
+    nebel_destroy_clouds(clouds);
+}
+
+/* A millimetre is far more than the last digit of a place on the Earth: density follows a line without steps. */
+static void test_details_stand_still_at_the_size_of_a_planet(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .8}});
+    double bend = 0, change = 0, last[2] = {0, 0}, x = 0;
+    /* A border of a cloud. */
+    for (float here = 0; !(here > .002f && here < .02f) && x < 1e5; x += 1)
+        here = extinction_at(clouds, 0, 0, x, 1300, -700);
+    for (int i = 0; i < 10000; i++) {
+        const double here = (double)extinction_at(clouds, 0, 0, x - 5 + 1e-3 * i, 1300, -700);
+        if (i > 1) bend = fmax(bend, fabs(here - 2 * last[0] + last[1]));
+        if (i > 0) change = fmax(change, fabs(here - last[0]));
+        last[1] = last[0];
+        last[0] = here;
+    }
+    assert_true(change > 1e-8 && change < 2e-5);
+    assert_true(bend < 5e-6);
+    nebel_destroy_clouds(clouds);
+}
+
+/* The wind carries what is over the origin along, as on a turning ball. */
+static void test_wind_turns_the_shell(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = 1, .wind = {30, -40}}});
+    int cloudy = 0;
+    for (int i = 0; i < 200; i++) {
+        const double height = 950 + 8 * i, x = 35. * i, radius = RADIUS + height;
+        const double angle = 50 * 100. / (RADIUS + 900), way[2] = {.6, -.8};
+        /* Split into along the wind and across it. */
+        const double along = x * way[0], across = -x * way[1], y = sqrt(radius * radius - x * x);
+        const double turned = along * cos(angle) + y * sin(angle), up = y * cos(angle) - along * sin(angle);
+        const double before = (double)extinction_at(clouds, 0, 0, x, y - RADIUS, 0);
+        const double after = (double)extinction_at(clouds, 100, 0, turned * way[0] - across * way[1], up - RADIUS,
+                                                   turned * way[1] + across * way[0]);
+        assert_near(before, after, 1e-5);
+        cloudy += before > 0;
+    }
+    assert_true(cloudy > 20);
+    nebel_destroy_clouds(clouds);
+}
+
+/* From afar a cloud is the mean of what is seen near. */
+static void test_wide_pixels_see_means(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .5}});
+    double near = 0, far = 0;
+    enum { COUNT = 40000 };
+    uint64_t numbers = 3;
+    for (int i = 0; i < COUNT; i++) {
+        const double x = dice(&numbers, -3e5, 3e5), z = dice(&numbers, -3e5, 3e5);
+        near += (double)above(clouds, 1300, x, RADIUS, z, 0) / COUNT;
+        far += (double)above(clouds, 1300, x, RADIUS, z, 3000) / COUNT;
+    }
+    print_message("mean extinction %.4g, of wide pixels %.4g\n", near, far);
+    assert_near(far, near, .25 * near);
+    nebel_destroy_clouds(clouds);
+}
+
+/* ---- along rays ------------------------------------------------------------------------------ */
+
+static nebel_cloud_view *view_of(const nebel_clouds *clouds, double tolerance, nebel_cloud_workspace **workspace)
+{
+    nebel_cloud_view *view;
+    const nebel_cloud_view_desc desc = {
+        .clouds = clouds, .sun = {.direction = {.6, .7, .1}, .irradiance = {5, 4, 3}}, .tolerance = tolerance};
+    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(view, workspace), NEBEL_OK);
+    return view;
+}
+
+/* Even steps, in m, through the density as it is stated. */
+static double brute_force(const nebel_clouds *clouds, const nebel_ray *ray, double begin, double end, double step)
+{
+    double depth = 0, place[1][3];
+    float extinction;
+    for (double t = begin + .5 * step; t < end && depth < 12; t += step) {
+        for (int c = 0; c < 3; c++) place[0][c] = ray->origin[c] + t * ray->direction[c];
+        assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, (const double(*)[3])place, 0, &extinction), NEBEL_OK);
+        depth += step * (double)extinction;
+    }
+    return exp(-depth);
+}
+
+static void test_transmittance_is_that_of_the_density(void **state)
+{
+    (void)state;
+    enum { RAYS = 60 };
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.extinction = .005, .coverage = .6}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 11;
+    double worst = 0, sum = 0;
+    int between = 0, untold = 0;
+    for (int i = 0; i < RAYS; i++) {
+        const double turn = dice(&numbers, 0, 2 * PI), up = dice(&numbers, .15, 1), level = sqrt(1 - up * up);
+        const nebel_ray ray = {{0, 2, 0}, {level * cos(turn), up, level * sin(turn)}, HUGE_VAL};
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_OK);
+        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        const double truth = brute_force(clouds, &ray, 890 / up * .98, 2720 / up, 1), off = fabs(left - truth);
+        worst = fmax(worst, off);
+        sum += off / RAYS;
+        between += truth > .02 && truth < .98;
+        untold += off > (double)knots.error + 2e-3;
+    }
+    print_message("transmittance of %d rays, %d within clouds: off by %.2g at most, %.2g in the mean, %d untold\n",
+                  RAYS, between, worst, sum, untold);
+    assert_true(between > 12 && worst < 2e-2 && sum < 2e-3 && untold <= 2);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* What a workspace has seen before changes nothing. */
+static void test_order_of_rays_makes_no_difference(void **state)
+{
+    (void)state;
+    enum { RAYS = 40 };
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.seed = 2}, {.kind = NEBEL_CLOUD_CIRRUS}});
+    nebel_cloud_workspace *workspace, *other;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_cloud_knots knots[2][RAYS];
+    nebel_ray rays[RAYS];
+    memset(knots, 0, sizeof knots);
+    assert_int_equal(nebel_create_cloud_workspace(view, &other), NEBEL_OK);
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (nebel_ray){{0, i % 2 ? 1500 : 3e4, 0}, {.02 * i, i % 2 ? .1 : -.3, 1}, HUGE_VAL};
+    assert_int_equal(nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, 1e-3, knots[0], sizeof **knots), NEBEL_OK);
+    for (int i = RAYS - 1; i >= 0; i--)
+        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, 1e-3, &knots[1][i], 0), NEBEL_OK);
+    assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
+    int some = 0;
+    for (int i = 0; i < RAYS; i++) {
+        const nebel_cloud_knots *k = &knots[0][i];
+        some += k->count > 0;
+        for (uint32_t n = 0; n < k->count; n++) {
+            assert_true(k->transmittance[n] >= 0 && k->transmittance[n] <= 1 && k->in_scattering[n][1] >= 0);
+            if (n > 0) assert_true(k->t[n] >= k->t[n - 1] && k->transmittance[n] <= k->transmittance[n - 1]);
+        }
+    }
+    assert_true(some > RAYS / 3);
+    nebel_destroy_cloud_workspace(other);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* ---- light ----------------------------------------------------------------------------------- */
+
+/* What a slab of drops sends up against the sun's light and down with it, as paths say: the part of the light that comes
+ * back, sunlight at a cosine. */
+static double reflected_by_paths(double depth, double cosine, double g, int paths, uint64_t *numbers)
+{
+    int back = 0;
+    for (int i = 0; i < paths; i++) {
+        double z = 0, mu = cosine;
+        for (;;) {
+            z -= mu * log(dice(numbers, 1e-12, 1));
+            if (!(z >= 0 && z <= depth)) break;
+            const double s = dice(numbers, -1, 1), f = (1 - g * g) / (1 + g * s);
+            const double turn = (1 + g * g - f * f) / (2 * g), sine = sqrt(fmax(0, 1 - turn * turn));
+            mu = turn * mu + sine * sqrt(fmax(0, 1 - mu * mu)) * cos(dice(numbers, 0, 2 * PI));
+        }
+        back += z < 0;
+    }
+    return (double)back / paths;
+}
+
+/* The same of the model: its light integrated over the eyes above, in a slab that is seen under a cosine. */
+static double reflected_by_model(const nebel_cloud_view *view, double depth, double cosine)
+{
+    enum { EYES = 24, TURNS = 16, STEPS = 400 };
+    const nb_cloud_light white = {.sun = {1, 1, 1}};
+    const double up[3] = {0, 1, 0};
+    double sum = 0;
+    for (int i = 0; i < EYES * TURNS; i++) {
+        const double out = (i % EYES + .5) / EYES, level = sqrt(1 - out * out), turn = PI * (i / EYES + .5) / TURNS;
+        const double sine = sqrt(1 - cosine * cosine);
+        /* The eye looks down; the sun's place is in the x-y plane. */
+        const double direction[3] = {level * cos(turn), -out, level * sin(turn)};
+        nb_cloud_ray ray = nb_cloud_ray_make(view, direction);
+        ray.sun = sine * direction[0] + cosine * direction[1];
+        const nb_cloud_layer *layer = &view->clouds->layers[0];
+        const nebel_phase wide = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN,
+                                  .g = layer->mean_cosine / (1 + layer->mean_cosine)};
+        const nb_phase lobe = nb_phase_resolve(&wide);
+        ray.phase[0] = (float)nb_phase_at(&layer->phase, ray.sun);
+        ray.wide_phase[0] = (float)nb_phase_at(&lobe, ray.sun);
+        double radiance = 0;
+        const double step = depth / out / STEPS, apart = (double)ray.apart[0];
+        for (int k = 0; k < STEPS; k++) {
+            const double way = (k + .5) * step, x = way * out;
+            const nb_cloud_depths depths = {(float)(x / cosine), (float)((depth - x) / cosine), (float)x,
+                                            (float)(depth - x)};
+            const nb_cloud_source s = nb_cloud_source_of(view, &ray, 0, &depths, &white, up);
+            radiance += step * (exp(-way) * (double)s.once[1] + exp(-apart * way) * (double)s.often[1]);
+        }
+        sum += radiance * out * 2 * PI / (EYES * TURNS);
+    }
+    return sum / cosine;
+}
+
+static void test_light_of_slabs(void **state)
+{
+    (void)state;
+    static const struct {
+        double depth, cosine, off; /* and by what part of the light the model may be wrong */
+    } slabs[] = {{1, 1, .06},  {4, 1, .06},   {16, 1, .06},  {64, 1, .06},
+                 {4, .5, .08}, {16, .5, .08}, {64, .5, .06}, {16, .2, .08}};
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 5;
+    for (size_t i = 0; i < sizeof slabs / sizeof *slabs; i++) {
+        const double truth =
+            reflected_by_paths(slabs[i].depth, slabs[i].cosine, clouds->layers[0].mean_cosine, 20000, &numbers);
+        const double model = reflected_by_model(view, slabs[i].depth, slabs[i].cosine);
+        print_message(
+            "slab of depth %g, sun at a cosine of %g: %.3f of the light comes back by paths, %.3f by the model\n",
+            slabs[i].depth, slabs[i].cosine, truth, model);
+        assert_near(model, truth, slabs[i].off);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* What comes straight from the sun to places in clouds, by lattices and by steps of two metres. */
+static void test_ways_to_the_sun(void **state)
+{
+    (void)state;
+    enum { PLACES = 400 };
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.extinction = .005, .coverage = .6}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    const double *sun = view->sun.direction;
+    uint64_t numbers = 17;
+    double sum = 0, bias = 0;
+    int between = 0;
+    for (int i = 0; i < PLACES; i++) {
+        const double x = dice(&numbers, -5e3, 5e3), z = dice(&numbers, -5e3, 5e3), y = dice(&numbers, 1000, 2000);
+        const nebel_ray ray = {{x, y, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
+        const double from[3] = {x, y + RADIUS, z};
+        const double left = exp(-(double)nb_cloud_sun_depth_at(workspace, from, 25));
+        const double truth = brute_force(clouds, &ray, 0, (2720 - y) / sun[1], 2);
+        sum += fabs(left - truth) / PLACES;
+        bias += (left - truth) / PLACES;
+        between += truth > .02 && truth < .98;
+    }
+    print_message(
+        "sunlight at %d places, %d of them in part in shadow: off by %.2g in the mean, all together by %.2g\n", PLACES,
+        between, sum, bias);
+    assert_true(between > PLACES / 12 && sum < .012 && fabs(bias) < .004);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_shadows(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .5}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    const double high[1][3] = {{0, 5000, 0}};
+    double least = 1, sum = 0;
+    float part;
+    assert_int_equal(nebel_shade_clouds(workspace, 1, 1, high, 0, &part), NEBEL_OK);
+    assert_true(part == 1);
+    for (int i = 0; i < 400; i++) {
+        const double place[1][3] = {{400. * (i % 20), 0, 400. * (i / 20.)}};
+        assert_int_equal(nebel_shade_clouds(workspace, 1, 1, place, 0, &part), NEBEL_OK);
+        assert_true(part >= 0 && part <= 1);
+        least = fmin(least, (double)part);
+        sum += (double)part / 400;
+    }
+    assert_true(least < .25 && sum > .3 && sum < .95);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* ---- bad input ------------------------------------------------------------------------------- */
+
+static void test_bad_layers_are_refused(void **state)
+{
+    (void)state;
+    const double none = (double)NAN;
+    float texel = 2;
+    const nebel_cloud_layer bad[] = {{.kind = (nebel_cloud_kind)7},
+                                     {.base = -5},
+                                     {.base = 2000, .top = 1000},
+                                     {.base = 1000, .top = 1000},
+                                     {.base = none},
+                                     {.top = none},
+                                     {.top = 2e5},
+                                     {.coverage = 1.5},
+                                     {.coverage = -.1},
+                                     {.coverage = none},
+                                     {.extinction = -1},
+                                     {.extinction = HUGE_VAL},
+                                     {.size = none},
+                                     {.size = 1e10},
+                                     {.detail = 1.1},
+                                     {.detail = -.5},
+                                     {.variation = 2},
+                                     {.diameter = 1},
+                                     {.wind = {none, 0}},
+                                     {.wind = {0, HUGE_VAL}},
+                                     {.weather = {1, 1, 1, &texel}},
+                                     {.weather = {1, 1, 3, &texel}}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        nebel_clouds *clouds = (nebel_clouds *)&texel;
+        nebel_clouds_desc desc = {.atmosphere = air, .layers = {bad[i]}, .layer_count = 1};
+        assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_VALUE);
+        assert_null(clouds);
+    }
+    nebel_clouds *clouds;
+    nebel_clouds_desc desc = {
+        .atmosphere = air, .layers = {{.top = 2000}, {.base = 1500, .top = 3000}}, .layer_count = 2};
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_VALUE);
+    desc.layer_count = NEBEL_MAX_CLOUD_LAYERS + 1;
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_LIMIT);
+    desc.layer_count = 0;
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
+    nebel_destroy_clouds(clouds);
+    desc.atmosphere = NULL;
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_clouds(NULL, &clouds), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_clouds(NULL);
+}
+
+static void test_bad_calls_are_refused(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace), *other;
+    const double none = (double)NAN, place[1][3] = {{0, none, 0}};
+    nebel_ray ray = {{0, 0, 0}, {0, 1, 0}, HUGE_VAL};
+    nebel_cloud_knots knots;
+    float number;
+    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .time = none}, &other),
+                     NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .tolerance = -1}, &other),
+                     NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.time = 1}, &other), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_cloud_workspace(workspace);
+    assert_int_equal(nebel_create_cloud_workspace(NULL, &workspace), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+    assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_cloud_extinction(clouds, none, 0, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_clouds(workspace, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, -1, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    ray.t_max = none;
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    ray = (nebel_ray){{0, 0, 0}, {0, 0, 0}, 1};
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_workspace(NULL);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_view(NULL);
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_without_memory(void **state)
+{
+    (void)state;
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (int k = 0; result != NEBEL_OK; k++) {
+        int left = k;
+        nebel_clouds *clouds = NULL;
+        nebel_cloud_view *view = NULL;
+        nebel_cloud_workspace *workspace = NULL;
+        const nebel_allocator scarce = {scarce_allocate, scarce_release, &left};
+        result = nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1, .allocator = scarce},
+                                     &clouds);
+        if (result == NEBEL_OK)
+            result = nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .allocator = scarce}, &view);
+        if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
+        assert_true(result == NEBEL_OK || result == NEBEL_ERROR_MEMORY);
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+        nebel_destroy_clouds(clouds);
+        assert_true(k < 20);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_noise_is_what_its_constants_say),
+        cmocka_unit_test(test_there_is_no_seam_and_no_pole),
+        cmocka_unit_test(test_details_stand_still_at_the_size_of_a_planet),
+        cmocka_unit_test(test_wind_turns_the_shell),
+        cmocka_unit_test(test_wide_pixels_see_means),
+        cmocka_unit_test(test_transmittance_is_that_of_the_density),
+        cmocka_unit_test(test_order_of_rays_makes_no_difference),
+        cmocka_unit_test(test_light_of_slabs),
+        cmocka_unit_test(test_ways_to_the_sun),
+        cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_bad_layers_are_refused),
+        cmocka_unit_test(test_bad_calls_are_refused),
+        cmocka_unit_test(test_without_memory),
+    };
+    return cmocka_run_group_tests(tests, make_air, free_air);
+}

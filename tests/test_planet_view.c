@@ -1,0 +1,347 @@
+/* Tables of air from one place: how far they are from nebel_trace_air, and whether they say so. */
+#include <nebel/planet.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scarce_memory.h"
+#include "unit.h"
+
+enum { RAYS = 250 };
+
+typedef struct bundle {
+    double direction[3][RAYS];
+    float t_max[RAYS];
+    float transmittance[3][RAYS], in_scattering[3][RAYS], error[RAYS];
+    nebel_light exact[RAYS];
+} bundle;
+
+/* 0 to 1; the same in every run. */
+static double draw(uint32_t *state)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return (*state >> 8) / 16777216.0;
+}
+
+static nebel_atmosphere *make(const char *name)
+{
+    nebel_atmosphere *atmosphere = NULL;
+    assert_int_equal(nebel_create_atmosphere(nebel_find_atmosphere(name), &atmosphere), NEBEL_OK);
+    return atmosphere;
+}
+
+/* From a height over the ground, half of the rays near the horizon or, from space, at the rim of the planet. */
+static void aim(bundle *rays, const nebel_atmosphere_desc *desc, double height, uint32_t *state)
+{
+    const double r = desc->radius + height, horizon = -sqrt(1 - pow(desc->radius / r, 2));
+    for (int i = 0; i < RAYS; i++) {
+        const double turn = 2 * acos(-1) * draw(state), side = draw(state) < 0.5 ? -1 : 1;
+        double up = i % 2 ? 2 * draw(state) - 1 : horizon + 0.3 * side * pow(draw(state), 3);
+        if (height > desc->thickness) {
+            const double aside = desc->radius * sqrt(draw(state)) + (i % 2 ? desc->thickness * draw(state) : 0);
+            up = -sqrt(1 - pow(aside / r, 2));
+        }
+        up = fmax(-1, fmin(1, up));
+        const double level = sqrt(1 - up * up);
+        rays->direction[0][i] = 3 * level * cos(turn);
+        rays->direction[1][i] = 3 * up;
+        rays->direction[2][i] = 3 * level * sin(turn);
+        rays->t_max[i] = (float)(desc->thickness * pow(10, 6 * draw(state) - 5));
+    }
+}
+
+static void trace_both(bundle *rays, const nebel_air_view_desc *desc, const nebel_air_view *view)
+{
+    const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
+    const nebel_light_planes lights = {
+        .transmittance = {rays->transmittance[0], rays->transmittance[1], rays->transmittance[2]},
+        .in_scattering = {rays->in_scattering[0], rays->in_scattering[1], rays->in_scattering[2]},
+        .error = rays->error};
+    assert_int_equal(nebel_trace_air_view(view, RAYS, direction, desc->has_distances ? rays->t_max : NULL, &lights),
+                     NEBEL_OK);
+    for (int i = 0; i < RAYS; i++) {
+        nebel_ray ray = {.t_max = desc->has_distances ? (double)rays->t_max[i] : HUGE_VAL};
+        memcpy(ray.origin, desc->position, sizeof ray.origin);
+        for (int c = 0; c < 3; c++) ray.direction[c] = rays->direction[c][i];
+        assert_int_equal(nebel_trace_air(desc->atmosphere, &desc->sun, 1, &ray, 0, &rays->exact[i], 0), NEBEL_OK);
+    }
+}
+
+/* What is off, as a part of the brightest ray. */
+typedef struct tally {
+    double off[4000];
+    double worst_clear; /* of transmittance */
+    int count, untold;
+} tally;
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void count(const bundle *rays, tally *all)
+{
+    double brightest = 0;
+    for (int i = 0; i < RAYS; i++)
+        for (int c = 0; c < 3; c++) brightest = fmax(brightest, rays->exact[i].in_scattering[c]);
+    for (int i = 0; i < RAYS; i++) {
+        double off = 0, clear = 0;
+        for (int c = 0; c < 3; c++) {
+            off = fmax(off, fabs((double)rays->in_scattering[c][i] - rays->exact[i].in_scattering[c]));
+            clear = fmax(clear, fabs((double)rays->transmittance[c][i] - rays->exact[i].transmittance[c]));
+        }
+        all->untold += fmax(off, clear) > (double)rays->error[i];
+        all->worst_clear = fmax(all->worst_clear, clear);
+        all->off[all->count++] = off / brightest;
+    }
+}
+
+/* Ends that a table was measured by: of 100 rays the worst but one, and the worst of all, as parts of the brightest. */
+static void check(const char *what, tally *all, double most_of_99, double most)
+{
+    qsort(all->off, (size_t)all->count, sizeof *all->off, ascending);
+    const double of_99 = all->off[all->count * 99 / 100], worst = all->off[all->count - 1];
+    print_message("%s: %.1e of 99 in 100, %.1e of all; transmittance %.1e; told too little %d of %d\n", what, of_99,
+                  worst, all->worst_clear, all->untold, all->count);
+    assert_true(of_99 <= most_of_99 && worst <= most && all->untold * 200 <= all->count);
+}
+
+static void tables_are_as_far_off_as_they_say(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *where;
+        double height; /* in thicknesses of the air */
+        double most_of_99, most;
+    } places[] = {{"2 m", 2e-5, 2e-3, 5e-3}, {"10 km", 0.1, 4e-3, 2e-2}, {"orbit", 4, 1.5e-3, 1e-2}};
+    static const char *const names[] = {"earth", "mars", "toy"};
+    static const double elevations[] = {60, 10, 0.5};
+    uint32_t seed = 1;
+    for (int n = 0; n < 3; n++) {
+        nebel_atmosphere *air = make(names[n]);
+        const nebel_atmosphere_desc *known = nebel_find_atmosphere(names[n]);
+        for (int p = 0; p < 3; p++) {
+            tally all = {.count = 0};
+            for (int s = 0; s < 3; s++) {
+                const double angle = elevations[s] * acos(-1) / 180, height = places[p].height * known->thickness;
+                const nebel_air_view_desc desc = {.atmosphere = air,
+                                                  .sun = {{cos(angle), sin(angle), 0.1}, {2, 1.9, 1.7}},
+                                                  .position = {0, height, 0}};
+                nebel_air_view *view;
+                bundle rays;
+                assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+                aim(&rays, known, height, &seed);
+                trace_both(&rays, &desc, view);
+                count(&rays, &all);
+                nebel_destroy_air_view(view);
+            }
+            char what[40];
+            (void)snprintf(what, sizeof what, "%s from %s", names[n], places[p].where);
+            check(what, &all, places[p].most_of_99, places[p].most);
+        }
+        nebel_destroy_atmosphere(air);
+    }
+}
+
+static void rays_may_end_within_the_air(void **state)
+{
+    (void)state;
+    static const double heights[] = {2, 1e4};
+    nebel_atmosphere *air = make("earth");
+    uint32_t seed = 2;
+    tally all = {.count = 0};
+    for (int h = 0; h < 2; h++)
+        for (int s = 0; s < 3; s++) {
+            const nebel_air_view_desc desc = {.atmosphere = air,
+                                              .sun = {{0.3, 0.02 + 0.2 * s, 1}, {1, 1, 1}},
+                                              .position = {0, heights[h], 0},
+                                              .has_distances = 1};
+            nebel_air_view *view;
+            bundle rays;
+            assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+            aim(&rays, nebel_find_atmosphere("earth"), heights[h], &seed);
+            trace_both(&rays, &desc, view);
+            count(&rays, &all);
+            nebel_destroy_air_view(view);
+        }
+    check("ends within the air", &all, 1.5e-2, 5e-2);
+    nebel_destroy_atmosphere(air);
+}
+
+/* The ground is a ball, lit by what nebel_light_air says. */
+static void ground_is_lit_as_places_are(void **state)
+{
+    (void)state;
+    const double radius = 6.36e6;
+    nebel_atmosphere *air = make("earth");
+    for (int h = 0; h < 3; h++) {
+        const nebel_air_view_desc desc = {.atmosphere = air,
+                                          .sun = {{0.9, h == 2 ? 0.05 : 0.4, 0.2}, {3, 2, 1}},
+                                          .position = {0,
+                                                       h == 0   ? 2
+                                                       : h == 1 ? 1e4
+                                                                : 4e7,
+                                                       0}};
+        nebel_air_view *view;
+        bundle rays;
+        float distance[RAYS], normal[3][RAYS], sun[3][RAYS], sky[3][RAYS];
+        const nebel_ground_planes planes = {.distance = distance,
+                                            .normal = {normal[0], normal[1], normal[2]},
+                                            .sun = {sun[0], sun[1], sun[2]},
+                                            .sky = {sky[0], sky[1], sky[2]}};
+        uint32_t seed = 3;
+        int met = 0;
+        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+        aim(&rays, nebel_find_atmosphere("earth"), desc.position[1], &seed);
+        const double *const direction[3] = {rays.direction[0], rays.direction[1], rays.direction[2]};
+        assert_int_equal(nebel_find_ground(view, RAYS, direction, &planes), NEBEL_OK);
+        for (int i = 0; i < RAYS; i++) {
+            const double length = sqrt(pow(direction[0][i], 2) + pow(direction[1][i], 2) + pow(direction[2][i], 2));
+            double place[3], square = 0, closest = 0;
+            for (int c = 0; c < 3; c++)
+                closest -= direction[c][i] / length * (desc.position[c] + (c == 1 ? radius : 0));
+            if (!((double)distance[i] < HUGE_VAL)) {
+                const double r = desc.position[1] + radius;
+                assert_true(closest <= 0 || r * r - closest * closest >= radius * radius * (1 - 1e-9));
+                continue;
+            }
+            met++;
+            for (int c = 0; c < 3; c++) {
+                place[c] = desc.position[c] + (double)distance[i] * direction[c][i] / length;
+                const double from = place[c] + (c == 1 ? radius : 0);
+                square += from * from;
+                assert_true(fabs((double)normal[c][i] - from / radius) <= 1e-6);
+            }
+            assert_true(fabs(sqrt(square) - radius) <= 1e-6 * (double)distance[i]);
+            nebel_air_light light;
+            assert_int_equal(nebel_light_air(air, &desc.sun, 1, (const double(*)[3])place, 0, &light, 0), NEBEL_OK);
+            for (int c = 0; c < 3; c++) {
+                assert_true(fabs((double)sun[c][i] - light.sun[c]) <= 2e-3);
+                assert_true(fabs((double)sky[c][i] - light.sky[c]) <= 1e-3 * light.sky[c] + 1e-6);
+            }
+        }
+        assert_true(met > RAYS / 4 && met < RAYS);
+        nebel_destroy_air_view(view);
+    }
+    nebel_destroy_atmosphere(air);
+}
+
+/* Parts in another order. */
+static void run_backwards(size_t parts, void (*part)(void *data, size_t i), void *data, void *user)
+{
+    (*(int *)user)++;
+    while (parts > 0) part(data, --parts);
+}
+
+static void order_of_work_changes_nothing(void **state)
+{
+    (void)state;
+    nebel_atmosphere *air = make("toy");
+    int runs = 0;
+    nebel_air_view_desc desc = {
+        .atmosphere = air, .sun = {{1, 1, 0}, {1, 1, 1}}, .position = {0, 3, 0}, .has_distances = 1};
+    nebel_air_view *one, *other;
+    static bundle a, b;
+    uint32_t seed = 4;
+    assert_int_equal(nebel_create_air_view(&desc, &one), NEBEL_OK);
+    desc.run = run_backwards;
+    desc.run_user = &runs;
+    assert_int_equal(nebel_create_air_view(&desc, &other), NEBEL_OK);
+    assert_true(runs > 0);
+    aim(&a, nebel_find_atmosphere("toy"), 3, &seed);
+    b = a;
+    trace_both(&a, &desc, one);
+    trace_both(&b, &desc, other);
+    assert_memory_equal(a.transmittance, b.transmittance, sizeof a.transmittance);
+    assert_memory_equal(a.in_scattering, b.in_scattering, sizeof a.in_scattering);
+    assert_memory_equal(a.error, b.error, sizeof a.error);
+    nebel_destroy_air_view(one);
+    nebel_destroy_air_view(other);
+    nebel_destroy_atmosphere(air);
+}
+
+/* On the ground, below it, in the centre, on the edge of the air and far away; the sun anywhere. */
+static void odd_places_have_answers(void **state)
+{
+    (void)state;
+    static const double heights[] = {0, -1, -1000, -1500, 125, 1e9, 1e15};
+    static const double suns[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}};
+    static const double ways[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {1, -1e-9, 0}, {0, 0, 0}, {(double)NAN, 0, 0}};
+    nebel_atmosphere *air = make("toy");
+    for (int h = 0; h < 7; h++)
+        for (int s = 0; s < 3; s++)
+            for (int levels = 0; levels < 2; levels++) {
+                nebel_air_view_desc desc = {.atmosphere = air,
+                                            .sun = {.irradiance = {1, 1, 1}},
+                                            .position = {0, heights[h], 0},
+                                            .has_distances = levels};
+                memcpy(desc.sun.direction, suns[s], sizeof suns[s]);
+                nebel_air_view *view;
+                assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+                for (int w = 0; w < 6; w++) {
+                    const double *const direction[3] = {&ways[w][0], &ways[w][1], &ways[w][2]};
+                    const float reach = 10;
+                    float left[3], light[3], error, distance, sun[3], sky[3];
+                    const nebel_light_planes lights = {.transmittance = {&left[0], &left[1], &left[2]},
+                                                       .in_scattering = {&light[0], &light[1], &light[2]},
+                                                       .error = &error};
+                    const nebel_ground_planes ground = {
+                        .distance = &distance, .sun = {&sun[0], &sun[1], &sun[2]}, .sky = {&sky[0], &sky[1], &sky[2]}};
+                    assert_int_equal(nebel_trace_air_view(view, 1, direction, levels ? &reach : NULL, &lights),
+                                     NEBEL_OK);
+                    for (int c = 0; c < 3; c++)
+                        assert_true(left[c] >= 0 && left[c] <= 1 && light[c] >= 0 && light[c] < 1);
+                    assert_true(error >= 0 && error < 1);
+                    assert_int_equal(nebel_find_ground(view, 1, direction, &ground), NEBEL_OK);
+                    assert_true(distance >= 0);
+                    for (int c = 0; c < 3 && distance < HUGE_VALF; c++)
+                        assert_true(sun[c] >= 0 && sun[c] <= 1 && sky[c] >= 0 && sky[c] <= 1);
+                }
+                nebel_destroy_air_view(view);
+            }
+    nebel_destroy_atmosphere(air);
+}
+
+static void bad_calls_are_refused(void **state)
+{
+    (void)state;
+    nebel_atmosphere *air = make("toy");
+    nebel_air_view *view = NULL;
+    const nebel_air_view_desc bad[] = {{.atmosphere = NULL},
+                                       {.atmosphere = air, .sun = {{0, 0, 0}, {1, 1, 1}}},
+                                       {.atmosphere = air, .sun = {{0, 1, 0}, {(double)NAN, 1, 1}}},
+                                       {.atmosphere = air, .position = {0, (double)NAN, 0}},
+                                       {.atmosphere = air, .position = {0, 1e16, 0}}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(nebel_create_air_view(&bad[i], &view), NEBEL_ERROR_ARGUMENT);
+        assert_null(view);
+    }
+    assert_int_equal(nebel_create_air_view(NULL, &view), NEBEL_ERROR_ARGUMENT);
+    for (int calls = 0; calls < 3; calls++) {
+        int left = calls;
+        const nebel_air_view_desc desc = {.atmosphere = air, .allocator = {scarce_allocate, scarce_release, &left}};
+        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_ERROR_MEMORY);
+        assert_null(view);
+    }
+    nebel_destroy_air_view(NULL);
+    nebel_destroy_atmosphere(air);
+    nebel_atmosphere_desc whole = {.radius = 5};
+    assert_int_equal(nebel_resolve_atmosphere(&(nebel_atmosphere_desc){.radius = -1}, &whole), NEBEL_ERROR_VALUE);
+    assert_true(whole.radius == 5);
+    assert_int_equal(nebel_resolve_atmosphere(&(nebel_atmosphere_desc){.radius = 0}, &whole), NEBEL_OK);
+    assert_true(whole.radius == 6.36e6 && whole.air_count == 3);
+    assert_int_equal(nebel_resolve_atmosphere(NULL, &whole), NEBEL_ERROR_ARGUMENT);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(tables_are_as_far_off_as_they_say), cmocka_unit_test(rays_may_end_within_the_air),
+        cmocka_unit_test(ground_is_lit_as_places_are),       cmocka_unit_test(order_of_work_changes_nothing),
+        cmocka_unit_test(odd_places_have_answers),           cmocka_unit_test(bad_calls_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

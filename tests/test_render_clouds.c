@@ -1,0 +1,207 @@
+/* Clouds in pictures of the CPU: among the air along a ray, behind and before surfaces, on any number of threads. */
+#include "test_render_scene.h"
+
+enum { WIDTH = 48, HEIGHT = 27 };
+
+typedef struct world {
+    nebel_atmosphere *atmosphere;
+    nebel_clouds *clouds;
+    nebel_planet planet;
+    nebel_scene_data scene;
+} world;
+
+static void make_world(const nebel_cloud_layer *layer, world *w)
+{
+    static const double sun[3] = {.6, .64, .48};
+    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_left = {1, 1, 1}, .cloud_layer_count = 1}};
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layer_count = 1};
+    desc.layers[0] = *layer;
+    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    w->planet.clouds = w->clouds;
+    w->scene = (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = 1, .planets = &w->planet};
+    memcpy(w->scene.sun_direction, sun, sizeof sun);
+}
+
+static void free_world(world *w)
+{
+    nebel_destroy_clouds(w->clouds);
+    nebel_destroy_atmosphere(w->atmosphere);
+}
+
+static nebel_camera camera_at(double height, double pitch)
+{
+    return (nebel_camera){.position = {0, height, 0},
+                          .look_at = {0, height + sin(pitch), -cos(pitch)},
+                          .up = {0, 1, 0},
+                          .vertical_fov = 60};
+}
+
+static test_picture render(const world *w, const nebel_camera *camera, int threads, uint32_t samples, double time)
+{
+    nebel_renderer *renderer;
+    const test_picture picture = test_picture_make(WIDTH, HEIGHT);
+    assert_int_equal(nebel_create_renderer(&w->scene, NULL, &(nebel_renderer_desc){.threads = threads}, &renderer),
+                     NEBEL_OK);
+    const nebel_frame_desc desc = {
+        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples, .time = time};
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    return picture;
+}
+
+/* The ray through the middle of a pixel; of the camera above. */
+static nebel_ray ray_of(const nebel_camera *camera, double pitch, uint32_t x, uint32_t y)
+{
+    const double half = tan(30 * test_pi / 180), across = (2 * (x + .5) / WIDTH - 1) * half * WIDTH / HEIGHT,
+                 up = (1 - 2 * (y + .5) / HEIGHT) * half;
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    memcpy(ray.origin, camera->position, sizeof ray.origin);
+    ray.direction[0] = across;
+    ray.direction[1] = sin(pitch) + up * cos(pitch);
+    ray.direction[2] = -cos(pitch) + up * sin(pitch);
+    return ray;
+}
+
+static nebel_light air_to(const world *w, const nebel_sun *sun, nebel_ray ray, double t)
+{
+    nebel_light light;
+    ray.t_max = t;
+    assert_int_equal(nebel_trace_air(w->atmosphere, sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+    return light;
+}
+
+/* The table of air in pictures is off by up to 2.7e-2 for rays that end in it. Clouds and air in short pieces: sum of T_air dS_cloud + T_cloud dS_air, with clouds as a straight line between knots. */
+static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_cloud_knots *knots,
+                    double light[3])
+{
+    enum { STEPS = 24 };
+    const nebel_light all = air_to(w, sun, *ray, HUGE_VAL);
+    const uint32_t last = knots->count - 1;
+    nebel_light before = air_to(w, sun, *ray, knots->count > 0 ? (double)knots->t[0] : 0);
+    for (int c = 0; c < 3; c++) light[c] = knots->count > 0 ? before.in_scattering[c] : 0;
+    for (uint32_t k = 1; k < knots->count; k++)
+        for (int i = 1; i <= STEPS; i++) {
+            const double part = (double)i / STEPS,
+                         t = (double)knots->t[k - 1] * (1 - part) + (double)knots->t[k] * part;
+            const double left = (double)knots->transmittance[k - 1] +
+                                (part - .5 / STEPS) * (double)(knots->transmittance[k] - knots->transmittance[k - 1]);
+            const nebel_light here = air_to(w, sun, *ray, t);
+            for (int c = 0; c < 3; c++)
+                light[c] += left * (here.in_scattering[c] - before.in_scattering[c]) +
+                            .5 * (here.transmittance[c] + before.transmittance[c]) / STEPS *
+                                (double)(knots->in_scattering[k][c] - knots->in_scattering[k - 1][c]);
+            before = here;
+        }
+    for (int c = 0; c < 3; c++)
+        light[c] += (knots->count > 0 ? (double)knots->transmittance[last] : 1) *
+                    (all.in_scattering[c] - (knots->count > 0 ? before.in_scattering[c] : 0));
+}
+
+static void clouds_and_air_are_one(void **state)
+{
+    (void)state;
+    static const struct {
+        double height, pitch;
+    } views[] = {{2, .4}, {1500, .1}, {9000, -.5}};
+    for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
+        world w;
+        nebel_cloud_view *view;
+        nebel_cloud_workspace *workspace;
+        make_world(&(nebel_cloud_layer){.coverage = .5, .extinction = .01}, &w);
+        nebel_sun sun = {.irradiance = {5, 4, 3}};
+        memcpy(sun.direction, w.scene.sun_direction, sizeof sun.direction);
+        assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = w.clouds, .sun = sun}, &view),
+                         NEBEL_OK);
+        assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+        const nebel_camera camera = camera_at(views[v].height, views[v].pitch);
+        test_picture picture = render(&w, &camera, 2, 1, 0);
+        const double spread = 2 * tan(30 * test_pi / 180) / HEIGHT;
+        double worst = 0;
+        int cloudy = 0;
+        for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+            const nebel_ray ray = ray_of(&camera, views[v].pitch, i % WIDTH, i / WIDTH);
+            const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
+            nebel_cloud_knots knots;
+            double light[3];
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spread / length, &knots, 0), NEBEL_OK);
+            compose(&w, &sun, &ray, &knots, light);
+            cloudy += knots.count > 0;
+            for (int c = 0; c < 3; c++)
+                worst = fmax(worst, fabs((double)picture.planes.in_scattering[3 * i + (uint32_t)c] - light[c]));
+        }
+        print_message("from %g m: %d pixels with clouds, off by %.2g at most\n", views[v].height, cloudy, worst);
+        assert_true(cloudy > WIDTH * HEIGHT / 16 && worst < 3e-2);
+        test_picture_free(&picture);
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+        free_world(&w);
+    }
+}
+
+/* Bits are the same on any number of threads; time moves clouds that have wind, and a second sample changes little. */
+static void pictures_are_still(void **state)
+{
+    (void)state;
+    world w;
+    make_world(&(nebel_cloud_layer){.wind = {300, 0}}, &w);
+    const nebel_camera camera = camera_at(2, .4);
+    test_picture pictures[3] = {render(&w, &camera, 1, 1, 0), render(&w, &camera, 3, 1, 0),
+                                render(&w, &camera, 2, 1, 7)};
+    const size_t size = (size_t)WIDTH * HEIGHT * 3;
+    double moved = 0;
+    assert_memory_equal(pictures[0].planes.color, pictures[1].planes.color, size * sizeof(float));
+    for (size_t i = 0; i < size; i++)
+        moved = fmax(moved, fabs((double)pictures[0].planes.color[i] - (double)pictures[2].planes.color[i]));
+    assert_true(moved > .1);
+    for (int i = 0; i < 3; i++) test_picture_free(&pictures[i]);
+    free_world(&w);
+}
+
+static void the_ground_has_shadows(void **state)
+{
+    (void)state;
+    world w;
+    make_world(&(nebel_cloud_layer){.coverage = .5}, &w);
+    w.planet.air.ground_albedo[1] = .5;
+    const nebel_camera camera = camera_at(800, -.6);
+    test_picture picture = render(&w, &camera, 2, 1, 0);
+    double darkest = HUGE_VAL, brightest = 0;
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
+        darkest = fmin(darkest, (double)picture.planes.color[3 * i + 1]);
+        brightest = fmax(brightest, (double)picture.planes.color[3 * i + 1]);
+    }
+    assert_true(brightest > 2 * darkest);
+    test_picture_free(&picture);
+    free_world(&w);
+}
+
+static void bad_times_are_refused(void **state)
+{
+    (void)state;
+    world w;
+    nebel_renderer *renderer;
+    make_world(&(nebel_cloud_layer){.seed = 1}, &w);
+    test_picture picture = test_picture_make(WIDTH, HEIGHT);
+    assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    nebel_frame_desc desc = {
+        .camera = camera_at(2, 0), .width = WIDTH, .height = HEIGHT, .samples = 1, .time = (double)NAN};
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_ERROR_VALUE);
+    desc.time = 0;
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    test_picture_free(&picture);
+    free_world(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(clouds_and_air_are_one),
+        cmocka_unit_test(pictures_are_still),
+        cmocka_unit_test(the_ground_has_shadows),
+        cmocka_unit_test(bad_times_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,517 @@
+/* Planets in pictures of the CPU: the sky, the ground and models through air are what nebel_trace_air says, and air and fog along one ray are
+ * what many short pieces give. */
+#include "test_render_scene.h"
+
+#include "cpu/daylight.h"
+
+enum { WIDTH = 40, HEIGHT = 24 };
+
+/* A planet without a file. */
+typedef struct world {
+    nebel_atmosphere *atmosphere;
+    nebel_planet planet;
+    nebel_scene_data scene;
+} world;
+
+static void make_world(const char *name, const double sun[3], world *w)
+{
+    static const double origin[1][3] = {{0, 0, 0}};
+    const nebel_sun white = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {1, 1, 1}};
+    nebel_air_light light;
+    *w = (world){.planet = {.air = *nebel_find_atmosphere(name)}};
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, origin, 0, &light, 0), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    memcpy(w->planet.sun_left, light.sun, sizeof light.sun);
+    w->scene = (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = 1, .planets = &w->planet};
+    memcpy(w->scene.sun_direction, sun, sizeof w->scene.sun_direction);
+}
+
+static nebel_sun sun_of(const world *w)
+{
+    nebel_sun sun;
+    memcpy(sun.direction, w->scene.sun_direction, sizeof sun.direction);
+    memcpy(sun.irradiance, w->scene.sun_irradiance, sizeof sun.irradiance);
+    return sun;
+}
+
+static nebel_camera camera_at(double height, double pitch)
+{
+    return (nebel_camera){.position = {0, height, 0},
+                          .look_at = {0, height + sin(pitch), -cos(pitch)},
+                          .up = {0, 1, 0},
+                          .vertical_fov = 60};
+}
+
+/* The ray through the middle of a pixel; of the camera above. */
+static nebel_ray ray_of(const nebel_camera *camera, double pitch, uint32_t x, uint32_t y)
+{
+    const double half = tan(30 * test_pi / 180), across = (2 * (x + .5) / WIDTH - 1) * half * WIDTH / HEIGHT,
+                 up = (1 - 2 * (y + .5) / HEIGHT) * half;
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    memcpy(ray.origin, camera->position, sizeof ray.origin);
+    ray.direction[0] = across;
+    ray.direction[1] = sin(pitch) + up * cos(pitch);
+    ray.direction[2] = -cos(pitch) + up * sin(pitch);
+    return ray;
+}
+
+static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, nebel_isa isa, int threads,
+                           uint32_t samples)
+{
+    nebel_renderer *renderer;
+    const test_picture picture = test_picture_make(WIDTH, HEIGHT);
+    assert_int_equal(
+        nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.isa = isa, .threads = threads}, &renderer),
+        NEBEL_OK);
+    const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples};
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    return picture;
+}
+
+/* Lambert's ground where the ray ends, before the air. */
+static void light_ground(const world *w, const nebel_ray *ray, const nebel_sun *sun, double light[3], double *way)
+{
+    const double radius = w->planet.air.radius;
+    double unit[3], from[3], b = 0, c0 = -radius * radius;
+    const double length = sqrt(pow(ray->direction[0], 2) + pow(ray->direction[1], 2) + pow(ray->direction[2], 2));
+    for (int c = 0; c < 3; c++) {
+        unit[c] = ray->direction[c] / length;
+        from[c] = ray->origin[c] + (c == 1 ? radius : 0);
+        b += unit[c] * from[c];
+        c0 += from[c] * from[c];
+    }
+    *way = b < 0 && b * b > c0 ? c0 / (sqrt(b * b - c0) - b) : HUGE_VAL;
+    memset(light, 0, 3 * sizeof *light);
+    if (!(*way < HUGE_VAL)) return;
+    double place[1][3], cosine = 0;
+    nebel_air_light arrives;
+    for (int c = 0; c < 3; c++) {
+        place[0][c] = ray->origin[c] + *way * unit[c];
+        cosine += (from[c] + *way * unit[c]) / radius * sun->direction[c];
+    }
+    assert_int_equal(nebel_light_air(w->atmosphere, sun, 1, (const double(*)[3])place, 0, &arrives, 0), NEBEL_OK);
+    for (int c = 0; c < 3; c++)
+        light[c] = w->planet.air.ground_albedo[c] / test_pi * (fmax(0, cosine) * arrives.sun[c] + arrives.sky[c]);
+}
+
+static void sky_and_ground_are_those_of_the_air(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double height, pitch, sun[3];
+    } views[] = {{"earth", 1.7, .2, {.8, .6, 0}},      {"earth", 1.7, -.1, {0, .0348994967, -.9993908270}},
+                 {"earth", 1e4, -.2, {.6, 0, -.8}},    {"earth", 4e5, -.5, {.96, .28, 0}},
+                 {"earth", 2e7, -1.5, {.96, 0, -.28}}, {"mars", 2, 0, {0, .28, .96}},
+                 {"toy", 30, -.3, {-.6, .48, .64}}};
+    for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
+        world w;
+        make_world(views[v].name, views[v].sun, &w);
+        const nebel_camera camera = camera_at(views[v].height, views[v].pitch);
+        const nebel_sun sun = sun_of(&w);
+        test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 2, 1);
+        double brightest = 0, worst = 0;
+        int ground = 0, untold = 0;
+        for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+            const nebel_ray ray = ray_of(&camera, views[v].pitch, i % WIDTH, i / WIDTH);
+            nebel_light light;
+            double behind[3], way;
+            assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+            light_ground(&w, &ray, &sun, behind, &way);
+            const double depth = (double)picture.planes.depth[i];
+            if (fabs(way) < HUGE_VAL) assert_true(fabs(depth - way) <= 1e-5 * way + 1e-3);
+            if (!(way < HUGE_VAL)) assert_true(!(depth < HUGE_VAL));
+            ground += way < HUGE_VAL;
+            double off = 0;
+            for (int c = 0; c < 3; c++) {
+                const double exact = light.in_scattering[c] + light.transmittance[c] * behind[c];
+                off = fmax(off, fabs((double)picture.planes.color[3 * i + (uint32_t)c] - exact));
+                brightest = fmax(brightest, exact);
+            }
+            worst = fmax(worst, off);
+            untold += off > (double)picture.planes.error[i] * 2 + 1e-5; /* of light and of what dims the ground */
+        }
+        print_message("%s from %g m: %.1e of the brightest, %d of %d told too little\n", views[v].name, views[v].height,
+                      worst / brightest, untold, WIDTH * HEIGHT);
+        assert_true(brightest > .05 && worst <= .02 * brightest && untold <= WIDTH * HEIGHT / 200);
+        assert_true(ground > 0 && ground < WIDTH * HEIGHT);
+        test_picture_free(&picture);
+        nebel_destroy_atmosphere(w.atmosphere);
+    }
+}
+
+static const float quad[4][3] = {{-40, -40, 0}, {40, -40, 0}, {40, 40, 0}, {-40, 40, 0}};
+static const uint32_t quad_indices[6] = {0, 1, 2, 0, 2, 3};
+
+/* A white wall 2 km away that faces the camera. */
+static nebel_mesh wall_at(double distance)
+{
+    return (nebel_mesh){.origin = {0, 20, -distance},
+                        .positions = quad[0],
+                        .indices = quad_indices,
+                        .vertex_count = 4,
+                        .triangle_count = 2,
+                        .base_color = {1, 1, 1},
+                        .texture = -1};
+}
+
+static void models_are_seen_through_air(void **state)
+{
+    (void)state;
+    const double to_sun[3] = {0, .6, .8};
+    const nebel_mesh wall = wall_at(2000);
+    world w;
+    make_world("earth", to_sun, &w);
+    w.scene.mesh_count = 1;
+    w.scene.meshes = &wall;
+    nebel_camera camera = camera_at(20, 0);
+    camera.vertical_fov = 1.5;
+    const nebel_sun sun = sun_of(&w);
+    test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 1);
+    const uint32_t middle = HEIGHT / 2 * WIDTH + WIDTH / 2;
+    const nebel_ray ray = {{0, 20, 0}, {0, 0, -1}, 2000};
+    nebel_light light;
+    assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+    assert_true(fabs((double)picture.planes.depth[middle] - 2000) < 1);
+    for (int c = 0; c < 3; c++) {
+        const double lit = w.planet.sun_left[c] * sun.irradiance[c] * .8 / test_pi;
+        const double exact = light.transmittance[c] * lit + light.in_scattering[c];
+        assert_true(light.in_scattering[c] > .004 && light.transmittance[c] < .995);
+        assert_true(fabs((double)picture.planes.color[3 * middle + (uint32_t)c] - exact) <
+                    fmin(.01 * exact, (double)picture.planes.error[middle] * 2 + 1e-4));
+    }
+    test_picture_free(&picture);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+/* Summits in the sun that has set below them, and plains that the night has reached. */
+static void models_take_the_light_of_their_place(void **state)
+{
+    (void)state;
+    static const double cases[][2] = {{5, 3e4}, {5000, 3e4}, {2e4, 3e4}, {40, 2e5}}; /* m: height, distance */
+    double lit_below = 0;
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        world w;
+        const double to_sun[3] = {0, -.02, sqrt(1 - .02 * .02)}, height = cases[k][0], distance = cases[k][1];
+        const nebel_mesh wall = wall_at(distance);
+        nebel_mesh high = wall;
+        high.origin[1] = height;
+        make_world("earth", to_sun, &w);
+        w.scene.mesh_count = 1;
+        w.scene.meshes = &high;
+        nebel_camera camera = camera_at(height, 0);
+        camera.vertical_fov = .01;
+        camera.position[2] = 20 - distance;
+        camera.look_at[2] = -distance;
+        const nebel_sun sun = sun_of(&w);
+        test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 1);
+        const uint32_t middle = HEIGHT / 2 * WIDTH + WIDTH / 2;
+        const nebel_ray ray = {{0, height, 20 - distance}, {0, 0, -1}, 20};
+        const double place[1][3] = {{0, height, -distance}};
+        nebel_light light;
+        nebel_air_light there;
+        assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
+        assert_int_equal(nebel_light_air(w.atmosphere, &sun, 1, place, 0, &there, 0), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            const double exact = light.transmittance[c] * there.sun[c] * to_sun[2] / test_pi + light.in_scattering[c];
+            print_message("%g m up, %g m off: %.4g of %.4g\n", height, distance,
+                          (double)picture.planes.color[3 * middle + (uint32_t)c], exact);
+            assert_true(fabs((double)picture.planes.color[3 * middle + (uint32_t)c] - exact) < .01 * exact + 1e-5);
+        }
+        assert_true(w.planet.sun_left[0] == 0);
+        lit_below += height < 100 ? there.sun[0] : 0;
+        test_picture_free(&picture);
+        nebel_destroy_atmosphere(w.atmosphere);
+    }
+    assert_true(lit_below == 0);
+}
+
+/* What the tables of daylight say is what the air says of the same places. */
+static void daylight_is_that_of_the_air(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"earth", "mars", "toy"};
+    static const double to_sun[3] = {.48, .6, .64}, origin[1][3] = {{0, 0, 0}};
+    static nb_daylight daylight;
+    for (int n = 0; n < 3; n++) {
+        world w;
+        make_world(names[n], to_sun, &w);
+        const double radius = w.planet.air.radius, top = w.planet.air.thickness;
+        const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
+        nebel_air_light at_origin, there;
+        double worst_sun = 0, worst_sky = 0;
+        nb_daylight_set(&daylight, &w.planet, to_sun);
+        assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, origin, 0, &at_origin, 0), NEBEL_OK);
+        for (int i = 0; i < 2000; i++) {
+            const double y = 1 - 2 * (i + .5) / 2000, turn = 2.4 * i, height = 1.2 * top * pow(i % 37 / 36., 2);
+            const double level = sqrt(1 - y * y);
+            const double place[1][3] = {{(radius + height) * level * cos(turn), (radius + height) * y - radius,
+                                         (radius + height) * level * sin(turn)}};
+            double sun[3], sky[3];
+            assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, place, 0, &there, 0), NEBEL_OK);
+            nb_daylight_at(&daylight, place[0], sun, sky);
+            for (int c = 0; c < 3; c++) {
+                worst_sun = fmax(worst_sun, fabs(sun[c] - there.sun[c]));
+                if (height < top) /* beyond it there is none */
+                    worst_sky = fmax(worst_sky, fabs(sky[c] * at_origin.sky[c] - there.sky[c]) / at_origin.sky[c]);
+            }
+        }
+        print_message("%s: sun off by %.1e, sky by %.1e of that at the origin\n", names[n], worst_sun, worst_sky);
+        assert_true(worst_sun <= 2e-3 && worst_sky <= 6e-3);
+        nebel_destroy_atmosphere(w.atmosphere);
+    }
+}
+
+/* Many short pieces, each of air and of fog for itself: what is left is of their length. */
+static void step_along(const world *w, const nebel_snapshot *fog, nebel_ray ray, double end, double light[3])
+{
+    enum { STEPS = 3000 };
+    const nebel_sun sun = sun_of(w);
+    double unit[3], left[3] = {1, 1, 1}, at = 0;
+    const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
+    const nebel_ray whole = ray;
+    for (int c = 0; c < 3; c++) {
+        unit[c] = ray.direction[c] / length;
+        light[c] = 0;
+    }
+    for (int i = 0; i < STEPS; i++) {
+        const double next = end * pow((i + 1.0) / STEPS, 3);
+        nebel_light air, of_fog;
+        ray.t_max = next - at;
+        for (int c = 0; c < 3; c++) ray.origin[c] = whole.origin[c] + at * unit[c];
+        assert_int_equal(nebel_trace_air(w->atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace(fog, NULL, 1, &ray, 0, &of_fog, 0), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            light[c] += left[c] * (0.5 * (1 + of_fog.transmittance[c]) * air.in_scattering[c] +
+                                   0.5 * (1 + air.transmittance[c]) * of_fog.in_scattering[c]);
+            left[c] *= air.transmittance[c] * of_fog.transmittance[c];
+        }
+        at = next;
+    }
+}
+
+static void air_and_fog_share_a_ray(void **state)
+{
+    (void)state;
+    const double to_sun[3] = {.6, .3, -.74161984870956629}, pitch = .05;
+    world w;
+    make_world("earth", to_sun, &w);
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3000, -9000}, .radius = 2500},
+         .extinction = {4e-4, 4e-4, 4e-4},
+         .source = {.5, .4, .3}},
+        {.shape = {.type = NEBEL_SHAPE_WORLD},
+         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 200},
+         .extinction = {1e-4, 2e-4, 3e-4},
+         .albedo = {.9, .9, .9}}};
+    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    const nebel_camera camera = camera_at(50, pitch);
+    test_picture picture = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 2, 1);
+    double worst = 0, apart = 0;
+    for (uint32_t i = 5; i < WIDTH * HEIGHT; i += 97) {
+        const nebel_ray ray = ray_of(&camera, pitch, i % WIDTH, i / WIDTH);
+        const nebel_sun sun = sun_of(&w);
+        double light[3], behind[3], way;
+        nebel_light air, alone;
+        light_ground(&w, &ray, &sun, behind, &way);
+        nebel_ray ending = ray;
+        ending.t_max = fmin(way, 1.5e6);
+        step_along(&w, snapshot, ray, ending.t_max, light);
+        assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &air, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace(snapshot, NULL, 1, &ending, 0, &alone, 0), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            const double got = (double)picture.planes.in_scattering[3 * i + (uint32_t)c];
+            const double left = (double)picture.planes.transmittance[3 * i + (uint32_t)c];
+            assert_true(fabs(left - air.transmittance[c] * alone.transmittance[c]) < 2e-3);
+            assert_true(fabs(got - light[c]) <= (double)picture.planes.error[i] + 5e-4);
+            worst = fmax(worst, fabs(got - light[c]));
+            apart =
+                fmax(apart, fabs(air.in_scattering[c] * alone.transmittance[c] + alone.in_scattering[c] - light[c]));
+        }
+    }
+    print_message("air and fog: off by %.1e; fog before all air would be off by %.1e\n", worst, apart);
+    assert_true(worst < 6e-3 && apart > 5 * worst);
+    test_picture_free(&picture);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+/* All its light, however few pixels it is, and no more: the picture with it less the one without. */
+/* Where one sample does for a pixel, many agree: with the disc of the sun, the horizon and the limb in the picture. */
+static void many_samples_are_the_mean_of_single_ones(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double height, pitch, sun[3];
+    } views[] = {{"earth", 1.7, .1, {0, .1, -.99498743710662}},
+                 {"earth", 1e4, -.2, {.6, 0, -.8}},
+                 {"earth", 4e5, -.4, {.96, .28, 0}},
+                 {"earth", 2e7, -1.5, {.96, 0, -.28}},
+                 {"mars", 2, 0, {0, .28, -.96}},
+                 {"toy", 30, -.3, {-.6, .48, .64}}};
+    for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
+        enum { TIMES = 4 };
+        world w;
+        make_world(views[v].name, views[v].sun, &w);
+        w.planet.sun_diameter = 2;
+        nebel_camera camera = camera_at(views[v].height, views[v].pitch);
+        camera.vertical_fov = 6;
+        test_picture small = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 2, TIMES * TIMES);
+        test_picture large = test_picture_make(TIMES * WIDTH, TIMES * HEIGHT);
+        nebel_renderer *renderer;
+        assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 2}, &renderer),
+                         NEBEL_OK);
+        assert_int_equal(
+            nebel_render_frame(
+                renderer,
+                &(nebel_frame_desc){.camera = camera, .width = TIMES * WIDTH, .height = TIMES * HEIGHT, .samples = 1},
+                &large.planes),
+            NEBEL_OK);
+        nebel_destroy_renderer(renderer);
+        double worst = 0, all[2] = {0, 0};
+        int far_off = 0;
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            double off = 0, most = 1e-9;
+            for (int c = 0; c < 3; c++) {
+                double mean = 0;
+                for (int k = 0; k < TIMES * TIMES; k++)
+                    mean += (double)large.planes.color[3 * ((i / WIDTH * TIMES + k / TIMES) * TIMES * WIDTH +
+                                                            i % WIDTH * TIMES + k % TIMES) +
+                                                       c] /
+                            (TIMES * TIMES);
+                all[0] += (double)small.planes.color[3 * i + c];
+                all[1] += mean;
+                most = fmax(most, mean);
+                off = fmax(off, fabs((double)small.planes.color[3 * i + c] - mean));
+            }
+            worst = fmax(worst, off / most);
+            far_off += off > 2e-3 * most;
+        }
+        print_message("%s from %g m: %d of %d pixels off by more than 2e-3, the worst by %.1e\n", views[v].name,
+                      views[v].height, far_off, WIDTH * HEIGHT, worst);
+        /* Samples lie elsewhere in a pixel, which shows at the horizon and the edge of the disc: three rows, of a
+         * curved one, or its rim. */
+        assert_true(far_off <= 3 * WIDTH && (v == 0 || worst <= 1e-2) && fabs(all[0] / all[1] - 1) <= 2e-3);
+        test_picture_free(&small);
+        test_picture_free(&large);
+        nebel_destroy_atmosphere(w.atmosphere);
+    }
+}
+
+static void the_sun_is_a_disc(void **state)
+{
+    (void)state;
+    static const double fields[] = {5, 60};
+    const double to_sun[3] = {0, .6, -.8};
+    world w;
+    make_world("mars", to_sun, &w);
+    for (int f = 0; f < 2; f++) {
+        nebel_camera camera = camera_at(2, asin(.6));
+        camera.vertical_fov = fields[f];
+        camera.look_at[0] += .001;
+        double sum[3] = {0, 0, 0};
+        for (int seen = 0; seen < 2; seen++) {
+            w.planet.sun_diameter = seen ? .35 : 0;
+            test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 16);
+            const double pixel = 2 * tan(fields[f] * test_pi / 360) / HEIGHT;
+            for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+                for (int c = 0; c < 3; c++)
+                    sum[c] += (seen ? 1 : -1) * pixel * pixel * (double)picture.planes.color[3 * i + (uint32_t)c];
+            test_picture_free(&picture);
+        }
+        for (int c = 0; c < 3; c++) {
+            const double arrives = w.planet.sun_left[c] * w.scene.sun_irradiance[c];
+            print_message("field %g: %.3f of the sun's light\n", fields[f], sum[c] / arrives);
+            assert_true(fabs(sum[c] / arrives - 1) < .1);
+        }
+    }
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+static void every_thread_and_processor_gives_the_same(void **state)
+{
+    (void)state;
+    const double to_sun[3] = {.6, .3, -.74161984870956629};
+    const nebel_mesh wall = wall_at(300);
+    world w;
+    make_world("toy", to_sun, &w);
+    w.scene.mesh_count = 1;
+    w.scene.meshes = &wall;
+    w.planet.sun_diameter = 3;
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 20, -90}, .radius = 40},
+                                    .extinction = {.01, .02, .03},
+                                    .source = {.5, .4, .3}};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    const nebel_camera camera = camera_at(10, .1);
+    test_picture one = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 1, 1);
+    for (int isa = NEBEL_ISA_DEFAULT; isa <= (int)NEBEL_ISA_NEON; isa++) {
+        if (isa != NEBEL_ISA_DEFAULT && !nebel_isa_available((nebel_isa)isa)) continue;
+        test_picture other = render(&w, snapshot, &camera, (nebel_isa)isa, 3, 1);
+        assert_memory_equal(one.planes.transmittance, other.planes.transmittance, WIDTH * HEIGHT * 12);
+        assert_memory_equal(one.planes.in_scattering, other.planes.in_scattering, WIDTH * HEIGHT * 12);
+        if (isa == NEBEL_ISA_DEFAULT) assert_memory_equal(one.planes.color, other.planes.color, WIDTH * HEIGHT * 12);
+        test_picture_free(&other);
+    }
+    test_picture_free(&one);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+/* Below the ground, in the centre, far away, and what planets are not drawn with. */
+static void odd_cameras(void **state)
+{
+    (void)state;
+    static const double heights[] = {0, -1, -1000, -1999, 1e9};
+    const double to_sun[3] = {.6, .8, 0};
+    world w;
+    make_world("toy", to_sun, &w);
+    for (int h = 0; h < 5; h++) {
+        const nebel_camera camera = camera_at(heights[h], -.1);
+        test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 1);
+        for (uint32_t i = 0; i < WIDTH * HEIGHT * 3; i++)
+            assert_true(picture.planes.color[i] >= 0 && picture.planes.color[i] < 1e6f);
+        test_picture_free(&picture);
+    }
+    nebel_renderer *renderer;
+    assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
+    nebel_frame_desc desc = {.camera = camera_at(10, 0), .width = 8, .height = 8};
+    desc.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    desc.camera.view_height = 10;
+    assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);
+    desc.camera.projection = NEBEL_PROJECTION_PANORAMA;
+    assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_OK);
+    assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);
+    nebel_destroy_renderer(renderer);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sky_and_ground_are_those_of_the_air),
+        cmocka_unit_test(models_are_seen_through_air),
+        cmocka_unit_test(daylight_is_that_of_the_air),
+        cmocka_unit_test(models_take_the_light_of_their_place),
+        cmocka_unit_test(air_and_fog_share_a_ray),
+        cmocka_unit_test(many_samples_are_the_mean_of_single_ones),
+        cmocka_unit_test(the_sun_is_a_disc),
+        cmocka_unit_test(every_thread_and_processor_gives_the_same),
+        cmocka_unit_test(odd_cameras),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
