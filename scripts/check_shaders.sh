@@ -40,12 +40,16 @@ calls='
     float way = nebel_ball_length(sight.origin, sight.direction, sight.t_max, place, 2.0, 3);
     way += nebel_gaussian_length(sight.origin, sight.direction, sight.t_max, place, 3.0, 1.0);
     blend.factor *= nebel_blend_medium(nebel_medium_light(way, place, place), light).factor;
+    nebel_light air = nebel_trace_air(sight.direction, sight.t_max);
+    nebel_ground ground = nebel_find_ground(sight.direction);
+    light.in_scattering += air.transmittance * air.in_scattering + ground.distance * ground.normal + ground.sun + ground.sky;
+    light.in_scattering += nebel_environment_radiance(sight.direction) * nebel_environment_reflected(place);
     light.in_scattering += nebel_blend_grey(blend).xyz * nebel_five_taps(place.xy, place.z, nebel_default_taps());'
 
 # try_opengl DIALECT VERSION DEFINES
 try_opengl() {
     {
-        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n#define NEBEL_TRANSPARENT\n%b' "$2" "$3"
+        printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n#define NEBEL_TRANSPARENT\n#define NEBEL_AIR\n%b' "$2" "$3"
         printf 'uniform highp sampler2D opaque;\n#define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x\n'
         text "$1"
         printf 'in highp vec3 place; out highp vec4 color;\nvoid main()\n{%s\n' "$calls"
@@ -54,10 +58,10 @@ try_opengl() {
     verdict "$1 $3" glslangValidator "$work/fog.frag"
 }
 
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
     try_opengl glsl_330 "330 core" "$defines"
 done
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
     try_opengl glsl_300_es "300 es" "$defines"
 done
 
@@ -69,6 +73,9 @@ layout(std430, binding = 1) readonly buffer tiles { uint entries[]; };
 layout(std140, binding = 2) uniform view { vec4 rays[10]; };
 layout(binding = 3) uniform sampler2D opaque;
 layout(std430, binding = 4) readonly buffer grids { uvec4 texels[]; };
+layout(std430, binding = 5) readonly buffer lattice { vec4 nodes[]; };
+layout(std430, binding = 6) readonly buffer sky { vec4 lights[]; };
+layout(std430, binding = 7) readonly buffer air { vec4 airs[]; };
 layout(location = 0) in vec3 place;
 layout(location = 0) out vec4 color;
 #define NEBEL_VIEW
@@ -76,6 +83,9 @@ layout(location = 0) out vec4 color;
 #define NEBEL_WORD(i) words[i]
 #define NEBEL_INDEX(i) int(entries[i])
 #define NEBEL_VOXEL(i) texels[i]
+#define NEBEL_NODE(i) nodes[i]
+#define NEBEL_ENVIRONMENT_WORD(i) lights[i]
+#define NEBEL_AIR_WORD(i) airs[i]
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x
 GLSL
@@ -90,6 +100,9 @@ cbuffer fog { float4 words[1024]; };
 cbuffer view { float4 rays[10]; };
 StructuredBuffer<uint> entries;
 StructuredBuffer<uint4> texels;
+StructuredBuffer<float4> nodes;
+StructuredBuffer<float4> lights;
+StructuredBuffer<float4> airs;
 Texture2D opaque;
 SamplerState opaque_sampler;
 #define NEBEL_VIEW
@@ -97,6 +110,9 @@ SamplerState opaque_sampler;
 #define NEBEL_WORD(i) words[i]
 #define NEBEL_INDEX(i) int(entries[i])
 #define NEBEL_VOXEL(i) texels[i]
+#define NEBEL_NODE(i) nodes[i]
+#define NEBEL_ENVIRONMENT_WORD(i) lights[i]
+#define NEBEL_AIR_WORD(i) airs[i]
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) opaque.SampleLevel(opaque_sampler, at, 0.0).x
 HLSL

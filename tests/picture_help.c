@@ -174,6 +174,110 @@ picture_difference picture_compare(const picture_pair *pair, double source)
     return all;
 }
 
+/* ---- light on surfaces ----------------------------------------------------------------------- */
+
+/* What the surface of a pixel reflects; below 0 where there is none, or where fog hides it. */
+static void reflected_light(const nebel_frame *frame, size_t pixel, float light[3])
+{
+    for (size_t c = 0; c < 3; c++) {
+        const size_t i = 3 * pixel + c;
+        const int shows = isfinite(frame->depth[pixel]) && frame->transmittance[i] > .05f;
+        light[c] = shows ? fmaxf((frame->color[i] - frame->in_scattering[i]) / frame->transmittance[i], 0) : -1;
+    }
+}
+
+static float srgb_of(float x)
+{
+    return x <= .0031308f ? 12.92f * x : 1.055f * powf(x, 1 / 2.4f) - .055f;
+}
+
+/* Those of all pixels, in sRGB. */
+static float *make_light(const picture_pair *pair, const nebel_frame *frame, float white)
+{
+    const size_t count = 3 * (size_t)pair->width * pair->height;
+    float *const light = make_plane(pair, 3);
+    for (size_t i = 0; i < count; i += 3) reflected_light(frame, i / 3, light + i);
+    for (size_t i = 0; i < count; i++) light[i] = light[i] < 0 ? -1 : srgb_of(light[i] / white);
+    return light;
+}
+
+static float brightest_surface(const picture_pair *pair)
+{
+    float white = 1e-6f, light[3];
+    for (size_t i = 0; i < (size_t)pair->width * pair->height; i++) {
+        reflected_light(&pair->cpu, i, light);
+        white = fmaxf(white, fmaxf(light[0], fmaxf(light[1], light[2])));
+    }
+    return white;
+}
+
+static int light_bends(const float *light, size_t before, size_t here, size_t behind)
+{
+    int bends = 0;
+    for (size_t c = 0; c < 3; c++) {
+        const float bend = light[3 * before + c] - 2 * light[3 * here + c] + light[3 * behind + c];
+        bends |= fabsf(bend) > 2.f / 255;
+    }
+    return bends;
+}
+
+/* Of each pixel whether it is one of a border itself. */
+static unsigned char *find_borders(const picture_pair *pair, const float *light)
+{
+    unsigned char *const border = calloc(pair->height, pair->width);
+    assert_non_null(border);
+    for (uint32_t y = 0; y < pair->height; y++) {
+        for (uint32_t x = 0; x < pair->width; x++) {
+            const size_t width = pair->width, i = y * width + x;
+            const size_t left = x > 0 ? i - 1 : i, right = x + 1 < pair->width ? i + 1 : i;
+            const size_t above = y > 0 ? i - width : i, below = y + 1 < pair->height ? i + width : i;
+            border[i] =
+                is_silhouette(pair, x, y) || light_bends(light, left, i, right) || light_bends(light, above, i, below);
+        }
+    }
+    return border;
+}
+
+static int is_near_border(const picture_pair *pair, const unsigned char *border, uint32_t x, uint32_t y)
+{
+    const uint32_t x_end = x + 3 < pair->width ? x + 3 : pair->width,
+                   y_end = y + 3 < pair->height ? y + 3 : pair->height;
+    for (uint32_t v = y > 2 ? y - 2 : 0; v < y_end; v++) {
+        for (uint32_t u = x > 2 ? x - 2 : 0; u < x_end; u++) {
+            if (border[(size_t)v * pair->width + u]) return 1;
+        }
+    }
+    return 0;
+}
+
+picture_light picture_compare_light(const picture_pair *pair)
+{
+    picture_light all = {.seen = 0};
+    const float white = brightest_surface(pair);
+    float *const cpu = make_light(pair, &pair->cpu, white), *const gl = make_light(pair, &pair->gl, white);
+    unsigned char *const border = find_borders(pair, cpu);
+    for (uint32_t y = 0; y < pair->height; y++) {
+        for (uint32_t x = 0; x < pair->width; x++) {
+            const size_t i = (size_t)y * pair->width + x;
+            const double d = vector_difference(cpu, gl, i);
+            const int inner = !is_near_border(pair, border, x, y), apart = d > 2. / 255;
+            if (fminf(cpu[3 * i], fminf(cpu[3 * i + 1], cpu[3 * i + 2])) < 0) continue;
+            all.seen++;
+            all.apart += (size_t)apart;
+            all.inner += (size_t)inner;
+            all.inner_apart += (size_t)(inner && apart);
+            if (!inner || d <= all.largest) continue;
+            all.largest = d;
+            all.x = x;
+            all.y = y;
+        }
+    }
+    free(border);
+    free(cpu);
+    free(gl);
+    return all;
+}
+
 /* ---- report ---------------------------------------------------------------------------------- */
 
 picture_report picture_report_open(const char *title)

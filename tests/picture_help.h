@@ -43,6 +43,18 @@ typedef struct picture_difference {
 
 picture_difference picture_compare(const picture_pair *pair, double source);
 
+/* How far apart the light is that surfaces reflect, (color - in_scattering) / transmittance, in sRGB of which the
+ * brightest on the CPU is white. A border is where depth, or that light on the CPU, jumps or bends within two pixels:
+ * silhouettes and edges of shadows, which in OpenGL are texels wide. */
+typedef struct picture_light {
+    size_t seen, apart;        /* pixels whose surface shows, and those of them more than 2/255 apart */
+    size_t inner, inner_apart; /* of those off borders */
+    double largest;            /* off borders */
+    uint32_t x, y;             /* where */
+} picture_light;
+
+picture_light picture_compare_light(const picture_pair *pair);
+
 /* ---- the report: an HTML page and its pictures in the folder NEBEL_REPORT; nothing without it ---- */
 
 typedef struct picture_report {

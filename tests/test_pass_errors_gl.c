@@ -8,6 +8,8 @@
 #include "fog_help.h"
 #include "pass_help.h"
 
+#include <nebel/environment.h>
+
 #include <epoxy/gl.h>
 
 #include "gl_errors.h"
@@ -208,6 +210,26 @@ static nebel_snapshot *fog_of_voxels(size_t size)
     return fog;
 }
 
+/* One that scatters a small map sharply. */
+static nebel_snapshot *fog_under_a_map(void)
+{
+    static const float pixels[3 * 4 * 2] = {1, 2, 3, 4, 5, 6};
+    const nebel_environment_map_desc desc = {.width = 4, .height = 2, .pixels = pixels};
+    const nebel_volume_desc v = {
+        .extinction = {.1, .1, .1}, .albedo = {1, 1, 1}, .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .8}};
+    nebel_environment sky = {.type = NEBEL_ENVIRONMENT_MAP};
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_environment_map(&desc, &sky.map), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &v, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_environment(fog, &sky), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    nebel_release_environment_map(sky.map);
+    return snapshot;
+}
+
 static void test_more_volumes_than_a_texture_holds(void **state)
 {
     (void)state;
@@ -226,6 +248,10 @@ static void test_more_volumes_than_a_texture_holds(void **state)
     expect_message(nebel_gl_set_fog(narrow, fine, &s.picture.view), NEBEL_ERROR_LIMIT, "use fewer voxels");
     assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
     nebel_release_snapshot(fine);
+    nebel_snapshot *const lit = fog_under_a_map();
+    expect_message(nebel_gl_set_fog(narrow, lit, &s.picture.view), NEBEL_ERROR_LIMIT, "fewer phase functions");
+    assert_int_equal(nebel_gl_set_fog(narrow, s.fog, &s.picture.view), NEBEL_OK);
+    nebel_release_snapshot(lit);
     nebel_destroy_gl(narrow);
     nebel_release_snapshot(many);
     close_stage(&s);
@@ -258,6 +284,14 @@ static void test_a_driver_without_memory(void **state)
     expect_message(refused, NEBEL_ERROR_MEMORY, "no memory for the texture of voxels");
     assert_int_equal(nebel_gl_set_fog(s.gl, voxels, &s.picture.view), NEBEL_OK);
     assert_int_equal(draw(&s), NEBEL_OK);
+    nebel_snapshot *const lit = fog_under_a_map();
+    epoxy_glGetError = out_of_memory;
+    const nebel_result dark = nebel_gl_set_fog(s.gl, lit, &s.picture.view);
+    epoxy_glGetError = true_error;
+    expect_message(dark, NEBEL_ERROR_MEMORY, "no memory for the texture of the environment");
+    assert_int_equal(nebel_gl_set_fog(s.gl, lit, &s.picture.view), NEBEL_OK);
+    assert_int_equal(draw(&s), NEBEL_OK);
+    nebel_release_snapshot(lit);
     nebel_release_snapshot(voxels);
     nebel_release_snapshot(many);
     close_stage(&s);
@@ -271,7 +305,7 @@ static void test_memory_that_runs_out(void **state)
     (void)state;
     static stage s;
     open_stage(&s, NB_GL_330);
-    nebel_snapshot *const many = pass_fog(60), *const voxels = fog_of_voxels(12);
+    nebel_snapshot *const many = pass_fog(60), *const voxels = fog_of_voxels(12), *const lit = fog_under_a_map();
     const nebel_gl_pass pass = pass_of(&s);
     nebel_result result = NEBEL_ERROR_MEMORY;
     size_t fails = 0;
@@ -284,14 +318,16 @@ static void test_memory_that_runs_out(void **state)
         if (result == NEBEL_OK) result = nebel_gl_set_fog(gl, many, &s.picture.view);
         if (result == NEBEL_OK) result = nebel_gl_draw_fog(gl, &pass);
         if (result == NEBEL_OK) result = nebel_gl_set_fog(gl, voxels, &s.picture.view);
+        if (result == NEBEL_OK) result = nebel_gl_set_fog(gl, lit, &s.picture.view);
         if (result != NEBEL_OK) expect_message(result, NEBEL_ERROR_MEMORY, "memory");
         fails += result != NEBEL_OK;
         nebel_destroy_gl(gl);
         assert_int_equal(memory.live, 0);
         assert_int_equal(pass_count_objects(), objects);
     }
-    assert_true(fails >= 5);
+    assert_true(fails >= 6);
     nebel_release_snapshot(many);
+    nebel_release_snapshot(lit);
     nebel_release_snapshot(voxels);
     close_stage(&s);
 }

@@ -206,6 +206,48 @@ static void test_a_lost_context_is_survived(void **state)
     pass_close(&s.context);
 }
 
+/* ---- what is not drawn ----------------------------------------------------------------------- */
+
+static nebel_snapshot *commit_sunlit_box(double x, double y)
+{
+    const nebel_volume_desc box = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {x, y, -1}, .max = {x + 1, y + 1, 1}},
+                                   .extinction = {1, 1, 1},
+                                   .albedo = {1, 1, 1}};
+    return fog_commit(&(nebel_fog_desc){.sun = {{0, 1, 0}, {3, 3, 3}}}, &box, 1);
+}
+
+/* Draws twice: what is said is said once. word NULL: nothing is. */
+static void expect_said(stage *s, double x, double y, const char *word)
+{
+    nebel_snapshot *const fog = commit_sunlit_box(x, y);
+    messages.count = 0;
+    assert_int_equal(nebel_set_gl_renderer_fog(s->renderer, fog), NEBEL_OK);
+    for (int i = 0; i < 2; i++) assert_int_equal(draw(s, 32, 1), NEBEL_OK);
+    assert_int_equal(messages.count, word != NULL);
+    if (word != NULL && strstr(messages.text, word) == NULL) fail_msg("it says: %s", messages.text);
+    nebel_release_snapshot(fog);
+}
+
+/* Fog under particles, beside them and above; a lamp. */
+static void test_shadows_of_particles_are_missed(void **state)
+{
+    (void)state;
+    static stage s;
+    const nebel_lamp lamp = {.position = {0, 3, 0}, .intensity = {1, 1, 1}};
+    start_with_renderer(&s, NB_GL_330);
+    expect_said(&s, 0, -2, "light of the sun from fog");
+    expect_said(&s, 9, -2, NULL);
+    expect_said(&s, 0, 2, NULL);
+    s.ball.scene.lamps = &lamp;
+    s.ball.scene.lamp_count = 1;
+    expect_said(&s, 9, -2, "light of lamps");
+    for (int i = 0; i < PARTICLES; i++) memset(s.particles[i].extinction, 0, sizeof s.particles[i].extinction);
+    assert_int_equal(nebel_set_gl_renderer_particles(s.renderer, s.particles, PARTICLES), NEBEL_OK);
+    expect_said(&s, 0, -2, NULL);
+    s.ball.scene.lamp_count = 0;
+    end(&s);
+}
+
 /* ---- drivers that fail ----------------------------------------------------------------------- */
 
 static PFNGLSHADERSOURCEPROC true_shader_source;
@@ -370,10 +412,11 @@ static void test_memory_that_runs_out(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_contexts_that_are_not_enough), cmocka_unit_test(test_extensions_that_are_missing),
-        cmocka_unit_test(test_a_lost_context_is_survived),   cmocka_unit_test(test_shaders_that_the_driver_refuses),
-        cmocka_unit_test(test_pictures_that_do_not_fit),     cmocka_unit_test(test_a_driver_without_memory),
-        cmocka_unit_test(test_a_driver_that_maps_nothing),   cmocka_unit_test(test_memory_that_runs_out),
+        cmocka_unit_test(test_contexts_that_are_not_enough),    cmocka_unit_test(test_extensions_that_are_missing),
+        cmocka_unit_test(test_a_lost_context_is_survived),      cmocka_unit_test(test_shaders_that_the_driver_refuses),
+        cmocka_unit_test(test_pictures_that_do_not_fit),        cmocka_unit_test(test_a_driver_without_memory),
+        cmocka_unit_test(test_a_driver_that_maps_nothing),      cmocka_unit_test(test_memory_that_runs_out),
+        cmocka_unit_test(test_shadows_of_particles_are_missed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

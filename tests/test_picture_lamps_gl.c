@@ -83,6 +83,22 @@ static void test_surfaces_are_lit_as_on_the_cpu(void **state)
     }
 }
 
+/* In the very floor, and within the least radius below it: the side that is seen is lit. */
+static void test_lamps_may_lie_in_surfaces(void **state)
+{
+    (void)state;
+    static test_stage s;
+    for (int i = 0; i < 2; i++) {
+        test_stage_set(&s, (const double[3]){0, 0, 0}, (const double[3]){3, 2, 5});
+        const nebel_lamp lamp = {.position = {1.8, i == 0 ? -1 : -1 - 1e-4, 1.6}, .intensity = {6, 5, 4}};
+        s.ball.scene.has_sun = 0;
+        s.ball.scene.lamp_count = 1;
+        s.ball.scene.lamps = &lamp;
+        expect_same_light(&s.ball.scene, NULL, &s.camera, NB_GL_330, .005);
+        nebel_release_snapshot(s.fog);
+    }
+}
+
 /* Each shines past the ball on the floor. */
 static void set_ring(const test_stage *s, nebel_lamp *lamps, int count)
 {
@@ -272,6 +288,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_lamps_light_fog_as_on_the_cpu),
         cmocka_unit_test(test_surfaces_are_lit_as_on_the_cpu),
+        cmocka_unit_test(test_lamps_may_lie_in_surfaces),
         cmocka_unit_test(test_many_lamps_cast_shadows),
         cmocka_unit_test(test_lamps_may_change_from_frame_to_frame),
         cmocka_unit_test(test_lamps_have_a_limit),

@@ -23,8 +23,176 @@ static void test_grids(void **unused)
     try_grids(NB_GL_300ES, 6);
 }
 
-int main(void)
+/* ---- in sunlight ----------------------------------------------------------------------------- */
+
+static int tries_all; /* an argument asks for more scenes */
+
+static const nebel_sun low_sun = {{.8, .42, .4}, {3, 2.5, 2}};
+
+/* Against light in double, which is found without lattices; features as packed. */
+static void trace_packed(const nebel_snapshot *snapshot, const double eye[3], double scale, const char *name,
+                         nb_gl_language language)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_grids)};
+    char defines[96];
+    tracer t;
+    snprintf(defines, sizeof defines, "#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n",
+             (unsigned)nebel_pack_features(snapshot));
+    open_tracer(&t, language, TEXTURE, defines, trace_body);
+    pack_and_upload(&t, snapshot, eye);
+    upload_voxels(&t, snapshot);
+    evaluate(&t);
+    compare(snapshot, &(nebel_trace_desc){.tolerance = 1e-4}, eye, scale, 0, name);
+    nb_gl_close(&t.gl);
+}
+
+static nebel_volume_desc cloud_of(nebel_grid *grid, double extinction)
+{
+    return (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-6, -4, -5}, .max = {6, 4, 5}},
+                               .density = {.type = NEBEL_DENSITY_GRID, .grid = grid},
+                               .extinction = {extinction, 1.1 * extinction, 1.3 * extinction},
+                               .albedo = {.95, .9, .8},
+                               .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .5}};
+}
+
+/* A puff: dense in the middle, with waves on it. */
+static nebel_grid *make_puff(nebel_filter filter)
+{
+    enum { SIZE = 40 };
+    static uint8_t voxels[SIZE * SIZE * SIZE];
+    const nebel_grid_desc desc = {
+        .size = {SIZE, SIZE, SIZE}, .type = NEBEL_VOXEL_UINT8, .voxels = voxels, .filter = filter};
+    nebel_grid *grid = NULL;
+    for (int i = 0; i < SIZE * SIZE * SIZE; i++) {
+        const double x = i % SIZE - 19.5, y = i / SIZE % SIZE - 19.5, z = i / (SIZE * SIZE) - 19.5;
+        const double waves = sin(x * .7) * sin(y * .9 + 1) * sin(z * .8 + 2);
+        voxels[i] = (uint8_t)(255 * fmin(fmax(1 - sqrt(x * x + y * y + z * z) / 17 + .4 * waves, 0), 1));
+    }
+    assert_int_equal(nebel_create_grid(&desc, &grid), NEBEL_OK);
+    return grid;
+}
+
+static const double origin[3] = {0, 0, 0}, before[3] = {-3, 2, 14}, amid[3] = {.5, .4, -.3};
+
+static void test_sunlit_puff(void **unused)
+{
+    (void)unused;
+    for (int i = tries_all ? 0 : 1; i < (tries_all ? 4 : 3); i++) {
+        nebel_grid *grid = make_puff(i < 2 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        const nebel_volume_desc cloud = cloud_of(grid, i == 0 ? .4 : 2);
+        nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.sun = low_sun, .ambient = {.1, .12, .15}}, &cloud, 1);
+        const double *eye = i == 1 ? amid : before;
+        camera_rays(eye, origin, (uint64_t)i);
+        trace_packed(snapshot, eye, 1, i < 2 ? "sunlit puff" : "sunlit puff of nearest voxels",
+                     i % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
+        nebel_release_snapshot(snapshot);
+        nebel_release_grid(grid);
+    }
+}
+
+/* Noise that scatters as droplets do, in haze and beside a body, which shade each other. */
+static void test_sunlit_noise_among_others(void **unused)
+{
+    (void)unused;
+    uint64_t state = 3;
+    nebel_grid *grid = random_noise(&state);
+    nebel_volume_desc volumes[] = {cloud_of(grid, .8),
+                                   {.shape = {.type = NEBEL_SHAPE_WORLD},
+                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 6},
+                                    .extinction = {.02, .025, .03},
+                                    .albedo = {.9, .9, .9},
+                                    .phase = {.type = NEBEL_PHASE_RAYLEIGH}},
+                                   {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {5, 5, 3}, .radius = 2},
+                                    .extinction = {1, 1, 1},
+                                    .source = {.1, .2, .3}}};
+    volumes[0].phase = (nebel_phase){.type = NEBEL_PHASE_DROPLETS, .diameter = 12};
+    for (int i = tries_all ? 0 : 1; i < 2; i++) {
+        nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){.sun = low_sun}, volumes, i == 0 ? 2 : 3);
+        const double *eye = i == 1 ? amid : before;
+        camera_rays(eye, origin, (uint64_t)i);
+        trace_packed(snapshot, eye, 1, "sunlit noise among others", i == 0 ? NB_GL_330 : NB_GL_300ES);
+        nebel_release_snapshot(snapshot);
+    }
+    nebel_release_grid(grid);
+}
+
+static void test_sunlit_random_grids(void **unused)
+{
+    (void)unused;
+    for (uint64_t seed = 0; seed < 12; seed += tries_all ? 1 : 9) {
+        nebel_grid *grids[RANDOM_GRIDS];
+        uint64_t state = seed + 100;
+        random_grids_make(&fog, (random_fog_kind)(seed % 6 + (seed % 6 >= RANDOM_FOG_MANY)), seed, grids);
+        random_fog_light(&fog, &state);
+        nebel_fog_desc desc = random_fog_desc(&fog);
+        desc.sun = (nebel_sun){{dice(&state, -1, 1), dice(&state, .2, 1), .3}, {3, 2.5, 2}};
+        nebel_snapshot *snapshot = fog_commit(&desc, fog.volumes, fog.count);
+        double eye[3];
+        for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
+        camera_rays(eye, fog.shift, seed);
+        trace_packed(snapshot, eye, largest_source(&fog), "sunlit random grids", NB_GL_330);
+        nebel_release_snapshot(snapshot);
+        random_grids_release(grids);
+    }
+}
+
+/* ---- lamps ----------------------------------------------------------------------------------- */
+
+/* A ball in the puff and a spot beside it that shines through it. */
+static nebel_snapshot *commit_lamplit(const nebel_volume_desc *volumes, size_t count)
+{
+    const nebel_fog_desc desc = {.ambient = {.1, .12, .15}};
+    const nebel_lamp lamps[2] = {{.position = {1, -.5, .8}, .intensity = {9, 6, 3}, .radius = .1},
+                                 {.type = NEBEL_LAMP_SPOT,
+                                  .position = {-9, 3, 2},
+                                  .intensity = {200, 250, 300},
+                                  .direction = {9, -2.5, -2},
+                                  .inner_angle = 20,
+                                  .outer_angle = 40}};
+    nebel_fog *made = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&desc, &made), NEBEL_OK);
+    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(made, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(made, 2, lamps), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(made);
+    return snapshot;
+}
+
+/* The others end at once. */
+static void keep_rays(int count, const double eye[3])
+{
+    for (int i = count; i < RAYS; i++) {
+        nebel_ray ray = rays[i];
+        ray.t_max = 0;
+        set_ray(i, &ray, eye);
+    }
+}
+
+static void test_lamplit_puff(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < (tries_all ? 4 : 2); i++) {
+        nebel_grid *grid = make_puff(i % 2 == 0 ? NEBEL_FILTER_LINEAR : NEBEL_FILTER_NEAREST);
+        const nebel_volume_desc volumes[] = {cloud_of(grid, i < 2 ? 2 : .4),
+                                             {.extinction = {.02, .02, .03}, .albedo = {.9, .9, .9}}};
+        nebel_snapshot *snapshot = commit_lamplit(volumes, i == 0 ? 1 : 2);
+        const double *eye = i == 0 ? amid : before;
+        camera_rays(eye, origin, (uint64_t)i);
+        keep_rays(tries_all ? RAYS : 192, eye);
+        trace_packed(snapshot, eye, 1, i % 2 == 0 ? "lamplit puff" : "lamplit puff of nearest voxels",
+                     i % 2 == 0 ? NB_GL_300ES : NB_GL_330);
+        nebel_release_snapshot(snapshot);
+        nebel_release_grid(grid);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    (void)argv;
+    tries_all = argc > 1;
+    if (argc > 2) cmocka_set_test_filter(argv[2]);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_grids), cmocka_unit_test(test_lamplit_puff), cmocka_unit_test(test_sunlit_puff),
+        cmocka_unit_test(test_sunlit_noise_among_others), cmocka_unit_test(test_sunlit_random_grids)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -23,7 +23,7 @@
  * Which state is touched: every function leaves all state of the context as it found it. While it runs it changes
  *
  *   - the program, the vertex array, the active texture unit;
- *   - on texture units 0 to 4: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler;
+ *   - on texture units 0 to 6: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler;
  *   - the bindings UNIFORM_BUFFER (general and index 0) and PIXEL_UNPACK_BUFFER, and the parameters UNPACK_*;
  *   - the viewport (the first of an array); SCISSOR_TEST (of all viewports), STENCIL_TEST, DEPTH_TEST, CULL_FACE,
  *     RASTERIZER_DISCARD, SAMPLE_COVERAGE, SAMPLE_SHADING, SAMPLE_MASK, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE,
@@ -74,8 +74,8 @@ void nebel_destroy_gl(nebel_gl *gl);
  * NULL: no fog. O(volumes + tiles), plus what the driver takes for the upload; nothing is packed again where snapshot
  * and eye are those of the last call, to the last bit, and nothing at all is done where the view is, too. Errors:
  * ARGUMENT (also a view that nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
- * volumes, or larger grids, than the largest texture holds), UNSUPPORTED (the context is another one, or lost). On an error there is no
- * fog.
+ * volumes, larger grids or more phase functions of an environment than the largest texture holds), UNSUPPORTED (the
+ * context is another one, or lost). On an error there is no fog.
  *
  * Mesa's llvmpipe ends loops early: where a tile lists so many volumes of different light that this may matter, the log
  * is told once, with NEBEL_OK; see docs/shaders.md. */
@@ -117,6 +117,8 @@ typedef struct nebel_gl_fog {
     unsigned block;        /* uniform buffer of 16 KiB for nebel_fog_block; 0 where the fog is in the texture */
     unsigned texture;      /* for nebel_fog_texture; 0 where the fog is in the block. Read with texelFetch alone */
     unsigned voxels;       /* for nebel_voxel_texture; 0: there are no grids */
+    unsigned nodes;        /* for nebel_node_texture; 0: light is scattered once */
+    unsigned environment;  /* for nebel_environment_texture; 0: fog scatters no light by direction. For fog alone */
     unsigned tiles;        /* for nebel_tile_texture; 0: without tiles, use nebel_trace */
     uint32_t tile_size;    /* pixels */
     uint32_t tile_columns; /* tile of a pixel: x / tile_size + y / tile_size * tile_columns */

@@ -16,8 +16,12 @@
  * Particles dim the sun, not lamps. Panoramas are no resampled views: each pixel has its own ray, which meets
  * surfaces, fog and particles exactly. Link with libnebel_gl and libnebel.
  *
+ * A planet with air (`planets` of the scene, one) is drawn as by the CPU; its table is made anew in a frame whose eye or
+ * sun is another than in the one before, which takes 50 to 230 ms. Its atmosphere must live as long as the renderer:
+ * another one at the same address would be taken for the first.
+ *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
- * what nebel/gl.h lists it changes, while it runs, texture units 5 to 12, and TEXTURE_2D_ARRAY of units 8, 10 and 12; both
+ * what nebel/gl.h lists it changes, while it runs, texture units 7 to 15, and TEXTURE_2D_ARRAY of units 10, 12 and 14; both
  * framebuffers; the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth
  * function, mask and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and
  * the clip control, where they exist. Conditional rendering must not be under way: pictures would be missing within a
@@ -129,10 +133,11 @@ typedef struct nebel_gl_frame_desc {
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera or light as for nebel_render_frame; taps that are not finite or negative; a factor as for
- * nebel_resolve_factor),
- * LIMIT (a picture too large for this context; more than 4,096 lamps; stopped by progress), MEMORY, UNSUPPORTED (more than one
- * sample where OpenGL ES cannot blend floats; a shader that the driver does not take; the context is another one, or
- * lost). The first panorama copies the triangles of all meshes: 108 bytes each, with fog per vertex 48 more. */
+ * nebel_resolve_factor), LIMIT (a picture too large for this context; more than 4,096 lamps; stopped by progress),
+ * MEMORY, UNSUPPORTED (more than one sample where OpenGL ES cannot blend floats; a planet of layers or with clouds,
+ * several of them, or one with air in an orthographic view, by another method than EXACT, or with particles; a shader
+ * that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
+ * meshes: 108 bytes each, with fog per vertex 48 more. */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 
 /* What the last frame is made of: RGBA32F, linear light, the lowest row first, without filters or mipmaps. */

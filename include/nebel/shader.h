@@ -109,9 +109,31 @@
  * defined; NEBEL_TILES makes GLSL define it and declare `uniform highp usampler2D nebel_tile_texture;`, rows of
  * NEBEL_TEXTURE_WIDTH texels R32UI. NEBEL_VOXEL(i), a uvec4 of nebel_pack_voxels, is only needed for grids, which are
  * no fog without it; NEBEL_VOXELS makes GLSL define it and declare `uniform highp usampler2D nebel_voxel_texture;`,
- * rows of NEBEL_TEXTURE_WIDTH texels RGBA32UI. NEBEL_FEATURES may be defined as what nebel_pack_features says, and
+ * rows of NEBEL_TEXTURE_WIDTH texels RGBA32UI. So is NEBEL_NODE(i), a vec4 of nebel_pack_diffusion, for light that is
+ * scattered more than once; NEBEL_DIFFUSION makes GLSL define it and declare
+ * `uniform highp sampler2D nebel_node_texture;`, rows of NEBEL_TEXTURE_WIDTH texels RGBA32F. NEBEL_ENVIRONMENT_WORD(i),
+ * a vec4 of nebel_pack_environment, is only needed for ambient light by direction, which is dark without it;
+ * NEBEL_ENVIRONMENT makes GLSL define it and declare `uniform highp sampler2D nebel_environment_texture;`, rows of
+ * NEBEL_TEXTURE_WIDTH texels RGBA32F. NEBEL_FEATURES may be defined as what nebel_pack_features says, and
  * NEBEL_MOST_TURNS as how many turns of loops a ray may take, for drivers that end loops: see docs/shaders.md. The GLSL
  * ES text makes highp the default precision.
+ *
+ * Ambient light by direction (nebel_set_environment) is among the in-scattering of fog that has an albedo. Surfaces and
+ * what is behind everything ask for it themselves, of words that were packed for surfaces:
+ *
+ *     vec3 nebel_environment_radiance(vec3 direction);
+ *     vec3 nebel_environment_reflected(vec3 normal);
+ *         As in nebel/environment.h, of unit length; also of a constant one.
+ *
+ * With NEBEL_AIR_WORD(i), a vec4 of nebel_pack_air_view, or NEBEL_AIR, which makes GLSL define it and declare
+ * `uniform highp sampler2D nebel_air_texture;` (rows of NEBEL_TEXTURE_WIDTH texels RGBA32F), the text also declares the
+ * air of a planet, for rays of unit length from the place that the view was made for:
+ *
+ *     nebel_light nebel_trace_air(vec3 direction, float t_max);
+ *         What nebel_trace_air_view says; t_max 1e18 or more: to the ground or the end of the air.
+ *     struct nebel_ground { float distance; vec3 normal; vec3 sun; vec3 sky; };
+ *     nebel_ground nebel_find_ground(vec3 direction);
+ *         What nebel_find_ground says; distance 1e18 where the ground is not met, and the rest means nothing.
  *
  * Fog that the sun lights knows no surfaces. A host says where they keep the sun away by a function in front of the
  * text, named by
@@ -132,6 +154,7 @@
 #define NEBEL_SHADER_H
 
 #include <nebel/nebel.h>
+#include <nebel/planet.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -172,14 +195,35 @@ typedef struct nebel_texel {
 
 /* Packs the voxels of a snapshot's grids. *count receives the number of texels needed, 0 where there is no grid; they
  * are written when `capacity` is at least that. A cube of 8 x 8 x 8 voxels takes one texel where all are equal, else
- * 513: each voxel in 65,536 steps between the least and the most of its cube. They do not depend on the eye: pack again
- * when nebel_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for
+ * 513: each voxel in 65,536 steps between the least and the most of its cube. Where the sun lights fog each grid has
+ * besides how much of it lies before the sun, which takes up to 2^23 texels. They do not depend on the eye: pack again
+ * when nebel_same_voxels denies. O(voxels). Any thread. Errors: ARGUMENT; MEMORY; LIMIT when capacity is too small (not for
  * texels NULL and capacity 0, which only asks) or when more than 2^24 texels (256 MiB) would be needed, for which
  * nebel_pack_fog answers LIMIT, too. */
 nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel *texels, size_t capacity, size_t *count);
 
-/* Whether nebel_pack_voxels makes the same of both. O(volumes) where they share their grids. Any thread. */
+/* Whether nebel_pack_voxels makes the same of both: not where the sun moves. O(volumes) where they share their grids. Any thread. */
 int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b);
+
+/* Packs the lattice of light that is scattered more than once. *count receives the number of words needed, 0 where
+ * nebel_set_diffusion is off or no fog is lit; they are written when `capacity` is at least that: three a node, seven
+ * where fog has colour. They do not depend on the eye. O(nodes). Any thread. Errors: ARGUMENT; LIMIT when capacity is
+ * too small (not for words NULL and capacity 0, which only asks) or when more than 2^24 words (256 MiB) would be needed,
+ * for which nebel_pack_fog answers LIMIT, too. */
+nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_word *words, size_t capacity, size_t *count);
+
+/* Packs what a snapshot's environment (nebel/environment.h) is to the fog that it lights, and where `surfaces` is not 0
+ * what nebel_environment_radiance and nebel_environment_reflected of the text want. *count receives the number of words
+ * needed, 0 where no fog scatters light by direction and surfaces are not asked for; they are written when `capacity` is
+ * at least that. A gradient takes 4, and 127 for each phase function; a map up to 524,289 (8 MiB) for each, the same once
+ * for surfaces, and one for each of its pixels. They do not depend on the eye: pack again when nebel_same_environment
+ * denies. O(words). Any thread. Errors: ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0,
+ * which only asks) or when more than 2^24 words (256 MiB) would be needed, for which nebel_pack_fog answers LIMIT, too. */
+nebel_result nebel_pack_environment(const nebel_snapshot *snapshot, int surfaces, nebel_word *words, size_t capacity,
+                                    size_t *count);
+
+/* Whether nebel_pack_environment makes the same of both. O(phase functions). Any thread. */
+int nebel_same_environment(const nebel_snapshot *a, const nebel_snapshot *b);
 
 /* What the fog has, as a mask for NEBEL_FEATURES: the text leaves out the shapes, profiles and walks that it does not
  * name, and a driver makes a smaller and faster program. Fog that has more than the shader was compiled for gives wrong
@@ -195,6 +239,21 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 
 /* The feature of fog that lamps light, which transmittance has no need of. */
 #define NEBEL_FEATURE_LAMPS 2097152u
+
+/* The feature of fog whose light is scattered more than once (nebel/diffusion.h), which transmittance has no need of:
+ * the text needs NEBEL_DIFFUSION, or NEBEL_NODE, defined before it. */
+#define NEBEL_FEATURE_DIFFUSION 4194304u
+
+/* The feature of fog that scatters ambient light by direction: the text needs NEBEL_ENVIRONMENT, or
+ * NEBEL_ENVIRONMENT_WORD, defined before it. Transmittance has no need of it. */
+#define NEBEL_FEATURE_ENVIRONMENT 8388608u
+
+/* Packs the table of a view of a planet's air (nebel/planet.h), for the place that it was made for: all that the text's
+ * nebel_trace_air and nebel_find_ground want. *count receives the number of words needed; they are written when `capacity`
+ * is at least that: 5,000 to 10,000 for each kind of air that scatters, from space three times as many, where rays may end
+ * within the air six times. The words stay while eye and sun do, however the camera turns. O(words). Any thread. Errors:
+ * ARGUMENT; LIMIT when capacity is too small (not for words NULL and capacity 0, which only asks). */
+nebel_result nebel_pack_air_view(const nebel_air_view *view, nebel_word *words, size_t capacity, size_t *count);
 
 /* ---- views ----------------------------------------------------------------------------------- */
 

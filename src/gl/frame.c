@@ -2,6 +2,7 @@
  * properties; once, shadow maps around what the first sample sees; the fog up to the surfaces; the light of all that.
  */
 #include "corners.h"
+#include "frame_check.h"
 #include "gl.h"
 #include "method.h"
 #include "panorama.h"
@@ -13,8 +14,6 @@
 
 #include <math.h>
 
-enum { MOST_SIDE = 32768, MOST_SAMPLES = 4096 };
-
 typedef struct frame {
     nebel_gl_renderer *renderer;
     const nebel_gl_frame_desc *desc;
@@ -22,65 +21,19 @@ typedef struct frame {
     nb_lighting light;
     double eye[3];
     int panorama;
+    const nebel_planet *planet; /* with air; NULL: none */
     nb_method method;
-    nebel_view view;        /* through the pixels' centres; of a panorama without clip_from_eye */
-    nebel_view sample_view; /* through the places of the present sample */
-    nebel_rays rays;        /* of sample_view, or of the panorama */
-    nebel_view sun_view;    /* of all that is seen, against the sun's light */
-    int casts;              /* the sun shines, and there is something to cast shadows */
-    int dims;               /* particles dim the sun */
-    int shafts;             /* models shade fog */
+    nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
+    nebel_view sample_view;  /* through the places of the present sample */
+    nebel_rays rays;         /* of sample_view, or of the panorama */
+    nebel_view sun_view;     /* of all that is seen, against the sun's light */
+    int casts;               /* the sun shines, and there is something to cast shadows */
+    int dims;                /* particles dim the sun */
+    int shafts;              /* models shade fog */
+    nebel_sunlit_fog sunlit; /* that fog */
 } frame;
 
-/* ---- checks ---------------------------------------------------------------------------------- */
-
-static nebel_result check_size(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
-{
-    GLint viewport[2] = {0, 0};
-    glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
-    uint32_t most = r->context.widest < MOST_SIDE ? r->context.widest : MOST_SIDE;
-    for (int i = 0; i < 2; i++) most = (uint32_t)viewport[i] < most ? (uint32_t)viewport[i] : most;
-    if (desc->width < 1 || desc->height < 1) {
-        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u x %u pixels; 1 to %u are possible", (unsigned)desc->width,
-                       (unsigned)desc->height, (unsigned)most);
-    }
-    if (desc->width > most || desc->height > most) {
-        return nb_fail(
-            &r->log, NEBEL_ERROR_LIMIT,
-            "frame: %u x %u pixels; this OpenGL draws at most %u either way. The CPU renders larger pictures",
-            (unsigned)desc->width, (unsigned)desc->height, (unsigned)most);
-    }
-    return NEBEL_OK;
-}
-
-static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
-{
-    if (samples > MOST_SAMPLES) {
-        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)samples);
-    }
-    if (samples > 1 && r->context.es && !epoxy_has_gl_extension("GL_EXT_float_blend")) {
-        return nb_fail(
-            &r->log, NEBEL_ERROR_UNSUPPORTED,
-            "frame: OpenGL ES without GL_EXT_float_blend cannot add samples; ask for one sample, or use OpenGL");
-    }
-    return NEBEL_OK;
-}
-
-static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
-{
-    if ((unsigned)desc->method >= NEBEL_GL_METHOD_COUNT) {
-        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: there is no method %d", (int)desc->method);
-    }
-    if (nb_method_takes_cells(desc->method) && desc->cells == NULL)
-        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: this method needs cells; they are NULL");
-    const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
-    if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
-        isfinite(taps.offset + taps.nothing + taps.edge + taps.margin + taps.brightness)) {
-        return NEBEL_OK;
-    }
-    return nb_fail(&r->log, NEBEL_ERROR_VALUE,
-                   "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
-}
+/* ---- what is drawn ---------------------------------------------------------------------------- */
 
 static nebel_result set_method(frame *f)
 {
@@ -90,11 +43,10 @@ static nebel_result set_method(frame *f)
 }
 
 /* Whether models shade fog: that of the pass, or before particles. */
-static int find_shafts(const frame *f)
+static int find_shafts(frame *f)
 {
-    nebel_sunlit_fog lit;
     const nebel_gl_renderer *const r = f->renderer;
-    return f->casts && r->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(r->fog, &lit);
+    return f->casts && r->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(r->fog, &f->sunlit);
 }
 
 static nebel_result set_frame(frame *f)
@@ -102,19 +54,15 @@ static nebel_result set_frame(frame *f)
     const nebel_gl_renderer *const r = f->renderer;
     const nebel_gl_frame_desc *const desc = f->desc;
     f->samples = desc->samples != 0 ? desc->samples : 4;
-    nebel_result result = check_size(r, desc);
-    if (result == NEBEL_OK) result = check_samples(r, f->samples);
-    if (result == NEBEL_OK) result = check_method(r, desc);
+    nebel_result result = nb_frame_check(r, desc, f->samples);
     if (result == NEBEL_OK) result = set_method(f);
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
-    if (result == NEBEL_OK && f->light.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
-        result = nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
-                         "frame: OpenGL cannot draw a gradient or an environment yet; use the CPU (--device cpu)");
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
     f->shafts = find_shafts(f);
+    f->planet = nb_gl_air_planet(r->scene);
     return result;
 }
 
@@ -183,6 +131,20 @@ static void draw_meshes(const frame *f, unsigned program)
     }
 }
 
+/* Behind nearer surfaces. */
+static void draw_ground(const frame *f)
+{
+    const nb_shading *const shading = &f->renderer->shading;
+    const unsigned program = f->panorama ? shading->round_ground : shading->ground;
+    float albedo[3];
+    for (int i = 0; i < 3; i++) albedo[i] = (float)f->planet->air.ground_albedo[i];
+    glUseProgram(program);
+    set_rays(f, program);
+    set_vector(program, "ground_albedo", albedo);
+    glBindVertexArray(f->renderer->vertex_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
 static void draw_surfaces(const frame *f)
 {
     static const GLfloat zeros[4] = {0, 0, 0, 0};
@@ -197,12 +159,14 @@ static void draw_surfaces(const frame *f)
     glUseProgram(program);
     set_rays(f, program);
     set_clip(f, program);
+    set_vector(program, "scene_sun", f->light.sun);
     draw_meshes(f, program);
+    if (f->planet != NULL) draw_ground(f);
 }
 
 static int has_lamps(const frame *f)
 {
-    return f->renderer->scene->lamp_count > 0 && f->renderer->meshes.count > 0;
+    return f->renderer->scene->lamp_count > 0 && (f->renderer->meshes.count > 0 || f->planet != NULL);
 }
 
 /* ---- fog ------------------------------------------------------------------------------------- */
@@ -305,6 +269,7 @@ static nebel_result draw_exact_fog(const frame *f)
                              .width = f->view.width,
                              .height = f->view.height,
                              .panorama = f->panorama,
+                             .air = f->planet != NULL,
                              .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
@@ -314,10 +279,11 @@ static nebel_result draw_exact_fog(const frame *f)
     return nb_gl_draw_fog(r->eye_fog, &pass, &picture);
 }
 
-/* Cells and factors have no need of the renderer's fog. */
+/* Or air. Cells and factors have no need of the renderer's fog. */
 static int has_fog(const frame *f)
 {
-    return f->renderer->fog != NULL || nb_method_takes_cells(f->desc->method) || f->method.replaces_fog;
+    return f->renderer->fog != NULL || f->planet != NULL || nb_method_takes_cells(f->desc->method) ||
+           f->method.replaces_fog;
 }
 
 /* A wall may hide a vertex whose triangle is seen beside it. */
@@ -368,7 +334,7 @@ static nebel_result draw_fog(const frame *f)
     const int is_exact =
         !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
     const int is_asked = is_exact || has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
-    if (result == NEBEL_OK && r->fog != NULL && is_asked) result = set_eye_fog(f);
+    if (result == NEBEL_OK && (r->fog != NULL || f->planet != NULL) && is_asked) result = set_eye_fog(f);
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
 
@@ -401,7 +367,9 @@ static void bind_media(const nebel_gl_fog *fog)
 {
     if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
+    if (fog->environment != 0) bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, fog->environment);
     if (fog->voxels != 0) bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
+    if (fog->nodes != 0) bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->nodes);
 }
 
 static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned program)
@@ -436,11 +404,12 @@ static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_
     const nebel_result result = passes != NULL ? nebel_gl_get_fog(passes, fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     kind.panorama = f->panorama;
-    kind.has_surfaces = r->meshes.count > 0;
+    kind.has_surfaces = r->meshes.count > 0 || kind.air;
     kind.has_fog = passes != NULL;
     kind.in_texture = fog->texture != 0;
-    kind.tiled = fog->tiles != 0;
-    kind.features = kind.of_particles ? fog->features : fog->features & ~NEBEL_FEATURE_LAMPS;
+    kind.tiled = fog->tiles != 0 && !kind.air; /* ground reaches beyond all lists along the sun's light */
+    const uint32_t lights = NEBEL_FEATURE_LAMPS | NEBEL_FEATURE_DIFFUSION | NEBEL_FEATURE_ENVIRONMENT;
+    kind.features = kind.of_particles ? fog->features : fog->features & ~lights;
     return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
 
@@ -459,6 +428,7 @@ static nebel_result draw_particles(const frame *f)
     unsigned program = 0;
     const int layers = count_veil_layers(f);
     if (layers == 0) return NEBEL_OK;
+    nb_renderer_judge_particles(r);
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
     const nb_light_kind kind = {.of_particles = r->particles.profiles,
                                 .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
@@ -508,7 +478,8 @@ static void set_sun_view(frame *f)
 static nebel_result set_sun_fog(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    if (r->fog == NULL || f->method.replaces_fog || !(r->shadows.seen_low[0] < r->shadows.seen_high[0]))
+    if (r->fog == NULL || f->planet != NULL || f->method.replaces_fog ||
+        !(r->shadows.seen_low[0] < r->shadows.seen_high[0]))
         return NEBEL_OK;
     set_sun_view(f);
     return nebel_gl_set_fog(r->sun_fog, r->fog, &f->sun_view);
@@ -527,18 +498,19 @@ static nebel_result set_sun_cloud(frame *f)
     return nebel_gl_set_fog(r->sun_cloud, r->cloud, &f->sun_view);
 }
 
-static nebel_result prepare_shafts(frame *f)
+static nebel_result prepare_shafts(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nb_shadows_turn(&r->shafts.maps, f->light.sun_direction);
+    nb_shadows_turn_fog(&r->shafts.maps, f->light.sun_direction);
     return nb_shafts_draw(&r->shafts, &r->context, &r->log, r->shading.shadow, r->vertex_array, &r->shadows,
-                          &r->targets, &f->rays, f->panorama, &r->meshes);
+                          &r->targets, &f->rays, f->panorama, &r->meshes, &f->sunlit);
 }
 
 static nebel_result prepare_sun(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     nb_shadows_turn(&r->shadows, f->light.sun_direction);
+    r->shadows.sees_ground = f->planet != NULL;
     glBindVertexArray(r->vertex_array);
     nebel_result result = nb_shadows_fit(&r->shadows, &r->context, &r->allocator, &r->log, r->shading.survey,
                                          &r->targets, &f->rays, f->panorama, &r->meshes);
@@ -596,7 +568,7 @@ static nebel_result prepare_lamps(const frame *f)
 static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
     bind_media(fog);
-    if (fog->tiles != 0 && f->casts) set_tiles(f, fog, program);
+    if (fog->tiles != 0 && f->casts && f->planet == NULL) set_tiles(f, fog, program);
 }
 
 /* What comes through the particles of the sun's light to each surface. */
@@ -621,15 +593,55 @@ static nebel_result draw_dimming(const frame *f)
     return NEBEL_OK;
 }
 
+/* Of the whole frame. */
+static nebel_result prepare_air(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const int ends = r->meshes.count > 0 || (r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0);
+    if (f->planet == NULL) return NEBEL_OK;
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
+    nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends);
+    glActiveTexture(GL_TEXTURE0);
+    return result == NEBEL_OK ? nb_shading_make_ground(&r->shading, &r->context, &r->log, f->panorama) : result;
+}
+
+/* Of white surfaces that face the sun; air leaves them what it leaves at the scene's origin. */
+static void set_sunlight(const frame *f, unsigned program)
+{
+    float light[3];
+    for (int i = 0; i < 3; i++)
+        light[i] = f->light.sunlight[i] * (f->planet != NULL ? (float)f->planet->sun_left[i] : 1);
+    set_vector(program, "scene_sunlight", light);
+    if (f->planet != NULL) nb_gl_air_set_disc(program, f->renderer->scene);
+}
+
+static int has_environment(const frame *f)
+{
+    return f->light.environment.type != NEBEL_ENVIRONMENT_CONSTANT;
+}
+
+/* Of the whole frame. */
+static nebel_result prepare_environment(const frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    if (!has_environment(f)) return NEBEL_OK;
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_ENVIRONMENT);
+    const nebel_result result =
+        nb_environment_show(&r->environment, &r->allocator, &r->log, &r->context, &f->light.environment);
+    glActiveTexture(GL_TEXTURE0);
+    return result;
+}
+
 static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
-    const nb_targets *const t = &f->renderer->targets;
+    const nebel_gl_renderer *const r = f->renderer;
+    const nb_targets *const t = &r->targets;
     glUseProgram(program);
     set_rays(f, program);
     set_vector(program, "scene_background", f->light.background);
     set_vector(program, "scene_ambient", f->light.ambient);
     set_vector(program, "scene_sun", f->light.sun);
-    set_vector(program, "scene_sunlight", f->light.sunlight);
+    set_sunlight(f, program);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
     if (f->casts) set_shadows(f, program);
     if (has_lamps(f)) set_lamps(f, program);
@@ -641,6 +653,8 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     if (f->dims) bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
     if (has_particles(f)) bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
     bind_fog(f, fog, program);
+    glUniform1i(glGetUniformLocation(program, "scene_shows_ambient"), f->light.shows_ambient);
+    if (has_environment(f)) bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, r->environment.name);
 }
 
 /* The first sample replaces what was there. */
@@ -657,12 +671,15 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    const int is_lit = f->casts || has_lamps(f), dims = r->fog != NULL && !f->method.replaces_fog;
-    const nebel_gl *const passes = !is_lit || !dims ? NULL : f->casts ? r->sun_fog : r->eye_fog;
+    const int is_lit = f->casts || has_lamps(f) || f->planet != NULL, dims = r->fog != NULL && !f->method.replaces_fog,
+              along_sun = f->casts && f->planet == NULL;
+    const nebel_gl *const passes = !is_lit || !dims ? NULL : along_sun ? r->sun_fog : r->eye_fog;
     const nb_light_kind kind = {.sunlit = f->casts,
+                                .air = f->planet != NULL,
                                 .lamplit = has_lamps(f),
                                 .dimmed = f->dims,
                                 .in_fog = has_fog(f),
+                                .environment = has_environment(f),
                                 .veil_layers = count_veil_layers(f)};
     const nebel_result result = find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
@@ -749,6 +766,8 @@ static nebel_result draw_samples(frame *f)
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
     if (result == NEBEL_OK && has_particles(f)) result = prepare_particles(f);
     if (result == NEBEL_OK) result = prepare_lamps(f);
+    if (result == NEBEL_OK) result = prepare_environment(f);
+    if (result == NEBEL_OK) result = prepare_air(f);
     if (result == NEBEL_OK) result = prepare_vertices(f);
     if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {

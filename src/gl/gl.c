@@ -60,10 +60,11 @@ nebel_result nebel_create_gl(const nebel_gl_desc *desc, nebel_gl **gl)
 /* Names of 0 are skipped by OpenGL. */
 static void delete_objects(nebel_gl *gl)
 {
-    const GLuint textures[] = {gl->texture, gl->voxels, gl->tiles};
+    const GLuint textures[] = {gl->texture, gl->voxels, gl->nodes, gl->tiles};
     nb_programs_delete(&gl->programs);
-    glDeleteTextures(3, textures);
+    glDeleteTextures(4, textures);
     glDeleteBuffers(1, &gl->block);
+    nb_environment_delete(&gl->environment);
     glDeleteFramebuffers(1, &gl->framebuffer);
     glDeleteSamplers(1, &gl->sampler);
     glDeleteVertexArrays(1, &gl->vertex_array);
@@ -77,6 +78,8 @@ void nebel_destroy_gl(nebel_gl *gl)
     nebel_release_snapshot(gl->empty);
     nebel_release_snapshot(gl->packed);
     nebel_release_snapshot(gl->voxels_of);
+    nebel_release_snapshot(gl->nodes_of);
+    nebel_release_snapshot(gl->environment.of);
     nb_release(&gl->allocator, gl->programs.list);
     nb_release(&gl->allocator, gl->words);
     nb_release(&gl->allocator, gl->entries);

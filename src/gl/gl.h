@@ -2,6 +2,7 @@
 #ifndef NB_GL_GL_H
 #define NB_GL_GL_H
 
+#include "environment.h"
 #include "program.h"
 
 struct nebel_gl {
@@ -12,8 +13,9 @@ struct nebel_gl {
     nebel_snapshot *empty; /* what is seen where there is no fog */
 
     /* Names in OpenGL; 0: not made yet. The sampler fetches single texels, whatever the host's textures ask for. */
-    unsigned vertex_array, sampler, block, texture, voxels, tiles, framebuffer;
-    uint32_t texture_rows, voxel_rows, tile_rows; /* allocated */
+    unsigned vertex_array, sampler, block, texture, voxels, nodes, tiles, framebuffer;
+    uint32_t texture_rows, voxel_rows, node_rows, tile_rows; /* allocated */
+    nb_environment environment;
     nb_programs programs;
 
     int dims_alone; /* the fog is asked for transmittance alone: nothing of it is mixed */
@@ -22,6 +24,7 @@ struct nebel_gl {
     int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_snapshot *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
     nebel_snapshot *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
+    nebel_snapshot *nodes_of;  /* the same of the lattice of multiple scattering */
     nebel_view views[6];       /* one, or six of a panorama */
     int view_count;
     int face_first[6]; /* entry of the first tile of each */
@@ -51,6 +54,7 @@ typedef struct nb_gl_picture {
     uint32_t width, height;
     int panorama;
     nb_gl_shade shade;
+    int air;                        /* NB_UNIT_AIR has that of a planet, for the same eye; one sample a pixel */
     const struct nb_shafts *shafts; /* where surfaces shade fog; NULL: nowhere. Changes their units */
 } nb_gl_picture;
 

@@ -5,6 +5,7 @@
 #include "state.h"
 #include "targets.h"
 
+#include "base/bulb.h"
 #include "base/vector.h"
 
 #include <nebel/shader.h>
@@ -20,9 +21,6 @@
 #define MOST_TEXELS ((size_t)1 << 25)
 
 enum { FACES = 6, LEAST_FACE = 64 };
-
-/* What lamps without a radius have in the fog. */
-static const double least_radius = 1e-3;
 
 static nebel_result out_of_memory(const nebel_log *log)
 {
@@ -44,7 +42,7 @@ static void set_cone(const nebel_lamp *lamp, float *axis, float *rise)
 
 static void set_words(const nebel_lamp *lamp, const double eye[3], int layer, int fog_layer, float *words)
 {
-    const double radius = fmax(lamp->radius, least_radius);
+    const double radius = nb_bulb(lamp->radius);
     nb_camera_subtract(lamp->position, eye, words);
     words[3] = (float)layer;
     for (int i = 0; i < 3; i++) words[4 + i] = (float)lamp->intensity[i];
@@ -267,8 +265,8 @@ static void draw_face(const nb_lamps *lamps, const nb_lamp_source *source, int f
     set_turn(face, turn);
     glUniformMatrix3fv(glGetUniformLocation(program, "map_turn"), 1, GL_FALSE, turn);
     glUniform1f(glGetUniformLocation(program, "map_share"), share);
-    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)source->radius);
-    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)fmax(source->radius, least_radius));
+    glUniform1f(glGetUniformLocation(program, "map_radius"), (float)nb_bulb(source->radius));
+    glUniform1f(glGetUniformLocation(program, "map_near"), .5f * (float)nb_bulb(source->radius));
     for (size_t i = 0; i < meshes->count; i++) {
         const nb_mesh *const mesh = &meshes->list[i];
         float from_lamp[3], low[3], high[3];

@@ -127,6 +127,9 @@ static void add_triangle(draft *d, const uint32_t *corners)
     nb_vertex last = vertex_of(mesh, corners[2]);
     if (!set_face(position_of(mesh, corners[0]), position_of(mesh, corners[1]), last.position, last.face)) return;
     for (int k = 0; k < 3; k++) include(d->made, position_of(mesh, corners[k]));
+    for (int e = 0; e < 2; e++) {
+        for (int k = 0; k < 3; k++) last.edges[e][k] = position_of(mesh, corners[e])[k] - last.position[k];
+    }
     d->indices[d->index_count++] = corners[0];
     d->indices[d->index_count++] = corners[1];
     d->indices[d->index_count++] = (uint32_t)d->vertex_count;
@@ -167,6 +170,8 @@ static nebel_result upload(const nb_meshes *meshes, const draft *d)
     set_attribute(NB_ATTRIBUTE_NORMAL, 3, offsetof(nb_vertex, normal));
     set_attribute(NB_ATTRIBUTE_UV, 2, offsetof(nb_vertex, uv));
     set_attribute(NB_ATTRIBUTE_FACE, 3, offsetof(nb_vertex, face));
+    set_attribute(NB_ATTRIBUTE_EDGE, 3, offsetof(nb_vertex, edges[0]));
+    set_attribute(NB_ATTRIBUTE_EDGE + 1, 3, offsetof(nb_vertex, edges[1]));
     return nb_context_check_memory(&meshes->log, "the meshes; use fewer triangles");
 }
 

@@ -7,11 +7,19 @@
 #include <nebel/scene.h>
 
 /* Vertex attributes. */
-enum { NB_ATTRIBUTE_POSITION, NB_ATTRIBUTE_NORMAL, NB_ATTRIBUTE_UV, NB_ATTRIBUTE_FACE, NB_ATTRIBUTE_FOG };
+enum {
+    NB_ATTRIBUTE_POSITION,
+    NB_ATTRIBUTE_NORMAL,
+    NB_ATTRIBUTE_UV,
+    NB_ATTRIBUTE_FACE,
+    NB_ATTRIBUTE_FOG,
+    NB_ATTRIBUTE_EDGE, /* two */
+};
 
 /* The last vertex of each triangle is its own and holds what is constant on the triangle. */
 typedef struct nb_vertex {
     float position[3], normal[3], uv[2], face[3];
+    float edges[2][3]; /* from it to the first corner and to the second */
 } nb_vertex;
 
 typedef struct nb_mesh {

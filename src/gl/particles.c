@@ -134,6 +134,32 @@ nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, co
     return nb_context_check_memory(log, "the particles; use fewer");
 }
 
+/* Whether the ray from a place meets a box that is `margin` larger to all sides. */
+static int meets(const double from[3], const double way[3], const double low[3], const double high[3], double margin)
+{
+    double enter = 0, leave = HUGE_VAL;
+    for (int i = 0; i < 3; i++) {
+        const double under = low[i] - margin - from[i], over = high[i] + margin - from[i];
+        if (way[i] == 0 && (under > 0 || over < 0)) return 0;
+        if (way[i] == 0) continue;
+        enter = fmax(enter, (way[i] > 0 ? under : over) / way[i]);
+        leave = fmin(leave, (way[i] > 0 ? over : under) / way[i]);
+    }
+    return enter <= leave;
+}
+
+int nb_particles_shade(const nb_particles *particles, const double to_light[3], const double low[3],
+                       const double high[3])
+{
+    const double away[3] = {-to_light[0], -to_light[1], -to_light[2]};
+    for (size_t i = 0; i < particles->count; i++) {
+        const nebel_particle *const p = &particles->list[i];
+        const int takes = p->extinction[0] > 0 || p->extinction[1] > 0 || p->extinction[2] > 0;
+        if (takes && meets(p->center, away, low, high, p->radius)) return 1;
+    }
+    return 0;
+}
+
 void nb_particles_draw(const nb_particles *particles, int vertices)
 {
     glBindVertexArray(particles->vertex_array);

@@ -40,6 +40,10 @@ nebel_result nb_particles_commit(const nb_particles *particles, const nebel_allo
 nebel_result nb_particles_sort(nb_particles *particles, const nebel_log *log, const double eye[3],
                                const double *forward);
 
+/* Whether one that takes light is between places of the box and a light that is infinitely far into this direction. */
+int nb_particles_shade(const nb_particles *particles, const double to_light[3], const double low[3],
+                       const double high[3]);
+
 /* Each a strip of so many vertices. */
 void nb_particles_draw(const nb_particles *particles, int vertices);
 

@@ -188,6 +188,8 @@ static nebel_result bind_textures(const task *t)
     if (gl->fog.texture != 0) bind_texture(gl, NB_UNIT_FOG, GL_TEXTURE_2D, gl->fog.texture);
     if (gl->fog.block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, gl->fog.block);
     if (gl->fog.voxels != 0) bind_texture(gl, NB_UNIT_VOXELS, GL_TEXTURE_2D, gl->fog.voxels);
+    if (gl->fog.nodes != 0) bind_texture(gl, NB_UNIT_NODES, GL_TEXTURE_2D, gl->fog.nodes);
+    if (gl->fog.environment != 0) bind_texture(gl, NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, gl->fog.environment);
     if (gl->fog.tiles != 0) bind_texture(gl, NB_UNIT_TILES, GL_TEXTURE_2D, gl->fog.tiles);
     bind_host_texture(gl, NB_UNIT_DEPTH, target, t->pass->depth_texture);
     const nebel_result result = check_size(t, target, "depth");
@@ -294,6 +296,7 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .from_eye = t->picture->rays.from_eye,
                                   .panorama = t->picture->panorama,
                                   .shafts = t->picture->shafts != NULL,
+                                  .air = t->picture->air,
                                   .features = gl->fog.features,
                                   .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =

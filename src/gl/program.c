@@ -1,5 +1,6 @@
 #include "program.h"
 
+#include "air_text.h"
 #include "panorama.h"
 #include "shafts.h"
 
@@ -40,6 +41,15 @@ static const char fragment_text[] =
     "layout(location = PASS_SECOND) out highp vec4 pass_second;\n"
     "#endif\n"
     "\n"
+    "nebel_light pass_up_to(nebel_sight sight, int entry, float t)\n"
+    "{\n"
+    "#ifdef NEBEL_TILES\n"
+    "    return nebel_trace_list(sight.origin, sight.direction, t, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
+    "#else\n"
+    "    return nebel_trace(sight.origin, sight.direction, t);\n"
+    "#endif\n"
+    "}\n"
+    "\n"
     "nebel_light pass_fog(vec2 pixel, float depth)\n"
     "{\n"
     "#ifdef PASS_PANORAMA\n"
@@ -50,17 +60,17 @@ static const char fragment_text[] =
     "#else\n"
     "    nebel_sight sight = nebel_see(pixel, depth);\n"
     "#endif\n"
-    "#ifdef NEBEL_TILES\n"
-    "#ifdef PASS_PANORAMA\n"
-    "    int entry = face_entry(sight.direction);\n"
-    "#else\n"
+    "    int entry = 0;\n"
+    "#if defined(NEBEL_TILES) && defined(PASS_PANORAMA)\n"
+    "    entry = face_entry(sight.direction);\n"
+    "#elif defined(NEBEL_TILES)\n"
     "    ivec2 tile = ivec2(pixel) >> pass_tiling.x;\n"
-    "    int entry = 2 * (tile.x + tile.y * pass_tiling.y);\n"
+    "    entry = 2 * (tile.x + tile.y * pass_tiling.y);\n"
     "#endif\n"
-    "    return nebel_trace_list(sight.origin, sight.direction, sight.t_max, NEBEL_INDEX(entry), NEBEL_INDEX(entry + "
-    "1));\n"
+    "#ifdef NEBEL_AIR\n"
+    "    return pass_haze(sight, entry);\n"
     "#else\n"
-    "    return nebel_trace(sight.origin, sight.direction, sight.t_max);\n"
+    "    return pass_up_to(sight, entry, sight.t_max);\n"
     "#endif\n"
     "}\n"
     "\n"
@@ -134,18 +144,23 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
     const char *const samples = "#define PASS_MULTISAMPLED\nuniform ivec2 pass_sample_range;\n";
     const int extended = kind->output == NEBEL_GL_OUTPUT_BLEND && context->dual_source == 2;
     char limits[128];
-    const char *const shares = kind->multisampled ? "(pass_sample_range.y - pass_sample_range.x)" : "1";
-    (void)snprintf(text, size,
-                   "%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
-                   "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
-                   "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
-                   nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
-                   nb_program_limits(context, shares, limits, sizeof limits),
-                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-                   (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
-                   kind->multisampled ? samples : "", output[kind->output],
-                   kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
-                   kind->panorama ? "#define PASS_PANORAMA\n" : "");
+    const char *const shares = kind->multisampled ? "(pass_sample_range.y - pass_sample_range.x)"
+                               : kind->air        ? "32" /* PASS_KNOTS */
+                                                  : "1";
+    (void)snprintf(
+        text, size,
+        "%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
+        "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
+        "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
+        nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
+        nb_program_limits(context, shares, limits, sizeof limits), kind->in_texture ? "#define NEBEL_TEXTURE\n" : "",
+        kind->tiled ? "#define NEBEL_TILES\n" : "",
+        (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
+        (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
+        (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
+        kind->air ? "#define NEBEL_AIR\n" : "", kind->multisampled ? samples : "", output[kind->output],
+        kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
+        kind->panorama ? "#define PASS_PANORAMA\n" : "");
 }
 
 /* A message is one line. */
@@ -225,6 +240,9 @@ static void set_uniforms(nb_program *program)
     glUniform1i(glGetUniformLocation(name, "nebel_fog_texture"), NB_UNIT_FOG);
     glUniform1i(glGetUniformLocation(name, "nebel_tile_texture"), NB_UNIT_TILES);
     glUniform1i(glGetUniformLocation(name, "nebel_voxel_texture"), NB_UNIT_VOXELS);
+    glUniform1i(glGetUniformLocation(name, "nebel_node_texture"), NB_UNIT_NODES);
+    glUniform1i(glGetUniformLocation(name, "nebel_environment_texture"), NB_UNIT_ENVIRONMENT);
+    glUniform1i(glGetUniformLocation(name, "nebel_air_texture"), NB_UNIT_AIR);
     glUniform1i(glGetUniformLocation(name, "pass_depth"), NB_UNIT_DEPTH);
     glUniform1i(glGetUniformLocation(name, "pass_color"), NB_UNIT_COLOR);
 }
@@ -235,7 +253,7 @@ static const char precision_text[] = "#ifdef GL_ES\nprecision highp float;\nprec
 static nebel_result make(const nb_context *context, const nebel_log *log, const nb_program_kind *kind,
                          nb_program *program)
 {
-    char head[512];
+    char head[768];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
@@ -244,8 +262,8 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const int is_shaded = kind->shade[0] != NULL;
     const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
                                 is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "", fog, ray, tile,
-                                fragment_text},
-                               9};
+                                kind->air ? nb_air_haze_text : "", fragment_text},
+                               10};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
@@ -256,7 +274,7 @@ static int is_same(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
            a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
-           a->shafts == b->shafts && a->features == b->features && a->shade[0] == b->shade[0] &&
+           a->shafts == b->shafts && a->air == b->air && a->features == b->features && a->shade[0] == b->shade[0] &&
            a->shade[1] == b->shade[1];
 }
 

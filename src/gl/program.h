@@ -7,7 +7,8 @@
 #include <nebel/gl.h>
 
 /* Texture units of the samplers in a program. */
-enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_VOXELS, NB_UNIT_DEPTH, NB_UNIT_COLOR };
+enum { NB_UNIT_FOG, NB_UNIT_TILES, NB_UNIT_VOXELS, NB_UNIT_NODES, NB_UNIT_ENVIRONMENT, NB_UNIT_DEPTH, NB_UNIT_COLOR };
+enum { NB_UNIT_AIR = 15 }; /* behind those of scenes; OpenGL ES has no more */
 
 enum { NB_SAMPLES_MOST = 32 };
 
@@ -34,6 +35,7 @@ typedef struct nb_program_kind {
     int from_eye;         /* all rays start where the fog was packed for */
     int panorama;         /* rays go all around, and tiles are of six faces; depth is the distance */
     int shafts;           /* surfaces shade fog */
+    int air;              /* the fog lies in that of a planet, which is bound */
     uint32_t features;    /* of the fog: what the text leaves out makes it faster */
     const char *shade[2]; /* texts before that of the fog; NULL: none */
 } nb_program_kind;

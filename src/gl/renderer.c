@@ -26,7 +26,7 @@ static nebel_result check_context(const nb_context *context, const nebel_log *lo
     if (!context->es || context->version >= 32 || epoxy_has_gl_extension("GL_EXT_color_buffer_float")) return NEBEL_OK;
     return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
                    "OpenGL ES: the driver (%s) does not draw into textures of floats (GL_EXT_color_buffer_float); use "
-                   "OpenGL, or a newer driver",
+                   "OpenGL, a newer driver, or the CPU renderer",
                    (const char *)glGetString(GL_RENDERER));
 }
 
@@ -102,12 +102,15 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
         nb_lamps_delete(&r->lamps);
         nb_targets_delete(&r->targets);
         nb_particles_delete(&r->particles);
+        nb_environment_delete(&r->environment);
+        nb_gl_air_delete(&r->air);
         glDeleteVertexArrays(1, &r->vertex_array);
     }
     nebel_destroy_gl(r->eye_fog);
     nebel_destroy_gl(r->sun_fog);
     nebel_destroy_gl(r->sun_cloud);
     nebel_release_snapshot(r->cloud);
+    nebel_release_snapshot(r->environment.of);
     nebel_release_snapshot(r->fog);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
@@ -123,6 +126,7 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *r, nebel_snapshot *fog
     if (fog != NULL) nebel_retain_snapshot(fog);
     nebel_release_snapshot(r->fog);
     r->fog = fog;
+    r->has_judged_particles = 0;
     return NEBEL_OK;
 }
 
@@ -136,11 +140,45 @@ nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *r, const nebel_p
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
                        "particles: OpenGL ES without GL_EXT_float_blend cannot blend light; use OpenGL");
     }
+    r->has_judged_particles = 0;
     const nebel_result result = nb_particles_set(&r->particles, &r->allocator, &r->log, particles, count);
     if (result != NEBEL_OK) return result;
     nebel_release_snapshot(r->cloud);
     r->cloud = NULL;
     return result;
+}
+
+/* Whether particles should take light of lamps, which reaches surfaces and fog. */
+static int dim_lamps(const nebel_gl_renderer *r)
+{
+    static const double any[3] = {0, 1, 0}, low[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL},
+                        high[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+    double fog_low[3], fog_high[3];
+    const int are_lit =
+        r->scene->lamp_count > 0 || (r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, fog_low, fog_high));
+    return are_lit && nb_particles_shade(&r->particles, any, low, high);
+}
+
+static int shade_sunlit_fog(const nebel_gl_renderer *r)
+{
+    nebel_sunlit_fog lit;
+    return r->fog != NULL && nebel_snapshot_sunlit_fog(r->fog, &lit) &&
+           nb_particles_shade(&r->particles, lit.direction, lit.min, lit.max);
+}
+
+void nb_renderer_judge_particles(nebel_gl_renderer *r)
+{
+    if (r->has_judged_particles) return;
+    r->has_judged_particles = 1;
+    const int lamps = dim_lamps(r), sun = shade_sunlit_fog(r);
+    if (!lamps && !sun) return;
+    (void)nb_fail(&r->log, NEBEL_OK,
+                  "warning: frame: what is in the shadow of particles is too bright: OpenGL lets them take no light "
+                  "%s. The CPU renderer "
+                  "(--device cpu) does, and OpenGL where they are volumes among the fog",
+                  !lamps ? "of the sun from fog"
+                  : sun  ? "of lamps, nor of the sun from fog"
+                         : "of lamps");
 }
 
 /* ---- results --------------------------------------------------------------------------------- */

@@ -2,7 +2,9 @@
 #ifndef NB_GL_RENDERER_H
 #define NB_GL_RENDERER_H
 
+#include "air.h"
 #include "camera.h"
+#include "environment.h"
 #include "lamps.h"
 #include "meshes.h"
 #include "particles.h"
@@ -28,9 +30,16 @@ struct nebel_gl_renderer {
     nb_shadows shadows;
     nb_shafts shafts;
     nb_lamps lamps;
+    nb_environment environment; /* of the scene, for surfaces and the background */
+    nb_gl_air air;
     nb_targets targets;
     nb_particles particles;
+    int has_judged_particles; /* whether they should take light that they do not take, and said so */
     int has_frame;
 };
+
+/* Particles are asked for no light in fog, nor for that of lamps: tells the log where they should be, once for each fog
+ * and cloud. */
+void nb_renderer_judge_particles(nebel_gl_renderer *renderer);
 
 #endif

@@ -1,5 +1,7 @@
 #include "scene_state.h"
 
+#include "shading.h"
+
 /* Which contexts know a switch. */
 typedef enum nb_known { EVERYWHERE, DESKTOP, FIXED_INDEX } nb_known;
 
@@ -13,7 +15,8 @@ static const struct {
 };
 enum { SWITCHES = sizeof switches / sizeof *switches, FIRST_UNIT = NB_STATE_UNITS };
 
-static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE8, GL_TEXTURE10, GL_TEXTURE12};
+static const GLenum array_units[NB_SCENE_ARRAYS] = {GL_TEXTURE0 + NB_UNIT_SHADOWS, GL_TEXTURE0 + NB_UNIT_VEIL,
+                                                    GL_TEXTURE0 + NB_UNIT_LAMP_MAPS};
 
 /* The last two are of OpenGL alone. */
 static const GLenum pack_names[NB_SCENE_PACK] = {GL_PACK_ALIGNMENT,   GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,

@@ -1,5 +1,6 @@
 #include "shading.h"
 
+#include "air_text.h"
 #include "corners.h"
 #include "lamps.h"
 #include "panorama.h"
@@ -10,6 +11,8 @@
 #include <epoxy/gl.h>
 #include <stdio.h>
 
+_Static_assert((int)NB_SCENE_UNIT_END <= (int)NB_UNIT_AIR, "no unit is two");
+
 /* ---- surfaces ------------------------------------------------------------------------------------------------------
  * Positions are relative to the eye. The distance of a surface is where the ray of the pixel's centre meets the plane
  * of the triangle, which the last vertex of each triangle brings: interpolation between far corners would be off by
@@ -19,6 +22,8 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "layout(location = 1) in vec3 mesh_normal;\n"
                                           "layout(location = 2) in vec2 mesh_uv;\n"
                                           "layout(location = 3) in vec3 mesh_face;\n"
+                                          "layout(location = 5) in vec3 mesh_edge_a;\n"
+                                          "layout(location = 6) in vec3 mesh_edge_b;\n"
                                           "uniform mat4 scene_clip;\n"
                                           "uniform vec3 scene_offset;\n"
                                           "out vec3 surface_place;\n"
@@ -27,9 +32,12 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "out vec2 surface_uv;\n"
                                           "flat out vec3 surface_corner;\n"
                                           "flat out vec3 surface_face;\n"
+                                          "flat out vec3 surface_edge_a, surface_edge_b;\n"
                                           "void main()\n"
                                           "{\n"
                                           "    surface_place = surface_corner = mesh_position + scene_offset;\n"
+                                          "    surface_edge_a = mesh_edge_a;\n"
+                                          "    surface_edge_b = mesh_edge_b;\n"
                                           "    surface_normal = mesh_normal;\n"
                                           "    surface_support = dot(surface_place, mesh_normal);\n"
                                           "    surface_uv = mesh_uv;\n"
@@ -75,17 +83,32 @@ static const char distance_text[] =
 static const char attributes_text[] = "in vec3 surface_normal;\n"
                                       "in float surface_support;\n"
                                       "in vec2 surface_uv;\n"
+                                      "flat in vec3 surface_edge_a, surface_edge_b;\n"
                                       "bool surface_is_met(vec3 direction) { return true; }\n";
 
-/* surface_rise: how far the round surface that the normals stand for lies above the triangle, as height_of_tangents of
+/* rise: how far the round surface that the normals stand for lies above the triangle, as height_of_tangents of
  * the CPU renderer has it: sum w_i V_i . N_i, which is surface_support, less P . sum w_i N_i. */
 static const char surface_fragment_text[] =
     "uniform vec3 scene_color;\n"
     "uniform bool scene_has_texture;\n"
     "uniform highp sampler2D scene_texture;\n"
+    "uniform vec3 scene_sun;\n" /* 0: none */
     "layout(location = 0) out vec4 out_place;\n"
     "layout(location = 1) out vec4 out_normal;\n"
     "layout(location = 2) out vec4 out_reflectance;\n"
+    /* Whether the way to the sun from the round surface above a place (from the last corner) meets the triangle itself,
+       which is too near for a shadow map. Where the round surface is none it does at once; a triangle with holes is left
+       to the map. */
+    "bool shades_itself(vec3 place, vec3 normal, float rise, vec3 side)\n"
+    "{\n"
+    "    float lean = dot(side, scene_sun);\n"
+    "    if (lean > 0.0 || !(dot(normal, scene_sun) > 0.0)) return false;\n"
+    "    if (!(rise > 1e-6 * length(surface_place))) return true;\n"
+    "    if (scene_cutoff > 0.0) return false;\n"
+    "    vec3 met = place + rise * (normal + scene_sun * (dot(side, normal) / max(-lean, 1e-9)));\n"
+    "    float a = dot(cross(met, surface_edge_b), surface_face), b = dot(cross(surface_edge_a, met), surface_face);\n"
+    "    return a >= 0.0 && b >= 0.0 && a + b <= dot(cross(surface_edge_a, surface_edge_b), surface_face);\n"
+    "}\n"
     "void main()\n"
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
@@ -97,11 +120,12 @@ static const char surface_fragment_text[] =
     "    bool is_smooth = size > 1e-12 && size < 1e12;\n"
     "    float turn = is_smooth && dot(surface_normal, side) < 0.0 ? -1.0 : 1.0;\n"
     "    vec3 normal = is_smooth ? surface_normal * (turn * inversesqrt(size)) : side;\n"
-    "    float rise = turn * (surface_support - dot(surface_place, surface_normal));\n"
+    "    float rise = is_smooth ? max(turn * (surface_support - dot(surface_place, surface_normal)), 0.0) : 0.0;\n"
+    "    if (shades_itself(origin + t * direction - surface_corner, normal, rise, side)) rise = -1.0;\n"
     "    vec3 reflectance = scene_color;\n"
     "    if (scene_has_texture) reflectance *= textureLod(scene_texture, surface_uv, 0.0).rgb;\n"
     "    out_place = vec4(t, side);\n"
-    "    out_normal = vec4(normal, is_smooth ? max(rise, 0.0) : 0.0);\n"
+    "    out_normal = vec4(normal, rise);\n"
     "    out_reflectance = vec4(reflectance, 0.0);\n"
     "    gl_FragDepth = 1.0 / (1.0 + t);\n"
     "}\n";
@@ -225,7 +249,7 @@ static const char round_surface_text[] =
     "#else\n"
     "flat in mat3 corners_normal;\n"
     "flat in mat3x2 corners_uv;\n"
-    "vec3 surface_normal;\n"
+    "vec3 surface_normal, surface_edge_a, surface_edge_b;\n"
     "float surface_support;\n"
     "vec2 surface_uv;\n"
     "#endif\n"
@@ -250,6 +274,8 @@ static const char round_surface_text[] =
     "#ifdef SCENE_VERTEX_FOG\n"
     "    surface_fog = corners_fog * weights;\n"
     "#else\n"
+    "    surface_edge_a = corners_place[0] - surface_corner;\n"
+    "    surface_edge_b = corners_place[1] - surface_corner;\n"
     "    surface_normal = corners_normal * weights;\n"
     "    surface_support = dot(weights, vec3(dot(corners_place[0], corners_normal[0]),\n"
     "        dot(corners_place[1], corners_normal[1]), dot(corners_place[2], corners_normal[2])));\n"
@@ -302,7 +328,7 @@ static const char shadow_text[] =
     "float shadow_tap(int map, ivec2 texel, float height)\n"
     "{\n"
     "    float depth = texelFetch(scene_shadows, ivec3(texel, map), 0).x;\n"
-    "    return mix(map_heights.y, map_heights.x, depth) <= height ? 1.0 : 0.0;\n"
+    "    return depth == 1.0 || mix(map_heights.y, map_heights.x, depth) <= height ? 1.0 : 0.0;\n"
     "}\n"
     "float shadow_filter(int map, vec2 place, float height, vec2 slope)\n"
     "{\n"
@@ -323,7 +349,7 @@ static const char shadow_text[] =
     "float shadow(vec3 at, vec3 side, float t)\n"
     "{\n"
     "    vec3 leaning = scene_light * side;\n"
-    "    vec2 slope = -leaning.xy / max(leaning.z, 0.05);\n"
+    "    vec2 slope = -leaning.xy / max(leaning.z, 0.01);\n"
     "    for (int map = 0; map < NB_CASCADES; map++) {\n"
     "        vec2 place = (at.xy - map_places[map].xy) * map_places[map].zw;\n"
     "        bool inside = all(greaterThan(place, vec2(1.0))) && all(lessThan(place, vec2(map_size - 1.0)));\n"
@@ -383,27 +409,40 @@ static const char light_text[] =
     "#endif\n"
     "uniform highp sampler2DArray scene_veil;\n"
     "uniform vec3 scene_background;\n"
+    "#ifdef NEBEL_ENVIRONMENT\n" /* the scene's, whatever lights the fog: that is asked for transmittance alone */
+    "uniform bool scene_shows_ambient;\n"
+    "vec3 background(vec3 direction)\n"
+    "{\n"
+    "    return scene_shows_ambient ? nebel_environment_radiance(direction) : scene_background;\n"
+    "}\n"
+    "vec3 ambient(vec3 normal) { return nebel_environment_reflected(normal); }\n"
+    "#else\n"
     "uniform vec3 scene_ambient;\n"
-    "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun */
+    "vec3 background(vec3 direction) { return scene_background; }\n"
+    "vec3 ambient(vec3 normal) { return scene_ambient; }\n"
+    "#endif\n"
+    "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun, before shadows and fog */
     "uniform float scene_share;\n"   /* of this sample */
     "layout(location = 0) out highp vec4 out_color;\n"
     "layout(location = 1) out highp vec4 out_transmittance;\n"
     "layout(location = 2) out highp vec4 out_in_scattering;\n"
     "layout(location = 3) out highp vec4 out_surface;\n"
-    /* Triangles that face away from the sun where their normals do not would shade themselves: the round surface that
-       the normals stand for is looked up in their place. */
-    "vec3 sunlight(vec3 place, vec3 normal, float rise, vec3 side, float t)\n"
+    /* Triangles that face away from the sun where their normals do not are lit as the round surface that the normals
+       stand for, unless they shade it themselves (rise -1). */
+    "vec3 sunlight(vec3 place, vec3 normal, float rise, vec3 side, float t, vec3 shining)\n"
     "{\n"
-    "#ifndef SCENE_SUNLIT\n"
+    "#if !defined(SCENE_SUNLIT) && !defined(NEBEL_AIR)\n"
     "    return vec3(0.0);\n"
     "#else\n"
     "    float cosine = dot(normal, scene_sun);\n"
-    "    if (!(cosine > 0.0)) return vec3(0.0);\n"
+    "    if (!(cosine > 0.0 && rise >= 0.0)) return vec3(0.0);\n"
     "    bool away = !(dot(side, scene_sun) > 0.0);\n"
     "    vec3 at = scene_light * (away ? place + rise * normal : place);\n"
-    "    float visible = shadow(at, away ? normal : side, t);\n"
-    "    if (!(visible > 0.0)) return vec3(0.0);\n"
-    "    vec3 light = visible * cosine * scene_sunlight * sun_transmittance(place, at.xy);\n"
+    "#ifdef SCENE_SUNLIT\n"
+    "    shining *= shadow(at, away ? normal : side, t);\n"
+    "    if (shining == vec3(0.0)) return vec3(0.0);\n"
+    "#endif\n"
+    "    vec3 light = cosine * shining * sun_transmittance(place, at.xy);\n"
     "#ifdef SCENE_DIMMED\n"
     "    light *= texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).rgb;\n"
     "#endif\n"
@@ -443,14 +482,24 @@ static const char light_text[] =
     "#endif\n"
     "    see_through_veil(texel, transmittance, in_scattering);\n"
     "    vec4 normal = texelFetch(scene_normal, texel, 0);\n"
-    "    vec3 surface = scene_background;\n"
-    "    if (place.x > 0.0) {\n"
-    "        vec3 at = ray_origin(gl_FragCoord.xy) + place.x * ray_direction(gl_FragCoord.xy);\n"
-    "        vec3 light = scene_ambient + sunlight(at, normal.xyz, normal.w, place.yzw, place.x);\n"
+    "    vec3 direction = ray_direction(gl_FragCoord.xy), surface;\n"
+    "    if (!(place.x > 0.0)) {\n"
+    "        surface = background(direction);\n"
+    "#ifdef NEBEL_AIR\n"
+    "        surface += sun_disc(direction, gl_FragCoord.xy);\n"
+    "#endif\n"
+    "    } else {\n"
+    "        vec3 at = ray_origin(gl_FragCoord.xy) + place.x * direction;\n"
+    "        vec4 reflectance = texelFetch(scene_reflectance, texel, 0);\n"
+    "        vec3 light = ambient(normal.xyz), shining = scene_sunlight;\n"
+    "#ifdef NEBEL_AIR\n"
+    "        if (reflectance.a > 0.5) light_ground(direction, light, shining);\n"
+    "#endif\n"
+    "        light += sunlight(at, normal.xyz, normal.w, place.yzw, place.x, shining);\n"
     "#ifdef SCENE_LAMPLIT\n"
     "        light += lamplight(at, normal.xyz, place.yzw);\n"
     "#endif\n"
-    "        surface = texelFetch(scene_reflectance, texel, 0).rgb * light;\n"
+    "        surface = reflectance.rgb * light;\n"
     "    }\n"
     "    float hit = place.x > 0.0 ? scene_share : 0.0;\n"
     "    out_color = vec4(scene_share * (transmittance * surface + in_scattering), hit);\n"
@@ -562,6 +611,22 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
     return NEBEL_OK;
 }
 
+nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
+{
+    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : ray_text;
+    const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
+    const nb_texts vertex = {{version, light_vertex_text}, 2};
+    const nb_texts fragment = {
+        {version, "#define NEBEL_AIR\n", precision_of(context), fog, words_text, ray, nb_air_ground_text}, 7};
+    unsigned *const name = panorama ? &shading->round_ground : &shading->ground;
+    if (*name != 0) return NEBEL_OK;
+    const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
+    if (result != NEBEL_OK) return result;
+    glUseProgram(*name);
+    set_unit(*name, "nebel_air_texture", NB_UNIT_AIR);
+    return NEBEL_OK;
+}
+
 /* A program of panoramas' surfaces; what it looks up is on `unit`. */
 static nebel_result make_round(const nb_context *context, const nebel_log *log, const char *option,
                                const char *fragment_text, const char *sampler, int unit, unsigned *name)
@@ -594,7 +659,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
     char limits[128];
     (void)snprintf(
         text, size,
-        "%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
+        "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
         "%d\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
@@ -602,8 +667,11 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lamplit ? "#define SCENE_LAMPLIT\n" : "",
         kind->panorama ? "#define SCENE_PANORAMA\n" : "", kind->of_particles ? "#define NEBEL_TRANSPARENT\n" : "",
         kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
-        (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "", kind->of_particles,
-        kind->veil_layers, NB_CASCADES, (unsigned)kind->features, precision_of(context));
+        (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
+        (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
+        kind->environment || (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
+        kind->air ? "#define NEBEL_AIR\n" : "", kind->of_particles, kind->veil_layers, NB_CASCADES,
+        (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -614,6 +682,8 @@ static void set_units(unsigned program)
     set_unit(program, "nebel_fog_texture", NB_UNIT_FOG);
     set_unit(program, "nebel_tile_texture", NB_UNIT_TILES);
     set_unit(program, "nebel_voxel_texture", NB_UNIT_VOXELS);
+    set_unit(program, "nebel_node_texture", NB_UNIT_NODES);
+    set_unit(program, "nebel_environment_texture", NB_UNIT_ENVIRONMENT);
     set_unit(program, "scene_place", NB_UNIT_PLACE);
     set_unit(program, "scene_depth", NB_UNIT_PLACE);
     set_unit(program, "scene_normal", NB_UNIT_NORMAL);
@@ -625,6 +695,7 @@ static void set_units(unsigned program)
     set_unit(program, "scene_veil", NB_UNIT_VEIL);
     set_unit(program, "scene_lamps", NB_UNIT_LAMPS);
     set_unit(program, "lamp_maps", NB_UNIT_LAMP_MAPS);
+    set_unit(program, "nebel_air_texture", NB_UNIT_AIR);
 }
 
 static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kind)
@@ -638,14 +709,15 @@ static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kin
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
                                unsigned *name)
 {
-    char head[768];
+    char head[1024];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts light = {{head, kind->has_fog ? fog : "", words_text, ray, shadow_text, sun_text,
-                             kind->lamplit ? nb_lamp_map_text : "", kind->lamplit ? nb_lamp_text : "", light_text},
-                            9};
+    const nb_texts light = {{head, kind->has_fog || kind->environment || kind->air ? fog : "", words_text, ray,
+                             shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
+                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_light_text : "", light_text},
+                            10};
     const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,
                                 words_text, ray, tile, nb_particle_start_text, nb_particle_text},
@@ -663,10 +735,11 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
 static int is_same(const nb_light_kind *a, const nb_light_kind *b)
 {
     return a->of_particles == b->of_particles && a->of_dimming == b->of_dimming && a->dimmed == b->dimmed &&
-           a->sunlit == b->sunlit && a->lamplit == b->lamplit && a->five_taps == b->five_taps &&
-           a->veil_layers == b->veil_layers && a->panorama == b->panorama && a->has_surfaces == b->has_surfaces &&
-           a->in_fog == b->in_fog && a->has_fog == b->has_fog && a->shafts == b->shafts &&
-           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
+           a->sunlit == b->sunlit && a->environment == b->environment && a->lamplit == b->lamplit &&
+           a->five_taps == b->five_taps && a->veil_layers == b->veil_layers && a->panorama == b->panorama &&
+           a->has_surfaces == b->has_surfaces && a->in_fog == b->in_fog && a->has_fog == b->has_fog &&
+           a->shafts == b->shafts && a->air == b->air && a->in_texture == b->in_texture && a->tiled == b->tiled &&
+           a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,
@@ -697,6 +770,8 @@ void nb_shading_delete(const nb_shading *shading)
     glDeleteProgram(shading->round_vertex_fog);
     glDeleteProgram(shading->factor);
     glDeleteProgram(shading->round_factor);
+    glDeleteProgram(shading->ground);
+    glDeleteProgram(shading->round_ground);
     glDeleteProgram(shading->lamp_map);
     for (size_t i = 0; i < shading->light_count; i++) glDeleteProgram(shading->lights[i].name);
 }

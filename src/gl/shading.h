@@ -7,7 +7,7 @@
 
 /* Texture units of the samplers; the fog's are those of the passes. */
 enum {
-    NB_UNIT_PLACE = NB_UNIT_VOXELS + 1,
+    NB_UNIT_PLACE = NB_UNIT_ENVIRONMENT + 1,
     NB_UNIT_NORMAL,
     NB_UNIT_REFLECTANCE,
     NB_UNIT_IN_SCATTERING,
@@ -17,6 +17,7 @@ enum {
     NB_UNIT_VEIL,
     NB_UNIT_LAMPS,
     NB_UNIT_LAMP_MAPS,
+    NB_SCENE_UNIT_END,            /* at most NB_UNIT_AIR */
     NB_UNIT_MASK = NB_UNIT_NORMAL /* while surfaces are drawn nothing reads normals */
 };
 
@@ -31,12 +32,14 @@ typedef struct nb_light_kind {
     int sunlit;       /* surfaces are */
     int lamplit;      /* the same */
     int five_taps;    /* particles are discs, which are there or not */
+    int environment;  /* surfaces are lit by direction, and the background may be */
     int veil_layers;  /* that particles are drawn into, or surfaces are seen through; 0: there are none */
     int panorama;
     int has_surfaces; /* there are meshes */
     int in_fog;       /* that the pass, or vertices, made for all pixels */
     int has_fog;
     int shafts; /* surfaces shade fog */
+    int air;    /* of a planet, with its ground and sun */
     int in_texture, tiled;
     uint32_t features;
 } nb_light_kind;
@@ -50,6 +53,7 @@ typedef struct nb_shading {
     unsigned surface, survey, shadow;
     unsigned vertex_fog, round_surface, round_vertex_fog; /* 0 until they are needed; round: of panoramas */
     unsigned factor, round_factor;
+    unsigned ground, round_ground;
     unsigned lamp_map;
     nb_light_program *lights;
     size_t light_count, light_capacity;
@@ -72,6 +76,9 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
 
 /* Surfaces of panoramas, and the fog that vertices bring to them. */
 nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog);
+
+/* The ground of a planet. */
+nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama);
 
 /* In OpenGL. */
 void nb_shading_delete(const nb_shading *shading);

@@ -23,6 +23,7 @@ typedef struct survey {
     uint32_t width, height; /* pixels */
     double nearest, farthest;
     rectangle seen[NB_CASCADES];
+    double low[3], high[3]; /* a box around the fog that the sun lights, relative to the eye */
 } survey;
 
 static rectangle nothing(void)
@@ -38,6 +39,23 @@ static void include(rectangle *r, const double at[2])
     }
 }
 
+static void clip(rectangle *r, const rectangle *to)
+{
+    for (int i = 0; i < 2; i++) {
+        r->low[i] = fmax(r->low[i], to->low[i]);
+        r->high[i] = fmin(r->high[i], to->high[i]);
+    }
+}
+
+static void use_axes(nb_shadows *shadows, const double sun[3])
+{
+    for (int i = 0; i < 3; i++) {
+        shadows->light[3 * i] = (float)shadows->across[0][i];
+        shadows->light[3 * i + 1] = (float)shadows->across[1][i];
+        shadows->light[3 * i + 2] = (float)sun[i];
+    }
+}
+
 void nb_shadows_turn(nb_shadows *shadows, const double sun[3])
 {
     double axis[3] = {0, 0, 0};
@@ -49,11 +67,42 @@ void nb_shadows_turn(nb_shadows *shadows, const double sun[3])
     nb_vector_cross(axis, sun, shadows->across[0]);
     (void)nb_vector_make_unit(shadows->across[0]);
     nb_vector_cross(shadows->across[0], sun, shadows->across[1]);
+    use_axes(shadows, sun);
+}
+
+/* The middle of the widest gap between angles, of which a quarter of a circle more is the same. */
+static double widest_gap(double angles[3])
+{
+    static const double quarter = 1.5707963267948966;
+    double middle = 0, widest = 0;
     for (int i = 0; i < 3; i++) {
-        shadows->light[3 * i] = (float)shadows->across[0][i];
-        shadows->light[3 * i + 1] = (float)shadows->across[1][i];
-        shadows->light[3 * i + 2] = (float)sun[i];
+        double gap = quarter;
+        for (int k = 0; k < 3; k++) {
+            const double apart = angles[k] - angles[i], ahead = apart - quarter * floor(apart / quarter);
+            if (k != i && ahead < gap && ahead > 0) gap = ahead;
+        }
+        if (gap > widest) {
+            widest = gap;
+            middle = angles[i] + .5 * gap;
+        }
     }
+    return middle;
+}
+
+void nb_shadows_turn_fog(nb_shadows *shadows, const double sun[3])
+{
+    double angles[3], turned[2][3];
+    nb_shadows_turn(shadows, sun);
+    for (int i = 0; i < 3; i++) angles[i] = atan2(shadows->across[1][i], shadows->across[0][i]);
+    const double turn = widest_gap(angles);
+    for (int i = 0; i < 3; i++) {
+        turned[0][i] = cos(turn) * shadows->across[0][i] + sin(turn) * shadows->across[1][i];
+        turned[1][i] = cos(turn) * shadows->across[1][i] - sin(turn) * shadows->across[0][i];
+    }
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < 3; i++) shadows->across[k][i] = turned[k][i];
+    }
+    use_axes(shadows, sun);
 }
 
 static void find_distances(survey *s)
@@ -216,7 +265,7 @@ static void lay_map(nb_shadows *shadows, const survey *s, int map, const rectang
 {
     enum { BORDER = 4 };
     const rectangle r = *seen;
-    if (r.low[0] > r.high[0]) {
+    if (!(r.low[0] <= r.high[0] && r.low[1] <= r.high[1])) {
         shadows->ends[map] = 0;
         return;
     }
@@ -264,6 +313,25 @@ static void find_heights(nb_shadows *shadows, const double eye[3], const nb_mesh
     shadows->rounding = (float)(0x1p-20 * farthest);
     shadows->low = (float)low - shadows->rounding;
     shadows->high = (float)high + shadows->rounding;
+}
+
+/* Of ground the maps cover what lies in the way of the sun's light past all that casts shadows, and are shared out over the
+ * distances of that. */
+static void leave_ground(const nb_shadows *shadows, survey *s, const double eye[3], const nb_meshes *meshes)
+{
+    const rectangle all = casting(shadows, eye, meshes);
+    for (int k = 0; k < NB_CASCADES && shadows->sees_ground; k++) clip(&s->seen[k], &all);
+}
+
+/* The same for distances. */
+static void bound_distances(const nb_shadows *shadows, survey *s, const double eye[3], const nb_meshes *meshes)
+{
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        const double way = fmax(fabs(meshes->low[i] - eye[i]), fabs(meshes->high[i] - eye[i]));
+        square += way * way;
+    }
+    if (shadows->sees_ground) s->farthest = fmax(s->nearest, fmin(s->farthest, 4 * sqrt(square)));
 }
 
 static void draw_survey(const nb_context *context, unsigned program, const nb_targets *targets)
@@ -314,44 +382,18 @@ nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, cons
     s.blocks = shadows->blocks;
     find_distances(&s);
     if (!(s.farthest > 0)) return NEBEL_OK;
+    bound_distances(shadows, &s, rays->eye, meshes);
     set_ends(shadows, &s);
     find_rectangles(shadows, &s);
+    leave_ground(shadows, &s, rays->eye, meshes);
     for (int k = 0; k < NB_CASCADES; k++) lay_map(shadows, &s, k, &s.seen[k]);
     find_heights(shadows, rays->eye, meshes);
     return NEBEL_OK;
 }
 
-static void clip(rectangle *r, const rectangle *to)
-{
-    for (int i = 0; i < 2; i++) {
-        r->low[i] = fmax(r->low[i], to->low[i]);
-        r->high[i] = fmin(r->high[i], to->high[i]);
-    }
-}
-
 static int is_empty(const rectangle *r)
 {
     return !(r->low[0] <= r->high[0] && r->low[1] <= r->high[1]);
-}
-
-/* Of all places before the surfaces of the blocks, those within a rectangle. Where a block has pixels without surface,
- * rays go on to `reach`. */
-static rectangle places_before(const nb_shadows *shadows, const survey *s, double reach, const rectangle *within)
-{
-    rectangle all = nothing();
-    for (uint32_t row = 0; row < s->rows; row++) {
-        for (uint32_t column = 0; column < s->columns; column++) {
-            const float *const block = s->blocks + 4 * ((size_t)row * s->columns + column);
-            const extent e = block_extent(s, column, row);
-            rectangle r = nothing();
-            include_block(shadows, s, &e, 0, block[2] > 0 ? reach : (double)block[1], &r);
-            clip(&r, within);
-            if (is_empty(&r)) continue;
-            include(&all, r.low);
-            include(&all, r.high);
-        }
-    }
-    return all;
 }
 
 /* How far from the eye across the light, at least and at most. */
@@ -366,20 +408,94 @@ static void find_radii(const rectangle *r, double *nearest, double *farthest)
     *farthest = hypot(far[0], far[1]);
 }
 
+typedef struct range {
+    double low, high;
+} range;
+
+/* Leaves of the distances t those where low <= origin + t way <= high may hold. */
+static void clip_distances(range origin, range way, double low, double high, range *t)
+{
+    const double rise[2] = {way.high, -way.low}, over[2] = {origin.high - low, high - origin.low};
+    for (int i = 0; i < 2; i++) {
+        if (rise[i] > 0) t->low = fmax(t->low, -over[i] / rise[i]);
+        if (rise[i] < 0) t->high = fmin(t->high, -over[i] / rise[i]);
+        if (rise[i] == 0 && over[i] < 0) t->high = -HUGE_VAL;
+    }
+}
+
+static range range_of(const double corners[4][3], int axis)
+{
+    range r = {corners[0][axis], corners[0][axis]};
+    for (int i = 1; i < 4; i++) {
+        r.low = fmin(r.low, corners[i][axis]);
+        r.high = fmax(r.high, corners[i][axis]);
+    }
+    return r;
+}
+
+/* Leaves of the distances those where the rays of a block may be in sunlit fog. */
+static void clip_to_fog(const survey *s, const extent *e, range *t)
+{
+    if (s->panorama) {
+        double middle[3];
+        nb_panorama_direction(s->rays, .5 * (e->left + e->right), .5 * (e->low + e->high), middle);
+        const double most = 2 * sin(.5 * fmin(opening_of(s, e, middle), 3.1415926535897932));
+        for (int i = 0; i < 3; i++)
+            clip_distances((range){0, 0}, (range){middle[i] - most, middle[i] + most}, s->low[i], s->high[i], t);
+        return;
+    }
+    const beam b = make_beam(s, e);
+    range steps = {t->low / b.most_size, t->high / b.least_size};
+    for (int i = 0; i < 3; i++)
+        clip_distances(range_of(b.origin, i), range_of(b.way, i), s->low[i], s->high[i], &steps);
+    *t = (range){fmax(t->low, steps.low * b.least_size), fmin(t->high, steps.high * b.most_size)};
+}
+
+/* Places, and how near to the eye and how far from it they are across the light. */
+typedef struct region {
+    rectangle around;
+    double nearest, farthest;
+} region;
+
+/* Of all places in sunlit fog before the surfaces of the blocks, those within a rectangle. Where a block has pixels
+ * without surface, rays go on to `reach`. */
+static region places_before(const nb_shadows *shadows, const survey *s, double reach, const rectangle *within)
+{
+    region all = {.around = nothing(), .nearest = HUGE_VAL};
+    for (uint32_t row = 0; row < s->rows; row++) {
+        for (uint32_t column = 0; column < s->columns; column++) {
+            const float *const block = s->blocks + 4 * ((size_t)row * s->columns + column);
+            const extent e = block_extent(s, column, row);
+            rectangle r = nothing();
+            double nearest, farthest;
+            range t = {0, block[2] > 0 ? reach : (double)block[1]};
+            clip_to_fog(s, &e, &t);
+            if (!(t.low <= t.high)) continue;
+            include_block(shadows, s, &e, t.low, t.high, &r);
+            clip(&r, within);
+            if (is_empty(&r)) continue;
+            find_radii(&r, &nearest, &farthest);
+            all.nearest = fmin(all.nearest, nearest);
+            all.farthest = fmax(all.farthest, farthest);
+            include(&all.around, r.low);
+            include(&all.around, r.high);
+        }
+    }
+    return all;
+}
+
 /* Rays from the eye go away from it across the light. What a texel is off along a ray is in proportion to the way there
  * where texels are in proportion to the distance across: each map is a square around the eye, its side a multiple of the
  * one before. */
-static void lay_squares(nb_shadows *shadows, const survey *s, double reach, const rectangle *seen)
+static void lay_squares(nb_shadows *shadows, const survey *s, double reach, const region *seen)
 {
     static const double most_ratio = 4096;
-    double nearest, farthest;
-    find_radii(seen, &nearest, &farthest);
-    nearest = fmax(nearest, farthest / most_ratio);
+    const double farthest = seen->farthest, nearest = fmax(seen->nearest, farthest / most_ratio);
     for (int k = 0; k < shadows->count; k++) {
         const double side = nearest * pow(farthest / nearest, (k + 1.) / shadows->count);
         rectangle square = {{-side, -side}, {side, side}};
-        clip(&square, seen);
-        square = places_before(shadows, s, reach, &square);
+        clip(&square, &seen->around);
+        square = places_before(shadows, s, reach, &square).around;
         lay_map(shadows, s, k, &square);
     }
 }
@@ -410,7 +526,7 @@ static int are_parallel(const survey *s)
 }
 
 void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const nb_targets *targets,
-                        const nebel_rays *rays, int panorama, const nb_meshes *meshes)
+                        const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog)
 {
     static const double longest = 1000; /* times the way across: of rays nearly along the light */
     survey s = {.rays = rays,
@@ -420,16 +536,20 @@ void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const n
                 .rows = targets->survey_height,
                 .width = targets->width,
                 .height = targets->height};
+    for (int i = 0; i < 3; i++) {
+        s.low[i] = fog->min[i] - rays->eye[i];
+        s.high[i] = fog->max[i] - rays->eye[i];
+    }
     const rectangle all = casting(shadows, rays->eye, meshes);
     double nearest;
     find_radii(&all, &nearest, &s.farthest);
     const double reach = longest * s.farthest;
-    const rectangle seen = places_before(shadows, &s, reach, &all);
-    for (int k = 0; k < shadows->count; k++) shadows->ends[k] = is_empty(&seen) ? 0 : 1;
+    const region seen = places_before(shadows, &s, reach, &all);
+    for (int k = 0; k < shadows->count; k++) shadows->ends[k] = is_empty(&seen.around) ? 0 : 1;
     find_heights(shadows, rays->eye, meshes);
-    if (is_empty(&seen)) return;
+    if (is_empty(&seen.around)) return;
     if (are_parallel(&s)) {
-        lay_tiles(shadows, &s, &seen);
+        lay_tiles(shadows, &s, &seen.around);
     } else {
         lay_squares(shadows, &s, reach, &seen);
     }

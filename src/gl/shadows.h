@@ -21,10 +21,15 @@ typedef struct nb_shadows {
     float *blocks;                    /* the survey, read back */
     size_t capacity;
     int leaning; /* depths are those of the farthest corners of texels, so that what leans does not shade the air above it */
+    int sees_ground; /* which casts no shadow, and may reach far beyond all that does */
 } nb_shadows;
 
 /* The axes of a sun in this direction. */
 void nb_shadows_turn(nb_shadows *shadows, const double sun[3]);
+
+/* The same, turned so that no axis of the world lies along texels: the border of the shadow of what is upright would be off by
+ * half a texel all along. Askew it is off to both sides in turns, which along a ray cancel. */
+void nb_shadows_turn_fog(nb_shadows *shadows, const double sun[3]);
 
 /* Surveys the surfaces of targets, whose pixels have these rays, and lays the maps. `program` is that of the survey;
  * the current vertex array has no attributes that matter. What is read back, and waited for, is a 64th of the picture.
@@ -33,9 +38,9 @@ nebel_result nb_shadows_fit(nb_shadows *shadows, const nb_context *context, cons
                             const nebel_log *log, unsigned program, const nb_targets *targets, const nebel_rays *rays,
                             int panorama, const nb_meshes *meshes);
 
-/* Lays the maps around all places before those surfaces where shadows may be. */
+/* Lays the maps around all places before those surfaces where shadows may be in the fog. */
 void nb_shadows_fit_fog(nb_shadows *shadows, const nb_shadows *surfaces, const nb_targets *targets,
-                        const nebel_rays *rays, int panorama, const nb_meshes *meshes);
+                        const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog);
 
 /* Draws the maps. Depth is tested afterwards. MEMORY, UNSUPPORTED. */
 nebel_result nb_shadows_draw(nb_shadows *shadows, const nb_context *context, const nebel_log *log, unsigned program,

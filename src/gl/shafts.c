@@ -188,11 +188,11 @@ static nebel_result make(nb_shafts *shafts, const nb_context *context, const neb
 
 nebel_result nb_shafts_draw(nb_shafts *shafts, const nb_context *context, const nebel_log *log, unsigned program,
                             unsigned vertex_array, const nb_shadows *surfaces, const nb_targets *targets,
-                            const nebel_rays *rays, int panorama, const nb_meshes *meshes)
+                            const nebel_rays *rays, int panorama, const nb_meshes *meshes, const nebel_sunlit_fog *fog)
 {
     nebel_result result = make(shafts, context, log);
     if (result != NEBEL_OK) return result;
-    nb_shadows_fit_fog(&shafts->maps, surfaces, targets, rays, panorama, meshes);
+    nb_shadows_fit_fog(&shafts->maps, surfaces, targets, rays, panorama, meshes, fog);
     result = nb_shadows_draw(&shafts->maps, context, log, program, meshes, rays->eye);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, shafts->buffer);

@@ -125,7 +125,9 @@ static void save_masks(const nb_context *c, nb_state *s)
 {
     for (GLuint i = 0; i < NB_STATE_BUFFERS; i++) {
         if (c->switches_by_buffer) {
-            glGetBooleani_v(GL_COLOR_WRITEMASK, i, s->mask[i]);
+            GLint mask[4];
+            glGetIntegeri_v(GL_COLOR_WRITEMASK, i, mask); /* OpenGL ES 3.0 has no glGetBooleani_v */
+            for (int k = 0; k < 4; k++) s->mask[i][k] = mask[k] != 0;
         } else {
             glGetBooleanv(GL_COLOR_WRITEMASK, s->mask[i]);
         }

@@ -6,7 +6,7 @@
 
 #include <epoxy/gl.h>
 
-enum { NB_STATE_UNITS = 5, NB_STATE_BUFFERS = 4, NB_STATE_UNPACK = 6, NB_STATE_BLENDING = 6 };
+enum { NB_STATE_UNITS = 7, NB_STATE_BUFFERS = 4, NB_STATE_UNPACK = 6, NB_STATE_BLENDING = 6 };
 
 typedef struct nb_unit {
     GLint texture, multisample, sampler;

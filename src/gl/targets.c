@@ -45,7 +45,9 @@ static int make_buffers(nb_targets *t)
 
 static nebel_result refuse_floats(const nebel_log *log)
 {
-    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED, "OpenGL: the driver (%s) does not draw into textures of floats",
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                   "OpenGL: the driver (%s) does not draw into textures of floats of 32 bits; "
+                   "update it, or take Mesa's software (LIBGL_ALWAYS_SOFTWARE=1) or the CPU renderer",
                    (const char *)glGetString(GL_RENDERER));
 }
 

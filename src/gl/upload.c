@@ -2,6 +2,7 @@
 #include "gl.h"
 #include "panorama.h"
 #include "state.h"
+#include "words.h"
 
 #include <string.h>
 
@@ -109,8 +110,8 @@ static uint32_t fullest_tile(const nebel_gl *gl)
     return most;
 }
 
-/* So many overlapping volumes, of a density that varies, are walked in full. */
-enum { SURELY_WALKED = 40 };
+/* So many overlapping volumes are walked in full. */
+enum { SURELY_WALKED = 60 };
 
 static void warn_of_turns(nebel_gl *gl)
 {
@@ -119,28 +120,31 @@ static void warn_of_turns(nebel_gl *gl)
     gl->has_warned = 1;
     (void)nb_fail(
         &gl->log, NEBEL_OK,
-        "nebel_gl_set_fog: a tile of the picture lists %u volumes of different light. This driver (%s) ends "
-        "long loops: where more than %d of them overlap on a ray, what lies behind may count as evenly mixed. "
-        "A graphics processor or the CPU renderer has no such bound",
+        "warning: nebel_gl_set_fog: a tile of the picture lists %u volumes of different light. This driver (%s) ends "
+        "long loops: where more than %d of them overlap on a ray, light behind them is summed in coarser steps, in "
+        "each "
+        "of which they count as evenly mixed. A graphics processor or the CPU renderer has no such bound",
         (unsigned)gl->fog.tile_most, (const char *)glGetString(GL_RENDERER), (int)SURELY_WALKED);
 }
 
 /* Each stretch between the ends of volumes takes some two steps for each lamp, of eight places, at which all volumes of
- * the tile are asked, and all there are on the way to the lamp. */
+ * the tile are asked, and all there are on the way to the lamp. How many cells of voxels a ray passes is not known. */
 static void warn_of_lamps(nebel_gl *gl, const nebel_snapshot *snapshot)
 {
     const double lamps = (double)nebel_snapshot_lamp_count(snapshot),
                  all = (double)nebel_snapshot_volume_count(snapshot);
     const double listed = gl->fog.tiles != 0 ? (double)gl->fog.tile_most : all;
-    const int is_much = lamps * (2 * listed) * 2 * 8 * (listed + all) > (double)gl->context.most_turns;
+    const int voxels = (gl->fog.features & NEBEL_FEATURE_GRID) != 0;
+    const int is_much = voxels || lamps * (2 * listed) * 2 * 8 * (listed + all) > (double)gl->context.most_turns;
     const int is_lit = (gl->fog.features & NEBEL_FEATURE_LAMPS) != 0 && !gl->dims_alone;
     if (gl->context.most_turns == 0 || gl->has_warned_of_lamps || !is_lit || !is_much) return;
     gl->has_warned_of_lamps = 1;
-    (void)nb_fail(&gl->log, NEBEL_OK,
-                  "nebel_gl_set_fog: %.0f lamps light up to %.0f volumes on a ray. This driver (%s) ends long loops: "
-                  "light of lamps that is far behind others' may be missing. A graphics processor or the CPU renderer "
-                  "has no such bound",
-                  lamps, listed, (const char *)glGetString(GL_RENDERER));
+    (void)nb_fail(
+        &gl->log, NEBEL_OK,
+        "warning: nebel_gl_set_fog: %.0f lamps light up to %.0f volumes on a ray%s. This driver (%s) ends long loops: "
+        "light of lamps that is far behind others' may be missing. A graphics processor or the CPU renderer "
+        "has no such bound",
+        lamps, listed, voxels ? ", some of them voxels" : "", (const char *)glGetString(GL_RENDERER));
 }
 
 /* ---- textures -------------------------------------------------------------------------------- */
@@ -157,14 +161,7 @@ static const texel_kind entry_texels = {GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_IN
 static const texel_kind voxel_texels = {GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, "the texture of voxels",
                                         "voxels"};
 
-static void make_texture(unsigned *name)
-{
-    glGenTextures(1, name);
-    glBindTexture(GL_TEXTURE_2D, *name);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
-}
+static const texel_kind node_texels = {GL_RGBA32F, GL_RGBA, GL_FLOAT, "the texture of multiple scattering", "cells"};
 
 /* `rows` grows by half at least, so that fog that grows slowly seldom allocates. */
 static nebel_result grow_texture(const nebel_gl *gl, const texel_kind *kind, uint32_t needed, uint32_t *rows)
@@ -187,8 +184,7 @@ static nebel_result fill_texture(const nebel_gl *gl, const texel_kind *kind, con
                        "nebel_gl_set_fog: %s needs %zu rows, this context has %u (GL_MAX_TEXTURE_SIZE); use fewer %s",
                        kind->what, needed, (unsigned)gl->context.widest, kind->fewer);
     }
-    if (*name == 0) make_texture(name);
-    glBindTexture(GL_TEXTURE_2D, *name);
+    nb_words_bind(name);
     if (needed > *rows) {
         const nebel_result result = grow_texture(gl, kind, (uint32_t)needed, rows);
         if (result != NEBEL_OK) return result;
@@ -257,6 +253,39 @@ static nebel_result upload_voxels(nebel_gl *gl, nebel_snapshot *snapshot)
     return result;
 }
 
+/* A lattice belongs to one snapshot. */
+static nebel_result write_nodes(nebel_gl *gl, const nebel_snapshot *snapshot, size_t count)
+{
+    nebel_word *const words = nb_allocate_zero(&gl->allocator, whole_rows(count), sizeof *words);
+    if (words == NULL) return out_of_memory(gl);
+    nebel_result result = nebel_pack_diffusion(snapshot, words, count, &count);
+    if (result == NEBEL_OK) result = fill_texture(gl, &node_texels, words, count, &gl->nodes, &gl->node_rows);
+    nb_release(&gl->allocator, words);
+    return result;
+}
+
+static nebel_result upload_nodes(nebel_gl *gl, nebel_snapshot *snapshot)
+{
+    size_t count = 0;
+    nebel_result result = nebel_pack_diffusion(snapshot, NULL, 0, &count);
+    if (result != NEBEL_OK || count == 0) return result;
+    if (gl->nodes_of != snapshot) {
+        result = write_nodes(gl, snapshot, count);
+        keep(&gl->nodes_of, result == NEBEL_OK ? snapshot : NULL);
+    }
+    gl->fog.nodes = gl->nodes;
+    return result;
+}
+
+static nebel_result upload_environment(nebel_gl *gl, nebel_snapshot *snapshot)
+{
+    if ((gl->fog.features & NEBEL_FEATURE_ENVIRONMENT) == 0) return NEBEL_OK;
+    const nebel_result result =
+        nb_environment_set(&gl->environment, &gl->allocator, &gl->log, &gl->context, snapshot, 0);
+    gl->fog.environment = gl->environment.name;
+    return result;
+}
+
 static nebel_result upload_tiles(nebel_gl *gl, size_t count)
 {
     const nebel_result result = fill_texture(gl, &entry_texels, gl->entries, count, &gl->tiles, &gl->tile_rows);
@@ -274,6 +303,8 @@ static nebel_result upload(nebel_gl *gl, nebel_snapshot *snapshot, size_t entry_
     nebel_result result = NEBEL_OK;
     nb_state_save_unpacking(&gl->context, &unpacking);
     if (snapshot != NULL) result = upload_voxels(gl, snapshot);
+    if (result == NEBEL_OK && snapshot != NULL) result = upload_nodes(gl, snapshot);
+    if (result == NEBEL_OK && snapshot != NULL && !gl->dims_alone) result = upload_environment(gl, snapshot);
     if (result == NEBEL_OK && snapshot != NULL) result = upload_words(gl);
     if (result == NEBEL_OK && entry_count > 0) result = upload_tiles(gl, entry_count);
     nb_state_restore_unpacking(&gl->context, &unpacking);

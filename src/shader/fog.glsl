@@ -1,4 +1,4 @@
-/* The march in shading languages: what src/march does, for one ray, from the words of layout.h.
+/* The march in shading languages: what src/march does, for one ray, from the words of layout.h; walk.glsl puts it together.
  *
  * Transmittance is a plain sum over media, and so is light where one medium or one radiance is met: most rays end there
  * (nb_sum_media). Where light of different colour mixes, or one medium takes away another's fog, nb_walk goes from event to event
@@ -7,18 +7,6 @@
  * to turn, see sun.glsl. */
 
 /* ---- sums over media ------------------------------------------------------------------------- */
-
-/* The word of the medium that stands at `i` of all media, or of the host's list. */
-int nb_medium_at(int i, bool listed)
-{
-#ifdef NEBEL_INDEX
-    int index = i;
-    if (listed) index = NEBEL_INDEX(i);
-    return NB_HEADER_WORDS + NB_MEDIUM_WORDS * index;
-#else
-    return NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
-#endif
-}
 
 /* What the media on a ray add up to if none covers another. */
 struct nb_media_sum {
@@ -29,6 +17,7 @@ struct nb_media_sum {
     bool mixed; /* more than one quotient of light and extinction */
     bool covers; /* one that covers is met, and another */
     bool scatters; /* light of sun or lamps */
+    float last; /* where the last body ends, as far as bodies end at all */
 };
 
 nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
@@ -42,6 +31,7 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
     sum.mixed = false;
     sum.covers = false;
     sum.scatters = false;
+    sum.last = 0.0;
     bool any = false;
     bool covering = false;
     int most = NB_HAS(NB_HAS_SEVERAL) ? count : 1; /* with one, all places in the words are constants */
@@ -49,9 +39,8 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
         if (i >= count) break;
         int at = nb_medium_at(first + i, listed);
         nb_vec4 extinction = NEBEL_WORD(at);
-        nb_vec4 radiance = NEBEL_WORD(at + 2);
         int kind = int(extinction.w);
-        int leaves = int(radiance.w);
+        int leaves = int(NEBEL_WORD(at + 2).w);
         float length = 0.0;
         float from = 0.0;
         for (int part = 0; part < (NB_HAS(NB_HAS_GROUP) ? leaves : 1); part++) {
@@ -60,111 +49,31 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
             length += nb_integral(nb_profile_of(at, kind, ray, s.enter), s.leave - s.enter);
             from = s.leave;
         }
+        if (from < ray.t_max) sum.last = max(sum.last, from);
         if (!(length > 0.0)) continue;
-        nb_vec4 light = NEBEL_WORD(at + 1);
-        int flags = int(light.w);
+        int flags = int(NEBEL_WORD(at + 1).w);
         if (NB_HAS(NB_HAS_COVER)) {
             sum.covers = sum.covers || (any && (covering || (flags & NB_LIGHT_COVERS) != 0));
             covering = covering || (flags & NB_LIGHT_COVERS) != 0;
             any = true;
         }
         if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
+            nb_vec3 radiance = nb_opaque_radiance(at, ray.direction);
             bool emits = (flags & NB_LIGHT_EMITS) != 0;
             bool other = radiance.x != sum.radiance.x || radiance.y != sum.radiance.y || radiance.z != sum.radiance.z;
             sum.mixed = sum.mixed || (sum.met && (other || emits || sum.emits));
             sum.emits = sum.emits || emits;
             sum.met = true;
             if (NB_HAS(NB_HAS_SUN | NB_HAS_LAMPS)) sum.scatters = sum.scatters || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
-            sum.radiance = radiance.xyz;
+            sum.radiance = radiance;
             sum.depth += extinction.xyz * length;
-            sum.light += light.xyz * length;
+            sum.light += nb_light_per_metre(at, radiance) * length;
         }
     }
     return sum;
 }
 
 /* ---- the walk -------------------------------------------------------------------------------- */
-
-/* Stretches that the walk keeps at hand, the next ones of their media: enter, leave, the medium's word. The mask keeps drivers from
- * unrolling every loop over them to the array's length. */
-#ifndef NEBEL_SLOTS
-#define NEBEL_SLOTS 32
-#endif
-NB_GLOBAL nb_vec3 nb_slots[NEBEL_SLOTS];
-
-nb_vec3 nb_slot(int k) { return nb_slots[k & (NEBEL_SLOTS - 1)]; }
-void nb_set_slot(int k, int medium, nb_stretch s) { nb_slots[k & (NEBEL_SLOTS - 1)] = nb_vec3(s.enter, s.leave, float(medium)); }
-bool nb_is_inside(nb_vec3 slot, float t) { return slot.x <= t && slot.y > t; }
-
-int nb_farthest_slot(int used)
-{
-    int farthest = 0;
-    float most = nb_slot(0).x;
-    for (int k = 1; k < used; k++) {
-        float enter = nb_slot(k).x;
-        if (enter > most) {
-            most = enter;
-            farthest = k;
-        }
-    }
-    return farthest;
-}
-
-/* Some drivers end loops after so many turns, all loops of a shader together, without a word. Where the host says how many, the walk
- * counts its own and stops before; neighbours of a pixel run along with it, which the host's number has to allow for. */
-#ifdef NEBEL_MOST_TURNS
-bool nb_is_tired(int turns) { return turns >= NEBEL_MOST_TURNS; }
-#else
-bool nb_is_tired(int turns) { return false; }
-#endif
-
-/* What the slots hold: `used` of them, of the media before `rest` in the list, right until `end`. */
-struct nb_window {
-    int used;
-    int rest;
-    float end;
-    int turns; /* it took */
-};
-
-/* Stretches behind t. The nearest of all media; or in a crowd, where more begin at t than there are slots, those of the media
- * from `begin` on until the slots are full. A stretch of a body of several leaves ends the window: another may follow. Without a
- * crowd, a window that ends at t says that there is one. */
-nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin, float t, bool crowd)
-{
-    nb_window window;
-    window.used = 0;
-    window.rest = count;
-    window.end = ray.t_max;
-    window.turns = 0;
-    int farthest = 0;
-    for (int i = begin; i < count; i++) {
-        if (window.end <= t || nb_is_tired(window.turns)) break;
-        if (crowd && window.used == NEBEL_SLOTS) {
-            window.rest = i;
-            break;
-        }
-        int at = nb_medium_at(first + i, listed);
-        int leaves = int(NEBEL_WORD(at + 2).w);
-        nb_stretch s = nb_next_stretch(at, leaves, ray, t);
-        window.turns += NB_HAS(NB_HAS_GROUP) && leaves > 1 ? (2 * leaves + 1) * (2 * leaves + 1) : 1; /* events, leaves, folds */
-        if (!(s.enter < s.leave)) continue;
-        if (NB_HAS(NB_HAS_GROUP) && leaves > 1) window.end = min(window.end, s.leave);
-        if (window.used < NEBEL_SLOTS) {
-            nb_set_slot(window.used, at, s);
-            window.used++;
-            if (window.used == NEBEL_SLOTS) farthest = nb_farthest_slot(window.used);
-            continue;
-        }
-        float dropped = max(s.enter, nb_slot(farthest).x);
-        window.end = min(window.end, dropped);
-        if (s.enter < dropped) {
-            nb_set_slot(farthest, at, s);
-            farthest = nb_farthest_slot(window.used);
-            window.turns += NEBEL_SLOTS;
-        }
-    }
-    return window;
-}
 
 /* Nodes of the Gauss-Lobatto rule of five points on [0, 1], exact for degree 7, and its weights. Source: Abramowitz and Stegun,
  * table 25.6. */
@@ -238,6 +147,7 @@ struct nb_piece {
     nb_vec3 least, most;       /* radiance */
     float rate;                /* of the fastest profile */
     bool sunlit;
+    int voxels; /* word of a grid whose cells do not end the piece, see voxels.glsl; 0: there is none */
 };
 
 nb_piece nb_open_piece(float start, float end)
@@ -255,6 +165,7 @@ nb_piece nb_open_piece(float start, float end)
     piece.most = nb_splat3(0.0);
     piece.rate = 0.0;
     piece.sunlit = false;
+    piece.voxels = 0;
     return piece;
 }
 
@@ -296,27 +207,30 @@ nb_piece nb_cover_piece(nb_piece piece, int used)
     return piece;
 }
 
-nb_piece nb_note_slot(nb_piece piece, nb_vec3 slot, nb_ray ray)
+/* `by_cells`: one grid may be walked from cell to cell within the piece. */
+nb_piece nb_note_slot(nb_piece piece, int k, nb_ray ray, bool by_cells)
 {
+    nb_vec3 slot = nb_slot(k);
     if (slot.x > piece.start) piece.end = min(piece.end, slot.x);
     if (slot.y > piece.start) piece.end = min(piece.end, slot.y);
     if (nb_is_there(slot, piece)) {
         int at = int(slot.z);
         nb_vec4 extinction = NEBEL_WORD(at);
-        nb_vec4 light = NEBEL_WORD(at + 1);
-        nb_vec3 radiance = NEBEL_WORD(at + 2).xyz;
+        nb_vec3 radiance = nb_slot_radiance(k, at);
         int kind = int(extinction.w);
         if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
             piece.present++;
-            piece.emits = piece.emits || (int(light.w) & NB_LIGHT_EMITS) != 0;
+            piece.emits = piece.emits || (int(NEBEL_WORD(at + 1).w) & NB_LIGHT_EMITS) != 0;
             piece.least = min(piece.least, radiance);
             piece.most = max(piece.most, radiance);
             if (NB_HAS(NB_HAS_SUN)) piece.sunlit = piece.sunlit || NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w > 0.0;
-            if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT) {
+            if (NB_HAS(NB_HAS_GRID) && by_cells && piece.voxels == 0 && kind == NB_KIND_GRID) {
+                piece.voxels = at;
+            } else if (NB_HAS(NB_HAS_PROFILE) && kind != NB_KIND_CONSTANT) {
                 piece = nb_note_profile(piece, nb_profile_of(at, kind, ray, piece.start));
             } else {
                 piece.extinction += extinction.xyz;
-                piece.light += light.xyz;
+                piece.light += nb_light_per_metre(at, radiance);
             }
         }
     }
@@ -334,6 +248,7 @@ struct nb_leg {
     nb_vec3 light;
     float stop;    /* no leg goes on from before to behind it: a turn, or where sunlight ends or begins; from the start of the piece */
     float sunlight; /* share of it that surfaces let through; 0: the leg is dark */
+    float most;     /* metres that a leg may take in what voxels leave of sunlight */
     bool first_is_curved, last_is_curved; /* there is a turn at its start, at its stop, behind which light changes as a root does */
     nb_vec3 glow[NB_NODES]; /* what full sunlight would add at each node, and in all */
     nb_vec3 shine;
@@ -349,6 +264,7 @@ nb_leg nb_open_leg(float from, float h, bool mixed, int number)
     leg.light = nb_splat3(0.0);
     leg.stop = NB_FAR;
     leg.sunlight = 0.0;
+    leg.most = NB_FAR;
     leg.first_is_curved = false;
     leg.last_is_curved = false;
     leg.shine = nb_splat3(0.0);
@@ -390,29 +306,34 @@ float nb_leg_weight(nb_leg leg, int j)
 bool nb_has_nodes(nb_leg leg) { return leg.mixed || (nb_is_sunlit(leg) && !nb_sun_is_closed()); }
 
 /* A grid's density is one polynomial within a piece: that of the cell in its middle, `middle` metres behind the leg's start. */
-void nb_add_grid(inout nb_leg leg, nb_profile profile, nb_vec3 extinction, nb_vec3 light, float middle)
+void nb_add_grid(inout nb_leg leg, nb_profile profile, nb_vec3 extinction, nb_vec3 light, nb_vec3 glow, float middle)
 {
     nb_grid_spot spot = nb_grid_spot_at(profile.first, profile.offset + profile.slope * middle);
-    for (int j = leg.mixed ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
-        float s = leg.h * nb_node(j);
+    for (int j = nb_has_nodes(leg) ? 0 : NB_NODES - 1; j < NB_NODES; j++) {
+        float s = leg.h * nb_leg_node(leg, j);
         float length = nb_grid_spot_integral(spot, profile.offset, profile.slope, s);
+        float density = nb_grid_density(spot, profile.offset + profile.slope * s);
         leg.depth[j] += extinction * length;
-        leg.density[j] += light * nb_grid_density(spot, profile.offset + profile.slope * s);
-        if (j == NB_NODES - 1) leg.light += light * length;
+        leg.density[j] += light * density;
+        if (NB_HAS(NB_HAS_SUN)) leg.glow[j] += glow * density;
+        if (j == NB_NODES - 1) {
+            leg.light += light * length;
+            if (NB_HAS(NB_HAS_SUN)) leg.shine += glow * length;
+        }
     }
 }
 
-void nb_add_slot(inout nb_leg leg, nb_piece piece, nb_vec3 slot, nb_ray ray)
+void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
 {
-    int at = int(slot.z);
+    int at = int(nb_slot(k).z);
     nb_vec4 extinction = NEBEL_WORD(at);
-    nb_vec3 light = NEBEL_WORD(at + 1).xyz;
+    nb_vec3 light = nb_light_per_metre(at, nb_slot_radiance(k, at));
     nb_vec3 glow = nb_splat3(0.0);
     if (nb_is_sunlit(leg)) glow = nb_sunlit_radiance(at, ray.direction) * extinction.xyz;
     nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
     profile.offset += profile.slope * leg.from;
     if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID) {
-        nb_add_grid(leg, profile, extinction.xyz, light, 0.5 * (piece.end - piece.start) - leg.from);
+        nb_add_grid(leg, profile, extinction.xyz, light, glow, 0.5 * (piece.end - piece.start) - leg.from);
         return;
     }
     /* linear within a piece, which ends at kinks: dear to find for many faces */
@@ -443,6 +364,8 @@ struct nb_gathered {
     nb_vec3 light; /* if nothing attenuated it */
     nb_vec3 radiance;
     nb_vec3 sunlight; /* of the radiance */
+    bool is_cut; /* there was no end to it, and it is all up to here: */
+    float reached;
 };
 
 /* Light through what lies before it, if the quotient of light and extinction were the same all along the way. */
@@ -537,6 +460,7 @@ nb_leg nb_next_leg(nb_leg leg, nb_piece piece, float rest, float strain, bool fi
     nb_leg next = nb_open_leg(fits ? leg.from + leg.h : leg.from, min(h, rest), leg.mixed, leg.number + 1);
     next.stop = leg.stop;
     next.sunlight = leg.sunlight;
+    next.most = leg.most;
     next.first_is_curved = !fits && leg.first_is_curved;
     next.last_is_curved = leg.last_is_curved;
     return next;
@@ -560,6 +484,7 @@ void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit
         nb_turning turning = nb_find_turn(ray, t, piece.start + leg.stop);
         leg.stop = turning.next - piece.start;
         leg.last_is_curved = turning.curved;
+        if (NB_HAS(NB_HAS_GRID)) leg.most = nb_most_in_shadow(ray, 0.5 * (t + turning.next));
     }
 }
 
@@ -606,185 +531,3 @@ int nb_turns_to_sun()
     int search = NB_MOST_PASSED + (NB_HAS(NB_HAS_PLANES) ? 32 : 0);
     return media * (search + (nb_sun_is_closed() ? 2 : NB_NODES - 1) * way);
 }
-
-/* The first leg of a piece: all of it. */
-nb_leg nb_first_leg(nb_piece piece, bool lit)
-{
-    bool uneven = piece.emits || nb_largest(piece.most - piece.least) > 0.0;
-    return nb_open_leg(0.0, piece.end - piece.start, lit && uneven && piece.present > 1, 0);
-}
-
-void nb_pass_piece(inout nb_gathered g, nb_piece piece, bool lit)
-{
-    float length = piece.end - piece.start;
-    nb_vec3 depth = piece.extinction * length;
-    if (lit) g.radiance += nb_light_even(piece.light * length, depth, g.depth);
-    g.light += piece.light * length;
-    g.depth += depth;
-}
-
-/* The rest of a ray that is too much to walk, where no medium covers another: what is left of all, as if it were mixed evenly, and as
- * sunny as what lies before it. */
-nb_gathered nb_pass_rest(nb_gathered g, nb_media_sum all)
-{
-    nb_vec3 depth = max(all.depth - g.depth, nb_splat3(0.0));
-    g.radiance += nb_light_even(max(all.light - g.light, nb_splat3(0.0)), depth, g.depth);
-    if (NB_HAS(NB_HAS_SUN)) {
-        nb_vec3 taken = nb_attenuate(g.depth).mean * g.depth;
-        g.radiance += g.sunlight * nb_exp3(-g.depth) * nb_attenuate(depth).mean * depth / max(taken, nb_splat3(1e-6));
-    }
-    g.depth += depth;
-    return g;
-}
-
-/* Each turn of the outer loop looks once at all media on the ray: to find the end of the next piece, or to sum a leg within one of
- * varying density. So the shapes and profiles stand in the program once, not once for each purpose. */
-nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit, nb_media_sum all)
-{
-    float tolerance = NEBEL_WORD(0).y;
-    float t = 0.0;
-    bool crowd = false;
-    bool stepping = false;
-    nb_gathered g;
-    g.depth = nb_splat3(0.0);
-    g.light = nb_splat3(0.0);
-    g.radiance = nb_splat3(0.0);
-    g.sunlight = nb_splat3(0.0);
-    int turns = count; /* of the sums */
-    nb_vec2 sunlit = nb_vec2(1.0, 0.0);
-    nb_piece piece = nb_open_piece(0.0, 0.0);
-    nb_leg leg = nb_open_leg(0.0, 0.0, false, 0);
-    nb_window window;
-    window.used = 0;
-    window.rest = count;
-    window.end = 0.0;
-    window.turns = 0;
-    while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
-        bool on_leg = NB_HAS(NB_HAS_PROFILE | NB_HAS_SUN) && stepping;
-        if (NB_HAS(NB_HAS_SUN) && on_leg && lit && piece.sunlit) {
-            nb_plan_leg(leg, piece, ray, sunlit);
-            leg.h = min(leg.h, leg.stop - leg.from);
-        }
-        bool stale = crowd || t >= window.end;
-        if (!on_leg) piece = nb_open_piece(t, ray.t_max);
-        for (int next = 0; next < count;) {
-            if (stale) {
-                window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
-                turns += window.turns;
-                if (nb_is_tired(turns)) break;
-            }
-            turns += 1 + window.used * (on_leg ? 1 + NB_NODES : 2);
-            bool over_full = !crowd && window.end <= t;
-            crowd = crowd || over_full;
-            if (over_full) continue;
-            next = window.rest;
-            piece.end = min(piece.end, window.end);
-            if (NB_HAS(NB_HAS_COVER) && !on_leg) piece = nb_cover_piece(piece, window.used);
-            for (int k = 0; k < window.used; k++) {
-                nb_vec3 slot = nb_slot(k);
-                if (!on_leg)
-                    piece = nb_note_slot(piece, slot, ray);
-                else if (nb_is_there(slot, piece))
-                    nb_add_slot(leg, piece, slot, ray);
-            }
-        }
-        if (nb_is_tired(turns)) break;
-        bool foggy = piece.present > 0;
-        bool legged = (NB_HAS(NB_HAS_PROFILE) && piece.varies) || (NB_HAS(NB_HAS_SUN) && lit && piece.sunlit);
-        bool begins = foggy && !on_leg && legged;
-        bool over = !begins;
-        if (NB_HAS(NB_HAS_SUN) && on_leg && nb_is_sunlit(leg)) turns += nb_turns_to_sun();
-        if (on_leg)
-            over = nb_end_leg(g, leg, piece, ray, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
-        else if (begins)
-            leg = nb_first_leg(piece, lit);
-        else if (foggy)
-            nb_pass_piece(g, piece, lit);
-        stepping = !over;
-        if (over) {
-            t = piece.end;
-            if (crowd) window.end = t;
-            crowd = false;
-        }
-    }
-    if (lit && nb_is_tired(turns) && !all.covers) g = nb_pass_rest(g, all);
-    return g;
-}
-
-/* ---- the face -------------------------------------------------------------------------------- */
-
-/* See lamp.glsl. */
-nb_vec3 nb_lamplight(nb_ray ray, int first, int count, bool listed);
-
-/* See nebel_set_max_opacity. */
-nebel_light nb_limit_opacity(nebel_light light, float most)
-{
-    nb_vec3 opacity = nb_splat3(1.0) - light.transmittance;
-    light.in_scattering *= nb_vec3(most / max(opacity.x, most), most / max(opacity.y, most), most / max(opacity.z, most));
-    light.transmittance = max(light.transmittance, nb_splat3(1.0 - most));
-    return light;
-}
-
-/* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
-nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
-                           bool from_eye)
-{
-    nb_ray ray;
-    ray.origin = origin;
-    ray.direction = direction;
-    ray.t_max = min(t_max, NB_FAR);
-    ray.from_eye = from_eye;
-    nebel_light light;
-    light.transmittance = nb_splat3(1.0);
-    light.in_scattering = nb_splat3(0.0);
-    float square = dot(direction, direction);
-    if (t_max > 0.0 && square > 0.0 && nb_is_number(dot(origin, origin) + square + t_max)) {
-        nb_media_sum sum = nb_sum_media(ray, first, count, listed);
-        nb_attenuation attenuation = nb_attenuate(sum.depth);
-        light.transmittance = attenuation.left;
-        light.in_scattering = sum.light * attenuation.mean;
-        bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
-        bool walks = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
-        if (covers || (lit && walks)) {
-            nb_gathered walked = nb_walk(ray, first, count, listed, lit, sum);
-            light.in_scattering = walked.radiance;
-            if (covers) light.transmittance = nb_exp3(-walked.depth);
-        }
-        if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) light.in_scattering += nb_lamplight(ray, first, count, listed);
-        if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
-        light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
-    }
-    return light;
-}
-
-nebel_light nebel_trace(nb_vec3 origin, nb_vec3 direction, float t_max)
-{
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, true, true);
-}
-
-nb_vec3 nebel_transmit(nb_vec3 origin, nb_vec3 direction, float t_max)
-{
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, true).transmittance;
-}
-
-nb_vec3 nebel_transmit_light(nb_vec3 origin, nb_vec3 direction, float t_max)
-{
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, false).transmittance;
-}
-
-#ifdef NEBEL_INDEX
-nebel_light nebel_trace_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
-{
-    return nb_trace_media(origin, direction, t_max, first, count, true, true, true);
-}
-
-nb_vec3 nebel_transmit_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
-{
-    return nb_trace_media(origin, direction, t_max, first, count, true, false, true).transmittance;
-}
-
-nb_vec3 nebel_transmit_light_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
-{
-    return nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance;
-}
-#endif

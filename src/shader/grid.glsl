@@ -85,6 +85,9 @@ float nb_grid_mean(nb_grid_cell cell, nb_vec3 from, nb_vec3 to)
 
 int nb_grid_index(nb_vec3 block, nb_vec3 size) { return int(block.x) + int(size.x) * (int(block.y) + int(size.y) * int(block.z)); }
 
+/* Turns of the loops below, for who counts them. */
+NB_GLOBAL int nb_grid_turns;
+
 /* The sum over the cells of a brick, whose first texel is `first`, from t to `end`. */
 float nb_grid_brick_sum(nb_grid_ray ray, int first, nb_vec3 brick, float t, float end)
 {
@@ -96,6 +99,7 @@ float nb_grid_brick_sum(nb_grid_ray ray, int first, nb_vec3 brick, float t, floa
     for (int i = 0; i < 32; i++) { /* at most 21 faces, and one of each axis that t lies in */
         nb_vec3 next = nb_grid_crossings(cell, last, from, ray.inverse, 1.0);
         float until = max(min(min(next.x, min(next.y, next.z)), end), t);
+        nb_grid_turns++;
         nb_grid_cell corners = nb_grid_cell_of(NEBEL_VOXEL(first + nb_grid_index(cell, size)));
         sum += (until - t) * nb_grid_mean(corners, nb_grid_share(from + ray.slope * t, cell),
                                           nb_grid_share(from + ray.slope * until, cell));
@@ -127,6 +131,7 @@ float nb_grid_integral(nb_vec3 from, nb_vec3 slope, int grid, float h, float eno
     for (int i = 0; i < most; i++) {
         nb_vec3 next = nb_grid_crossings(brick, last, from, ray.inverse, NB_BRICK);
         float until = max(min(min(next.x, min(next.y, next.z)), h), t);
+        nb_grid_turns++;
         nb_uvec4 texel = NEBEL_VOXEL(grid + 1 + nb_grid_index(brick, size));
         sum += nb_from_bits(int(texel.x)) * (until - t);
         if (texel.z != 0u) sum += nb_from_bits(int(texel.y)) * nb_grid_brick_sum(ray, int(texel.z), brick, t, until);

@@ -96,6 +96,7 @@ struct nb_lamp_piece {
     bool scatters;
     nb_vec3 depth;    /* of all of it */
     float scatter;    /* radiance per irradiance that opaque fog of it gives at most */
+    float ahead, back; /* how wide the sharpest peaks of phase functions are, tangents of half an angle */
 };
 
 /* Of all lobes at their peaks, of either side. */
@@ -108,6 +109,19 @@ float nb_most_scattered(int scattering)
         most += lobe.x * (1.0 + lobe.y) / (lobe.z * sqrt(lobe.z));
     }
     return most * nb_largest(albedo.xyz);
+}
+
+/* A lobe is (peak + slope (1 - cosine))^-1.5, of which the cosine is (1 - u u) / (1 + u u), u the tangent of half the angle from its peak:
+ * up to u = width it hardly falls. */
+void nb_narrow_peaks(int scattering, inout nb_lamp_piece piece)
+{
+    int lobes = int(NEBEL_WORD(scattering).w);
+    for (int i = 1; i <= lobes; i++) {
+        nb_vec4 lobe = NEBEL_WORD(scattering + i);
+        float width = sqrt(lobe.z / (lobe.z + 2.0 * abs(lobe.w)));
+        if (lobe.w > 0.0) piece.ahead = min(piece.ahead, width);
+        if (lobe.w < 0.0) piece.back = min(piece.back, width);
+    }
 }
 
 /* Word of the medium number `i` of a piece; where they are more than there are slots each is asked whether it is there, 0: it is not. */
@@ -141,6 +155,17 @@ int nb_drop_covered(int used, int floor)
     return kept;
 }
 
+/* Pieces end at the faces of bricks: depths from the start of a piece are sums over a few cells then. */
+float nb_even_voxels(nb_ray ray, int medium, float t)
+{
+    float length = NB_FAR;
+    if (NB_HAS(NB_HAS_GRID) && int(NEBEL_WORD(medium).w) == NB_KIND_GRID) {
+        nb_profile profile = nb_profile_of(medium, NB_KIND_GRID, ray, t);
+        length = nb_grid_faces(profile.offset, profile.slope, NB_BRICK, max(t * (8.0 * NB_EPSILON), 1e-6));
+    }
+    return length;
+}
+
 nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float t, inout int turns)
 {
     nb_lamp_piece piece;
@@ -152,6 +177,8 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
     piece.scatters = false;
     piece.depth = nb_splat3(0.0);
     piece.scatter = 0.0;
+    piece.ahead = 1.0;
+    piece.back = 1.0;
     for (int i = 0; i < count; i++) {
         int at = nb_medium_at(first + i, listed);
         int leaves = int(NEBEL_WORD(at + 2).w);
@@ -160,6 +187,7 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
         if (!(s.enter < s.leave)) continue;
         piece.end = min(piece.end, s.enter > t ? s.enter : s.leave);
         if (s.enter > t) continue;
+        piece.end = min(piece.end, t + nb_even_voxels(ray, at, t));
         int flags = int(NEBEL_WORD(at + 1).w);
         if (NB_HAS(NB_HAS_COVER) && (flags & NB_LIGHT_COVERS) != 0) piece.floor = max(piece.floor, flags / NB_LIGHT_RANK);
         if (piece.media < NEBEL_SLOTS) nb_set_slot(piece.media, at, s);
@@ -178,6 +206,7 @@ nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float
         if (scattering > 0) {
             piece.scatters = true;
             piece.scatter = max(piece.scatter, nb_most_scattered(scattering));
+            nb_narrow_peaks(scattering, piece);
         }
     }
     return piece;
@@ -203,7 +232,7 @@ nb_lamp_place nb_place_in_piece(nb_ray ray, int first, bool listed, nb_lamp_piec
         nb_vec4 extinction = NEBEL_WORD(at);
         nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
         int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
-        nb_vec3 here = extinction.xyz * nb_density(profile, t - piece.start);
+        nb_vec3 here = extinction.xyz * nb_density_beside(profile, t - piece.start);
         place.depth += extinction.xyz * nb_integral(profile, t - piece.start);
         place.extinction += here;
         if (scattering > 0) place.glow += here * NEBEL_WORD(scattering).xyz * nb_scattered(scattering, ray.direction, towards);
@@ -232,6 +261,9 @@ float nb_lamp_weight(int j)
 
 float nb_lamp_weight_of_three(int j) { return j == 3 ? 8.0 / 18.0 : j == 1 || j == 5 ? 5.0 / 18.0 : 0.0; }
 
+/* What a step's error may be of the light that is found so far. */
+#define NB_LAMP_SHARE 0.01
+
 struct nb_lamp_step {
     nb_vec3 light;
     float error;
@@ -240,7 +272,7 @@ struct nb_lamp_step {
 /* Light of the first part of a swing, up to w = length, of which `drop` of transmittance is lost. `before` is the depth in front of the
  * piece. Where nodes do not see that loss they have passed over what causes it. */
 nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece piece, nb_lamp_pass by, nb_swing swing,
-                               float length, nb_vec3 before, nb_vec3 drop, inout int turns)
+                               float length, nb_vec3 before, nb_vec3 seen, nb_vec3 drop, inout int turns)
 {
     nb_vec3 seven = nb_splat3(0.0);
     nb_vec3 three = nb_splat3(0.0);
@@ -260,7 +292,7 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
         nb_vec3 depth = before + place.depth;
         nb_vec3 light = nb_splat3(0.0);
         if (fluence > 0.0) {
-            nb_vec3 to_lamp = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), turns);
+            nb_vec3 to_lamp = nb_depth_to_light(ray.origin + ray.direction * t, towards, max(distance - by.clear, 0.0), false, turns);
             light = place.glow * by.intensity * fluence * nb_exp3(-(depth + to_lamp));
         }
         seven += nb_lamp_weight(j) * light;
@@ -271,7 +303,8 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
     float most = nb_most_fluence(by, swing.start, end) * piece.scatter;
     nb_lamp_step s;
     s.light = seven;
-    s.error = max(nb_largest(abs(seven - three)), most * nb_largest(abs(taken - drop)));
+    float unseen = nb_largest(abs(taken - drop) - 8.0 * NB_EPSILON * seen); /* beyond rounding */
+    s.error = max(nb_largest(abs(seven - three)), most * unseen);
     s.error = min(s.error, most * nb_largest(drop));
     return s;
 }
@@ -279,7 +312,24 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
 /* Behind a lamp nothing of its light is left [m]; squares of squares of it are numbers. */
 #define NB_LAMP_REACH 1e8
 
-/* Steps that a lamp takes in a piece; the rest is one. A step is a right angle at most. */
+/* The end of a step on which phase functions change smoothly. `ahead` is the tangent of half the angle by which light is turned: a step
+ * goes to 2.5 times as much, and by 1.5 widths where it is in a peak. Towards peaks of light that is turned back it ends at a quarter of
+ * 1 / ahead. On a ray through the lamp itself what is shorter than a hundredth of its radius does not count. */
+float nb_smooth_end(nb_lamp_pass by, nb_lamp_piece piece, float t, float end)
+{
+    float from = t - by.closest;
+    float side = max(sqrt(by.aside2), 1e-12);
+    float distance = sqrt(side * side + from * from);
+    float ahead = from < 0.0 ? side / (distance - from) : (distance + from) / side;
+    float next = 2.5 * ahead + 1.5 * piece.ahead;
+    float back = 0.25 * min(1.0 / ahead, 1.0) - 0.75 * piece.back;
+    if (back > 0.0) next = min(next, 1.0 / back);
+    else if (ahead > 1.0) return end;
+    float place = by.closest + 0.5 * side * (next - 1.0 / next);
+    return min(max(place, t + max(0.01 * by.aside, t * (8.0 * NB_EPSILON))), end);
+}
+
+/* Steps that a lamp takes in a piece; the rest is one. */
 #define NB_MOST_LAMP_STEPS 96
 
 /* The light of one lamp in a piece. */
@@ -293,13 +343,13 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
     float far = min(piece.end, by.closest + NB_LAMP_REACH);
     float guess = 1.0;
     for (int i = 0; i < NB_MOST_LAMP_STEPS; i++) {
-        if (!(t < far) || nb_is_tired(turns)) break;
+        if (!(t < far) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
             lit = NEBEL_LAMP_LIT(by.number, ray.origin, ray.direction, t, far);
             lit.y = min(max(lit.y, t + max(t * (8.0 * NB_EPSILON), 1e-6)), far);
         }
         bool last = i + 1 == NB_MOST_LAMP_STEPS;
-        float stop = last ? far : nb_lamp_turn(by, ray, t, lit.y);
+        float stop = last ? far : nb_smooth_end(by, piece, t, nb_lamp_turn(by, ray, t, lit.y));
         nb_swing swing = nb_swing_between(by.closest, by.aside, t, stop);
         float length = lit.x > 0.0 && !last ? min(min(guess, 1.0), swing.end) : swing.end;
         float end = length >= swing.end ? stop : min(nb_swing_place(swing, length), stop);
@@ -307,8 +357,9 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         turns += NB_LAMP_NODES + 1;
         bool fits = true;
         if (lit.x > 0.0) {
-            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, before, seen - behind, turns);
-            fits = last || taken.error <= tolerance || length < 1e-4;
+            nb_lamp_step taken = nb_step_past_lamp(ray, first, listed, piece, by, swing, length, before, seen, seen - behind, turns);
+            float allowed = tolerance + NB_LAMP_SHARE * nb_largest(max(sum, taken.light));
+            fits = last || taken.error <= allowed || length < 1e-4;
             if (fits) sum += lit.x * taken.light;
             guess = fits ? max(guess, 2.0 * length) : 0.5 * length;
         }
@@ -335,7 +386,8 @@ nb_vec3 nb_lamplight(nb_ray ray, int first, int count, bool listed)
     int lamps = int(NEBEL_WORD(0).w);
     int turns = 0;
     float t = 0.0;
-    while (t < ray.t_max && nb_smallest(before) < NB_OPAQUE && !nb_is_tired(turns)) {
+    nb_grid_turns = 0;
+    while (t < ray.t_max && nb_smallest(before) < NB_OPAQUE && !nb_is_tired(turns + nb_grid_turns)) {
         nb_lamp_piece piece = nb_next_piece(ray, first, count, listed, t, turns);
         nb_vec3 drop = nb_exp3(-before) - nb_exp3(-(before + piece.depth));
         for (int i = 0; i < (piece.scatters ? lamps : 0); i++) {

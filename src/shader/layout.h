@@ -6,19 +6,22 @@
  *         fog.
  * Word 1: the direction towards the sun, of length 1; how what the sun adds is had between turns, NB_SUN_.
  * Word 2: the sun's irradiance; the first word of the lamps. The sun's numbers are 0 where no medium is sunlit.
+ * Word 3: the first word of the lattice of diffuse light, 0 where there is none; three unused.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
  *     1  light per metre at density 1 (radiance times extinction, plus emission), flags and rank: 1 where there is
  *        emission, plus 2 where it covers, plus 4 times its rank, counted from 0: what covers takes away the fog of
  *        every lower rank
- *     2  radiance of opaque fog, leaves
+ *     2  radiance of opaque fog, leaves; where an environment lights it, albedo instead, and word 1 has emission alone
  *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye,
  *        1 / (sqrt(2) sigma); soft edge of a box: three unused, 1 / distance; of a round body: gain, steepness and
  *        inner of nb_edge, one unused; of planes: unused; grid: cells per unit of the box along each axis, first texel
  *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
  *        The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does
- *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or lamps.
+ *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or lamps; that of word 8
+ *        what part of the light it scatters diffusion takes to go straight on; that of word 9 the first environment word of
+ *        its phase function's filter, 0 where no environment lights it.
  *
  * A leaf, NB_LEAF_WORDS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
@@ -36,8 +39,15 @@
  *     2  axis and cosine at the edge of its cone; 0, -1 where it has none
  *     3  what nb_lamp_cone calls rise, cosine of the inner angle, 0, 0
  *
+ * A lattice, NB_LATTICE_WORDS words; behind it another one for what is beside it where NB_LATTICE_BESIDE says so:
+ *     0  its low end, the texel of its first node
+ *     1  the size of a cell [m], channels: 1 or 3
+ *     2  cells along each axis, flags: 1 << (2 axis) where fog goes on beyond the low end, twice that for the high one
+ *     3  gains of diffuse light that leaves along x upwards; downwards; along y, along z
+ *
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
- * both must hold; above them all a 1. a and b: radius of a ball; radius and slope of a cone; length of a capsule;
+ * both must hold; above them all a 1. a and b: of the box of a grid in sunlit fog its first
+ * texel of sun lattices, unused; radius of a ball; radius and slope of a cone; length of a capsule;
  * number of faces and first face's word of planes. A face is one word: normal and distance, which are the world's.
  * Faces with a soft edge are scaled: a place is distance - normal . place edges deep.
  *
@@ -46,21 +56,69 @@
  *     then one for each brick of 8 x 8 x 8 cells, x fastest: least density and its step, as the bits of floats; the
  *     first texel of its cells, 0 where the whole brick has the least density
  * and for each brick that has cells 512 texels, x fastest: what the corners are above the least density, in steps, 16
- * bits each. Components are the corners with y and z at 00, 10, 01, 11; x low in the lower half, high in the upper. */
+ * bits each. Components are the corners with y and z at 00, 10, 01, 11; x low in the lower half, high in the upper.
+ *
+ * Behind all grids, where the sun lights fog, come lattices of what lies between places in voxels and the sun
+ * (src/media/grid_lattice.h says where its nodes are), NB_SUN_LATTICE_TEXELS texels and the cells between eight nodes:
+ *     0  cells along both sides and layers; the axis across layers
+ *     1  lean of both sides, first of both sides, as the bits of floats
+ *     2  the same of columns per cell and of a step; 1 where there is fog at the faces of the box;
+ *        one unused
+ *     3  the faces towards the sun, in cells along both sides and the axis; 1 where the sun is where layers have larger
+ *        numbers, else -1; as the bits of floats
+ * and the cells, columns of the first side fastest: eight integrals of the density, in steps, as the corners above.
+ *
+ * Nodes of lattices are texels of four floats, the same for every eye: of each node, x fastest, two for each channel,
+ * source radiance and flux of diffuse light; NB_NODE_TURNED, _ONCE, _GLOW and _WIDTH of march/diffusion.h; then one that
+ * holds g of what is turned.
+ *
+ * Environment words are vectors of floats, the same for every eye:
+ *     0  NB_ENVIRONMENT_; of a map cosine and sine of its rotation, intensity
+ *     1  radiance of a constant one; a gradient's zenith; of a map the first words of what white surfaces reflect, and of its
+ *        pixels, 0 where they were not asked for
+ *     2  a gradient's horizon
+ *     3  a gradient's ground
+ * then a filter for each phase function that scatters it, and for a map, where they were asked for, the same for surfaces, and
+ * its pixels behind one word with its width and height. A filter of a gradient, see sky.c:
+ *     0  mean cosine of the phase function, 1 / width of the knots, number of the last / log(1 + 1 / width)
+ *     then for each of the NB_FILTER_PIECES four knots from its number on
+ * A filter of a map, B-splines over longitude and latitude, see sky_map.c:
+ *     0  columns, rows
+ *     then the coefficients, the top row first.
+ *
+ * Air words are vectors of floats, of one place, see planet/view.h:
+ *     0  nb_outlook: radius, ground, thickness, height
+ *     1  dip, ratio, horizon, half_arc
+ *     2  up; 3 level towards the sun; 4 level aside, of length 1
+ *     5  the direction towards the sun, of length 1
+ *     6  its irradiance above the air
+ *     7  columns, levels beside the one at the start, kinds of air that scatter
+ *     8  the first words of entries; of extinction; of what air leaves of the sun on the ground; of what it scatters there
+ *     9  of those: 1 / scale, first, entries per step, number
+ *     10 two lobes of each kind's phase function, as above
+ * then the entries, levels fastest, columns, rows: what each kind scattered once, what all scattered more often, 1/m; the
+ * extinction, levels fastest, rows, 1/m; sunlight on the ground, for a sun of irradiance 1; the logarithm of the sky's. */
 #ifndef NB_SHADER_LAYOUT_H
 #define NB_SHADER_LAYOUT_H
 
-#define NB_HEADER_WORDS 3
+#define NB_HEADER_WORDS 4
 #define NB_HEADER_SUN 1
 #define NB_HEADER_LAMPS 2 /* its last number */
+#define NB_HEADER_LATTICE 3
 #define NB_MEDIUM_WORDS 10
 #define NB_MEDIUM_LEAF 4
 #define NB_MEDIUM_START 5
 #define NB_MEDIUM_CUTOFF 6
 #define NB_MEDIUM_SCATTERING 7
+#define NB_MEDIUM_AHEAD 8
+#define NB_MEDIUM_FILTER 9
 #define NB_LEAF_WORDS 6
 #define NB_SCATTERING_WORDS 3
 #define NB_LAMP_WORDS 4
+#define NB_LATTICE_WORDS 9
+#define NB_SUN_LATTICE_TEXELS 4
+
+#define NB_LATTICE_BESIDE 64
 
 #define NB_KIND_CONSTANT 0
 #define NB_KIND_HEIGHT 1        /* grows below the base */
@@ -77,6 +135,25 @@
 #define NB_SUN_STEPS 0  /* in steps */
 #define NB_SUN_FLAT 1   /* in closed form: flat faces, constant densities */
 #define NB_SUN_HEIGHT 2 /* the same: one endless height fog */
+
+#define NB_ENVIRONMENT_WORDS 4
+#define NB_ENVIRONMENT_CONSTANT 0
+#define NB_ENVIRONMENT_GRADIENT 1
+#define NB_ENVIRONMENT_MAP 2
+#define NB_FILTER_PIECES 126
+
+#define NB_AIR_OUTLOOK 0
+#define NB_AIR_AXES 2
+#define NB_AIR_SUN 5
+#define NB_AIR_IRRADIANCE 6
+#define NB_AIR_SIZES 7
+#define NB_AIR_PARTS 8
+#define NB_AIR_SKIES 9
+#define NB_AIR_LOBES 10
+#define NB_AIR_WORDS 18
+#define NB_AIR_FALLING 48.0
+#define NB_AIR_RISING 64.0
+#define NB_AIR_SUNS 257.0
 
 #define NB_LIGHT_EMITS 1
 #define NB_LIGHT_COVERS 2
@@ -113,8 +190,10 @@
 #define NB_HAS_SOFT_PLANES 262144
 #define NB_HAS_SUN 524288 /* which lights fog */
 #define NB_HAS_GRID 1048576
-#define NB_HAS_LAMPS 2097152 /* as the sun does */
-#define NB_HAS_ALL 4194303
+#define NB_HAS_LAMPS 2097152       /* as the sun does */
+#define NB_HAS_DIFFUSION 4194304   /* light scattered more than once */
+#define NB_HAS_ENVIRONMENT 8388608 /* which lights fog */
+#define NB_HAS_ALL 16777215
 #define NB_HAS_SOFT (NB_HAS_SOFT_EDGE | NB_HAS_SOFT_ROUND | NB_HAS_SOFT_PLANES)
 #define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL | NB_HAS_GRID)
 

@@ -24,8 +24,20 @@ nb_vec3 nb_depth_within(int at, nb_ray ray, nb_stretch s)
     return extinction.xyz * min(nb_integral(nb_profile_of(at, int(extinction.w), ray, s.enter), s.leave - s.enter), NB_FAR);
 }
 
+/* Voxels on the way to the sun are not walked through. */
+nb_vec3 nb_depth_to_light_within(int at, nb_ray ray, nb_stretch s, bool to_sun)
+{
+    nb_vec4 extinction = NEBEL_WORD(at);
+    nb_vec3 depth = nb_splat3(0.0);
+    if (NB_HAS(NB_HAS_GRID) && NB_HAS(NB_HAS_SUN) && to_sun && int(extinction.w) == NB_KIND_GRID)
+        depth = extinction.xyz * nb_amount_to_sun(at, ray, s);
+    else
+        depth = nb_depth_within(at, ray, s);
+    return depth;
+}
+
 /* Where no medium covers another. */
-nb_vec3 nb_added_depth(nb_ray ray, int count, inout int turns)
+nb_vec3 nb_added_depth(nb_ray ray, int count, bool to_sun, inout int turns)
 {
     nb_vec3 depth = nb_splat3(0.0);
     for (int i = 0; i < count; i++) {
@@ -36,7 +48,7 @@ nb_vec3 nb_added_depth(nb_ray ray, int count, inout int turns)
             nb_stretch s = nb_next_stretch(at, leaves, ray, from);
             turns += nb_stretch_turns(leaves, s);
             if (!(s.enter < s.leave)) break;
-            depth += nb_depth_within(at, ray, s);
+            depth += nb_depth_to_light_within(at, ray, s, to_sun);
             from = s.leave;
         }
     }
@@ -44,7 +56,7 @@ nb_vec3 nb_added_depth(nb_ray ray, int count, inout int turns)
 }
 
 /* Where some may: from event to event, each time first to find the next event and what covers, then to sum. Media come by rank. */
-nb_vec3 nb_covered_depth(nb_ray ray, int count, inout int turns)
+nb_vec3 nb_covered_depth(nb_ray ray, int count, bool to_sun, inout int turns)
 {
     nb_vec3 depth = nb_splat3(0.0);
     float t = 0.0;
@@ -64,7 +76,7 @@ nb_vec3 nb_covered_depth(nb_ray ray, int count, inout int turns)
                 end = min(end, s.enter > t ? s.enter : s.leave);
                 if (s.enter <= t && (flags & NB_LIGHT_COVERS) != 0) floor = max(floor, flags / NB_LIGHT_RANK);
             } else if (s.enter <= t && int(NEBEL_WORD(at).w) != NB_KIND_EXCLUDE) {
-                depth += nb_depth_within(at, ray, nb_stretch_of(t, end));
+                depth += nb_depth_to_light_within(at, ray, nb_stretch_of(t, end), to_sun);
             }
         }
         if (summing) {
@@ -77,9 +89,9 @@ nb_vec3 nb_covered_depth(nb_ray ray, int count, inout int turns)
     return depth;
 }
 
-
-/* As far as `reach` into the direction; `start` and `cutoff` of volumes do not count. Adds the turns of loops it took. */
-nb_vec3 nb_depth_to_light(nb_vec3 place, nb_vec3 direction, float reach, inout int turns)
+/* As far as `reach` into the direction; `start` and `cutoff` of volumes do not count. `to_sun`: that is where it goes. Adds the turns of
+ * loops it took. */
+nb_vec3 nb_depth_to_light(nb_vec3 place, nb_vec3 direction, float reach, bool to_sun, inout int turns)
 {
     nb_ray ray;
     ray.origin = place;
@@ -87,6 +99,6 @@ nb_vec3 nb_depth_to_light(nb_vec3 place, nb_vec3 direction, float reach, inout i
     ray.t_max = reach;
     ray.from_eye = false;
     int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
-    if (NB_HAS(NB_HAS_COVER)) return nb_covered_depth(ray, count, turns);
-    return nb_added_depth(ray, count, turns);
+    if (NB_HAS(NB_HAS_COVER)) return nb_covered_depth(ray, count, to_sun, turns);
+    return nb_added_depth(ray, count, to_sun, turns);
 }

@@ -313,7 +313,7 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
     return profile;
 }
 
-/* Soft edges of planes, as in src/march/trace_packet.h: the least of the faces' depths is linear from kink to kink. */
+/* Soft edges of planes, as in src/march/trace_profile.h: the least of the faces' depths is linear from kink to kink. */
 float nb_planes_least(nb_profile profile, nb_vec3 place)
 {
     float least = 1.0;

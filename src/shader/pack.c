@@ -1,4 +1,6 @@
 /* Fog as words: every place is brought to the eye in long double before it becomes float. */
+#include "environment.h"
+#include "lattice.h"
 #include "layout.h"
 #include "voxels.h"
 
@@ -48,7 +50,8 @@ static void set_color(nebel_word *word, const double v[3], double last)
 }
 
 _Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID &&
-                   NEBEL_FEATURE_LAMPS == NB_HAS_LAMPS,
+                   NEBEL_FEATURE_LAMPS == NB_HAS_LAMPS && NEBEL_FEATURE_DIFFUSION == NB_HAS_DIFFUSION &&
+                   NEBEL_FEATURE_ENVIRONMENT == NB_HAS_ENVIRONMENT,
                "the public names of features");
 
 /* ---- leaves ---------------------------------------------------------------------------------- */
@@ -255,7 +258,8 @@ static void pack_scattering(packer *p, const nb_medium *medium, nebel_word *word
     const nb_phase *phase = &medium->body.phase;
     nebel_word *scattering = &p->words[p->used];
     if (!scatters(medium)) return;
-    word->v[3] = (float)p->used;
+    word[NB_MEDIUM_SCATTERING].v[3] = (float)p->used;
+    word[NB_MEDIUM_AHEAD].v[3] = (float)medium->ahead;
     p->used += NB_SCATTERING_WORDS;
     memset(scattering, 0, NB_SCATTERING_WORDS * sizeof *scattering);
     set_color(&scattering[0], medium->body.albedo, phase->lobe_count);
@@ -308,9 +312,10 @@ static double light_flags(const nb_medium *medium, size_t rank)
 static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
 {
     const nb_volume *body = &medium->body;
+    const int by_direction = medium->sky != NULL;
     set_color(&word[0], body->extinction, kind_of(body));
-    set_color(&word[1], medium->light, light_flags(medium, p->rank));
-    set_color(&word[2], medium->radiance, (double)body->leaf_count);
+    set_color(&word[1], by_direction ? body->emission : medium->light, light_flags(medium, p->rank));
+    set_color(&word[2], by_direction ? body->albedo : medium->radiance, (double)body->leaf_count);
     pack_density(p, body, &word[3]);
     if (body->leaf_count > 1)
         pack_group(p, body, &word[NB_MEDIUM_LEAF]);
@@ -318,7 +323,7 @@ static void pack_medium(packer *p, const nb_medium *medium, nebel_word *word)
         pack_leaf(p, body, &body->leaves[0], 1, &word[NB_MEDIUM_LEAF]);
     word[NB_MEDIUM_START].v[3] = (float)body->start;
     word[NB_MEDIUM_CUTOFF].v[3] = narrow((long double)body->cutoff);
-    pack_scattering(p, medium, &word[NB_MEDIUM_SCATTERING]);
+    pack_scattering(p, medium, word);
 }
 
 static size_t count_words(const nebel_snapshot *snapshot)
@@ -330,25 +335,7 @@ static size_t count_words(const nebel_snapshot *snapshot)
         count += scatters(&snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
     }
     if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LAMP_WORDS;
-    return count;
-}
-
-static nebel_result refuse_light(const nebel_snapshot *snapshot)
-{
-    if (snapshot->diffusion != NULL)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot show light that fog scatters more than once; use nebel_trace or the CPU's "
-                       "renderer (--device cpu), or leave multiple scattering out");
-    if (snapshot->skylight_count > 0)
-        return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                       "pack: shaders cannot light fog with a gradient or a map yet; use nebel_trace or the CPU's "
-                       "renderer (--device cpu), or a constant ambient light");
-    if ((snapshot->is_sunlit || snapshot->is_lamplit) && nb_has_voxels(snapshot))
-        return nb_fail(
-            &snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-            "pack: shaders cannot light fog with sun or lamps where there are grids yet; use nebel_trace or the "
-            "CPU's renderer (--device cpu), or give volumes a source instead of an albedo");
-    return NEBEL_OK;
+    return count + nb_count_lattice_words(snapshot);
 }
 
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
@@ -361,8 +348,9 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (!(fabs(eye[i]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
-    nebel_result result = refuse_light(snapshot);
-    if (result == NEBEL_OK) result = nb_check_voxels(snapshot);
+    nebel_result result = nb_check_voxels(snapshot);
+    if (result == NEBEL_OK) result = nb_check_lattices(snapshot);
+    if (result == NEBEL_OK) result = nb_check_environment(snapshot);
     if (result != NEBEL_OK) return result;
     *count = count_words(snapshot);
     if (*count > MOST_WORDS)
@@ -382,14 +370,18 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         (nebel_word){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
                       (float)snapshot->max_opacity, 0}};
     pack_sun(snapshot, &words[NB_HEADER_SUN]);
+    words[NB_HEADER_LATTICE] = (nebel_word){{0}};
     const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;
         pack_medium(&p, &snapshot->media[i], &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS]);
     }
     pack_lamps(&p, snapshot);
+    if (snapshot->diffusion != NULL) words[NB_HEADER_LATTICE].v[0] = (float)p.used;
+    nb_pack_lattice_words(snapshot, p.eye, &words[p.used]);
     nb_restore_precision(precision);
     nb_place_voxels(snapshot, words);
+    nb_place_filters(snapshot, words);
     return NEBEL_OK;
 }
 
@@ -431,7 +423,7 @@ static int is_mixed(const nebel_snapshot *snapshot)
             first = medium;
             continue;
         }
-        if (medium->emits || first->emits) return 1;
+        if (medium->emits || first->emits || medium->sky != first->sky) return 1;
         for (int c = 0; c < 3; c++)
             if (medium->radiance[c] < first->radiance[c] || medium->radiance[c] > first->radiance[c]) return 1;
     }
@@ -443,7 +435,9 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
     if (snapshot == NULL) return NB_HAS_ALL;
     uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
                         (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0) |
-                        (snapshot->is_lamplit ? NB_HAS_LAMPS : 0);
+                        (snapshot->is_lamplit ? NB_HAS_LAMPS : 0) |
+                        (snapshot->diffusion != NULL ? NB_HAS_DIFFUSION : 0) |
+                        (snapshot->skylight_count > 0 ? NB_HAS_ENVIRONMENT : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         features |= features_of_kind(kind_of(body)) | (body->leaf_count > 1 ? NB_HAS_GROUP : 0) |

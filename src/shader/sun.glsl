@@ -12,6 +12,9 @@
 
 nb_vec3 nb_to_sun() { return NEBEL_WORD(NB_HEADER_SUN).xyz; }
 
+/* Whether the sun lights any fog. */
+bool nb_is_day() { return NB_HAS(NB_HAS_SUN) && nb_largest(abs(nb_to_sun())) > 0.0; }
+
 /* Whether light along a ray has a closed form between turns: the whole depth is linear in that along the ray. */
 bool nb_sun_is_closed() { return NEBEL_WORD(NB_HEADER_SUN).w > 0.0; }
 
@@ -30,7 +33,7 @@ nb_vec3 nb_sunlit_radiance(int medium, nb_vec3 direction)
 nb_vec3 nb_depth_to_sun(nb_vec3 place)
 {
     int turns = 0; /* nb_turns_to_sun counts them */
-    return nb_depth_to_light(place, nb_to_sun(), NB_FAR, turns);
+    return nb_depth_to_light(place, nb_to_sun(), NB_FAR, true, turns);
 }
 
 /* ---- turns ----------------------------------------------------------------------------------- */
@@ -264,4 +267,36 @@ nb_turning nb_find_turn(nb_ray ray, float t, float end)
         }
     }
     return turning;
+}
+
+/* ---- the shadow of voxels -------------------------------------------------------------------- */
+
+/* Cells across the way to the sun that light may be seen through at once. */
+#define NB_CELLS_AT_ONCE 2.0
+
+/* Metres along the ray within which the way to the sun passes so many cells by. */
+float nb_cells_by(nb_sun_lattice_ray to_sun)
+{
+    return NB_CELLS_AT_ONCE / max(max(abs(to_sun.slope.x), abs(to_sun.slope.y)), NB_TINY);
+}
+
+/* What a step may be where voxels lie between a place on the ray and the sun; NB_FAR where there are none. */
+float nb_most_in_shadow(nb_ray ray, float t)
+{
+    float most = NB_FAR;
+    nb_ray way = ray;
+    way.origin = ray.origin + ray.direction * t;
+    way.direction = nb_to_sun();
+    way.t_max = NB_FAR;
+    way.from_eye = false;
+    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    for (int i = 0; i < count; i++) {
+        int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+        if (int(NEBEL_WORD(at).w) != NB_KIND_GRID) continue;
+        nb_stretch s = nb_next_stretch(at, 1, way, 0.0);
+        if (!(s.enter < s.leave)) continue;
+        nb_profile profile = nb_profile_of(at, NB_KIND_GRID, ray, 0.0);
+        most = min(most, nb_cells_by(nb_sun_lattice_ray_of(int(NEBEL_WORD(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope)));
+    }
+    return most;
 }

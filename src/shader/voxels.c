@@ -1,6 +1,7 @@
 /* Voxels as texels, the same for every eye. Grids lie in the order in which the snapshot's media first have them. */
 #include "voxels.h"
 
+#include "sun_lattices.h"
 #include "layout.h"
 
 #include "march/snapshot.h"
@@ -8,8 +9,6 @@
 
 #include <math.h>
 #include <string.h>
-
-#define MOST_TEXELS ((size_t)1 << 24) /* indices are exact floats */
 
 enum { BRICK_CELLS = BRICK * BRICK * BRICK, CORNERS = BRICK + 1, MOST_STEPS = UINT16_MAX };
 
@@ -53,7 +52,7 @@ static size_t count_texels(const nebel_grid *grid)
     return 1 + count_bricks(grid) + grid->uneven_bricks * BRICK_CELLS;
 }
 
-static size_t count_all(const nebel_snapshot *snapshot)
+static size_t count_grids(const nebel_snapshot *snapshot)
 {
     size_t count = 0;
     for (size_t i = next_grid(snapshot, 0); i < snapshot->medium_count; i = next_grid(snapshot, i + 1))
@@ -61,19 +60,26 @@ static size_t count_all(const nebel_snapshot *snapshot)
     return count;
 }
 
-int nb_has_voxels(const nebel_snapshot *snapshot)
+/* What grids leave for lattices. */
+static size_t room_beside(size_t grids)
 {
-    return next_grid(snapshot, 0) < snapshot->medium_count;
+    return grids < NB_MOST_TEXELS ? NB_MOST_TEXELS - grids : 0;
+}
+
+static size_t count_all(const nebel_snapshot *snapshot)
+{
+    const size_t grids = count_grids(snapshot);
+    return grids + nb_count_sun_lattice_texels(snapshot, room_beside(grids));
 }
 
 nebel_result nb_check_voxels(const nebel_snapshot *snapshot)
 {
     const size_t count = count_all(snapshot);
-    if (count <= MOST_TEXELS) return NEBEL_OK;
+    if (count <= NB_MOST_TEXELS) return NEBEL_OK;
     return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
                    "pack: the grids are too large for shaders: where they are not even they take %zu texels, of which "
                    "%zu can be addressed; use fewer voxels, or nebel_trace or the CPU's renderer (--device cpu)",
-                   count, MOST_TEXELS);
+                   count, NB_MOST_TEXELS);
 }
 
 void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words)
@@ -87,6 +93,7 @@ void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words)
         word->v[3] = first < i ? words[NB_HEADER_WORDS + first * NB_MEDIUM_WORDS + 3].v[3] : (float)next;
         if (first == i) next += count_texels(grid);
     }
+    nb_place_sun_lattices(snapshot, room_beside(next), next, words);
 }
 
 int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b)
@@ -96,7 +103,7 @@ int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b)
         i = next_grid(a, i + 1);
         k = next_grid(b, k + 1);
     }
-    return i == a->medium_count && k == b->medium_count;
+    return i == a->medium_count && k == b->medium_count && nb_same_sun_lattices(a, b);
 }
 
 /* ---- texels ---------------------------------------------------------------------------------- */
@@ -182,5 +189,5 @@ nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel *texe
     size_t next = 0;
     for (size_t i = next_grid(snapshot, 0); i < snapshot->medium_count; i = next_grid(snapshot, i + 1))
         next = pack_grid(grid_of(snapshot, i), next, texels);
-    return NEBEL_OK;
+    return nb_pack_sun_lattices(snapshot, room_beside(next), &texels[next]);
 }

@@ -4,13 +4,13 @@
 
 #include <nebel/shader.h>
 
-/* Whether there are any. */
-int nb_has_voxels(const nebel_snapshot *snapshot);
+/* How many texels can be addressed: indices are exact floats. */
+#define NB_MOST_TEXELS ((size_t)1 << 24)
 
 /* LIMIT, with a message, where the texels are more than can be addressed. */
 nebel_result nb_check_voxels(const nebel_snapshot *snapshot);
 
-/* Writes the first texel of each grid into the words of the media. */
+/* Writes the first texel of each grid, and of its lattice, into the words of the media. */
 void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words);
 
 #endif

@@ -16,6 +16,18 @@ uniform highp usampler2D nebel_tile_texture;
 uniform highp usampler2D nebel_voxel_texture;
 #define NEBEL_VOXEL(i) texelFetch(nebel_voxel_texture, ivec2((i) & 1023, (i) >> 10), 0)
 #endif
+#if defined(NEBEL_DIFFUSION) && !defined(NEBEL_NODE)
+uniform highp sampler2D nebel_node_texture;
+#define NEBEL_NODE(i) texelFetch(nebel_node_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#endif
+#if defined(NEBEL_ENVIRONMENT) && !defined(NEBEL_ENVIRONMENT_WORD)
+uniform highp sampler2D nebel_environment_texture;
+#define NEBEL_ENVIRONMENT_WORD(i) texelFetch(nebel_environment_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#endif
+#if defined(NEBEL_AIR) && !defined(NEBEL_AIR_WORD)
+uniform highp sampler2D nebel_air_texture;
+#define NEBEL_AIR_WORD(i) texelFetch(nebel_air_texture, ivec2((i) & 1023, (i) >> 10), 0)
+#endif
 #if defined(NEBEL_VIEW) && !defined(NEBEL_RAY)
 uniform vec4 nebel_rays[10];
 #define NEBEL_RAY(i) nebel_rays[i]

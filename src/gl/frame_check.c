@@ -1,0 +1,90 @@
+#include "frame_check.h"
+
+#include "method.h"
+
+#include <math.h>
+
+enum { MOST_SIDE = 32768, MOST_SAMPLES = 4096 };
+
+static nebel_result check_size(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    GLint viewport[2] = {0, 0};
+    glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
+    uint32_t most = r->context.widest < MOST_SIDE ? r->context.widest : MOST_SIDE;
+    for (int i = 0; i < 2; i++) most = (uint32_t)viewport[i] < most ? (uint32_t)viewport[i] : most;
+    if (desc->width < 1 || desc->height < 1) {
+        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u x %u pixels; 1 to %u are possible", (unsigned)desc->width,
+                       (unsigned)desc->height, (unsigned)most);
+    }
+    if (desc->width > most || desc->height > most) {
+        return nb_fail(
+            &r->log, NEBEL_ERROR_LIMIT,
+            "frame: %u x %u pixels; this OpenGL draws at most %u either way. The CPU renders larger pictures",
+            (unsigned)desc->width, (unsigned)desc->height, (unsigned)most);
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_samples(const nebel_gl_renderer *r, uint32_t samples)
+{
+    if (samples > MOST_SAMPLES) {
+        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)samples);
+    }
+    if (samples > 1 && r->context.es && !epoxy_has_gl_extension("GL_EXT_float_blend")) {
+        return nb_fail(
+            &r->log, NEBEL_ERROR_UNSUPPORTED,
+            "frame: OpenGL ES without GL_EXT_float_blend cannot add samples; ask for one sample, or use OpenGL");
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    if ((unsigned)desc->method >= NEBEL_GL_METHOD_COUNT) {
+        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: there is no method %d", (int)desc->method);
+    }
+    if (nb_method_takes_cells(desc->method) && desc->cells == NULL)
+        return nb_fail(&r->log, NEBEL_ERROR_ARGUMENT, "frame: this method needs cells; they are NULL");
+    const nebel_gl_taps taps = desc->taps != NULL ? *desc->taps : nebel_gl_default_taps();
+    if (taps.offset >= 0 && taps.edge >= 0 && taps.brightness >= 0 &&
+        isfinite(taps.offset + taps.nothing + taps.edge + taps.margin + taps.brightness)) {
+        return NEBEL_OK;
+    }
+    return nb_fail(&r->log, NEBEL_ERROR_VALUE,
+                   "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
+}
+
+/* What cannot be drawn with air is refused, not left out. */
+static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    const nebel_log *const log = &r->log;
+    if (r->scene->planet_count == 0) return NEBEL_OK;
+    if (r->scene->planets[0].model == NEBEL_PLANET_LAYERS)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "frame: OpenGL cannot draw a planet of layers yet; the CPU can (nebel render --device cpu)");
+    if (r->scene->planet_count > 1)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "frame: OpenGL cannot draw several planets yet; the CPU can (nebel render --device cpu)");
+    if (r->scene->planets[0].cloud_layer_count > 0)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "frame: OpenGL cannot draw clouds with volume yet; the CPU can (nebel render --device cpu)");
+    if (nb_gl_air_planet(r->scene) == NULL) return NEBEL_OK;
+    if (desc->method != NEBEL_GL_METHOD_EXACT)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
+    if (desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "frame: orthographic cameras see no planets; take a perspective one");
+    if (r->particles.count > 0)
+        return nb_fail(
+            log, NEBEL_ERROR_UNSUPPORTED,
+            "frame: OpenGL cannot draw particles in the air of a planet yet; the CPU can (nebel render --device cpu)");
+    return NEBEL_OK;
+}
+
+nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)
+{
+    nebel_result result = check_size(r, desc);
+    if (result == NEBEL_OK) result = check_samples(r, samples);
+    if (result == NEBEL_OK) result = check_planet(r, desc);
+    return result == NEBEL_OK ? check_method(r, desc) : result;
+}

@@ -1,0 +1,10 @@
+/* What a frame may ask for. */
+#ifndef NB_GL_FRAME_CHECK_H
+#define NB_GL_FRAME_CHECK_H
+
+#include "renderer.h"
+
+/* Size, samples, method and taps. VALUE, LIMIT, ARGUMENT, UNSUPPORTED, with a message. */
+nebel_result nb_frame_check(const nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc, uint32_t samples);
+
+#endif

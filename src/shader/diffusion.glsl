@@ -1,0 +1,328 @@
+/* Light that fog scatters more than once, as src/march/diffusion_light.c gathers it along a ray: the source radiance of the lattice's
+ * nodes, which layout.h describes, between places a cell apart; in each such piece the exact transmittance. */
+#ifndef NEBEL_NODE
+#define NEBEL_NODE(i) nb_vec4(0.0, 0.0, 0.0, 0.0)
+#endif
+
+/* Pieces that leave less than this are halved, so often at most: fog may begin anywhere in them. Where they leave more than that they
+ * grow again. */
+#define NB_THICK_PIECE 0.5
+#define NB_THIN_PIECE 0.8
+#define NB_MOST_HALVINGS 5
+
+/* What fog leaves less of does not matter. */
+#define NB_DARK_DEPTH 9.2103
+
+/* ---- depth ----------------------------------------------------------------------------------- */
+
+/* Of the fog as it is, and of what does not scatter straight on. */
+struct nb_two_depths {
+    nb_vec3 whole, scaled;
+};
+
+void nb_add_two_depths(inout nb_two_depths sum, int at, nb_ray ray, nb_stretch s)
+{
+    nb_vec3 depth = nb_depth_within(at, ray, s);
+    int scattering = int(NEBEL_WORD(at + NB_MEDIUM_SCATTERING).w);
+    nb_vec3 albedo = nb_splat3(0.0);
+    if (scattering > 0) albedo = NEBEL_WORD(scattering).xyz;
+    sum.whole += depth;
+    sum.scaled += depth * (nb_splat3(1.0) - albedo * NEBEL_WORD(at + NB_MEDIUM_AHEAD).w);
+}
+
+/* Between two places of a ray, where no medium covers another. */
+void nb_add_depths_between(inout nb_two_depths sum, nb_ray ray, int first, int count, bool listed, float from, inout int turns)
+{
+    for (int i = 0; i < count; i++) {
+        int at = nb_medium_at(first + i, listed);
+        int leaves = int(NEBEL_WORD(at + 2).w);
+        float t = from;
+        turns++;
+        for (int part = 0; part < (NB_HAS(NB_HAS_GROUP) ? leaves : 1); part++) {
+            nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+            turns += nb_stretch_turns(leaves, s);
+            if (!(s.enter < s.leave)) break;
+            nb_add_two_depths(sum, at, ray, s);
+            t = s.leave;
+        }
+    }
+}
+
+/* Where some may: see nb_covered_depth. */
+void nb_add_covered_between(inout nb_two_depths sum, nb_ray ray, int first, int count, bool listed, float from, inout int turns)
+{
+    float t = from;
+    float end = ray.t_max;
+    int floor = 0;
+    bool summing = false;
+    while (t < ray.t_max && !nb_is_tired(turns)) {
+        for (int i = 0; i < count; i++) {
+            int at = nb_medium_at(first + i, listed);
+            int leaves = int(NEBEL_WORD(at + 2).w);
+            int flags = int(NEBEL_WORD(at + 1).w);
+            turns++;
+            if (summing && flags / NB_LIGHT_RANK < floor) continue;
+            nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+            turns += nb_stretch_turns(leaves, s);
+            if (!(s.enter < s.leave)) continue;
+            if (!summing) {
+                end = min(end, s.enter > t ? s.enter : s.leave);
+                if (s.enter <= t && (flags & NB_LIGHT_COVERS) != 0) floor = max(floor, flags / NB_LIGHT_RANK);
+            } else if (s.enter <= t && int(NEBEL_WORD(at).w) != NB_KIND_EXCLUDE) {
+                nb_add_two_depths(sum, at, ray, nb_stretch_of(t, end));
+            }
+        }
+        if (summing) {
+            t = end;
+            end = ray.t_max;
+            floor = 0;
+        }
+        summing = !summing;
+    }
+}
+
+nb_two_depths nb_depths_between(nb_ray ray, int first, int count, bool listed, float from, float to, inout int turns)
+{
+    nb_two_depths sum;
+    sum.whole = nb_splat3(0.0);
+    sum.scaled = nb_splat3(0.0);
+    ray.t_max = to;
+    if (NB_HAS(NB_HAS_COVER))
+        nb_add_covered_between(sum, ray, first, count, listed, from, turns);
+    else
+        nb_add_depths_between(sum, ray, first, NB_HAS(NB_HAS_SEVERAL) ? count : min(count, 1), listed, from, turns);
+    return sum;
+}
+
+/* ---- the lattice ----------------------------------------------------------------------------- */
+
+struct nb_lattice {
+    nb_vec3 low, spacing, cells; /* relative to the packed eye [m] */
+    int word, texel, channels, flags;
+};
+
+nb_lattice nb_lattice_of(int word)
+{
+    nb_vec4 low = NEBEL_WORD(word);
+    nb_vec4 spacing = NEBEL_WORD(word + 1);
+    nb_vec4 cells = NEBEL_WORD(word + 2);
+    nb_lattice l;
+    l.low = low.xyz;
+    l.spacing = spacing.xyz;
+    l.cells = cells.xyz;
+    l.word = word;
+    l.texel = int(low.w);
+    l.channels = int(spacing.w);
+    l.flags = int(cells.w);
+    return l;
+}
+
+/* Whether fog goes on beyond the low end along an axis, of the high one for high = 1. */
+bool nb_goes_on(nb_lattice l, int axis, int high) { return (l.flags >> (2 * axis + high) & 1) != 0; }
+
+bool nb_is_beside(float place, float low, float extent) { return place < low || place > low + extent; }
+
+/* Where fog goes on beside a lattice, bodies in it are not seen any more. */
+nb_lattice nb_lattice_at(nb_lattice l, nb_vec3 place)
+{
+    nb_vec3 extent = l.spacing * l.cells;
+    bool beside = (nb_goes_on(l, 0, 0) && nb_is_beside(place.x, l.low.x, extent.x)) ||
+                  (nb_goes_on(l, 2, 0) && nb_is_beside(place.z, l.low.z, extent.z));
+    if ((l.flags & NB_LATTICE_BESIDE) != 0 && beside) return nb_lattice_of(l.word + NB_LATTICE_WORDS);
+    return l;
+}
+
+/* The part of a ray between two ends of the lattice. `from` counts from its low end. */
+void nb_clip_axis(inout nb_vec2 span, float from, float d, float extent, bool low_goes_on, bool high_goes_on)
+{
+    float inverse = nb_rcp_bounded(d);
+    bool up = d > 0.0;
+    bool still = d == 0.0;
+    bool beyond = (from < 0.0 && !low_goes_on) || (from > extent && !high_goes_on);
+    if (still && beyond) span.y = 0.0;
+    if (!still && !(up ? low_goes_on : high_goes_on)) span.x = max(span.x, (up ? -from : extent - from) * inverse);
+    if (!still && !(up ? high_goes_on : low_goes_on)) span.y = min(span.y, (up ? extent - from : -from) * inverse);
+}
+
+nb_vec2 nb_clip_to_lattice(nb_lattice l, nb_ray ray)
+{
+    nb_vec2 span = nb_vec2(0.0, ray.t_max);
+    nb_vec3 from = ray.origin - l.low;
+    nb_vec3 extent = l.spacing * l.cells;
+    nb_clip_axis(span, from.x, ray.direction.x, extent.x, nb_goes_on(l, 0, 0), nb_goes_on(l, 0, 1));
+    nb_clip_axis(span, from.y, ray.direction.y, extent.y, nb_goes_on(l, 1, 0), nb_goes_on(l, 1, 1));
+    nb_clip_axis(span, from.z, ray.direction.z, extent.z, nb_goes_on(l, 2, 0), nb_goes_on(l, 2, 1));
+    return span;
+}
+
+/* How far along a ray to the next cell, about; a place outside goes to the end first. */
+float nb_step_along(float at, float d, float spacing, float cells)
+{
+    float inverse = abs(nb_rcp_bounded(d));
+    float extent = spacing * cells;
+    float before = d > 0.0 ? -at : at - extent;
+    float behind = d > 0.0 ? at - extent : -at;
+    float step = NB_FAR;
+    if (cells > 1.0 && d != 0.0) {
+        if (before > 1e-5 * spacing)
+            step = before * inverse;
+        else if (behind < -1e-5 * spacing)
+            step = spacing * inverse;
+    }
+    return step;
+}
+
+float nb_lattice_step(nb_lattice l, nb_ray ray, float t)
+{
+    nb_vec3 at = ray.origin + ray.direction * t - l.low;
+    float step = nb_step_along(at.x, ray.direction.x, l.spacing.x, l.cells.x);
+    step = min(step, nb_step_along(at.y, ray.direction.y, l.spacing.y, l.cells.y));
+    return min(step, nb_step_along(at.z, ray.direction.z, l.spacing.z, l.cells.z));
+}
+
+/* ---- source radiance ------------------------------------------------------------------------- */
+
+float nb_lattice_lobe(float g, nb_turn turn)
+{
+    float rest = 1.0 - abs(g);
+    return nb_phase_lobe(rest * (1.0 + abs(g)) * 0.079577471545947667884, 0.0, rest * rest, 2.0 * g, turn);
+}
+
+/* See diffuse_source in diffusion_light.c. `numbers`: mean over directions, and flux. */
+float nb_diffuse_source(nb_vec4 numbers, float most, nb_vec3 direction)
+{
+    float size = length(numbers.yzw);
+    float mean = max(numbers.x, 0.0);
+    if (!(mean > 0.0) || !(size > 0.0)) return mean;
+    nb_turn turn = nb_turn_between(numbers.yzw * (1.0 / size), -direction);
+    return 12.566370614359172954 * mean * nb_lattice_lobe(min(size / mean, most), turn);
+}
+
+/* How much more of what is diffuse there is than nodes say, in light of this direction. */
+nb_vec3 nb_lattice_gain(nb_lattice l, nb_vec3 d)
+{
+    int word = l.word + 3;
+    return d.x * d.x * NEBEL_WORD(word + (d.x < 0.0 ? 1 : 0)).xyz + d.y * d.y * NEBEL_WORD(word + (d.y < 0.0 ? 3 : 2)).xyz +
+           d.z * d.z * NEBEL_WORD(word + (d.z < 0.0 ? 5 : 4)).xyz;
+}
+
+/* Of opaque fog after scaling, and what of it exact light of one scattering has already, of fog as it is. */
+struct nb_node_light {
+    nb_vec3 source, once;
+};
+
+/* Eight nodes around a place, which is taken to the nearest one of the lattice. */
+struct nb_nodes {
+    int texel, right, up, deep; /* the lowest, and how much farther the next ones along the axes are */
+    nb_vec3 share;
+};
+
+nb_nodes nb_nodes_around(nb_lattice l, nb_vec3 place)
+{
+    nb_vec3 at = clamp((place - l.low) / l.spacing, nb_splat3(0.0), l.cells);
+    nb_vec3 base = min(floor(at), l.cells - nb_splat3(1.0));
+    nb_nodes n;
+    n.right = 2 * l.channels + 1;
+    n.up = n.right * (int(l.cells.x) + 1);
+    n.deep = n.up * (int(l.cells.y) + 1);
+    n.texel = l.texel + int(base.x) * n.right + int(base.y) * n.up + int(base.z) * n.deep;
+    n.share = at - base;
+    return n;
+}
+
+nb_vec4 nb_mix_row(nb_nodes n, int texel)
+{
+    return NEBEL_NODE(texel) * (1.0 - n.share.x) + NEBEL_NODE(texel + n.right) * n.share.x;
+}
+
+/* The texel with this number in each node. */
+nb_vec4 nb_mix_nodes(nb_nodes n, int number)
+{
+    int texel = n.texel + number;
+    nb_vec4 near = nb_mix_row(n, texel) * (1.0 - n.share.y) + nb_mix_row(n, texel + n.up) * n.share.y;
+    texel += n.deep;
+    nb_vec4 far = nb_mix_row(n, texel) * (1.0 - n.share.y) + nb_mix_row(n, texel + n.up) * n.share.y;
+    return near * (1.0 - n.share.z) + far * n.share.z;
+}
+
+nb_node_light nb_look_at_nodes(nb_lattice l, nb_ray ray, float t, nb_turn to_sun)
+{
+    nb_nodes n = nb_nodes_around(l, ray.origin + ray.direction * t);
+    float g = nb_mix_nodes(n, 2 * l.channels).x;
+    float turned = nb_lattice_lobe(g, to_sun);
+    nb_vec3 gain = nb_lattice_gain(l, ray.direction);
+    nb_node_light light;
+    light.source = nb_splat3(0.0);
+    light.once = nb_splat3(0.0);
+    for (int c = 0; c < l.channels; c++) {
+        nb_vec3 own = nb_vec3(c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0);
+        if (l.channels == 1) own = nb_splat3(1.0);
+        nb_vec4 sun = nb_mix_nodes(n, 2 * c + 1);
+        float diffuse = nb_diffuse_source(nb_mix_nodes(n, 2 * c), max(g, 0.0), ray.direction);
+        light.source += own * (gain * diffuse + nb_splat3(turned * nb_exp(sun.x)));
+        light.once += own * (sun.z * nb_lattice_lobe(sun.w, to_sun) - turned * nb_exp(sun.y));
+    }
+    return light;
+}
+
+/* ---- along the ray --------------------------------------------------------------------------- */
+
+/* Light of a piece in front of its own fog: its source is linear between the ends, the fog even. */
+nb_vec3 nb_light_between(nb_vec3 first, nb_vec3 last, nb_vec3 depth)
+{
+    nb_attenuation through = nb_attenuate(depth);
+    nb_vec3 x = min(depth, nb_splat3(1.0));
+    nb_vec3 thin = x * (nb_splat3(0.5) - x * (nb_splat3(1.0 / 3.0) - x * 0.125));
+    nb_vec3 of_last = through.mean - through.left;
+    of_last = nb_vec3(depth.x > 0.01 ? of_last.x : thin.x, depth.y > 0.01 ? of_last.y : thin.y, depth.z > 0.01 ? of_last.z : thin.z);
+    return first * (through.mean * depth - of_last) + last * of_last;
+}
+
+/* About how many turns of loops a piece takes, besides those of its media. */
+#define NB_TURNS_OF_PIECE 8
+
+/* A piece is in one lattice; where it is another one than that of the piece before, and at first, an empty piece looks at it. */
+nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
+{
+    nb_lattice l = nb_lattice_of(int(NEBEL_WORD(NB_HEADER_LATTICE).x));
+    nb_turn to_sun = nb_turn_between(ray.direction, nb_to_sun());
+    nb_vec2 span = nb_clip_to_lattice(l, ray);
+    nb_vec3 light = nb_splat3(0.0);
+    nb_two_depths before;
+    before.whole = nb_splat3(0.0);
+    before.scaled = nb_splat3(0.0);
+    float t = span.x;
+    float smaller = 1.0;
+    int halvings = 0;
+    int turns = 0;
+    int word = 0;
+    nb_node_light here;
+    here.source = nb_splat3(0.0);
+    here.once = nb_splat3(0.0);
+    while (t < span.y && nb_smallest(before.scaled) < NB_DARK_DEPTH && !nb_is_tired(turns)) {
+        float step = max(smaller * min(nb_lattice_step(l, ray, t), span.y - t), t * (2.0 * NB_EPSILON));
+        nb_lattice within = nb_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
+        float end = within.word == word ? min(t + step, span.y) : t;
+        word = within.word;
+        nb_two_depths depth = nb_depths_between(ray, first, count, listed, t, end, turns);
+        float left = nb_smallest(nb_exp3(-depth.scaled));
+        turns += NB_TURNS_OF_PIECE;
+        if (left < NB_THICK_PIECE && halvings < NB_MOST_HALVINGS) {
+            halvings++;
+            smaller *= 0.5;
+            continue;
+        }
+        nb_node_light there = nb_look_at_nodes(within, ray, end, to_sun);
+        light += nb_exp3(-before.scaled) * nb_light_between(here.source, there.source, depth.scaled) +
+                 nb_exp3(-before.whole) * nb_light_between(here.once, there.once, depth.whole);
+        before.scaled += depth.scaled;
+        before.whole += depth.whole;
+        if (left > NB_THIN_PIECE && halvings > 0) {
+            halvings--;
+            smaller *= 2.0;
+        }
+        here = there;
+        t = end;
+    }
+    return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz;
+}

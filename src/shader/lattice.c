@@ -1,0 +1,123 @@
+/* Lattices of light that is scattered more than once: where they are as words, their nodes as texels. */
+#include "lattice.h"
+
+#include "layout.h"
+
+#include "march/diffusion.h"
+#include "march/snapshot.h"
+
+#define MOST_TEXELS ((size_t)1 << 24) /* indices are exact floats */
+
+/* The lattice, and the one of what is beside it. */
+enum { MOST_LATTICES = 2 };
+
+static size_t list_lattices(const nebel_snapshot *snapshot, const nb_diffusion *all[MOST_LATTICES])
+{
+    size_t count = 0;
+    for (const nb_diffusion *d = snapshot->diffusion; d != NULL; d = d->beside) all[count++] = d;
+    return count;
+}
+
+static size_t texels_of_node(const nb_diffusion *d)
+{
+    return 2 * (size_t)d->channel_count + 1;
+}
+
+static size_t count_texels(const nebel_snapshot *snapshot)
+{
+    const nb_diffusion *all[MOST_LATTICES];
+    const size_t lattices = list_lattices(snapshot, all);
+    size_t count = 0;
+    for (size_t i = 0; i < lattices; i++) count += nb_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
+    return count;
+}
+
+nebel_result nb_check_lattices(const nebel_snapshot *snapshot)
+{
+    const size_t count = count_texels(snapshot);
+    if (count <= MOST_TEXELS) return NEBEL_OK;
+    return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+                   "pack: the lattice of multiple scattering is too large for shaders: it takes %zu texels, of which "
+                   "%zu can be addressed; use fewer cells, or nebel_trace or the CPU's renderer (--device cpu)",
+                   count, MOST_TEXELS);
+}
+
+/* ---- words ----------------------------------------------------------------------------------- */
+
+size_t nb_count_lattice_words(const nebel_snapshot *snapshot)
+{
+    const nb_diffusion *all[MOST_LATTICES];
+    return NB_LATTICE_WORDS * list_lattices(snapshot, all);
+}
+
+static int flags_of(const nb_diffusion *d)
+{
+    int flags = d->beside != NULL ? NB_LATTICE_BESIDE : 0;
+    for (int i = 0; i < 6; i++) flags |= (d->lattice.ends[i / 2][i % 2] == NB_END_LEVEL) << i;
+    return flags;
+}
+
+static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t first, nebel_word *word)
+{
+    const nb_lattice *l = &d->lattice;
+    for (int a = 0; a < 3; a++) {
+        word[0].v[a] = (float)((long double)l->low[a] - eye[a]);
+        word[1].v[a] = (float)l->spacing[a];
+        word[2].v[a] = (float)l->size[a];
+    }
+    word[0].v[3] = (float)first;
+    word[1].v[3] = (float)d->channel_count;
+    word[2].v[3] = (float)flags_of(d);
+    for (int i = 0; i < 6; i++) {
+        word[3 + i] = (nebel_word){{0}};
+        for (int c = 0; c < 3; c++) word[3 + i].v[c] = (float)d->gain[d->channel_count == 1 ? 0 : c][i / 2][i % 2];
+    }
+}
+
+void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_word *words)
+{
+    const nb_diffusion *all[MOST_LATTICES];
+    const size_t lattices = list_lattices(snapshot, all);
+    size_t first = 0;
+    for (size_t i = 0; i < lattices; i++) {
+        pack_lattice(all[i], eye, first, &words[i * NB_LATTICE_WORDS]);
+        first += nb_lattice_nodes(&all[i]->lattice) * texels_of_node(all[i]);
+    }
+}
+
+/* ---- texels ---------------------------------------------------------------------------------- */
+
+_Static_assert(NB_NODE_DIFFUSE == 0 && NB_NODE_FLUX == 1 && NB_NODE_TURNED == 4 && NB_NODE_WIDTH == 7 &&
+                   NB_NODE_NUMBERS == 8,
+               "what layout.h says");
+
+/* Numbers of the march lie as texels do, but for the last one of each node. Returns the word behind the last. */
+static nebel_word *pack_nodes(const nb_diffusion *d, nebel_word *word)
+{
+    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    for (size_t i = 0; i < nodes; i++) {
+        const float *numbers = &d->nodes[i * d->node_numbers];
+        for (size_t k = 0; k + 1 < texels_of_node(d); k++, numbers += 4)
+            *word++ = (nebel_word){{numbers[0], numbers[1], numbers[2], numbers[3]}};
+        *word++ = (nebel_word){{numbers[0]}};
+    }
+    return word;
+}
+
+nebel_result nebel_pack_diffusion(const nebel_snapshot *snapshot, nebel_word *words, size_t capacity, size_t *count)
+{
+    if (snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (count == NULL || (words == NULL && capacity > 0))
+        return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "pack: words and count must not be NULL");
+    const nebel_result result = nb_check_lattices(snapshot);
+    if (result != NEBEL_OK) return result;
+    *count = count_texels(snapshot);
+    if (words == NULL) return NEBEL_OK;
+    if (capacity < *count)
+        return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT,
+                       "pack: %zu words of multiple scattering are needed, there is room for %zu", *count, capacity);
+    const nb_diffusion *all[MOST_LATTICES];
+    const size_t lattices = list_lattices(snapshot, all);
+    for (size_t i = 0; i < lattices; i++) words = pack_nodes(all[i], words);
+    return NEBEL_OK;
+}

@@ -1,0 +1,124 @@
+/* The media that a walk along a ray has at hand. fog.glsl follows. */
+
+/* The word of the medium that stands at `i` of all media, or of the host's list. */
+int nb_medium_at(int i, bool listed)
+{
+#ifdef NEBEL_INDEX
+    int index = i;
+    if (listed) index = NEBEL_INDEX(i);
+    return NB_HEADER_WORDS + NB_MEDIUM_WORDS * index;
+#else
+    return NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+#endif
+}
+
+/* Stretches that the walk keeps at hand, the next ones of their media: enter, leave, the medium's word. The mask keeps drivers from
+ * unrolling every loop over them to the array's length. */
+#ifndef NEBEL_SLOTS
+#define NEBEL_SLOTS 32
+#endif
+NB_GLOBAL nb_vec3 nb_slots[NEBEL_SLOTS];
+
+nb_vec3 nb_slot(int k) { return nb_slots[k & (NEBEL_SLOTS - 1)]; }
+void nb_set_slot(int k, int medium, nb_stretch s) { nb_slots[k & (NEBEL_SLOTS - 1)] = nb_vec3(s.enter, s.leave, float(medium)); }
+
+/* What opaque fog of their media gives; kept where an environment lights fog, which is dear to look up. */
+NB_GLOBAL nb_vec3 nb_slot_lights[NEBEL_SLOTS];
+
+void nb_light_slot(int k, int medium, nb_vec3 direction)
+{
+    if (NB_HAS(NB_HAS_ENVIRONMENT)) nb_slot_lights[k & (NEBEL_SLOTS - 1)] = nb_opaque_radiance(medium, direction);
+}
+
+nb_vec3 nb_slot_radiance(int k, int medium)
+{
+    nb_vec3 radiance = NEBEL_WORD(medium + 2).xyz;
+    if (NB_HAS(NB_HAS_ENVIRONMENT)) radiance = nb_slot_lights[k & (NEBEL_SLOTS - 1)];
+    return radiance;
+}
+
+bool nb_is_inside(nb_vec3 slot, float t) { return slot.x <= t && slot.y > t; }
+
+int nb_farthest_slot(int used)
+{
+    int farthest = 0;
+    float most = nb_slot(0).x;
+    for (int k = 1; k < used; k++) {
+        float enter = nb_slot(k).x;
+        if (enter > most) {
+            most = enter;
+            farthest = k;
+        }
+    }
+    return farthest;
+}
+
+/* Some drivers end loops after so many turns, all loops of a shader together, without a word. Where the host says how many, the walk
+ * counts its own and stops before; neighbours of a pixel run along with it, which the host's number has to allow for. */
+#ifdef NEBEL_MOST_TURNS
+#define NB_MAY_TIRE true
+bool nb_is_tired(int turns) { return turns >= NEBEL_MOST_TURNS; }
+#else
+#define NB_MAY_TIRE false
+bool nb_is_tired(int turns) { return false; }
+#endif
+
+/* How many sums over `count` media are made of a ray that was too much to walk. */
+int nb_rest_steps(int count)
+{
+#ifdef NEBEL_MOST_TURNS
+    return clamp(NEBEL_MOST_TURNS / (2 * count), 1, 64);
+#else
+    return 0;
+#endif
+}
+
+/* What the slots hold: `used` of them, of the media before `rest` in the list, right until `end`. */
+struct nb_window {
+    int used;
+    int rest;
+    float end;
+    int turns; /* it took */
+};
+
+/* Stretches behind t. The nearest of all media; or in a crowd, where more begin at t than there are slots, those of the media
+ * from `begin` on until the slots are full. A stretch of a body of several leaves ends the window: another may follow. Without a
+ * crowd, a window that ends at t says that there is one. */
+nb_window nb_fill_slots(nb_ray ray, int first, int count, bool listed, int begin, float t, bool crowd)
+{
+    nb_window window;
+    window.used = 0;
+    window.rest = count;
+    window.end = ray.t_max;
+    window.turns = 0;
+    int farthest = 0;
+    for (int i = begin; i < count; i++) {
+        if (window.end <= t || nb_is_tired(window.turns)) break;
+        if (crowd && window.used == NEBEL_SLOTS) {
+            window.rest = i;
+            break;
+        }
+        int at = nb_medium_at(first + i, listed);
+        int leaves = int(NEBEL_WORD(at + 2).w);
+        nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+        window.turns += NB_HAS(NB_HAS_GROUP) && leaves > 1 ? (2 * leaves + 1) * (2 * leaves + 1) : 1; /* events, leaves, folds */
+        if (!(s.enter < s.leave)) continue;
+        if (NB_HAS(NB_HAS_GROUP) && leaves > 1) window.end = min(window.end, s.leave);
+        if (window.used < NEBEL_SLOTS) {
+            nb_set_slot(window.used, at, s);
+            nb_light_slot(window.used, at, ray.direction);
+            window.used++;
+            if (!crowd && window.used == NEBEL_SLOTS) farthest = nb_farthest_slot(window.used);
+            continue;
+        }
+        float dropped = max(s.enter, nb_slot(farthest).x);
+        window.end = min(window.end, dropped);
+        if (s.enter < dropped) {
+            nb_set_slot(farthest, at, s);
+            nb_light_slot(farthest, at, ray.direction);
+            farthest = nb_farthest_slot(window.used);
+            window.turns += NEBEL_SLOTS;
+        }
+    }
+    return window;
+}

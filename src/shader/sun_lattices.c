@@ -1,0 +1,161 @@
+/* One lattice for each grid and each way to the sun through it, however many volumes share them. Each of its texels has
+ * the eight nodes of a cell, so that shaders read one texel for each place they ask for. */
+#include "sun_lattices.h"
+
+#include "layout.h"
+
+#include "march/snapshot.h"
+
+#include <string.h>
+
+/* Two columns a cell where they take no more than 128 MiB; more, for cells that are long in metres, where that is 4 MiB. */
+#define MOST_TEXELS ((size_t)1 << 23)
+static const nb_lattice_limit small_limit = {8, (size_t)1 << 18};
+
+static nebel_grid *grid_of(const nebel_snapshot *snapshot, size_t medium)
+{
+    const nebel_density *density = &snapshot->media[medium].body.density;
+    return density->type == NEBEL_DENSITY_GRID ? density->grid : NULL;
+}
+
+static int is_same(const nebel_snapshot *a, size_t i, const nebel_snapshot *b, size_t k)
+{
+    double one[3], other[3];
+    if (grid_of(a, i) == NULL || grid_of(b, k) == NULL) return 0;
+    nb_way_in_cells(a, &a->media[i].body, one);
+    nb_way_in_cells(b, &b->media[k].body, other);
+    return memcmp(one, other, sizeof one) == 0 && nb_grid_compare(grid_of(a, i), grid_of(b, k)) == 0;
+}
+
+/* The first medium that has this one's lattice. */
+static size_t first_of(const nebel_snapshot *snapshot, size_t medium)
+{
+    size_t first = 0;
+    while (!is_same(snapshot, first, snapshot, medium)) first++;
+    return first;
+}
+
+/* The next medium, from `medium` on, with a lattice that none before it has; medium_count: there is none. */
+static size_t next_lattice(const nebel_snapshot *snapshot, size_t medium)
+{
+    if (!snapshot->is_sunlit) return snapshot->medium_count;
+    while (medium < snapshot->medium_count &&
+           (grid_of(snapshot, medium) == NULL || first_of(snapshot, medium) != medium))
+        medium++;
+    return medium;
+}
+
+static size_t count_lattices(const nebel_snapshot *snapshot)
+{
+    size_t count = 0;
+    for (size_t i = next_lattice(snapshot, 0); i < snapshot->medium_count; i = next_lattice(snapshot, i + 1)) count++;
+    return count;
+}
+
+static nb_lattice_limit limit_of(const nebel_snapshot *snapshot, size_t medium, size_t room)
+{
+    const size_t share = room / count_lattices(snapshot);
+    nb_grid_lattice lattice = {0};
+    double way[3];
+    nb_way_in_cells(snapshot, &snapshot->media[medium].body, way);
+    nb_grid_lattice_lay(&lattice, grid_of(snapshot, medium), way, small_limit);
+    if (lattice.per_cell > 2 && share > small_limit.most_nodes) return small_limit;
+    return (nb_lattice_limit){2, share < MOST_TEXELS ? share : MOST_TEXELS};
+}
+
+static size_t cells_of(const nb_grid_lattice *l, int axis)
+{
+    return (size_t)l->count[axis] - 1;
+}
+
+static size_t texels_of(const nebel_snapshot *snapshot, size_t medium, size_t room)
+{
+    nb_grid_lattice lattice = {0};
+    double way[3];
+    nb_way_in_cells(snapshot, &snapshot->media[medium].body, way);
+    nb_grid_lattice_lay(&lattice, grid_of(snapshot, medium), way, limit_of(snapshot, medium, room));
+    return NB_SUN_LATTICE_TEXELS + cells_of(&lattice, 0) * cells_of(&lattice, 1) * cells_of(&lattice, 2);
+}
+
+size_t nb_count_sun_lattice_texels(const nebel_snapshot *snapshot, size_t room)
+{
+    size_t count = 0;
+    for (size_t i = next_lattice(snapshot, 0); i < snapshot->medium_count; i = next_lattice(snapshot, i + 1))
+        count += texels_of(snapshot, i, room);
+    return count;
+}
+
+void nb_place_sun_lattices(const nebel_snapshot *snapshot, size_t room, size_t first, nebel_word *words)
+{
+    for (size_t i = 0; i < snapshot->medium_count && snapshot->is_sunlit; i++) {
+        if (grid_of(snapshot, i) == NULL) continue;
+        nebel_word *word = &words[NB_HEADER_WORDS + i * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF];
+        const size_t before = first_of(snapshot, i);
+        word->v[1] =
+            before < i ? words[NB_HEADER_WORDS + before * NB_MEDIUM_WORDS + NB_MEDIUM_LEAF].v[1] : (float)first;
+        if (before == i) first += texels_of(snapshot, i, room);
+    }
+}
+
+int nb_same_sun_lattices(const nebel_snapshot *a, const nebel_snapshot *b)
+{
+    size_t i = next_lattice(a, 0), k = next_lattice(b, 0);
+    while (i < a->medium_count && k < b->medium_count && is_same(a, i, b, k)) {
+        i = next_lattice(a, i + 1);
+        k = next_lattice(b, k + 1);
+    }
+    return i == a->medium_count && k == b->medium_count;
+}
+
+/* ---- texels ---------------------------------------------------------------------------------- */
+
+static uint32_t bits_of(double x)
+{
+    const float narrow = (float)x;
+    uint32_t bits;
+    memcpy(&bits, &narrow, sizeof bits);
+    return bits;
+}
+
+static void pack_head(const nb_grid_lattice *l, nebel_texel *head)
+{
+    for (int i = 0; i < 3; i++) head[0].v[i] = (uint32_t)cells_of(l, i);
+    head[0].v[3] = (uint32_t)l->axis;
+    for (int s = 0; s < 2; s++) {
+        head[1].v[s] = bits_of(l->lean[s]);
+        head[1].v[2 + s] = bits_of(l->first[s]);
+    }
+    head[2] = (nebel_texel){{bits_of(l->per_cell), bits_of(l->step), (uint32_t)l->ends_in_fog, 0}};
+    head[3] = (nebel_texel){{bits_of(l->end[0]), bits_of(l->end[1]), bits_of(l->end[2]), bits_of(l->up ? 1 : -1)}};
+}
+
+/* Returns the texel behind the last. */
+static nebel_texel *pack_lattice(const nb_grid_lattice *l, nebel_texel *texel)
+{
+    const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
+    pack_head(l, texel);
+    texel += NB_SUN_LATTICE_TEXELS;
+    for (size_t k = 0; k < cells_of(l, 2); k++)
+        for (size_t j = 0; j < cells_of(l, 1); j++)
+            for (size_t i = 0; i < cells_of(l, 0); i++, texel++)
+                for (size_t n = 0; n < 4; n++) {
+                    const uint16_t *node = &l->amount[(k + n / 2) * layer + (j + n % 2) * row + i];
+                    texel->v[n] = node[0] | (uint32_t)node[1] << 16;
+                }
+    return texel;
+}
+
+nebel_result nb_pack_sun_lattices(const nebel_snapshot *snapshot, size_t room, nebel_texel *texels)
+{
+    for (size_t i = next_lattice(snapshot, 0); i < snapshot->medium_count; i = next_lattice(snapshot, i + 1)) {
+        double way[3];
+        nb_way_in_cells(snapshot, &snapshot->media[i].body, way);
+        nb_grid_lattice *lattice =
+            nb_grid_lattice_make(grid_of(snapshot, i), &snapshot->allocator, way, limit_of(snapshot, i, room));
+        if (lattice == NULL)
+            return nb_fail(&snapshot->log, NEBEL_ERROR_MEMORY, "pack: out of memory for light in voxels");
+        texels = pack_lattice(lattice, texels);
+        nb_grid_lattice_release(lattice);
+    }
+    return NEBEL_OK;
+}

@@ -1,0 +1,238 @@
+/* The march along a ray, and the face of the text. */
+
+/* The first leg of a piece: all of it. */
+nb_leg nb_first_leg(nb_piece piece, bool lit)
+{
+    bool uneven = piece.emits || nb_largest(piece.most - piece.least) > 0.0;
+    return nb_open_leg(0.0, piece.end - piece.start, lit && uneven && piece.present > 1, 0);
+}
+
+void nb_pass_piece(inout nb_gathered g, nb_piece piece, bool lit)
+{
+    float length = piece.end - piece.start;
+    nb_vec3 depth = piece.extinction * length;
+    if (lit) g.radiance += nb_light_even(piece.light * length, depth, g.depth);
+    g.light += piece.light * length;
+    g.depth += depth;
+}
+
+/* What is left of a ray that is too much to walk, where no medium covers another: in steps up to each of which all media are summed in
+ * closed form. Within a step they count as if they were mixed evenly, and as sunny as what lies before it; so transmittance is right, and
+ * light is off by the square of a step's depth, nb_even_error. */
+struct nb_rest {
+    float end, step; /* of the step to come [m] */
+    float share; /* optical depth that a step should take */
+};
+
+/* Behind so much depth light hardly counts. */
+#define NB_REST_DEPTH 8.0
+
+nb_rest nb_open_rest(nb_gathered g, nb_media_sum all, float t_max, int steps)
+{
+    nb_rest rest;
+    rest.share = min(nb_largest(all.depth - g.depth), NB_REST_DEPTH) / float(steps);
+    rest.step = ((all.last > g.reached ? all.last : t_max) - g.reached) / float(steps);
+    rest.end = min(g.reached + rest.step, t_max);
+    return rest;
+}
+
+/* `sum`: of all up to the end of the step. */
+nb_gathered nb_pass_even(nb_gathered g, nb_media_sum sum)
+{
+    nb_vec3 depth = max(sum.depth - g.depth, nb_splat3(0.0));
+    nb_vec3 light = max(sum.light - g.light, nb_splat3(0.0));
+    g.radiance += nb_light_even(light, depth, g.depth);
+    if (NB_HAS(NB_HAS_SUN)) {
+        nb_vec3 taken = nb_attenuate(g.depth).mean * g.depth;
+        nb_vec3 sunlight = g.sunlight * nb_exp3(-g.depth) * nb_attenuate(depth).mean * depth / max(taken, nb_splat3(1e-6));
+        g.radiance += sunlight;
+        g.sunlight += sunlight;
+    }
+    g.depth += depth;
+    g.light += light;
+    return g;
+}
+
+/* Passes a step, or makes it shorter. */
+nb_rest nb_step_rest(inout nb_gathered g, nb_rest rest, nb_media_sum sum, float t_max)
+{
+    float depth = nb_largest(sum.depth - g.depth);
+    if (depth <= 2.0 * rest.share) {
+        g = nb_pass_even(g, sum);
+        g.reached = rest.end;
+    }
+    rest.step *= clamp(rest.share / max(depth, NB_TINY), 0.1, 4.0);
+    rest.end = min(g.reached + rest.step, t_max);
+    return rest;
+}
+
+/* `all`: the sum of the whole ray. */
+nb_gathered nb_pass_rest(nb_gathered g, nb_media_sum all, nb_ray ray, int first, int count, bool listed)
+{
+    int steps = nb_rest_steps(count);
+    nb_ray part = ray;
+    nb_rest rest = nb_open_rest(g, all, ray.t_max, steps);
+    for (int i = 0; i < steps; i++) {
+        if (g.reached >= ray.t_max || nb_smallest(g.depth) >= NB_OPAQUE) break;
+        part.t_max = rest.end;
+        rest = nb_step_rest(g, rest, nb_sum_media(part, first, count, listed), ray.t_max);
+    }
+    return nb_pass_even(g, all);
+}
+
+/* Each turn of the outer loop looks once at all media on the ray: to find the end of the next piece, or to sum a leg within one of
+ * varying density. So the shapes and profiles stand in the program once, not once for each purpose. */
+nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
+{
+    float tolerance = NEBEL_WORD(0).y;
+    float t = 0.0;
+    bool crowd = false;
+    bool stepping = false;
+    nb_gathered g;
+    g.depth = nb_splat3(0.0);
+    g.light = nb_splat3(0.0);
+    g.radiance = nb_splat3(0.0);
+    g.sunlight = nb_splat3(0.0);
+    g.is_cut = false;
+    int turns = count; /* of the sums */
+    nb_vec2 sunlit = nb_vec2(1.0, 0.0);
+    nb_piece piece = nb_open_piece(0.0, 0.0);
+    nb_leg leg = nb_open_leg(0.0, 0.0, false, 0);
+    nb_window window;
+    window.used = 0;
+    window.rest = count;
+    window.end = 0.0;
+    window.turns = 0;
+    while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
+        bool on_leg = NB_HAS(NB_HAS_PROFILE | NB_HAS_SUN) && stepping;
+        if (NB_HAS(NB_HAS_SUN) && on_leg && lit && piece.sunlit) {
+            nb_plan_leg(leg, piece, ray, sunlit);
+            leg.h = min(leg.h, min(leg.stop - leg.from, leg.most));
+        }
+        bool stale = crowd || t >= window.end;
+        if (!on_leg) piece = nb_open_piece(t, ray.t_max);
+        for (int next = 0; next < count;) {
+            if (stale) {
+                window = nb_fill_slots(ray, first, count, listed, next, t, crowd);
+                turns += window.turns;
+                if (nb_is_tired(turns)) break;
+            }
+            turns += 1 + window.used * (on_leg ? 1 + NB_NODES : 2);
+            bool over_full = !crowd && window.end <= t;
+            crowd = crowd || over_full;
+            if (over_full) continue;
+            next = window.rest;
+            piece.end = min(piece.end, window.end);
+            if (NB_HAS(NB_HAS_COVER) && !on_leg) piece = nb_cover_piece(piece, window.used);
+            for (int k = 0; k < window.used; k++) {
+                if (!on_leg)
+                    piece = nb_note_slot(piece, k, ray, lit && !crowd && nb_is_day());
+                else if (nb_is_there(nb_slot(k), piece))
+                    nb_add_slot(leg, piece, k, ray);
+            }
+        }
+        if (nb_is_tired(turns)) break;
+        bool foggy = piece.present > 0;
+        bool legged = (NB_HAS(NB_HAS_PROFILE) && piece.varies) || (NB_HAS(NB_HAS_SUN) && lit && piece.sunlit);
+        bool celled = NB_HAS(NB_HAS_GRID) && NB_HAS(NB_HAS_SUN) && !on_leg && piece.voxels > 0;
+        bool begins = foggy && !on_leg && legged && !celled;
+        bool over = !begins;
+        if (NB_HAS(NB_HAS_SUN) && on_leg && nb_is_sunlit(leg)) turns += nb_turns_to_sun();
+        if (on_leg)
+            over = nb_end_leg(g, leg, piece, ray, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
+        else if (begins)
+            leg = nb_first_leg(piece, lit);
+        else if (celled)
+            turns = nb_walk_voxels(g, piece, ray, window.used, tolerance, sunlit, turns);
+        else if (foggy)
+            nb_pass_piece(g, piece, lit);
+        stepping = !over;
+        if (over) {
+            t = piece.end;
+            if (crowd) window.end = t;
+            crowd = false;
+        }
+    }
+    /* by itself, or because the driver has ended its loops */
+    if (NB_MAY_TIRE) g.is_cut = nb_is_tired(turns) || (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE);
+    g.reached = t + (stepping ? leg.from : 0.0);
+    return g;
+}
+
+/* ---- the face -------------------------------------------------------------------------------- */
+
+/* See nebel_set_max_opacity. */
+nebel_light nb_limit_opacity(nebel_light light, float most)
+{
+    nb_vec3 opacity = nb_splat3(1.0) - light.transmittance;
+    light.in_scattering *= nb_vec3(most / max(opacity.x, most), most / max(opacity.y, most), most / max(opacity.z, most));
+    light.transmittance = max(light.transmittance, nb_splat3(1.0 - most));
+    return light;
+}
+
+/* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
+nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
+                           bool from_eye)
+{
+    nb_ray ray;
+    ray.origin = origin;
+    ray.direction = direction;
+    ray.t_max = min(t_max, NB_FAR);
+    ray.from_eye = from_eye;
+    nebel_light light;
+    light.transmittance = nb_splat3(1.0);
+    light.in_scattering = nb_splat3(0.0);
+    float square = dot(direction, direction);
+    if (t_max > 0.0 && square > 0.0 && nb_is_number(dot(origin, origin) + square + t_max)) {
+        nb_media_sum sum = nb_sum_media(ray, first, count, listed);
+        nb_attenuation attenuation = nb_attenuate(sum.depth);
+        light.transmittance = attenuation.left;
+        light.in_scattering = sum.light * attenuation.mean;
+        bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
+        bool walks = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
+        if (covers || (lit && walks)) {
+            nb_gathered walked = nb_walk(ray, first, count, listed, lit);
+            if (NB_MAY_TIRE && lit && walked.is_cut && !covers) walked = nb_pass_rest(walked, sum, ray, first, count, listed);
+            light.in_scattering = walked.radiance;
+            if (covers) light.transmittance = nb_exp3(-walked.depth);
+        }
+        if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) light.in_scattering += nb_lamplight(ray, first, count, listed);
+        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x > 0.0)
+            light.in_scattering += nb_gather_diffuse(ray, first, count, listed);
+        if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
+        light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
+    }
+    return light;
+}
+
+nebel_light nebel_trace(nb_vec3 origin, nb_vec3 direction, float t_max)
+{
+    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, true, true);
+}
+
+nb_vec3 nebel_transmit(nb_vec3 origin, nb_vec3 direction, float t_max)
+{
+    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, true).transmittance;
+}
+
+nb_vec3 nebel_transmit_light(nb_vec3 origin, nb_vec3 direction, float t_max)
+{
+    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, false).transmittance;
+}
+
+#ifdef NEBEL_INDEX
+nebel_light nebel_trace_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
+{
+    return nb_trace_media(origin, direction, t_max, first, count, true, true, true);
+}
+
+nb_vec3 nebel_transmit_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
+{
+    return nb_trace_media(origin, direction, t_max, first, count, true, false, true).transmittance;
+}
+
+nb_vec3 nebel_transmit_light_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
+{
+    return nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance;
+}
+#endif

@@ -1,0 +1,347 @@
+/* Planets in OpenGL are those of the CPU: the scenes of planets, a flight from the ground into space, fog and models in air. With
+ * an argument all of the scenes and heights, in pictures so many times wider. */
+#include "pass_help.h"
+#include "picture_help.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t scale = 1;
+static int all;
+
+/* Of pixels the share that is more than 2/255 apart as they are shown. */
+static double shown_apart(const picture_pair *pair)
+{
+    const size_t pixels = (size_t)pair->width * pair->height;
+    float *const cpu = malloc(3 * pixels * sizeof *cpu), *const gl = malloc(3 * pixels * sizeof *gl);
+    size_t apart = 0;
+    assert_true(cpu != NULL && gl != NULL);
+    nebel_tone_map(pixels, pair->cpu.color, 0, cpu);
+    nebel_tone_map(pixels, pair->gl.color, 0, gl);
+    for (size_t i = 0; i < pixels; i++) {
+        int is = 0;
+        for (size_t c = 0; c < 3; c++) is |= !(fabsf(cpu[3 * i + c] - gl[3 * i + c]) <= 2.f / 255);
+        apart += (size_t)is;
+    }
+    free(cpu);
+    free(gl);
+    return (double)apart / (double)pixels;
+}
+
+/* The largest radiance, which in-scattering is measured by. */
+static double largest_light(const picture_pair *pair)
+{
+    double most = 0;
+    for (size_t i = 0; i < 3 * (size_t)pair->width * pair->height; i++)
+        most = fmax(most, (double)pair->cpu.in_scattering[i]);
+    return most;
+}
+
+/* Pixels of which transmittance or, as a share of the brightest, in-scattering is more than 1/255 apart. */
+static size_t count_fog_apart(const picture_pair *pair)
+{
+    const double most = largest_light(pair);
+    size_t apart = 0;
+    for (size_t i = 0; i < (size_t)pair->width * pair->height; i++) {
+        double is = 0;
+        for (size_t c = 3 * i; c < 3 * i + 3; c++)
+            is = fmax(is, fmax(fabs((double)pair->cpu.transmittance[c] - (double)pair->gl.transmittance[c]),
+                               fabs((double)pair->cpu.in_scattering[c] - (double)pair->gl.in_scattering[c]) / most));
+        apart += is > 1. / 255;
+    }
+    return apart;
+}
+
+/* Depth, which near the horizon hangs on the last digit of a ray. */
+static size_t count_depth_apart(const picture_pair *pair)
+{
+    size_t apart = 0;
+    for (size_t i = 0; i < (size_t)pair->width * pair->height; i++) {
+        const double cpu = (double)pair->cpu.depth[i], gl = (double)pair->gl.depth[i];
+        if (isinf(cpu) != isinf(gl) || (!isinf(cpu) && fabs(cpu - gl) > 1e-3 * fmax(cpu, 1))) apart++;
+    }
+    return apart;
+}
+
+static void compare(const char *name, const picture_pair *pair)
+{
+    const double pixels = (double)pair->width * pair->height, shown = shown_apart(pair),
+                 fog = (double)count_fog_apart(pair) / pixels, depth = (double)count_depth_apart(pair) / pixels;
+    print_message("%s: of 1000 pixels %.2f are shown 2/255 apart, %.2f have other fog or air, %.2f another depth\n",
+                  name, 1e3 * shown, 1e3 * fog, 1e3 * depth);
+    assert_true(largest_light(pair) > .01);
+    assert_true(shown <= 1e-3 && fog <= 1e-3 && depth <= 5e-3);
+}
+
+static picture_pair make_pair(uint32_t width, uint32_t height)
+{
+    return picture_make(scale * width, scale * height);
+}
+
+static void render(const nebel_scene_data *data, nebel_snapshot *fog, const nebel_camera *camera, picture_pair *pair)
+{
+    const int objects = pass_count_objects();
+    picture_render(data, fog, camera, 1, pair);
+    assert_int_equal(pass_count_objects(), objects);
+}
+
+/* ---- scenes ---------------------------------------------------------------------------------- */
+
+static nebel_scene *load(const char *name)
+{
+    char path[512];
+    nebel_scene *scene = NULL;
+    snprintf(path, sizeof path, NEBEL_SOURCE "/examples/scenes/%s", name);
+    assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){0}, &scene), NEBEL_OK);
+    if (nebel_load_scene_models(scene) == NEBEL_OK && nebel_load_scene_planet(scene) == NEBEL_OK) return scene;
+    print_message("%s: left out: its models are made, not kept\n", name);
+    nebel_destroy_scene(scene);
+    return NULL;
+}
+
+static void check_scene(const char *name, int around)
+{
+    nebel_scene *const scene = load(name);
+    nebel_snapshot *fog = NULL;
+    if (scene == NULL) return;
+    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    nebel_camera camera = data->camera;
+    if (around) camera.projection = NEBEL_PROJECTION_PANORAMA;
+    picture_pair pair = around ? make_pair(96, 48) : make_pair(96, 54);
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    render(data, fog, &camera, &pair);
+    compare(around ? "all around" : name, &pair);
+    picture_free(&pair);
+    nebel_release_snapshot(fog);
+    nebel_destroy_scene(scene);
+}
+
+static void scenes_are_the_same(void **state)
+{
+    (void)state;
+    nb_gl context;
+    pass_open(&context, NB_GL_330);
+    check_scene("sunset.json", 0);
+    check_scene("terminator.json", 0);
+    if (all) {
+        check_scene("noon.json", 0);
+        check_scene("mars.json", 0);
+        check_scene("sunset.json", 1);
+    }
+    pass_close(&context);
+}
+
+/* ---- heights --------------------------------------------------------------------------------- */
+
+typedef struct world {
+    nebel_atmosphere *atmosphere;
+    nebel_planet planet;
+    nebel_scene_data scene;
+} world;
+
+static void make_world(const char *name, double elevation, world *w)
+{
+    static const double origin[1][3] = {{0, 0, 0}};
+    const double angle = elevation * acos(-1) / 180, sun[3] = {.3 * cos(angle), sin(angle), -.95 * cos(angle)};
+    const nebel_sun white = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {1, 1, 1}};
+    nebel_air_light light;
+    *w = (world){.planet = {.air = *nebel_find_atmosphere(name), .sun_diameter = .53}};
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, origin, 0, &light, 0), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    memcpy(w->planet.sun_left, light.sun, sizeof light.sun);
+    w->scene =
+        (nebel_scene_data){.has_sun = 1, .sun_irradiance = {20, 19, 18}, .planet_count = 1, .planets = &w->planet};
+    memcpy(w->scene.sun_direction, sun, sizeof sun);
+}
+
+static nebel_camera camera_at(double height, double pitch)
+{
+    return (nebel_camera){.position = {0, height, 0},
+                          .look_at = {0, height + sin(pitch), -cos(pitch)},
+                          .up = {0, cos(pitch), sin(pitch)},
+                          .vertical_fov = 50};
+}
+
+static void a_flight_is_the_same(void **state)
+{
+    (void)state;
+    static const double heights[] = {-3, 2e4, 2e7, 2, 300, 9e4, 2e5, 3e6};
+    nb_gl context;
+    world w;
+    make_world("earth", 8, &w);
+    pass_open(&context, NB_GL_300ES);
+    for (int i = 0; i < (all ? 8 : 3); i++) {
+        char name[64];
+        const double dip = heights[i] > 0 ? acos(w.planet.air.radius / (w.planet.air.radius + heights[i])) : 0;
+        nebel_camera camera = camera_at(heights[i], -dip);
+        if (i == 1) camera.projection = NEBEL_PROJECTION_PANORAMA;
+        picture_pair pair = make_pair(96, 48);
+        render(&w.scene, NULL, &camera, &pair);
+        snprintf(name, sizeof name, "from %g m", heights[i]);
+        compare(name, &pair);
+        picture_free(&pair);
+    }
+    pass_close(&context);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+/* ---- fog ------------------------------------------------------------------------------------- */
+
+static const float wall[4][3] = {{-400, -20, 0}, {400, -20, 0}, {400, 300, 0}, {-400, 300, 0}};
+static const uint32_t wall_indices[6] = {0, 1, 2, 0, 2, 3};
+
+static nebel_snapshot *make_fog(const double to_sun[3])
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3000, -9000}, .radius = 2500},
+         .extinction = {4e-4, 4e-4, 4e-4},
+         .source = {.5, .4, .3}},
+        {.shape = {.type = NEBEL_SHAPE_WORLD},
+         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 200},
+         .extinction = {1e-4, 2e-4, 3e-4},
+         .albedo = {.9, .9, .9}}};
+    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* A bank of fog far away in air, ground fog, and a wall that shades both and the ground. */
+static void fog_lies_in_air(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world("earth", 15, &w);
+    pass_open(&context, NB_GL_330);
+    nebel_snapshot *const fog = make_fog(w.scene.sun_direction);
+    const nebel_mesh mesh = {.origin = {300, 0, -2500},
+                             .positions = wall[0],
+                             .indices = wall_indices,
+                             .vertex_count = 4,
+                             .triangle_count = 2,
+                             .base_color = {.8f, .8f, .8f},
+                             .texture = -1};
+    const nebel_camera camera = camera_at(120, .05);
+    picture_pair pair = make_pair(72, 48);
+    if (all) {
+        render(&w.scene, fog, &camera, &pair);
+        compare("fog in air", &pair);
+    }
+    w.scene.mesh_count = 1;
+    w.scene.meshes = &mesh;
+    render(&w.scene, fog, &camera, &pair);
+    compare("a wall in fog in air", &pair);
+    picture_free(&pair);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+/* ---- what is kept, and what is refused ------------------------------------------------------- */
+
+/* Allocations of the size of a table. */
+static void *count_large(size_t size, void *user)
+{
+    *(int *)user += size > 100000;
+    return malloc(size);
+}
+
+static void release(void *memory, void *user)
+{
+    (void)user;
+    free(memory);
+}
+
+static void the_table_stays_while_the_camera_turns(void **state)
+{
+    (void)state;
+    int tables = 0;
+    nb_gl context;
+    nebel_gl_renderer *renderer;
+    world w;
+    make_world("toy", 30, &w);
+    pass_open(&context, NB_GL_330);
+    const nebel_gl_renderer_desc desc = {.allocator = {count_large, release, &tables}};
+    assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
+    nebel_gl_frame_desc frame = {.camera = camera_at(20, 0), .width = 8, .height = 8, .samples = 1};
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    const int first = tables;
+    assert_true(first > 0);
+    frame.camera = camera_at(20, .4);
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    assert_int_equal(tables, first);
+    frame.camera = camera_at(21, .4);
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    assert_int_equal(tables, 2 * first);
+    w.scene.sun_irradiance[0] = 7;
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    assert_int_equal(tables, 3 * first);
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+static void keep(nebel_result result, const char *message, void *user)
+{
+    (void)result;
+    snprintf(user, 256, "%s", message);
+}
+
+static void expect_refusal(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *frame, char *said, const char *words)
+{
+    assert_int_equal(nebel_gl_render_frame(renderer, frame), NEBEL_ERROR_UNSUPPORTED);
+    if (strstr(said, words) == NULL) fail_msg("'%s' does not say '%s'", said, words);
+}
+
+static void what_is_not_drawn_is_refused_by_name(void **state)
+{
+    (void)state;
+    char said[256] = "";
+    nb_gl context;
+    nebel_gl_renderer *renderer;
+    world w;
+    make_world("toy", 30, &w);
+    pass_open(&context, NB_GL_330);
+    const nebel_gl_renderer_desc desc = {.log = {keep, said}};
+    assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
+    nebel_gl_frame_desc frame = {.camera = camera_at(20, 0), .width = 8, .height = 8, .samples = 1};
+    frame.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    frame.camera.view_height = 10;
+    expect_refusal(renderer, &frame, said, "orthographic");
+    frame.camera = camera_at(20, 0);
+    frame.method = NEBEL_GL_METHOD_VERTEX;
+    expect_refusal(renderer, &frame, said, "method");
+    frame.method = NEBEL_GL_METHOD_EXACT;
+    const nebel_particle particle = {.center = {0, 20, -5}, .radius = 1, .extinction = {1, 1, 1}};
+    assert_int_equal(nebel_set_gl_renderer_particles(renderer, &particle, 1), NEBEL_OK);
+    expect_refusal(renderer, &frame, said, "particles");
+    assert_int_equal(nebel_set_gl_renderer_particles(renderer, NULL, 0), NEBEL_OK);
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    w.planet.model = NEBEL_PLANET_LAYERS;
+    expect_refusal(renderer, &frame, said, "layers");
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scenes_are_the_same),
+        cmocka_unit_test(a_flight_is_the_same),
+        cmocka_unit_test(fog_lies_in_air),
+        cmocka_unit_test(the_table_stays_while_the_camera_turns),
+        cmocka_unit_test(what_is_not_drawn_is_refused_by_name),
+    };
+    all = argc > 1;
+    if (all) scale = (uint32_t)atoi(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

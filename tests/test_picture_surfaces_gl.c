@@ -1,0 +1,232 @@
+/* Light on surfaces is that of the CPU: thin cards, round and flat surfaces, under a sun and among lamps, with what they
+ * shade. The argument `all` tries more. (The demo scenes are in test_picture_gl.c.) */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "dice.h"
+#include "fog_help.h"
+#include "pass_help.h"
+#include "picture_help.h"
+
+enum {
+    WIDTH = 128,
+    HEIGHT = 96,
+    CARDS = 20,
+    BALLS = 3,
+    BALL_RINGS = 12,
+    BALL_SIDES = 16,
+    BALL_VERTICES = (BALL_RINGS + 1) * (BALL_SIDES + 1),
+    BALL_TRIANGLES = 2 * BALL_RINGS * BALL_SIDES,
+    MESHES = CARDS + BALLS + 1
+};
+
+static const double pi = 3.14159265358979323846;
+static int random_scenes = 12;
+
+static picture_light compare(const char *name, const picture_pair *pair)
+{
+    const picture_light d = picture_compare_light(pair);
+    print_message("%s: of %zu pixels %zu apart; off borders of %zu %zu apart, worst %.2f/255 at %u, %u\n", name, d.seen,
+                  d.apart, d.inner, d.inner_apart, 255 * d.largest, (unsigned)d.x, (unsigned)d.y);
+    return d;
+}
+
+static picture_light render(const char *name, const nebel_scene_data *scene, nebel_snapshot *fog,
+                            const nebel_camera *camera, nb_gl_language language)
+{
+    nb_gl context;
+    picture_pair pair = picture_make(WIDTH, HEIGHT);
+    pass_open(&context, language);
+    picture_render(scene, fog, camera, 1, &pair);
+    pass_close(&context);
+    const picture_light d = compare(name, &pair);
+    picture_free(&pair);
+    return d;
+}
+
+/* ---- one card -------------------------------------------------------------------------------- */
+
+static const uint32_t card_indices[6] = {0, 1, 2, 0, 2, 3};
+
+static nebel_mesh card_of(float positions[4][3], float normals[4][3])
+{
+    return (nebel_mesh){.positions = positions[0],
+                        .normals = normals != NULL ? normals[0] : NULL,
+                        .indices = card_indices,
+                        .vertex_count = 4,
+                        .triangle_count = 2,
+                        .base_color = {.5f, .5f, .5f},
+                        .texture = -1};
+}
+
+/* The sun stands behind it, but not behind the surface that its normals stand for: it shades itself. */
+static void test_a_card_is_dark_where_the_sun_is_behind_it(void **state)
+{
+    (void)state;
+    static float positions[4][3] = {{-1, 0, 0}, {1, 0, 0}, {1, 2, 0}, {-1, 2, 0}};
+    static float normals[4][3] = {{0, .98f, .2f}, {0, .98f, .2f}, {0, .98f, .2f}, {0, .98f, .2f}};
+    const nebel_mesh card = card_of(positions, normals);
+    for (int i = 0; i < 3; i++) {
+        const nebel_scene_data scene = {.ambient = {.1, .1, .1},
+                                        .mesh_count = 1,
+                                        .meshes = &card,
+                                        .has_sun = 1,
+                                        .sun_direction = {.3, .5, i == 1 ? .3 : -.3},
+                                        .sun_irradiance = {3, 3, 3}};
+        const nebel_camera camera = {.position = {0, 1, 5},
+                                     .look_at = {0, 1, 0},
+                                     .up = {0, 1, 0},
+                                     .vertical_fov = 40,
+                                     .projection = i == 2 ? NEBEL_PROJECTION_PANORAMA : NEBEL_PROJECTION_PERSPECTIVE};
+        const picture_light d = render("card", &scene, NULL, &camera, i == 1 ? NB_GL_300ES : NB_GL_330);
+        assert_true(d.seen > 60);
+        assert_int_equal(d.apart, 0);
+    }
+}
+
+/* ---- random models --------------------------------------------------------------------------- */
+
+typedef struct stage {
+    float floor[4][3], cards[CARDS][4][3], card_normals[CARDS][4][3];
+    float ball[BALL_VERTICES][3];
+    float balls[BALLS][BALL_VERTICES][3];
+    uint32_t ball_indices[3 * BALL_TRIANGLES];
+    nebel_mesh meshes[MESHES];
+    nebel_lamp lamps[2];
+    nebel_scene_data scene;
+} stage;
+
+static void dice_vector(uint64_t *numbers, double size, float v[3])
+{
+    for (int k = 0; k < 3; k++) v[k] = (float)dice(numbers, -size, size);
+}
+
+/* Normals are those of the card, none, the same at all corners or another at each. */
+static void set_card(stage *s, int number, uint64_t *numbers)
+{
+    float middle[3], along[3], across[3], lean[3];
+    dice_vector(numbers, 2, middle);
+    dice_vector(numbers, .6, along);
+    dice_vector(numbers, .6, across);
+    dice_vector(numbers, 1, lean);
+    middle[1] += 2.5f;
+    for (int i = 0; i < 4; i++) {
+        const float u = i == 1 || i == 2 ? 1 : -1, v = i >= 2 ? 1 : -1;
+        float off[3];
+        dice_vector(numbers, number % 4 == 2 ? .5 : 0, off);
+        for (int k = 0; k < 3; k++) {
+            s->cards[number][i][k] = middle[k] + u * along[k] + v * across[k];
+            s->card_normals[number][i][k] = lean[k] + off[k];
+        }
+    }
+    s->meshes[number] = card_of(s->cards[number], number % 4 == 0 ? NULL : s->card_normals[number]);
+}
+
+static void set_ball(stage *s)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i <= BALL_RINGS; i++) {
+        for (uint32_t j = 0; j <= BALL_SIDES; j++) {
+            const double up = pi * i / BALL_RINGS, turn = 2 * pi * j / BALL_SIDES;
+            const uint32_t a = i * (BALL_SIDES + 1) + j, b = a + BALL_SIDES + 1;
+            const float v[3] = {(float)(sin(up) * cos(turn)), (float)cos(up), (float)(sin(up) * sin(turn))};
+            memcpy(s->ball[a], v, sizeof v);
+            if (i == BALL_RINGS || j == BALL_SIDES) continue;
+            memcpy(s->ball_indices + count, (const uint32_t[6]){a, a + 1, b, b, a + 1, b + 1}, 6 * sizeof a);
+            count += 6;
+        }
+    }
+}
+
+static nebel_mesh ball_of(stage *s, int number, uint64_t *numbers)
+{
+    float middle[3];
+    const float radius = (float)dice(numbers, .3, .8);
+    dice_vector(numbers, 1.5, middle);
+    for (int v = 0; v < BALL_VERTICES; v++) {
+        for (int k = 0; k < 3; k++) s->balls[number][v][k] = middle[k] + radius * s->ball[v][k];
+    }
+    return (nebel_mesh){.positions = s->balls[number][0],
+                        .normals = number > 0 ? s->ball[0] : NULL,
+                        .indices = s->ball_indices,
+                        .origin = {0, 1.5, 0},
+                        .vertex_count = BALL_VERTICES,
+                        .triangle_count = BALL_TRIANGLES,
+                        .base_color = {.8f, .5f, .3f},
+                        .texture = -1};
+}
+
+/* Odd ones have the sun alone, and those that two divides the lamps; those that four divides have both. */
+static void set_stage(stage *s, int number)
+{
+    static const float floor[4][3] = {{-6, -.5f, -6}, {-6, -.5f, 6}, {6, -.5f, 6}, {6, -.5f, -6}};
+    uint64_t numbers = (uint64_t)number;
+    set_ball(s);
+    for (int i = 0; i < CARDS; i++) set_card(s, i, &numbers);
+    for (int i = 0; i < BALLS; i++) s->meshes[CARDS + i] = ball_of(s, i, &numbers);
+    memcpy(s->floor, floor, sizeof floor);
+    s->meshes[CARDS + BALLS] = card_of(s->floor, NULL);
+    for (int i = 0; i < 2; i++) {
+        s->lamps[i] = (nebel_lamp){.type = i == 0 ? NEBEL_LAMP_POINT : NEBEL_LAMP_SPOT,
+                                   .position = {dice(&numbers, -3, 3), 4, dice(&numbers, -3, 3)},
+                                   .intensity = {12, 10, 8},
+                                   .direction = {0, -1, .1},
+                                   .inner_angle = 30,
+                                   .outer_angle = 60};
+    }
+    s->scene =
+        (nebel_scene_data){.ambient = {.1, .12, .15},
+                           .mesh_count = MESHES,
+                           .meshes = s->meshes,
+                           .has_sun = number % 4 != 2,
+                           .sun_direction = {dice(&numbers, -1, 1), dice(&numbers, .2, 1), dice(&numbers, -1, 1)},
+                           .sun_irradiance = {4, 3, 2},
+                           .lamp_count = number % 2 == 0 ? 2 : 0,
+                           .lamps = s->lamps};
+}
+
+static void add(picture_light *all, const picture_light *d)
+{
+    all->seen += d->seen;
+    all->apart += d->apart;
+    all->inner += d->inner;
+    all->inner_apart += d->inner_apart;
+    all->largest = fmax(all->largest, d->largest);
+}
+
+static void test_random_models(void **state)
+{
+    (void)state;
+    static stage s;
+    picture_light all = {.seen = 0};
+    for (int i = 0; i < random_scenes; i++) {
+        char name[32];
+        set_stage(&s, i);
+        const double turn = 2.4 * i;
+        const nebel_camera camera = {.position = {6 * cos(turn), 2.5, 6 * sin(turn)},
+                                     .look_at = {0, 1.5, 0},
+                                     .up = {0, 1, 0},
+                                     .vertical_fov = 45,
+                                     .projection =
+                                         i % 5 == 4 ? NEBEL_PROJECTION_PANORAMA : NEBEL_PROJECTION_PERSPECTIVE};
+        snprintf(name, sizeof name, "random-%d", i);
+        const picture_light d = render(name, &s.scene, NULL, &camera, i % 2 == 0 ? NB_GL_330 : NB_GL_300ES);
+        add(&all, &d);
+    }
+    print_message("all: of %zu pixels %zu apart; off borders of %zu %zu apart\n", all.seen, all.apart, all.inner,
+                  all.inner_apart);
+    assert_true(all.inner > all.seen / 4);
+    assert_true(all.inner_apart * 5000 <= all.inner);
+    assert_true(all.apart * 50 <= all.seen);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_card_is_dark_where_the_sun_is_behind_it),
+        cmocka_unit_test(test_random_models),
+    };
+    if (argc > 1 && strcmp(argv[1], "all") == 0) random_scenes = 60;
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
