@@ -5,6 +5,7 @@
 #include <nebel/gl.h>
 
 #include "engine.h"
+#include "host.h"
 
 #include <GLFW/glfw3.h>
 #include <string.h>
@@ -21,8 +22,8 @@ static nebel_snapshot *make_fog(nebel_fog **fog)
                                     .extinction = {.4, .8, 1.2},
                                     .emission = {.7, .35, .1}};
     nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){0}, fog) == NEBEL_OK && nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK &&
-        nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
+    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
+        nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
         nebel_commit_fog(*fog, &snapshot);
     return snapshot;
 }
@@ -45,10 +46,12 @@ static GLFWwindow *open_window(void)
 int main(void)
 {
     GLFWwindow *const window = open_window();
+    const char *why;
     nebel_fog *fog = NULL;
     nebel_snapshot *const snapshot = make_fog(&fog);
     nebel_gl *passes = NULL;
-    if (!window || !snapshot || nebel_create_gl(&(nebel_gl_desc){0}, &passes) != NEBEL_OK) return 1;
+    if (!window) return glfwGetError(&why), host_refuse("embed_glfw", why);
+    if (!snapshot || nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK) return 1;
 
     engine host = engine_open_textures();
     const nebel_gl_pass pass = {.color_texture = host.color, .depth_texture = host.depth};

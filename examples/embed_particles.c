@@ -6,6 +6,7 @@
 #include <nebel/gl.h>
 
 #include "engine.h"
+#include "host.h"
 #include "particles.h"
 
 #include <GLFW/glfw3.h>
@@ -58,12 +59,14 @@ int main(void)
                                     .extinction = {.25, .25, .25},
                                     .source = {.5, .6, .7}};
     GLFWwindow *const window = open_window();
+    const char *why;
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
     nebel_gl *passes = NULL;
-    if (!window || nebel_create_fog(&(nebel_fog_desc){0}, &fog) != NEBEL_OK ||
+    if (!window) return glfwGetError(&why), host_refuse("embed_particles", why);
+    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, &fog) != NEBEL_OK ||
         nebel_add_volume(fog, &mist, NULL) != NEBEL_OK || nebel_commit_fog(fog, &snapshot) != NEBEL_OK ||
-        nebel_create_gl(&(nebel_gl_desc){0}, &passes) != NEBEL_OK)
+        nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK)
         return 1;
 
     engine host = engine_open_textures();

@@ -7,6 +7,7 @@
 #include <nebel/shader.h>
 
 #include "engine.h"
+#include "host.h"
 
 #include <SDL.h>
 
@@ -22,15 +23,18 @@ static nebel_snapshot *make_fog(nebel_fog **fog)
                                     .extinction = {.4, .8, 1.2},
                                     .emission = {.7, .35, .1}};
     nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){0}, fog) == NEBEL_OK && nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK &&
-        nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
+    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
+        nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
         nebel_commit_fog(*fog, &snapshot);
     return snapshot;
 }
 
 static SDL_Window *open_window(void)
 {
+    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); /* SIGTERM ends it, also where a driver is busy with shaders */
     if (SDL_Init(SDL_INIT_VIDEO) != 0) return NULL;
+    if (!strcmp(SDL_GetCurrentVideoDriver(), "offscreen") && !SDL_getenv("SDL_VIDEODRIVER"))
+        return SDL_SetError("no display; SDL would draw into memory, where nobody sees it"), NULL;
     SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
     SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
     SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_CORE);
@@ -65,7 +69,8 @@ int main(void)
     const SDL_GLContext context = window ? SDL_GL_CreateContext(window) : NULL;
     nebel_fog *fog = NULL;
     nebel_snapshot *const snapshot = make_fog(&fog);
-    if (!context || !snapshot) return 1;
+    if (!context) return host_refuse("embed_sdl", SDL_GetError());
+    if (!snapshot) return 1;
 
     engine host = engine_open(3, fragment_texts);
     unsigned block;
@@ -78,8 +83,7 @@ int main(void)
     int running = 1;
     for (double angle = 0; result == NEBEL_OK && running;) {
         for (SDL_Event event; SDL_PollEvent(&event);)
-            if (event.type == SDL_QUIT || (event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_ESCAPE))
-                running = 0;
+            running &= event.type != SDL_QUIT && !(event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_ESCAPE);
         angle += .02 * (keys[SDL_SCANCODE_RIGHT] - keys[SDL_SCANCODE_LEFT]);
         engine_turn(&host, angle);
         result = upload_fog(snapshot, host.eye);

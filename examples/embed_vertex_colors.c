@@ -5,6 +5,7 @@
 #include <nebel/nebel.h>
 
 #include "engine_fixed.h"
+#include "host.h"
 
 #include <GLFW/glfw3.h>
 
@@ -20,8 +21,8 @@ static nebel_snapshot *make_fog(nebel_fog **fog)
                                     .extinction = {.4, .8, 1.2},
                                     .emission = {.7, .35, .1}};
     nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){0}, fog) == NEBEL_OK && nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK &&
-        nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
+    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
+        nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
         nebel_commit_fog(*fog, &snapshot);
     return snapshot;
 }
@@ -46,16 +47,23 @@ static nebel_result fog_vertices(const nebel_snapshot *fog, engine *host)
     return result;
 }
 
+static GLFWwindow *open_window(void)
+{
+    if (!glfwInit()) return NULL;
+    glfwWindowHint(GLFW_SRGB_CAPABLE, GLFW_TRUE);
+    glfwWindowHint(GLFW_RESIZABLE, GLFW_FALSE);
+    return glfwCreateWindow(WIDTH, HEIGHT, "nebel: fog in vertex colours", NULL, NULL);
+}
+
 int main(void)
 {
     static engine host;
     nebel_fog *fog = NULL;
     nebel_snapshot *const snapshot = make_fog(&fog);
-    if (!snapshot || !glfwInit()) return 1;
-    glfwWindowHint(GLFW_SRGB_CAPABLE, GLFW_TRUE);
-    glfwWindowHint(GLFW_RESIZABLE, GLFW_FALSE);
-    GLFWwindow *const window = glfwCreateWindow(WIDTH, HEIGHT, "nebel: fog in vertex colours", NULL, NULL);
-    if (!window) return 1;
+    GLFWwindow *const window = open_window();
+    const char *why;
+    if (!window) return glfwGetError(&why), host_refuse("embed_vertex_colors", why);
+    if (!snapshot) return 1;
     glfwMakeContextCurrent(window);
     glfwSetInputMode(window, GLFW_STICKY_KEYS, GLFW_TRUE);
     engine_open(&host);

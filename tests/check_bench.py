@@ -70,6 +70,14 @@ class BenchTest(unittest.TestCase):
         floors = [figure["floor"]["name"] for figure in figures if "floor" in figure]
         self.assertEqual(floors, 2 * ["additive sprites", "additive sprites without a surface"])
 
+    def test_planets_in_opengl_are_judged_by_a_copy(self):
+        done = bench("--quick", "--device", "gl", "--group", "planet", "--json", self.file)
+        if "built without OpenGL" in done.stderr:
+            self.skipTest("built without OpenGL")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        figures = json.loads(self.file.read_text())["figures"]
+        self.assertEqual([figure["floor"]["name"] for figure in figures], 3 * ["a copy of the picture"])
+
     def test_wrong_calls(self):
         for words in (["--group", "nothing"], ["scene.json"], ["--fast"], ["--device", "none"],
                       ["--device", "gl", "--group", "segments"]):

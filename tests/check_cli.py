@@ -96,7 +96,7 @@ class CallingTest(Case):
 
     def test_every_option_of_the_contract_is_on_the_help_page(self):
         contract = {
-            "render": "output size device method tolerance samples exposure threads isa frames frame aov bounces seed quiet",
+            "render": "output size device method tolerance samples exposure threads isa frames fps quality frame aov bounces seed quiet",
             "trace": "precision isa tolerance threads", "compare": "output amplify channel fail-above", "info": ""}
         for command, names in contract.items():
             page = nebel(command, "--help").out
@@ -469,9 +469,6 @@ class RenderTest(PictureCase):
         own = render("own.exr")
         self.assertEqual(render("same.exr", "--multiple-scattering", "diffusion", "--threads", "1"), own)
         self.assertNotEqual(render("off.exr", "--multiple-scattering", "off"), own)
-        done = nebel("render", scene, "-o", self.folder / "no.exr", "--device", "gl")
-        self.assertEqual(done.returncode, 1)
-        self.assertFalse((self.folder / "no.exr").exists())
 
     def test_fog_in_cells(self):
         self.assert_failed(self.render("a.exr", "--method", "cells"), "scene.json", 'no section "cells"')
@@ -666,6 +663,48 @@ class RenderTest(PictureCase):
             self.assert_misused(self.render("a%d.png", "--frames", frames), "--frames")
         self.assert_misused(self.render("a%d.png", "--frames", "0-1", "--frame", "0"), "--frame")
         self.assert_misused(self.render("a.png", "--frame", "1.5"), "--frame")
+        self.assertEqual(self.files(), self.given)
+
+    def test_films(self):
+        """What is in them tests/test_film.c knows."""
+        moving = dict(FOG, keys=[{"frame": 0}, {"frame": 3, "extinction": 0}])
+        self.scene = self.write_scene("fog.json", [moving], background=1, camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        self.assert_misused(self.render("a.webp"), "--output", "--frames 0-95")
+        self.assert_misused(self.render("a%03d.webp", "--frames", "0-3"), "--output", "one film")
+        self.assert_misused(self.render("a.webp", "--frames", "0-3", "--aov"), "--output", ".exr")
+        self.assert_misused(self.render("a.webp", "--frames", "0-3", "--size", "16384x10"), "--size", "16383")
+        for option, values in {"--fps": ("0.5", "101", "x"), "--quality": ("0", "101", "9.5")}.items():
+            self.assert_misused(self.render("a%d.png", "--frames", "0-3", option, values[0]), option)
+            for value in values:
+                self.assert_misused(self.render("a.webp", "--frames", "0-3", option, value), option)
+        self.assert_misused(self.render("a%d.png", "--frames", "0-3", "--fps", "30"), "--fps", ".webp")
+        self.assertEqual(self.files(), sorted(self.given + ["fog.json"]))
+        done = self.render("a.webp", "--frames", "0-3", "--fps", "12.5", "--quality", "100")
+        if "WebP 1" not in nebel("info").out:
+            self.assert_failed(done, "libwebp")
+            return
+        self.assert_done(done)
+        self.assertRegex(done.err, "4 pictures")
+        film = (self.folder / "a.webp").read_bytes()
+        self.assertTrue(film.startswith(b"RIFF") and film[8:12] == b"WEBP")
+        self.assertEqual(film.count(b"ANMF"), 4)
+        duration = film.index(b"ANMF") + 8 + 12
+        self.assertEqual(int.from_bytes(film[duration:duration + 3], "little"), 80)
+        self.assertEqual(self.files(), sorted(self.given + ["a.webp", "fog.json"]))
+        # LLVM's OpenMP writes a file of 1024 bytes itself.
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
+        done = self.render("a.webp", "--frames", "0-15", "--quality", "100", preexec_fn=limit)
+        self.assert_failed(done, "a.webp", "too large")
+        self.assert_failed(self.render("none/a.webp", "--frames", "0-3"), "none/a.webp")
+        self.assertEqual((self.folder / "a.webp").read_bytes(), film)
+        self.assertEqual(self.files(), sorted(self.given + ["a.webp", "fog.json"]))
+
+    def test_a_film_is_whole_or_not_there(self):
+        if "WebP 1" not in nebel("info").out:
+            return
+        process, seen = self.run_on_terminal("f.webp", "--frames", "0-9999", "--size", "160x90",
+                                             interrupt_after=rb"frame ([4-9]|\d\d+) of")
+        self.assertEqual(process.returncode, -signal.SIGINT, seen)
         self.assertEqual(self.files(), self.given)
 
     def test_a_turntable_turns(self):
@@ -888,6 +927,22 @@ class InfoTest(PictureCase):
                         "less than 1 m", "the models are black"):
             self.assertIn(warning, out)
         self.assertIn("there is no fog", nebel("info", self.write_scene("none.json", [])).out)
+
+    def test_fog_that_keeps_the_sun_away(self):
+        world, low, high = {"type": "world"}, [0, -0.1, 1], [0, 0.1, 1]
+        ground = {"type": "half_space", "point": [0, 0, 0], "normal": [0, 1, 0]}
+        rising = {"type": "height", "base": 0, "scale_height": 3}
+        for shape, density, sun, is_dark in ((world, None, high, True), (world, rising, low, True), (ground, None, low, True),
+                                             (world, rising, high, False), (ground, None, high, False), (BOX, None, low, False)):
+            volume = {"name": "haze", "shape": shape, "extinction": 0.1, "albedo": 0.9}
+            if density is not None:
+                volume["density"] = density
+            scene = self.write_scene("dim.json", [{"shape": BOX, "extinction": 1, "albedo": 0.5}, volume],
+                                     sun={"direction": sun, "irradiance": 3})
+            warned = "warning: no sunlight reaches fog or models: fog[1] 'haze' has no end" in nebel("info", scene).out
+            self.assertEqual(warned, is_dark, (shape, density, sun))
+            done = nebel("render", scene, "-o", self.folder / "dim.png", "-s", "8x8")
+            self.assertEqual("no sunlight reaches fog or models: fog[1]" in done.err, is_dark)
 
     def test_a_scene_or_a_model_that_is_wrong(self):
         self.assert_failed(nebel("info", self.folder / "none.json"), "none.json")

@@ -215,6 +215,12 @@ class GlDeviceTest(PictureCase):
         old = {"MESA_GL_VERSION_OVERRIDE": "2.1", "MESA_GLES_VERSION_OVERRIDE": "2.0"}
         self.assert_failed(self.draw("a.png", env=old), "OpenGL 3.3", "update", "--device cpu")
 
+    def test_opengl_es_says_why(self):
+        for version in ("3.0", "3.2"):
+            done = self.draw("a.png", env={"MESA_GL_VERSION_OVERRIDE": "2.1", "MESA_GLES_VERSION_OVERRIDE": version})
+            self.assert_done(done)
+            self.assertIn("OpenGL ES, because the driver has no OpenGL 3.3 core", done.err)
+
     def test_no_warning_of_what_dims_alone(self):
         cloud = {"shape": {"type": "sphere", "center": [0, 0, 0], "radius": 1}, "count": 200, "size": [0.5, 1], "absorption": 1,
                  "emission": [1, 2, 3], "colors": [[1, 0, 0], [0, 0, 1]]}

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Runs the example engines in a window of their own display, photographs it, and compares with the fog in closed form.
+"""Runs the example engines in a window of their own display, photographs it, and compares with the fog in closed form; then without
+a display, and ends them from outside.
 
 What the pictures should show is computed here once more, from the scene and the fog that the examples describe: rays against
 boxes, the optical depth of mist that thins out with height, and the ball of other fog by quadrature. With a folder as argument
@@ -214,7 +215,7 @@ def check(name, wanted, step, share, key, output):
     ends the program."""
     with tempfile.TemporaryDirectory() as folder:
         # Drivers and window systems leak; what nebel leaks the tests without a window would find.
-        program = subprocess.Popen([BUILD / "examples" / name], env=dict(os.environ, ASAN_OPTIONS="detect_leaks=0"))
+        program = subprocess.Popen([BUILD / "examples" / name], env=QUIET)
         try:
             picture = settled(program, folder)
             press("keydown", key)
@@ -234,12 +235,48 @@ def check(name, wanted, step, share, key, output):
     return status == 0 and found >= share and np.median(off) <= .5
 
 
+# ---- what ends them ------------------------------------------------------------------------------------------------
+
+NAMES = ["embed_glfw", "embed_sdl", "embed_vertex_colors", "embed_particles"]
+QUIET = dict(os.environ, ASAN_OPTIONS="detect_leaks=0")
+
+
+def check_refusal(name):
+    """Without a display the program ends by itself and says what to do."""
+    bare = {key: value for key, value in QUIET.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")}
+    try:
+        done = subprocess.run([BUILD / "examples" / name], env=bare, stderr=subprocess.PIPE, timeout=60, text=True)
+    except subprocess.TimeoutExpired:
+        print(f"{name}: without a display it does not end")
+        return False
+    good = done.returncode == 1 and "display" in done.stderr.lower() and f"xvfb-run -a {name}" in done.stderr
+    if not good:
+        print(f"{name}: without a display: status {done.returncode}, {done.stderr}")
+    return good
+
+
+def check_signal(name):
+    """SIGTERM ends the program, also while a driver compiles its shaders."""
+    program = subprocess.Popen([BUILD / "examples" / name], env=QUIET)
+    time.sleep(1)
+    program.terminate()
+    try:
+        program.wait(20)
+    except subprocess.TimeoutExpired:
+        print(f"{name}: SIGTERM does not end it")
+        program.kill()
+        program.wait()
+        return False
+    return True
+
+
 def main():
     output = sys.argv[2] if len(sys.argv) > 2 else None
     scene = expected_scene()
     good = [check("embed_glfw", scene, 2, .99, "Right", output), check("embed_sdl", scene, 2, .99, "Right", output),
             check("embed_vertex_colors", scene, 6, .99, "Right", output),
             check("embed_particles", expected_particles(), 2, .99, "space", output)]
+    good += [check_refusal(name) and check_signal(name) for name in NAMES]
     sys.exit(0 if all(good) else 1)
 
 

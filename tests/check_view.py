@@ -10,7 +10,7 @@ import time
 import unittest
 
 from check_cli import FOG, nebel
-from view_case import ROUNDING, WAIT, Manager, Viewer, ViewTest
+from view_case import LEAVING, ROUNDING, WAIT, Manager, Viewer, ViewTest
 
 
 class PicturesTest(ViewTest):
@@ -153,6 +153,99 @@ class CompareTest(ViewTest):
                 self.assertTrue(self.same(traced, drawn, 0.05), "one sample is the difference")
                 self.assertFalse(self.same(traced, drawn, 0.0001))
                 viewer.key("c")
+        viewer.end()
+
+
+# Planets, and noise in other fog, are slow to draw: few pixels, and controls of half the size so that they are seen.
+SMALL = ["--size", "100x250", "--ui-scale", 0.5]
+
+# Of what either renderer draws: a byte of each, and one for tables of the air in floats.
+BOTH_DRAW = 2.5 / 255
+
+
+NOISE = {"shape": {"type": "box", "min": [-3, -3, -2], "max": [3, 3, 0]}, "extinction": 0.6, "source": [0.9, 0.8, 0.7],
+         "density": {"type": "noise", "size": [24, 24, 8], "cells": [4, 4, 2], "drift": [0.2, 0, 0], "change": 0.1}}
+EYE = {"position": [0, 0, 6], "look_at": [0, 0, 0]}
+
+
+class FilmTest(ViewTest):
+    """Frame k in the window is frame k of a film."""
+
+    def open(self, fog, camera=EYE, **more):
+        self.scene = self.write_scene("scene.json", fog, camera=camera, **more)
+        viewer = Viewer(self, *SMALL)
+        viewer.type("samples", "1")
+        return viewer
+
+    def assert_frame(self, viewer, frame, device, most=ROUNDING):
+        name = f"film-{device}-{frame}.png"
+        self.assert_done(self.render(name, *SMALL[:2], "--samples", 1, "--frame", frame, "--device", device))
+        picture = viewer.take_picture()
+        self.assertTrue(self.same(picture, self.folder / name, most), f"frame {frame}")
+        return picture
+
+
+class ClockTest(FilmTest):
+    def test_all_that_moves_is_where_the_film_has_it(self):
+        keys = [{"frame": 0}, {"frame": 12, "extinction": 0}]
+        path = [{"frame": 0}, {"frame": 16, "position": [3, 1, 6]}]
+        viewer = self.open([NOISE, {**FOG, "keys": keys}], camera={**EYE, "keys": path}, background=1)
+        before = self.scene.read_text()
+        first = viewer.take_picture()
+        viewer.type("frame", "7")
+        self.assertFalse(self.same(self.assert_frame(viewer, 7, "gl"), first, 0.02))
+        for key in ("period", "period", "comma"):
+            viewer.key(key)
+            viewer.settle()
+        viewer.press(">")
+        self.assert_frame(viewer, 9, "gl")
+        self.assertEqual(self.scene.read_text(), before)
+        viewer.end()
+        self.assertEqual(viewer.said(LEAVING), 0, "time is no change")
+
+    def test_noise_goes_on_and_is_saved_without_its_time(self):
+        viewer = self.open([NOISE])
+        first = viewer.take_picture()
+        viewer.key("space")
+        viewer.settle()
+        viewer.key("space")
+        self.assertFalse(self.same(viewer.take_picture(), first, 0.02), "time has gone on")
+        viewer.type("frame", "300")
+        viewer.press("fog[0].visibility", 0.4)
+        saved = viewer.save()
+        self.assertEqual({**saved["fog"][0], "extinction": 0.6}, NOISE)
+        self.assert_frame(viewer, 300, "gl")
+        viewer.key("ctrl+z")
+        viewer.settle()
+        viewer.say(LEAVING, lambda: viewer.key("ctrl+q"))
+        viewer.end()
+
+
+class PlanetTest(FilmTest):
+    """What OpenGL may not draw, the viewer draws all the same; no edges are seen, which renderers may place differently."""
+
+    def test_the_air_of_a_planet_and_its_sun(self):
+        sun = {"direction": [0.3, 0.6, 0.4], "irradiance": 4, "keys": [{"frame": 0}, {"frame": 20, "direction": [1, 0.1, 0]}]}
+        fog = {"shape": {"type": "box", "min": [-500, 0, -900], "max": [500, 800, -100]}, "extinction": 0.001, "albedo": 0.9}
+        camera = {"position": [0, 30, 0], "look_at": [0, 60, -100], "vertical_fov": 25}
+        viewer = self.open([fog], camera=camera, sun=sun, planet={"model": "physical", "preset": "earth"})
+        viewer.press("fog[0].visibility", 0.4)
+        saved = viewer.save()
+        self.assertNotEqual(saved["fog"][0]["extinction"], 0.001)
+        self.assertEqual(saved["sun"], sun)
+        noon = self.assert_frame(viewer, 0, "cpu", BOTH_DRAW)
+        viewer.type("frame", "18")
+        self.assertFalse(self.same(self.assert_frame(viewer, 18, "cpu", BOTH_DRAW), noon, 0.02), "another sky")
+        self.assertNotIn("--device", viewer.log.read_text())
+        viewer.end()
+
+    def test_a_planet_of_layers_turns(self):
+        camera = {"position": [0, 0, 0], "look_at": [0, 0, -1], "vertical_fov": 25}
+        planet = {"model": "layers", "center": [0, 0, -500], "radius": 300, "day": 400, "clouds": [{"height": 10, "day": -300}]}
+        viewer = self.open([], camera=camera, planet=planet, sun={"direction": [1, 1, 1], "irradiance": 4})
+        first = self.assert_frame(viewer, 0, "cpu", BOTH_DRAW)
+        viewer.type("frame", "150")
+        self.assertFalse(self.same(self.assert_frame(viewer, 150, "cpu", BOTH_DRAW), first, 0.1))
         viewer.end()
 
 

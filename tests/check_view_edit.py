@@ -59,11 +59,25 @@ class FogTest(ViewTest):
 
         def find_others():  # the list may be read while it is written
             lines = [line.split(" ", 4) for line in viewer.controls.read_text().splitlines()]
-            others[:] = [int(line[1]) + int(line[3]) for line in lines if line[4:] != ["OK"]]
+            others[:] = [int(line[1]) + int(line[3]) for line in lines if line[4:] != ["OK"] and not line[-1].startswith("(")]
             return len(others) > 9
 
         viewer.wait(find_others, "the controls")
         self.assertLess(max(others), top)
+        viewer.press("OK")
+        viewer.end()
+
+    def test_the_list_of_keys_hides_no_messages(self):
+        viewer = Viewer(self, "--size", "320x180")
+        viewer.key("F1")
+        viewer.say("scene.json:1:", lambda: self.scene.write_text("{"))
+        for start, end in ((None, None), ((160, 8), (160, 170))):
+            if start is not None:
+                viewer.drag(*start, *end)
+            x, y, width, height = viewer.place("(keys)")
+            self.assertTrue(0 <= x and 0 <= y and x + width <= 320, (x, y, width))
+            self.assertLessEqual(y + height, viewer.place("(notice)")[1])
+            self.assertGreater(height, 60)
         viewer.press("OK")
         viewer.end()
 
@@ -299,6 +313,29 @@ class KeysTest(ViewTest):
         self.assertEqual(viewer.save()["camera"]["keys"], keys)
         viewer.end()
 
+    def test_noise_has_other_numbers(self):
+        noise = {"type": "noise", "size": [24, 24, 8], "cells": [4, 4, 2]}
+        fog = {"shape": {"type": "box", "min": [-3, -3, -2], "max": [3, 3, 0]}, "extinction": 0.6, "source": 0.8, "density": noise}
+        self.scene = self.write_scene("scene.json", [fog], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        viewer = Viewer(self, "--size", "400x900")
+        viewer.type("samples", "1")
+        first = viewer.take_picture()
+        wanted = {"cells": [6, 4, 2], "size": [32, 24, 8], "octaves": 2, "gain": 0.75, "coverage": 0.5, "edge": [0.25, 0, 0], "seed": 5,
+                  "drift": [0.5, 0, 0], "change": 0.25}
+        for name, text in (("cells", "6"), ("voxels", "32"), ("octaves", "2"), ("gain", "0.75"), ("coverage", "0.5"),
+                           ("soft faces", "0.25"), ("noise seed", "5"), ("drift", "0.5"), ("change", "0.25")):
+            viewer.type(f"fog[0].{name}", text, 0.1)
+        picture = viewer.take_picture()
+        self.assertFalse(self.same(picture, first, 0.02))
+        self.assertEqual(viewer.save()["fog"], [{**fog, "density": {**noise, **wanted}}])
+        self.assertTrue(self.same(picture, self.draw_at("0.png", 0), ROUNDING_TOGETHER))
+        viewer.key("period")
+        viewer.settle()
+        self.assertTrue(self.same(viewer.take_picture(), self.draw_at("1.png", 1), ROUNDING_TOGETHER), "still noise now moves")
+        viewer.key("ctrl+z")
+        self.assertEqual(viewer.save()["fog"][0]["density"]["change"], 0)
+        viewer.end()
+
     def test_time_goes_on(self):
         fog = {**FOG, "keys": [{"frame": 0, "extinction": 0.001}, {"frame": 100000}]}
         self.scene = self.write_scene("scene.json", [fog], camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
@@ -375,6 +412,22 @@ class SceneTest(ViewTest):
         drawn = viewer.take_picture()
         self.scene.write_text(json.dumps({**saved, "camera": before["camera"]}))
         self.assertTrue(self.same(drawn, self.draw_like("linear.png", "--method", "linear"), ROUNDING_TOGETHER))
+        viewer.end()
+
+    def test_a_sky_changes(self):
+        sky = {"type": "gradient", "zenith": [0.1, 0.2, 0.8], "horizon": [0.9, 0.5, 0.3], "ground": [0, 0, 0]}
+        fog = {"shape": FOG["shape"], "extinction": 0.1, "albedo": 0.9}
+        self.scene = self.write_scene("scene.json", [fog], models=[{"file": "triangle.obj"}], ambient=sky)
+        scene = json.loads(self.scene.read_text())
+        self.scene.write_text(json.dumps({**scene, "background": "ambient"}))
+        viewer = self.open()
+        viewer.press("Light")
+        first = viewer.take_picture()
+        viewer.type("horizon", "3", 0.1)
+        self.assertEqual(viewer.save()["ambient"]["horizon"], [3, 0.5, 0.3])
+        redder = viewer.take_picture()
+        self.assertFalse(self.same(first, redder, ROUNDING_TOGETHER))
+        self.assertTrue(self.same(redder, self.draw_like("redder.png", "--device", "gl"), ROUNDING_TOGETHER))
         viewer.end()
 
     def test_a_preset_fills_in_what_a_fog_is(self):

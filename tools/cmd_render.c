@@ -1,7 +1,8 @@
-/* nebel render: a scene to a picture, or to many. */
+/* nebel render: a scene to a picture, to many, or to a film. */
 #define _POSIX_C_SOURCE 200809L
 
 #include "commands.h"
+#include "endless.h"
 #include "finer.h"
 #include "interrupt.h"
 #include "layers.h"
@@ -42,7 +43,8 @@ static const char examples[] = "Examples:\n"
                                "    nebel render mist.json -o mist.png --size 1920x1080 --samples 16\n"
                                "  Everything a compositor wants, in linear light:\n"
                                "    nebel render mist.json -o mist.exr --aov\n"
-                               "  Four seconds of film:\n"
+                               "  Four seconds of film, in one file or as pictures:\n"
+                               "    nebel render orbit.json -o orbit.webp --frames 0-95\n"
                                "    nebel render orbit.json -o 'frames/orbit_%04d.png' --frames 0-95\n"
                                "\n"
                                "Exit status: 0 done, 1 the work failed, 2 the call was wrong.\n";
@@ -58,6 +60,7 @@ static char *name_picture(const nb_render_call *wanted, uint32_t frame)
 /* Before minutes of work: every picture has a place to go to. */
 static int check_targets(const nb_render_call *wanted)
 {
+    if (wanted->is_film) return NB_DONE; /* nebel_create_film does */
     for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
         if (nb_interrupt_is_requested()) break;
         char *const name = name_picture(wanted, frame);
@@ -78,6 +81,7 @@ typedef struct studio {
     nebel_renderer *renderer; /* of the CPU */
     nb_finer finer;
     nebel_cells *cells; /* of the methods of that name */
+    nebel_film *film;   /* NULL: pictures in files of their own */
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter painter; /* of OpenGL */
 #endif
@@ -133,6 +137,7 @@ static void free_studio(studio *all)
     free(all->interleaved);
     nebel_destroy_renderer(all->renderer);
     nebel_destroy_cells(all->cells);
+    nebel_destroy_film(all->film);
 #if defined(NEBEL_HAVE_GL)
     nb_gl_painter_close(&all->painter);
 #endif
@@ -140,11 +145,11 @@ static void free_studio(studio *all)
     nb_load_free(&all->loaded);
 }
 
-static int write_picture(studio *all, const char *name)
+/* The picture of all planes that are wanted. */
+static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHANNELS])
 {
     const nb_render_call *const wanted = all->wanted;
     const size_t pixels = (size_t)wanted->width * wanted->height;
-    const char *names[NB_LAYERS_MOST_CHANNELS];
     nebel_image image = {.width = wanted->width, .height = wanted->height, .channel_names = names};
     const uint32_t of = count_channels(wanted);
     for (int i = 0; i < NB_LAYER_COUNT; i++) {
@@ -155,12 +160,50 @@ static int write_picture(studio *all, const char *name)
             names[image.channel_count++] = nb_layer_kinds[i].names[c];
     }
     image.samples = all->interleaved != NULL ? all->interleaved : all->samples[NB_LAYER_COLOR];
-    if (wanted->format == NEBEL_IMAGE_PNG) nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
+    if (wanted->is_film || wanted->format == NEBEL_IMAGE_PNG)
+        nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
+    return image;
+}
+
+static int write_picture(studio *all)
+{
+    const char *names[NB_LAYERS_MOST_CHANNELS];
+    const nebel_image image = join_planes(all, names);
+    if (all->film != NULL) {
+        const nebel_result result = nebel_add_film_picture(all->film, &image);
+        return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->output, result);
+    }
+    char *const name = name_picture(all->wanted, all->frame);
+    if (name == NULL) return NB_FAILED;
     const nebel_scene_desc desc = {.log = nb_report_log(&all->listener)};
     nb_interrupt_hold();
     const nebel_result result = nebel_write_image(name, &desc, &image);
     nb_interrupt_release();
-    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, name, result);
+    const int status = result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, name, result);
+    free(name);
+    return status;
+}
+
+/* Before the long work, because it sees whether the film can be written. */
+static int open_film(studio *all)
+{
+    const nb_render_call *const wanted = all->wanted;
+    if (!wanted->is_film) return NB_DONE;
+    const nebel_film_desc desc = {
+        .log = nb_report_log(&all->listener), .frames_per_second = wanted->fps, .quality = wanted->quality};
+    nb_interrupt_hold();
+    const nebel_result result = nebel_create_film(wanted->output, &desc, &all->film);
+    nb_interrupt_release();
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, wanted->output, result);
+}
+
+static int finish_film(studio *all)
+{
+    if (all->film == NULL) return NB_DONE;
+    nb_interrupt_hold();
+    const nebel_result result = nebel_finish_film(all->film);
+    nb_interrupt_release();
+    return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->output, result);
 }
 
 static int show_progress(size_t done, size_t total, void *user)
@@ -189,6 +232,7 @@ static nebel_result trace_frame(studio *all)
         .progress_user = all,
         .bounces = wanted->bounces,
         .seed = wanted->seed,
+        .time = all->frame,
     };
     const nebel_frame frame = {
         .color = all->samples[NB_LAYER_COLOR],
@@ -307,6 +351,7 @@ static void note_spread(const studio *all)
 static int move_fog(studio *all)
 {
     const nebel_result result = nb_load_move_fog(&all->loaded, all->frame);
+    nb_finer_light(&all->finer, nebel_scene_contents(all->loaded.scene));
     return result == NEBEL_OK ? NB_DONE : nb_report_result(&all->listener, all->wanted->scene, result);
 }
 
@@ -316,9 +361,7 @@ static int make_picture(studio *all)
     int status = move_fog(all);
     if (status == NB_DONE) status = render_frame(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
-    char *const name = name_picture(all->wanted, all->frame);
-    status = name != NULL ? write_picture(all, name) : NB_FAILED;
-    free(name);
+    status = write_picture(all);
     if (status == NB_DONE) note_spread(all);
     return status;
 }
@@ -326,10 +369,20 @@ static int make_picture(studio *all)
 static void note_stillness(const nebel_scene *scene, const nb_render_call *wanted)
 {
     const nebel_scene_data *const data = nebel_scene_contents(scene);
-    if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->moving_volume_count > 0) return;
+    if (data->turntable_frames > 0 || data->camera_key_count > 1 || data->moving_volume_count > 0 || data->moves_on ||
+        data->sun_key_count > 1)
+        return;
     nb_report_message("note: %s: nothing moves, all frames are the same picture; "
                       "the camera turns with \"turntable\", or moves with \"keys\"",
                       wanted->scene);
+}
+
+static void note_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
+{
+    const size_t endless = nb_find_endless(scene);
+    if (wanted->quiet || wanted->method != NEBEL_METHOD_EXACT || endless == scene->volume_count) return;
+    nb_report_message("note: %s: no sunlight reaches fog or models: fog[%zu] %s", wanted->scene, endless,
+                      nb_endless_advice);
 }
 
 /* What the scene has beside its cells is not drawn. */
@@ -503,6 +556,7 @@ static int set_up(studio *all)
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
+    note_darkness(nebel_scene_contents(all->loaded.scene), wanted);
     status = check_classic(all);
     if (status == NB_DONE) status = make_cells(all);
     if (status == NB_DONE) status = tessellate(all);
@@ -524,13 +578,15 @@ static void summarize(const nb_render_call *wanted, double seconds)
 static int render(const nb_render_call *wanted)
 {
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
-    int status = set_up(&all);
+    int status = open_film(&all);
+    if (status == NB_DONE) status = set_up(&all);
     all.frame = wanted->first_frame;
     while (status == NB_DONE && all.frame <= wanted->last_frame) {
         status = make_picture(&all);
         if (nb_interrupt_is_requested()) break;
         all.frame++;
     }
+    if (status == NB_DONE && all.frame > wanted->last_frame) status = finish_film(&all);
     const double seconds = nb_meter_end(&all.meter);
     free_studio(&all);
     if (status == NB_DONE && all.frame <= wanted->last_frame) {
@@ -556,7 +612,7 @@ static int run(int count, char **words)
 
 const nb_command nb_commands_render = {
     .name = "render",
-    .summary = "a scene to a picture, or to many",
+    .summary = "a scene to a picture, to many, or to a film",
     .synopsis = "SCENE -o FILE [options]",
     .about = about,
     .options = nb_render_options,

@@ -36,6 +36,8 @@ static const nb_option options[] = {
 
 static const char about[] = "Reads rays from standard input and writes to standard output what the fog of\n"
                             "SCENE (JSON) does to the light along each: no surfaces, media only.\n"
+                            "With \"multiple_scattering\" in the scene the light that fog scatters more than\n"
+                            "once is in it, by diffusion: a model, whose own error is not in the bound.\n"
                             "\n"
                             "In: one ray to a line,\n"
                             "\n"

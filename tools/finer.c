@@ -67,6 +67,13 @@ nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *
     return result;
 }
 
+void nb_finer_light(nb_finer *finer, const nebel_scene_data *scene)
+{
+    memcpy(finer->data.sun_direction, scene->sun_direction, sizeof scene->sun_direction);
+    memcpy(finer->data.sun_irradiance, scene->sun_irradiance, sizeof scene->sun_irradiance);
+    finer->data.environment = scene->environment;
+}
+
 static int is_unproven(const nebel_scene *scene, double frame, size_t count)
 {
     nebel_fog *fog = NULL;

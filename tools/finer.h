@@ -19,6 +19,9 @@ typedef struct nb_finer {
 nebel_result nb_finer_make(const nebel_scene_data *scene, const nebel_snapshot *fog,
                            const nebel_tessellation_desc *desc, nb_finer *finer);
 
+/* Lights it as the scene is lit now. */
+void nb_finer_light(nb_finer *finer, const nebel_scene_data *scene);
+
 /* The volume with which the fog of the scene up to there has no proof at a frame; their number where none is found. */
 size_t nb_finer_find_unproven(const nebel_scene *scene, double frame);
 void nb_finer_free(nb_finer *finer);

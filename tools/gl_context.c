@@ -136,6 +136,7 @@ static int open_on_any(nb_gl_context *gl, nb_gl_api api)
     return -1;
 }
 
+/* The first of the APIs that can be had. */
 static int open_one(nb_gl_context *gl, const nb_gl_api *apis, int count)
 {
     *gl = (nb_gl_context){.stage = STAGE_NONE};
@@ -146,6 +147,7 @@ static int open_one(nb_gl_context *gl, const nb_gl_api *apis, int count)
     }
     for (int i = 0; i < count; i++) {
         if (open_on_any(gl, apis[i]) == 0) return 0;
+        (void)snprintf(gl->no_desktop, sizeof gl->no_desktop, "%s", gl->fault);
     }
     const size_t used = strlen(gl->fault);
     (void)snprintf(gl->fault + used, sizeof gl->fault - used,

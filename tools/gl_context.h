@@ -13,6 +13,7 @@ typedef struct nb_gl_context {
     char fault[256];                   /* why there is none */
     int stage;                         /* how far the attempt came that `fault` is of */
     char renderer[256];                /* GL_RENDERER and GL_VERSION */
+    char no_desktop[256];              /* nb_gl_context_open_any: why it is OpenGL ES; empty where it is not */
 } nb_gl_context;
 
 /* Makes a context of OpenGL 3.3, or OpenGL ES 3.0, current in this thread. Its framebuffer is one pixel: draw into

@@ -28,6 +28,8 @@ static int suits_fixed(const nebel_scene_data *scene)
 static void note_driver(const nb_gl_painter *painter, nebel_method method)
 {
     nb_report_message("note: --device gl: %s", painter->context.renderer);
+    if (painter->context.no_desktop[0] != '\0')
+        nb_report_message("note: --device gl: OpenGL ES, because %s", painter->context.no_desktop);
     if (painter->is_fixed || !is_of_fixed(method)) return;
     nb_report_message("note: --device gl: --method %s is drawn by shaders, not by the fixed pipeline, because %s",
                       nebel_method_word(method),

@@ -1,5 +1,6 @@
 #include "info_scene.h"
 
+#include "endless.h"
 #include "load.h"
 #include "report.h"
 
@@ -58,6 +59,10 @@ static void print_ambient(const nebel_scene_data *scene)
         print_triple(", ground ", environment->ground);
         break;
     case NEBEL_ENVIRONMENT_MAP:
+        if (scene->environment_file == NULL) {
+            (void)printf("ambient: the sky of the planet");
+            break;
+        }
         (void)printf("ambient: environment %s, rotation %.4g degrees, intensity %.4g", scene->environment_file,
                      environment->rotation, environment->intensity);
         break;
@@ -66,11 +71,35 @@ static void print_ambient(const nebel_scene_data *scene)
     }
 }
 
+static void print_planet(const nebel_scene_data *scene)
+{
+    if (scene->planet_count == 0) return;
+    if (scene->planets[0].model == NEBEL_PLANET_LAYERS) {
+        (void)printf("planet: radius %.6g m, %u shells of clouds\n", scene->planets[0].shells.radius,
+                     (unsigned)scene->planets[0].shells.cloud_count);
+        return;
+    }
+    const nebel_atmosphere_desc *air = &scene->planets[0].air;
+    (void)printf("planet: radius %.6g m, %.6g m of air of %u kinds\n", air->radius, air->thickness,
+                 (unsigned)air->air_count);
+    for (uint32_t i = 0; i < scene->planets[0].cloud_layer_count; i++) {
+        static const char *const kinds[] = {"cumulus", "stratus", "cirrus"};
+        nebel_cloud_layer layer;
+        if (nebel_resolve_cloud_layer(air->thickness, &scene->planets[0].cloud_layers[i], NULL, &layer) != NEBEL_OK)
+            return;
+        (void)printf("clouds: %s, %.6g to %.6g m, %.3g of the sky\n", kinds[layer.kind], layer.base, layer.top,
+                     layer.coverage);
+    }
+}
+
 static void print_light(const nebel_scene_data *scene)
 {
     if (scene->has_sun) {
         print_triple("sun: irradiance ", scene->sun_irradiance);
         (void)printf(", %.3g degrees above the horizon\n", asin(fmin(fmax(scene->sun_direction[Y], -1), 1)) * degrees);
+        if (scene->sun_key_count > 0)
+            (void)printf("sun: %zu keys, frames %g to %g\n", scene->sun_key_count, scene->sun_keys[0].frame,
+                         scene->sun_keys[scene->sun_key_count - 1].frame);
     }
     if (scene->lamp_count > 0) (void)printf("lamps: %zu\n", scene->lamp_count);
     print_ambient(scene);
@@ -239,6 +268,15 @@ static void warn_of_volumes(const nebel_scene_data *scene)
     }
 }
 
+static void warn_of_darkness(const nebel_scene_data *scene)
+{
+    const size_t endless = nb_find_endless(scene);
+    if (endless == scene->volume_count) return;
+    const char *const name = scene->volume_names[endless];
+    (void)printf("warning: no sunlight reaches fog or models: fog[%zu]%s%s%s %s\n", endless,
+                 name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "", nb_endless_advice);
+}
+
 static void warn_of_scene(const nebel_scene_data *scene, double visibility)
 {
     size_t volumes = 0;
@@ -258,6 +296,7 @@ int nb_info_print_scene(const char *path)
     const double visibility = visibility_of(scene, loaded.fog);
     (void)printf("scene: %s\n", path);
     print_camera(scene);
+    print_planet(scene);
     print_light(scene);
     print_models(scene);
     print_volumes(scene);
@@ -265,6 +304,7 @@ int nb_info_print_scene(const char *path)
     print_cells(scene->cells);
     print_visibility(visibility);
     warn_of_volumes(scene);
+    warn_of_darkness(scene);
     warn_of_scene(scene, visibility);
     nb_load_free(&loaded);
     return NB_DONE;

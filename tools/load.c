@@ -1,5 +1,7 @@
 #include "load.h"
 
+#include <nebel/render.h>
+
 void nb_load_free(nb_load_result *result)
 {
     nebel_release_snapshot(result->fog);
@@ -10,8 +12,11 @@ void nb_load_free(nb_load_result *result)
 nebel_result nb_load_move_fog(nb_load_result *result, double frame)
 {
     nebel_snapshot *moved = NULL;
-    if (nebel_scene_contents(result->scene)->moving_volume_count == 0) return NEBEL_OK;
-    const nebel_result failed = nebel_commit_scene_fog_at(result->scene, frame, &moved);
+    const nebel_scene_data *const scene = nebel_scene_contents(result->scene);
+    if (scene->moving_volume_count == 0 && scene->sun_key_count == 0) return NEBEL_OK;
+    nebel_result failed = nebel_light_scene_at(result->scene, frame);
+    if (failed != NEBEL_OK) return failed;
+    failed = nebel_commit_scene_fog_at(result->scene, frame, &moved);
     if (failed != NEBEL_OK) return failed;
     nebel_release_snapshot(result->fog);
     result->fog = moved;
@@ -28,7 +33,7 @@ static int finish(const char *path, nebel_result done, nb_report_listener *liste
 int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result)
 {
     *result = (nb_load_result){0};
-    const nebel_scene_desc desc = {.log = nb_report_log(listener)};
+    const nebel_scene_desc desc = {.log = nb_report_log(listener), .run = nebel_run_parts};
     nebel_result done = nebel_load_scene(path, &desc, &result->scene);
     if (done == NEBEL_OK && with_models) done = nebel_load_scene_models(result->scene);
     return finish(path, done, listener, result);
@@ -36,7 +41,10 @@ int nb_load_file(const char *path, int with_models, nb_report_listener *listener
 
 int nb_load_fog(const char *path, double frame, nb_report_listener *listener, nb_load_result *result)
 {
-    return finish(path, nebel_commit_scene_fog_at(result->scene, frame, &result->fog), listener, result);
+    nebel_result done = nebel_light_scene_at(result->scene, frame);
+    if (done == NEBEL_OK) done = nebel_load_scene_planet(result->scene);
+    if (done == NEBEL_OK) done = nebel_commit_scene_fog_at(result->scene, frame, &result->fog);
+    return finish(path, done, listener, result);
 }
 
 int nb_load_scene(const char *path, int with_models, double frame, nb_report_listener *listener, nb_load_result *result)

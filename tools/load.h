@@ -12,7 +12,7 @@ typedef struct nb_load_result {
     nebel_snapshot *fog;
 } nb_load_result;
 
-/* Reads the scene file, with models where wanted, and makes a snapshot of its fog at a frame. Returns NB_DONE; or
+/* Reads the scene file, with models where wanted, and makes its air and a snapshot of its fog at a frame. Returns NB_DONE; or
  * NB_FAILED, said on standard error. `listener` must outlive the result. */
 int nb_load_scene(const char *path, int with_models, double frame, nb_report_listener *listener,
                   nb_load_result *result);
@@ -21,7 +21,7 @@ int nb_load_scene(const char *path, int with_models, double frame, nb_report_lis
 int nb_load_file(const char *path, int with_models, nb_report_listener *listener, nb_load_result *result);
 int nb_load_fog(const char *path, double frame, nb_report_listener *listener, nb_load_result *result);
 
-/* Puts the fog of another frame in place of the snapshot, where it moves at all. Returns a result; the log has said
+/* Lights the scene as at another frame, and puts the fog of that in place of the snapshot, where sun or fog move at all. Returns a result; the log has said
  * why. */
 nebel_result nb_load_move_fog(nb_load_result *result, double frame);
 

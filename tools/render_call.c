@@ -18,6 +18,8 @@ enum {
     EXPOSURE,
     FRAME,
     FRAMES,
+    FPS,
+    QUALITY,
     AOV,
     TOLERANCE,
     METHOD,
@@ -35,17 +37,21 @@ enum {
 };
 
 _Static_assert((int)COUNT == (int)NB_RENDER_OPTIONS, "as many as the header says");
+_Static_assert((int)COUNT <= (int)NB_OPTIONS_MOST, "no more than arguments have room for");
 
 const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
     [OUTPUT] = {"output", 'o', "FILE",
                 "The picture: .png (tone mapped, sRGB, 8 bit) or .exr\n(linear light, float); -: PNG to standard "
-                "output.\nNeeded."},
+                "output.\nWith --frames also .webp: a film. Needed."},
     [SIZE] = {"size", 's', "WxH", "Pixels, each side 1 to 32768, 2^28 in all (--aov:\n2^26). Default: 1280x720."},
     [SAMPLES] = {"samples", 0, "N", "Samples for each pixel, 1 to 4096. Default: 4."},
-    [EXPOSURE] = {"exposure", 'e', "EV", "Stops, -20 to 20: 1 doubles the light. PNG only.\nDefault: 0."},
+    [EXPOSURE] = {"exposure", 'e', "EV", "Stops, -20 to 20: 1 doubles the light. Not for\nEXR. Default: 0."},
     [FRAME] = {"frame", 0, "N", "The frame of a moving camera, 0 to 1000000.\nDefault: 0."},
     [FRAMES] = {"frames", 0, "A-B",
-                "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %)."},
+                "All frames from A to B; FILE then has %d or %04d\nwhere the number belongs (and %% for a %), or it "
+                "ends\nin .webp: one film of all."},
+    [FPS] = {"fps", 0, "N", "Of a film: frames a second, 1 to 100. Default: 24."},
+    [QUALITY] = {"quality", 0, "N", "Of a film, 1 to 100: more is larger and better, 100\nwithout loss. Default: 85."},
     [AOV] = {"aov", 0, NULL,
              "EXR only: adds transmittance.{R,G,B},\nin_scattering.{R,G,B}, depth.Z (m, inf: nothing\n"
              "there), normal.{X,Y,Z} and, of the CPU, error (its\nbound) or, of reference, standard_error.{R,G,B}."},
@@ -81,7 +87,8 @@ const nb_option nb_render_options[NB_RENDER_OPTIONS] = {
                  "exact shows. Default: as often as it happens."},
     [SEED] = {"seed", 0, "N",
               "With --method reference: 0 to 4294967295; other\nseeds give independent pictures. Default: 0."},
-    [QUIET] = {"quiet", 'q', NULL, "No progress bar and no summary; errors are still\nreported."},
+    [QUIET] = {"quiet", 'q', NULL,
+               "No progress bar, no notes and no summary; warnings\nand errors are still reported."},
 };
 
 /* What nebel_tessellate counts for rounding. */
@@ -128,6 +135,29 @@ static void read_frames(nb_arguments *arguments, nb_render_call *wanted)
     nb_options_reject(arguments, FRAMES, "is no range such as 0-95, of frames up to 1000000");
 }
 
+/* A side of a WebP. */
+enum { FILM_SIDE = 16383 };
+
+static void read_film(nb_arguments *arguments, nb_render_call *wanted)
+{
+    static const int of_films[] = {FPS, QUALITY};
+    wanted->fps = nb_options_number(arguments, FPS, 1, NEBEL_MAX_FILM_RATE, NEBEL_DEFAULT_FILM_RATE);
+    wanted->quality = (int)nb_options_whole(arguments, QUALITY, 1, 100, NEBEL_DEFAULT_FILM_QUALITY);
+    if (!wanted->is_film) {
+        for (size_t i = 0; i < sizeof of_films / sizeof *of_films; i++)
+            if (arguments->values[of_films[i]] != NULL)
+                nb_options_refuse(arguments, of_films[i], "is for films; name a file that ends in .webp");
+        return;
+    }
+    if (!wanted->many_frames)
+        nb_options_reject(arguments, OUTPUT, "is a film; say which frames, as in --frames 0-95, or name a .png");
+    else if (nb_pattern_find_fault(wanted->output) == NULL)
+        nb_options_reject(arguments, OUTPUT, "is one film of all frames; leave out the number");
+    if (wanted->aov) nb_options_reject(arguments, OUTPUT, "is no .exr; --aov needs one");
+    if (wanted->width > FILM_SIDE || wanted->height > FILM_SIDE)
+        nb_options_reject(arguments, SIZE, "is too large for a film, whose sides are at most 16383");
+}
+
 static const char standard_output[] = "/dev/stdout";
 
 static void read_output(nb_arguments *arguments, nb_render_call *wanted)
@@ -141,9 +171,11 @@ static void read_output(nb_arguments *arguments, nb_render_call *wanted)
     if (strcmp(wanted->output, "-") == 0) wanted->output = standard_output;
     if (strcmp(wanted->output, standard_output) == 0 && isatty(STDOUT_FILENO))
         nb_options_reject(arguments, OUTPUT, "is a terminal; send the picture to a file or to a program");
+    wanted->is_film = nebel_is_film_path(wanted->output);
+    if (wanted->is_film) return;
     wanted->format = nebel_find_image_format(wanted->output);
     if (wanted->format == NEBEL_IMAGE_NONE)
-        nb_options_reject(arguments, OUTPUT, "is no name that ends in .png or .exr");
+        nb_options_reject(arguments, OUTPUT, "is no name that ends in .png, .exr or .webp");
     const char *const fault = wanted->many_frames ? nb_pattern_find_fault(wanted->output) : NULL;
     if (fault != NULL) nb_options_reject(arguments, OUTPUT, fault);
     if (wanted->format == NEBEL_IMAGE_PNG && wanted->aov)
@@ -242,6 +274,7 @@ int nb_render_call_read(nb_arguments *arguments, nb_render_call *wanted)
     read_size(arguments, wanted);
     read_frames(arguments, wanted);
     read_output(arguments, wanted);
+    read_film(arguments, wanted);
     read_device(arguments, wanted);
     read_reference(arguments, wanted);
     read_scattering(arguments, wanted);

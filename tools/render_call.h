@@ -15,19 +15,21 @@ typedef enum nb_scattering {
 
 typedef struct nb_render_call {
     const char *scene, *output;
-    nebel_image_format format;
+    nebel_image_format format; /* of pictures; a film has none */
     uint32_t width, height, samples;
     uint32_t bounces, seed; /* of the reference; 0 bounces: no limit */
     double exposure, tolerance;
     nebel_tessellation_desc tessellation; /* bound 0: the triangles of the models */
     uint32_t first_frame, last_frame;
-    int many_frames, aov, quiet, gl;
+    int many_frames, is_film, aov, quiet, gl;
+    double fps;  /* of a film, and */
+    int quality; /* NEBEL_DEFAULT_FILM_QUALITY */
     nebel_method method;
     nb_scattering scattering;
     nebel_renderer_desc renderer;
 } nb_render_call;
 
-enum { NB_RENDER_OPTIONS = 19 };
+enum { NB_RENDER_OPTIONS = 21 };
 
 extern const nb_option nb_render_options[NB_RENDER_OPTIONS];
 

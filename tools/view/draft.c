@@ -4,6 +4,8 @@
 #include "keys.h"
 #include "navigate.h"
 
+#include <nebel/render.h>
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,26 +20,104 @@ static nebel_result fail_memory(const nb_draft *draft)
  * -------------------------------------------------------------------------------------------------------------
  */
 
-static nebel_sun sun_of(const nb_edition *edition)
+/* The sky, and the sun that a planet's air leaves: as the scene has them at the present frame where the sun moves, and
+ * else as the file was written, with another sun perhaps. */
+static const nebel_scene_data *find_light(const nb_draft *draft)
 {
+    return nebel_scene_contents(draft->data.sun_key_count > 0 ? draft->scene : draft->file);
+}
+
+/* Keys are the file's alone. */
+static nebel_sun find_sun(const nb_draft *draft, const nb_edition *edition)
+{
+    const nebel_scene_data *const data = &draft->data;
     nebel_sun sun = {{0}, {0}};
     if (!edition->has_sun) return sun;
+    if (data->sun_key_count > 0) return nebel_sun_between_keys(data->sun_keys, data->sun_key_count, draft->frame);
     memcpy(sun.direction, edition->sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, edition->sun_irradiance, sizeof sun.irradiance);
     return sun;
 }
 
+/* What the air of a planet leaves of it. */
+static nebel_sun sun_of(const nb_draft *draft, const nb_edition *edition)
+{
+    const nebel_scene_data *const light = find_light(draft);
+    nebel_sun sun = find_sun(draft, edition);
+    for (int c = 0; c < 3 && light->planet_count > 0; c++) sun.irradiance[c] *= light->planets[0].sun_left[c];
+    return sun;
+}
+
+/* Nobody may render the scene meanwhile. */
+static nebel_result light_scene(nb_draft *draft)
+{
+    const nebel_result result = nebel_light_scene_at(draft->scene, draft->frame);
+    draft->data.environment.map = nebel_scene_contents(draft->scene)->environment.map;
+    return result;
+}
+
+/* What the file has that moves without end, or noise that does so now. */
+static int moves_on(const nb_draft *draft)
+{
+    int result = nebel_scene_contents(draft->file)->moves_on;
+    for (size_t i = 0; i < draft->now.count && !result; i++) {
+        nebel_scene_noise noise;
+        if (nebel_find_scene_noise(draft->scene, draft->now.volumes[i].density.grid, &noise))
+            result = noise.change != 0 || noise.drift[0] != 0 || noise.drift[1] != 0 || noise.drift[2] != 0;
+    }
+    return result;
+}
+
+void nb_draft_show(nb_draft *draft)
+{
+    nebel_scene_data *const data = &draft->data;
+    nb_edition_show(&draft->now, data);
+    data->moves_on = moves_on(draft);
+    if (!data->has_sun) return;
+    const nebel_sun sun = find_sun(draft, &draft->now);
+    memcpy(data->sun_direction, sun.direction, sizeof sun.direction);
+    memcpy(data->sun_irradiance, sun.irradiance, sizeof sun.irradiance);
+}
+
 static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
-    desc.sun = sun_of(edition);
-    nebel_result result = nebel_create_fog(&desc, fog);
+    desc.sun = sun_of(draft, edition);
     const nebel_scene_data *const file = nebel_scene_contents(draft->file);
-    const nebel_environment environment = nb_edition_environment(edition, file->environment.map);
+    nebel_result result = nebel_create_fog(&desc, fog);
+    const nebel_environment environment = nb_edition_environment(edition, find_light(draft)->environment.map);
     if (result == NEBEL_OK) result = nebel_set_environment(*fog, &environment);
     if (result == NEBEL_OK) result = nebel_set_lamps(*fog, file->lamp_count, file->lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
     if (result != NEBEL_OK) nebel_destroy_fog(*fog);
+    return result;
+}
+
+/* A volume as it is at the present frame; its grid has one more owner, also where this fails. */
+static nebel_result find_volume(const nb_draft *draft, const nb_edition *edition, size_t index,
+                                nebel_volume_desc *volume)
+{
+    *volume = edition->volumes[index];
+    nebel_grid *const grid = volume->density.type == NEBEL_DENSITY_GRID ? volume->density.grid : NULL;
+    return nebel_scene_grid(draft->scene, grid, draft->frame, &volume->density.grid);
+}
+
+static nebel_result add_volume(const nb_draft *draft, const nb_edition *edition, size_t index, nebel_fog *fog,
+                               nebel_volume_id *id)
+{
+    nebel_volume_desc volume;
+    nebel_result result = find_volume(draft, edition, index, &volume);
+    if (result == NEBEL_OK) result = nebel_add_volume(fog, &volume, id);
+    nebel_release_grid(volume.density.grid);
+    return result;
+}
+
+static nebel_result change_volume(const nb_draft *draft, const nb_edition *edition, size_t index)
+{
+    nebel_volume_desc volume;
+    nebel_result result = find_volume(draft, edition, index, &volume);
+    if (result == NEBEL_OK) result = nebel_change_volume(draft->fog, draft->ids[index], &volume);
+    nebel_release_grid(volume.density.grid);
     return result;
 }
 
@@ -50,6 +130,7 @@ static nebel_result commit_fog(nb_draft *draft)
     nebel_release_snapshot(draft->whole);
     draft->volumes = fresh;
     draft->whole = NULL;
+    draft->fog_frame = draft->frame;
     return NEBEL_OK;
 }
 
@@ -86,7 +167,7 @@ static nebel_result fill_fog(nb_draft *draft, const nb_edition *edition)
     if (ids == NULL) return fail_memory(draft);
     nebel_result result = create_fog(draft, edition, &fog);
     for (size_t i = 0; i < edition->count && result == NEBEL_OK; i++)
-        result = nebel_add_volume(fog, &edition->volumes[i], &ids[i]);
+        result = add_volume(draft, edition, i, fog, &ids[i]);
     if (result == NEBEL_OK) result = add_cells(fog, edition);
     if (result != NEBEL_OK) {
         nebel_destroy_fog(fog);
@@ -100,17 +181,21 @@ static nebel_result fill_fog(nb_draft *draft, const nb_edition *edition)
     return commit_fog(draft);
 }
 
+static int has_changed(const nb_draft *draft, const nebel_volume_desc *was, const nebel_volume_desc *now)
+{
+    const int may_move = draft->data.moves_on && now->density.type == NEBEL_DENSITY_GRID;
+    return !nb_edition_is_same_volume(now, was) || (may_move && draft->frame != draft->fog_frame);
+}
+
 /* Only numbers of the edition are not as they were. */
 static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_edition *now)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < now->count && result == NEBEL_OK; i++)
-        if (!nb_edition_is_same_volume(&now->volumes[i], &was->volumes[i]))
-            result = nebel_change_volume(draft->fog, draft->ids[i], &now->volumes[i]);
-    const nebel_environment environment =
-        nb_edition_environment(now, nebel_scene_contents(draft->file)->environment.map);
+        if (has_changed(draft, &was->volumes[i], &now->volumes[i])) result = change_volume(draft, now, i);
+    const nebel_environment environment = nb_edition_environment(now, find_light(draft)->environment.map);
     if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
-    const nebel_sun sun = sun_of(now);
+    const nebel_sun sun = sun_of(draft, now);
     if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
     if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
     return result == NEBEL_OK ? commit_fog(draft) : result;
@@ -204,7 +289,7 @@ static nebel_result add_all(const nb_draft *draft, nebel_fog *fog)
 {
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < draft->good.count && result == NEBEL_OK; i++)
-        result = nebel_add_volume(fog, &draft->good.volumes[i], NULL);
+        result = add_volume(draft, &draft->good, i, fog, NULL);
     if (result == NEBEL_OK) result = add_cells(fog, &draft->good);
     for (size_t i = 0; i < draft->particle_count && result == NEBEL_OK; i++) {
         const nebel_volume_desc volume = nebel_particle_volume(&draft->particles[i]);
@@ -249,14 +334,25 @@ static int is_saved(const nb_draft *draft, size_t volume)
     return origin == NEBEL_VOLUME_WRITTEN || origin == NEBEL_VOLUME_MOVING;
 }
 
+/* Ten seconds at 24 a second, of what moves on without end. */
+static const double usual_frames = 240;
+
+/* Nonzero. */
+static int widen(double range[2], int has_range, double first, double last)
+{
+    range[0] = has_range ? fmin(range[0], first) : first;
+    range[1] = has_range ? fmax(range[1], last) : last;
+    return 1;
+}
+
 int nb_draft_find_frames(const nb_draft *draft, double range[2])
 {
-    const double turns = draft->data.turntable_frames;
-    const int has_keys = nb_keys_find_range(&draft->now, range);
-    if (!(turns > 0)) return has_keys;
-    range[0] = has_keys ? fmin(range[0], 0) : 0;
-    range[1] = has_keys ? fmax(range[1], turns) : turns;
-    return 1;
+    const nebel_scene_data *const data = &draft->data;
+    const size_t suns = data->sun_key_count;
+    int has_range = nb_keys_find_range(&draft->now, range);
+    if (suns > 0) has_range = widen(range, has_range, data->sun_keys[0].frame, data->sun_keys[suns - 1].frame);
+    if (data->turntable_frames > 0) return widen(range, has_range, 0, data->turntable_frames);
+    return data->moves_on && !has_range ? widen(range, 0, 0, usual_frames) : has_range;
 }
 
 /* What the file says stands at the same frame, to be compared. */
@@ -286,21 +382,23 @@ static nebel_result make_editions(nb_draft *draft)
         return fail_memory(draft);
     place_volumes(draft);
     place_camera(draft);
-    nb_edition_show(&draft->now, &draft->data);
     return nb_edition_copy(&draft->now, &draft->good) == 0 ? NEBEL_OK : fail_memory(draft);
 }
 
 nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
 {
-    const nebel_scene_desc desc = {.log = *log};
+    const nebel_scene_desc desc = {.log = *log, .run = nebel_run_parts};
     *draft = (nb_draft){.log = *log, .frame = frame};
     nebel_result result = nebel_load_scene(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
+    if (result == NEBEL_OK) result = nebel_load_scene_planet(draft->scene);
     if (result == NEBEL_OK) {
         draft->file = draft->scene;
         draft->data = *nebel_scene_contents(draft->scene);
         result = make_editions(draft);
     }
+    if (result == NEBEL_OK) result = light_scene(draft);
+    if (result == NEBEL_OK) nb_draft_show(draft);
     if (result == NEBEL_OK) result = make_cells(draft, &draft->good);
     if (result == NEBEL_OK) result = fill_fog(draft, &draft->good);
     if (result == NEBEL_OK) result = strew(draft, &draft->good);
@@ -367,7 +465,7 @@ static nebel_result settle(nb_draft *draft, int is_step)
         nb_edition_free(&draft->good);
         draft->good = fresh;
     }
-    nb_edition_show(&draft->now, &draft->data);
+    nb_draft_show(draft);
     return result;
 }
 
@@ -393,9 +491,11 @@ nebel_result nb_draft_commit(nb_draft *draft)
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
 {
     draft->frame = frame;
+    const nebel_result lit = light_scene(draft);
     place_volumes(draft);
     place_camera(draft);
-    return settle(draft, 0);
+    const nebel_result result = settle(draft, 0);
+    return lit == NEBEL_OK ? result : lit;
 }
 
 int nb_draft_undo(nb_draft *draft, nebel_result *result)
@@ -443,32 +543,35 @@ int nb_draft_must_be_read(const nb_draft *draft)
     return now->model_count != scene->model_count || (brings_fog && !nb_edition_has_same_models(now, &draft->written));
 }
 
-static int is_black(const double rgb[3])
-{
-    return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0;
-}
-
-/* Fog that lamps light, sunlight among voxels, ambient light that varies, and light that is scattered more than once. */
-int nb_draft_is_for_cpu(const nb_draft *draft)
-{
-    const nb_edition *const good = &draft->good;
-    const nebel_scene_data *const file = nebel_scene_contents(draft->file);
-    const int has_sun = good->has_sun && !is_black(good->sun_irradiance);
-    int scatters = 0, has_voxels = 0;
-    for (size_t i = 0; i < good->count; i++) {
-        scatters |= !is_black(good->volumes[i].albedo);
-        has_voxels |= good->volumes[i].density.type == NEBEL_DENSITY_GRID;
-    }
-    const int is_beyond = file->diffusion != NULL || good->environment.type != NEBEL_ENVIRONMENT_CONSTANT;
-    return is_beyond || (scatters && has_voxels && (has_sun || file->lamp_count > 0));
-}
-
 int nb_draft_can_save_camera(const nb_draft *draft)
 {
     return draft->now.camera_key_count == 0 && draft->data.turntable_frames == 0;
 }
 
-/* Points and portals are those of the scene that stays. */
+/* That of the scene that stays; by its name, which is what the file says of it. */
+static nebel_grid *find_grid(const nb_draft *draft, nebel_grid *grid)
+{
+    const nebel_scene_data *const scene = nebel_scene_contents(draft->scene);
+    for (size_t i = 0; i < scene->volume_count && grid != NULL; i++) {
+        nebel_grid *const own = scene->volumes[i].density.grid;
+        if (own != NULL && strcmp(nebel_grid_name(own), nebel_grid_name(grid)) == 0) return own;
+    }
+    return grid;
+}
+
+/* Its keys have the same one, without owning it. */
+static void adopt_grid(const nb_draft *draft, nb_edition *edition, size_t index)
+{
+    nebel_grid *const fresh = edition->volumes[index].density.grid, *const own = find_grid(draft, fresh);
+    const nebel_volume_entry *const entry = &edition->entries[index];
+    if (own == fresh) return;
+    edition->volumes[index].density.grid = nebel_retain_grid(own);
+    for (size_t i = 0; i < entry->key_count; i++) ((nebel_volume_key *)entry->keys)[i].volume.density.grid = own;
+    if (entry->own != NULL) ((nebel_volume_desc *)entry->own)->density.grid = own;
+    nebel_release_grid(fresh);
+}
+
+/* Points, portals and grids are those of the scene that stays. */
 static void adopt_arrays(const nb_draft *draft, nb_edition *edition)
 {
     const nebel_nebula_desc *const own = nebel_scene_contents(draft->scene)->nebulae;
@@ -477,6 +580,7 @@ static void adopt_arrays(const nb_draft *draft, nb_edition *edition)
         if (own[i].points != NULL) edition->nebulae[i].count = own[i].count;
     }
     if (edition->cells != NULL) edition->cells_desc.portals = draft->now.cells_desc.portals;
+    for (size_t i = 0; i < edition->count; i++) adopt_grid(draft, edition, i);
 }
 
 static void exchange(nebel_volume_desc *a, nebel_volume_desc *b)
@@ -509,10 +613,11 @@ static nebel_result read_back(nb_draft *draft, const char *path)
     nebel_scene *fresh = NULL;
     nb_edition written;
     nebel_result result = nebel_load_scene(path, &desc, &fresh);
-    if (result != NEBEL_OK) return result;
-    if (nb_edition_make(nebel_scene_contents(fresh), &written) != 0) {
+    if (result == NEBEL_OK) result = nebel_load_scene_planet(fresh);
+    if (result == NEBEL_OK && nb_edition_make(nebel_scene_contents(fresh), &written) != 0) result = fail_memory(draft);
+    if (result != NEBEL_OK) {
         nebel_destroy_scene(fresh);
-        return fail_memory(draft);
+        return result;
     }
     adopt_arrays(draft, &written);
     if (draft->file != draft->scene) nebel_destroy_scene(draft->file);
@@ -525,13 +630,16 @@ static nebel_result read_back(nb_draft *draft, const char *path)
 nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log};
-    const nebel_scene_data *const before = nebel_scene_contents(draft->file);
-    nebel_scene_data changed = *before;
+    nebel_scene_data before = *nebel_scene_contents(draft->file);
+    /* That of the contents is where its keys have it. */
+    memcpy(before.sun_direction, draft->written.sun_direction, sizeof before.sun_direction);
+    memcpy(before.sun_irradiance, draft->written.sun_irradiance, sizeof before.sun_irradiance);
+    nebel_scene_data changed = before;
     nb_edition_show(&draft->now, &changed);
     if (with_camera && nb_draft_can_save_camera(draft)) changed.camera = nb_navigate_round(draft->data.camera);
     if (changed.camera_key_count > 0) changed.camera.projection = changed.camera_keys->camera.projection;
     nb_interrupt_hold();
-    const nebel_result result = nebel_save_scene(path, &desc, before, &changed, draft->now.sources);
+    const nebel_result result = nebel_save_scene(path, &desc, &before, &changed, draft->now.sources);
     nb_interrupt_release();
     return result == NEBEL_OK ? read_back(draft, path) : result;
 }

@@ -15,6 +15,7 @@ typedef struct nb_draft {
     nb_history history;
     nebel_fog *fog; /* the volumes of `good` */
     nebel_volume_id *ids;
+    double fog_frame;          /* that its noise is of */
     nebel_snapshot *volumes;   /* of the fog */
     nebel_snapshot *whole;     /* with the particles; NULL: not asked for yet */
     nebel_particle *particles; /* of all nebulae */
@@ -32,6 +33,9 @@ nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log,
 /* Fine with zeros. */
 void nb_draft_close(nb_draft *draft);
 
+/* Points `data` to the draft, which has been copied, and has the sun there as it is at the frame. */
+void nb_draft_show(nb_draft *draft);
+
 /* Puts `now` into new snapshots. If it is not valid, all of it is what it was before, and the log says why. */
 nebel_result nb_draft_commit(nb_draft *draft);
 
@@ -42,7 +46,8 @@ nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole);
  * fails. */
 nebel_result nb_draft_place_models(nb_draft *draft);
 
-/* Goes to another frame: everything that moves. Volumes that stand still keep their changes. */
+/* Goes to another frame: everything that moves. Volumes that stand still keep their changes. Nobody may render `data`
+ * meanwhile where the sun has keys: the sky of a planet is made anew. */
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame);
 
 /* A step back or forth; 0: there is none. */
@@ -61,9 +66,6 @@ int nb_draft_find_frames(const nb_draft *draft, double range[2]);
 /* Whether what was saved cannot be shown without the scene being read anew: models that have gone, or have taken fog
  * with them. */
 int nb_draft_must_be_read(const nb_draft *draft);
-
-/* Whether the fog has light that OpenGL does not draw. */
-int nb_draft_is_for_cpu(const nb_draft *draft);
 
 /* Whether the camera is one that the file could hold. */
 int nb_draft_can_save_camera(const nb_draft *draft);

@@ -353,16 +353,24 @@ size_t nb_edition_size(const nb_edition *edition)
 #define HAS_SAME(a, b, type, first, behind)                                                                            \
     (memcmp(&(a)->first, &(b)->first, offsetof(type, behind) - offsetof(type, first)) == 0)
 
+/* The file's words, which are the name of a grid, say all of it. */
+static int is_same_grid(const nebel_grid *a, const nebel_grid *b)
+{
+    if (a == b) return 1;
+    return a != NULL && b != NULL && nebel_grid_name(a)[0] != '\0' &&
+           strcmp(nebel_grid_name(a), nebel_grid_name(b)) == 0;
+}
+
 static int is_same_density(const nebel_density *a, const nebel_density *b)
 {
     return a->type == b->type && a->below == b->below && a->power == b->power &&
            HAS_SAME(a, b, nebel_density, base, power) && HAS_SAME(a, b, nebel_density, center, distance) &&
-           a->distance == b->distance && a->grid == b->grid;
+           a->distance == b->distance && is_same_grid(a->grid, b->grid);
 }
 
 static int is_same_phase(const nebel_phase *a, const nebel_phase *b)
 {
-    return a->type == b->type && a->g == b->g && a->diameter == b->diameter;
+    return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
 }
 
 int nb_edition_is_same_volume(const nebel_volume_desc *a, const nebel_volume_desc *b)

@@ -67,18 +67,25 @@ bool draw_amount(double extinction[3], nebel_volume_entry *entry)
 
 bool draw_phase(nebel_phase *phase)
 {
-    static const char *const names[] = {"isotropic", "Henyey-Greenstein", "Rayleigh", "Cornette-Shanks", "droplets"};
-    static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN, NEBEL_PHASE_RAYLEIGH,
-                                             NEBEL_PHASE_CORNETTE_SHANKS, NEBEL_PHASE_DROPLETS};
+    static const char *const names[] = {"isotropic", "Henyey-Greenstein", "Rayleigh", "Cornette-Shanks",
+                                        "Draine",    "droplets"};
+    static const nebel_phase_type types[] = {NEBEL_PHASE_ISOTROPIC, NEBEL_PHASE_HENYEY_GREENSTEIN,
+                                             NEBEL_PHASE_RAYLEIGH,  NEBEL_PHASE_CORNETTE_SHANKS,
+                                             NEBEL_PHASE_DRAINE,    NEBEL_PHASE_DROPLETS};
+    const int count = sizeof types / sizeof *types;
     int type = 0;
-    while (type < 4 && types[type] != phase->type) type++;
+    while (type < count - 1 && types[type] != phase->type) type++;
     bool changed = choose(
-        "phase", &type, names, 5,
+        "phase", &type, names, count,
         "Into which direction sunlight is scattered. Under ambient light that is the same from everywhere all look the "
         "same.");
     phase->type = types[type];
-    if (phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS)
+    if (phase->type == NEBEL_PHASE_HENYEY_GREENSTEIN || phase->type == NEBEL_PHASE_CORNETTE_SHANKS ||
+        phase->type == NEBEL_PHASE_DRAINE)
         changed |= slide("g", &phase->g, -0.99, 0.99, "%.3f", false, "Mean cosine: 1 goes straight on, -1 comes back.");
+    if (phase->type == NEBEL_PHASE_DRAINE)
+        changed |= slide("alpha", &phase->alpha, 0, 1000, "%.3g", true,
+                         "0: Henyey-Greenstein, 1: Cornette-Shanks; much: light is sent on and back, not aside.");
     if (phase->type != NEBEL_PHASE_DROPLETS) return changed;
     if (!(phase->diameter > 0)) phase->diameter = 10;
     return slide("diameter", &phase->diameter, 0.1, NEBEL_MAX_DROPLET, "%.3g um", true, "Of a droplet.") || changed;
@@ -108,7 +115,7 @@ bool is_of(const nebel_volume_desc *volume, const nebel_preset *preset)
             volume->albedo[c] != preset->albedo[c])
             return false;
     return volume->phase.type == preset->phase.type && volume->phase.g == preset->phase.g &&
-           volume->phase.diameter == preset->phase.diameter;
+           volume->phase.alpha == preset->phase.alpha && volume->phase.diameter == preset->phase.diameter;
 }
 
 // Measured fog, by its name where the numbers are still its own.
@@ -174,7 +181,7 @@ bool draw_numbers(nb_panel *panel, nebel_volume_desc *volume, nebel_volume_entry
         if (entry->key_count == 0) changed |= draw_preset(volume);
         changed |= draw_amount(volume->extinction, entry);
         changed |= draw_light(volume, entry);
-        changed |= draw_density(&volume->density, panel->data->camera.look_at, reach);
+        changed |= draw_density(panel, &volume->density, reach, true);
     }
     changed |= draw_shape(panel, &volume->shape, reach, true);
     if (volume->shape.type != type) fit_density(volume);
@@ -336,7 +343,7 @@ bool draw_strewing(nb_panel *panel, nebel_nebula_desc *nebula, nebel_transform *
     bool changed = false;
     if (nebula->points == nullptr) {
         changed |= slide_whole("particles", &count, 1, MOST_PARTICLES, true, "How many there are.");
-        changed |= draw_density(&nebula->density, panel->data->camera.look_at, reach);
+        changed |= draw_density(panel, &nebula->density, reach, false);
         changed |= slide("fade", &nebula->fade, 0, 1, "%.2f", false,
                          "How much the density dims particles, in place of thinning them out.");
         changed |= draw_shape(panel, &nebula->shape, reach, true);

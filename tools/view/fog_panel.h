@@ -17,7 +17,7 @@ bool draw_shape(nb_panel *panel, nebel_shape *shape, double reach, bool may_chan
 bool draw_transform(nebel_transform *transform, double reach);
 bool draw_rotation(double rotation[4]);
 
-// `place` is where a new kind of density starts.
-bool draw_density(nebel_density *density, const double place[3], double reach);
+// A new kind of density starts where the camera looks. `moves`: noise may do so.
+bool draw_density(nb_panel *panel, nebel_density *density, double reach, bool moves);
 
 #endif

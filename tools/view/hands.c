@@ -35,6 +35,8 @@ static void press(nb_hands *hands, nb_look *look, int key, int modifiers)
     hands->wants_home |= key == GLFW_KEY_HOME || key == GLFW_KEY_H;
     hands->wants_help |= key == GLFW_KEY_F1;
     hands->wants_panel |= key == GLFW_KEY_TAB;
+    hands->wants_play ^= key == GLFW_KEY_SPACE;
+    hands->steps = key == GLFW_KEY_COMMA ? -1 : key == GLFW_KEY_PERIOD ? 1 : hands->steps;
     hands->wants_reload |= key == GLFW_KEY_F5;
     hands->wants_picture |= key == GLFW_KEY_F12 && !with_shift;
     hands->wants_window_picture |= key == GLFW_KEY_F12 && with_shift;
@@ -171,7 +173,7 @@ static void take_event(nb_hands *hands, const nb_window *window, const nb_window
 /* What comes behind a command waits until it is obeyed, so that each counts, in its order. */
 static int has_command(const nb_hands *hands)
 {
-    return hands->wants_undo || hands->wants_redo || hands->wants_save || hands->wants_reload;
+    return hands->wants_undo || hands->wants_redo || hands->wants_save || hands->wants_reload || hands->steps != 0;
 }
 
 void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_look *look)

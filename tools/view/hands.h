@@ -25,7 +25,8 @@ typedef struct nb_hands {
     /* Answers of the last nb_hands_move. */
     int moved_camera, changed_look;
     int wants_home, wants_help, wants_panel, wants_picture, wants_window_picture, wants_save, wants_reload, wants_undo,
-        wants_redo, wants_end;
+        wants_redo, wants_end, wants_play;
+    int steps; /* 1: to the next frame, -1: to the one before */
 } nb_hands;
 
 /* Takes what has happened since the last turn, and what is held down. */

@@ -114,6 +114,7 @@ static void store_kind(nebel_volume_desc *to, const nebel_volume_desc *from)
     if (to->density.type != from->density.type) to->density = from->density;
     to->density.below = from->density.below;
     to->density.power = from->density.power;
+    to->density.grid = from->density.grid;
 }
 
 static int store(nb_edition *edition, const nb_edition *before, size_t index, double frame)

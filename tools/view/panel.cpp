@@ -35,6 +35,13 @@ void note_area(int which)
     areas[which] = area{low, ImVec2(low.x + size.x, low.y + size.y)};
 }
 
+// Among the places of the controls.
+void note_window(const char *name)
+{
+    const ImVec2 low = ImGui::GetWindowPos(), size = ImGui::GetWindowSize();
+    if (places != nullptr) fprintf(places, "%d %d %d %d %s\n", int(low.x), int(low.y), int(size.x), int(size.y), name);
+}
+
 /* ---- what is shown
  * ---------------------------------------------------------------------------------------------------
  */
@@ -105,7 +112,9 @@ void draw_method(nb_panel *panel)
                                   "alone. Cells and the factors linear, exp and exp2 are offered where the scene has "
                                   "such sections; see Classic fog below.");
     panel->look->method = methods[chosen];
-    if (panel->note[0] != '\0') ImGui::TextDisabled("%s", panel->note);
+    if (panel->note[0] == '\0') return;
+    ImGui::TextDisabled("%s", panel->note);
+    if (panel->reason[0] != '\0') explain(panel->reason);
 }
 
 void draw_technique(nb_panel *panel)
@@ -157,8 +166,10 @@ void draw_state(nb_panel *panel)
     const char *const folder_end = strrchr(panel->scene, '/');
     ImGui::Text("%s%s", panel->is_changed ? "* " : "", folder_end != nullptr ? folder_end + 1 : panel->scene);
     explain(panel->scene);
-    draw_seconds("OpenGL", panel->seconds, panel->samples);
-    explain(panel->driver);
+    if (panel->samples > 0) {
+        draw_seconds("OpenGL", panel->seconds, panel->samples);
+        explain(panel->driver);
+    }
     if (panel->cpu_seconds > 0) draw_seconds("CPU", panel->cpu_seconds, 1);
     ImGui::TextDisabled("%s", panel->picture);
 }
@@ -215,7 +226,8 @@ void draw_notice(nb_panel *panel)
     const float margin = 8 * scale, width = fminf(420 * scale, size.x - 2 * margin);
     if (panel->message[0] == '\0' && !panel->file_is_newer) return;
     ImGui::SetNextWindowPos(ImVec2(size.x - margin, size.y - margin), ImGuiCond_Always, ImVec2(1, 1));
-    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, size.y));
+    /* Half of a small window is the list's of keys. */
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, panel->help_shown ? size.y / 2 : size.y));
     ImGui::SetNextWindowBgAlpha(0.9f);
     ImGui::Begin("notice", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoTitleBar |
@@ -223,7 +235,29 @@ void draw_notice(nb_panel *panel)
     draw_message(panel);
     draw_question(panel);
     note_area(NOTICE);
+    note_window("(notice)");
     ImGui::End();
+}
+
+/* Where the list of keys ended last. */
+float help_end;
+
+// Above the notice, which it would cover: back there, too, where it was dragged or a notice came.
+void place_help()
+{
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const area &notice = areas[NOTICE];
+    const float end = notice.low.y < notice.high.y ? notice.low.y : size.y;
+    ImGui::SetNextWindowPos(ImVec2(size.x / 2, end / 2), help_end > end ? ImGuiCond_Always : ImGuiCond_Appearing,
+                            ImVec2(0.5f, 0.5f));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(size.x, end));
+}
+
+void draw_wrapped(const char *words, float end)
+{
+    ImGui::PushTextWrapPos(end);
+    ImGui::TextUnformatted(words);
+    ImGui::PopTextWrapPos();
 }
 
 void draw_help(nb_panel *panel)
@@ -238,6 +272,8 @@ void draw_help(nb_panel *panel)
         {"1 2 3 4", "colour, transmittance, in-scattering, depth"},
         {"[ ]", "exposure"},
         {"C", "OpenGL, split, difference, CPU"},
+        {"Space", "time goes on, stops"},
+        {"comma, full stop", "a frame back, on"},
         {"F12, Shift + F12", "save the picture, the window"},
         {"Ctrl + S, F5", "save the scene, read it again"},
         {"Ctrl + Z, Ctrl + Y", "undo, redo"},
@@ -246,19 +282,19 @@ void draw_help(nb_panel *panel)
         {"Ctrl + Q", "end"},
     };
     bool shown = true;
-    const ImVec2 size = ImGui::GetIO().DisplaySize;
-    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing, ImVec2(0.5f, 0.5f));
-    if (ImGui::Begin("Keys", &shown, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings) &&
-        ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
+    place_help();
+    if (ImGui::Begin("Keys", &shown, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
+        const float room = ImGui::GetIO().DisplaySize.x - 40 * scale;
+        const float middle = fminf(230 * scale, 0.4f * room), end = fminf(middle + 310 * scale, room);
         for (const auto &key : keys) {
-            ImGui::TableNextColumn();
-            ImGui::TextUnformatted(key[0]);
-            ImGui::TableNextColumn();
-            ImGui::TextUnformatted(key[1]);
+            draw_wrapped(key[0], middle - 10 * scale);
+            ImGui::SameLine(middle);
+            draw_wrapped(key[1], end);
         }
-        ImGui::EndTable();
     }
     note_area(HELP);
+    help_end = areas[HELP].high.y;
+    note_window("(keys)");
     ImGui::End();
     panel->help_shown = shown;
 }
@@ -333,7 +369,7 @@ void clear_answers(nb_panel *panel)
 {
     panel->fog_changed = panel->camera_changed = panel->frame_changed = panel->look_changed = 0;
     panel->wants_save = panel->wants_reload = panel->wants_home = panel->wants_picture = 0;
-    panel->wants_undo = panel->wants_redo = panel->has_read_message = 0;
+    panel->wants_undo = panel->wants_redo = panel->has_read_message = panel->steps = 0;
 }
 
 } // namespace
@@ -378,6 +414,7 @@ extern "C" void nb_panel_draw(nb_panel *panel, const char *controls)
     if (panel->help_shown) draw_help(panel);
     release_keys();
     panel->is_held = ImGui::IsAnyItemActive();
+    if (!panel->is_held) panel->held_noise.owner = 0;
     ImGui::Render();
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (places != nullptr) fclose(places);

@@ -11,6 +11,13 @@
 extern "C" {
 #endif
 
+/* Noise that follows its control once that is let go: its voxels take time. */
+typedef struct nb_held_noise {
+    unsigned owner; /* whose it is, by Dear ImGui's numbers; 0: nobody's */
+    nebel_scene_noise noise;
+    double seconds; /* that the last one took to be made */
+} nb_held_noise;
+
 /* What the panel shows, and what was done with it. */
 typedef struct nb_panel {
     const char *scene;                  /* the file's name */
@@ -20,8 +27,11 @@ typedef struct nb_panel {
     const nebel_volume_origin *origins; /* of the volumes */
     const char *const *cell_names;
     const nebel_model *models; /* of the file: their names */
+    const nebel_scene *loaded; /* that makes noise */
+    nb_held_noise held_noise;
     nb_look *look;
     const char *note;    /* why the picture is not what was chosen; "": it is */
+    const char *reason;  /* ... in the words of OpenGL; "": none */
     double *frame;       /* of what moves */
     double frames[2];    /* the first and the last at which anything moves; the same: nothing does */
     int plays;           /* the frame goes on by itself */
@@ -31,7 +41,7 @@ typedef struct nb_panel {
     int is_fault;        /* the message says what went wrong */
     const char *picture; /* what of the picture is done */
     double seconds;      /* that OpenGL took for the last one */
-    unsigned samples;    /* ... with so many for each pixel */
+    unsigned samples;    /* ... with so many for each pixel; 0: it draws none */
     double cpu_seconds;  /* ... the CPU; 0: there is none */
     int has_past, has_future;
     int is_changed;        /* something is not as the file says */
@@ -41,6 +51,7 @@ typedef struct nb_panel {
     /* Answers of the last nb_panel_draw. */
     int fog_changed, camera_changed, frame_changed, look_changed;
     int wants_save, wants_reload, wants_home, wants_undo, wants_redo, wants_picture;
+    int steps;            /* frames, on or back */
     int is_held;          /* a control is being changed: more will follow */
     int is_out_of_memory; /* something could not be added */
     int has_read_message; /* it may go */
@@ -52,7 +63,8 @@ int nb_panel_open(void *window, double scale);
 void nb_panel_close(void);
 
 /* Draws over the picture and fills in the answers. `controls` is NULL, or takes a line "x y width height name", in
- * pixels, for each control; the name of the first is "(typing)" while keys go into one. */
+ * pixels, for each control; the name of the first is "(typing)" while keys go into one, "(notice)" and "(keys)" are
+ * the windows with messages and with the list of keys. */
 void nb_panel_draw(nb_panel *panel, const char *controls);
 
 /* Tells of a key, or a button of the mouse, that went down, by GLFW's numbers: it, or Ctrl, may have come up before the

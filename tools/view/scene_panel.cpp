@@ -30,8 +30,12 @@ void add_sun(nb_edition *now)
     }
 }
 
-bool draw_sun(nb_edition *now)
+bool draw_sun(nb_edition *now, bool moves)
 {
+    if (moves) {
+        ImGui::TextDisabled("the sun moves by keys of the file");
+        return false;
+    }
     double *const d = now->sun_direction;
     double height = asin(fmax(-1, fmin(1, d[1]))) / degree, turn = atan2(d[0], d[2]) / degree;
     bool changed =
@@ -206,12 +210,20 @@ void draw_time(nb_panel *panel)
     const double high = fmax(moves ? panel->frames[1] : 100, *panel->frame);
     if (!open_section("Time", moves)) return;
     panel->frame_changed |= slide("frame", panel->frame, low, high, "%.0f", false,
-                                  "Of the camera and the fog that move. Ctrl + click types a number in.");
-    if (press_if(moves, panel->plays ? "Stop" : "Play", "From the first key to the last, again and again."))
+                                  "Of all that moves, as nebel render --frame has it. Ctrl + click types a number in.");
+    if (press_if(moves, panel->plays ? "Stop" : "Play",
+                 "Space: from the first key to the last, again and again; on and on where something has no end."))
         panel->plays = !panel->plays;
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(110 * scale);
-    slide_whole("per second", &panel->look->rate, 1, 60, false, "Frames.");
+    panel->steps -= press_if(moves, "<", "Comma: a frame back.");
+    ImGui::SameLine();
+    panel->steps += press_if(moves, ">", "Full stop: a frame on.");
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(70 * scale);
+    slide_whole("per second", &panel->look->rate, 1, 60, false, "Frames: how fast time goes.");
+    ImGui::SameLine();
+    ImGui::TextDisabled("%.4g s", *panel->frame / panel->look->rate);
+    explain("When the frame comes, at so many a second.");
 }
 
 void draw_models(nb_panel *panel, double reach)
@@ -238,7 +250,8 @@ void draw_lights(nb_panel *panel)
     bool changed = draw_ambient(now);
     changed |= draw_background(now);
     changed |= draw_opacity(now);
-    panel->fog_changed |= (now->has_sun ? draw_sun(now) : draw_missing_sun(now)) || changed;
+    panel->fog_changed |=
+        (now->has_sun ? draw_sun(now, panel->data->sun_key_count > 0) : draw_missing_sun(now)) || changed;
 }
 
 void draw_classic(nb_panel *panel, double reach)

@@ -4,8 +4,10 @@
 #include "shape.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
+#include <time.h>
 
 namespace
 {
@@ -252,6 +254,110 @@ void complete_density(nebel_density *density, const double place[3], double size
     density->to[1] += size;
 }
 
+/* ---- noise
+ * -----------------------------------------------------------------------------------------------------------
+ */
+
+// What the scene file allows.
+const double least_share = 1e-6, most_motion = 1000;
+
+void limit(double *numbers, int count, double low, double high)
+{
+    for (int i = 0; i < count; i++) numbers[i] = fmin(fmax(numbers[i], low), high);
+}
+
+// A cell has two voxels at least.
+bool draw_lattice(nebel_noise_desc *desc)
+{
+    double size[3];
+    for (int i = 0; i < 3; i++) size[i] = double(desc->size[i]);
+    bool changed = drag("cells", desc->cells, 3, 1, 0, "%.4g",
+                        "How many there are along each axis of the box: more are smaller. Waves are two cells long, "
+                        "cells two voxels at least.");
+    for (int i = 0; i < 3; i++) limit(&desc->cells[i], 1, least_share, size[i] / 2);
+    changed |= drag("voxels", size, 3, 10, 1, "%.0f",
+                    "Along each axis of the box. More of them show smaller octaves and take longer.");
+    for (int i = 0; i < 3; i++) {
+        limit(&size[i], 1, fmax(1, ceil(2 * desc->cells[i])), NEBEL_MAX_GRID_SIZE);
+        desc->size[i] = size_t(size[i]);
+    }
+    return changed;
+}
+
+bool draw_octaves(nebel_noise_desc *desc)
+{
+    int seed = int(desc->seed);
+    bool changed = slide_whole("octaves", &desc->octaves, 1, 16, false,
+                               "Each has half the size of the one before; those of less than two voxels are left out.");
+    changed |= slide("gain", &desc->gain, 0.01, 1, "%.3f", false, "The weight of an octave to that of the one before.");
+    changed |= slide("coverage", &desc->coverage, 0.01, 1, "%.3f", false, "The less, the farther apart are the wisps.");
+    changed |= drag("soft faces", desc->edge, 3, 0.2, 0, "%.3g",
+                    "Over this part of the box the density rises from 0 on its faces, along each axis; 0.5 at most.");
+    changed |= ImGui::DragInt("noise seed", &seed, 0.1f, 0, INT_MAX, "%d", ImGuiSliderFlags_AlwaysClamp);
+    note_place("noise seed");
+    explain("Another number: other wisps of the same kind.");
+    limit(&desc->gain, 1, least_share, 1);
+    limit(&desc->coverage, 1, least_share, 1);
+    limit(desc->edge, 3, 0, 0.5);
+    desc->seed = uint32_t(seed);
+    return changed;
+}
+
+bool draw_motion(nebel_scene_noise *noise)
+{
+    bool changed = drag("drift", noise->drift, 3, 0.1, -DBL_MAX, "%.4g", "Wind: in cells for each frame.");
+    changed |= drag("change", &noise->change, 1, 0.1, -DBL_MAX, "%.4g a frame",
+                    "At 1 it is another after each frame; smaller octaves change sooner.");
+    limit(noise->drift, 3, -most_motion, most_motion);
+    limit(&noise->change, 1, -most_motion, most_motion);
+    return changed;
+}
+
+double now()
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
+}
+
+// The density owns its grid.
+bool replace_noise(nb_panel *panel, nebel_density *density)
+{
+    nb_held_noise *const held = &panel->held_noise;
+    nebel_grid *fresh = nullptr;
+    const double start = now();
+    const nebel_result result = nebel_change_scene_noise(panel->loaded, density->grid, &held->noise, &fresh);
+    held->seconds = now() - start;
+    panel->is_out_of_memory |= result == NEBEL_ERROR_MEMORY;
+    if (result != NEBEL_OK) return false;
+    nebel_release_grid(density->grid);
+    density->grid = fresh;
+    return true;
+}
+
+// Noise that takes longer to be made follows once its control is let go [s].
+const double quick_noise = 0.05;
+
+// Other grids are those of a file.
+bool draw_noise(nb_panel *panel, nebel_density *density, bool moves)
+{
+    nb_held_noise *const held = &panel->held_noise;
+    const unsigned here = ImGui::GetID("noise");
+    nebel_scene_noise noise;
+    if (!nebel_find_scene_noise(panel->loaded, density->grid, &noise)) return false;
+    if (held->owner == here) noise = held->noise;
+    bool changed = draw_lattice(&noise.desc);
+    changed |= draw_octaves(&noise.desc);
+    if (moves) changed |= draw_motion(&noise);
+    if (changed) {
+        held->owner = here;
+        held->noise = noise;
+    }
+    if (held->owner != here || (ImGui::IsAnyItemActive() && held->seconds > quick_noise)) return false;
+    held->owner = 0;
+    return replace_noise(panel, density);
+}
+
 } // namespace
 
 bool draw_shape(nb_panel *panel, nebel_shape *shape, double reach, bool may_change)
@@ -261,17 +367,17 @@ bool draw_shape(nb_panel *panel, nebel_shape *shape, double reach, bool may_chan
     return draw_transform(&shape->transform, reach) || changed;
 }
 
-bool draw_density(nebel_density *density, const double place[3], double reach)
+bool draw_density(nb_panel *panel, nebel_density *density, double reach, bool moves)
 {
     static const char *const names[] = {"constant", "height", "linear", "radial", "gaussian", "soft edge"};
     int type = density->type;
-    if (type == NEBEL_DENSITY_GRID) return false; // its voxels are those of a file
+    if (type == NEBEL_DENSITY_GRID) return draw_noise(panel, density, moves);
     bool changed = choose("density", &type, names, NEBEL_DENSITY_GRID,
                           "How thick the fog is from place to place. Radial is for spheres and ellipsoids; a soft edge "
                           "is not for the world, unions and intersections.");
     if (changed) {
         density->type = nebel_density_type(type);
-        complete_density(density, place, reach / 4);
+        complete_density(density, panel->data->camera.look_at, reach / 4);
     }
     return draw_density_numbers(density, reach) || changed;
 }

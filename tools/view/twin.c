@@ -15,9 +15,9 @@ struct nb_twin {
     nebel_scene_data scene; /* of the thread, with the light of the wish */
     thrd_t thread;
     mtx_t lock; /* of all that follows */
-    cnd_t news;
+    cnd_t news, rest;
     nb_twin_wish wish;
-    int is_asked, is_ended, is_working, is_fresh;
+    int is_asked, is_ended, is_working, is_fresh, must_rest;
     nb_twin_picture made, taken;
 };
 
@@ -35,7 +35,7 @@ typedef struct work {
 static int is_out_of_date(nb_twin *twin)
 {
     mtx_lock(&twin->lock);
-    const int is = twin->is_asked || twin->is_ended;
+    const int is = twin->is_asked || twin->is_ended || twin->must_rest;
     mtx_unlock(&twin->lock);
     return is;
 }
@@ -55,7 +55,8 @@ static nebel_result render(work *w, const nb_twin_picture *picture)
                                    .height = picture->height,
                                    .samples = 1,
                                    .progress = stop,
-                                   .progress_user = w};
+                                   .progress_user = w,
+                                   .time = w->wish.frame};
     nebel_frame frame = {.color = NULL};
     float **const planes[NB_LOOK_PLANES] = {&frame.color, &frame.transmittance, &frame.in_scattering, &frame.depth};
     *planes[w->wish.plane] = picture->rgb;
@@ -147,6 +148,7 @@ static int take_wish(work *w)
     nb_twin *const twin = w->twin;
     mtx_lock(&twin->lock);
     twin->is_working = 0;
+    cnd_signal(&twin->rest);
     while (!twin->is_asked && !twin->is_ended) cnd_wait(&twin->news, &twin->lock);
     const int goes_on = !twin->is_ended;
     if (goes_on) {
@@ -183,7 +185,10 @@ static int start(nb_twin *twin)
 {
     if (mtx_init(&twin->lock, mtx_plain) != thrd_success) return -1;
     if (cnd_init(&twin->news) == thrd_success) {
-        if (thrd_create(&twin->thread, run, twin) == thrd_success) return 0;
+        if (cnd_init(&twin->rest) == thrd_success) {
+            if (thrd_create(&twin->thread, run, twin) == thrd_success) return 0;
+            cnd_destroy(&twin->rest);
+        }
         cnd_destroy(&twin->news);
     }
     mtx_destroy(&twin->lock);
@@ -209,11 +214,23 @@ void nb_twin_close(nb_twin *twin)
     mtx_unlock(&twin->lock);
     (void)thrd_join(twin->thread, NULL);
     forget(&twin->wish);
+    cnd_destroy(&twin->rest);
     cnd_destroy(&twin->news);
     mtx_destroy(&twin->lock);
     free(twin->made.rgb);
     free(twin->taken.rgb);
     free(twin);
+}
+
+void nb_twin_rest(nb_twin *twin)
+{
+    if (twin == NULL) return;
+    mtx_lock(&twin->lock);
+    twin->is_asked = 0;
+    twin->must_rest = 1;
+    while (twin->is_working) cnd_wait(&twin->rest, &twin->lock);
+    twin->must_rest = 0;
+    mtx_unlock(&twin->lock);
 }
 
 void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish)

@@ -13,6 +13,7 @@ typedef struct nb_twin nb_twin;
 typedef struct nb_twin_wish {
     nebel_camera camera;
     uint32_t width, height;
+    double frame; /* of what moves on without keys */
     nb_look_plane plane;
     nebel_method method;
     nebel_factor_desc factor;
@@ -32,6 +33,9 @@ nb_twin *nb_twin_open(const nebel_scene_data *scene);
 
 /* Waits for the thread. NULL is fine. */
 void nb_twin_close(nb_twin *twin);
+
+/* Forgets what was asked for. Until the next wish the thread does not look at the scene. NULL is fine. */
+void nb_twin_rest(nb_twin *twin);
 
 /* In place of what was asked for before. */
 void nb_twin_ask(nb_twin *twin, const nb_twin_wish *wish);

@@ -23,6 +23,9 @@
 /* How long after the last movement the picture waits before it becomes whole [s]. */
 static const double rest = 0.15;
 
+/* The last one that keys and nebel render have; keys may be before 0, too. */
+static const double last_frame = 1000000;
+
 /* How long a message that is no fault is shown [s]. */
 static const double message_seconds = 6;
 
@@ -42,13 +45,17 @@ typedef struct viewer {
     nebel_log log;
     char message[512]; /* the last one, for the window */
     int is_fault;      /* it says what went wrong */
+    char refusal[512]; /* what of the present frame OpenGL does not draw; "": it draws it */
+    int is_asking;     /* whether OpenGL draws it */
     double said;       /* when it was said [s] */
     nebel_volume_origin *origins;
     size_t origin_count;
     double lost;        /* when the context was lost last [s] */
     double cpu_seconds; /* that its last picture took */
     double moved;       /* when something changed last [s] */
-    double frame;
+    double frame;       /* that the panel shows and changes */
+    double clock;       /* frames, with their fractions, while time goes on */
+    int was_playing;
     int wants_picture, wants_window_picture;
     int was_warned;         /* that changes are lost if the window is left */
     double placing_seconds; /* that models took to be loaded last */
@@ -58,11 +65,15 @@ typedef struct viewer {
  * --------------------------------------------------------------------------------------------------------
  */
 
-/* Where the fine picture was given up the library says "stopped", which is no news. */
+/* Where the fine picture was given up the library says "stopped", which is no news, nor is it that the CPU has to draw. */
 static void listen(nebel_result result, const char *message, void *user)
 {
     viewer *const all = user;
     if (result == NEBEL_ERROR_LIMIT && all->stage.was_stopped) return;
+    if (result == NEBEL_ERROR_UNSUPPORTED && all->is_asking) {
+        (void)snprintf(all->refusal, sizeof all->refusal, "%s", message);
+        return;
+    }
     (void)snprintf(all->message, sizeof all->message, "%s", message);
     all->is_fault = 1;
     nb_report_message("%s", message);
@@ -110,8 +121,6 @@ static nebel_result set_fog(viewer *all)
     nebel_snapshot *fog = draft->volumes;
     const int is_whole = all->look.particles == NB_LOOK_AS_FOG;
     nebel_result result = is_whole ? nb_draft_whole(draft, &fog) : NEBEL_OK;
-    /* Behind the CPU's picture. */
-    if (nb_draft_is_for_cpu(draft)) fog = NULL;
     if (result == NEBEL_OK) result = nebel_set_gl_renderer_fog(all->stage.renderer, fog);
     if (result != NEBEL_OK) return result;
     return nebel_set_gl_renderer_particles(all->stage.renderer, draft->particles, is_whole ? 0 : draft->particle_count);
@@ -201,7 +210,7 @@ static void check_method(viewer *all)
 static const char *explain_method(const viewer *all)
 {
     if (all->look.method == NEBEL_METHOD_CELLS_PIXEL) return "drawn by the CPU alone";
-    return nb_draft_is_for_cpu(&all->draft) ? "drawn by the CPU alone" : "";
+    return all->refusal[0] != '\0' ? "drawn by the CPU alone" : "";
 }
 
 /* What can be shown of what is wished for. */
@@ -279,6 +288,12 @@ static nebel_result use_fog(viewer *all, nebel_result committed)
     return result == NEBEL_OK ? place_models(all) : result;
 }
 
+static nebel_result set_frame(viewer *all, double frame)
+{
+    if (all->draft.data.sun_key_count > 0) nb_twin_rest(all->twin);
+    return use_fog(all, nb_draft_set_frame(&all->draft, frame));
+}
+
 static nebel_result commit(viewer *all)
 {
     say(all, "");
@@ -308,12 +323,12 @@ static nebel_result replace_draft(viewer *all, const nb_draft *fresh)
     nb_twin_close(all->twin);
     all->twin = NULL;
     all->draft = *fresh;
-    nb_edition_show(&all->draft.now, &all->draft.data);
+    nb_draft_show(&all->draft);
     const nebel_result result = renew_stage(all);
     if (result != NEBEL_OK) {
         nb_draft_close(&all->draft);
         all->draft = old;
-        nb_edition_show(&all->draft.now, &all->draft.data);
+        nb_draft_show(&all->draft);
         return result;
     }
     nb_draft_close(&old);
@@ -436,6 +451,7 @@ static void obey_keys(viewer *all)
     if (hands->moved_camera) note_change(all);
     if (hands->wants_help) all->panel.help_shown = !all->panel.help_shown;
     if (hands->wants_panel) all->panel.shown = !all->panel.shown;
+    if (hands->wants_play) all->panel.plays = !all->panel.plays;
     if (hands->changed_look) note_change(all);
     all->wants_picture |= hands->wants_picture || all->panel.wants_picture;
     all->wants_window_picture |= hands->wants_window_picture;
@@ -455,23 +471,46 @@ static nebel_result obey_panel(viewer *all)
     if (panel->camera_changed || panel->look_changed) note_change(all);
     if (panel->look_changed) result = forgive(set_fog(all));
     if (panel->fog_changed && result == NEBEL_OK) result = commit(all);
-    if (panel->frame_changed && result == NEBEL_OK) result = use_fog(all, nb_draft_set_frame(&all->draft, all->frame));
+    if (panel->frame_changed && result == NEBEL_OK) result = set_frame(all, all->frame);
     if (!panel->is_held) nb_history_close(&all->draft.history);
     if (!panel->is_held && result == NEBEL_OK) result = place_models(all);
     return result;
 }
 
-/* From the last frame on it begins again. */
-static nebel_result play(viewer *all)
+static nebel_result go_to_frame(viewer *all, double frame)
+{
+    const double there = fmin(fmax(frame, -last_frame), last_frame);
+    return there == all->draft.frame ? NEBEL_OK : set_frame(all, there);
+}
+
+/* From the last key on it begins again, unless something moves on without end. */
+static double find_clock(const viewer *all)
 {
     const double *const range = all->panel.frames, length = range[1] - range[0];
-    if (!all->panel.plays) return NEBEL_OK;
-    if (!(length > 0)) {
-        all->panel.plays = 0;
-        return NEBEL_OK;
-    }
-    const double frame = all->draft.frame - range[0] + all->look.rate * all->window.elapsed;
-    return use_fog(all, nb_draft_set_frame(&all->draft, range[0] + frame - length * floor(frame / length)));
+    const double on = all->clock - range[0];
+    return all->draft.data.moves_on ? all->clock : range[0] + on - length * floor(on / length);
+}
+
+/* Whole frames, as those of a film. */
+static nebel_result play(viewer *all)
+{
+    nb_panel *const panel = &all->panel;
+    const int was_playing = all->was_playing;
+    panel->plays = panel->plays && panel->frames[0] < panel->frames[1] && all->draft.frame < last_frame;
+    all->was_playing = panel->plays;
+    if (!panel->plays) return NEBEL_OK;
+    if (!was_playing || floor(all->clock) != all->draft.frame) all->clock = all->draft.frame;
+    all->clock += all->look.rate * all->window.elapsed;
+    all->clock = find_clock(all);
+    return go_to_frame(all, floor(all->clock));
+}
+
+/* To the next whole frame either way. */
+static nebel_result step_frame(viewer *all, int by)
+{
+    const double frame = all->draft.frame;
+    all->panel.plays = 0;
+    return go_to_frame(all, by > 0 ? floor(frame) + 1 : ceil(frame) - 1);
 }
 
 /* Those of the keys and of the panel's buttons, one at a time. */
@@ -482,7 +521,16 @@ static nebel_result obey_commands(viewer *all)
     if (panel->wants_undo || hands->wants_undo) return step(all, 1);
     if (panel->wants_redo || hands->wants_redo) return step(all, 0);
     if (panel->wants_reload || hands->wants_reload) return read_again(all);
+    if (panel->steps != 0) return step_frame(all, panel->steps);
+    if (hands->steps != 0) return step_frame(all, hands->steps);
     return panel->wants_save || hands->wants_save ? save(all) : NEBEL_OK;
+}
+
+static int is_complete(const viewer *all)
+{
+    if (all->stage.state != NB_STAGE_FINE) return 0;
+    return shown_look(all).compare == NB_LOOK_GL_ALONE || all->twin == NULL ||
+           (!all->twin_is_stale && nb_twin_is_done(all->twin));
 }
 
 static int list_origins(viewer *all)
@@ -508,19 +556,21 @@ static int fill_panel(viewer *all)
     panel->now = &all->draft.now;
     panel->origins = all->origins;
     panel->cell_names = data->cell_names;
+    panel->loaded = all->draft.scene;
     panel->look = &all->look;
     all->frame = all->draft.frame;
     panel->frame = &all->frame;
     panel->camera_is_keyed = !nb_draft_can_save_camera(&all->draft);
     panel->models = nebel_scene_contents(all->draft.scene)->models;
     panel->note = explain_method(all);
+    panel->reason = all->refusal;
     if (!nb_draft_find_frames(&all->draft, panel->frames)) panel->frames[0] = panel->frames[1] = 0;
     panel->is_changed = nb_draft_is_changed(&all->draft);
     panel->has_past = all->draft.history.at > 0;
     panel->has_future = all->draft.history.at < all->draft.history.count;
     panel->message = all->message;
     panel->is_fault = all->is_fault;
-    panel->picture = states[all->stage.state];
+    panel->picture = states[all->stage.state == NB_STAGE_FINE && !is_complete(all) ? NB_STAGE_WHOLE : all->stage.state];
     panel->seconds = all->stage.seconds;
     panel->samples = all->stage.samples;
     panel->cpu_seconds = shown_look(all).compare != NB_LOOK_GL_ALONE && all->has_cpu ? all->cpu_seconds : 0;
@@ -546,6 +596,7 @@ static nebel_result ask_twin(viewer *all)
     nb_twin_wish wish = {.camera = all->draft.data.camera,
                          .width = all->window.width,
                          .height = all->window.height,
+                         .frame = all->draft.frame,
                          .plane = all->look.plane,
                          .method = all->look.method,
                          .factor = all->draft.good.classic,
@@ -572,13 +623,6 @@ static void compare(viewer *all)
     nb_screen_set_cpu(&all->screen, picture.width, picture.height, picture.rgb);
     all->has_cpu = 1;
     all->cpu_seconds = picture.seconds;
-}
-
-static int is_complete(const viewer *all)
-{
-    if (all->stage.state != NB_STAGE_FINE) return 0;
-    return shown_look(all).compare == NB_LOOK_GL_ALONE || all->twin == NULL ||
-           (!all->twin_is_stale && nb_twin_is_done(all->twin));
 }
 
 /* ---- pictures
@@ -627,17 +671,31 @@ static int show(viewer *all)
     return status;
 }
 
+/* Each frame is tried: OpenGL itself says what it does not draw, and the CPU draws that. */
+static nebel_result try_frame(viewer *all)
+{
+    const nb_window *const window = &all->window;
+    all->refusal[0] = '\0';
+    const nb_look look = shown_look(all);
+    all->is_asking = 1;
+    const nebel_result result =
+        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
+    all->is_asking = 0;
+    if (all->refusal[0] == '\0') return result;
+    all->stage.samples = 0;
+    all->stage.state = NB_STAGE_FINE;
+    return NEBEL_OK;
+}
+
 /* A frame that cannot be drawn is not tried again before something has changed. */
 static nebel_result draw(viewer *all)
 {
-    nb_window *const window = &all->window;
-    const nb_look look = shown_look(all);
     all->stage.cells = all->draft.cells;
     all->stage.factor = &all->draft.good.classic;
-    const nebel_result result =
-        nb_stage_draw(&all->stage, &all->draft.data.camera, window->width, window->height, &look, is_moving(all));
+    if (all->stage.state == NB_STAGE_FINE && !is_moving(all)) return NEBEL_OK;
+    const nebel_result result = try_frame(all);
     if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
-    return nb_window_is_lost(window) ? NEBEL_OK : forgive(result);
+    return nb_window_is_lost(&all->window) ? NEBEL_OK : forgive(result);
 }
 
 static int turn(viewer *all)

@@ -1,0 +1,51 @@
+#include "endless.h"
+
+const char nb_endless_advice[] =
+    "has no end towards the sun; give it a shape that ends, such as a box, or a density of "
+    "type height and a sun above the horizon";
+
+static double dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static int is_black(const double *color)
+{
+    return color[0] == 0 && color[1] == 0 && color[2] == 0;
+}
+
+/* A half space goes on inwards and level with its face. */
+static int has_endless_shape(const nebel_shape *shape, const double *sun)
+{
+    if (shape->type == NEBEL_SHAPE_HALF_SPACE) return dot(shape->normal, sun) <= 0;
+    return shape->type == NEBEL_SHAPE_WORLD;
+}
+
+static int has_endless_density(const nebel_density *density, const double *sun)
+{
+    switch (density->type) {
+    case NEBEL_DENSITY_CONSTANT:
+    case NEBEL_DENSITY_SOFT_EDGE:
+        return 1;
+    case NEBEL_DENSITY_HEIGHT:
+        return sun[1] <= 0;
+    case NEBEL_DENSITY_LINEAR:
+        return dot(density->to, sun) > dot(density->from, sun);
+    default:
+        return 0;
+    }
+}
+
+static int is_endless(const nebel_volume_desc *volume, const double *sun)
+{
+    return volume->operation != NEBEL_OPERATION_EXCLUDE && !is_black(volume->extinction) &&
+           has_endless_shape(&volume->shape, sun) && has_endless_density(&volume->density, sun);
+}
+
+size_t nb_find_endless(const nebel_scene_data *scene)
+{
+    size_t i = 0;
+    if (!scene->has_sun || is_black(scene->sun_irradiance)) return scene->volume_count;
+    while (i < scene->volume_count && !is_endless(&scene->volumes[i], scene->sun_direction)) i++;
+    return i;
+}

@@ -1,0 +1,14 @@
+/* Fog without an end on the way to the sun. */
+#ifndef NB_ENDLESS_H
+#define NB_ENDLESS_H
+
+#include <nebel/scene.h>
+
+/* The number of the first volume, in the order of the scene, behind which there is no sunlight for any fog or model since
+ * it goes on for ever towards the sun; or the count of volumes. Volumes that others cut out endlessly far count too. */
+size_t nb_find_endless(const nebel_scene_data *scene);
+
+/* What to say of it, behind its name. */
+extern const char nb_endless_advice[];
+
+#endif
