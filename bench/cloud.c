@@ -44,7 +44,7 @@ static float fractal(float x, float y, float z)
 static float density_at(float x, float y, float z)
 {
     const float dx = 2 * x - 1, dy = 2 * y - 1, dz = 2 * z - 1, square = dx * dx + dy * dy + dz * dz;
-    const float density = 4 * (fractal(x, y, z) - .58f - 1.35f * square);
+    const float density = 4 * (fractal(x, y, z) - 1.7f * square);
     return fminf(fmaxf(density, 0), 1);
 }
 

@@ -8,9 +8,11 @@ const char *nb_bench_cells(const nb_bench_desc *desc, nb_figures *figures); /* o
 const char *nb_bench_frame(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_opengl_particles(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_opengl_pass(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_opengl_planet(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_overlap(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_particles(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_pass(const nb_bench_desc *desc, nb_figures *figures);
+const char *nb_bench_planet(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_process(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_segments(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_sunlight(const nb_bench_desc *desc, nb_figures *figures);

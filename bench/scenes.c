@@ -3,8 +3,10 @@
 #include "cloud.h"
 
 #include "height_map.h"
+#include "measure.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -123,20 +125,63 @@ int nb_bench_scene_add_pillars(nb_bench_scene *scene)
 
 /* ---- fog ------------------------------------------------------------------------------------- */
 
-nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *scene)
+/* Counts what is kept. */
+typedef union counted {
+    size_t size;
+    max_align_t any;
+} counted;
+
+static void *allocate_counted(size_t size, void *user)
+{
+    counted *const memory = malloc(sizeof *memory + size);
+    if (memory == NULL) return NULL;
+    memory->size = size;
+    *(size_t *)user += size;
+    return memory + 1;
+}
+
+static void release_counted(void *block, void *user)
+{
+    counted *const memory = (counted *)block - 1;
+    *(size_t *)user -= memory->size;
+    free(memory);
+}
+
+static nebel_snapshot *commit_fog(nb_bench_fog kind, const nebel_scene_data *scene, const nebel_allocator *allocator,
+                                  double *seconds)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.max_opacity = 1};
+    nebel_fog_desc desc = {.max_opacity = 1, .allocator = *allocator};
     memcpy(desc.ambient, scene->ambient, sizeof desc.ambient);
     memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
     memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);
     if (kind == NB_FOG_NONE || nebel_create_fog(&desc, &fog) != NEBEL_OK) return NULL;
     nebel_volume_desc volume = volume_of(kind);
     if (kind == NB_FOG_CLOUD) volume.density.grid = nb_cloud_make();
-    if (nebel_add_volume(fog, &volume, NULL) == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
+    if (nebel_add_volume(fog, &volume, NULL) == NEBEL_OK) {
+        const double start = nb_clock_cpu();
+        (void)nebel_commit_fog(fog, &snapshot);
+        *seconds = nb_clock_cpu() - start;
+    }
     nebel_release_grid(volume.density.grid);
     nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+nebel_snapshot *nb_bench_fog_commit(nb_bench_fog kind, const nebel_scene_data *scene)
+{
+    double seconds;
+    return commit_fog(kind, scene, &(nebel_allocator){.user = NULL}, &seconds);
+}
+
+nebel_snapshot *nb_bench_fog_measure(nb_bench_fog kind, const nebel_scene_data *scene, double *seconds, size_t *bytes)
+{
+    static size_t kept; /* outlives every snapshot */
+    const nebel_allocator counting = {allocate_counted, release_counted, &kept};
+    const size_t before = kept;
+    nebel_snapshot *const snapshot = commit_fog(kind, scene, &counting, seconds);
+    *bytes = kept - before;
     return snapshot;
 }
 
