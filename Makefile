@@ -21,7 +21,7 @@ endif
 # A make below has processes of its own to share out: it must not look for those of this one.
 COMPILE = MAKEFLAGS=--no-print-directory cmake --build
 
-.PHONY: all demo test report bench asan lint format clean
+.PHONY: all demo film test report bench asan lint format clean
 
 all: $(MODELS)
 	@scripts/install_packages.sh build
@@ -36,6 +36,11 @@ demo: $(MODELS)
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=OFF
 	@$(COMPILE) $(BUILD) -j $(JOBS) --target nebel_tool
 	@scripts/demo.sh $(BUILD)
+
+film: all
+	@mkdir -p $(BUILD)/demo
+	@$(BUILD)/nebel render examples/scenes/wisps.json -o $(BUILD)/demo/wisps.webp --frames 0-35 --fps 12 --size 384x216 --samples 1
+	@$(BUILD)/nebel render examples/scenes/sunset.json -o $(BUILD)/demo/sunset.webp --frames 0-35 --fps 12 --size 384x216 --samples 1
 
 test: $(MODELS)
 	@scripts/install_packages.sh build demo test

@@ -15,6 +15,8 @@ struct CMUnitTest {
     void (*run)(void **state);
 };
 
+typedef int (*CMFixtureFunction)(void **state);
+
 static jmp_buf cross_end_of_test;
 
 static inline void cross_require(int holds, const char *what, const char *file, int line)
@@ -29,8 +31,14 @@ static inline void cross_skip(void)
     longjmp(cross_end_of_test, 2);
 }
 
-static inline int cross_run_group(const struct CMUnitTest *tests, size_t count)
+static inline int cross_run_group(const struct CMUnitTest *tests, size_t count, CMFixtureFunction setup,
+                                  CMFixtureFunction teardown)
 {
+    void *group = NULL;
+    if (setup != NULL && setup(&group) != 0) {
+        printf("FAILED  before the first test\n");
+        return 1;
+    }
     volatile int failed = 0;
     volatile size_t skipped = 0;
     for (volatile size_t i = 0; i < count; i++) {
@@ -41,6 +49,7 @@ static inline int cross_run_group(const struct CMUnitTest *tests, size_t count)
         if (end == 2) skipped++;
         printf("%s %s\n", end == 0 ? "passed " : end == 1 ? "FAILED " : "skipped", tests[i].name);
     }
+    if (teardown != NULL && teardown(&group) != 0) failed++;
     printf("%zu tests, %d failed, %zu skipped\n", count, failed, skipped);
     return failed;
 }
@@ -57,7 +66,8 @@ static inline int cross_is_near(float a, float b, float epsilon)
     {                                                                                                                  \
 #function, function                                                                                            \
     }
-#define cmocka_run_group_tests(tests, setup, teardown) cross_run_group(tests, sizeof tests / sizeof tests[0])
+#define cmocka_run_group_tests(tests, setup, teardown)                                                                 \
+    cross_run_group(tests, sizeof tests / sizeof tests[0], setup, teardown)
 #define skip() cross_skip()
 #define print_message(...) printf(__VA_ARGS__)
 #define print_error(...) printf(__VA_ARGS__)
