@@ -2,6 +2,7 @@
  * an argument all of the scenes and heights, in pictures so many times wider. */
 #include "pass_help.h"
 #include "picture_help.h"
+#include "planet_help.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -157,14 +158,6 @@ static void make_world(const char *name, double elevation, world *w)
     memcpy(w->scene.sun_direction, sun, sizeof sun);
 }
 
-static nebel_camera camera_at(double height, double pitch)
-{
-    return (nebel_camera){.position = {0, height, 0},
-                          .look_at = {0, height + sin(pitch), -cos(pitch)},
-                          .up = {0, cos(pitch), sin(pitch)},
-                          .vertical_fov = 50};
-}
-
 static void a_flight_is_the_same(void **state)
 {
     (void)state;
@@ -176,7 +169,7 @@ static void a_flight_is_the_same(void **state)
     for (int i = 0; i < (all ? 8 : 3); i++) {
         char name[64];
         const double dip = heights[i] > 0 ? acos(w.planet.air.radius / (w.planet.air.radius + heights[i])) : 0;
-        nebel_camera camera = camera_at(heights[i], -dip);
+        nebel_camera camera = planet_camera(heights[i], -dip);
         if (i == 1) camera.projection = NEBEL_PROJECTION_PANORAMA;
         picture_pair pair = make_pair(96, 48);
         render(&w.scene, NULL, &camera, &pair);
@@ -193,26 +186,6 @@ static void a_flight_is_the_same(void **state)
 static const float wall[4][3] = {{-400, -20, 0}, {400, -20, 0}, {400, 300, 0}, {-400, 300, 0}};
 static const uint32_t wall_indices[6] = {0, 1, 2, 0, 2, 3};
 
-static nebel_snapshot *make_fog(const double to_sun[3])
-{
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
-    const nebel_volume_desc volumes[] = {
-        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3000, -9000}, .radius = 2500},
-         .extinction = {4e-4, 4e-4, 4e-4},
-         .source = {.5, .4, .3}},
-        {.shape = {.type = NEBEL_SHAPE_WORLD},
-         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 200},
-         .extinction = {1e-4, 2e-4, 3e-4},
-         .albedo = {.9, .9, .9}}};
-    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
-}
-
 /* A bank of fog far away in air, ground fog, and a wall that shades both and the ground. */
 static void fog_lies_in_air(void **state)
 {
@@ -221,7 +194,7 @@ static void fog_lies_in_air(void **state)
     world w;
     make_world("earth", 15, &w);
     pass_open(&context, NB_GL_330);
-    nebel_snapshot *const fog = make_fog(w.scene.sun_direction);
+    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
     const nebel_mesh mesh = {.origin = {300, 0, -2500},
                              .positions = wall[0],
                              .indices = wall_indices,
@@ -229,7 +202,7 @@ static void fog_lies_in_air(void **state)
                              .triangle_count = 2,
                              .base_color = {.8f, .8f, .8f},
                              .texture = -1};
-    const nebel_camera camera = camera_at(120, .05);
+    const nebel_camera camera = planet_camera(120, .05);
     picture_pair pair = make_pair(72, 48);
     if (all) {
         render(&w.scene, fog, &camera, &pair);
@@ -271,14 +244,14 @@ static void the_table_stays_while_the_camera_turns(void **state)
     pass_open(&context, NB_GL_330);
     const nebel_gl_renderer_desc desc = {.allocator = {count_large, release, &tables}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
-    nebel_gl_frame_desc frame = {.camera = camera_at(20, 0), .width = 8, .height = 8, .samples = 1};
+    nebel_gl_frame_desc frame = {.camera = planet_camera(20, 0), .width = 8, .height = 8, .samples = 1};
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
     const int first = tables;
     assert_true(first > 0);
-    frame.camera = camera_at(20, .4);
+    frame.camera = planet_camera(20, .4);
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
     assert_int_equal(tables, first);
-    frame.camera = camera_at(21, .4);
+    frame.camera = planet_camera(21, .4);
     assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
     assert_int_equal(tables, 2 * first);
     w.scene.sun_irradiance[0] = 7;
@@ -312,11 +285,11 @@ static void what_is_not_drawn_is_refused_by_name(void **state)
     pass_open(&context, NB_GL_330);
     const nebel_gl_renderer_desc desc = {.log = {keep, said}};
     assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
-    nebel_gl_frame_desc frame = {.camera = camera_at(20, 0), .width = 8, .height = 8, .samples = 1};
+    nebel_gl_frame_desc frame = {.camera = planet_camera(20, 0), .width = 8, .height = 8, .samples = 1};
     frame.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     frame.camera.view_height = 10;
     expect_refusal(renderer, &frame, said, "orthographic");
-    frame.camera = camera_at(20, 0);
+    frame.camera = planet_camera(20, 0);
     frame.method = NEBEL_GL_METHOD_VERTEX;
     expect_refusal(renderer, &frame, said, "method");
     frame.method = NEBEL_GL_METHOD_EXACT;

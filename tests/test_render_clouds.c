@@ -1,4 +1,5 @@
 /* Clouds in pictures of the CPU: among the air along a ray, behind and before surfaces, on any number of threads. */
+#include "planet_help.h"
 #include "test_render_scene.h"
 
 enum { WIDTH = 48, HEIGHT = 27 };
@@ -30,14 +31,6 @@ static void free_world(world *w)
     nebel_destroy_atmosphere(w->atmosphere);
 }
 
-static nebel_camera camera_at(double height, double pitch)
-{
-    return (nebel_camera){.position = {0, height, 0},
-                          .look_at = {0, height + sin(pitch), -cos(pitch)},
-                          .up = {0, 1, 0},
-                          .vertical_fov = 60};
-}
-
 static test_picture render(const world *w, const nebel_camera *camera, int threads, uint32_t samples, double time)
 {
     nebel_renderer *renderer;
@@ -49,19 +42,6 @@ static test_picture render(const world *w, const nebel_camera *camera, int threa
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     return picture;
-}
-
-/* The ray through the middle of a pixel; of the camera above. */
-static nebel_ray ray_of(const nebel_camera *camera, double pitch, uint32_t x, uint32_t y)
-{
-    const double half = tan(30 * test_pi / 180), across = (2 * (x + .5) / WIDTH - 1) * half * WIDTH / HEIGHT,
-                 up = (1 - 2 * (y + .5) / HEIGHT) * half;
-    nebel_ray ray = {.t_max = HUGE_VAL};
-    memcpy(ray.origin, camera->position, sizeof ray.origin);
-    ray.direction[0] = across;
-    ray.direction[1] = sin(pitch) + up * cos(pitch);
-    ray.direction[2] = -cos(pitch) + up * sin(pitch);
-    return ray;
 }
 
 static nebel_light air_to(const world *w, const nebel_sun *sun, nebel_ray ray, double t)
@@ -115,13 +95,13 @@ static void clouds_and_air_are_one(void **state)
         assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = w.clouds, .sun = sun}, &view),
                          NEBEL_OK);
         assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
-        const nebel_camera camera = camera_at(views[v].height, views[v].pitch);
+        const nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
         test_picture picture = render(&w, &camera, 2, 1, 0);
         const double spread = 2 * tan(30 * test_pi / 180) / HEIGHT;
         double worst = 0;
         int cloudy = 0;
         for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
-            const nebel_ray ray = ray_of(&camera, views[v].pitch, i % WIDTH, i / WIDTH);
+            const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
             nebel_cloud_knots knots;
             double light[3];
@@ -146,7 +126,7 @@ static void pictures_are_still(void **state)
     (void)state;
     world w;
     make_world(&(nebel_cloud_layer){.wind = {300, 0}}, &w);
-    const nebel_camera camera = camera_at(2, .4);
+    const nebel_camera camera = planet_camera(2, .4);
     test_picture pictures[3] = {render(&w, &camera, 1, 1, 0), render(&w, &camera, 3, 1, 0),
                                 render(&w, &camera, 2, 1, 7)};
     const size_t size = (size_t)WIDTH * HEIGHT * 3;
@@ -165,7 +145,7 @@ static void the_ground_has_shadows(void **state)
     world w;
     make_world(&(nebel_cloud_layer){.coverage = .5}, &w);
     w.planet.air.ground_albedo[1] = .5;
-    const nebel_camera camera = camera_at(800, -.6);
+    const nebel_camera camera = planet_camera(800, -.6);
     test_picture picture = render(&w, &camera, 2, 1, 0);
     double darkest = HUGE_VAL, brightest = 0;
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
@@ -186,7 +166,7 @@ static void bad_times_are_refused(void **state)
     test_picture picture = test_picture_make(WIDTH, HEIGHT);
     assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
     nebel_frame_desc desc = {
-        .camera = camera_at(2, 0), .width = WIDTH, .height = HEIGHT, .samples = 1, .time = (double)NAN};
+        .camera = planet_camera(2, 0), .width = WIDTH, .height = HEIGHT, .samples = 1, .time = (double)NAN};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_ERROR_VALUE);
     desc.time = 0;
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);

@@ -1,5 +1,6 @@
 /* Planets in pictures of the CPU: the sky, the ground and models through air are what nebel_trace_air says, and air and fog along one ray are
  * what many short pieces give. */
+#include "planet_help.h"
 #include "test_render_scene.h"
 
 #include "cpu/daylight.h"
@@ -33,27 +34,6 @@ static nebel_sun sun_of(const world *w)
     memcpy(sun.direction, w->scene.sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, w->scene.sun_irradiance, sizeof sun.irradiance);
     return sun;
-}
-
-static nebel_camera camera_at(double height, double pitch)
-{
-    return (nebel_camera){.position = {0, height, 0},
-                          .look_at = {0, height + sin(pitch), -cos(pitch)},
-                          .up = {0, 1, 0},
-                          .vertical_fov = 60};
-}
-
-/* The ray through the middle of a pixel; of the camera above. */
-static nebel_ray ray_of(const nebel_camera *camera, double pitch, uint32_t x, uint32_t y)
-{
-    const double half = tan(30 * test_pi / 180), across = (2 * (x + .5) / WIDTH - 1) * half * WIDTH / HEIGHT,
-                 up = (1 - 2 * (y + .5) / HEIGHT) * half;
-    nebel_ray ray = {.t_max = HUGE_VAL};
-    memcpy(ray.origin, camera->position, sizeof ray.origin);
-    ray.direction[0] = across;
-    ray.direction[1] = sin(pitch) + up * cos(pitch);
-    ray.direction[2] = -cos(pitch) + up * sin(pitch);
-    return ray;
 }
 
 static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, nebel_isa isa, int threads,
@@ -109,13 +89,13 @@ static void sky_and_ground_are_those_of_the_air(void **state)
     for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
         world w;
         make_world(views[v].name, views[v].sun, &w);
-        const nebel_camera camera = camera_at(views[v].height, views[v].pitch);
+        const nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
         const nebel_sun sun = sun_of(&w);
         test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 2, 1);
         double brightest = 0, worst = 0;
         int ground = 0, untold = 0;
         for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
-            const nebel_ray ray = ray_of(&camera, views[v].pitch, i % WIDTH, i / WIDTH);
+            const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             nebel_light light;
             double behind[3], way;
             assert_int_equal(nebel_trace_air(w.atmosphere, &sun, 1, &ray, 0, &light, 0), NEBEL_OK);
@@ -166,7 +146,7 @@ static void models_are_seen_through_air(void **state)
     make_world("earth", to_sun, &w);
     w.scene.mesh_count = 1;
     w.scene.meshes = &wall;
-    nebel_camera camera = camera_at(20, 0);
+    nebel_camera camera = planet_camera(20, 0);
     camera.vertical_fov = 1.5;
     const nebel_sun sun = sun_of(&w);
     test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 1);
@@ -201,7 +181,7 @@ static void models_take_the_light_of_their_place(void **state)
         make_world("earth", to_sun, &w);
         w.scene.mesh_count = 1;
         w.scene.meshes = &high;
-        nebel_camera camera = camera_at(height, 0);
+        nebel_camera camera = planet_camera(height, 0);
         camera.vertical_fov = .01;
         camera.position[2] = 20 - distance;
         camera.look_at[2] = -distance;
@@ -298,25 +278,12 @@ static void air_and_fog_share_a_ray(void **state)
     const double to_sun[3] = {.6, .3, -.74161984870956629}, pitch = .05;
     world w;
     make_world("earth", to_sun, &w);
-    nebel_fog *fog;
-    nebel_snapshot *snapshot;
-    const nebel_volume_desc volumes[] = {
-        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3000, -9000}, .radius = 2500},
-         .extinction = {4e-4, 4e-4, 4e-4},
-         .source = {.5, .4, .3}},
-        {.shape = {.type = NEBEL_SHAPE_WORLD},
-         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 200},
-         .extinction = {1e-4, 2e-4, 3e-4},
-         .albedo = {.9, .9, .9}}};
-    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
-    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    const nebel_camera camera = camera_at(50, pitch);
+    nebel_snapshot *snapshot = planet_fog(to_sun);
+    const nebel_camera camera = planet_camera(50, pitch);
     test_picture picture = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 2, 1);
     double worst = 0, apart = 0;
     for (uint32_t i = 5; i < WIDTH * HEIGHT; i += 97) {
-        const nebel_ray ray = ray_of(&camera, pitch, i % WIDTH, i / WIDTH);
+        const nebel_ray ray = planet_ray(&camera, pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         const nebel_sun sun = sun_of(&w);
         double light[3], behind[3], way;
         nebel_light air, alone;
@@ -340,7 +307,6 @@ static void air_and_fog_share_a_ray(void **state)
     assert_true(worst < 6e-3 && apart > 5 * worst);
     test_picture_free(&picture);
     nebel_release_snapshot(snapshot);
-    nebel_destroy_fog(fog);
     nebel_destroy_atmosphere(w.atmosphere);
 }
 
@@ -363,7 +329,7 @@ static void many_samples_are_the_mean_of_single_ones(void **state)
         world w;
         make_world(views[v].name, views[v].sun, &w);
         w.planet.sun_diameter = 2;
-        nebel_camera camera = camera_at(views[v].height, views[v].pitch);
+        nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
         camera.vertical_fov = 6;
         test_picture small = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 2, TIMES * TIMES);
         test_picture large = test_picture_make(TIMES * WIDTH, TIMES * HEIGHT);
@@ -415,7 +381,7 @@ static void the_sun_is_a_disc(void **state)
     world w;
     make_world("mars", to_sun, &w);
     for (int f = 0; f < 2; f++) {
-        nebel_camera camera = camera_at(2, asin(.6));
+        nebel_camera camera = planet_camera(2, asin(.6));
         camera.vertical_fov = fields[f];
         camera.look_at[0] += .001;
         double sum[3] = {0, 0, 0};
@@ -455,7 +421,7 @@ static void every_thread_and_processor_gives_the_same(void **state)
     assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    const nebel_camera camera = camera_at(10, .1);
+    const nebel_camera camera = planet_camera(10, .1);
     test_picture one = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 1, 1);
     for (int isa = NEBEL_ISA_DEFAULT; isa <= (int)NEBEL_ISA_NEON; isa++) {
         if (isa != NEBEL_ISA_DEFAULT && !nebel_isa_available((nebel_isa)isa)) continue;
@@ -480,7 +446,7 @@ static void odd_cameras(void **state)
     world w;
     make_world("toy", to_sun, &w);
     for (int h = 0; h < 5; h++) {
-        const nebel_camera camera = camera_at(heights[h], -.1);
+        const nebel_camera camera = planet_camera(heights[h], -.1);
         test_picture picture = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 1, 1);
         for (uint32_t i = 0; i < WIDTH * HEIGHT * 3; i++)
             assert_true(picture.planes.color[i] >= 0 && picture.planes.color[i] < 1e6f);
@@ -488,7 +454,7 @@ static void odd_cameras(void **state)
     }
     nebel_renderer *renderer;
     assert_int_equal(nebel_create_renderer(&w.scene, NULL, &(nebel_renderer_desc){.threads = 1}, &renderer), NEBEL_OK);
-    nebel_frame_desc desc = {.camera = camera_at(10, 0), .width = 8, .height = 8};
+    nebel_frame_desc desc = {.camera = planet_camera(10, 0), .width = 8, .height = 8};
     desc.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     desc.camera.view_height = 10;
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);

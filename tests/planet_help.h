@@ -1,0 +1,57 @@
+/* What tests of planets share: a camera above the ground, the rays through its pixels, fog in the air. */
+#ifndef PLANET_HELP_H
+#define PLANET_HELP_H
+
+#include "unit.h"
+
+#include <nebel/nebel.h>
+#include <nebel/render.h>
+
+#include <math.h>
+#include <string.h>
+
+/* A camera above the origin that looks along -z, raised by a pitch (radians). */
+static inline nebel_camera planet_camera(double height, double pitch)
+{
+    return (nebel_camera){.position = {0, height, 0},
+                          .look_at = {0, height + sin(pitch), -cos(pitch)},
+                          .up = {0, 1, 0},
+                          .vertical_fov = 60};
+}
+
+/* The ray through the middle of a pixel of a picture of that camera; computed apart from the renderers' own. */
+static inline nebel_ray planet_ray(const nebel_camera *camera, double pitch, uint32_t x, uint32_t y, uint32_t width,
+                                   uint32_t height)
+{
+    const double half = tan(30 * acos(-1) / 180), across = (2 * (x + .5) / width - 1) * half * width / height,
+                 up = (1 - 2 * (y + .5) / height) * half;
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    memcpy(ray.origin, camera->position, sizeof ray.origin);
+    ray.direction[0] = across;
+    ray.direction[1] = sin(pitch) + up * cos(pitch);
+    ray.direction[2] = -cos(pitch) + up * sin(pitch);
+    return ray;
+}
+
+/* A ball that shines, far before the camera, in a lit height fog. */
+static inline nebel_snapshot *planet_fog(const double to_sun[3])
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3000, -9000}, .radius = 2500},
+         .extinction = {4e-4, 4e-4, 4e-4},
+         .source = {.5, .4, .3}},
+        {.shape = {.type = NEBEL_SHAPE_WORLD},
+         .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = 200},
+         .extinction = {1e-4, 2e-4, 3e-4},
+         .albedo = {.9, .9, .9}}};
+    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {2, 1.5, 1}}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+#endif
