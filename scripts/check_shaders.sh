@@ -58,15 +58,17 @@ try_opengl() {
     verdict "$1 $3" glslangValidator "$work/fog.frag"
 }
 
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
     try_opengl glsl_330 "330 core" "$defines"
 done
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
     try_opengl glsl_300_es "300 es" "$defines"
 done
 
-{
-    cat <<'GLSL'
+# try_vulkan DEFINES
+try_vulkan() {
+    {
+        cat <<'GLSL'
 #version 450
 layout(std140, binding = 0) uniform fog { vec4 words[1024]; };
 layout(std430, binding = 1) readonly buffer tiles { uint entries[]; };
@@ -89,13 +91,17 @@ layout(location = 0) out vec4 color;
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x
 GLSL
-    text glsl_450
-    printf 'void main()\n{%s\n    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n' "$calls"
-} >"$work/fog.frag"
-verdict glsl_450 glslangValidator -V "$work/fog.frag" -o "$work/fog.spv"
+        printf '%b' "$1"
+        text glsl_450
+        printf 'void main()\n{%s\n    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n' "$calls"
+    } >"$work/fog.frag"
+    verdict "glsl_450 $1" glslangValidator -V "$work/fog.frag" -o "$work/fog.spv"
+}
 
-{
-    cat <<'HLSL'
+# try_hlsl DEFINES
+try_hlsl() {
+    {
+        cat <<'HLSL'
 cbuffer fog { float4 words[1024]; };
 cbuffer view { float4 rays[10]; };
 StructuredBuffer<uint> entries;
@@ -116,11 +122,18 @@ SamplerState opaque_sampler;
 #define NEBEL_RAY(i) rays[i]
 #define NEBEL_OPAQUE_DEPTH(at) opaque.SampleLevel(opaque_sampler, at, 0.0).x
 HLSL
-    text hlsl
-    printf 'float4 main(float3 place : TEXCOORD0) : SV_Target\n{%s\n' "$calls"
-    printf '    return float4(light.transmittance + light.in_scattering, 1.0);\n}\n'
-} >"$work/fog.hlsl"
-verdict hlsl glslangValidator -D -S frag -e main -V "$work/fog.hlsl" -o "$work/fog.spv"
+        printf '%b' "$1"
+        text hlsl
+        printf 'float4 main(float3 place : TEXCOORD0) : SV_Target\n{%s\n' "$calls"
+        printf '    return float4(light.transmittance + light.in_scattering, 1.0);\n}\n'
+    } >"$work/fog.hlsl"
+    verdict "hlsl $1" glslangValidator -D -S frag -e main -V "$work/fog.hlsl" -o "$work/fog.spv"
+}
+
+for defines in "" "#define NEBEL_FEATURES 2u\n"; do
+    try_vulkan "$defines"
+    try_hlsl "$defines"
+done
 
 text glsl_330 >"$work/glsl_330"
 sed -n '/^```glsl$/,/^```$/p' docs/shaders.md | sed '/^```/d' | sed -e "/^\/\/ here:/r $work/glsl_330" >"$work/docs.frag"

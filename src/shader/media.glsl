@@ -6,7 +6,7 @@
 #ifndef NEBEL_MOST_LIGHT
 #define NEBEL_MOST_LIGHT 65504.0
 #endif
-#define NB_HAS(feature) ((NEBEL_FEATURES & (feature)) != 0)
+#define NB_HAS(feature) ((int(NEBEL_FEATURES) & (feature)) != 0) /* a host may write 123 or 123u */
 
 struct nebel_light {
     nb_vec3 transmittance;
