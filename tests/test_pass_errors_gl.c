@@ -93,16 +93,21 @@ static const GLubyte *EPOXY_CALLSPEC fake_get_string(GLenum name)
     return name == GL_VERSION ? (const GLubyte *)version_text : true_get_string(name);
 }
 
+static nebel_result create_with_version(const char *version, const nebel_gl_desc *desc, nebel_gl **gl)
+{
+    version_text = version;
+    true_get_string = epoxy_glGetString;
+    epoxy_glGetString = fake_get_string;
+    const nebel_result result = nebel_create_gl(desc, gl);
+    epoxy_glGetString = true_get_string;
+    return result;
+}
+
 static void expect_too_old(const char *version, const char *part)
 {
     const nebel_gl_desc desc = desc_of(NULL);
     nebel_gl *gl = NULL;
-    version_text = version;
-    true_get_string = epoxy_glGetString;
-    epoxy_glGetString = fake_get_string;
-    const nebel_result result = nebel_create_gl(&desc, &gl);
-    epoxy_glGetString = true_get_string;
-    expect_message(result, NEBEL_ERROR_UNSUPPORTED, part);
+    expect_message(create_with_version(version, &desc, &gl), NEBEL_ERROR_UNSUPPORTED, part);
     assert_null(gl);
 }
 
@@ -428,6 +433,37 @@ static void test_targets_that_do_not_fit(void **state)
     close_stage(&s);
 }
 
+static void EPOXY_CALLSPEC tell_no_size(GLenum target, GLint level, GLenum name, GLint *value)
+{
+    fail_msg("glGetTexLevelParameteriv(%#x, %d, %#x, %p) in OpenGL ES 3.0", target, (int)level, name, (void *)value);
+}
+
+/* OpenGL ES 3.1 tells sizes, OpenGL ES 3.0 has no function that would. */
+static void test_textures_too_small_for_embedded_contexts(void **state)
+{
+    (void)state;
+    static stage s;
+    open_stage(&s, NB_GL_300ES);
+    nebel_gl_pass pass = pass_of(&s);
+    pass.x = 1;
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "the depth texture is only");
+    pass.x = 0;
+    pass.color_texture = pass_color_texture(PASS_WIDTH, PASS_HEIGHT - 1, 4, NULL);
+    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "the color texture is only");
+    nebel_destroy_gl(s.gl);
+
+    const nebel_gl_desc desc = desc_of(NULL);
+    const PFNGLGETTEXLEVELPARAMETERIVPROC true_tell = epoxy_glGetTexLevelParameteriv;
+    assert_int_equal(create_with_version("OpenGL ES 3.0 Modest Driver", &desc, &s.gl), NEBEL_OK);
+    assert_int_equal(nebel_gl_set_fog(s.gl, s.fog, &s.picture.view), NEBEL_OK);
+    epoxy_glGetTexLevelParameteriv = tell_no_size;
+    const nebel_result result = nebel_gl_draw_fog(s.gl, &pass);
+    epoxy_glGetTexLevelParameteriv = true_tell;
+    assert_int_equal(result, NEBEL_OK);
+    glDeleteTextures(1, &pass.color_texture);
+    close_stage(&s);
+}
+
 static PFNGLGETSTRINGIPROC true_get_stringi;
 
 static const GLubyte *EPOXY_CALLSPEC without_dual_source(GLenum name, GLuint index)
@@ -473,6 +509,7 @@ int main(void)
         cmocka_unit_test(test_views_that_are_none),
         cmocka_unit_test(test_passes_that_cannot_be_drawn),
         cmocka_unit_test(test_targets_that_do_not_fit),
+        cmocka_unit_test(test_textures_too_small_for_embedded_contexts),
         cmocka_unit_test(test_what_embedded_contexts_lack),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -29,7 +29,7 @@ static void read_features(nb_context *c)
     c->blending_by_buffer = desktop ? c->version >= 40 : c->switches_by_buffer;
     c->viewport_arrays = desktop && c->version >= 41;
     c->pauses_feedback = !desktop || c->version >= 40 || has("GL_ARB_transform_feedback2");
-    c->sample_mask = desktop || c->version >= 31;
+    c->sample_mask = c->tells_sizes = desktop || c->version >= 31;
     c->dual_source = desktop ? 1 : has("GL_EXT_blend_func_extended") ? 2 : 0;
     c->depth_bounds = has("GL_EXT_depth_bounds_test");
 }

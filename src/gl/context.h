@@ -9,7 +9,7 @@ typedef struct nb_context {
     int version; /* 33: 3.3 */
     int switches_by_buffer, blending_by_buffer, viewport_arrays, pauses_feedback;
     uint32_t viewports; /* with a scissor each, 32 at most; 1 where there are no viewport arrays */
-    int sample_mask, clip_distances, depth_bounds;
+    int sample_mask, tells_sizes, clip_distances, depth_bounds;
     int dual_source; /* 0: no, 1: yes, 2: through an extension of the shading language */
     uint32_t widest; /* texture */
     int most_turns;  /* of the walk through a ray's fog in one shader; 0: any number */

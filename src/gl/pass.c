@@ -72,7 +72,7 @@ static nebel_result check_size(const task *t, GLenum target, const char *name)
     const nebel_gl *const gl = t->gl;
     const nebel_gl_pass *const pass = t->pass;
     size s = {0, 0, 0};
-    if (gl->context.es) return NEBEL_OK;
+    if (!gl->context.tells_sizes) return NEBEL_OK;
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_WIDTH, &s.width);
     glGetTexLevelParameteriv(target, 0, GL_TEXTURE_HEIGHT, &s.height);
     if (target == GL_TEXTURE_2D_MULTISAMPLE) glGetTexLevelParameteriv(target, 0, GL_TEXTURE_SAMPLES, &s.samples);
