@@ -5,28 +5,11 @@
 #include <nebel/gl.h>
 
 #include "engine.h"
+#include "fog.h"
 #include "host.h"
 
 #include <GLFW/glfw3.h>
 #include <string.h>
-
-/* Mist on the ground, and a ball of other fog within it. */
-static nebel_snapshot *make_fog(nebel_fog **fog)
-{
-    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_WORLD},
-                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = .6},
-                                    .extinction = {.25, .25, .25},
-                                    .source = {.5, .6, .7}};
-    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1.2, 2}, .radius = 1.5},
-                                    .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
-                                    .extinction = {.4, .8, 1.2},
-                                    .emission = {.7, .35, .1}};
-    nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
-        nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
-        nebel_commit_fog(*fog, &snapshot);
-    return snapshot;
-}
 
 static GLFWwindow *open_window(void)
 {
@@ -53,6 +36,7 @@ int main(void)
     if (!window) return glfwGetError(&why), host_refuse("embed_glfw", why);
     if (!snapshot || nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK) return 1;
 
+    host_say_compiling("embed_glfw");
     engine host = engine_open_textures();
     const nebel_gl_pass pass = {.color_texture = host.color, .depth_texture = host.depth};
     glEnable(GL_FRAMEBUFFER_SRGB); /* the window shows sRGB */

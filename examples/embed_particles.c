@@ -69,9 +69,10 @@ int main(void)
         nebel_create_gl(&(nebel_gl_desc){.log = host_log}, &passes) != NEBEL_OK)
         return 1;
 
+    host_say_compiling("embed_particles");
     engine host = engine_open_textures();
     const nebel_gl_pass pass = {.color_texture = host.color, .depth_texture = host.depth};
-    const unsigned program = particles_open();
+    const unsigned program = particles_open(snapshot);
     glEnable(GL_FRAMEBUFFER_SRGB); /* the window shows sRGB */
 
     nebel_result result = NEBEL_OK;

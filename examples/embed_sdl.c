@@ -7,27 +7,10 @@
 #include <nebel/shader.h>
 
 #include "engine.h"
+#include "fog.h"
 #include "host.h"
 
 #include <SDL.h>
-
-/* Mist on the ground, and a ball of other fog within it. */
-static nebel_snapshot *make_fog(nebel_fog **fog)
-{
-    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_WORLD},
-                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = .6},
-                                    .extinction = {.25, .25, .25},
-                                    .source = {.5, .6, .7}};
-    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1.2, 2}, .radius = 1.5},
-                                    .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
-                                    .extinction = {.4, .8, 1.2},
-                                    .emission = {.7, .35, .1}};
-    nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
-        nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
-        nebel_commit_fog(*fog, &snapshot);
-    return snapshot;
-}
 
 static SDL_Window *open_window(void)
 {
@@ -53,18 +36,26 @@ static nebel_result upload_fog(const nebel_snapshot *snapshot, const double eye[
     return result;
 }
 
+/* The text leaves out what this fog does not have: without NEBEL_FEATURES drivers compile all that fog can be. */
+static engine open_engine(const nebel_snapshot *snapshot)
+{
+    char head[80];
+    const char *const texts[] = {head, nebel_shader_text(NEBEL_DIALECT_GLSL_330),
+                                 "flat in vec3 color;\n"
+                                 "in vec3 place;\n"
+                                 "out vec4 pixel;\n"
+                                 "void main()\n"
+                                 "{\n"
+                                 "    nebel_light fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
+                                 "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
+                                 "}\n"};
+    snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_FEATURES %u\n", nebel_pack_features(snapshot));
+    host_say_compiling("embed_sdl");
+    return engine_open(3, texts);
+}
+
 int main(void)
 {
-    const char *const fragment_texts[] = {
-        "#version 330 core\n", nebel_shader_text(NEBEL_DIALECT_GLSL_330),
-        "flat in vec3 color;\n"
-        "in vec3 place;\n"
-        "out vec4 pixel;\n"
-        "void main()\n"
-        "{\n"
-        "    nebel_light fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
-        "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
-        "}\n"};
     SDL_Window *const window = open_window();
     const SDL_GLContext context = window ? SDL_GL_CreateContext(window) : NULL;
     nebel_fog *fog = NULL;
@@ -72,7 +63,7 @@ int main(void)
     if (!context) return host_refuse("embed_sdl", SDL_GetError());
     if (!snapshot) return 1;
 
-    engine host = engine_open(3, fragment_texts);
+    engine host = open_engine(snapshot);
     unsigned block;
     glGenBuffers(1, &block);
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, block); /* where nebel_fog_block is unless told otherwise */

@@ -5,27 +5,10 @@
 #include <nebel/nebel.h>
 
 #include "engine_fixed.h"
+#include "fog.h"
 #include "host.h"
 
 #include <GLFW/glfw3.h>
-
-/* Mist on the ground, and a ball of other fog within it. */
-static nebel_snapshot *make_fog(nebel_fog **fog)
-{
-    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_WORLD},
-                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .scale_height = .6},
-                                    .extinction = {.25, .25, .25},
-                                    .source = {.5, .6, .7}};
-    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-1, 1.2, 2}, .radius = 1.5},
-                                    .density = {.type = NEBEL_DENSITY_RADIAL, .power = 2},
-                                    .extinction = {.4, .8, 1.2},
-                                    .emission = {.7, .35, .1}};
-    nebel_snapshot *snapshot = NULL;
-    if (nebel_create_fog(&(nebel_fog_desc){.log = host_log}, fog) == NEBEL_OK &&
-        nebel_add_volume(*fog, &mist, NULL) == NEBEL_OK && nebel_add_volume(*fog, &ball, NULL) == NEBEL_OK)
-        nebel_commit_fog(*fog, &snapshot);
-    return snapshot;
-}
 
 /* A ray from the eye to each vertex: colour = transmittance * surface + in-scattering. */
 static nebel_result fog_vertices(const nebel_snapshot *fog, engine *host)

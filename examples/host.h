@@ -25,4 +25,10 @@ static inline int host_refuse(const char *program, const char *why)
     return 1;
 }
 
+/* Drivers compile shaders before the first picture, software for some seconds: so long the window is empty. */
+static inline void host_say_compiling(const char *program)
+{
+    fprintf(stderr, "%s: the driver compiles shaders; the picture follows\n", program);
+}
+
 #endif

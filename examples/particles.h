@@ -50,12 +50,16 @@ static const char *const particle_fragment_text =
     "    factor = vec4(blend.factor, 1.0);\n"
     "}\n";
 
-static inline unsigned particles_open(void)
+/* For fog that has no more than `snapshot`. */
+static inline unsigned particles_open(const nebel_snapshot *snapshot)
 {
-    const char *const texts[] = {particle_defines, nebel_shader_text(NEBEL_DIALECT_GLSL_330), particle_fragment_text};
+    char features[40];
+    const char *const texts[] = {particle_defines, features, nebel_shader_text(NEBEL_DIALECT_GLSL_330),
+                                 particle_fragment_text};
     const unsigned program = glCreateProgram();
+    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", nebel_pack_features(snapshot));
     engine_add_shader(program, GL_VERTEX_SHADER, 1, &particle_vertex_text);
-    engine_add_shader(program, GL_FRAGMENT_SHADER, 3, texts);
+    engine_add_shader(program, GL_FRAGMENT_SHADER, 4, texts);
     glLinkProgram(program);
     return program;
 }

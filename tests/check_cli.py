@@ -337,6 +337,34 @@ class PictureCase(Case):
     def render(self, output, *words, **more):
         return nebel("render", self.scene, "-o", output, "--size", "64x36", *words, cwd=self.folder, **more)
 
+    def run_on_terminal(self, output, *words, env=None, interrupt_after=None):
+        try:
+            master, slave = pty.openpty()
+        except OSError as error:
+            self.skipTest(f"no pseudo-terminal can be had here ({error}); bar and Ctrl-C stay unchecked")
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 70, 0, 0))
+        process = subprocess.Popen([NEBEL, "render", str(self.scene), "-o", output, *words], stderr=slave,
+                                   stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, cwd=self.folder,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+                                   env={**os.environ, "TERM": "xterm", **(env or {})})
+        os.close(slave)
+        seen = b""
+        while True:
+            try:
+                piece = os.read(master, 65536)
+            except OSError:
+                break
+            if not piece:
+                break
+            seen += piece
+            if interrupt_after is not None and re.search(interrupt_after, seen):
+                process.send_signal(signal.SIGINT)
+                interrupt_after = None
+        os.close(master)
+        process.stdout.close()
+        process.wait(60)
+        return process, seen.decode()
+
 
 class RenderTest(PictureCase):
     def test_png(self):
@@ -732,34 +760,6 @@ class RenderTest(PictureCase):
         done = self.render("a.png", "--samples", "64")
         self.assertNotIn("\r", done.err)
         self.assertNotIn("%", done.err)
-
-    def run_on_terminal(self, output, *words, env=None, interrupt_after=None):
-        try:
-            master, slave = pty.openpty()
-        except OSError as error:
-            self.skipTest(f"no pseudo-terminal can be had here ({error}); bar and Ctrl-C stay unchecked")
-        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 70, 0, 0))
-        process = subprocess.Popen([NEBEL, "render", str(self.scene), "-o", output, *words], stderr=slave,
-                                   stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, cwd=self.folder,
-                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-                                   env={**os.environ, "TERM": "xterm", **(env or {})})
-        os.close(slave)
-        seen = b""
-        while True:
-            try:
-                piece = os.read(master, 65536)
-            except OSError:
-                break
-            if not piece:
-                break
-            seen += piece
-            if interrupt_after is not None and re.search(interrupt_after, seen):
-                process.send_signal(signal.SIGINT)
-                interrupt_after = None
-        os.close(master)
-        process.stdout.close()
-        process.wait(60)
-        return process, seen.decode()
 
     def test_a_bar_on_a_terminal(self):
         process, seen = self.run_on_terminal("a.png", "--samples", "16", "--size", "640x360")

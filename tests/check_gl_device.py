@@ -29,6 +29,14 @@ class GlDeviceTest(PictureCase):
         self.assertEqual(self.draw("b.png", "--quiet").err, "")
         self.assertEqual((self.folder / "a.png").read_bytes(), (self.folder / "b.png").read_bytes())
 
+    def test_a_terminal_is_told_what_takes_so_long(self):
+        process, seen = self.run_on_terminal("a.png", "--device", "gl")
+        self.assertEqual(process.returncode, 0, seen)
+        self.assertRegex(seen, r"\rOpenGL: compiling shaders\.\.\.[^\n]*\r +\r")
+        self.assertTrue(seen.splitlines()[-1].startswith("nebel: a.png: "), seen)
+        self.assertNotIn("compiling", self.run_on_terminal("a.png", "--device", "gl", "--quiet")[1])
+        self.assertNotIn("compiling", self.draw("a.png").err)
+
     def test_every_layer_is_that_of_the_cpu(self):
         self.assert_done(self.render("cpu.exr", "--aov", "--samples", 1))
         done = self.draw("gl.exr", "--aov", "--samples", 1)

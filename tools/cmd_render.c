@@ -300,6 +300,7 @@ static nebel_result draw_frame(studio *all)
         .depth = all->samples[NB_LAYER_DEPTH],
         .normal = all->samples[NB_LAYER_NORMAL],
     };
+    if (all->frame == all->wanted->first_frame) nb_meter_say(&all->meter, "OpenGL: compiling shaders...");
     return nb_gl_painter_draw(&all->painter, all->frame, &desc, &wanted);
 }
 

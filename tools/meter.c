@@ -95,6 +95,11 @@ void nb_meter_show(nb_meter *meter, double done, const char *label)
     draw(share, label, left);
 }
 
+void nb_meter_say(const nb_meter *meter, const char *words)
+{
+    if (meter->visible) nb_report_status(words);
+}
+
 double nb_meter_end(nb_meter *meter)
 {
     if (meter->visible) nb_report_status("");

@@ -16,6 +16,9 @@ nb_meter nb_meter_start(int quiet);
 /* `done` of all the work, 0 to 1; `label` may be "". Cheap to call often. */
 void nb_meter_show(nb_meter *meter, double done, const char *label);
 
+/* Words in its place until it is shown, for work whose end nobody knows. */
+void nb_meter_say(const nb_meter *meter, const char *words);
+
 /* Clears the bar. Returns the seconds since the start. */
 double nb_meter_end(nb_meter *meter);
 

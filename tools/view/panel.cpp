@@ -169,6 +169,8 @@ void draw_state(nb_panel *panel)
     if (panel->samples > 0) {
         draw_seconds("OpenGL", panel->seconds, panel->samples);
         explain(panel->driver);
+    } else if (panel->cpu_seconds == 0) {
+        ImGui::TextUnformatted("");
     }
     if (panel->cpu_seconds > 0) draw_seconds("CPU", panel->cpu_seconds, 1);
     ImGui::TextDisabled("%s", panel->picture);

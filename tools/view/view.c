@@ -3,6 +3,7 @@
 #include "view.h"
 
 #include "../interrupt.h"
+#include "../meter.h"
 #include "../report.h"
 #include "draft.h"
 #include "hands.h"
@@ -56,6 +57,7 @@ typedef struct viewer {
     double frame;       /* that the panel shows and changes */
     double clock;       /* frames, with their fractions, while time goes on */
     int was_playing;
+    int blank_turns; /* so many without a picture: it takes long to come, and the window says so first */
     int wants_picture, wants_window_picture;
     int was_warned;         /* that changes are lost if the window is left */
     double placing_seconds; /* that models took to be loaded last */
@@ -545,7 +547,7 @@ static int list_origins(viewer *all)
 
 static int fill_panel(viewer *all)
 {
-    static const char *const states[] = {"", "moving: fewer pixels", "refining...", "complete"};
+    static const char *const states[] = {"compiling shaders...", "moving: fewer pixels", "refining...", "complete"};
     nb_panel *const panel = &all->panel;
     const nebel_scene_data *const data = &all->draft.data;
     let_message_fade(all);
@@ -687,13 +689,27 @@ static nebel_result try_frame(viewer *all)
     return NEBEL_OK;
 }
 
+/* Dear ImGui knows how large a window is when it has been drawn once. */
+enum { BLANK_TURNS = 2 };
+
+/* The driver compiles shaders in it, for seconds. */
+static nebel_result try_first_frame(viewer *all)
+{
+    if (all->settings->screenshot == NULL && all->blank_turns < BLANK_TURNS) return all->blank_turns++, NEBEL_OK;
+    nb_meter meter = nb_meter_start(0);
+    nb_meter_say(&meter, "OpenGL: compiling shaders...");
+    const nebel_result result = try_frame(all);
+    (void)nb_meter_end(&meter);
+    return result;
+}
+
 /* A frame that cannot be drawn is not tried again before something has changed. */
 static nebel_result draw(viewer *all)
 {
     all->stage.cells = all->draft.cells;
     all->stage.factor = &all->draft.good.classic;
     if (all->stage.state == NB_STAGE_FINE && !is_moving(all)) return NEBEL_OK;
-    const nebel_result result = try_frame(all);
+    const nebel_result result = all->stage.state == NB_STAGE_STALE ? try_first_frame(all) : try_frame(all);
     if (result != NEBEL_OK) all->stage.state = NB_STAGE_FINE;
     return nb_window_is_lost(&all->window) ? NEBEL_OK : forgive(result);
 }
