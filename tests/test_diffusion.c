@@ -4,6 +4,7 @@
 #include "random_fog.h"
 
 #include <nebel/diffusion.h>
+#include <nebel/environment.h>
 
 static uint64_t random_count = 27;
 
@@ -195,6 +196,74 @@ static void test_white_layers_keep_the_suns_light(void **unused)
     }
 }
 
+/* Chandrasekhar's half spaces: what comes back of the sun's flux, 1 - H sqrt(1 - albedo). */
+static const struct {
+    double albedo, cosine, reflected;
+} spaces[] = {{.5, .5, .160144},  {.9, .5, .507939},  {.9, 1, .414947},
+              {.99, .5, .815140}, {.999, 1, .912835}, {1, 1, 1}};
+
+/* ---- ambient light --------------------------------------------------------------------------- */
+
+static nebel_snapshot *commit_under(const nebel_environment *sky, const nebel_volume_desc *volume,
+                                    const nebel_diffusion_desc *diffusion)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_set_environment(fog, sky), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, diffusion), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* In-scattering of a ray down through a layer that is lit from everywhere alike. */
+static double seen_in_even_light(const layer *l, const nebel_diffusion_desc *diffusion)
+{
+    static const nebel_environment even = {.radiance = {1, 1, 1}};
+    const nebel_volume_desc volume = layer_of(&l->light, l->depth);
+    nebel_snapshot *snapshot = commit_under(&even, &volume, diffusion);
+    const nebel_ray ray = {{0, 2, 0}, {sqrt(1 - l->light.cosine * l->light.cosine), -l->light.cosine, 0}, HUGE_VAL};
+    nebel_light out;
+    assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
+    nebel_release_snapshot(snapshot);
+    return out.in_scattering[0];
+}
+
+/* Light goes the same ways back: what a layer scatters to the eye of light from everywhere is what it scatters anywhere of
+ * light that comes from the eye, both fluxes of the published numbers. */
+static void test_layers_in_even_light_are_near_published_ones(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < LAYERS; i++) {
+        const layer *l = &layers[i];
+        const double truth = l->reflected + l->transmitted;
+        const double off = seen_in_even_light(l, &by_default) - truth, undimmed = seen_in_even_light(l, NULL) - truth;
+        /* White ones are exact but for the numbers' last digit. */
+        assert_true(fabs(off) < (l->light.albedo < 1 ? .025 : 2e-4));
+        assert_true(l->light.albedo == 1 || undimmed > .07);
+    }
+}
+
+/* The half spaces above in even light, which they show by what comes back of the sun's; undimmed they show their albedo. */
+static void test_endless_depth_in_even_light(void **unused)
+{
+    (void)unused;
+    static const nebel_environment even = {.radiance = {1, 1, 1}};
+    for (size_t i = 0; i < sizeof spaces / sizeof *spaces; i++) {
+        const light l = {.albedo = spaces[i].albedo, .cosine = spaces[i].cosine};
+        nebel_volume_desc volume = volume_of(&l, .3);
+        volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {3, 20, 4}, .normal = {0, 1, 0}};
+        nebel_snapshot *snapshot = commit_under(&even, &volume, &by_default);
+        const nebel_ray ray = {{0, 21, 0}, {sqrt(1 - l.cosine * l.cosine), -l.cosine, 0}, HUGE_VAL};
+        nebel_light out;
+        assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &out, sizeof out), NEBEL_OK);
+        nebel_release_snapshot(snapshot);
+        assert_true(fabs(out.in_scattering[0] - spaces[i].reflected) < .02);
+    }
+}
+
 /* ---- height fog ------------------------------------------------------------------------------ */
 
 /* Level fog knows optical depth alone: height fog above black ground reflects as a layer of that depth does. */
@@ -224,20 +293,15 @@ static void test_height_fog_reflects_as_a_layer(void **unused)
     }
 }
 
-/* Chandrasekhar's half space: what comes back of the sun's flux, 1 - H sqrt(1 - albedo). */
 static void test_endless_depth(void **unused)
 {
     (void)unused;
-    static const struct {
-        double albedo, cosine, reflected;
-    } truths[] = {{.5, .5, .160144},  {.9, .5, .507939},  {.9, 1, .414947},
-                  {.99, .5, .815140}, {.999, 1, .912835}, {1, 1, 1}};
-    for (size_t i = 0; i < sizeof truths / sizeof *truths; i++) {
-        const light l = {.albedo = truths[i].albedo, .cosine = truths[i].cosine};
+    for (size_t i = 0; i < sizeof spaces / sizeof *spaces; i++) {
+        const light l = {.albedo = spaces[i].albedo, .cosine = spaces[i].cosine};
         nebel_volume_desc volume = volume_of(&l, .3);
         volume.shape = (nebel_shape){.type = NEBEL_SHAPE_HALF_SPACE, .point = {3, 20, 4}, .normal = {0, 1, 0}};
         nebel_snapshot *snapshot = commit(&l, &volume, &by_default);
-        const double off = flux_at(snapshot, &l, 21, 0) - truths[i].reflected;
+        const double off = flux_at(snapshot, &l, 21, 0) - spaces[i].reflected;
         nebel_release_snapshot(snapshot);
         assert_true(fabs(off) < MOST_OFF);
     }
@@ -305,6 +369,27 @@ static void test_white_fog_under_a_white_sky_is_white(void **unused)
             assert_true(fabs(lights[i].transmittance[c] + lights[i].in_scattering[c] - 1) < 1e-9);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
+}
+
+/* The same where the lattice is solved: nothing says beforehand that a gradient is even. White ground sends back what a sky
+ * below it would. */
+static void test_white_fog_over_white_ground_is_white(void **unused)
+{
+    (void)unused;
+    static const nebel_environment sky = {
+        .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {2, 2, 2}, .horizon = {2, 2, 2}, .ground = {2, 2, 2}};
+    const nebel_diffusion_desc on_ground = {.has_ground = 1, .ground_albedo = {1, 1, 1}};
+    const nebel_volume_desc level = layer_of(&white, 5), body = ball(&white, 3);
+    const nebel_volume_desc *volumes[] = {&level, &body};
+    for (int k = 0; k < 2; k++) {
+        nebel_snapshot *snapshot = commit_under(&sky, volumes[k], &on_ground);
+        nebel_light lights[RAYS];
+        trace(snapshot, &(nebel_trace_desc){0}, lights);
+        for (int i = 0; i < RAYS; i++)
+            for (int c = 0; c < 3; c++)
+                assert_true(fabs(2 * lights[i].transmittance[c] + lights[i].in_scattering[c] - 2) < 1e-6);
+        nebel_release_snapshot(snapshot);
+    }
 }
 
 static void test_transmittance_stays_and_light_is_added(void **unused)
@@ -557,6 +642,9 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(test_endless_depth),
                                        cmocka_unit_test(test_ground_reflects),
                                        cmocka_unit_test(test_white_fog_under_a_white_sky_is_white),
+                                       cmocka_unit_test(test_white_fog_over_white_ground_is_white),
+                                       cmocka_unit_test(test_layers_in_even_light_are_near_published_ones),
+                                       cmocka_unit_test(test_endless_depth_in_even_light),
                                        cmocka_unit_test(test_transmittance_stays_and_light_is_added),
                                        cmocka_unit_test(test_same_bits_for_every_isa_and_split),
                                        cmocka_unit_test(test_cells_do_not_matter_much),

@@ -6,16 +6,26 @@ enum { SIDE = 16, PIXELS = SIDE * SIDE, BLOCK = 4 };
 
 static uint32_t samples = 64;
 
-/* White fog, seen from the front and a little from above. */
+/* Fog, white unless it is said otherwise, seen from the front and a little from above. */
 typedef struct trial {
     const char *name;
     nebel_shape shape;
     nebel_density density;
     double extinction, g;
-    double sun[3];
+    double sun[3];             /* all 0: none */
     double most_off, most_rms; /* of the picture's mean, and of its blocks: in terms of that mean */
     double coverage;           /* of a grid */
+    double darkness;           /* 1 - albedo */
+    int sky;                   /* of `skies` */
 } trial;
+
+enum { DARK, EVEN, OVERCAST };
+
+static const nebel_environment skies[] = {
+    [DARK] = {.type = NEBEL_ENVIRONMENT_CONSTANT},
+    [EVEN] = {.type = NEBEL_ENVIRONMENT_CONSTANT, .radiance = {1, 1, 1}},
+    [OVERCAST] = {.type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {1, 1, 1}, .horizon = {.5, .5, .5}},
+};
 
 #define BALL                                                                                                           \
     {                                                                                                                  \
@@ -40,21 +50,51 @@ typedef struct trial {
 
 /* What is measured, and some room for chance. */
 static const trial trials[] = {
-    {"ball, depth 2", BALL, {0}, 1, 0, SIDEWAYS, .06, .1, 0},
-    {"ball, depth 10, sun behind the eye", BALL, {0}, 5, 0, BEHIND, .08, .1, 0},
-    {"ball, depth 10, sun ahead", BALL, {0}, 5, 0, AHEAD, .15, .25, 0},
-    {"ball, depth 20, g .85", BALL, {0}, 10, .85, SIDEWAYS, .15, .25, 0},
-    {"ball, depth 20, g .85, sun ahead", BALL, {0}, 10, .85, AHEAD, .15, .3, 0},
-    {"ball, depth 20, g .85, sun behind the eye", BALL, {0}, 10, .85, BEHIND, .35, .45, 0},
-    {"ball, depth 30", BALL, {0}, 15, 0, SIDEWAYS, .1, .12, 0},
-    {"ball, depth 100", BALL, {0}, 50, 0, SIDEWAYS, .15, .2, 0},
-    {"ball, depth 100, g .85", BALL, {0}, 50, .85, SIDEWAYS, .15, .25, 0},
-    {"ball that thins out, depth 10", BALL, {.type = NEBEL_DENSITY_RADIAL, .power = 2}, 10, 0, SIDEWAYS, .1, .22, 0},
-    {"box, depth 6", BOX, {0}, 5, 0, SIDEWAYS, .08, .12, 0},
-    {"box, depth 100", BOX, {0}, 83, 0, SIDEWAYS, .1, .15, 0},
-    {"box, depth 20, g .85", BOX, {0}, 16, .85, SIDEWAYS, .25, .4, 0},
-    {"cloud of voxels, depth 20 in a knot, g .85", BOX, {.type = NEBEL_DENSITY_GRID}, 40, .85, SIDEWAYS, .2, .3, .65},
-    {"thin clouds with holes, g .85, sun ahead", BOX, {.type = NEBEL_DENSITY_GRID}, 40, .85, AHEAD, .3, .45, .55},
+    {"ball, depth 2", BALL, {0}, 1, 0, SIDEWAYS, .06, .1, 0, 0, DARK},
+    {"ball, depth 10, sun behind the eye", BALL, {0}, 5, 0, BEHIND, .08, .1, 0, 0, DARK},
+    {"ball, depth 10, sun ahead", BALL, {0}, 5, 0, AHEAD, .15, .25, 0, 0, DARK},
+    {"ball, depth 20, g .85", BALL, {0}, 10, .85, SIDEWAYS, .15, .25, 0, 0, DARK},
+    {"ball, depth 20, g .85, sun ahead", BALL, {0}, 10, .85, AHEAD, .15, .3, 0, 0, DARK},
+    {"ball, depth 20, g .85, sun behind the eye", BALL, {0}, 10, .85, BEHIND, .35, .45, 0, 0, DARK},
+    {"ball, depth 30", BALL, {0}, 15, 0, SIDEWAYS, .1, .12, 0, 0, DARK},
+    {"ball, depth 100", BALL, {0}, 50, 0, SIDEWAYS, .15, .2, 0, 0, DARK},
+    {"ball, depth 100, g .85", BALL, {0}, 50, .85, SIDEWAYS, .15, .25, 0, 0, DARK},
+    {"ball that thins out, depth 10",
+     BALL,
+     {.type = NEBEL_DENSITY_RADIAL, .power = 2},
+     10,
+     0,
+     SIDEWAYS,
+     .1,
+     .22,
+     0,
+     0,
+     DARK},
+    {"box, depth 6", BOX, {0}, 5, 0, SIDEWAYS, .08, .12, 0, 0, DARK},
+    {"box, depth 100", BOX, {0}, 83, 0, SIDEWAYS, .1, .15, 0, 0, DARK},
+    {"box, depth 20, g .85", BOX, {0}, 16, .85, SIDEWAYS, .25, .4, 0, 0, DARK},
+    {"cloud of voxels, depth 20 in a knot, g .85",
+     BOX,
+     {.type = NEBEL_DENSITY_GRID},
+     40,
+     .85,
+     SIDEWAYS,
+     .2,
+     .3,
+     .65,
+     0,
+     DARK},
+    {"thin clouds with holes, g .85, sun ahead",
+     BOX,
+     {.type = NEBEL_DENSITY_GRID},
+     40,
+     .85,
+     AHEAD,
+     .3,
+     .45,
+     .55,
+     0,
+     DARK},
     {"height fog above black ground, depth 8, g .85",
      {.type = NEBEL_SHAPE_WORLD},
      {.type = NEBEL_DENSITY_HEIGHT, .base = -1.2, .scale_height = .4},
@@ -63,9 +103,63 @@ static const trial trials[] = {
      SIDEWAYS,
      .2,
      .25,
-     0}};
+     0,
+     0,
+     DARK}};
 
 enum { TRIALS = sizeof trials / sizeof *trials };
+
+#define NO_SUN                                                                                                         \
+    {                                                                                                                  \
+        0                                                                                                              \
+    }
+
+/* The same in ambient light alone. */
+static const trial skylit[] = {
+    {"ball, depth 10, albedo .8, even sky", BALL, {0}, 5, 0, NO_SUN, .06, .09, 0, .2, EVEN},
+    {"ball, depth 10, white, overcast", BALL, {0}, 5, 0, NO_SUN, .04, .05, 0, 0, OVERCAST},
+    {"ball, depth 10, albedo .8, overcast", BALL, {0}, 5, 0, NO_SUN, .07, .1, 0, .2, OVERCAST},
+    {"ball, depth 2, albedo .5, even sky", BALL, {0}, 1, 0, NO_SUN, .06, .1, 0, .5, EVEN},
+    {"ball, depth 100, albedo .5, overcast", BALL, {0}, 50, 0, NO_SUN, .05, .18, 0, .5, OVERCAST},
+    {"ball, depth 100, albedo .99, even sky", BALL, {0}, 50, 0, NO_SUN, .08, .1, 0, .01, EVEN},
+    {"ball, depth 20, g .85, albedo .9, even sky", BALL, {0}, 10, .85, NO_SUN, .06, .11, 0, .1, EVEN},
+    {"ball, depth 20, g .85, white, overcast", BALL, {0}, 10, .85, NO_SUN, .05, .08, 0, 0, OVERCAST},
+    {"ball that thins out, depth 10, albedo .8, overcast",
+     BALL,
+     {.type = NEBEL_DENSITY_RADIAL, .power = 2},
+     10,
+     0,
+     NO_SUN,
+     .08,
+     .12,
+     0,
+     .2,
+     OVERCAST},
+    {"box, depth 6, albedo .8, overcast", BOX, {0}, 5, 0, NO_SUN, .1, .15, 0, .2, OVERCAST},
+    {"smoke of voxels, depth 20 in a knot, g .5, albedo .6, overcast",
+     BOX,
+     {.type = NEBEL_DENSITY_GRID},
+     40,
+     .5,
+     NO_SUN,
+     .13,
+     .19,
+     .65,
+     .4,
+     OVERCAST},
+    {"height fog above black ground, depth 8, g .85, even sky",
+     {.type = NEBEL_SHAPE_WORLD},
+     {.type = NEBEL_DENSITY_HEIGHT, .base = -1.2, .scale_height = .4},
+     20,
+     .85,
+     NO_SUN,
+     .09,
+     .1,
+     0,
+     0,
+     EVEN}};
+
+enum { SKYLIT = sizeof skylit / sizeof *skylit };
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 
@@ -82,21 +176,28 @@ static nebel_grid *make_cloud(double coverage)
     return grid;
 }
 
+static int has_sun(const trial *t)
+{
+    return t->sun[0] != 0;
+}
+
 static nebel_snapshot *commit(const trial *t, int is_diffuse)
 {
     nebel_fog *fog = NULL;
     nebel_snapshot *snapshot = NULL;
-    nebel_fog_desc desc = {.sun = {.irradiance = {1, 1, 1}}};
+    const double sunlight = has_sun(t), albedo = 1 - t->darkness;
+    const nebel_fog_desc desc = {
+        .sun = {.direction = {t->sun[0], t->sun[1], t->sun[2]}, .irradiance = {sunlight, sunlight, sunlight}}};
     nebel_volume_desc volume = {.shape = t->shape,
                                 .density = t->density,
                                 .extinction = {t->extinction, t->extinction, t->extinction},
-                                .albedo = {1, 1, 1},
+                                .albedo = {albedo, albedo, albedo},
                                 .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = t->g}};
     const nebel_diffusion_desc diffusion = {.has_ground = t->shape.type == NEBEL_SHAPE_WORLD,
                                             .ground_height = t->density.base};
     if (t->density.type == NEBEL_DENSITY_GRID) volume.density.grid = make_cloud(t->coverage);
-    memcpy(desc.sun.direction, t->sun, sizeof desc.sun.direction);
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_set_environment(fog, &skies[t->sky]), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
     assert_int_equal(nebel_set_diffusion(fog, is_diffuse ? &diffusion : NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
@@ -123,10 +224,14 @@ static void take(const trial *t, nebel_method method, int is_diffuse, shot *out)
     nebel_renderer *renderer = NULL;
     const int is_endless = t->shape.type == NEBEL_SHAPE_WORLD;
     const nebel_mesh ground = make_ground(t->density.base);
-    nebel_scene_data scene = {
-        .has_sun = 1, .sun_irradiance = {1, 1, 1}, .meshes = &ground, .mesh_count = is_endless ? 1 : 0};
+    nebel_scene_data scene = {.has_sun = has_sun(t),
+                              .sun_irradiance = {1, 1, 1},
+                              .environment = skies[t->sky],
+                              .meshes = &ground,
+                              .mesh_count = is_endless ? 1 : 0};
     const double length = sqrt(t->sun[0] * t->sun[0] + t->sun[1] * t->sun[1] + t->sun[2] * t->sun[2]);
-    for (int c = 0; c < 3; c++) scene.sun_direction[c] = t->sun[c] / length;
+    for (int c = 0; c < 3 && has_sun(t); c++) scene.sun_direction[c] = t->sun[c] / length;
+    memcpy(scene.ambient, skies[t->sky].radiance, sizeof scene.ambient);
     scene.camera = test_camera(0, 10, 50, 0, 0, 0);
     scene.camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
     scene.camera.view_height = 2.4;
@@ -180,38 +285,47 @@ static void take_all(const trial *t)
     take(t, NEBEL_METHOD_REFERENCE, 0, &reference);
 }
 
-static void print_trials(void)
+static void print_trials(const char *title, const char *exact, const trial *all_trials, int count)
 {
-    printf(
-        "| white fog | light of one scattering | diffusion | its RMS over blocks | chance |\n|---|---|---|---|---|\n");
-    for (int i = 0; i < TRIALS; i++) {
-        take_all(&trials[i]);
+    printf("| %s | %s | diffusion | its RMS over blocks | chance |\n|---|---|---|---|---|\n", title, exact);
+    for (int i = 0; i < count; i++) {
+        take_all(&all_trials[i]);
         const verdict single = judge(&once, &reference), many = judge(&all, &reference);
-        printf("| %s | %+.0f %% | %+.0f %% | %.0f %% | %.1f %% |\n", trials[i].name, 100 * single.off, 100 * many.off,
-               100 * many.rms, 100 * many.chance);
+        printf("| %s | %+.0f %% | %+.0f %% | %.0f %% | %.1f %% |\n", all_trials[i].name, 100 * single.off,
+               100 * many.off, 100 * many.rms, 100 * many.chance);
     }
+}
+
+static void judge_trial(const trial *t)
+{
+    take_all(t);
+    const verdict single = judge(&once, &reference), many = judge(&all, &reference);
+    if (fabs(many.off) >= t->most_off + 3 * many.chance || many.rms >= t->most_rms + 3 * many.chance)
+        fail_msg("%s: off by %.3f, %.3f rms, chance %.3f", t->name, many.off, many.rms, many.chance);
+    assert_true(has_sun(t) ? single.off < -.4 : single.rms > 2 * many.rms);
 }
 
 static void test_bodies_are_as_bright_as_the_reference(void **unused)
 {
     (void)unused;
-    for (int i = 0; i < TRIALS; i++) {
-        const trial *t = &trials[i];
-        take_all(t);
-        const verdict single = judge(&once, &reference), many = judge(&all, &reference);
-        if (fabs(many.off) >= t->most_off + 3 * many.chance || many.rms >= t->most_rms + 3 * many.chance)
-            fail_msg("%s: off by %.3f, %.3f rms, chance %.3f", t->name, many.off, many.rms, many.chance);
-        assert_true(single.off < -.4);
-    }
+    for (int i = 0; i < TRIALS; i++) judge_trial(&trials[i]);
+}
+
+static void test_ambient_light_is_dimmed_as_in_the_reference(void **unused)
+{
+    (void)unused;
+    for (int i = 0; i < SKYLIT; i++) judge_trial(&skylit[i]);
 }
 
 int main(int argc, char **argv)
 {
     if (argc > 1 && strcmp(argv[1], "table") == 0) {
         samples *= 16;
-        print_trials();
+        print_trials("white fog", "light of one scattering", trials, TRIALS);
+        print_trials("ambient light alone", "undimmed", skylit, SKYLIT);
         return 0;
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bodies_are_as_bright_as_the_reference)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bodies_are_as_bright_as_the_reference),
+                                       cmocka_unit_test(test_ambient_light_is_dimmed_as_in_the_reference)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -51,7 +51,8 @@ typedef struct trial {
     nebel_volume_desc volumes[MOST_VOLUMES];
     nebel_diffusion_desc diffusion;
     nebel_projection projection;
-    double far; /* where all is, along x [m] */
+    double far;      /* where all is, along x [m] */
+    int is_overcast; /* a coloured gradient in place of sun and even light */
 } trial;
 
 static const trial trials[] = {
@@ -100,7 +101,21 @@ static const trial trials[] = {
                   .priority = 1,
                   .shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1.2}}},
      .diffusion = {.cells = 2048}},
+    {.name = "smoke in height fog, overcast",
+     .count = 2,
+     .volumes = {{.shape = BALL,
+                  .extinction = {3, 3, 3},
+                  .albedo = {.6, .6, .6},
+                  .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .7}},
+                 {.extinction = {.3, .4, .5},
+                  .albedo = {1, .98, .9},
+                  .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
+     .diffusion = {.cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.1, .3, .1}},
+     .is_overcast = 1},
 };
+
+static const nebel_environment overcast = {
+    .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.9, 1, 1.2}, .horizon = {.5, .4, .3}, .ground = {.1, .1, 0}};
 
 static nebel_snapshot *commit(const trial *t)
 {
@@ -109,7 +124,8 @@ static nebel_snapshot *commit(const trial *t)
     const nebel_fog_desc desc = {.ambient = {.1, .1, .12},
                                  .sun = {.direction = {1, .6, .5}, .irradiance = {3, 2.8, 2.5}}};
     nebel_diffusion_desc diffusion = t->diffusion;
-    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_create_fog(t->is_overcast ? &(nebel_fog_desc){.max_opacity = 0} : &desc, &fog), NEBEL_OK);
+    if (t->is_overcast) assert_int_equal(nebel_set_environment(fog, &overcast), NEBEL_OK);
     for (size_t i = 0; i < t->count; i++) {
         nebel_volume_desc volume = t->volumes[i];
         volume.shape.center[0] += t->far;

@@ -1,4 +1,4 @@
-/* Light that fog scatters more than once, so that white fog is white: a model, where all else is exact.
+/* Light that fog scatters more than once, so that white fog is white and smoke is dark: a model, where all else is exact.
  *
  *     nebel_set_diffusion(fog, &(nebel_diffusion_desc){0});
  *     nebel_commit_fog(fog, &now);
@@ -27,16 +27,17 @@ typedef struct nebel_diffusion_desc {
 #define NEBEL_DEFAULT_DIFFUSION_CELLS 65536
 
 /* Makes snapshots from now on hold what becomes of the sun's light after fog has scattered it once, which queries then
- * add to in-scattering; NULL: no longer. What is scattered once stays as exact as it is. `error` says nothing of this
- * model's own error. Lamps' and ambient light are scattered once, as without it; surfaces and their shadows are not
- * known to it.
+ * add to in-scattering; NULL: no longer. What is scattered once stays as exact as it is. Ambient light, which without it
+ * nothing dims, is dimmed by what fog and ground take from it. `error` says nothing of this model's own error. Lamps'
+ * light is scattered once, as without it; surfaces and their shadows are not known to it.
  *
- * A commit then costs a march to the sun from each node of a lattice around all fog that the sun lights, and the
- * solution of one linear equation for each cell (for each channel, where fog has colour), in all about a second for
- * 65536 cells; the snapshot keeps 36 bytes a node, or 100 where fog has colour. A query asks for the transmittance of
- * each piece of its ray from cell to cell. Same bits for every isa and any number of threads.
+ * A commit then costs a march to the sun from each node of a lattice around all fog that is lit, and the
+ * solution of one linear equation for each cell (for each channel, where fog or the sky has colour; once more where ambient
+ * light is dimmed), in all about a second for 65536 cells; the snapshot keeps 36 bytes a node, or 100 where there is
+ * colour, and 32 or 96 more where ambient light is dimmed. A query asks for the transmittance of each piece of its ray
+ * from cell to cell. Same bits for every isa and any number of threads.
  *
- * nebel_commit_fog then refuses (UNSUPPORTED) fog with max_opacity, start or cutoff, and sunlit fog that goes on
+ * nebel_commit_fog then refuses (UNSUPPORTED) fog with max_opacity, start or cutoff, and lit fog that goes on
  * endlessly along x or z but changes on the way. Errors: ARGUMENT, VALUE. */
 nebel_result nebel_set_diffusion(nebel_fog *fog, const nebel_diffusion_desc *desc);
 

@@ -1,4 +1,5 @@
-/* What fog makes of the sun's light after it has scattered it once: from a fog to the numbers at a lattice's nodes. */
+/* What fog makes of the sun's light after it has scattered it once, and what it takes from ambient light: from a fog to the
+ * numbers at a lattice's nodes. */
 #include "diffusion.h"
 
 #include <math.h>
@@ -125,6 +126,23 @@ static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const
     out[NB_NODE_WIDTH] = (float)width_of(cosine, times + 1);
 }
 
+/* `light`: fluence and flux of what the sky lacks. What goes straight on dims no light: of that, the sky's own light is what
+ * comes instead of what extinction as it is takes away. Nodes without fog say nothing of the sky. */
+static void set_sky_node(const nb_transport *t, int c, const nb_sky_moments *sky, const double light[4], float *out)
+{
+    const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
+    const double absorption = fmax(t->extinction[c] - t->scattering[c], 0);
+    const double transport = fmax(scaled - t->forward[c], 0);
+    const double turned = share(t->turned[c], scaled), forward = share(t->forward[c], scaled), linear = 3 / (4 * PI);
+    out[NB_NODE_DIMMED] = (float)(turned * light[0] / (4 * PI) + share(absorption, scaled));
+    out[NB_NODE_ABSORBED] = (float)share(absorption, t->extinction[c]);
+    for (int a = 0; a < 3; a++) {
+        const double even = linear * sky->flux[a];
+        out[NB_NODE_DIMMED + 1 + a] = (float)(linear * forward * light[1 + a] + share(transport, scaled) * even);
+        out[NB_NODE_ABSORBED + 1 + a] = (float)(share(transport, t->extinction[c]) * even);
+    }
+}
+
 static int has_colour(const nebel_snapshot *snapshot, const nebel_diffusion_desc *desc)
 {
     const double *ground = desc->ground_albedo;
@@ -147,26 +165,55 @@ static int has_peaks(const nebel_snapshot *snapshot)
 typedef struct draft {
     nb_transport *cells;
     nb_node_sun *sun;
-    nb_diffuse_light light[3];
+    nb_diffuse_light light[3], sky;
 } draft;
 
-static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
 {
     const size_t nodes = nb_lattice_nodes(&d->lattice);
-    nb_lattice_mean(&d->lattice, snapshot, made->cells);
+    const nb_diffuse_source source = {.sun = made->sun, .to_sun = d->to_sun};
     const nebel_result result = light_nodes(d, snapshot, made->sun);
     for (int c = 0; c < d->channel_count && result == NEBEL_OK; c++) {
-        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, made->sun, d->to_sun,
-                                fog->diffusion.ground_albedo[c], c, &made->light[c]))
+        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
+                                &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
             const nb_transport t = around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers];
             set_node(&t, c, &made->sun[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS);
-            node[d->node_numbers - 1] =
+            node[NB_NODE_NUMBERS * d->channel_count] =
                 (float)share(t.forward[0] + t.forward[1] + t.forward[2], t.turned[0] + t.turned[1] + t.turned[2]);
         }
     }
+    return result;
+}
+
+static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, draft *made)
+{
+    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    nb_sky_moments moments[3];
+    nb_sky_find_moments(&fog->sky, d->skylight, moments);
+    for (int c = 0; c < d->channel_count; c++) {
+        const nb_diffuse_source source = {.sky = moments[c]};
+        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
+                                &made->sky))
+            return NEBEL_ERROR_MEMORY;
+        for (size_t i = 0; i < nodes; i++) {
+            const nb_transport t = around(&d->lattice, made->cells, i);
+            float *node = &d->nodes[i * d->node_numbers + nb_diffusion_sky_number(d, c)];
+            set_sky_node(&t, c, &moments[c], &made->sky.nodes[4 * i], node);
+        }
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+{
+    nebel_result result = NEBEL_OK;
+    nb_lattice_mean(&d->lattice, snapshot, made->cells);
+    if (d->has_sun) result = fill_sun(d, fog, snapshot, made);
+    if (result == NEBEL_OK && d->has_sky) result = fill_sky(d, fog, made);
+    if (result == NEBEL_OK && d->has_sun) result = nb_diffusion_balance(snapshot, d, made->light);
     return result;
 }
 
@@ -179,10 +226,10 @@ static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_sna
     double *light = nb_allocate(allocator, nodes, 4 * sizeof *light);
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (int c = 0; c < 3; c++) made.light[c].nodes = light;
-    d->nodes = nb_allocate(allocator, nodes, d->node_numbers * sizeof *d->nodes);
+    made.sky.nodes = light;
+    d->nodes = nb_allocate_zero(allocator, nodes, d->node_numbers * sizeof *d->nodes);
     if (made.cells != NULL && made.sun != NULL && light != NULL && d->nodes != NULL)
         result = fill(d, fog, snapshot, &made);
-    if (result == NEBEL_OK) result = nb_diffusion_balance(snapshot, d, made.light);
     nb_release(allocator, made.cells);
     nb_release(allocator, made.sun);
     nb_release(allocator, light);
@@ -202,8 +249,11 @@ nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snaps
     d->lattice = lattice;
     d->scaled = nebel_retain_snapshot(scaled);
     d->has_peaks = has_peaks(snapshot);
-    d->channel_count = has_colour(snapshot, &fog->diffusion) ? 3 : 1;
-    d->node_numbers = (size_t)d->channel_count * NB_NODE_NUMBERS + 1;
+    d->has_sun = snapshot->is_sunlit;
+    d->has_sky = nb_sky_is_dimmed(fog, snapshot);
+    d->channel_count = has_colour(snapshot, &fog->diffusion) || (d->has_sky && nb_sky_has_colour(&fog->sky)) ? 3 : 1;
+    d->node_numbers =
+        (size_t)d->channel_count * (d->has_sky ? NB_NODE_NUMBERS + NB_NODE_SKY_NUMBERS : NB_NODE_NUMBERS) + 1;
     memcpy(d->to_sun, snapshot->to_sun, sizeof d->to_sun);
     memcpy(d->irradiance, fog->sun.irradiance, sizeof d->irradiance);
     result = solve(d, fog, snapshot);

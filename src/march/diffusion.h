@@ -37,13 +37,24 @@ enum {
     NB_NODE_NUMBERS
 };
 
+/* Of one channel at a node, per unit of the sky's mean radiance: what fog takes from the undimmed sky. Four numbers each:
+ * mean over directions, and the part that is linear in the direction of the light. */
+enum {
+    NB_NODE_DIMMED, /* source radiance of the lack of light, that of extinction after scaling */
+    NB_NODE_ABSORBED =
+        NB_NODE_DIMMED + 4, /* what of the undimmed sky is not scattered again, of the fog's extinction */
+    NB_NODE_SKY_NUMBERS = NB_NODE_ABSORBED + 4
+};
+
 typedef struct nb_diffusion {
     nb_lattice lattice;
     int channel_count;    /* 1: all channels are alike */
     int has_peaks;        /* some fog scatters forwards, so that `scaled` is another fog */
+    int has_sun, has_sky; /* whether the sun lights it; whether it dims the sky */
     double to_sun[3];     /* of length 1 */
     double irradiance[3]; /* of the sun */
-    size_t node_numbers;  /* of all channels, and one more: g of what is turned */
+    double skylight[3];   /* mean radiance of the sky */
+    size_t node_numbers;  /* of all channels, one more: g of what is turned; behind it the sky's of all channels */
     double gain[3][3][2]; /* of channels: of NB_NODE_DIFFUSE and NB_NODE_FLUX, in light that leaves along an axis
                                   to one side: see nb_diffusion_balance */
     float *nodes;         /* x fastest, then y; size + 1 along each axis */
@@ -51,6 +62,12 @@ typedef struct nb_diffusion {
         *beside;            /* of the endless fog alone, for what is beside the lattice; NULL where that is no more */
     nebel_snapshot *scaled; /* takes from light what does not go straight on; scatters nothing */
 } nb_diffusion;
+
+/* The first of the sky's numbers of a channel at a node; where it has any. */
+static inline size_t nb_diffusion_sky_number(const nb_diffusion *diffusion, int channel)
+{
+    return (size_t)diffusion->channel_count * NB_NODE_NUMBERS + 1 + (size_t)channel * NB_NODE_SKY_NUMBERS;
+}
 
 static inline size_t nb_lattice_cells(const nb_lattice *lattice)
 {
@@ -67,6 +84,31 @@ typedef struct nb_node_sun {
     double scaled[3], whole[3];
 } nb_node_sun;
 
+/* Two moments of undimmed ambient light in one channel, per unit of its mean radiance. */
+typedef struct nb_sky_moments {
+    double flux[3];      /* the way that light goes */
+    double above, below; /* irradiance of a level plane from above, and from below */
+} nb_sky_moments;
+
+/* What fog scatters: the sun's light, or the sky's, of which that is solved for which it lacks. */
+typedef struct nb_diffuse_source {
+    const nb_node_sun *sun; /* of each node; NULL: the sky */
+    const double *to_sun;
+    nb_sky_moments sky;
+} nb_diffuse_source;
+
+/* Whether the medium scatters the sun's light or ambient light. */
+int nb_medium_is_lit(const nb_medium *medium);
+
+/* Whether any fog or the ground takes something from ambient light, so that it is darker than undimmed. */
+int nb_sky_is_dimmed(const nebel_fog *fog, const nebel_snapshot *snapshot);
+
+/* Of each channel; all 0 where it is dark. */
+void nb_sky_find_moments(const nebel_environment *sky, double mean[3], nb_sky_moments moments[3]);
+
+/* Whether the moments are not the same in all channels. */
+int nb_sky_has_colour(const nebel_environment *sky);
+
 /* Where the lattice is, and its cells. *lit: 0 where there is nothing to be solved. Errors: UNSUPPORTED. */
 nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
                               nb_lattice *lattice, int *lit);
@@ -77,7 +119,7 @@ int nb_lattice_has_bodies(const nb_lattice *lattice);
 /* Means over the cells. */
 void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, nb_transport *cells);
 
-/* One channel's diffuse light, per unit of irradiance. */
+/* One channel's diffuse light, per unit of irradiance; the sky's lack of light, per unit of its mean radiance. */
 typedef struct nb_diffuse_light {
     double *nodes;        /* fluence and flux, four numbers each */
     double leaving[3][2]; /* power through the lattice's ends [m^2] */
@@ -87,8 +129,7 @@ typedef struct nb_diffuse_light {
 
 /* Fills *light, whose nodes are the caller's. 0 when memory is out. */
 int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *lattice, const nb_transport *cells,
-                       const nb_node_sun *sun, const double to_sun[3], double ground_albedo, int channel,
-                       nb_diffuse_light *light);
+                       const nb_diffuse_source *source, double ground_albedo, int channel, nb_diffuse_light *light);
 
 /* Sets the gains of a diffusion that is ready but for them. The radiance at an end of the lattice, which comes from what
  * is scattered towards it all along a ray, carries less out than diffusion says: that knows the energy better than where
@@ -97,6 +138,7 @@ nebel_result nb_diffusion_balance(const nebel_snapshot *fog, nb_diffusion *diffu
 
 typedef struct nb_gathered {
     double light[3], diffuse[3]; /* all, and what of it is diffuse */
+    double dimmed[3];            /* what undimmed ambient light has too much, per unit of the sky's mean radiance */
 } nb_gathered;
 
 /* Light per unit of irradiance that rays gather from the sun's light scattered in scaled fog; of what fog is there is no

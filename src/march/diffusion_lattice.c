@@ -26,7 +26,7 @@ typedef struct span {
     int is_endless[2];
 } span;
 
-/* ---- where sunlit fog is --------------------------------------------------------------------- */
+/* ---- where lit fog is ------------------------------------------------------------------------ */
 
 static span span_of(const nb_medium *medium, int axis)
 {
@@ -57,13 +57,13 @@ static int is_level(const nb_medium *medium, int axis)
     return density->type == NEBEL_DENSITY_CONSTANT || density->type == NEBEL_DENSITY_HEIGHT;
 }
 
-/* The span of all sunlit fog that ends, and whether there is any that does not. NULL, or what goes on and changes. */
+/* The span of all lit fog that ends, and whether there is any that does not. NULL, or what goes on and changes. */
 static const nb_medium *gather(const nebel_snapshot *snapshot, int axis, span *all)
 {
     *all = (span){HUGE_VAL, -HUGE_VAL, {0, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
-        if (!medium->is_sunlit) continue;
+        if (!nb_medium_is_lit(medium)) continue;
         const span s = span_of(medium, axis);
         const int goes_on = s.is_endless[0] || s.is_endless[1];
         if (goes_on && axis != 1 && !is_level(medium, axis)) return medium;

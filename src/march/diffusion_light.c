@@ -1,4 +1,4 @@
-/* What light that was scattered more than once adds to rays. */
+/* What light that was scattered more than once adds to rays, and what it takes from ambient light. */
 #include "diffusion.h"
 
 #include "base/vector.h"
@@ -35,7 +35,9 @@ typedef struct walker {
     double scaled[3], whole[3];     /* transmittance up to t, of scaled fog and of fog as it is */
     double source[3], once[3];      /* source radiance at t, of each of them */
     double diffuse[3];              /* of the former: what is diffuse */
+    double lack[3], taken[3];       /* of ambient light at t: NB_NODE_DIMMED, NB_NODE_ABSORBED */
     double light[3], spread[3];     /* what was gathered, and what of it is diffuse */
+    double dimmed[3];               /* of ambient light */
     int halvings;                   /* of steps, where fog is thick */
     const nb_diffusion *in;         /* whose nodes `source` and the others are of; NULL: not looked up */
 } walker;
@@ -115,6 +117,22 @@ static double gain_of(const nb_diffusion *d, int c, const double direction[3])
     return gain;
 }
 
+/* What is linear in the direction of the light, which comes along the ray. */
+static double along(const double numbers[4], const double direction[3])
+{
+    return numbers[0] - nb_vector_dot(&numbers[1], direction);
+}
+
+static void look_at_sky(const nb_diffusion *d, const size_t nodes[8], const double weights[8], int c, int own,
+                        walker *w)
+{
+    double numbers[NB_NODE_SKY_NUMBERS];
+    for (size_t k = 0; k < NB_NODE_SKY_NUMBERS; k++)
+        numbers[k] = mix(d, nodes, weights, nb_diffusion_sky_number(d, own) + k);
+    w->lack[c] = along(&numbers[NB_NODE_DIMMED], w->direction);
+    w->taken[c] = along(&numbers[NB_NODE_ABSORBED], w->direction);
+}
+
 /* In the lattice that the piece is in. */
 static void look(const block *b, walker *w)
 {
@@ -123,9 +141,13 @@ static void look(const block *b, walker *w)
     for (int a = 0; a < 3; a++) place[a] = b->middle[a] + w->origin[a] + w->t * w->direction[a];
     const nb_diffusion *d = w->in;
     find_nodes(&d->lattice, place, nodes, weights);
-    const double g = mix(d, nodes, weights, d->node_numbers - 1), turned = lobe(g, w->cosine);
+    const double g = mix(d, nodes, weights, (size_t)d->channel_count * NB_NODE_NUMBERS), turned = lobe(g, w->cosine);
     for (int c = 0; c < b->diffusion->channel_count; c++) {
         const int own = d->channel_count == 1 ? 0 : c;
+        w->lack[c] = w->taken[c] = 0;
+        if (d->has_sky && b->is_rest) look_at_sky(d, nodes, weights, c, own, w);
+        w->source[c] = w->once[c] = w->diffuse[c] = 0;
+        if (!d->has_sun) continue;
         const size_t first = (size_t)own * NB_NODE_NUMBERS;
         double numbers[4];
         for (size_t k = 0; k < 4; k++) numbers[k] = mix(d, nodes, weights, first + NB_NODE_DIFFUSE + k);
@@ -263,6 +285,8 @@ static void advance(block *b, size_t i)
         w->light[c] += w->scaled[c] * (of_scaled.first * before.source[c] + of_scaled.last * w->source[c]) +
                        w->whole[c] * (of_whole.first * before.once[c] + of_whole.last * w->once[c]);
         w->spread[c] += w->scaled[c] * (of_scaled.first * before.diffuse[c] + of_scaled.last * w->diffuse[c]);
+        w->dimmed[c] += w->scaled[c] * (of_scaled.first * before.lack[c] + of_scaled.last * w->lack[c]) -
+                        w->whole[c] * (of_whole.first * before.taken[c] + of_whole.last * w->taken[c]);
         is_thin = is_thin && scaled > THIN;
         w->scaled[c] *= scaled;
         w->whole[c] *= whole;
@@ -335,6 +359,7 @@ nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *
             const int own = d->channel_count == 1 ? 0 : c;
             gathered[i].light[c] = fmax(b.walkers[i].light[own], 0);
             gathered[i].diffuse[c] = b.walkers[i].spread[own];
+            gathered[i].dimmed[c] = b.walkers[i].dimmed[own];
         }
     return result;
 }
@@ -351,13 +376,13 @@ static void add(const nb_trace_job *job, size_t i, int c, double light)
 {
     if (job->light_planes == NULL) {
         nebel_light *out = (nebel_light *)(void *)((char *)job->lights + i * job->light_stride);
-        out->in_scattering[c] += light;
+        out->in_scattering[c] = fmax(out->in_scattering[c] + light, 0);
         return;
     }
     const nebel_light_planes *planes = job->light_planes;
     if (planes->in_scattering[c] == NULL) return;
     float *out = (float *)(void *)((char *)planes->in_scattering[c] + i * planes->in_scattering_stride);
-    *out += (float)light;
+    *out = fmaxf(*out + (float)light, 0);
 }
 
 nebel_result nb_diffusion_add(const nb_trace_job *job)
@@ -371,7 +396,9 @@ nebel_result nb_diffusion_add(const nb_trace_job *job)
         const nebel_result result = nb_diffusion_gather(job->snapshot, d, 1, n, rays, gathered);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < n; i++)
-            for (int c = 0; c < 3; c++) add(job, first + i, c, gathered[i].light[c] * d->irradiance[c]);
+            for (int c = 0; c < 3; c++)
+                add(job, first + i, c,
+                    gathered[i].light[c] * d->irradiance[c] - gathered[i].dimmed[c] * d->skylight[c]);
     }
     return NEBEL_OK;
 }

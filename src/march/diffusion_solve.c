@@ -7,6 +7,13 @@
  *
  * At an open end no diffuse light comes in, phi / 4 = F.n / 2 (Marshak). Of what ground of an albedo a receives, that
  * part comes back as phi / 4 - F.n / 2.
+ *
+ * Ambient light of mean radiance 1 and flux A that nothing dims fulfils none of that where fog absorbs, or where it is not
+ * the same from everywhere. What it has too much does, and none of it comes in at an open end:
+ *
+ *     div F + (s - w) phi = 4 pi (s - w)        phi' / 3 + (s - g w) F = (s - g w) A
+ *
+ * so that white fog under a white sky lacks nothing, exactly.
  */
 #include "diffusion.h"
 
@@ -37,13 +44,12 @@ typedef struct faces {
 
 typedef struct solver {
     const nb_lattice *lattice;
-    const nb_node_sun *sun;
-    const double *to_sun;
+    const nb_diffuse_source *source;
     double ground_albedo;
     int channel;
     size_t cell_count;
     double area[3];
-    double *diffusivity, *ahead; /* of cells: 1 / (3 transport extinction); g w over transport extinction */
+    double *diffusivity, *ahead; /* of cells: 1 / (3 transport extinction); g w over it, of the sky all of it over it */
     double *lost;                /* of cells: what goes away where there is no fog, by phi [1/m] */
     double *diagonal, *phi, *residual, *way, *product;
     faces faces[3];
@@ -102,17 +108,18 @@ static index3 shifted(const index3 *i, int axis, int by)
 
 /* ---- the equations --------------------------------------------------------------------------- */
 
-/* Sunlight through a face, along the axis, per area. */
+/* Light of the source through a face, along the axis, per area. */
 static double beam_through(const solver *s, int axis, const index3 *face)
 {
     double sum = 0;
+    if (s->source->sun == NULL) return s->source->sky.flux[axis];
     for (int k = 0; k < 4; k++) {
         index3 node = *face;
         node.at[(axis + 1) % 3] += (uint32_t)k & 1u;
         node.at[(axis + 2) % 3] += (uint32_t)k >> 1;
-        sum += s->sun[node_index(s->lattice, &node)].scaled[s->channel];
+        sum += s->source->sun[node_index(s->lattice, &node)].scaled[s->channel];
     }
-    return -s->to_sun[axis] * sum / 4;
+    return -s->source->to_sun[axis] * sum / 4;
 }
 
 /* Of half a cell, against flux along an axis: what fluence falls by per flux. Where a cell is very thick, light is in a
@@ -134,6 +141,14 @@ static void join_cells(solver *s, int axis, const index3 *face)
     s->faces[axis].drive[f] = s->area[axis] * beam_through(s, axis, face) * driven / resist;
 }
 
+/* What goes up from the ground of what the source sends down, per area; of the sky what comes from below without ground, less
+ * that. */
+static double returned_by_ground(const solver *s, double beam)
+{
+    const nb_sky_moments *sky = &s->source->sky;
+    return s->source->sun != NULL ? s->ground_albedo * fmax(beam, 0) : sky->below - s->ground_albedo * sky->above;
+}
+
 /* At an end the flux outwards is part * phi - returned. */
 static void end_cells(solver *s, int axis, int side, const index3 *face)
 {
@@ -144,7 +159,7 @@ static void end_cells(solver *s, int axis, int side, const index3 *face)
     const double beam = (side ? 1 : -1) * beam_through(s, axis, face), drive = s->ahead[cell] * beam;
     const double open = 1 / resistance(s, axis, cell), a = s->ground_albedo;
     const double part = end == NB_END_GROUND ? (1 - a) / (2 * (1 + a)) : 0.5;
-    const double returned = end == NB_END_GROUND ? 2 * a * fmax(beam, 0) / (1 + a) : 0;
+    const double returned = end == NB_END_GROUND ? 2 * returned_by_ground(s, beam) / (1 + a) : 0;
     const int level = end == NB_END_LEVEL;
     s->faces[axis].conductance[f] = level ? 0 : s->area[axis] * open * part / (part + open);
     s->faces[axis].drive[f] = s->area[axis] * (level ? drive : (part * drive - open * returned) / (part + open));
@@ -214,7 +229,7 @@ static void set_cells(solver *s, const nb_transport *cells)
         const double clear = mean > 0 ? fmax(1 - transport / (CLEAR_DENSITY * mean), 0) : 1;
         const double resisting = transport + clear / (3 * CLEAR_WAY * least);
         s->diffusivity[i] = 1 / (3 * fmax(resisting, 1e-12));
-        s->ahead[i] = cells[i].forward[c] / fmax(resisting, 1e-12);
+        s->ahead[i] = (s->source->sun != NULL ? cells[i].forward[c] : transport) / fmax(resisting, 1e-12);
         s->lost[i] = clear / (8 * CLEAR_WAY * least);
     }
 }
@@ -230,13 +245,16 @@ static void set_balance(solver *s, const nb_transport *cells)
         const size_t i = cell_index(l, &cell);
         const double extinction = scaled_extinction(&cells[i], c);
         const double turned = extinction > 0 ? cells[i].turned[c] / extinction : 0;
-        s->diagonal[i] = volume * (fmax(cells[i].extinction[c] - cells[i].scattering[c], 0) + s->lost[i]);
+        const double absorption = fmax(cells[i].extinction[c] - cells[i].scattering[c], 0);
+        const double begun =
+            s->source->sun != NULL ? turned * taken_from_beam(s, &cell) : volume * absorption * (4 * PI);
+        s->diagonal[i] = volume * (absorption + s->lost[i]);
         for (int axis = 0; axis < 3; axis++) {
             const index3 next = shifted(&cell, axis, 1);
             s->diagonal[i] += s->faces[axis].conductance[face_index(l, axis, &cell)] +
                               s->faces[axis].conductance[face_index(l, axis, &next)];
         }
-        s->residual[i] = turned * taken_from_beam(s, &cell) - outflow(s, &cell);
+        s->residual[i] = begun - outflow(s, &cell);
     } while (step(&cell, l->size));
 }
 
@@ -412,7 +430,8 @@ static void set_nodes(const solver *s, double *light)
     index3 node = {{0, 0, 0}};
     do {
         double *out = &light[4 * node_index(l, &node)];
-        out[0] = fmax(fluence_at(s, &node), 0);
+        const double fluence = fluence_at(s, &node);
+        out[0] = s->source->sun != NULL ? fmax(fluence, 0) : fluence; /* more light than the sky's is no fault */
         for (int axis = 0; axis < 3; axis++) out[1 + axis] = flux_at(s, axis, &node);
     } while (step(&node, size));
 }
@@ -461,12 +480,10 @@ static void release(const nebel_allocator *allocator, const solver *s)
 }
 
 int nb_diffusion_solve(const nebel_allocator *allocator, const nb_lattice *lattice, const nb_transport *cells,
-                       const nb_node_sun *sun, const double to_sun[3], double ground_albedo, int channel,
-                       nb_diffuse_light *light)
+                       const nb_diffuse_source *source, double ground_albedo, int channel, nb_diffuse_light *light)
 {
     solver s = {.lattice = lattice,
-                .sun = sun,
-                .to_sun = to_sun,
+                .source = source,
                 .ground_albedo = ground_albedo,
                 .channel = channel,
                 .cell_count = nb_lattice_cells(lattice)};

@@ -394,7 +394,8 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
     nebel_snapshot *s;
     nebel_result result = make_snapshot(fog, (selection){0}, &s);
-    if (result == NEBEL_OK && fog->diffusion.cells > 0 && s->is_sunlit) result = diffuse(fog, s);
+    if (result == NEBEL_OK && fog->diffusion.cells > 0 && (s->is_sunlit || nb_sky_is_dimmed(fog, s)))
+        result = diffuse(fog, s);
     if (result == NEBEL_OK) {
         *snapshot = s;
         return NEBEL_OK;

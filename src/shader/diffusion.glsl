@@ -120,6 +120,8 @@ nb_lattice nb_lattice_of(int word)
 /* Whether fog goes on beyond the low end along an axis, of the high one for high = 1. */
 bool nb_goes_on(nb_lattice l, int axis, int high) { return (l.flags >> (2 * axis + high) & 1) != 0; }
 
+bool nb_dims_sky(nb_lattice l) { return (l.flags & NB_LATTICE_SKY) != 0; }
+
 bool nb_is_beside(float place, float low, float extent) { return place < low || place > low + extent; }
 
 /* Where fog goes on beside a lattice, bodies in it are not seen any more. */
@@ -206,10 +208,21 @@ nb_vec3 nb_lattice_gain(nb_lattice l, nb_vec3 d)
            d.z * d.z * NEBEL_WORD(word + (d.z < 0.0 ? 5 : 4)).xyz;
 }
 
-/* Of opaque fog after scaling, and what of it exact light of one scattering has already, of fog as it is. */
+/* Of opaque fog after scaling, and what of it exact light of one scattering has already, of fog as it is; what ambient light lacks
+ * and what of it is absorbed, likewise. */
 struct nb_node_light {
-    nb_vec3 source, once;
+    nb_vec3 source, once, dimmed, absorbed;
 };
+
+nb_node_light nb_no_node_light()
+{
+    nb_node_light light;
+    light.source = nb_splat3(0.0);
+    light.once = nb_splat3(0.0);
+    light.dimmed = nb_splat3(0.0);
+    light.absorbed = nb_splat3(0.0);
+    return light;
+}
 
 /* Eight nodes around a place, which is taken to the nearest one of the lattice. */
 struct nb_nodes {
@@ -222,7 +235,7 @@ nb_nodes nb_nodes_around(nb_lattice l, nb_vec3 place)
     nb_vec3 at = clamp((place - l.low) / l.spacing, nb_splat3(0.0), l.cells);
     nb_vec3 base = min(floor(at), l.cells - nb_splat3(1.0));
     nb_nodes n;
-    n.right = 2 * l.channels + 1;
+    n.right = nb_dims_sky(l) ? 4 * l.channels + 1 : 2 * l.channels + 1;
     n.up = n.right * (int(l.cells.x) + 1);
     n.deep = n.up * (int(l.cells.y) + 1);
     n.texel = l.texel + int(base.x) * n.right + int(base.y) * n.up + int(base.z) * n.deep;
@@ -251,9 +264,7 @@ nb_node_light nb_look_at_nodes(nb_lattice l, nb_ray ray, float t, nb_turn to_sun
     float g = nb_mix_nodes(n, 2 * l.channels).x;
     float turned = nb_lattice_lobe(g, to_sun);
     nb_vec3 gain = nb_lattice_gain(l, ray.direction);
-    nb_node_light light;
-    light.source = nb_splat3(0.0);
-    light.once = nb_splat3(0.0);
+    nb_node_light light = nb_no_node_light();
     for (int c = 0; c < l.channels; c++) {
         nb_vec3 own = nb_vec3(c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0);
         if (l.channels == 1) own = nb_splat3(1.0);
@@ -261,6 +272,11 @@ nb_node_light nb_look_at_nodes(nb_lattice l, nb_ray ray, float t, nb_turn to_sun
         float diffuse = nb_diffuse_source(nb_mix_nodes(n, 2 * c), max(g, 0.0), ray.direction);
         light.source += own * (gain * diffuse + nb_splat3(turned * nb_exp(sun.x)));
         light.once += own * (sun.z * nb_lattice_lobe(sun.w, to_sun) - turned * nb_exp(sun.y));
+        if (!nb_dims_sky(l)) continue;
+        nb_vec4 along = nb_vec4(1.0, -ray.direction.x, -ray.direction.y, -ray.direction.z); /* light comes along the ray */
+        int sky = 2 * (l.channels + c) + 1;
+        light.dimmed += own * dot(nb_mix_nodes(n, sky), along);
+        light.absorbed += own * dot(nb_mix_nodes(n, sky + 1), along);
     }
     return light;
 }
@@ -288,6 +304,7 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
     nb_turn to_sun = nb_turn_between(ray.direction, nb_to_sun());
     nb_vec2 span = nb_clip_to_lattice(l, ray);
     nb_vec3 light = nb_splat3(0.0);
+    nb_vec3 dimmed = nb_splat3(0.0); /* of ambient light, per unit of its mean radiance */
     nb_two_depths before;
     before.whole = nb_splat3(0.0);
     before.scaled = nb_splat3(0.0);
@@ -296,9 +313,7 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
     int halvings = 0;
     int turns = 0;
     int word = 0;
-    nb_node_light here;
-    here.source = nb_splat3(0.0);
-    here.once = nb_splat3(0.0);
+    nb_node_light here = nb_no_node_light();
     while (t < span.y && nb_smallest(before.scaled) < NB_DARK_DEPTH && !nb_is_tired(turns)) {
         float step = max(smaller * min(nb_lattice_step(l, ray, t), span.y - t), t * (2.0 * NB_EPSILON));
         nb_lattice within = nb_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
@@ -315,6 +330,8 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
         nb_node_light there = nb_look_at_nodes(within, ray, end, to_sun);
         light += nb_exp3(-before.scaled) * nb_light_between(here.source, there.source, depth.scaled) +
                  nb_exp3(-before.whole) * nb_light_between(here.once, there.once, depth.whole);
+        dimmed += nb_exp3(-before.scaled) * nb_light_between(here.dimmed, there.dimmed, depth.scaled) -
+                  nb_exp3(-before.whole) * nb_light_between(here.absorbed, there.absorbed, depth.whole);
         before.scaled += depth.scaled;
         before.whole += depth.whole;
         if (left > NB_THIN_PIECE && halvings > 0) {
@@ -324,5 +341,5 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
         here = there;
         t = end;
     }
-    return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz;
+    return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz - dimmed * NEBEL_WORD(l.word + 9).xyz;
 }

@@ -20,7 +20,7 @@ static size_t list_lattices(const nebel_snapshot *snapshot, const nb_diffusion *
 
 static size_t texels_of_node(const nb_diffusion *d)
 {
-    return 2 * (size_t)d->channel_count + 1;
+    return (d->has_sky ? 4 : 2) * (size_t)d->channel_count + 1;
 }
 
 static size_t count_texels(const nebel_snapshot *snapshot)
@@ -52,7 +52,7 @@ size_t nb_count_lattice_words(const nebel_snapshot *snapshot)
 
 static int flags_of(const nb_diffusion *d)
 {
-    int flags = d->beside != NULL ? NB_LATTICE_BESIDE : 0;
+    int flags = (d->beside != NULL ? NB_LATTICE_BESIDE : 0) | (d->has_sky ? NB_LATTICE_SKY : 0);
     for (int i = 0; i < 6; i++) flags |= (d->lattice.ends[i / 2][i % 2] == NB_END_LEVEL) << i;
     return flags;
 }
@@ -72,6 +72,7 @@ static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t
         word[3 + i] = (nebel_word){{0}};
         for (int c = 0; c < 3; c++) word[3 + i].v[c] = (float)d->gain[d->channel_count == 1 ? 0 : c][i / 2][i % 2];
     }
+    word[9] = (nebel_word){{(float)d->skylight[0], (float)d->skylight[1], (float)d->skylight[2]}};
 }
 
 void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_word *words)
@@ -88,18 +89,25 @@ void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye
 /* ---- texels ---------------------------------------------------------------------------------- */
 
 _Static_assert(NB_NODE_DIFFUSE == 0 && NB_NODE_FLUX == 1 && NB_NODE_TURNED == 4 && NB_NODE_WIDTH == 7 &&
-                   NB_NODE_NUMBERS == 8,
+                   NB_NODE_NUMBERS == 8 && NB_NODE_DIMMED == 0 && NB_NODE_ABSORBED == 4 && NB_NODE_SKY_NUMBERS == 8,
                "what layout.h says");
 
-/* Numbers of the march lie as texels do, but for the last one of each node. Returns the word behind the last. */
+static nebel_word *pack_numbers(const float *numbers, size_t texels, nebel_word *word)
+{
+    for (size_t k = 0; k < texels; k++, numbers += 4)
+        *word++ = (nebel_word){{numbers[0], numbers[1], numbers[2], numbers[3]}};
+    return word;
+}
+
+/* Numbers of the march lie as texels do, but for the one of all channels. Returns the word behind the last. */
 static nebel_word *pack_nodes(const nb_diffusion *d, nebel_word *word)
 {
-    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    const size_t nodes = nb_lattice_nodes(&d->lattice), texels = 2 * (size_t)d->channel_count;
     for (size_t i = 0; i < nodes; i++) {
         const float *numbers = &d->nodes[i * d->node_numbers];
-        for (size_t k = 0; k + 1 < texels_of_node(d); k++, numbers += 4)
-            *word++ = (nebel_word){{numbers[0], numbers[1], numbers[2], numbers[3]}};
-        *word++ = (nebel_word){{numbers[0]}};
+        word = pack_numbers(numbers, texels, word);
+        *word++ = (nebel_word){{numbers[4 * texels]}};
+        if (d->has_sky) word = pack_numbers(&numbers[4 * texels + 1], texels, word);
     }
     return word;
 }

@@ -44,6 +44,7 @@
  *     1  the size of a cell [m], channels: 1 or 3
  *     2  cells along each axis, flags: 1 << (2 axis) where fog goes on beyond the low end, twice that for the high one
  *     3  gains of diffuse light that leaves along x upwards; downwards; along y, along z
+ *     9  mean radiance of the sky; where NB_LATTICE_SKY says that fog dims it
  *
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
  * both must hold; above them all a 1. a and b: of the box of a grid in sunlit fog its first
@@ -70,7 +71,7 @@
  *
  * Nodes of lattices are texels of four floats, the same for every eye: of each node, x fastest, two for each channel,
  * source radiance and flux of diffuse light; NB_NODE_TURNED, _ONCE, _GLOW and _WIDTH of march/diffusion.h; then one that
- * holds g of what is turned.
+ * holds g of what is turned. Where NB_LATTICE_SKY is set two more for each channel: NB_NODE_DIMMED and NB_NODE_ABSORBED.
  *
  * Environment words are vectors of floats, the same for every eye:
  *     0  NB_ENVIRONMENT_; of a map cosine and sine of its rotation, intensity
@@ -115,10 +116,11 @@
 #define NB_LEAF_WORDS 6
 #define NB_SCATTERING_WORDS 3
 #define NB_LAMP_WORDS 4
-#define NB_LATTICE_WORDS 9
+#define NB_LATTICE_WORDS 10
 #define NB_SUN_LATTICE_TEXELS 4
 
 #define NB_LATTICE_BESIDE 64
+#define NB_LATTICE_SKY 128
 
 #define NB_KIND_CONSTANT 0
 #define NB_KIND_HEIGHT 1        /* grows below the base */

@@ -5,6 +5,7 @@
 #include "voxels.h"
 
 #include "base/precision.h"
+#include "march/diffusion.h"
 #include "march/snapshot.h"
 #include "media/grid.h"
 
@@ -26,6 +27,7 @@ _Static_assert(NEBEL_MOST_PACKED_VOLUMES == (MOST_WORDS - NB_HEADER_WORDS) / NB_
 #define STEP_TOLERANCE 3e-5
 
 typedef struct packer {
+    const nebel_snapshot *snapshot;
     nebel_word *words;
     size_t used; /* words behind those of the media that are taken */
     size_t rank; /* of the medium, counted from 0 */
@@ -248,16 +250,18 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
 
 /* ---- scattering ------------------------------------------------------------------------------ */
 
-static int scatters(const nb_medium *medium)
+/* Whether anything needs to know what it scatters: of ambient light diffusion does. */
+static int scatters(const nebel_snapshot *snapshot, const nb_medium *medium)
 {
-    return medium->is_sunlit || medium->is_lamplit;
+    const int is_diffuse = snapshot->diffusion != NULL && nb_medium_is_lit(medium);
+    return medium->is_sunlit || medium->is_lamplit || is_diffuse;
 }
 
 static void pack_scattering(packer *p, const nb_medium *medium, nebel_word *word)
 {
     const nb_phase *phase = &medium->body.phase;
     nebel_word *scattering = &p->words[p->used];
-    if (!scatters(medium)) return;
+    if (!scatters(p->snapshot, medium)) return;
     word[NB_MEDIUM_SCATTERING].v[3] = (float)p->used;
     word[NB_MEDIUM_AHEAD].v[3] = (float)medium->ahead;
     p->used += NB_SCATTERING_WORDS;
@@ -332,7 +336,7 @@ static size_t count_words(const nebel_snapshot *snapshot)
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_WORDS : 0);
-        count += scatters(&snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
+        count += scatters(snapshot, &snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
     }
     if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LAMP_WORDS;
     return count + nb_count_lattice_words(snapshot);
@@ -362,7 +366,8 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     if (capacity < *count)
         return nb_fail(&snapshot->log, NEBEL_ERROR_LIMIT, "pack: %zu words are needed, there is room for %zu", *count,
                        capacity);
-    packer p = {words,
+    packer p = {snapshot,
+                words,
                 NB_HEADER_WORDS + snapshot->medium_count * NB_MEDIUM_WORDS,
                 0,
                 {(long double)eye[0], (long double)eye[1], (long double)eye[2]}};

@@ -198,7 +198,7 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
         }
         if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) light.in_scattering += nb_lamplight(ray, first, count, listed);
         if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x > 0.0)
-            light.in_scattering += nb_gather_diffuse(ray, first, count, listed);
+            light.in_scattering = max(light.in_scattering + nb_gather_diffuse(ray, first, count, listed), nb_splat3(0.0));
         if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
         light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
     }
