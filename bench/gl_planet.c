@@ -1,5 +1,5 @@
-/* Frames of the Earth's air in OpenGL, against a copy of such a picture: from the ground, from space, and where the eye moves,
- * so that the table is made anew. In the current context. */
+/* Frames of planets in OpenGL, against a copy of such a picture: air from the ground, from space, and where the eye moves,
+ * so that the table is made anew; layers. In the current context. */
 #include "groups.h"
 #include "measure.h"
 #include "scenes.h"
@@ -11,9 +11,10 @@
 
 typedef struct nb_gl_planet_bench {
     nebel_atmosphere *air;
-    nebel_planet planet;
-    nebel_scene_data scene;
-    nebel_gl_renderer *renderer;
+    nebel_layers *layers;
+    nebel_planet planet, layered;
+    nebel_scene_data scene, layered_scene;
+    nebel_gl_renderer *renderer, *layered_renderer;
     unsigned textures[2], framebuffers[2];
     nebel_gl_frame_desc frame;
 } nb_gl_planet_bench;
@@ -74,6 +75,18 @@ static double run_flight(void *user)
     return run_frame(b);
 }
 
+/* The Earth with two shells of clouds and its air, as tutorials draw it. */
+static int set_up_layers(nb_gl_planet_bench *b)
+{
+    b->layered = (nebel_planet){.model = NEBEL_PLANET_LAYERS, .shells = {.cloud_count = 2}, .sun_left = {1, 1, 1}};
+    if (nebel_create_layers(&b->layered.shells, &b->layers) != NEBEL_OK) return -1;
+    b->layered.layers = b->layers;
+    b->layered_scene = b->scene;
+    b->layered_scene.planets = &b->layered;
+    const nebel_gl_renderer_desc usual = {.shadow_size = 0};
+    return nebel_create_gl_renderer(&b->layered_scene, NULL, &usual, &b->layered_renderer) == NEBEL_OK ? 0 : -1;
+}
+
 static int set_up(const nb_bench_desc *desc, nb_gl_planet_bench *b)
 {
     static const double to_sun[3] = {0.5, 0.75, -0.43};
@@ -90,25 +103,29 @@ static int set_up(const nb_bench_desc *desc, nb_gl_planet_bench *b)
         (nebel_scene_data){.has_sun = 1, .sun_irradiance = {12, 12, 12}, .planet_count = 1, .planets = &b->planet};
     memcpy(b->scene.sun_direction, to_sun, sizeof to_sun);
     if (nebel_create_gl_renderer(&b->scene, NULL, &usual, &b->renderer) != NEBEL_OK) return -1;
-    return make_copy(b);
+    return set_up_layers(b) == 0 ? make_copy(b) : -1;
 }
 
 static const char *measure(const nb_bench_desc *desc, nb_gl_planet_bench *b, nb_figures *figures)
 {
-    enum { COPY, GROUND, SPACE, FLIGHT, CONTESTS };
+    enum { COPY, GROUND, SPACE, FLIGHT, LAYERS, CONTESTS };
     static const char *const names[CONTESTS] = {[GROUND] = "sky and ground, 1.7 m above it",
                                                 [SPACE] = "the planet from 2,000 km",
-                                                [FLIGHT] = "sky and ground, the eye moves: with the table"};
-    nb_gl_planet_bench space = *b, flight = *b;
+                                                [FLIGHT] = "sky and ground, the eye moves: with the table",
+                                                [LAYERS] = "a planet of layers, two shells of clouds"};
+    nb_gl_planet_bench space = *b, flight = *b, layers = *b;
+    layers.renderer = b->layered_renderer;
+    layers.frame.camera = (nebel_camera){.position = {0, 0, 2.2e7}, .up = {0, 1, 0}, .vertical_fov = 40};
     space.frame.camera = (nebel_camera){
         .position = {0, 2e6, 0}, .look_at = {-0.25e6, -0.15e6, -3e6}, .up = {0, 1, 0}, .vertical_fov = 60};
     nb_contest contests[CONTESTS] = {[COPY] = {.run = run_copy, .user = b},
                                      [GROUND] = {.run = run_still, .user = b},
                                      [SPACE] = {.run = run_still, .user = &space},
-                                     [FLIGHT] = {.run = run_flight, .user = &flight}};
+                                     [FLIGHT] = {.run = run_flight, .user = &flight},
+                                     [LAYERS] = {.run = run_still, .user = &layers}};
     if (nb_measure(contests, CONTESTS, desc->quick ? 1 : 7) != 0) return "opengl: a planet cannot be drawn";
     for (int i = 1; i < CONTESTS; i++) {
-        nb_figure figure = {.group = "The air of the Earth in OpenGL, one sample: the whole frame",
+        nb_figure figure = {.group = "Planets in OpenGL, one sample: the whole frame",
                             .unit = "ms",
                             .value = 1e3 * contests[i].seconds,
                             .floor_name = "a copy of the picture",
@@ -124,7 +141,9 @@ const char *nb_bench_opengl_planet(const nb_bench_desc *desc, nb_figures *figure
     nb_gl_planet_bench b = {.air = NULL};
     const char *fault = "opengl: a planet cannot be set up";
     if (set_up(desc, &b) == 0) fault = measure(desc, &b, figures);
+    nebel_destroy_gl_renderer(b.layered_renderer);
     nebel_destroy_gl_renderer(b.renderer);
+    nebel_destroy_layers(b.layers);
     nebel_destroy_atmosphere(b.air);
     glDeleteTextures(2, b.textures);
     glDeleteFramebuffers(2, b.framebuffers);

@@ -56,8 +56,12 @@ static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const
 {
     nebel_renderer *renderer = NULL;
     const nebel_renderer_desc desc = {.log = {write_message, NULL}};
-    const nebel_frame_desc frame = {
-        .camera = *camera, .width = pair->width, .height = pair->height, .samples = samples, .tolerance = 1e-4};
+    const nebel_frame_desc frame = {.camera = *camera,
+                                    .width = pair->width,
+                                    .height = pair->height,
+                                    .samples = samples,
+                                    .tolerance = 1e-4,
+                                    .time = pair->time};
     assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &pair->cpu), NEBEL_OK);
     nebel_destroy_renderer(renderer);
@@ -72,6 +76,7 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
                                        .width = pair->width,
                                        .height = pair->height,
                                        .samples = samples,
+                                       .time = pair->time,
                                        .particles_leave_sun = particles != NULL && particles->leave_sun};
     const nebel_gl_planes planes = {pair->gl.color, pair->gl.transmittance, pair->gl.in_scattering, pair->gl.depth,
                                     pair->gl.normal};
@@ -370,4 +375,21 @@ void picture_report_close(picture_report *report)
 {
     if (report->page != NULL) assert_int_equal(fclose(report->page), 0);
     report->page = NULL;
+}
+double picture_shown_apart(const picture_pair *pair)
+{
+    const size_t pixels = (size_t)pair->width * pair->height;
+    float *const cpu = malloc(3 * pixels * sizeof *cpu), *const gl = malloc(3 * pixels * sizeof *gl);
+    size_t apart = 0;
+    assert_true(cpu != NULL && gl != NULL);
+    nebel_tone_map(pixels, pair->cpu.color, 0, cpu);
+    nebel_tone_map(pixels, pair->gl.color, 0, gl);
+    for (size_t i = 0; i < pixels; i++) {
+        int is = 0;
+        for (size_t c = 0; c < 3; c++) is |= !(fabsf(cpu[3 * i + c] - gl[3 * i + c]) <= 2.f / 255);
+        apart += (size_t)is;
+    }
+    free(cpu);
+    free(gl);
+    return (double)apart / (double)pixels;
 }

@@ -12,6 +12,7 @@
 /* All planes, at the same pixels. */
 typedef struct picture_pair {
     uint32_t width, height;
+    double time; /* of both frames; 0 at first */
     nebel_frame cpu, gl;
 } picture_pair;
 
@@ -54,6 +55,9 @@ typedef struct picture_light {
 } picture_light;
 
 picture_light picture_compare_light(const picture_pair *pair);
+
+/* Of pixels the share that is more than 2/255 apart as they are shown. */
+double picture_shown_apart(const picture_pair *pair);
 
 /* ---- the report: an HTML page and its pictures in the folder NEBEL_REPORT; nothing without it ---- */
 

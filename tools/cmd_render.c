@@ -292,6 +292,7 @@ static nebel_result draw_frame(studio *all)
         .factor = scene->classic,
         .vertex = &look,
         .d3d9 = scene->classic_d3d9,
+        .time = all->frame,
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[NB_LAYER_COLOR],

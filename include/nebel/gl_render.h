@@ -18,7 +18,8 @@
  *
  * A planet with air (`planets` of the scene, one) is drawn as by the CPU; its table is made anew in a frame whose eye or
  * sun is another than in the one before, which takes 50 to 230 ms. Its atmosphere must live as long as the renderer:
- * another one at the same address would be taken for the first.
+ * another one at the same address would be taken for the first. So must the layers of one that has them, whose shells are
+ * surfaces of which a part is seen: each costs the fog and the particles of a frame once more.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
  * what nebel/gl.h lists it changes, while it runs, texture units 7 to 15, and TEXTURE_2D_ARRAY of units 10, 12 and 14; both
@@ -129,14 +130,15 @@ typedef struct nebel_gl_frame_desc {
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
                                   some microseconds each. Not where `fog` excludes, replaces or limits what particles
                                   do. Nonzero: sunlight passes particles by: for many of them and an eye that moves */
+    double time;             /* s, within 1e12: what a planet's layers have turned by */
 } nebel_gl_frame_desc;
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
- * needs), VALUE (a camera or light as for nebel_render_frame; taps that are not finite or negative; a factor as for
- * nebel_resolve_factor), LIMIT (a picture too large for this context; more than 4,096 lamps; stopped by progress),
- * MEMORY, UNSUPPORTED (more than one sample where OpenGL ES cannot blend floats; a planet of layers or with clouds,
- * several of them, or one with air in an orthographic view, by another method than EXACT, or with particles; a shader
- * that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
+ * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
+ * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; more than 4,096 lamps; stopped by progress),
+ * MEMORY, UNSUPPORTED (more than one sample, or a planet of layers, where OpenGL ES cannot blend floats; a planet with
+ * clouds of volume, several of them, one by another method than EXACT, or one with air in an orthographic view or with
+ * particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
  * meshes: 108 bytes each, with fog per vertex 48 more. */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 

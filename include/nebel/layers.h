@@ -136,6 +136,17 @@ typedef struct nebel_layer_hits {
 nebel_result nebel_trace_layers(const nebel_layers *layers, const nebel_layer_view *view, size_t n,
                                 const nebel_ray *rays, size_t ray_stride, nebel_layer_hits *hits, size_t hit_stride);
 
+/* ---- for those who draw it themselves ---------------------------------------------------------- */
+
+/* What a planet is made of: where the description had zeros stands what they stood for, and the maps are the planet's own,
+ * generated ones, too, which live as long as it does. A shell whose detail is {0} takes that from its map. NULL: NULL. */
+const nebel_layers_desc *nebel_describe_layers(const nebel_layers *layers);
+
+/* Maps are read between texels and between levels, so that what is small in a picture is averaged. Level 0 is the map; each
+ * next one is half as wide and high, rounded down to 1 at the least, and its texels are means of those that they cover.
+ * `map` is one of that description. Any thread. Errors: ARGUMENT (NULL, another map, no such level). */
+nebel_result nebel_find_map_level(const nebel_layers *layers, const nebel_map *map, uint32_t level, nebel_map *coarser);
+
 #ifdef __cplusplus
 }
 #endif

@@ -3,6 +3,7 @@
 #define NB_VECTOR_H
 
 #include <math.h>
+#include <string.h>
 
 static inline double nb_vector_dot(const double a[3], const double b[3])
 {
@@ -31,6 +32,16 @@ static inline int nb_vector_make_unit(double v[3])
     const double length = nb_vector_length(v);
     for (int i = 0; i < 3; i++) v[i] /= length;
     return 1;
+}
+
+/* What a quaternion x y z w of any length, 0: none, makes of the axes x, y and z. */
+static inline void nb_vector_axes(const double q[4], double axes[3][3])
+{
+    const double x = q[0], y = q[1], z = q[2], w = q[3], n = x * x + y * y + z * z + w * w, s = n > 0 ? 2 / n : 0;
+    const double turned[3][3] = {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)},
+                                 {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
+                                 {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}};
+    memcpy(axes, turned, sizeof turned);
 }
 
 #endif

@@ -2,36 +2,14 @@
  * properties; once, shadow maps around what the first sample sees; the fog up to the surfaces; the light of all that.
  */
 #include "corners.h"
+#include "frame.h"
 #include "frame_check.h"
 #include "gl.h"
-#include "method.h"
 #include "panorama.h"
 #include "pixel_fog.h"
-#include "renderer.h"
 #include "vertex_fog.h"
 
-#include "base/lighting.h"
-
-#include <math.h>
-
-typedef struct frame {
-    nebel_gl_renderer *renderer;
-    const nebel_gl_frame_desc *desc;
-    uint32_t samples;
-    nb_lighting light;
-    double eye[3];
-    int panorama;
-    const nebel_planet *planet; /* with air; NULL: none */
-    nb_method method;
-    nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
-    nebel_view sample_view;  /* through the places of the present sample */
-    nebel_rays rays;         /* of sample_view, or of the panorama */
-    nebel_view sun_view;     /* of all that is seen, against the sun's light */
-    int casts;               /* the sun shines, and there is something to cast shadows */
-    int dims;                /* particles dim the sun */
-    int shafts;              /* models shade fog */
-    nebel_sunlit_fog sunlit; /* that fog */
-} frame;
+typedef nb_gl_frame frame;
 
 /* ---- what is drawn ---------------------------------------------------------------------------- */
 
@@ -63,17 +41,18 @@ static nebel_result set_frame(frame *f)
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
     f->shafts = find_shafts(f);
     f->planet = nb_gl_air_planet(r->scene);
+    f->layers = nb_gl_shells_planet(r->scene);
     return result;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
 
-static void set_vector(unsigned program, const char *name, const float v[3])
+void nb_frame_set_vector(unsigned program, const char *name, const float v[3])
 {
     glUniform3fv(glGetUniformLocation(program, name), 1, v);
 }
 
-static void set_rays(const frame *f, unsigned program)
+void nb_frame_set_rays(const frame *f, unsigned program)
 {
     float rays[6][3];
     for (int i = 0; i < 6; i++) {
@@ -99,7 +78,7 @@ static void set_clip(const frame *f, unsigned program)
     glUniformMatrix4fv(glGetUniformLocation(program, "scene_clip"), 1, GL_FALSE, matrix);
 }
 
-static void bind_texture(GLuint unit, GLenum target, unsigned texture)
+void nb_frame_bind_texture(GLuint unit, GLenum target, unsigned texture)
 {
     glActiveTexture(GL_TEXTURE0 + unit);
     glBindTexture(target, texture);
@@ -120,7 +99,7 @@ static void draw_meshes(const frame *f, unsigned program)
         glUniform3fv(offset, 1, from_eye);
         glUniform3fv(color, 1, mesh->base_color);
         glUniform1i(has_texture, mesh->texture != 0);
-        bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
+        nb_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, mesh->texture);
         nb_meshes_bind_mask(mesh, cutoff);
         if (f->panorama) {
             nb_corners_draw(mesh, NB_PANORAMA_STRIP);
@@ -139,8 +118,8 @@ static void draw_ground(const frame *f)
     float albedo[3];
     for (int i = 0; i < 3; i++) albedo[i] = (float)f->planet->air.ground_albedo[i];
     glUseProgram(program);
-    set_rays(f, program);
-    set_vector(program, "ground_albedo", albedo);
+    nb_frame_set_rays(f, program);
+    nb_frame_set_vector(program, "ground_albedo", albedo);
     glBindVertexArray(f->renderer->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
@@ -157,11 +136,12 @@ static void draw_surfaces(const frame *f)
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER);
     glUseProgram(program);
-    set_rays(f, program);
+    nb_frame_set_rays(f, program);
     set_clip(f, program);
-    set_vector(program, "scene_sun", f->light.sun);
+    nb_frame_set_vector(program, "scene_sun", f->light.sun);
     draw_meshes(f, program);
     if (f->planet != NULL) draw_ground(f);
+    if (f->layers != NULL) nb_frame_draw_shell_ground(f);
 }
 
 static int has_lamps(const frame *f)
@@ -193,7 +173,7 @@ static void set_factor_numbers(const frame *f, unsigned program)
     glUniform1i(glGetUniformLocation(program, "factor_mode"), (GLint)f->method.factor.mode);
     glUniform3f(glGetUniformLocation(program, "factor_range"), (float)f->method.factor.start,
                 (float)f->method.factor.end, (float)f->method.factor.density);
-    set_vector(program, "factor_color", color);
+    nb_frame_set_vector(program, "factor_color", color);
 }
 
 /* The fog that vertices bring. */
@@ -203,12 +183,12 @@ static void draw_vertex_fog(const frame *f)
     const unsigned program = f->panorama ? r->shading.round_vertex_fog : r->shading.vertex_fog;
     clear_fog();
     glUseProgram(program);
-    set_rays(f, program);
+    nb_frame_set_rays(f, program);
     set_clip(f, program);
     glUniform1f(glGetUniformLocation(program, "scene_weakening"), f->desc->method != NEBEL_GL_METHOD_ADDITIVE);
     glUniform1i(glGetUniformLocation(program, "factor_mode"), -1);
     if (nb_method_is_by_user(&f->method) && f->method.factor.stage == NEBEL_STAGE_PIXEL) set_factor_numbers(f, program);
-    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     draw_meshes(f, program);
 }
 
@@ -220,7 +200,7 @@ static void set_axis(const frame *f, unsigned program)
     const int has_axis = !f->panorama && (parallel || f->method.factor.coordinate == NEBEL_COORDINATE_PLANE);
     float axis[3];
     for (int i = 0; i < 3; i++) axis[i] = has_axis ? (float)-eye[4 * i + 2] : 0;
-    set_vector(program, "scene_axis", axis);
+    nb_frame_set_vector(program, "scene_axis", axis);
 }
 
 static nebel_result draw_factor(const frame *f)
@@ -231,10 +211,10 @@ static nebel_result draw_factor(const frame *f)
     const unsigned program = f->panorama ? r->shading.round_factor : r->shading.factor;
     clear_fog();
     glUseProgram(program);
-    set_rays(f, program);
+    nb_frame_set_rays(f, program);
     set_axis(f, program);
     set_factor_numbers(f, program);
-    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
     return NEBEL_OK;
@@ -243,8 +223,8 @@ static nebel_result draw_factor(const frame *f)
 static void set_lamps(const frame *f, unsigned program)
 {
     const nb_lamps *const lamps = &f->renderer->lamps;
-    bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
-    bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
+    nb_frame_bind_texture(NB_UNIT_LAMPS, GL_TEXTURE_2D, lamps->words);
+    nb_frame_bind_texture(NB_UNIT_LAMP_MAPS, GL_TEXTURE_2D_ARRAY, lamps->maps);
     glUniform1i(glGetUniformLocation(program, "lamp_count"), (GLint)f->renderer->scene->lamp_count);
     glUniform1f(glGetUniformLocation(program, "map_face"), (float)lamps->face);
     glUniform1f(glGetUniformLocation(program, "map_share"), 1 - 2.f * NB_LAMP_BORDER / (float)lamps->face);
@@ -262,9 +242,8 @@ static void set_lamp_shade(const void *of, unsigned program)
 static nebel_result draw_exact_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    const nebel_gl_pass pass = {.output = NEBEL_GL_OUTPUT_SPLIT,
-                                .depth_texture = r->targets.place,
-                                .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
+    const nebel_gl_pass pass = {
+        .output = NEBEL_GL_OUTPUT_SPLIT, .depth_texture = f->place, .depth = {.kind = NEBEL_DEPTH_KIND_DISTANCE}};
     nb_gl_picture picture = {.rays = f->rays,
                              .width = f->view.width,
                              .height = f->view.height,
@@ -280,7 +259,7 @@ static nebel_result draw_exact_fog(const frame *f)
 }
 
 /* Or air. Cells and factors have no need of the renderer's fog. */
-static int has_fog(const frame *f)
+int nb_frame_has_fog(const frame *f)
 {
     return f->renderer->fog != NULL || f->planet != NULL || nb_method_takes_cells(f->desc->method) ||
            f->method.replaces_fog;
@@ -312,16 +291,16 @@ static nebel_result draw_pixel_fog(const frame *f)
     return nb_pixel_fog_set(&r->targets, &r->allocator, &r->log, &f->rays, &source);
 }
 
-static int has_particles(const frame *f)
+int nb_frame_has_particles(const frame *f)
 {
     return f->renderer->particles.count > 0 && !f->method.replaces_fog;
 }
 
 /* Particles ask for the renderer's fog before them whatever is on surfaces, and lamps for that before surfaces. */
-static nebel_result draw_fog(const frame *f)
+nebel_result nb_frame_draw_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    if (!has_fog(f)) return NEBEL_OK;
+    if (!nb_frame_has_fog(f)) return NEBEL_OK;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.fog_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     nebel_result result = NEBEL_OK;
@@ -333,7 +312,7 @@ static nebel_result draw_fog(const frame *f)
         result = draw_pixel_fog(f);
     const int is_exact =
         !nb_method_is_by_vertex(&f->method) && !f->method.replaces_fog && !nb_method_takes_cells(f->desc->method);
-    const int is_asked = is_exact || has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
+    const int is_asked = is_exact || nb_frame_has_particles(f) || (has_lamps(f) && !f->method.replaces_fog);
     if (result == NEBEL_OK && (r->fog != NULL || f->planet != NULL) && is_asked) result = set_eye_fog(f);
     return result == NEBEL_OK && is_exact ? draw_exact_fog(f) : result;
 }
@@ -365,11 +344,11 @@ static void set_face_tiles(const frame *f, const nebel_gl_fog *fog, unsigned pro
 
 static void bind_media(const nebel_gl_fog *fog)
 {
-    if (fog->texture != 0) bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
+    if (fog->texture != 0) nb_frame_bind_texture(NB_UNIT_FOG, GL_TEXTURE_2D, fog->texture);
     if (fog->block != 0) glBindBufferBase(GL_UNIFORM_BUFFER, 0, fog->block);
-    if (fog->environment != 0) bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, fog->environment);
-    if (fog->voxels != 0) bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
-    if (fog->nodes != 0) bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->nodes);
+    if (fog->environment != 0) nb_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, fog->environment);
+    if (fog->voxels != 0) nb_frame_bind_texture(NB_UNIT_VOXELS, GL_TEXTURE_2D, fog->voxels);
+    if (fog->nodes != 0) nb_frame_bind_texture(NB_UNIT_NODES, GL_TEXTURE_2D, fog->nodes);
 }
 
 static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned program)
@@ -377,17 +356,17 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     const int parallel = f->view.clip_from_eye[15] != 0;
     const double *const eye = f->view.eye_from_world;
     glUseProgram(program);
-    set_rays(f, program);
+    nb_frame_set_rays(f, program);
     set_clip(f, program);
     glUniform3f(glGetUniformLocation(program, "scene_forward"), parallel ? (float)-eye[2] : 0,
                 parallel ? (float)-eye[6] : 0, parallel ? (float)-eye[10] : 0);
     glUniform2f(glGetUniformLocation(program, "scene_size"), (float)f->desc->width, (float)f->desc->height);
     const int five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP;
     if (five_taps) set_taps(f, program);
-    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, five_taps ? f->renderer->targets.place : f->renderer->targets.depth);
+    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, five_taps ? f->place : f->depth);
     bind_media(fog);
     if (fog->tiles == 0) return;
-    bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
+    nb_frame_bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
     if (f->panorama) {
         set_face_tiles(f, fog, program);
     } else {
@@ -395,16 +374,15 @@ static void set_particles(const frame *f, const nebel_gl_fog *fog, unsigned prog
     }
 }
 
-/* The program that asks the fog of `passes`, NULL: none, and that fog. The kind is given but for its fog. */
-static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_kind kind, nebel_gl_fog *fog,
-                               unsigned *program)
+nebel_result nb_frame_find_light(const frame *f, const nebel_gl *passes, nb_light_kind kind, nebel_gl_fog *fog,
+                                 unsigned *program)
 {
     nebel_gl_renderer *const r = f->renderer;
     *fog = (nebel_gl_fog){0};
     const nebel_result result = passes != NULL ? nebel_gl_get_fog(passes, fog) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     kind.panorama = f->panorama;
-    kind.has_surfaces = r->meshes.count > 0 || kind.air;
+    kind.has_surfaces = r->meshes.count > 0 || f->planet != NULL || f->layers != NULL;
     kind.has_fog = passes != NULL;
     kind.in_texture = fog->texture != 0;
     kind.tiled = fog->tiles != 0 && !kind.air; /* ground reaches beyond all lists along the sun's light */
@@ -413,20 +391,19 @@ static nebel_result find_light(const frame *f, const nebel_gl *passes, nb_light_
     return nb_shading_find_light(&r->shading, &r->context, &r->allocator, &r->log, &kind, program);
 }
 
-/* Blending has room for one factor a target: grey particles are drawn into one, others into one for each colour. */
-static int count_veil_layers(const frame *f)
+int nb_frame_count_veil_layers(const frame *f)
 {
-    return !has_particles(f) ? 0 : f->renderer->particles.is_grey ? 1 : 3;
+    return !nb_frame_has_particles(f) ? 0 : f->renderer->particles.is_grey ? 1 : 3;
 }
 
 /* Whatever comes to the farthest particle, and what it adds, passes through each. */
-static nebel_result draw_particles(const frame *f)
+nebel_result nb_frame_draw_particles(const frame *f)
 {
     static const GLfloat clear[2][4] = {{0, 0, 0, 1}, {0, 1, 0, 0}};
     nebel_gl_renderer *const r = f->renderer;
     nebel_gl_fog fog;
     unsigned program = 0;
-    const int layers = count_veil_layers(f);
+    const int layers = nb_frame_count_veil_layers(f);
     if (layers == 0) return NEBEL_OK;
     nb_renderer_judge_particles(r);
     const int has_fog = r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0;
@@ -434,7 +411,7 @@ static nebel_result draw_particles(const frame *f)
                                 .five_taps = f->desc->method == NEBEL_GL_METHOD_FIVE_TAP,
                                 .veil_layers = layers,
                                 .shafts = has_fog && f->shafts};
-    const nebel_result result = find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
+    const nebel_result result = nb_frame_find_light(f, has_fog ? r->eye_fog : NULL, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.veil_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
@@ -444,108 +421,6 @@ static nebel_result draw_particles(const frame *f)
     if (kind.shafts) nb_shafts_set(&r->shafts, program);
     nb_particles_draw(&r->particles, f->panorama ? NB_PANORAMA_STRIP : 4);
     return NEBEL_OK;
-}
-
-/* ---- the sun --------------------------------------------------------------------------------- */
-
-/* A square picture of all that is seen, against the sun's light, from the same eye: light coordinates are its metres.
- */
-static void set_sun_view(frame *f)
-{
-    enum { SUN_VIEW_SIZE = 2048 };
-    const nb_shadows *const s = &f->renderer->shadows;
-    f->sun_view = (nebel_view){.width = SUN_VIEW_SIZE, .height = SUN_VIEW_SIZE};
-    double *const eye = f->sun_view.eye_from_world, *const clip = f->sun_view.clip_from_eye;
-    for (int i = 0; i < 3; i++) {
-        const double axes[3] = {s->across[0][i], s->across[1][i], -f->light.sun_direction[i]};
-        for (int k = 0; k < 3; k++) {
-            eye[4 * i + k] = axes[k];
-            eye[12 + k] -= axes[k] * f->eye[i];
-        }
-    }
-    for (int i = 0; i < 2; i++) {
-        const double extent = s->seen_high[i] - s->seen_low[i];
-        clip[5 * i] = 2 / extent;
-        clip[12 + i] = -(s->seen_high[i] + s->seen_low[i]) / extent;
-    }
-    const double reach = 1e9;
-    clip[10] = -2 / reach;
-    clip[14] = -1;
-    eye[15] = clip[15] = 1;
-}
-
-/* Lists of volumes along the sun's light are made where the eye has some, too. */
-static nebel_result set_sun_fog(frame *f)
-{
-    nebel_gl_renderer *const r = f->renderer;
-    if (r->fog == NULL || f->planet != NULL || f->method.replaces_fog ||
-        !(r->shadows.seen_low[0] < r->shadows.seen_high[0]))
-        return NEBEL_OK;
-    set_sun_view(f);
-    return nebel_gl_set_fog(r->sun_fog, r->fog, &f->sun_view);
-}
-
-/* The same for particles. */
-static nebel_result set_sun_cloud(frame *f)
-{
-    nebel_gl_renderer *const r = f->renderer;
-    nebel_result result = NEBEL_OK;
-    f->dims = !f->desc->particles_leave_sun && has_particles(f);
-    if (!f->dims) return NEBEL_OK;
-    if (r->cloud == NULL) result = nb_particles_commit(&r->particles, &r->allocator, &r->log, &r->cloud);
-    if (result != NEBEL_OK) return result;
-    set_sun_view(f);
-    return nebel_gl_set_fog(r->sun_cloud, r->cloud, &f->sun_view);
-}
-
-static nebel_result prepare_shafts(const frame *f)
-{
-    nebel_gl_renderer *const r = f->renderer;
-    nb_shadows_turn_fog(&r->shafts.maps, f->light.sun_direction);
-    return nb_shafts_draw(&r->shafts, &r->context, &r->log, r->shading.shadow, r->vertex_array, &r->shadows,
-                          &r->targets, &f->rays, f->panorama, &r->meshes, &f->sunlit);
-}
-
-static nebel_result prepare_sun(frame *f)
-{
-    nebel_gl_renderer *const r = f->renderer;
-    nb_shadows_turn(&r->shadows, f->light.sun_direction);
-    r->shadows.sees_ground = f->planet != NULL;
-    glBindVertexArray(r->vertex_array);
-    nebel_result result = nb_shadows_fit(&r->shadows, &r->context, &r->allocator, &r->log, r->shading.survey,
-                                         &r->targets, &f->rays, f->panorama, &r->meshes);
-    if (result == NEBEL_OK && f->shafts) result = prepare_shafts(f);
-    if (result != NEBEL_OK) return result;
-    f->casts = r->shadows.seen_low[0] < r->shadows.seen_high[0];
-    if (!f->casts) return NEBEL_OK;
-    result = nb_shadows_draw(&r->shadows, &r->context, &r->log, r->shading.shadow, &r->meshes, f->eye);
-    if (result == NEBEL_OK) result = set_sun_fog(f);
-    return result == NEBEL_OK ? set_sun_cloud(f) : result;
-}
-
-static void set_shadows(const frame *f, unsigned program)
-{
-    const nb_shadows *const s = &f->renderer->shadows;
-    bind_texture(NB_UNIT_SHADOWS, GL_TEXTURE_2D_ARRAY, s->texture);
-    glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, s->light);
-    glUniform1f(glGetUniformLocation(program, "map_size"), (float)s->size);
-    glUniform4fv(glGetUniformLocation(program, "map_places"), NB_CASCADES, s->places[0]);
-    glUniform4fv(glGetUniformLocation(program, "map_ends"), 1, s->ends);
-    glUniform3f(glGetUniformLocation(program, "map_heights"), s->low, s->high, s->rounding);
-}
-
-static void set_tiles(const frame *f, const nebel_gl_fog *fog, unsigned program)
-{
-    const nb_shadows *const s = &f->renderer->shadows;
-    float place[4];
-    for (int i = 0; i < 2; i++) {
-        place[i] = (float)s->seen_low[i];
-        place[2 + i] = (float)(f->sun_view.width / (s->seen_high[i] - s->seen_low[i]));
-    }
-    bind_texture(NB_UNIT_TILES, GL_TEXTURE_2D, fog->tiles);
-    glUniform4fv(glGetUniformLocation(program, "tile_place"), 1, place);
-    glUniform4i(glGetUniformLocation(program, "tile_grid"), (GLint)f->sun_view.width, (GLint)f->sun_view.height,
-                (GLint)fog->tile_size, (GLint)fog->tile_columns);
 }
 
 /* ---- lamps ----------------------------------------------------------------------------------- */
@@ -568,7 +443,7 @@ static nebel_result prepare_lamps(const frame *f)
 static void bind_fog(const frame *f, const nebel_gl_fog *fog, unsigned program)
 {
     bind_media(fog);
-    if (fog->tiles != 0 && f->casts && f->planet == NULL) set_tiles(f, fog, program);
+    if (fog->tiles != 0 && f->casts && f->planet == NULL) nb_frame_set_tiles(f, fog, program);
 }
 
 /* What comes through the particles of the sun's light to each surface. */
@@ -578,15 +453,15 @@ static nebel_result draw_dimming(const frame *f)
     nebel_gl_fog fog;
     unsigned program = 0;
     if (!f->dims) return NEBEL_OK;
-    const nebel_result result = find_light(f, r->sun_cloud, (nb_light_kind){.of_dimming = 1}, &fog, &program);
+    const nebel_result result = nb_frame_find_light(f, r->sun_cloud, (nb_light_kind){.of_dimming = 1}, &fog, &program);
     if (result != NEBEL_OK) return result;
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, r->targets.dimming_buffer);
     nb_state_clear(&r->context, 0, 0, r->targets.width, r->targets.height);
     glUseProgram(program);
-    set_rays(f, program);
-    set_vector(program, "scene_sun", f->light.sun);
+    nb_frame_set_rays(f, program);
+    nb_frame_set_vector(program, "scene_sun", f->light.sun);
     glUniformMatrix3fv(glGetUniformLocation(program, "scene_light"), 1, GL_FALSE, r->shadows.light);
-    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
+    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     bind_fog(f, &fog, program);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -611,7 +486,7 @@ static void set_sunlight(const frame *f, unsigned program)
     float light[3];
     for (int i = 0; i < 3; i++)
         light[i] = f->light.sunlight[i] * (f->planet != NULL ? (float)f->planet->sun_left[i] : 1);
-    set_vector(program, "scene_sunlight", light);
+    nb_frame_set_vector(program, "scene_sunlight", light);
     if (f->planet != NULL) nb_gl_air_set_disc(program, f->renderer->scene);
 }
 
@@ -637,24 +512,25 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     const nebel_gl_renderer *const r = f->renderer;
     const nb_targets *const t = &r->targets;
     glUseProgram(program);
-    set_rays(f, program);
-    set_vector(program, "scene_background", f->light.background);
-    set_vector(program, "scene_ambient", f->light.ambient);
-    set_vector(program, "scene_sun", f->light.sun);
+    nb_frame_set_rays(f, program);
+    nb_frame_set_vector(program, "scene_background", f->light.background);
+    nb_frame_set_vector(program, "scene_ambient", f->light.ambient);
+    nb_frame_set_vector(program, "scene_sun", f->light.sun);
     set_sunlight(f, program);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
-    if (f->casts) set_shadows(f, program);
+    if (f->casts) nb_frame_set_shadows(f, program);
     if (has_lamps(f)) set_lamps(f, program);
-    bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
-    bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
-    bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
-    bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
-    bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
-    if (f->dims) bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
-    if (has_particles(f)) bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
+    nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);
+    nb_frame_bind_texture(NB_UNIT_NORMAL, GL_TEXTURE_2D, t->normal);
+    nb_frame_bind_texture(NB_UNIT_REFLECTANCE, GL_TEXTURE_2D, t->reflectance);
+    nb_frame_bind_texture(NB_UNIT_IN_SCATTERING, GL_TEXTURE_2D, t->in_scattering);
+    nb_frame_bind_texture(NB_UNIT_TRANSMITTANCE, GL_TEXTURE_2D, t->transmittance);
+    if (f->dims) nb_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, t->dimming);
+    if (nb_frame_has_particles(f)) nb_frame_bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
     bind_fog(f, fog, program);
+    if (f->layers != NULL) nb_frame_set_shells(f, program);
     glUniform1i(glGetUniformLocation(program, "scene_shows_ambient"), f->light.shows_ambient);
-    if (has_environment(f)) bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, r->environment.name);
+    if (has_environment(f)) nb_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, r->environment.name);
 }
 
 /* The first sample replaces what was there. */
@@ -676,12 +552,13 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
     const nebel_gl *const passes = !is_lit || !dims ? NULL : along_sun ? r->sun_fog : r->eye_fog;
     const nb_light_kind kind = {.sunlit = f->casts,
                                 .air = f->planet != NULL,
+                                .shells = f->layers != NULL,
                                 .lamplit = has_lamps(f),
                                 .dimmed = f->dims,
-                                .in_fog = has_fog(f),
+                                .in_fog = nb_frame_has_fog(f),
                                 .environment = has_environment(f),
-                                .veil_layers = count_veil_layers(f)};
-    const nebel_result result = find_light(f, passes, kind, &fog, &program);
+                                .veil_layers = nb_frame_count_veil_layers(f)};
+    const nebel_result result = nb_frame_find_light(f, passes, kind, &fog, &program);
     if (result != NEBEL_OK) return result;
     start_picture(f, sample);
     set_light(f, &fog, program);
@@ -709,9 +586,12 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
     if (result != NEBEL_OK) return result;
     draw_surfaces(f);
-    if (sample == 0 && f->casts) result = prepare_sun(f);
-    if (result == NEBEL_OK) result = draw_fog(f);
-    if (result == NEBEL_OK) result = draw_particles(f);
+    if (sample == 0 && f->casts) result = nb_frame_prepare_sun(f);
+    if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_draw_shells(f);
+    f->place = f->renderer->targets.place;
+    f->depth = f->renderer->targets.depth;
+    if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
+    if (result == NEBEL_OK) result = nb_frame_draw_particles(f);
     if (result == NEBEL_OK) result = draw_dimming(f);
     return result == NEBEL_OK ? draw_light(f, sample) : result;
 }
@@ -731,14 +611,14 @@ static nebel_result prepare_particles(const frame *f)
     const double *const eye = f->view.eye_from_world, forward[3] = {-eye[2], -eye[6], -eye[10]};
     const int parallel = f->view.clip_from_eye[15] != 0;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_VEIL);
-    const nebel_result result = nb_targets_fit_veil(&r->targets, &r->log, count_veil_layers(f));
+    const nebel_result result = nb_targets_fit_veil(&r->targets, &r->log, nb_frame_count_veil_layers(f));
     glActiveTexture(GL_TEXTURE0);
     return result == NEBEL_OK ? nb_particles_sort(&r->particles, &r->log, f->eye, parallel ? forward : NULL) : result;
 }
 
 static int has_vertex_fog(const frame *f)
 {
-    return nb_method_is_by_vertex(&f->method) && has_fog(f);
+    return nb_method_is_by_vertex(&f->method) && nb_frame_has_fog(f);
 }
 
 static nebel_result prepare_vertices(const frame *f)
@@ -764,10 +644,11 @@ static nebel_result draw_samples(frame *f)
     nebel_gl_renderer *const r = f->renderer;
     glActiveTexture(GL_TEXTURE0);
     nebel_result result = nb_targets_fit(&r->targets, &r->log, f->desc->width, f->desc->height);
-    if (result == NEBEL_OK && has_particles(f)) result = prepare_particles(f);
+    if (result == NEBEL_OK && nb_frame_has_particles(f)) result = prepare_particles(f);
     if (result == NEBEL_OK) result = prepare_lamps(f);
     if (result == NEBEL_OK) result = prepare_environment(f);
     if (result == NEBEL_OK) result = prepare_air(f);
+    if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_prepare_shells(f);
     if (result == NEBEL_OK) result = prepare_vertices(f);
     if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {

@@ -54,31 +54,41 @@ static nebel_result check_method(const nebel_gl_renderer *r, const nebel_gl_fram
                    "frame: taps must be finite numbers; offset, edge and brightness 0 or more");
 }
 
-/* What cannot be drawn with air is refused, not left out. */
+static nebel_result refuse(const nebel_log *log, const char *what)
+{
+    return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                   "frame: OpenGL cannot draw %s yet; the CPU can (nebel render --device cpu)", what);
+}
+
+static nebel_result check_layers(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    if (!(fabs(desc->time) <= 1e12))
+        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);
+    if (!r->context.es || epoxy_has_gl_extension("GL_EXT_float_blend")) return NEBEL_OK;
+    return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                   "frame: OpenGL ES without GL_EXT_float_blend cannot lay the shells of a planet over each other; use "
+                   "OpenGL, or the CPU renderer");
+}
+
+static nebel_result check_air(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    if (desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
+        return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                       "frame: orthographic cameras see no planets; take a perspective one");
+    return r->particles.count > 0 ? refuse(&r->log, "particles in the air of a planet") : NEBEL_OK;
+}
+
+/* What cannot be drawn with a planet is refused, not left out. */
 static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
-    const nebel_log *const log = &r->log;
-    if (r->scene->planet_count == 0) return NEBEL_OK;
-    if (r->scene->planets[0].model == NEBEL_PLANET_LAYERS)
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: OpenGL cannot draw a planet of layers yet; the CPU can (nebel render --device cpu)");
-    if (r->scene->planet_count > 1)
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: OpenGL cannot draw several planets yet; the CPU can (nebel render --device cpu)");
-    if (r->scene->planets[0].cloud_layer_count > 0)
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: OpenGL cannot draw clouds with volume yet; the CPU can (nebel render --device cpu)");
-    if (nb_gl_air_planet(r->scene) == NULL) return NEBEL_OK;
-    if (desc->method != NEBEL_GL_METHOD_EXACT)
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
-    if (desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
-        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: orthographic cameras see no planets; take a perspective one");
-    if (r->particles.count > 0)
-        return nb_fail(
-            log, NEBEL_ERROR_UNSUPPORTED,
-            "frame: OpenGL cannot draw particles in the air of a planet yet; the CPU can (nebel render --device cpu)");
-    return NEBEL_OK;
+    const int has_air = nb_gl_air_planet(r->scene) != NULL, has_layers = nb_gl_shells_planet(r->scene) != NULL;
+    if (r->scene->planet_count > 1) return refuse(&r->log, "several planets");
+    if (r->scene->planet_count > 0 && r->scene->planets[0].cloud_layer_count > 0)
+        return refuse(&r->log, "clouds with volume");
+    if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
+        return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
+    if (has_layers) return check_layers(r, desc);
+    return has_air ? check_air(r, desc) : NEBEL_OK;
 }
 
 nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)

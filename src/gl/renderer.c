@@ -104,6 +104,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
         nb_particles_delete(&r->particles);
         nb_environment_delete(&r->environment);
         nb_gl_air_delete(&r->air);
+        nb_gl_shells_delete(&r->shells);
         glDeleteVertexArrays(1, &r->vertex_array);
     }
     nebel_destroy_gl(r->eye_fog);

@@ -12,6 +12,7 @@
 #include "shading.h"
 #include "shadows.h"
 #include "shafts.h"
+#include "shells.h"
 #include "targets.h"
 
 struct nebel_gl_renderer {
@@ -32,6 +33,7 @@ struct nebel_gl_renderer {
     nb_lamps lamps;
     nb_environment environment; /* of the scene, for surfaces and the background */
     nb_gl_air air;
+    nb_gl_shells shells;
     nb_targets targets;
     nb_particles particles;
     int has_judged_particles; /* whether they should take light that they do not take, and said so */

@@ -6,6 +6,7 @@
 #include "panorama.h"
 #include "particle_text.h"
 #include "shafts.h"
+#include "shells_text.h"
 #include "targets.h"
 
 #include <epoxy/gl.h>
@@ -46,17 +47,17 @@ static const char surface_vertex_text[] = "layout(location = 0) in vec3 mesh_pos
                                           "}\n";
 
 /* The ray of a pixel: scene_rays are the words of nebel_view_rays, or of a panorama. */
-static const char words_text[] = "uniform vec3 scene_rays[6];\n"
-                                 "#define RAY_WORD(i) scene_rays[i]\n";
+const char nb_words_text[] = "uniform vec3 scene_rays[6];\n"
+                             "#define RAY_WORD(i) scene_rays[i]\n";
 
-static const char ray_text[] = "vec3 ray_origin(vec2 pixel)\n"
-                               "{\n"
-                               "    return RAY_WORD(0) + pixel.x * RAY_WORD(1) + pixel.y * RAY_WORD(2);\n"
-                               "}\n"
-                               "vec3 ray_direction(vec2 pixel)\n"
-                               "{\n"
-                               "    return normalize(RAY_WORD(3) + pixel.x * RAY_WORD(4) + pixel.y * RAY_WORD(5));\n"
-                               "}\n";
+const char nb_ray_text[] = "vec3 ray_origin(vec2 pixel)\n"
+                           "{\n"
+                           "    return RAY_WORD(0) + pixel.x * RAY_WORD(1) + pixel.y * RAY_WORD(2);\n"
+                           "}\n"
+                           "vec3 ray_direction(vec2 pixel)\n"
+                           "{\n"
+                           "    return normalize(RAY_WORD(3) + pixel.x * RAY_WORD(4) + pixel.y * RAY_WORD(5));\n"
+                           "}\n";
 
 /* Where a ray grazes its triangle the plane alone would be met anywhere: the interpolated distance, which is off by
  * rounding of far corners only, bounds it. Depth is 1 at the eye and falls to 0: floats are as fine in all distances.
@@ -380,7 +381,7 @@ static const char sun_text[] =
     "}\n";
 
 /* One triangle that covers the picture. */
-static const char light_vertex_text[] =
+const char nb_whole_vertex_text[] =
     "void main()\n"
     "{\n"
     "    gl_Position = vec4(float(gl_VertexID & 1) * 4.0 - 1.0, float(gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0);\n"
@@ -398,6 +399,26 @@ static const char dimming_text[] = "uniform mat3 scene_light;\n"
                                    "    if (t > 0.0) out_dimming.rgb = sun_transmittance(at, (scene_light * at).xy);\n"
                                    "}\n";
 
+/* Particles are blended as if fog and surface behind them were black and transparent. */
+static const char veil_text[] =
+    "uniform highp sampler2DArray scene_veil;\n"
+    "void see_through_veil(ivec2 texel, inout vec3 transmittance, inout vec3 in_scattering)\n"
+    "{\n"
+    "#if SCENE_VEIL_LAYERS == 3\n"
+    "    vec2 red = texelFetch(scene_veil, ivec3(texel, 0), 0).xy, green = texelFetch(scene_veil, ivec3(texel, 1), "
+    "0).xy;\n"
+    "    vec2 blue = texelFetch(scene_veil, ivec3(texel, 2), 0).xy;\n"
+    "    vec3 light = vec3(red.x, green.x, blue.x), left = vec3(red.y, green.y, blue.y);\n"
+    "#elif SCENE_VEIL_LAYERS == 1\n"
+    "    vec4 veil = texelFetch(scene_veil, ivec3(texel, 0), 0);\n"
+    "    vec3 light = veil.rgb, left = veil.aaa;\n"
+    "#else\n"
+    "    vec3 light = vec3(0.0), left = vec3(1.0);\n"
+    "#endif\n"
+    "    transmittance *= left;\n"
+    "    in_scattering = light + left * in_scattering;\n"
+    "}\n";
+
 static const char light_text[] =
     "uniform highp sampler2D scene_place;\n"
     "uniform highp sampler2D scene_normal;\n"
@@ -407,7 +428,6 @@ static const char light_text[] =
     "#ifdef SCENE_DIMMED\n"
     "uniform highp sampler2D scene_dimming;\n"
     "#endif\n"
-    "uniform highp sampler2DArray scene_veil;\n"
     "uniform vec3 scene_background;\n"
     "#ifdef NEBEL_ENVIRONMENT\n" /* the scene's, whatever lights the fog: that is asked for transmittance alone */
     "uniform bool scene_shows_ambient;\n"
@@ -420,6 +440,10 @@ static const char light_text[] =
     "uniform vec3 scene_ambient;\n"
     "vec3 background(vec3 direction) { return scene_background; }\n"
     "vec3 ambient(vec3 normal) { return scene_ambient; }\n"
+    "#endif\n"
+    "#ifdef SCENE_SHELLS\n"
+    "uniform highp sampler2D scene_shells;\n"
+    "uniform vec3 shell_ambient;\n"
     "#endif\n"
     "uniform vec3 scene_sunlight;\n" /* reflected by a white surface that faces the sun, before shadows and fog */
     "uniform float scene_share;\n"   /* of this sample */
@@ -448,23 +472,6 @@ static const char light_text[] =
     "#endif\n"
     "    return light;\n"
     "#endif\n"
-    "}\n"
-    /* Particles are blended as if fog and surface behind them were black and transparent. */
-    "void see_through_veil(ivec2 texel, inout vec3 transmittance, inout vec3 in_scattering)\n"
-    "{\n"
-    "#if SCENE_VEIL_LAYERS == 3\n"
-    "    vec2 red = texelFetch(scene_veil, ivec3(texel, 0), 0).xy, green = texelFetch(scene_veil, ivec3(texel, 1), "
-    "0).xy;\n"
-    "    vec2 blue = texelFetch(scene_veil, ivec3(texel, 2), 0).xy;\n"
-    "    vec3 light = vec3(red.x, green.x, blue.x), left = vec3(red.y, green.y, blue.y);\n"
-    "#elif SCENE_VEIL_LAYERS == 1\n"
-    "    vec4 veil = texelFetch(scene_veil, ivec3(texel, 0), 0);\n"
-    "    vec3 light = veil.rgb, left = veil.aaa;\n"
-    "#else\n"
-    "    vec3 light = vec3(0.0), left = vec3(1.0);\n"
-    "#endif\n"
-    "    transmittance *= left;\n"
-    "    in_scattering = light + left * in_scattering;\n"
     "}\n"
     "void main()\n"
     "{\n"
@@ -499,10 +506,18 @@ static const char light_text[] =
     "#ifdef SCENE_LAMPLIT\n"
     "        light += lamplight(at, normal.xyz, place.yzw);\n"
     "#endif\n"
+    "#ifdef SCENE_SHELLS\n"
+    "        if (reflectance.a > 0.5) light = max(dot(normal.xyz, scene_sun), 0.0) * scene_sunlight + shell_ambient;\n"
+    "#endif\n"
     "        surface = reflectance.rgb * light;\n"
     "    }\n"
     "    float hit = place.x > 0.0 ? scene_share : 0.0;\n"
-    "    out_color = vec4(scene_share * (transmittance * surface + in_scattering), hit);\n"
+    "    vec3 color = transmittance * surface + in_scattering;\n"
+    "#ifdef SCENE_SHELLS\n"
+    "    vec4 shells = texelFetch(scene_shells, texel, 0);\n"
+    "    color = shells.rgb + shells.a * color;\n"
+    "#endif\n"
+    "    out_color = vec4(scene_share * color, hit);\n"
     "    out_transmittance = vec4(scene_share * transmittance, scene_share);\n"
     "    out_in_scattering = vec4(scene_share * in_scattering, scene_share);\n"
     "    out_surface = place.x > 0.0 ? hit * vec4(normal.xyz, place.x) : vec4(0.0);\n"
@@ -546,12 +561,12 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
-    const nb_texts surface_fragment = {{version, precision, words_text, ray_text, interpolated_text, attributes_text,
-                                        distance_text, hole_text, surface_fragment_text},
+    const nb_texts surface_fragment = {{version, precision, nb_words_text, nb_ray_text, interpolated_text,
+                                        attributes_text, distance_text, hole_text, surface_fragment_text},
                                        9};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
-    const nb_texts survey_vertex = {{version, light_vertex_text}, 2};
+    const nb_texts survey_vertex = {{version, nb_whole_vertex_text}, 2};
     const nb_texts survey_fragment = {{version, precision, block, survey_text}, 4};
     const nb_texts shadow_vertex = {{version, shadow_vertex_text}, 2};
     const nb_texts shadow_fragment = {{version, precision, hole_text, shadow_fragment_text}, 4};
@@ -573,7 +588,7 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
 {
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), words_text, ray_text, interpolated_text,
+    const nb_texts fragment = {{version, precision_of(context), nb_words_text, nb_ray_text, interpolated_text,
                                 fog_attribute_text, distance_text, hole_text, factor_text, vertex_fog_fragment_text},
                                10};
     if (shading->vertex_fog != 0) return NEBEL_OK;
@@ -599,9 +614,9 @@ nebel_result nb_shading_make_lamp_map(nb_shading *shading, const nb_context *con
 
 nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
 {
-    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : ray_text;
-    const nb_texts vertex = {{version, light_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), words_text, ray, factor_text, pixel_factor_text}, 6};
+    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
+    const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
+    const nb_texts fragment = {{version, precision_of(context), nb_words_text, ray, factor_text, pixel_factor_text}, 6};
     unsigned *const name = panorama ? &shading->round_factor : &shading->factor;
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
@@ -613,11 +628,11 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
 
 nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
 {
-    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : ray_text;
+    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const nb_texts vertex = {{version, light_vertex_text}, 2};
+    const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
     const nb_texts fragment = {
-        {version, "#define NEBEL_AIR\n", precision_of(context), fog, words_text, ray, nb_air_ground_text}, 7};
+        {version, "#define NEBEL_AIR\n", precision_of(context), fog, nb_words_text, ray, nb_air_ground_text}, 7};
     unsigned *const name = panorama ? &shading->round_ground : &shading->ground;
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
@@ -632,8 +647,8 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
                                const char *fragment_text, const char *sampler, int unit, unsigned *name)
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
-    const nb_texts vertex = {{version, option, words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
-    const nb_texts fragment = {{version, option, precision, words_text, nb_panorama_ray_text, round_surface_text,
+    const nb_texts vertex = {{version, option, nb_words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
+    const nb_texts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text, round_surface_text,
                                 distance_text, hole_text, factor_text, fragment_text},
                                10};
     if (*name != 0) return NEBEL_OK;
@@ -659,7 +674,8 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
     char limits[128];
     (void)snprintf(
         text, size,
-        "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define NB_CASCADES "
+        "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
+        "NB_CASCADES "
         "%d\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
@@ -670,8 +686,8 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
         (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
         kind->environment || (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
-        kind->air ? "#define NEBEL_AIR\n" : "", kind->of_particles, kind->veil_layers, NB_CASCADES,
-        (unsigned)kind->features, precision_of(context));
+        kind->air ? "#define NEBEL_AIR\n" : "", kind->shells ? "#define SCENE_SHELLS\n" : "", kind->of_particles,
+        kind->veil_layers, NB_CASCADES, (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -696,14 +712,16 @@ static void set_units(unsigned program)
     set_unit(program, "scene_lamps", NB_UNIT_LAMPS);
     set_unit(program, "lamp_maps", NB_UNIT_LAMP_MAPS);
     set_unit(program, "nebel_air_texture", NB_UNIT_AIR);
+    set_unit(program, "scene_shells", NB_UNIT_SHELLS);
+    set_unit(program, "shell_seen", NB_UNIT_REFLECTANCE);
 }
 
 static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kind)
 {
     const char *const version = nb_program_version(context);
-    if (!kind->of_particles) return (nb_texts){{version, light_vertex_text}, 2};
+    if (!kind->of_particles) return (nb_texts){{version, nb_whole_vertex_text}, 2};
     if (!kind->panorama) return (nb_texts){{version, nb_particle_vertex_text}, 2};
-    return (nb_texts){{version, words_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
+    return (nb_texts){{version, nb_words_text, nb_panorama_box_text, nb_round_particle_vertex_text}, 4};
 }
 
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
@@ -712,20 +730,23 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     char head[1024];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const char *const ray = kind->panorama ? nb_panorama_ray_text : ray_text;
+    const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts light = {{head, kind->has_fog || kind->environment || kind->air ? fog : "", words_text, ray,
+    const nb_texts light = {{head, kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
                              shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_light_text : "", light_text},
-                            10};
-    const nb_texts dimming = {{head, fog, words_text, ray, sun_text, dimming_text}, 6};
+                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_light_text : "", veil_text,
+                             light_text},
+                            11};
+    const nb_texts shell = {{head, veil_text, nb_shell_over_text}, 3};
+    const nb_texts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,
-                                words_text, ray, tile, nb_particle_start_text, nb_particle_text},
+                                nb_words_text, ray, tile, nb_particle_start_text, nb_particle_text},
                                9};
     const nb_texts vertex = light_vertex(context, kind);
     const nebel_result result = nb_program_build(log, &vertex,
                                                  kind->of_particles ? &particle
                                                  : kind->of_dimming ? &dimming
+                                                 : kind->of_shells  ? &shell
                                                                     : &light,
                                                  name);
     if (result == NEBEL_OK) set_units(*name);
@@ -738,8 +759,8 @@ static int is_same(const nb_light_kind *a, const nb_light_kind *b)
            a->sunlit == b->sunlit && a->environment == b->environment && a->lamplit == b->lamplit &&
            a->five_taps == b->five_taps && a->veil_layers == b->veil_layers && a->panorama == b->panorama &&
            a->has_surfaces == b->has_surfaces && a->in_fog == b->in_fog && a->has_fog == b->has_fog &&
-           a->shafts == b->shafts && a->air == b->air && a->in_texture == b->in_texture && a->tiled == b->tiled &&
-           a->features == b->features;
+           a->shafts == b->shafts && a->air == b->air && a->shells == b->shells && a->of_shells == b->of_shells &&
+           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

@@ -18,6 +18,7 @@ enum {
     NB_UNIT_LAMPS,
     NB_UNIT_LAMP_MAPS,
     NB_SCENE_UNIT_END,            /* at most NB_UNIT_AIR */
+    NB_UNIT_SHELLS = NB_UNIT_AIR, /* a planet has layers or air */
     NB_UNIT_MASK = NB_UNIT_NORMAL /* while surfaces are drawn nothing reads normals */
 };
 
@@ -28,6 +29,7 @@ typedef struct nb_light_kind {
     int of_particles; /* and the fog before them: 2 to the number of each profile that occurs; 0: of surfaces, and the
                          fog between them and the sun */
     int of_dimming;   /* of the sun by particles, for `dimmed` ones */
+    int of_shells;    /* one of a planet's, and the fog before it */
     int dimmed;       /* that counts, too */
     int sunlit;       /* surfaces are */
     int lamplit;      /* the same */
@@ -40,6 +42,7 @@ typedef struct nb_light_kind {
     int has_fog;
     int shafts; /* surfaces shade fog */
     int air;    /* of a planet, with its ground and sun */
+    int shells; /* of a planet of layers, over everything */
     int in_texture, tiled;
     uint32_t features;
 } nb_light_kind;
@@ -58,6 +61,10 @@ typedef struct nb_shading {
     nb_light_program *lights;
     size_t light_count, light_capacity;
 } nb_shading;
+
+/* What is drawn over the whole picture: its vertices, and the ray of a pixel. nb_words_text: scene_rays are the words of
+ * nebel_view_rays, or of a panorama, whose ray is another. */
+extern const char nb_whole_vertex_text[], nb_words_text[], nb_ray_text[];
 
 /* Compile and link what is not there yet, which changes the current program. UNSUPPORTED with the driver's words;
  * MEMORY. */

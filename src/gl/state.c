@@ -282,6 +282,14 @@ void nb_state_blend(const nb_context *c, GLenum source_factor, GLenum target_fac
     set_blending(c, 0, blending);
 }
 
+void nb_state_lay_under(const nb_context *c)
+{
+    const GLint blending[NB_STATE_BLENDING] = {GL_DST_ALPHA,           GL_ONE,      GL_ZERO,
+                                               GL_ONE_MINUS_SRC_ALPHA, GL_FUNC_ADD, GL_FUNC_ADD};
+    set_indexed_switch(c->switches_by_buffer, GL_BLEND, 0, 1);
+    set_blending(c, 0, blending);
+}
+
 void nb_state_layer(const nb_context *c, int buffers)
 {
     const GLint blending[NB_STATE_BLENDING] = {GL_ONE, GL_SRC_ALPHA, GL_ZERO, GL_SRC_ALPHA, GL_FUNC_ADD, GL_FUNC_ADD};

@@ -55,6 +55,9 @@ void nb_state_blend(const nb_context *context, GLenum source_factor, GLenum targ
 /* Blending of draw buffers: source + target * source's alpha; alpha: target * source. */
 void nb_state_layer(const nb_context *context, int buffers);
 
+/* Blending of draw buffer 0: target + the target's alpha * source; alpha: target * (1 - source). */
+void nb_state_lay_under(const nb_context *context);
+
 /* Fragments go to one sample of each pixel alone. OpenGL only. */
 void nb_state_choose_sample(uint32_t sample);
 

@@ -2,7 +2,7 @@
 
 #include <epoxy/gl.h>
 
-static unsigned make_texture(uint32_t width, uint32_t height, GLenum internal, GLenum format, GLenum type)
+unsigned nb_targets_make_texture(uint32_t width, uint32_t height, GLenum internal, GLenum format, GLenum type)
 {
     unsigned name = 0;
     glGenTextures(1, &name);
@@ -18,10 +18,10 @@ static unsigned make_texture(uint32_t width, uint32_t height, GLenum internal, G
 
 static unsigned make_floats(const nb_targets *t)
 {
-    return make_texture(t->width, t->height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
+    return nb_targets_make_texture(t->width, t->height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
 }
 
-static int make_buffer(unsigned *name, const unsigned *textures, int count, unsigned depth)
+int nb_targets_make_buffer(unsigned *name, const unsigned *textures, int count, unsigned depth)
 {
     static const GLenum all[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
                                  GL_COLOR_ATTACHMENT3};
@@ -38,12 +38,14 @@ static int make_buffer(unsigned *name, const unsigned *textures, int count, unsi
 static int make_buffers(nb_targets *t)
 {
     const unsigned surfaces[] = {t->place, t->normal, t->reflectance}, fog[] = {t->in_scattering, t->transmittance};
-    return make_buffer(&t->surface_buffer, surfaces, 3, t->depth) && make_buffer(&t->fog_buffer, fog, 2, 0) &&
-           make_buffer(&t->picture_buffer, t->picture, 4, 0) && make_buffer(&t->survey_buffer, &t->survey, 1, 0) &&
-           make_buffer(&t->dimming_buffer, &t->dimming, 1, 0);
+    return nb_targets_make_buffer(&t->surface_buffer, surfaces, 3, t->depth) &&
+           nb_targets_make_buffer(&t->fog_buffer, fog, 2, 0) &&
+           nb_targets_make_buffer(&t->picture_buffer, t->picture, 4, 0) &&
+           nb_targets_make_buffer(&t->survey_buffer, &t->survey, 1, 0) &&
+           nb_targets_make_buffer(&t->dimming_buffer, &t->dimming, 1, 0);
 }
 
-static nebel_result refuse_floats(const nebel_log *log)
+nebel_result nb_targets_refuse(const nebel_log *log)
 {
     return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
                    "OpenGL: the driver (%s) does not draw into textures of floats of 32 bits; "
@@ -57,20 +59,20 @@ nebel_result nb_targets_fit(nb_targets *t, const nebel_log *log, uint32_t width,
     nb_targets_delete(t);
     t->width = width;
     t->height = height;
-    t->depth = make_texture(width, height, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT);
+    t->depth = nb_targets_make_texture(width, height, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT);
     t->place = make_floats(t);
     t->normal = make_floats(t);
-    t->reflectance = make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
+    t->reflectance = nb_targets_make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
     t->in_scattering = make_floats(t);
     t->transmittance = make_floats(t);
-    t->dimming = make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
+    t->dimming = nb_targets_make_texture(width, height, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT);
     for (int i = 0; i < 4; i++) t->picture[i] = make_floats(t);
     t->survey_width = (width + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
     t->survey_height = (height + NB_SURVEY_BLOCK - 1) / NB_SURVEY_BLOCK;
-    t->survey = make_texture(t->survey_width, t->survey_height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
+    t->survey = nb_targets_make_texture(t->survey_width, t->survey_height, GL_RGBA32F, GL_RGBA, GL_FLOAT);
     nebel_result result = nb_context_check_memory(log, "the picture; ask for fewer pixels");
     if (result == NEBEL_OK && !make_buffers(t)) {
-        result = refuse_floats(log);
+        result = nb_targets_refuse(log);
     }
     if (result != NEBEL_OK) nb_targets_delete(t);
     return result;
@@ -123,7 +125,7 @@ nebel_result nb_targets_fit_veil(nb_targets *t, const nebel_log *log, int layers
     delete_veil(t);
     make_veil(t, layers);
     nebel_result result = nb_context_check_memory(log, "the light of particles; ask for fewer pixels");
-    if (result == NEBEL_OK && !make_veil_buffer(t)) result = refuse_floats(log);
+    if (result == NEBEL_OK && !make_veil_buffer(t)) result = nb_targets_refuse(log);
     if (result != NEBEL_OK) delete_veil(t);
     return result;
 }

@@ -35,6 +35,15 @@ nebel_result nb_targets_fit_veil(nb_targets *targets, const nebel_log *log, int 
 
 void nb_targets_delete(nb_targets *targets);
 
+/* A new texture, read without filter and bound to the active unit. */
+unsigned nb_targets_make_texture(uint32_t width, uint32_t height, unsigned internal, unsigned format, unsigned type);
+
+/* A new draw framebuffer of colors, and depth where that is not 0; 0: the driver does not draw into them. */
+int nb_targets_make_buffer(unsigned *name, const unsigned *textures, int count, unsigned depth);
+
+/* UNSUPPORTED, with a message. */
+nebel_result nb_targets_refuse(const nebel_log *log);
+
 /* A new array of textures, read without filter and bound to the active unit; its size is the caller's. */
 unsigned nb_targets_make_array(void);
 

@@ -3,6 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+#include "formulas/layers.inc"
+
 const char *nb_map_fault(const nebel_map *map, int channels)
 {
     if (map->texels == NULL) return NULL;
@@ -103,6 +109,11 @@ void nb_layer_map_free(const nebel_allocator *allocator, nb_layer_map *map)
     *map = (nb_layer_map){.channels = 0};
 }
 
+nebel_map nb_layer_map_level(const nb_layer_map *map, int level)
+{
+    return (nebel_map){map->width[level], map->height[level], map->channels, map->levels[level]};
+}
+
 /* ---- reading --------------------------------------------------------------------------------- */
 
 /* The texels on both sides of a place, and the share of the second. */
@@ -113,13 +124,9 @@ typedef struct nb_pair {
 
 static nb_pair pair_at(double place, size_t size, int repeats)
 {
-    const double n = (double)size;
-    if (!repeats) {
-        const double x = fmin(fmax(place * n - 0.5, 0), n - 1), low = floor(x);
-        return (nb_pair){(size_t)low, (size_t)fmin(low + 1, n - 1), x - low};
-    }
-    const double x = (place - floor(place)) * n + (n - 0.5), low = floor(x);
-    return (nb_pair){(size_t)low % size, ((size_t)low + 1) % size, x - low};
+    const double x = repeats ? nb_map_around(place, (double)size) : nb_map_within(place, (double)size), low = floor(x);
+    const size_t first = low < 0 ? size - 1 : (size_t)low, next = first + 1 < size ? first + 1 : repeats ? 0 : first;
+    return (nb_pair){first, next, x - low};
 }
 
 static void read_level(const nb_layer_map *map, int level, double u, double v, int repeats, double *values)

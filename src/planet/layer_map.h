@@ -20,6 +20,9 @@ nebel_result nb_layer_map_make(const nebel_allocator *allocator, const nebel_map
 
 void nb_layer_map_free(const nebel_allocator *allocator, nb_layer_map *map);
 
+/* One of its levels; {0} of a map that was not made. */
+nebel_map nb_layer_map_level(const nb_layer_map *map, int level);
+
 /* NULL, or what is wrong with one. */
 const char *nb_map_fault(const nebel_map *map, int channels);
 

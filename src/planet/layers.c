@@ -14,18 +14,14 @@
 #define PI 3.14159265358979323846
 
 typedef struct nb_shell {
-    double radius, day, color[3], wrap[3], gain;
     nb_layer_map map, detail; /* detail without levels: it is the map */
 } nb_shell;
 
 struct nebel_layers {
-    nebel_allocator allocator;
-    double center[3], frame[3][3]; /* the planet's axes in the scene */
-    double radius, day;
+    nebel_layers_desc desc; /* completed; its maps are the first levels of those here, its log is none */
+    double frame[3][3];     /* the planet's axes in the scene */
     nb_layer_map ground;
-    uint32_t shell_count;
     nb_shell shells[NEBEL_MAX_CLOUD_SHELLS];
-    nebel_air_shell air; /* its height is the radius */
 };
 
 /* ---- descriptions ---------------------------------------------------------------------------- */
@@ -121,17 +117,6 @@ static nebel_result check(const nebel_layers_desc *desc)
 
 /* ---- making ---------------------------------------------------------------------------------- */
 
-/* The columns of the rotation are the planet's axes. */
-static void set_frame(const double q[4], double frame[3][3])
-{
-    const double x = q[0], y = q[1], z = q[2], w = q[3], n = x * x + y * y + z * z + w * w;
-    const double s = n > 0 ? 2 / n : 0;
-    const double axes[3][3] = {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)},
-                               {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
-                               {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}};
-    memcpy(frame, axes, sizeof axes);
-}
-
 static nebel_result paint_map(const nebel_allocator *allocator, const nebel_map_desc *desc, nb_layer_map *map)
 {
     nebel_map painted = {.width = 0};
@@ -152,27 +137,26 @@ static nebel_result make_map(const nebel_allocator *allocator, const nebel_map *
     return given->texels != NULL ? nb_layer_map_make(allocator, given, map) : paint_map(allocator, desc, map);
 }
 
-static nebel_result make_shell(const nebel_layers *layers, const nebel_cloud_shell *desc, nb_shell *shell)
+static nebel_result make_shell(const nebel_allocator *allocator, nebel_cloud_shell *desc, nb_shell *shell)
 {
-    const nebel_allocator *allocator = &layers->allocator;
     const nebel_map_desc clouds = {.kind = NEBEL_MAP_CLOUDS, .seed = desc->seed, .coverage = desc->coverage};
     const nebel_map_desc detail = {.kind = NEBEL_MAP_DETAIL, .seed = desc->seed, .coverage = desc->coverage};
-    shell->radius = layers->radius + desc->height;
-    shell->day = desc->day;
-    shell->gain = desc->gain;
-    memcpy(shell->color, desc->color, sizeof shell->color);
-    memcpy(shell->wrap, desc->wrap, sizeof shell->wrap);
-    const nebel_result result = make_map(allocator, &desc->map, &clouds, &shell->map);
     const int is_one = desc->map.texels != NULL && desc->detail.texels == NULL;
-    return result != NEBEL_OK || is_one ? result : make_map(allocator, &desc->detail, &detail, &shell->detail);
+    nebel_result result = make_map(allocator, &desc->map, &clouds, &shell->map);
+    if (result == NEBEL_OK && !is_one) result = make_map(allocator, &desc->detail, &detail, &shell->detail);
+    desc->map = nb_layer_map_level(&shell->map, 0);
+    desc->detail = nb_layer_map_level(&shell->detail, 0);
+    return result;
 }
 
-static nebel_result make_maps(const nebel_layers_desc *desc, nebel_layers *layers)
+static nebel_result make_maps(nebel_layers *layers)
 {
+    nebel_layers_desc *const desc = &layers->desc;
     const nebel_map_desc ground = {.kind = NEBEL_MAP_GROUND, .seed = desc->seed, .coverage = desc->coverage};
-    nebel_result result = make_map(&layers->allocator, &desc->ground, &ground, &layers->ground);
-    for (uint32_t i = 0; i < desc->cloud_count && result == NEBEL_OK; i++, layers->shell_count++)
-        result = make_shell(layers, &desc->clouds[i], &layers->shells[i]);
+    nebel_result result = make_map(&desc->allocator, &desc->ground, &ground, &layers->ground);
+    desc->ground = nb_layer_map_level(&layers->ground, 0);
+    for (uint32_t i = 0; i < desc->cloud_count && result == NEBEL_OK; i++)
+        result = make_shell(&desc->allocator, &desc->clouds[i], &layers->shells[i]);
     return result;
 }
 
@@ -186,14 +170,11 @@ nebel_result nebel_create_layers(const nebel_layers_desc *desc, nebel_layers **l
     const nebel_allocator allocator = nb_resolve_allocator(&whole.allocator);
     nebel_layers *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&whole.log, NEBEL_ERROR_MEMORY, "planet: out of memory");
-    made->allocator = allocator;
-    made->radius = whole.radius;
-    made->day = whole.day;
-    made->air = whole.air;
-    made->air.height = whole.radius + whole.air.height;
-    memcpy(made->center, whole.center, sizeof made->center);
-    set_frame(whole.rotation, made->frame);
-    result = make_maps(&whole, made);
+    made->desc = whole;
+    made->desc.allocator = allocator;
+    made->desc.log = (nebel_log){.write = NULL};
+    nb_vector_axes(whole.rotation, made->frame);
+    result = make_maps(made);
     if (result == NEBEL_OK) {
         *layers = made;
         return NEBEL_OK;
@@ -205,13 +186,41 @@ nebel_result nebel_create_layers(const nebel_layers_desc *desc, nebel_layers **l
 void nebel_destroy_layers(nebel_layers *layers)
 {
     if (layers == NULL) return;
-    const nebel_allocator allocator = layers->allocator;
+    const nebel_allocator allocator = layers->desc.allocator;
     nb_layer_map_free(&allocator, &layers->ground);
     for (uint32_t i = 0; i < NEBEL_MAX_CLOUD_SHELLS; i++) {
         nb_layer_map_free(&allocator, &layers->shells[i].map);
         nb_layer_map_free(&allocator, &layers->shells[i].detail);
     }
     nb_release(&allocator, layers);
+}
+
+/* ---- for those who draw it themselves -------------------------------------------------------- */
+
+const nebel_layers_desc *nebel_describe_layers(const nebel_layers *layers)
+{
+    return layers != NULL ? &layers->desc : NULL;
+}
+
+static const nb_layer_map *find_map(const nebel_layers *layers, const float *texels)
+{
+    if (texels == layers->ground.levels[0]) return &layers->ground;
+    for (uint32_t i = 0; i < layers->desc.cloud_count; i++) {
+        const nb_shell *const shell = &layers->shells[i];
+        if (texels == shell->map.levels[0]) return &shell->map;
+        if (texels == shell->detail.levels[0]) return &shell->detail;
+    }
+    return NULL;
+}
+
+nebel_result nebel_find_map_level(const nebel_layers *layers, const nebel_map *map, uint32_t level, nebel_map *coarser)
+{
+    if (coarser != NULL) *coarser = (nebel_map){0};
+    if (layers == NULL || map == NULL || map->texels == NULL || coarser == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nb_layer_map *const found = find_map(layers, map->texels);
+    if (found == NULL || level >= (uint32_t)found->level_count) return NEBEL_ERROR_ARGUMENT;
+    *coarser = nb_layer_map_level(found, (int)level);
+    return NEBEL_OK;
 }
 
 /* ---- what a ray meets ------------------------------------------------------------------------ */
@@ -262,8 +271,7 @@ static nb_spot spot_at(const nb_sight *s, double radius, double t, const double 
     const double u = atan2(-local[2], local[0]) / (2 * PI) + 0.5;
     spot.u = turn(turn(u, days[0], s->time), days[1], s->time);
     spot.v = acos(spot.pole) / PI;
-    /* seen at a slant a pixel is longer than wide: its area counts */
-    spot.level = s->spread * t / (2 * PI * radius * sqrt(fmax(spot.view, 0.02)));
+    spot.level = nb_map_spread(s->spread * t, radius, spot.view);
     return spot;
 }
 
@@ -275,12 +283,12 @@ static double read_map(const nb_layer_map *map, const nb_spot *spot, double wrap
     return value;
 }
 
-static double cover_at(const nb_shell *shell, const nb_spot *spot)
+static double cover_at(const nb_shell *shell, const nebel_cloud_shell *desc, const nb_spot *spot)
 {
     const nb_layer_map *detail = shell->detail.level_count > 0 ? &shell->detail : &shell->map;
     double parts[3];
-    for (int i = 0; i < 3; i++) parts[i] = read_map(detail, spot, shell->wrap[i], 1);
-    return nb_cloud_cover(read_map(&shell->map, spot, 1, 0), parts[0], parts[1], parts[2], spot->pole, shell->gain);
+    for (int i = 0; i < 3; i++) parts[i] = read_map(detail, spot, desc->wrap[i], 1);
+    return nb_cloud_cover(read_map(&shell->map, spot, 1, 0), parts[0], parts[1], parts[2], spot->pole, desc->gain);
 }
 
 static void reflect(const nb_sight *s, double sun, const double color[3], double cover, double radiance[3])
@@ -297,8 +305,8 @@ static void insert(nebel_layer_hits *hits, const nebel_layer_hit *hit)
 
 static void add_ground(const nb_sight *s, double t, nebel_layer_hits *hits)
 {
-    const double days[2] = {s->layers->day, 0};
-    const nb_spot spot = spot_at(s, s->layers->radius, t, days);
+    const double days[2] = {s->layers->desc.day, 0};
+    const nb_spot spot = spot_at(s, s->layers->desc.radius, t, days);
     const nb_layer_map *map = &s->layers->ground;
     const double texels = spot.level * (double)map->width[0];
     nebel_layer_hit hit = {.t = t, .cover = 1, .is_ground = 1};
@@ -308,11 +316,18 @@ static void add_ground(const nb_sight *s, double t, nebel_layer_hits *hits)
     insert(hits, &hit);
 }
 
-static void add_clouds(const nb_sight *s, const nb_shell *shell, double t, nebel_layer_hits *hits)
+static double radius_of(const nebel_layers_desc *desc, uint32_t shell)
 {
-    const double days[2] = {s->layers->day, shell->day};
-    const nb_spot spot = spot_at(s, shell->radius, t, days);
-    nebel_layer_hit hit = {.t = t, .cover = cover_at(shell, &spot)};
+    return desc->radius + desc->clouds[shell].height;
+}
+
+static void add_clouds(const nb_sight *s, uint32_t number, double t, nebel_layer_hits *hits)
+{
+    const nebel_layers_desc *const desc = &s->layers->desc;
+    const nebel_cloud_shell *const shell = &desc->clouds[number];
+    const double days[2] = {desc->day, shell->day};
+    const nb_spot spot = spot_at(s, radius_of(desc, number), t, days);
+    nebel_layer_hit hit = {.t = t, .cover = cover_at(&s->layers->shells[number], shell, &spot)};
     reflect(s, spot.sun, shell->color, hit.cover, hit.radiance);
     insert(hits, &hit);
 }
@@ -320,8 +335,8 @@ static void add_clouds(const nb_sight *s, const nb_shell *shell, double t, nebel
 static void add_air(const nb_sight *s, double t, nebel_layer_hits *hits)
 {
     static const double days[2] = {0, 0};
-    const nebel_air_shell *air = &s->layers->air;
-    const nb_spot spot = spot_at(s, air->height, t, days);
+    const nebel_air_shell *air = &s->layers->desc.air;
+    const nb_spot spot = spot_at(s, s->layers->desc.radius + air->height, t, days);
     const nb_glow glow = nb_air_glow(spot.sun, spot.view);
     const double place = glow.place * (double)(air->ramp_count - 1);
     const uint32_t low = (uint32_t)place, high = low + 1 < air->ramp_count ? low + 1 : low;
@@ -335,14 +350,14 @@ static void add_air(const nb_sight *s, double t, nebel_layer_hits *hits)
 
 static void look(const nb_sight *s, nebel_layer_hits *hits)
 {
-    const nebel_layers *layers = s->layers;
-    const double ground = meet(s, layers->radius), end = ground >= 0 ? fmin(ground, s->t_max) : s->t_max;
+    const nebel_layers_desc *desc = &s->layers->desc;
+    const double ground = meet(s, desc->radius), end = ground >= 0 ? fmin(ground, s->t_max) : s->t_max;
     hits->count = 0;
-    for (uint32_t i = 0; i < layers->shell_count; i++) {
-        const double t = meet(s, layers->shells[i].radius);
-        if (t >= 0 && t <= end) add_clouds(s, &layers->shells[i], t, hits);
+    for (uint32_t i = 0; i < desc->cloud_count; i++) {
+        const double t = meet(s, radius_of(desc, i));
+        if (t >= 0 && t <= end) add_clouds(s, i, t, hits);
     }
-    const double t = layers->air.is_absent ? -1 : meet(s, layers->air.height);
+    const double t = desc->air.is_absent ? -1 : meet(s, desc->radius + desc->air.height);
     if (t >= 0 && t <= end) add_air(s, t, hits);
     if (ground >= 0 && ground <= s->t_max) add_ground(s, ground, hits);
 }
@@ -364,7 +379,7 @@ static int set_ray(const nebel_ray *ray, nb_sight *s)
 {
     if (!(ray->t_max >= 0)) return 0;
     for (int i = 0; i < 3; i++) {
-        s->from[i] = ray->origin[i] - s->layers->center[i];
+        s->from[i] = ray->origin[i] - s->layers->desc.center[i];
         s->to[i] = ray->direction[i];
         if (!isfinite(s->from[i])) return 0;
     }

@@ -137,7 +137,8 @@ static nebel_result draw(nb_stage *stage, const nebel_camera *camera, uint32_t w
                                 .particles_leave_sun = quick,
                                 .method = find_method(look),
                                 .cells = stage->cells,
-                                .factor = stage->factor};
+                                .factor = stage->factor,
+                                .time = stage->time};
     if (samples > 1) {
         desc.progress = stop;
         desc.progress_user = stage;

@@ -22,6 +22,7 @@ typedef struct nb_stage {
     double pixel_seconds;                     /* of the last coarse or whole frame */
     double seconds;                           /* of the last frame that was finished */
     uint32_t samples;                         /* of that frame */
+    double time;                              /* that layers have turned by */
     const nebel_cells *cells;                 /* of the method of that name */
     const nebel_factor_desc *factor;          /* of the methods that have one */
     int was_quick;                            /* the last frame did without what takes long for a new eye */

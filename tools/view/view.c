@@ -706,6 +706,7 @@ static nebel_result try_first_frame(viewer *all)
 /* A frame that cannot be drawn is not tried again before something has changed. */
 static nebel_result draw(viewer *all)
 {
+    all->stage.time = all->draft.frame;
     all->stage.cells = all->draft.cells;
     all->stage.factor = &all->draft.good.classic;
     if (all->stage.state == NB_STAGE_FINE && !is_moving(all)) return NEBEL_OK;

@@ -1,0 +1,75 @@
+/* A frame of the scene renderer while it is drawn: what its parts share. */
+#ifndef NB_GL_FRAME_H
+#define NB_GL_FRAME_H
+
+#include "method.h"
+#include "renderer.h"
+
+#include "base/lighting.h"
+
+typedef struct nb_gl_frame {
+    nebel_gl_renderer *renderer;
+    const nebel_gl_frame_desc *desc;
+    uint32_t samples;
+    nb_lighting light;
+    double eye[3];
+    int panorama;
+    const nebel_planet *planet; /* with air; NULL: none */
+    const nebel_layers *layers; /* a planet of them; NULL: none */
+    unsigned place, depth;      /* where rays end now: as those of the targets */
+    nb_method method;
+    nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
+    nebel_view sample_view;  /* through the places of the present sample */
+    nebel_rays rays;         /* of sample_view, or of the panorama */
+    nebel_view sun_view;     /* of all that is seen, against the sun's light */
+    int casts;               /* the sun shines, and there is something to cast shadows */
+    int dims;                /* particles dim the sun */
+    int shafts;              /* models shade fog */
+    nebel_sunlit_fog sunlit; /* that fog */
+} nb_gl_frame;
+
+/* Whether the frame has some: fog, or air; particles. */
+int nb_frame_has_fog(const nb_gl_frame *f);
+int nb_frame_has_particles(const nb_gl_frame *f);
+
+/* Of the present sample. The program is current, the texture on a unit that becomes the active one. */
+void nb_frame_set_rays(const nb_gl_frame *f, unsigned program);
+void nb_frame_set_vector(unsigned program, const char *name, const float v[3]);
+void nb_frame_bind_texture(GLuint unit, GLenum target, unsigned texture);
+
+/* Up to where rays end now, into the targets. */
+nebel_result nb_frame_draw_fog(const nb_gl_frame *f);
+nebel_result nb_frame_draw_particles(const nb_gl_frame *f);
+
+/* Blending has room for one factor a target: grey particles are drawn into one, others into one for each colour. */
+int nb_frame_count_veil_layers(const nb_gl_frame *f);
+
+/* The program that asks the fog of `passes`, NULL: none, and that fog. The kind is given but for its fog. */
+nebel_result nb_frame_find_light(const nb_gl_frame *f, const nebel_gl *passes, nb_light_kind kind, nebel_gl_fog *fog,
+                                 unsigned *program);
+
+/* ---- the sun --------------------------------------------------------------------------------- */
+
+/* What shades surfaces and fog, around what the first sample sees. */
+nebel_result nb_frame_prepare_sun(nb_gl_frame *f);
+
+/* Uniforms of the maps, and of the lists of fog along the sun's light. */
+void nb_frame_set_shadows(const nb_gl_frame *f, unsigned program);
+void nb_frame_set_tiles(const nb_gl_frame *f, const nebel_gl_fog *fog, unsigned program);
+
+/* ---- planets of layers ----------------------------------------------------------------------- */
+
+/* Of the whole frame: maps, targets, programs. MEMORY, LIMIT, UNSUPPORTED. */
+nebel_result nb_frame_prepare_shells(const nb_gl_frame *f);
+
+/* The ground, among the surfaces. */
+void nb_frame_draw_shell_ground(const nb_gl_frame *f);
+
+/* All shells of the present sample, each with fog and particles before it, over each other; changes where rays end, and what
+ * is in the targets of fog and particles. */
+nebel_result nb_frame_draw_shells(nb_gl_frame *f);
+
+/* What light_text asks for. */
+void nb_frame_set_shells(const nb_gl_frame *f, unsigned program);
+
+#endif

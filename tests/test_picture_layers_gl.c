@@ -1,0 +1,386 @@
+/* Planets of layers in OpenGL are those of the CPU: the scenes of them, eyes at all heights and of all kinds, fog and models
+ * between the shells. With an argument in pictures so many times wider. */
+#include "odd_state.h"
+#include "pass_help.h"
+#include "picture_help.h"
+
+#include <nebel/layers.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t scale = 1;
+
+/* Depth, which near the horizon hangs on the last digit of a ray. */
+static size_t count_depth_apart(const picture_pair *pair)
+{
+    size_t apart = 0;
+    for (size_t i = 0; i < (size_t)pair->width * pair->height; i++) {
+        const double cpu = (double)pair->cpu.depth[i], gl = (double)pair->gl.depth[i];
+        apart += isinf(cpu) != isinf(gl) || (!isinf(cpu) && fabs(cpu - gl) > 1e-3 * cpu);
+    }
+    return apart;
+}
+
+static double largest_color(const picture_pair *pair)
+{
+    double most = 0;
+    for (size_t i = 0; i < 3 * (size_t)pair->width * pair->height; i++) most = fmax(most, (double)pair->cpu.color[i]);
+    return most;
+}
+
+static void compare(const char *name, const picture_pair *pair)
+{
+    const double shown = picture_shown_apart(pair),
+                 depth = (double)count_depth_apart(pair) / ((double)pair->width * pair->height);
+    print_message("%s: of 1000 pixels %.2f are shown 2/255 apart, %.2f have another depth\n", name, 1e3 * shown,
+                  1e3 * depth);
+    assert_true(largest_color(pair) > .1);
+    assert_true(shown <= 1e-3 && depth <= 5e-3);
+}
+
+static void render(const nebel_scene_data *data, nebel_snapshot *fog, const nebel_camera *camera, picture_pair *pair)
+{
+    const int objects = pass_count_objects();
+    picture_render(data, fog, camera, 1, pair);
+    assert_int_equal(pass_count_objects(), objects);
+}
+
+/* ---- scenes ---------------------------------------------------------------------------------- */
+
+static void check_scene(const char *name, double time)
+{
+    char path[512];
+    nebel_scene *scene = NULL;
+    nebel_snapshot *fog = NULL;
+    picture_particles particles = {.count = 0};
+    nebel_particle *list = NULL;
+    snprintf(path, sizeof path, NEBEL_SOURCE "/examples/scenes/%s", name);
+    assert_int_equal(nebel_load_scene(path, &(nebel_scene_desc){0}, &scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    const nebel_scene_data *const data = nebel_scene_contents(scene);
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    assert_int_equal(nebel_commit_scene_volumes_at(scene, 0, &particles.others), NEBEL_OK);
+    particles.count = data->particle_count;
+    assert_int_equal(nebel_make_scene_particles(scene, &list), NEBEL_OK);
+    particles.list = list;
+    picture_pair pair = picture_make(96 * scale, 54 * scale);
+    pair.time = time;
+    picture_render_particles(data, fog, &particles, &data->camera, 1, &pair);
+    compare(name, &pair);
+    picture_free(&pair);
+    nebel_free_scene_particles(scene, list);
+    nebel_release_snapshot(particles.others);
+    nebel_release_snapshot(fog);
+    nebel_destroy_scene(scene);
+}
+
+static void scenes_are_the_same(void **state)
+{
+    (void)state;
+    nb_gl context;
+    pass_open(&context, NB_GL_330);
+    check_scene("planet-day.json", 100);
+    check_scene("planet-night.json", 0);
+    pass_close(&context);
+}
+
+/* ---- worlds ---------------------------------------------------------------------------------- */
+
+typedef struct world {
+    nebel_layers *layers;
+    nebel_planet planet;
+    nebel_mesh mesh;
+    nebel_scene_data scene;
+} world;
+
+/* Sizes that are no powers of two: their levels are means of parts of texels. */
+static nebel_map make_map(nebel_map_kind kind)
+{
+    static float texels[NEBEL_MAP_KIND_COUNT][90 * 45 * 3];
+    const nebel_map_desc desc = {.kind = kind, .width = 90, .height = 45, .coverage = .4, .seed = 3};
+    nebel_map map = {.texels = texels[kind]};
+    assert_int_equal(nebel_size_map(&desc, &map), NEBEL_OK);
+    assert_int_equal(nebel_make_map(&desc, texels[kind]), NEBEL_OK);
+    return map;
+}
+
+static const float wall[4][3] = {{-.6f, -.5f, 0}, {.6f, -.5f, 0}, {.6f, .5f, 0}, {-.6f, .5f, 0}};
+static const uint32_t wall_indices[6] = {0, 1, 2, 0, 2, 3};
+
+/* A ball of `radius`, shells a fifth and two fifths of that above it, and air between them. */
+static void make_world(double radius, world *w)
+{
+    const nebel_map clouds = make_map(NEBEL_MAP_CLOUDS), detail = make_map(NEBEL_MAP_DETAIL);
+    *w = (world){.mesh = {.origin = {0, 0, 1.3 * radius},
+                          .positions = wall[0],
+                          .indices = wall_indices,
+                          .vertex_count = 4,
+                          .triangle_count = 2,
+                          .base_color = {.8f, .4f, .2f},
+                          .texture = -1}};
+    w->planet.shells = (nebel_layers_desc){
+        .radius = radius,
+        .rotation = {.2, .3, -.1, 1},
+        .day = 100,
+        .ground = make_map(NEBEL_MAP_GROUND),
+        .clouds = {{.height = .2 * radius, .day = 50, .map = clouds, .detail = detail, .wrap = {2, -3, 4.5}},
+                   {.height = .4 * radius, .day = -70, .gain = .5, .map = clouds, .color = {1, .8, .6}}},
+        .cloud_count = 2,
+        .air = {.height = .3 * radius, .brightness = .4}};
+    assert_int_equal(nebel_create_layers(&w->planet.shells, &w->layers), NEBEL_OK);
+    w->planet.model = NEBEL_PLANET_LAYERS;
+    w->planet.layers = w->layers;
+    w->scene = (nebel_scene_data){.has_sun = 1,
+                                  .sun_direction = {.6, .48, .64},
+                                  .sun_irradiance = {3, 2.5, 2},
+                                  .ambient = {.1, .12, .15},
+                                  .background = {.2, .1, .3},
+                                  .planet_count = 1,
+                                  .planets = &w->planet,
+                                  .meshes = &w->mesh};
+}
+
+static nebel_snapshot *make_fog(void)
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {1, 1, 2.2}, .radius = 1},
+         .extinction = {.5, .7, 1},
+         .source = {1, .5, .2}},
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 5}, .extinction = {.05, .04, .03}, .source = {.2, .3, .4}}};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    for (int i = 0; i < 2; i++) assert_int_equal(nebel_add_volume(fog, &volumes[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static nebel_camera camera_from(double x, double y, double z, nebel_projection projection, double size)
+{
+    return (nebel_camera){.position = {x, y, z},
+                          .look_at = {.1 * x, .2 * y, 0},
+                          .up = {0, 1, 0},
+                          .projection = projection,
+                          .vertical_fov = size,
+                          .view_height = size};
+}
+
+/* Outside, between the shells, below them all, below the ground; parallel rays from a plane that cuts the shells. */
+static void eyes_everywhere_see_the_same(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        nb_gl_language language;
+    } contexts[] = {{"OpenGL", NB_GL_330}, {"OpenGL ES", NB_GL_300ES}};
+    const struct {
+        const char *name;
+        nebel_camera camera;
+        int models, clear;
+    } views[] = {{"outside", camera_from(1, 3, 8, NEBEL_PROJECTION_PERSPECTIVE, 45), 1, 0},
+                 {"between shells", camera_from(.5, 1, 2.4, NEBEL_PROJECTION_PERSPECTIVE, 80), 0, 0},
+                 {"below all", camera_from(0, 2.01, .3, NEBEL_PROJECTION_PERSPECTIVE, 100), 0, 1},
+                 {"in the planet", camera_from(.3, .4, 1.2, NEBEL_PROJECTION_PERSPECTIVE, 80), 0, 1},
+                 {"all around", camera_from(.5, 1, 2.4, NEBEL_PROJECTION_PANORAMA, 0), 1, 0},
+                 {"in parallel", camera_from(1, 3, 8, NEBEL_PROJECTION_ORTHOGRAPHIC, 7), 1, 0},
+                 {"in parallel from within", camera_from(.2, .9, 1.5, NEBEL_PROJECTION_ORTHOGRAPHIC, 7), 0, 0}};
+    world w;
+    make_world(2, &w);
+    nebel_snapshot *const fog = make_fog();
+    for (int i = 0; i < 2; i++) {
+        nb_gl context;
+        pass_open(&context, contexts[i].language);
+        for (size_t k = i == 0 ? 0 : 1; k < sizeof views / sizeof *views; k += i == 0 ? 1 : 3) {
+            picture_pair pair = picture_make(64 * scale, 32 * scale);
+            pair.time = 17;
+            w.scene.mesh_count = (size_t)views[k].models;
+            render(&w.scene, views[k].clear ? NULL : fog, &views[k].camera, &pair);
+            compare(views[k].name, &pair);
+            picture_free(&pair);
+        }
+        pass_close(&context);
+    }
+    nebel_release_snapshot(fog);
+    nebel_destroy_layers(w.layers);
+}
+
+/* Where squares of distances cancel: two metres above the ground of a planet as large as the Earth, and a hundred radii away. */
+static void large_distances_keep_their_digits(void **state)
+{
+    (void)state;
+    const double radius = 6.36e6, away = 100 * radius;
+    const nebel_camera cameras[] = {
+        {.position = {0, radius + 2, 0}, .look_at = {100, radius + 12, -60}, .up = {0, 1, 0}, .vertical_fov = 60},
+        {.position = {0, 0, away}, .up = {0, 1, 0}, .vertical_fov = 1.3}};
+    nb_gl context;
+    world w;
+    make_world(radius, &w);
+    pass_open(&context, NB_GL_330);
+    for (int i = 0; i < 2; i++) {
+        picture_pair pair = picture_make(96 * scale, 48 * scale);
+        render(&w.scene, NULL, &cameras[i], &pair);
+        compare(i == 0 ? "from 2 m" : "from 600,000 km", &pair);
+        picture_free(&pair);
+    }
+    pass_close(&context);
+    nebel_destroy_layers(w.layers);
+}
+
+/* ---- particles ------------------------------------------------------------------------------- */
+
+/* Apart from each other, before the shells, cut by them, and behind the planet's edge. */
+static void particles_lie_between_shells(void **state)
+{
+    (void)state;
+    static const double centers[3][3] = {{-1.2, .2, 4}, {.4, 2.35, .9}, {2.5, .3, -3}};
+    nebel_particle list[3];
+    nebel_fog *fog;
+    nebel_snapshot *all;
+    nb_gl context;
+    world w;
+    make_world(2, &w);
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){0}, &fog), NEBEL_OK);
+    for (int i = 0; i < 3; i++) {
+        list[i] = (nebel_particle){.radius = .5, .extinction = {1, 2, 3}, .emission = {.9, .6, .3}};
+        memcpy(list[i].center, centers[i], sizeof centers[i]);
+        const nebel_volume_desc volume = nebel_particle_volume(&list[i]);
+        assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    }
+    assert_int_equal(nebel_commit_fog(fog, &all), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    pass_open(&context, NB_GL_330);
+    const nebel_camera camera = camera_from(1, 3, 8, NEBEL_PROJECTION_PERSPECTIVE, 45);
+    picture_pair pair = picture_make(96 * scale, 64 * scale);
+    picture_render_particles(&w.scene, all, &(picture_particles){.list = list, .count = 3}, &camera, 1, &pair);
+    compare("particles", &pair);
+    picture_free(&pair);
+    pass_close(&context);
+    nebel_release_snapshot(all);
+    nebel_destroy_layers(w.layers);
+}
+
+/* ---- time, state, refusals ------------------------------------------------------------------- */
+
+typedef struct stage {
+    nb_gl context;
+    world w;
+    nebel_gl_renderer *renderer;
+    nebel_gl_frame_desc frame;
+    char said[256];
+} stage;
+
+static void keep(nebel_result result, const char *message, void *user)
+{
+    (void)result;
+    snprintf(user, 256, "%s", message);
+}
+
+static void open_stage(stage *s)
+{
+    *s = (stage){
+        .frame = {
+            .camera = camera_from(1, 3, 8, NEBEL_PROJECTION_PERSPECTIVE, 45), .width = 24, .height = 16, .samples = 1}};
+    make_world(2, &s->w);
+    pass_open(&s->context, NB_GL_330);
+    assert_int_equal(
+        nebel_create_gl_renderer(&s->w.scene, NULL, &(nebel_gl_renderer_desc){.log = {keep, s->said}}, &s->renderer),
+        NEBEL_OK);
+}
+
+static void close_stage(stage *s)
+{
+    nebel_destroy_gl_renderer(s->renderer);
+    pass_close(&s->context);
+    nebel_destroy_layers(s->w.layers);
+}
+
+static void shells_turn_and_return(void **state)
+{
+    (void)state;
+    static float colors[3][3 * 24 * 16];
+    static const double times[3] = {0, 35, 700 * 1e6}; /* the last is whole turns of all, far from 0 */
+    double moved = 0, back = 0;
+    stage s;
+    open_stage(&s);
+    for (int i = 0; i < 3; i++) {
+        s.frame.time = times[i];
+        assert_int_equal(nebel_gl_render_frame(s.renderer, &s.frame), NEBEL_OK);
+        assert_int_equal(nebel_gl_read_planes(s.renderer, &(nebel_gl_planes){.color = colors[i]}), NEBEL_OK);
+    }
+    for (size_t i = 0; i < sizeof colors[0] / sizeof **colors; i++) {
+        moved = fmax(moved, fabs((double)colors[1][i] - (double)colors[0][i]));
+        back = fmax(back, fabs((double)colors[2][i] - (double)colors[0][i]));
+    }
+    assert_true(moved > .1);
+    assert_true(back == 0);
+    close_stage(&s);
+}
+
+static void the_state_stays(void **state)
+{
+    (void)state;
+    static odd_snapshot before, after;
+    stage s;
+    odd o;
+    open_stage(&s);
+    odd_set(&o, 1, 1);
+    odd_take(&before, 1);
+    assert_int_equal(nebel_gl_render_frame(s.renderer, &s.frame), NEBEL_OK);
+    odd_take(&after, 1);
+    odd_expect_same(&before, &after);
+    odd_delete(&o);
+    close_stage(&s);
+}
+
+static void expect(stage *s, nebel_result result, const char *words)
+{
+    assert_int_equal(nebel_gl_render_frame(s->renderer, &s->frame), result);
+    if (strstr(s->said, words) == NULL) fail_msg("'%s' does not say '%s'", s->said, words);
+}
+
+static void what_cannot_be_drawn_is_refused(void **state)
+{
+    (void)state;
+    static float tall[16384];
+    const double good = 5, bad[] = {(double)NAN, HUGE_VAL, 2e12};
+    stage s;
+    open_stage(&s);
+    for (int i = 0; i < 3; i++) {
+        s.frame.time = bad[i];
+        expect(&s, NEBEL_ERROR_VALUE, "time");
+    }
+    s.frame.time = good;
+    s.frame.method = NEBEL_GL_METHOD_VERTEX;
+    expect(&s, NEBEL_ERROR_UNSUPPORTED, "method");
+    s.frame.method = NEBEL_GL_METHOD_EXACT;
+    nebel_layers_desc desc = s.w.planet.shells;
+    desc.clouds[0].map = (nebel_map){.width = 1, .height = 16384, .channels = 1, .texels = tall};
+    nebel_layers *large;
+    assert_int_equal(nebel_create_layers(&desc, &large), NEBEL_OK);
+    s.w.planet.layers = large;
+    expect(&s, NEBEL_ERROR_LIMIT, "GL_MAX_TEXTURE_SIZE");
+    expect(&s, NEBEL_ERROR_LIMIT, "GL_MAX_TEXTURE_SIZE");
+    s.w.planet.layers = s.w.layers;
+    assert_int_equal(nebel_gl_render_frame(s.renderer, &s.frame), NEBEL_OK);
+    nebel_destroy_layers(large);
+    close_stage(&s);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scenes_are_the_same),
+        cmocka_unit_test(eyes_everywhere_see_the_same),
+        cmocka_unit_test(large_distances_keep_their_digits),
+        cmocka_unit_test(particles_lie_between_shells),
+        cmocka_unit_test(shells_turn_and_return),
+        cmocka_unit_test(the_state_stays),
+        cmocka_unit_test(what_cannot_be_drawn_is_refused),
+    };
+    if (argc > 1) scale = (uint32_t)atoi(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
