@@ -85,6 +85,11 @@ endfunction()
 function(nebel_add_core)
     nebel_glob(sources src/base/*.c src/media/*.c src/march/*.c src/kernels/*.c src/shader/*.c src/nebula/*.c
         src/classic/*.c src/planet/*.c)
+    # Clouds are short loops over three axes and eight corners, which -O2 of gcc does not unroll.
+    nebel_glob(clouds src/planet/cloud*.c)
+    if(CMAKE_C_COMPILER_ID STREQUAL GNU)
+        set_source_files_properties(${clouds} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
+    endif()
     nebel_add_shader_text(text)
     list(APPEND sources ${text})
     nebel_add_kernels(kernel_objects definitions)

@@ -349,7 +349,8 @@ static void test_light_of_slabs(void **state)
     nebel_destroy_clouds(clouds);
 }
 
-/* What comes straight from the sun to places in clouds, by lattices and by steps of two metres. */
+/* What comes straight from the sun to places in clouds, by lattices, by what light of pieces of rays uses, and by steps of
+ * two metres. */
 static void test_ways_to_the_sun(void **state)
 {
     (void)state;
@@ -358,23 +359,30 @@ static void test_ways_to_the_sun(void **state)
     nebel_cloud_workspace *workspace;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     const double *sun = view->sun.direction;
+    const nb_cloud_grain grain = {.width = 6, .first = 16, .wide = 100};
     uint64_t numbers = 17;
-    double sum = 0, bias = 0;
+    double sum[2] = {0, 0}, bias[2] = {0, 0};
     int between = 0;
     for (int i = 0; i < PLACES; i++) {
         const double x = dice(&numbers, -5e3, 5e3), z = dice(&numbers, -5e3, 5e3), y = dice(&numbers, 1000, 2000);
         const nebel_ray ray = {{x, y, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
         const double from[3] = {x, y + RADIUS, z};
-        const double left = exp(-(double)nb_cloud_sun_depth_at(workspace, from, 25));
         const double truth = brute_force(clouds, &ray, 0, (2720 - y) / sun[1], 2);
-        sum += fabs(left - truth) / PLACES;
-        bias += (left - truth) / PLACES;
+        const double left[2] = {exp(-(double)nb_cloud_sun_depth_at(workspace, from, 25)),
+                                exp(-(double)nb_cloud_depths_at(workspace, from, &grain).sun)};
+        for (int k = 0; k < 2; k++) {
+            sum[k] += fabs(left[k] - truth) / PLACES;
+            bias[k] += (left[k] - truth) / PLACES;
+        }
         between += truth > .02 && truth < .98;
     }
-    print_message(
-        "sunlight at %d places, %d of them in part in shadow: off by %.2g in the mean, all together by %.2g\n", PLACES,
-        between, sum, bias);
-    assert_true(between > PLACES / 12 && sum < .012 && fabs(bias) < .004);
+    for (int k = 0; k < 2; k++) {
+        print_message(
+            "sunlight at %d places, %d of them in part in shadow, %s: off by %.2g in the mean, all together by "
+            "%.2g\n",
+            PLACES, between, k == 0 ? "by lattices" : "as of pieces", sum[k], bias[k]);
+        assert_true(between > PLACES / 12 && sum[k] < .012 && fabs(bias[k]) < .004);
+    }
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     nebel_destroy_clouds(clouds);

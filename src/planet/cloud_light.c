@@ -117,19 +117,19 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
 }
 
 /* At most so many steps, of which the last one goes to the layer's end; and what nodes near by take of their own. */
-enum { STEPS = 40, OWN_STEPS = 4, COARSER = 2 };
+enum { STEPS = 40, OWN_STEPS = 4, COARSER = 4 };
 
 /* Optical depth of a layer from a place on. Steps grow: what is far away throws soft shadows. Each takes the mean over its
  * length. *t: how far it came; returns whether there is more. */
-static int march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float width,
-                 int steps, double *sum, double *t)
+static int march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float first,
+                 float width, int steps, double *sum, double *t)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     double pieces[2][2];
     if (nb_cloud_pieces(layer->low, layer->high, from, unit, HUGE_VAL, pieces) == 0) return 0;
     const double end = pieces[0][1];
     *t = pieces[0][0];
-    double step = fmax((double)width, 0.02 * *t);
+    double step = fmax((double)first, 0.02 * *t);
     for (int i = 0; i < steps && *t < end; i++) {
         const double length = i == STEPS - 1 ? end - *t : fmin(step, end - *t);
         double place[3];
@@ -142,16 +142,16 @@ static int march(nebel_cloud_workspace *workspace, int k, const double from[3], 
 }
 
 static float depth_along(nebel_cloud_workspace *workspace, int but, const double from[3], const double unit[3],
-                         float width)
+                         float first, float width)
 {
     double sum = 0, t;
     for (int k = 0; k < workspace->view->clouds->layer_count; k++)
-        if (k != but) march(workspace, k, from, unit, width, STEPS, &sum, &t);
+        if (k != but) march(workspace, k, from, unit, first, width, STEPS, &sum, &t);
     return (float)fmin(sum, 1e6);
 }
 
-static void read_level(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], int level,
-                       float weight, float depth[3]);
+static void read_nodes(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], float width,
+                       float depth[3]);
 
 /* The layer that a place is in, whose lattices so coarse do not show through it; -1: none. */
 static int layer_for(const nebel_cloud_view *view, const double place[3], double coarse)
@@ -164,41 +164,41 @@ static int layer_for(const nebel_cloud_view *view, const double place[3], double
     return -1;
 }
 
-/* After some steps of its own a way to the sun goes on as a lattice says whose nodes are as far apart as the next step is
- * long. */
-static float depth_to_sun(nebel_cloud_workspace *workspace, const double from[3], int level)
+/* After some steps of its own, from `first` on, a way to the sun goes on as a lattice says whose nodes are as far apart
+ * as the next step is long. */
+static float depth_to_sun(nebel_cloud_workspace *workspace, const double from[3], float first, float width)
 {
     const double *sun = workspace->view->sun.direction;
-    const float width = (float)ldexp(1, level);
-    const int own = layer_for(workspace->view, from, ldexp(1, level + COARSER));
+    const float coarse = first * COARSER;
+    const int own = layer_for(workspace->view, from, (double)coarse);
     double sum = 0, t;
-    if (own >= 0 && march(workspace, own, from, sun, width, OWN_STEPS, &sum, &t)) {
+    if (own >= 0 && march(workspace, own, from, sun, first, width, OWN_STEPS, &sum, &t)) {
         double place[3];
-        float rest[3] = {0, 0, 0};
+        float rest[3];
         for (int c = 0; c < 3; c++) place[c] = from[c] + t * sun[c];
-        read_level(workspace, NB_CLOUD_TO_SUN, place, level + COARSER, 1, rest);
+        read_nodes(workspace, NB_CLOUD_TO_SUN, place, coarse, rest);
         return (float)sum + rest[0];
     }
-    return (float)sum + depth_along(workspace, own, from, sun, width);
+    return (float)sum + depth_along(workspace, own, from, sun, first, width);
 }
 
 static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t at[3], int level,
                         float depth[3])
 {
+    const float width = (float)ldexp(1, level);
     double place[3], up[3], turned[3];
     for (int i = 0; i < 3; i++) place[i] = ldexp((double)at[i], level);
     if (ways == NB_CLOUD_TO_SUN) {
-        depth[0] = depth_to_sun(workspace, place, level);
+        depth[0] = depth_to_sun(workspace, place, width, width);
         return;
     }
-    const float width = (float)ldexp(1, level);
     const double radius = fmax(1, nb_vector_length(place));
     for (int i = 0; i < 3; i++) turned[i] = -workspace->view->sun.direction[i];
-    depth[0] = depth_along(workspace, -1, place, turned, width);
+    depth[0] = depth_along(workspace, -1, place, turned, width, width);
     for (int i = 0; i < 3; i++) up[i] = place[i] / radius;
-    depth[1] = depth_along(workspace, -1, place, up, width);
+    depth[1] = depth_along(workspace, -1, place, up, width, width);
     for (int i = 0; i < 3; i++) up[i] = -up[i];
-    depth[2] = depth_along(workspace, -1, place, up, width);
+    depth[2] = depth_along(workspace, -1, place, up, width, width);
 }
 
 static uint32_t hash_of(const int32_t at[3], int level)
@@ -278,11 +278,11 @@ float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place
     return depth[0];
 }
 
-nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], float width)
+nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)
 {
-    nb_cloud_depths depths = {.sun = nb_cloud_sun_depth_at(workspace, place, width)};
+    nb_cloud_depths depths = {.sun = depth_to_sun(workspace, place, grain->first, grain->width)};
     float others[3];
-    read_nodes(workspace, NB_CLOUD_AROUND, place, 4 * width, others);
+    read_nodes(workspace, NB_CLOUD_AROUND, place, grain->wide, others);
     depths.away = others[0];
     depths.up = others[1];
     depths.down = others[2];

@@ -99,12 +99,20 @@ nebel_result nb_cloud_light_make(nebel_cloud_view *view);
 /* Light of clear air at a place from the centre. */
 nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius);
 
-/* Optical depths at a place, from nodes that are about `width` apart. */
+/* Optical depths at a place. */
 typedef struct nb_cloud_depths {
     float sun, away, up, down;
 } nb_cloud_depths;
 
-nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], float width);
+/* How finely they are found: what is narrower than a width is seen as a mean. */
+typedef struct nb_cloud_grain {
+    float width, first; /* first: length of the first step towards the sun */
+    float wide;         /* between nodes of the other ways */
+} nb_cloud_grain;
+
+nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3],
+                                   const nb_cloud_grain *grain);
+/* That to the sun, from nodes that are about `width` apart. */
 float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width);
 
 /* What comes through a slab of such depth, straight or scattered, for a mean cosine. */

@@ -18,13 +18,26 @@
 /* Of what a piece may miss: that of many pieces together is less than their number of it, since signs differ. */
 #define PIECES 1.5
 
-/* Optical depth of a piece, whose light is that of its middle. */
-#define MOST_DEPTH 0.8
+/* Optical depth of a piece; and of a stretch of them, whose light is that of its middle. Both grow as less is seen. */
+#define MOST_DEPTH 1
+#define STRETCH_DEPTH 0.35
+
+/* The first step from a piece towards the sun: optical depth in the middle of clouds; half of the least piece at most. */
+#define FIRST_DEPTH 0.3
 
 /* Where there may be cloud and is none, of a sixteenth of the smallest heaps. */
 #define LEAST_STEP 0.5
 
+/* Noise hardly ever rises by a quarter of its largest slope all the way to the next cloud. */
+#define SLOPE_PART 0.25
+
 enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
+
+/* Pieces one behind the other that have the same light. */
+typedef struct nb_stretch {
+    double end, depth, seen, seen_apart; /* seen: of all scattering, and of what leads away */
+    double weight, moment;               /* of places by what is seen */
+} nb_stretch;
 
 typedef struct nb_walk {
     const nebel_cloud_view *view;
@@ -36,6 +49,7 @@ typedef struct nb_walk {
     int layer;                                /* the only one here */
     double depth, apart;                      /* so far: optical depths, of all scattering and of what leads away */
     double light[3], missed;
+    nb_stretch stretch;
     nebel_cloud_knots *knots;
 } nb_walk;
 
@@ -145,31 +159,50 @@ static void pass(nb_walk *walk, double t)
 
 /* ---- pieces ---------------------------------------------------------------------------------- */
 
-/* Light of a piece as of its middle. */
-static void add_light(nb_walk *walk, int k, double t, double width, double depth)
+/* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
+static void add_light(nb_walk *walk, int k)
 {
+    const nb_stretch *stretch = &walk->stretch;
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
+    if (!(stretch->weight > 0)) return;
+    const double t = stretch->moment / stretch->weight, width = walk->spread * t;
+    const double thickness = 1 / (double)layer->per_thickness;
     double place[3], up[3];
-    const double radius = radius_at(walk, t, place), apart = (double)walk->ray.apart[k];
+    const double radius = radius_at(walk, t, place);
     for (int c = 0; c < 3; c++) up[c] = place[c] / radius;
-    const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, (float)width);
+    const nb_cloud_grain grain = {
+        .width = (float)width,
+        .first = (float)fmin(0.1 * thickness,
+                             fmax(2 * width, fmin(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
+        /* Wider lattices than the layer is high would show through it. */
+        .wide = (float)fmax(fmin(20 * width, 0.8 * thickness), 0.08 * walk->least),
+    };
+    const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, &grain);
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
     const nb_cloud_source source = nb_cloud_source_of(walk->view, &walk->ray, k, &depths, &light, up);
-    const double seen = nb_exp(-walk->depth) * (1 - nb_exp(-depth));
-    const double seen_apart = nb_exp(-walk->apart) * (1 - nb_exp(-apart * depth)) / apart;
     for (int c = 0; c < 3; c++)
-        walk->light[c] += seen * (double)(source.once[c] + source.ambient[c]) + seen_apart * (double)source.often[c];
+        walk->light[c] += stretch->seen * (double)(source.once[c] + source.ambient[c]) +
+                          stretch->seen_apart * (double)source.often[c];
+    walk->stretch = (nb_stretch){.weight = 0};
 }
 
 static void take_piece(nb_walk *walk, int k, double t, double length, double depth)
 {
+    nb_stretch *stretch = &walk->stretch;
     if (!(depth > 0)) return;
     if (walk->knots->count == 0) add_knot(walk, t);
-    const double middle = t + 0.5 * length;
-    /* Wider lattices than the layer is high would show through it. */
-    const double thickness = 1 / (double)walk->view->clouds->layers[k].per_thickness;
-    add_light(walk, k, middle, fmax(fmin(5 * walk->spread * middle, 0.2 * thickness), 0.02 * walk->least), depth);
+    if (t - stretch->end > walk->least) add_light(walk, k);
+    const double apart = (double)walk->ray.apart[k], seen = nb_exp(-walk->depth) * (1 - nb_exp(-depth));
+    const double seen_apart = nb_exp(-walk->apart) * (1 - nb_exp(-apart * depth)) / apart;
+    stretch->depth += depth;
+    stretch->end = t + length;
+    stretch->seen += seen;
+    stretch->seen_apart += seen_apart;
+    stretch->weight += seen + seen_apart;
+    stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
     walk->depth += depth;
-    walk->apart += (double)walk->ray.apart[k] * depth;
+    walk->apart += apart * depth;
+    if (stretch->depth > STRETCH_DEPTH / (0.15 + nb_exp(-walk->depth))) add_light(walk, k);
     pass(walk, t + length);
 }
 
@@ -177,18 +210,20 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
 static double skip(const nb_walk *walk, int k, double t, double end, float *far, double *length)
 {
     double clear = 0, known = 0; /* up to where no block is clear */
+    nb_spot spot = spot_at(walk, k, t);
     while (t < end) {
-        nb_spot spot = spot_at(walk, k, t);
         if (t >= known) {
             double unknown;
             const double way = clear_way(walk, k, &spot, &unknown);
             if (way > 0) {
                 t += way;
+                spot = spot_at(walk, k, t);
+                clear = 0;
                 continue;
             }
             known = t + unknown;
         }
-        *length = fmin(end - t, fmax(clear, fmax(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
+        *length = fmin(end - t, fmax(clear / SLOPE_PART, fmax(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
         spot = spot_at(walk, k, t + *length);
         *far = extinction_of(walk, k, &spot, &clear);
         if (*far > 0) return t;
@@ -288,6 +323,7 @@ static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
         const nb_cloud_layer *layer = &workspace->view->clouds->layers[stays[i].layer];
         walk.least = (double)layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 16;
         walk_layer(&walk, stays[i].layer, stays[i].begin, stays[i].end);
+        add_light(&walk, stays[i].layer);
         last = stays[i].end;
     }
     if (knots->count > 0) {
