@@ -34,6 +34,9 @@ static inline float nb_clamp_coordinate(float x)
 #define NB_CLONES
 #endif
 
+/* For what such functions call: else it is compiled for the least of the sets alone. */
+#define NB_ALWAYS_INLINE static inline __attribute__((always_inline))
+
 /* The next loop has no dependence between its rounds. clang finds out by itself, and warns of the pragma where it does
  * not. */
 #if defined(__clang__)

@@ -1,7 +1,6 @@
 #include "mask.h"
 
 #include <math.h>
-#include <string.h>
 
 /* ---- cells ----------------------------------------------------------------------------------- */
 
@@ -20,11 +19,10 @@ typedef struct nb_cell {
     float at[2][2]; /* by y, x */
 } nb_cell;
 
-static inline nb_cell cell_at(const nb_mask *mask, uint32_t x, uint32_t y)
+NB_ALWAYS_INLINE nb_cell cell_of(uint32_t corners, float threshold)
 {
-    const uint8_t *above = mask->alphas + (size_t)y * (mask->width + 1) + x, *below = above + mask->width + 1;
-    const float threshold = mask->threshold;
-    return (nb_cell){{{above[0] - threshold, above[1] - threshold}, {below[0] - threshold, below[1] - threshold}}};
+    return (nb_cell){{{(float)(corners & 255) - threshold, (float)(corners >> 8 & 255) - threshold},
+                      {(float)(corners >> 16 & 255) - threshold, (float)(corners >> 24) - threshold}}};
 }
 
 static int has_edge(const nb_cell *cell)
@@ -33,59 +31,63 @@ static int has_edge(const nb_cell *cell)
     return solid % 4 != 0;
 }
 
-static uint8_t least(uint8_t a, uint8_t b)
+static uint32_t least(uint32_t a, uint32_t b)
 {
     return a < b ? a : b;
 }
 
-static uint8_t next_to(uint8_t clearance)
+/* Ways of lines: towards higher x and y, or lower x, or lower y, or both. */
+NB_ALWAYS_INLINE uint32_t shift_of(int falls_x, int falls_y)
 {
-    return clearance < 255 ? (uint8_t)(clearance + 1) : 255;
+    return 8 * ((uint32_t)falls_x + 2 * (uint32_t)falls_y);
 }
 
-/* One sweep of those that find steps of a king in chess to the next cell with an edge (Rosenfeld and Pfaltz 1966), from
- * the first row or, back, from the last. Returns whether it changed anything. */
-static int sweep(const nb_mask *mask, int back)
+/* The square that begins at a cell is larger by one than the least of those that begin at its three neighbours ahead
+ * (the largest square of ones in a matrix of bits, by dynamic programming). A sweep from the far side of the texture; as
+ * squares go on at the opposite border it is repeated until nothing changes, which is returned. */
+static int sweep(const nb_mask *mask, int falls_x, int falls_y)
 {
-    const uint32_t width = mask->width, height = mask->height;
+    const uint32_t width = mask->width, height = mask->height, shift = shift_of(falls_x, falls_y);
     int changed = 0;
     for (uint32_t i = 0; i < height; i++) {
-        const uint32_t y = back ? height - 1 - i : i, other = back ? after(y, height) : before(y, height);
-        uint8_t *row = mask->clearances + (size_t)y * width;
-        const uint8_t *met = mask->clearances + (size_t)other * width;
+        const uint32_t y = falls_y ? i : height - 1 - i, other = falls_y ? before(y, height) : after(y, height);
+        uint32_t *row = mask->clearances + (size_t)y * width;
+        const uint32_t *ahead = mask->clearances + (size_t)other * width;
         for (uint32_t k = 0; k < width; k++) {
-            const uint32_t x = back ? width - 1 - k : k, left = before(x, width), right = after(x, width);
-            const uint8_t beside = least(row[back ? right : left], met[x]);
-            const uint8_t found = next_to(least(beside, least(met[left], met[right])));
-            changed |= found < row[x];
-            row[x] = least(row[x], found);
+            const uint32_t x = falls_x ? k : width - 1 - k, beside = falls_x ? before(x, width) : after(x, width);
+            const uint32_t across = ahead[beside] >> shift & 255;
+            const uint32_t found = 1 + least(across, least(row[beside] >> shift & 255, ahead[x] >> shift & 255));
+            const uint32_t known = row[x] >> shift & 255;
+            if (found >= known) continue;
+            row[x] -= (known - found) << shift;
+            changed = 1;
         }
     }
     return changed;
 }
 
-/* What a sweep leaves at one border of the texture another takes up at the opposite one. */
 static void set_clearances(const nb_mask *mask)
+{
+    const size_t count = (size_t)mask->width * mask->height;
+    for (size_t i = 0; i < count; i++) {
+        const nb_cell cell = cell_of(mask->corners[i], mask->threshold);
+        mask->clearances[i] = has_edge(&cell) ? 0 : UINT32_MAX;
+    }
+    for (int way = 0; way < 4; way++)
+        while (sweep(mask, way & 1, way >> 1)) {
+        }
+}
+
+static void set_corners(const nb_mask *mask, const nebel_texture *texture)
 {
     const uint32_t width = mask->width, height = mask->height;
     for (uint32_t y = 0; y < height; y++)
         for (uint32_t x = 0; x < width; x++) {
-            const nb_cell cell = cell_at(mask, x, y);
-            mask->clearances[(size_t)y * width + x] = has_edge(&cell) ? 0 : 255;
-        }
-    int changed = 1;
-    while (changed) {
-        changed = sweep(mask, 0);
-        changed |= sweep(mask, 1);
-    }
-}
-
-static void copy_alphas(const nb_mask *mask, const nebel_texture *texture)
-{
-    for (uint32_t y = 0; y <= mask->height; y++)
-        for (uint32_t x = 0; x <= mask->width; x++) {
-            const size_t texel = (size_t)(y % mask->height) * mask->width + x % mask->width;
-            mask->alphas[(size_t)y * (mask->width + 1) + x] = texture->rgba[4 * texel + 3];
+            const size_t here = (size_t)y * width, below = (size_t)after(y, height) * width, right = after(x, width);
+            const size_t texels[4] = {here + x, here + right, below + x, below + right};
+            uint32_t corners = 0;
+            for (int k = 0; k < 4; k++) corners |= (uint32_t)texture->rgba[4 * texels[k] + 3] << 8 * k;
+            mask->corners[here + x] = corners;
         }
 }
 
@@ -93,19 +95,20 @@ nebel_result nb_mask_make(nb_mask *mask, const nebel_allocator *allocator, const
                           int32_t number, float cutoff)
 {
     const nebel_texture *texture = &scene->textures[number];
+    const size_t count = (size_t)texture->width * texture->height;
     *mask = (nb_mask){.number = number, .cutoff = cutoff, .width = texture->width, .height = texture->height};
     mask->threshold = 255 * cutoff - 0.125f;
-    mask->alphas = nb_allocate(allocator, (size_t)texture->width + 1, (size_t)texture->height + 1);
-    mask->clearances = nb_allocate(allocator, texture->width, texture->height);
-    if (mask->alphas == NULL || mask->clearances == NULL) return NEBEL_ERROR_MEMORY;
-    copy_alphas(mask, texture);
+    mask->corners = nb_allocate(allocator, count, sizeof *mask->corners);
+    mask->clearances = nb_allocate(allocator, count, sizeof *mask->clearances);
+    if (mask->corners == NULL || mask->clearances == NULL) return NEBEL_ERROR_MEMORY;
+    set_corners(mask, texture);
     set_clearances(mask);
     return NEBEL_OK;
 }
 
 void nb_mask_free(nb_mask *mask, const nebel_allocator *allocator)
 {
-    nb_release(allocator, mask->alphas);
+    nb_release(allocator, mask->corners);
     nb_release(allocator, mask->clearances);
 }
 
@@ -125,8 +128,9 @@ int nb_mask_is_hole(const nb_mask *mask, float u, float v)
     const double x = isfinite(u) ? (double)u * mask->width : 0, y = isfinite(v) ? (double)v * mask->height : 0;
     double f, g;
     const uint32_t column = find_cell(x, mask->width, &f), row = find_cell(y, mask->height, &g);
-    const nb_cell cell = cell_at(mask, column, row);
-    if (mask->clearances[(size_t)row * mask->width + column] > 0) return cell.at[0][0] < 0;
+    const size_t number = (size_t)row * mask->width + column;
+    const nb_cell cell = cell_of(mask->corners[number], mask->threshold);
+    if (mask->clearances[number] > 0) return cell.at[0][0] < 0;
     const double above = (double)cell.at[0][0] + f * (double)(cell.at[0][1] - cell.at[0][0]);
     const double below = (double)cell.at[1][0] + f * (double)(cell.at[1][1] - cell.at[1][0]);
     return above + g * (below - above) < 0;
@@ -137,131 +141,197 @@ int nb_mask_is_hole(const nb_mask *mask, float u, float v)
 /* Steps end so far beyond a cell: in another one, whatever rounding does. */
 static const double margin = 1e-6;
 
-static nb_mask_axis axis_of(double from, double to, uint32_t size)
+/* Of lines that are not walked the place is of no meaning, but within the mask. */
+NB_ALWAYS_INLINE void begin_axis(nb_mask_walk *walk, const nb_mask_lines *lines, int axis, double size, int *is_walked)
 {
-    const double way = to - from, least = (way < 0 ? to : from) - 0.5 - margin;
-    const double start = from - 0.5 - size * floor(least / size);
-    return (nb_mask_axis){.start = start,
-                          .way = way,
-                          .inverse = 1 / (fabs(way) > 1e-200 ? way : 1e-200),
-                          .size = size,
-                          .lap = (uint32_t)start / size * size};
-}
-
-static int is_short(double from, double to)
-{
-    const double reach = NB_MASK_REACH;
-    return fabs(to - from) <= reach && isfinite(from);
-}
-
-nb_mask_walk nb_mask_begin(const nb_mask *mask, const double from[2], const double to[2])
-{
-    if (!is_short(from[0], to[0]) || !is_short(from[1], to[1]))
-        return (nb_mask_walk){.mask = mask, .at = 1, .ends = {1}, .solid = {1}, .count = 1};
-    return (nb_mask_walk){
-        .mask = mask, .x = axis_of(from[0], to[0], mask->width), .y = axis_of(from[1], to[1], mask->height)};
-}
-
-/* In which cell of the mask a line is, and how far within. */
-static inline uint32_t enter_axis(nb_mask_axis *axis, double at, double *within)
-{
-    const double place = axis->start + at * axis->way;
-    const uint32_t cell = (uint32_t)place;
-    *within = place - cell;
-    while (cell < axis->lap) axis->lap -= axis->size;
-    while (cell - axis->lap >= axis->size) axis->lap += axis->size;
-    return cell - axis->lap;
-}
-
-/* How long a line stays within so many cells. */
-static inline double stay(const nb_mask_axis *axis, double within, double reach)
-{
-    const double end = axis->way < 0 ? 1 - reach - margin : reach + margin;
-    return (end - within) * axis->inverse;
-}
-
-static inline void add_piece(nb_mask_walk *walk, double end, int solid)
-{
-    walk->ends[walk->count] = end;
-    walk->solid[walk->count++] = solid;
-}
-
-/* Alpha over the threshold along a line in a cell is a + b s + c s^2. */
-typedef struct nb_quadratic {
-    double a, b, c;
-} nb_quadratic;
-
-static inline double value_at(const nb_quadratic *q, double s)
-{
-    return q->a + s * (q->b + s * q->c);
-}
-
-/* Of one sign from 0 to `length`: at both ends, without a turn between them that may lead beyond 0. */
-static inline int is_of_one_sign(const nb_quadratic *q, double length)
-{
-    const int solid = q->a >= 0, falls = q->b<0, rises = q->b + 2 * length * q->c> 0;
-    return (value_at(q, length) >= 0) == solid && (solid ? !(falls && rises) : falls || rises);
-}
-
-/* Parts the cell at the roots. */
-static void cut_cell(nb_mask_walk *walk, const nb_quadratic *q, double length)
-{
-    const double discriminant = q->b * q->b - 4 * q->a * q->c;
-    double start = 0;
-    if (discriminant > 0) {
-        const double root = sqrt(discriminant), sum = q->b < 0 ? root - q->b : -root - q->b;
-        const double one = sum / (2 * (q->c != 0 ? q->c : 1e-300)), other = sum != 0 ? 2 * q->a / sum : HUGE_VAL;
-        const double roots[2] = {one < other ? one : other, one < other ? other : one};
-        for (int i = 0; i < 2; i++) {
-            if (!(roots[i] > start && roots[i] < length)) continue;
-            add_piece(walk, walk->at + roots[i], value_at(q, 0.5 * (start + roots[i])) >= 0);
-            start = roots[i];
-        }
+    const double reach = NB_MASK_REACH, cells = (double)walk->mask->width * walk->mask->height;
+    const int is_small = cells <= NB_MASK_LARGEST;
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const double from = lines->from[axis][i], way = lines->to[axis][i] - from;
+        const int is_short = (fabs(way) <= reach) & (fabs(from) < HUGE_VAL) & is_small;
+        const double start = is_short ? from : 1, goes = is_short ? way : 0;
+        const double least_place = (goes < 0 ? start + goes : start) - 0.5 - margin;
+        walk->start[axis][i] = start - 0.5 - size * floor(least_place / size);
+        walk->way[axis][i] = goes;
+        walk->inverse[axis][i] = 1 / (fabs(goes) > 1e-200 ? goes : 1e-200);
+        is_walked[i] &= is_short;
     }
-    add_piece(walk, walk->at + length, value_at(q, 0.5 * (start + length)) >= 0);
 }
 
-/* The pieces of the cell at walk->at, or of all cells around that are like it. */
-static void enter_cell(nb_mask_walk *walk)
+NB_CLONES static void begin_lines(nb_mask_walk *walk, const nb_mask_lines *lines)
+{
+    int is_walked[NB_PACKET];
+    for (int i = 0; i < NB_PACKET; i++) is_walked[i] = lines->is_asked[i];
+    begin_axis(walk, lines, 0, walk->mask->width, is_walked);
+    begin_axis(walk, lines, 1, walk->mask->height, is_walked);
+    for (uint32_t i = 0; i < NB_PACKET; i++) {
+        walk->shift[i] = shift_of(walk->way[0][i] < 0, walk->way[1][i] < 0);
+        walk->at[i] = is_walked[i] ? 0 : 1;
+        walk->since[i] = -1;
+        if (lines->is_asked[i] && !is_walked[i]) walk->found[walk->count++] = (nb_solid){i, 0, 1};
+    }
+}
+
+void nb_mask_begin(nb_mask_walk *walk, const nb_mask *mask, const nb_mask_lines *lines)
+{
+    walk->mask = mask;
+    walk->is_over = 0;
+    walk->count = 0;
+    begin_lines(walk, lines);
+}
+
+/* A step of each line: through its cell, or through all ahead that are like it. Alpha over the threshold on the way is
+ * a + b s + c s^2, whose sign changes at two places at most: so there are three pieces, of which some may have no
+ * length. */
+typedef struct nb_step {
+    double a[NB_PACKET], b[NB_PACKET], c[NB_PACKET], length[NB_PACKET];
+    double change[2][NB_PACKET]; /* s where the second piece begins and the third; 0 for those that are missing */
+    double value[3][NB_PACKET];  /* of each piece, of its sign; a missing one is like the next */
+    int is_cut[NB_PACKET];       /* there may be changes */
+} nb_step;
+
+/* In which cell a line is along one axis, among those around the mask, and how far within; and in which of the mask that
+ * is. Halves keep the quotient from whole numbers. */
+#define ENTER(place, cell, within, size, inverse, column)                                                              \
+    const int32_t cell = (int32_t)(place);                                                                             \
+    const double within = (place)-cell;                                                                                \
+    const int32_t column = cell - (size) * (int32_t)((cell + 0.5) * (inverse))
+
+/* Returns whether any line may have changes on its way. */
+NB_ALWAYS_INLINE int enter_cells(const nb_mask_walk *walk, nb_step *step)
 {
     const nb_mask *mask = walk->mask;
-    const double left = 1 - walk->at;
-    double f, g;
-    const uint32_t column = enter_axis(&walk->x, walk->at, &f), row = enter_axis(&walk->y, walk->at, &g);
-    const nb_cell cell = cell_at(mask, column, row);
-    const uint8_t clearance = mask->clearances[(size_t)row * mask->width + column];
-    const double reach = clearance > 0 ? clearance : 1;
-    const double across = stay(&walk->x, f, reach), down = stay(&walk->y, g, reach);
-    const double shorter = across < down ? across : down, length = shorter < left ? shorter : left;
-    const double origin = (double)cell.at[0][0], right = (double)(cell.at[0][1] - cell.at[0][0]);
-    const double below = (double)(cell.at[1][0] - cell.at[0][0]);
-    const double twist = (double)(cell.at[1][1] - cell.at[1][0]) - right;
-    const nb_quadratic q = {origin + right * f + below * g + twist * f * g,
-                            right * walk->x.way + below * walk->y.way + twist * (f * walk->y.way + g * walk->x.way),
-                            twist * walk->x.way * walk->y.way};
-    walk->count = walk->next = 0;
-    if (clearance > 0)
-        add_piece(walk, walk->at + length, origin >= 0);
-    else if (is_of_one_sign(&q, length))
-        add_piece(walk, walk->at + length, q.a >= 0);
-    else
-        cut_cell(walk, &q, length);
-    walk->at = length < left ? walk->ends[walk->count - 1] : 1;
+    const uint32_t *restrict corners = mask->corners, *restrict clearances = mask->clearances;
+    const int32_t width = (int32_t)mask->width, height = (int32_t)mask->height;
+    const double inverse_width = 1.0 / width, inverse_height = 1.0 / height;
+    const float threshold = mask->threshold;
+    int any = 0;
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const double at = walk->at[i], left = 1 - at, way_x = walk->way[0][i], way_y = walk->way[1][i];
+        const double x = walk->start[0][i] + at * way_x, y = walk->start[1][i] + at * way_y;
+        ENTER(x, cell_x, f, width, inverse_width, column);
+        ENTER(y, cell_y, g, height, inverse_height, row);
+        const int32_t cell = row * width + column;
+        const nb_cell v = cell_of(corners[cell], threshold);
+        const int32_t clearance = (int32_t)(clearances[cell] >> walk->shift[i] & 255);
+        const double reach = clearance > 0 ? clearance : 1;
+        const double across = ((way_x < 0 ? 1 - reach - margin : reach + margin) - f) * walk->inverse[0][i];
+        const double down = ((way_y < 0 ? 1 - reach - margin : reach + margin) - g) * walk->inverse[1][i];
+        const double shorter = across < down ? across : down, length = shorter < left ? shorter : left;
+        const double origin = (double)v.at[0][0], right = (double)(v.at[0][1] - v.at[0][0]);
+        const double below = (double)(v.at[1][0] - v.at[0][0]), twist = (double)(v.at[1][1] - v.at[1][0]) - right;
+        const double a = origin + right * f + below * g + twist * f * g;
+        const double b = right * way_x + below * way_y + twist * (f * way_y + g * way_x), c = twist * way_x * way_y;
+        const int begins = a >= 0, ends = a + length * (b + length * c) >= 0, falls = b < 0;
+        const int rises = b + 2 * length * c > 0; /* at the end */
+        const int is_even = (begins == ends) & (begins ? !(falls & rises) : falls | rises);
+        const int is_clear = clearance > 0, is_cut = !is_clear & !is_even;
+        const double value = is_clear ? origin : a, seen = at < 1 ? value : -1; /* what is walked is as a hole */
+        step->a[i] = a;
+        step->b[i] = b;
+        step->c[i] = c;
+        step->length[i] = length;
+        step->change[0][i] = step->change[1][i] = 0;
+        step->value[0][i] = step->value[1][i] = step->value[2][i] = seen;
+        step->is_cut[i] = is_cut;
+        any |= is_cut;
+    }
+    return any;
 }
 
-int nb_mask_next(nb_mask_walk *walk, double *enter, double *leave)
+/* Parts steps at the roots. */
+NB_ALWAYS_INLINE void cut_cells(nb_step *step)
 {
-    int found = 0;
-    double start = walk->next > 0 ? walk->ends[walk->next - 1] : walk->count > 0 ? 0 : walk->at;
-    while (walk->next < walk->count || walk->at < 1) {
-        if (walk->next == walk->count) enter_cell(walk);
-        const int solid = walk->solid[walk->next];
-        if (!solid && found) return 1;
-        const double end = walk->ends[walk->next++];
-        if (solid && !found) *enter = start;
-        if (solid) *leave = end;
-        found |= solid;
-        start = end;
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const double a = step->a[i], b = step->b[i], c = step->c[i], length = step->length[i];
+        const double discriminant = b * b - 4 * a * c, root = sqrt(discriminant > 0 ? discriminant : 0);
+        const double sum = b < 0 ? root - b : -root - b;
+        const double one = sum / (2 * (c != 0 ? c : 1e-300)), other = 2 * a / (sum != 0 ? sum : 1e-300);
+        const double low = one < other ? one : other, high = one < other ? other : one;
+        const int is_cut = step->is_cut[i], has_roots = is_cut & (discriminant > 0);
+        const double first = (has_roots & (low > 0) & (low < length)) ? low : 0;
+        const double second = (has_roots & (high > first) & (high < length)) ? high : first;
+        const double before = 0.5 * first, between = 0.5 * (first + second), behind = 0.5 * (second + length);
+        const double last = a + behind * (b + behind * c);
+        const double middle = second > first ? a + between * (b + between * c) : last;
+        step->change[0][i] = first;
+        step->change[1][i] = second;
+        step->value[0][i] = is_cut ? first > 0 ? a + before * (b + before * c) : middle : step->value[0][i];
+        step->value[1][i] = is_cut ? middle : step->value[1][i];
+        step->value[2][i] = is_cut ? last : step->value[2][i];
     }
-    return found;
+}
+
+/* Where stretches end: with one of the three pieces, or with the line. */
+typedef struct nb_ends {
+    double since[4][NB_PACKET], at[4][NB_PACKET]; /* at -1: there is no such end */
+} nb_ends;
+
+/* Goes on to a piece. Macro, as loops in loops become no vectors. */
+#define TAKE_PIECE(k, begin, value)                                                                                    \
+    do {                                                                                                               \
+        const double start = (begin), opened = since >= 0 ? since : start, closed = since >= 0 ? start : -1;           \
+        ends->since[k][i] = since;                                                                                     \
+        ends->at[k][i] = (value) >= 0 ? -1 : closed;                                                                   \
+        since = (value) >= 0 ? opened : -1;                                                                            \
+    } while (0)
+
+/* Returns whether there is any end. */
+NB_ALWAYS_INLINE int take_step(nb_mask_walk *walk, const nb_step *step, nb_ends *ends)
+{
+    int any = 0, goes_on = 0;
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const double at = walk->at[i];
+        double since = walk->since[i];
+        TAKE_PIECE(0, at, step->value[0][i]);
+        TAKE_PIECE(1, at + step->change[0][i], step->value[1][i]);
+        TAKE_PIECE(2, at + step->change[1][i], step->value[2][i]);
+        walk->since[i] = since;
+    }
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        const double at = walk->at[i], length = step->length[i], since = walk->since[i], end = at + length;
+        const int stays = length < 1 - at;
+        ends->since[3][i] = since;
+        ends->at[3][i] = (stays | (since < 0)) ? -1 : 1;
+        walk->since[i] = stays ? since : -1;
+        walk->at[i] = stays ? end : 1;
+        goes_on |= stays;
+    }
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++)
+        any |= (ends->at[0][i] >= 0) | (ends->at[1][i] >= 0) | (ends->at[2][i] >= 0) | (ends->at[3][i] >= 0);
+    walk->is_over = !goes_on;
+    return any;
+}
+
+/* Without a branch, as it would be guessed wrong every other time. */
+NB_ALWAYS_INLINE void list_stretches(nb_mask_walk *walk, const nb_ends *ends)
+{
+    for (uint32_t i = 0; i < NB_PACKET; i++)
+        for (int k = 0; k < 4; k++) {
+            walk->found[walk->count] = (nb_solid){i, ends->since[k][i], ends->at[k][i]};
+            walk->count += ends->at[k][i] >= 0;
+        }
+}
+
+NB_CLONES static void walk_lines(nb_mask_walk *walk)
+{
+    nb_step step;
+    nb_ends ends;
+    while (!walk->is_over && walk->count == 0) {
+        if (enter_cells(walk, &step)) cut_cells(&step);
+        if (take_step(walk, &step, &ends)) list_stretches(walk, &ends);
+    }
+}
+
+int nb_mask_next(nb_mask_walk *walk)
+{
+    walk->count = 0;
+    walk_lines(walk);
+    return walk->count > 0;
 }

@@ -7,6 +7,7 @@
 #define NB_CPU_MASK_H
 
 #include "base/base.h"
+#include "lanes.h"
 
 #include <nebel/scene.h>
 
@@ -14,10 +15,11 @@ typedef struct nb_mask {
     int32_t number; /* of the texture */
     float cutoff;   /* as the meshes have it */
     uint32_t width, height;
-    float threshold;     /* of alpha in bytes */
-    uint8_t *alphas;     /* of each texel and, in one more column and row, of the first ones again */
-    uint8_t *clearances; /* of each cell, row after row: those less than so many cells away have no edge of a hole, at
-                            most 255; 0: it has one itself. Cell 0 begins at the centre of texel 0, all are periodic */
+    float threshold;      /* of alpha in bytes */
+    uint32_t *corners;    /* alpha at the four corners of each cell, row after row: a byte each, by x, then y, from the
+                             lowest one up. Cell 0 begins at the centre of texel 0, all are periodic */
+    uint32_t *clearances; /* of each cell, a byte for each of the four ways of lines, as corners: the side of the square
+                             of cells without an edge of a hole that begins there, at most 255; 0: it has one itself */
 } nb_mask;
 
 /* Errors: MEMORY. */
@@ -28,29 +30,37 @@ void nb_mask_free(nb_mask *mask, const nebel_allocator *allocator);
 /* Whether there is a hole at these texture coordinates. What is no number is 0. */
 int nb_mask_is_hole(const nb_mask *mask, float u, float v);
 
-/* One axis of a line: its place at s is start + s way, in cells; never below 0. */
-typedef struct nb_mask_axis {
-    double start, way, inverse; /* of the way; never infinite */
-    uint32_t size, lap;         /* of cells; the first of those around the mask that the line is on */
-} nb_mask_axis;
+/* A stretch of a line without holes. */
+typedef struct nb_solid {
+    uint32_t line;
+    double enter, leave;
+} nb_solid;
 
-/* A line over a mask, from s = 0 to 1. */
+/* The lines of a packet over a mask, each from s = 0 to 1. Its place at s is start + s way, in cells; never below 0. */
 typedef struct nb_mask_walk {
     const nb_mask *mask;
-    nb_mask_axis x, y;
-    double at; /* how far it has been walked */
-    double ends[3];
-    int solid[3]; /* the pieces of the present cell that lie ahead */
-    int count, next;
+    double start[2][NB_PACKET], way[2][NB_PACKET], inverse[2][NB_PACKET]; /* of the way; never infinite */
+    uint32_t shift[NB_PACKET];                                            /* of the clearance for its way */
+    double at[NB_PACKET];                                                 /* how far it has been walked */
+    double since[NB_PACKET];           /* where it has come out of a hole; -1: it is in one */
+    int is_over;                       /* all lines have been walked */
+    nb_solid found[2 * NB_PACKET + 1]; /* by the last call */
+    uint32_t count;
 } nb_mask_walk;
 
-/* Lines with more than so many texels along either axis are taken for solid. */
-enum { NB_MASK_REACH = 1 << 20 };
+/* Lines with more than so many texels along either axis, and those over a mask of more, are taken for solid. */
+enum { NB_MASK_REACH = 1 << 20, NB_MASK_LARGEST = 1 << 30 };
 
-/* Between two places in texels; 0 is the border of the first. */
-nb_mask_walk nb_mask_begin(const nb_mask *mask, const double from[2], const double to[2]);
+/* Places between which lines run, in texels; 0 is the border of the first. */
+typedef struct nb_mask_lines {
+    double from[2][NB_PACKET], to[2][NB_PACKET];
+    int is_asked[NB_PACKET];
+} nb_mask_lines;
 
-/* The next stretch of the line without holes; 0 where there is none left. */
-int nb_mask_next(nb_mask_walk *walk, double *enter, double *leave);
+/* Lines that are not walked are found at once. */
+void nb_mask_begin(nb_mask_walk *walk, const nb_mask *mask, const nb_mask_lines *lines);
+
+/* Finds more stretches, those of a line one after the other; 0 where there are none left. */
+int nb_mask_next(nb_mask_walk *walk);
 
 #endif

@@ -6,8 +6,6 @@
 
 #include <math.h>
 
-#define NB_ALWAYS_INLINE static inline __attribute__((always_inline))
-
 /* Shadows that are nearer to each other than this part of the way there are one: the triangles of a surface have
  * common edges, but their shadows meet to rounding only. */
 static const float nb_closeness = 0x1p-18f;

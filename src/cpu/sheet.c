@@ -1,19 +1,48 @@
 #include "sheet.h"
 
-#include "base/vector.h"
-
 #include <math.h>
 
-/* Where a place of a ray is in its shadow's sheet: in texels, and how many times as far from the light as the sheet. */
-static double look_up(const nb_sheet *sheet, const nb_sheet_lamp *lamp, const nb_shaft_rays *rays, uint32_t lane,
-                      float t, double texel[2])
+/* Where stretches of rays are on the sheet that keeps the light from them. */
+typedef struct nb_sheet_lines {
+    nb_mask_lines lines;
+    double near[NB_PACKET], far[NB_PACKET]; /* their ends are so many times as far from the light as the sheet */
+} nb_sheet_lines;
+
+/* Of one end of the stretches, its places in texels. */
+NB_ALWAYS_INLINE void look_up(const nb_sheet *sheet, const nb_sheet_lamp *lamp, const nb_shaft_rays *rays,
+                              const float *t, double (*texel)[NB_PACKET], double *farness)
 {
-    double way[3], farness = 1;
-    for (int c = 0; c < 3; c++) way[c] = (double)rays->start[c][lane] + (double)t * (double)rays->way[c][lane];
-    if (lamp != NULL) farness = nb_vector_dot(lamp->normal, way) / lamp->distance;
-    for (int c = 0; c < 3; c++) way[c] = way[c] / farness + (lamp != NULL ? lamp->place[c] : 0) - sheet->place[c];
-    for (int i = 0; i < 2; i++) texel[i] = sheet->at[i] + nb_vector_dot(sheet->slope[i], way);
-    return farness;
+    const nb_sheet s = *sheet;
+    const double none[3] = {0, 0, 0}, distance = lamp != NULL ? lamp->distance : 1;
+    const double *place = lamp != NULL ? lamp->place : none, *normal = lamp != NULL ? lamp->normal : none;
+    const int is_lamp = lamp != NULL;
+    NB_SIMD
+    for (int i = 0; i < NB_PACKET; i++) {
+        double way[3];
+        for (int c = 0; c < 3; c++) way[c] = (double)rays->start[c][i] + (double)t[i] * (double)rays->way[c][i];
+        const double ahead = normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2];
+        farness[i] = is_lamp ? ahead / distance : 1;
+        for (int c = 0; c < 3; c++) way[c] = way[c] / farness[i] + place[c] - s.place[c];
+        for (int k = 0; k < 2; k++)
+            texel[k][i] = s.at[k] + (s.slope[k][0] * way[0] + s.slope[k][1] * way[1] + s.slope[k][2] * way[2]);
+    }
+}
+
+/* Stretches that are in a shadow that is known are not asked for. Returns whether any is. */
+NB_CLONES static int look_up_ends(const nb_sheet *sheet, const nb_sheet_lamp *lamp, const nb_stretch *found,
+                                  const nb_shaft_rays *rays, nb_sheet_lines *lines)
+{
+    int any = 0;
+    for (int i = 0; i < NB_PACKET; i++) {
+        const float enter = found->enter[i], leave = found->leave[i];
+        const int is_known = (enter >= rays->enter[i]) & (leave <= rays->leave[i]);
+        lines->lines.is_asked[i] = (enter < leave) & !is_known;
+        any |= lines->lines.is_asked[i];
+    }
+    if (!any) return 0;
+    look_up(sheet, lamp, rays, found->enter, lines->lines.from, lines->near);
+    look_up(sheet, lamp, rays, found->leave, lines->lines.to, lines->far);
+    return 1;
 }
 
 /* As nb_extend and nb_replace, of one lane. */
@@ -41,27 +70,22 @@ static float place_at(double s, float enter, float leave, double near, double fa
     return s >= 1 ? leave : (float)((double)enter + part * ((double)leave - (double)enter));
 }
 
-static int cast_lane(const nb_sheet *sheet, const nb_sheet_lamp *lamp, nb_shafts *shafts,
-                     const nebel_allocator *allocator, uint32_t lane, float enter, float leave, nb_shaft_rays *rays)
-{
-    double from[2], to[2], first, last;
-    const double near = look_up(sheet, lamp, rays, lane, enter, from);
-    const double far = look_up(sheet, lamp, rays, lane, leave, to);
-    nb_mask_walk walk = nb_mask_begin(sheet->mask, from, to);
-    while (nb_mask_next(&walk, &first, &last)) {
-        const float begin = place_at(first, enter, leave, near, far), end = place_at(last, enter, leave, near, far);
-        if (!add(shafts, allocator, lane, begin, end, rays)) return 0;
-    }
-    return 1;
-}
-
 int nb_sheet_cast(const nb_sheet *sheet, const nb_sheet_lamp *lamp, nb_shafts *shafts, const nebel_allocator *allocator,
                   const nb_stretch *found, nb_shaft_rays *rays)
 {
-    for (uint32_t i = 0; i < NB_PACKET; i++) {
-        const float enter = found->enter[i], leave = found->leave[i];
-        if (!(enter < leave) || (enter >= rays->enter[i] && leave <= rays->leave[i])) continue;
-        if (!cast_lane(sheet, lamp, shafts, allocator, i, enter, leave, rays)) return 0;
-    }
+    nb_sheet_lines lines;
+    nb_mask_walk walk;
+    if (!look_up_ends(sheet, lamp, found, rays, &lines)) return 1;
+    nb_mask_begin(&walk, sheet->mask, &lines.lines);
+    do {
+        for (uint32_t i = 0; i < walk.count; i++) {
+            const nb_solid *solid = &walk.found[i];
+            const uint32_t k = solid->line;
+            const float enter = found->enter[k], leave = found->leave[k];
+            const float begin = place_at(solid->enter, enter, leave, lines.near[k], lines.far[k]);
+            const float end = place_at(solid->leave, enter, leave, lines.near[k], lines.far[k]);
+            if (!add(shafts, allocator, k, begin, end, rays)) return 0;
+        }
+    } while (nb_mask_next(&walk));
     return 1;
 }
