@@ -131,6 +131,30 @@ class SizeTest(ViewTest):
                 viewer.end()
 
 
+    def test_narrow_windows_show_the_picture(self):
+        """All of it but for the button, which is in the corner; Tab brings the controls, room does so, too."""
+        self.assert_done(self.render("render.png", "--device", "gl", "--size", "256x144"))
+        words = ("--size", "256x144", "--ui-scale", 1)
+        self.assert_done(nebel("view", self.scene, *words, "--screenshot", "window.png", cwd=self.folder,
+                               env={"DISPLAY": self.screen.name}))
+        viewer = Viewer(self, *words)
+        for shown in (False, True, False):
+            viewer.key("Tab")
+            viewer.settle()
+            self.assertEqual(viewer.shows_controls(), shown)
+        x, y, width, height = viewer.place("Controls")
+        share = (x + width) * (y + height) / (256 * 144)
+        self.assertLess(share, 0.1)
+        self.assertTrue(self.same(self.folder / "window.png", self.folder / "render.png", share ** 0.5), "the rest is the picture")
+        viewer.xdotool("windowsize", "--sync", viewer.window, 600, 300)
+        viewer.settle()
+        self.assertTrue(viewer.shows_controls())
+        viewer.xdotool("windowsize", "--sync", viewer.window, 256, 144)
+        viewer.settle()
+        self.assertFalse(viewer.shows_controls())
+        viewer.end()
+
+
 class CompareTest(ViewTest):
     def test_both_renderers_draw_the_same(self):
         black = self.write_scene("black.json", [])

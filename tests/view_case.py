@@ -74,8 +74,21 @@ class Viewer:
                 [NEBEL, "view", str(case.scene), "--size", "560x420", "--controls", str(self.controls), *map(str, words)],
                 stderr=log, env=self.environment, cwd=case.folder)
         case.addCleanup(self.close)
-        self.wait(lambda: self.controls.exists() and "Home" in self.controls.read_text(), "a window")
+        self.wait(self.controls.exists, "a window")
         self.find_window()
+        if not self.shows_controls():
+            self.press("Controls")
+
+    def shows_controls(self):
+        """Rather than the button that brings them. The list may be read while it is written."""
+        found = []
+
+        def find():
+            found[:] = re.findall(" (Home|Controls)\n", self.controls.read_text())
+            return found
+
+        self.wait(find, "the controls, or their button")
+        return found[0] == "Home"
 
     def find_window(self):
         self.window = self.xdotool("search", "--sync", "--onlyvisible", "--name", "nebel$").split()[0]

@@ -310,15 +310,40 @@ double find_reach(const nebel_camera &camera)
     return sqrt(sum);
 }
 
+/* Where the controls would leave less than a third of the window's width to the picture they wait behind a button, and come back where
+ * there is room again. */
+const float window_width = 330, narrow_width = 1.5f * window_width;
+bool is_narrow, were_shown;
+
+void fold_controls(nb_panel *panel)
+{
+    const bool was_narrow = is_narrow;
+    is_narrow = ImGui::GetIO().DisplaySize.x < narrow_width * scale;
+    if (is_narrow == was_narrow) return;
+    if (is_narrow) were_shown = panel->shown;
+    panel->shown = !is_narrow && (were_shown || panel->shown);
+}
+
+void draw_button(nb_panel *panel)
+{
+    ImGui::SetNextWindowPos(ImVec2(0, 0));
+    ImGui::Begin("folded", nullptr,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoNav);
+    panel->shown |= press("Controls", "Tab brings them, and takes them away.");
+    note_area(WINDOW);
+    ImGui::End();
+}
+
 // After the notice: where that reaches over the controls they end above it.
 void draw_window(nb_panel *panel)
 {
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     const area &notice = areas[NOTICE];
-    const float width = fminf(330 * scale, size.x);
-    const bool is_narrow = notice.low.x < notice.high.x && notice.low.x < width;
+    const float width = fminf(window_width * scale, size.x);
+    const bool is_below = notice.low.x < notice.high.x && notice.low.x < width;
     ImGui::SetNextWindowPos(ImVec2(0, 0));
-    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, is_narrow ? fmaxf(notice.low.y, 0) : size.y));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, is_below ? fmaxf(notice.low.y, 0) : size.y));
     ImGui::SetNextWindowBgAlpha(0.85f);
     ImGui::Begin("nebel", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoTitleBar |
@@ -412,7 +437,11 @@ extern "C" void nb_panel_draw(nb_panel *panel, const char *controls)
     if (places != nullptr && ImGui::GetIO().WantTextInput) fprintf(places, "0 0 0 0 (typing)\n");
     for (area &taken : areas) taken = area{ImVec2(0, 0), ImVec2(0, 0)};
     draw_notice(panel);
-    if (panel->shown) draw_window(panel);
+    fold_controls(panel);
+    if (panel->shown)
+        draw_window(panel);
+    else if (is_narrow)
+        draw_button(panel);
     if (panel->help_shown) draw_help(panel);
     release_keys();
     panel->is_held = ImGui::IsAnyItemActive();
