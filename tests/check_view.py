@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Uses `nebel view` as people do: pictures, mouse and keys, windows of all sizes, a driver that is lost."""
 
+import math
 import os
 import pathlib
 import re
@@ -261,6 +262,27 @@ class PlanetTest(FilmTest):
         viewer.type("frame", "18")
         self.assertFalse(self.same(self.assert_frame(viewer, 18, "cpu", BOTH_DRAW), noon, 0.02), "another sky")
         self.assertNotIn("--device", viewer.log.read_text())
+        viewer.end()
+
+    def test_another_sun_lights_the_air_at_once(self):
+        """As a file that has it, before it is saved."""
+        sun = {"direction": [0, 0.6, 0.8], "irradiance": 4}
+        fog = {"shape": {"type": "box", "min": [-500, 0, -900], "max": [500, 800, -100]}, "extinction": 0.001, "albedo": 0.9}
+        scene = {"camera": {"position": [0, 30, 0], "look_at": [0, 60, -100], "vertical_fov": 25},
+                 "planet": {"model": "physical", "preset": "earth"}}
+        viewer = self.open([fog], sun=sun, **scene)
+        viewer.press("fog[0].open")
+        first = viewer.take_picture()
+        viewer.press("Light")
+        viewer.type("sun height", "4")
+        lit = viewer.take_picture()
+        self.assertFalse(self.same(lit, first, 0.05))
+        saved = viewer.save()["sun"]["direction"]
+        self.assertLess(abs(saved[1] - math.sin(math.radians(4))), 1e-9)
+        self.assert_frame(viewer, 0, "gl", BOTH_DRAW)
+        self.assertTrue(self.same(lit, self.folder / "film-gl-0.png", BOTH_DRAW))
+        viewer.key("ctrl+z")
+        self.assertTrue(self.same(viewer.take_picture(), first, ROUNDING))
         viewer.end()
 
     def test_a_planet_of_layers_turns(self):

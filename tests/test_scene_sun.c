@@ -112,6 +112,54 @@ static void test_it_lights_the_air_of_a_planet(void **state)
     nebel_destroy_scene(scene);
 }
 
+/* As a file that has that sun; without one, as a file that has none. */
+static void test_any_sun_lights_a_planet(void **state)
+{
+    (void)state;
+    const double up[3] = {0, 1, 0};
+    static const char *const suns[] = {", \"sun\": {\"direction\": [3, 4, 0], \"irradiance\": [1, 2, 3]}", ""};
+    static const nebel_sun bright = {{3, 4, 0}, {1, 2, 3}};
+    for (int i = 0; i < 2; i++) {
+        char text[400];
+        (void)snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": []%s%s}", suns[i], TOY);
+        nebel_scene *const wanted = parse_good(text);
+        (void)snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": []%s%s}", suns[1 - i], TOY);
+        nebel_scene *const scene = parse_good(text);
+        assert_int_equal(nebel_load_scene_planet(wanted), NEBEL_OK);
+        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+        assert_int_equal(nebel_light_scene_by(scene, i == 0 ? &bright : NULL), NEBEL_OK);
+        const nebel_scene_data *const a = nebel_scene_contents(wanted), *const b = nebel_scene_contents(scene);
+        double sky[2][3];
+        nebel_environment_radiance(&a->environment, up, sky[0]);
+        nebel_environment_radiance(&b->environment, up, sky[1]);
+        assert_int_equal(b->has_sun, i == 0);
+        assert_true((sky[0][2] > 0) == (i == 0));
+        for (int c = 0; c < 3; c++) {
+            assert_near(sky[0][c], sky[1][c], 1e-12);
+            if (i == 0) assert_near(a->planets[0].sun_left[c], b->planets[0].sun_left[c], 1e-12);
+        }
+        nebel_destroy_scene(wanted);
+        nebel_destroy_scene(scene);
+    }
+}
+
+static void test_suns_that_are_none(void **state)
+{
+    (void)state;
+    nebel_scene *const scene = parse_good(SCENE(TWO, EMPTY));
+    const nebel_sun before = nebel_scene_sun(scene, 0);
+    static const nebel_sun suns[] = {{{0, 0, 0}, {1, 1, 1}},
+                                     {{0, (double)NAN, 0}, {1, 1, 1}},
+                                     {{0, 1e200, 0}, {1, 1, 1}},
+                                     {{0, 1, 0}, {1, -1, 1}},
+                                     {{0, 1, 0}, {1, 1, (double)INFINITY}}};
+    for (size_t i = 0; i < sizeof suns / sizeof *suns; i++)
+        assert_int_equal(nebel_light_scene_by(scene, &suns[i]), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_light_scene_by(NULL, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_memory_equal(nebel_scene_contents(scene)->sun_direction, before.direction, sizeof before.direction);
+    nebel_destroy_scene(scene);
+}
+
 static void test_what_is_wrong(void **state)
 {
     (void)state;
@@ -162,6 +210,8 @@ int main(void)
         cmocka_unit_test(test_it_is_somewhere_at_every_frame),
         cmocka_unit_test(test_it_lights_fog),
         cmocka_unit_test(test_it_lights_the_air_of_a_planet),
+        cmocka_unit_test(test_any_sun_lights_a_planet),
+        cmocka_unit_test(test_suns_that_are_none),
         cmocka_unit_test(test_what_is_wrong),
         cmocka_unit_test(test_without_memory),
     };

@@ -142,7 +142,7 @@ typedef struct nebel_scene_data {
     double sun_direction[3];       /* towards the sun, unit length */
     double sun_irradiance[3];      /* on a surface that faces it, before any fog */
     size_t sun_key_count;          /* 0: the sun stands still */
-    const nebel_sun_key *sun_keys; /* ascending frames; the sun above is the section's own until nebel_light_scene_at */
+    const nebel_sun_key *sun_keys; /* ascending frames; the sun above is the section's own until the scene is lit by another */
     double ambient[3];             /* radiance, the same from everywhere, */
     nebel_environment environment; /* or where it is not CONSTANT this in its place; a map is the scene's */
     const char *environment_file;  /* of a map, as it is opened; NULL: none */
@@ -247,6 +247,10 @@ nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double
  * made it before. Frames and snapshots from now on have that light. Not thread safe against readers of the same scene, nor
  * while a frame of it is rendered. Errors: ARGUMENT (NULL), MEMORY; the sky is then as it was. */
 nebel_result nebel_light_scene_at(nebel_scene *scene, double frame);
+
+/* The same by any sun, also in a scene without one; NULL: none. Errors: as above; ARGUMENT also for a sun with numbers that are not
+ * finite, without a direction, or of less than no light. */
+nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun);
 
 /* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */

@@ -41,12 +41,30 @@ nebel_sun nebel_scene_sun(const nebel_scene *scene, double frame)
     return sun;
 }
 
+static bool is_sun(const nebel_sun *sun)
+{
+    const double square = nb_vector_dot(sun->direction, sun->direction);
+    bool good = square > 0 && isfinite(square);
+    for (int c = 0; c < 3; c++) good = good && sun->irradiance[c] >= 0 && isfinite(sun->irradiance[c]);
+    return good;
+}
+
+nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun)
+{
+    if (scene == NULL || (sun != NULL && !is_sun(sun))) return NEBEL_ERROR_ARGUMENT;
+    scene->data.has_sun = sun != NULL;
+    if (sun != NULL) {
+        memcpy(scene->data.sun_direction, sun->direction, sizeof sun->direction);
+        memcpy(scene->data.sun_irradiance, sun->irradiance, sizeof sun->irradiance);
+        nb_vector_normalize(scene->data.sun_direction, 3);
+    }
+    return nb_planet_light(scene);
+}
+
 nebel_result nebel_light_scene_at(nebel_scene *scene, double frame)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
     if (scene->data.sun_key_count == 0) return NEBEL_OK;
     const nebel_sun sun = nebel_scene_sun(scene, frame);
-    memcpy(scene->data.sun_direction, sun.direction, sizeof sun.direction);
-    memcpy(scene->data.sun_irradiance, sun.irradiance, sizeof sun.irradiance);
-    return nb_planet_light(scene);
+    return nebel_light_scene_by(scene, &sun);
 }

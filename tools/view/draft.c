@@ -20,11 +20,10 @@ static nebel_result fail_memory(const nb_draft *draft)
  * -------------------------------------------------------------------------------------------------------------
  */
 
-/* The sky, and the sun that a planet's air leaves: as the scene has them at the present frame where the sun moves, and
- * else as the file was written, with another sun perhaps. */
+/* The sky, and what a planet's air leaves of the sun, as light_scene has made them. */
 static const nebel_scene_data *find_light(const nb_draft *draft)
 {
-    return nebel_scene_contents(draft->data.sun_key_count > 0 ? draft->scene : draft->file);
+    return nebel_scene_contents(draft->scene);
 }
 
 /* Keys are the file's alone. */
@@ -48,10 +47,21 @@ static nebel_sun sun_of(const nb_draft *draft, const nb_edition *edition)
     return sun;
 }
 
-/* Nobody may render the scene meanwhile. */
-static nebel_result light_scene(nb_draft *draft)
+/* The scene's direction has been made a unit one, which rounds it. */
+static int is_lit_by(const nebel_scene_data *scene, int has_sun, const nebel_sun *sun)
 {
-    const nebel_result result = nebel_light_scene_at(draft->scene, draft->frame);
+    if (!has_sun || !scene->has_sun) return has_sun == scene->has_sun;
+    for (int i = 0; i < 3; i++)
+        if (fabs(scene->sun_direction[i] - sun->direction[i]) > 1e-12) return 0;
+    return memcmp(scene->sun_irradiance, sun->irradiance, sizeof sun->irradiance) == 0;
+}
+
+/* Nobody may render the scene meanwhile. */
+static nebel_result light_scene(nb_draft *draft, const nb_edition *edition)
+{
+    const nebel_sun sun = find_sun(draft, edition);
+    if (is_lit_by(find_light(draft), edition->has_sun, &sun)) return NEBEL_OK;
+    const nebel_result result = nebel_light_scene_by(draft->scene, edition->has_sun ? &sun : NULL);
     draft->data.environment.map = nebel_scene_contents(draft->scene)->environment.map;
     return result;
 }
@@ -397,7 +407,7 @@ nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log,
         draft->data = *nebel_scene_contents(draft->scene);
         result = make_editions(draft);
     }
-    if (result == NEBEL_OK) result = light_scene(draft);
+    if (result == NEBEL_OK) result = light_scene(draft, &draft->good);
     if (result == NEBEL_OK) nb_draft_show(draft);
     if (result == NEBEL_OK) result = make_cells(draft, &draft->good);
     if (result == NEBEL_OK) result = fill_fog(draft, &draft->good);
@@ -430,8 +440,8 @@ void nb_draft_close(nb_draft *draft)
 static nebel_result apply(nb_draft *draft)
 {
     const nb_edition *const now = &draft->now, *const was = &draft->good;
-    nebel_result result = NEBEL_OK;
-    if (!nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
+    nebel_result result = light_scene(draft, now);
+    if (result == NEBEL_OK && !nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
     const int has_other_cells = !nb_edition_has_same_cells(now, was);
     if (result == NEBEL_OK && has_other_cells) result = make_cells(draft, now);
     if (result != NEBEL_OK) return result;
@@ -448,6 +458,7 @@ static void revert(nb_draft *draft)
     if (!nb_edition_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
     nb_edition_free(&draft->now);
     draft->now = back;
+    (void)light_scene(draft, &draft->good);
     (void)fill_fog(draft, &draft->good);
 }
 
@@ -491,11 +502,9 @@ nebel_result nb_draft_commit(nb_draft *draft)
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame)
 {
     draft->frame = frame;
-    const nebel_result lit = light_scene(draft);
     place_volumes(draft);
     place_camera(draft);
-    const nebel_result result = settle(draft, 0);
-    return lit == NEBEL_OK ? result : lit;
+    return settle(draft, 0);
 }
 
 int nb_draft_undo(nb_draft *draft, nebel_result *result)
@@ -631,7 +640,8 @@ nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log};
     nebel_scene_data before = *nebel_scene_contents(draft->file);
-    /* That of the contents is where its keys have it. */
+    /* That of the contents lights the scene as it is now. */
+    before.has_sun = draft->written.has_sun;
     memcpy(before.sun_direction, draft->written.sun_direction, sizeof before.sun_direction);
     memcpy(before.sun_irradiance, draft->written.sun_irradiance, sizeof before.sun_irradiance);
     nebel_scene_data changed = before;

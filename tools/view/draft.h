@@ -36,7 +36,8 @@ void nb_draft_close(nb_draft *draft);
 /* Points `data` to the draft, which has been copied, and has the sun there as it is at the frame. */
 void nb_draft_show(nb_draft *draft);
 
-/* Puts `now` into new snapshots. If it is not valid, all of it is what it was before, and the log says why. */
+/* Puts `now` into new snapshots. If it is not valid, all of it is what it was before, and the log says why. Where there is a planet
+ * nobody may render `data` meanwhile, here and in what follows: its sky is made anew, where the sun has changed. */
 nebel_result nb_draft_commit(nb_draft *draft);
 
 /* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */
@@ -46,8 +47,7 @@ nebel_result nb_draft_whole(nb_draft *draft, nebel_snapshot **whole);
  * fails. */
 nebel_result nb_draft_place_models(nb_draft *draft);
 
-/* Goes to another frame: everything that moves. Volumes that stand still keep their changes. Nobody may render `data`
- * meanwhile where the sun has keys: the sky of a planet is made anew. */
+/* Goes to another frame: everything that moves. Volumes that stand still keep their changes. */
 nebel_result nb_draft_set_frame(nb_draft *draft, double frame);
 
 /* A step back or forth; 0: there is none. */

@@ -290,21 +290,31 @@ static nebel_result use_fog(viewer *all, nebel_result committed)
     return result == NEBEL_OK ? place_models(all) : result;
 }
 
+/* It reads the sky of a planet, which another sun may make anew. */
+static void rest_twin(viewer *all)
+{
+    if (all->draft.data.planet_count == 0) return;
+    nb_twin_rest(all->twin);
+    all->twin_is_stale = 1;
+}
+
 static nebel_result set_frame(viewer *all, double frame)
 {
-    if (all->draft.data.sun_key_count > 0) nb_twin_rest(all->twin);
+    rest_twin(all);
     return use_fog(all, nb_draft_set_frame(&all->draft, frame));
 }
 
 static nebel_result commit(viewer *all)
 {
     say(all, "");
+    rest_twin(all);
     return use_fog(all, nb_draft_commit(&all->draft));
 }
 
 static nebel_result step(viewer *all, int back)
 {
     nebel_result result = NEBEL_OK;
+    rest_twin(all);
     if (!(back ? nb_draft_undo(&all->draft, &result) : nb_draft_redo(&all->draft, &result))) return NEBEL_OK;
     say(all, "");
     return use_fog(all, result);
@@ -402,6 +412,7 @@ static nebel_result save(viewer *all)
     }
     if (!was_newer && !must_read && !all->panel.saves_camera && !nb_draft_is_changed(&all->draft))
         return say_nothing_to_save(all);
+    rest_twin(all);
     const nebel_result result = nb_draft_save(&all->draft, path, all->panel.saves_camera);
     if (result != NEBEL_OK) return say_not_saved(all, result);
     nb_report_message("view: saved %s", path);
