@@ -222,7 +222,7 @@ static void daylight_is_that_of_the_air(void **state)
         const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
         nebel_air_light at_origin, there;
         double worst_sun = 0, worst_sky = 0;
-        nb_daylight_set(&daylight, &w.planet, to_sun);
+        nb_daylight_set(&daylight, &w.planet, &w.planet, to_sun);
         assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, origin, 0, &at_origin, 0), NEBEL_OK);
         for (int i = 0; i < 2000; i++) {
             const double y = 1 - 2 * (i + .5) / 2000, turn = 2.4 * i, height = 1.2 * top * pow(i % 37 / 36., 2);

@@ -5,6 +5,8 @@
 #include <stdio.h>
 
 #define SCENE(top, members) "{\"nebel\": 1, " top "\"fog\": [], \"planet\": " members "}"
+#define EARTH "{\"model\": \"physical\"}"
+#define MOON_AT(y) "{\"model\": \"physical\", \"preset\": \"moon\", \"center\": [0, " y ", 0]}"
 #define SUN "\"sun\": {\"direction\": [1, 1, 0], \"irradiance\": [4, 3, 2]}, "
 
 static void test_defaults(void **state)
@@ -147,7 +149,7 @@ static void test_what_is_wrong(void **state)
         {FORMAT, SCENE("", "`\"earth\""), "planet: is a string; must be an object"},
         {FORMAT, SCENE("", "`{}"), "planet: the key \"model\" is missing"},
         {FORMAT, SCENE("", "{\"model\": `\"shells\"}"), "planet.model: unknown; must be one of: physical, layers"},
-        {FORMAT, PHYSICAL("\"preset\": `\"venus\""), "planet.preset: unknown; must be one of: earth, mars, toy"},
+        {FORMAT, PHYSICAL("\"preset\": `\"venus\""), "planet.preset: unknown; must be one of: earth, mars, toy, moon"},
         {FORMAT, PHYSICAL("`\"ozone\": 1"), "planet.ozone: unknown key; a physical planet has: model, preset"},
         {FORMAT, PHYSICAL("\"radius\": `0"), "planet.radius: is 0; must be a length from 1 to 1e12 m"},
         {FORMAT, PHYSICAL("\"radius\": `-6e6"), "planet.radius: is -6000000; must be"},
@@ -161,7 +163,6 @@ static void test_what_is_wrong(void **state)
         {FORMAT, PHYSICAL("\"ground_albedo\": `1.5"), "planet.ground_albedo: is 1.5"},
         {FORMAT, PHYSICAL("\"quality\": `\"best\""), "planet.quality: unknown; must be one of: fast, precise"},
         {FORMAT, PHYSICAL("\"sun_diameter\": `11"), "planet.sun_diameter: is 11"},
-        {FORMAT, PHYSICAL("\"airs\": `[]"), "planet.airs: is empty"},
         {FORMAT, PHYSICAL("\"airs\": `{}"), "planet.airs: is an object; must be an array"},
         {FORMAT, PHYSICAL("\"airs\": [{\"type\": `\"vacuum\"}]"),
          "planet.airs[0].type: unknown; must be one of: exponential, layer"},
@@ -173,16 +174,69 @@ static void test_what_is_wrong(void **state)
          PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": \"exponential\", "
                   "\"scale_height\": 8000}, {\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": "
                   "\"exponential\", \"scale_height\": 8000}, `{\"type\": \"exponential\", \"scale_height\": 1}]"),
-         "planet.airs[4]: is one too many"}};
+         "planet.airs[4]: is one too many"},
+        {FORMAT, SCENE("", "`[]"), "planet: is empty; leave it out for no planet"},
+        {FORMAT, SCENE("", "`5"), "planet: is a number; must be an object {\"model\": ...}, or an array of those"},
+        {FORMAT, SCENE("", "[" EARTH ", `7]"), "planet[1]: is a number"},
+        {FORMAT, SCENE("", "[" EARTH ", `" EARTH "]"),
+         "planet[1]: overlaps planet[0], air included; give it a \"center\" of its own"},
+        {FORMAT, SCENE("", "[" EARTH ", `" MOON_AT("1.83e6") "]"), "planet[1]: overlaps planet[0]"},
+        {FORMAT, SCENE("", "[" EARTH ", `{\"model\": \"layers\", \"center\": [0, 9e7, 0]}]"),
+         "planet[1]: is a planet of layers, which stands alone"},
+        {FORMAT, SCENE("", "[" EARTH ", `{\"model\": \"physical\", \"center\": [0, 9e7, 0], \"clouds\": [{}]}]"),
+         "planet[1]: has clouds; the first planet alone may"},
+        {LIMIT,
+         SCENE("", "[" EARTH "," MOON_AT("1e8") "," MOON_AT("2e8") "," MOON_AT("3e8") "," MOON_AT("4e8") "," MOON_AT(
+                       "5e8") "," MOON_AT("6e8") "," MOON_AT("7e8") ", `" MOON_AT("8e8") "]"),
+         "planet[8]: is one too many; a scene has at most 8 planets"}};
     CHECK(rules);
+}
+
+static void test_several(void **state)
+{
+    (void)state;
+    nebel_scene *scene =
+        parse_good(SCENE("\"sun\": {\"direction\": [0, 1, 0], \"irradiance\": 4}, ",
+                         "[" EARTH "," MOON_AT("8.3e6") ", {\"model\": \"physical\", \"preset\": \"toy\", \"center\": "
+                                                        "[0, -2e7, 0], \"airs\": []}]"));
+    const nebel_scene_data *data = nebel_scene_contents(scene);
+    assert_int_equal(data->planet_count, 3);
+    assert_number(data->planets[1].air.ground[1], 8.3e6 + 1.7374e6);
+    assert_number(data->planets[1].air.ground_albedo[0], .11);
+    assert_int_equal(data->planets[2].air.air_count, 1);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    for (int i = 0; i < 3; i++) assert_non_null(data->planets[i].atmosphere);
+    /* The moon in the zenith hides the sun. */
+    assert_true(data->planets[0].sun_left[0] == 0);
+    /* No air, no light but the sun's. */
+    const nebel_sun sun = {.direction = {1, 0, 0}, .irradiance = {4, 3, 2}};
+    const nebel_ray rays[2] = {{{-3e6, 8.4e6, 1e5}, {1, .1, 0}, (double)INFINITY},
+                               {{0, 8.3e6 + 1.7374e6 + 50, 0}, {1, -.00001, 0}, (double)INFINITY}};
+    const double places[2][3] = {{1.8e6, 8.3e6, 0}, {-1.8e6, 8.3e6, 0}};
+    nebel_light light[2];
+    nebel_air_light there[2];
+    assert_int_equal(nebel_trace_air(data->planets[1].atmosphere, &sun, 2, rays, sizeof *rays, light, sizeof *light),
+                     NEBEL_OK);
+    assert_int_equal(
+        nebel_light_air(data->planets[1].atmosphere, &sun, 2, places, sizeof *places, there, sizeof *there), NEBEL_OK);
+    for (int c = 0; c < 3; c++) {
+        for (int i = 0; i < 2; i++) {
+            assert_true(light[i].transmittance[c] == 1 && light[i].in_scattering[c] == 0);
+            assert_true(there[i].sky[c] >= 0 && there[i].sky[c] < 1e-20);
+        }
+        assert_number(there[0].sun[c], sun.irradiance[c]);
+        assert_true(there[1].sun[c] == 0);
+    }
+    nebel_destroy_scene(scene);
 }
 
 static void test_without_memory(void **state)
 {
     (void)state;
+    parse_without_memory(SCENE("", "[" EARTH "," MOON_AT("1e8") "]"));
     parse_without_memory(SCENE("", "{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": "
                                    "8000}]}"));
-    const char *text = SCENE(SUN, "{\"model\": \"physical\", \"preset\": \"toy\"}");
+    const char *text = SCENE(SUN, "[{\"model\": \"physical\", \"preset\": \"toy\"}, " MOON_AT("1e8") "]");
     for (long calls = 0;; calls += 2) {
         meter m;
         journal kept;
@@ -199,7 +253,7 @@ static void test_without_memory(void **state)
         nebel_destroy_scene(scene);
         assert_int_equal(m.live, 0);
         if (result == NEBEL_OK) break;
-        assert_true(calls < 60);
+        assert_true(calls < 80);
     }
 }
 
@@ -208,7 +262,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_defaults),       cmocka_unit_test(test_everything_it_may_say),
         cmocka_unit_test(test_air_lights_fog), cmocka_unit_test(test_sky_is_that_of_the_air),
-        cmocka_unit_test(test_what_is_wrong),  cmocka_unit_test(test_without_memory),
+        cmocka_unit_test(test_what_is_wrong),  cmocka_unit_test(test_several),
+        cmocka_unit_test(test_without_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -71,25 +71,38 @@ static void print_ambient(const nebel_scene_data *scene)
     }
 }
 
-static void print_planet(const nebel_scene_data *scene)
+static void print_clouds(const nebel_planet *planet)
 {
-    if (scene->planet_count == 0) return;
-    if (scene->planets[0].model == NEBEL_PLANET_LAYERS) {
-        (void)printf("planet: radius %.6g m, %u shells of clouds\n", scene->planets[0].shells.radius,
-                     (unsigned)scene->planets[0].shells.cloud_count);
-        return;
-    }
-    const nebel_atmosphere_desc *air = &scene->planets[0].air;
-    (void)printf("planet: radius %.6g m, %.6g m of air of %u kinds\n", air->radius, air->thickness,
-                 (unsigned)air->air_count);
-    for (uint32_t i = 0; i < scene->planets[0].cloud_layer_count; i++) {
+    for (uint32_t i = 0; i < planet->cloud_layer_count; i++) {
         static const char *const kinds[] = {"cumulus", "stratus", "cirrus"};
         nebel_cloud_layer layer;
-        if (nebel_resolve_cloud_layer(air->thickness, &scene->planets[0].cloud_layers[i], NULL, &layer) != NEBEL_OK)
+        if (nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[i], NULL, &layer) != NEBEL_OK)
             return;
         (void)printf("clouds: %s, %.6g to %.6g m, %.3g of the sky\n", kinds[layer.kind], layer.base, layer.top,
                      layer.coverage);
     }
+}
+
+static int has_air(const nebel_atmosphere_desc *air)
+{
+    double sum = 0;
+    for (uint32_t i = 0; i < air->air_count; i++)
+        for (int c = 0; c < 3; c++) sum += air->airs[i].scattering[c] + air->airs[i].absorption[c];
+    return sum > 0;
+}
+
+static void print_planet(const nebel_planet *planet)
+{
+    const nebel_atmosphere_desc *air = &planet->air;
+    if (planet->model == NEBEL_PLANET_LAYERS)
+        (void)printf("planet: radius %.6g m, %u shells of clouds\n", planet->shells.radius,
+                     (unsigned)planet->shells.cloud_count);
+    else if (has_air(air))
+        (void)printf("planet: radius %.6g m, %.6g m of air of %u kinds\n", air->radius, air->thickness,
+                     (unsigned)air->air_count);
+    else
+        (void)printf("planet: radius %.6g m, no air\n", air->radius);
+    print_clouds(planet);
 }
 
 static void print_light(const nebel_scene_data *scene)
@@ -296,7 +309,7 @@ int nb_info_print_scene(const char *path)
     const double visibility = visibility_of(scene, loaded.fog);
     (void)printf("scene: %s\n", path);
     print_camera(scene);
-    print_planet(scene);
+    for (size_t i = 0; i < scene->planet_count; i++) print_planet(&scene->planets[i]);
     print_light(scene);
     print_models(scene);
     print_volumes(scene);

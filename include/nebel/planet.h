@@ -68,7 +68,8 @@ typedef struct nebel_atmosphere_desc {
 } nebel_atmosphere_desc;
 
 /* Known airs: "earth" (constants of the demonstration of Hillaire, A Scalable and Production Ready Sky and Atmosphere
- * Rendering Technique, 2020), "mars" and "toy", a ball of 1 km in the Earth's colours. NULL where there is none of that name. Any thread. */
+ * Rendering Technique, 2020), "mars", "toy", a ball of 1 km in the Earth's colours, and "moon", which has no air: one kind of it that
+ * does nothing to light. NULL where there is none of that name. Any thread. */
 const nebel_atmosphere_desc *nebel_find_atmosphere(const char *name);
 
 /* Writes the description with every default in its place. desc may be resolved. Errors: ARGUMENT, VALUE (a number out of range;

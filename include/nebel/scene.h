@@ -106,14 +106,16 @@ typedef enum nebel_planet_model {
     NEBEL_PLANET_MODEL_COUNT
 } nebel_planet_model;
 
-/* The section "planet". */
+#define NEBEL_MAX_PLANETS 8
+
+/* One of the section "planet". */
 typedef struct nebel_planet {
     nebel_planet_model model;
     nebel_atmosphere_desc air; /* resolved; allocator and log are not set */
     double sun_diameter;       /* degrees; 0: the sun is not seen */
 
     const nebel_atmosphere *atmosphere; /* the scene's; NULL until nebel_load_scene_planet */
-    double sun_left[3];                 /* what it leaves of sunlight at the scene's origin */
+    double sun_left[3];                 /* of the first one: what planets leave of sunlight at the scene's origin */
 
     nebel_cloud_layer cloud_layers[NEBEL_MAX_CLOUD_LAYERS]; /* PHYSICAL: wind in m per frame; maps are the scene's */
     uint32_t cloud_layer_count;
@@ -174,8 +176,8 @@ typedef struct nebel_scene_data {
     const float *classic_table;         /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
     const nebel_d3d9_fog *classic_d3d9; /* switched on. NULL: none */
 
-    size_t planet_count; /* 0 or 1 */
-    const nebel_planet *planets;
+    size_t planet_count;         /* at most NEBEL_MAX_PLANETS; of the model LAYERS: 1 */
+    const nebel_planet *planets; /* the sky of the first one is that of the scene's origin */
 
     const nebel_diffusion_desc *diffusion; /* the section "multiple_scattering"; NULL: none */
 
@@ -213,9 +215,9 @@ nebel_result nebel_parse_scene(const char *text, size_t size, const char *name, 
  * scene. Errors: FILE, FORMAT, LIMIT, UNSUPPORTED, MEMORY; the scene stays usable without models. */
 nebel_result nebel_load_scene_models(nebel_scene *scene);
 
-/* Makes the scene's planet: its layers, or its air. Fog of snapshots from now on is lit by what that air leaves of the sun at the scene's
- * origin and, where the file has no ambient light, by the sky there: `environment` becomes a map of it. Without this call, and for the light of
- * fog before it, there is no air. Idempotent. Some 0.25 s on one thread, 1 s with quality "precise". Not thread safe against readers of
+/* Makes the scene's planets: their layers, or their air. Fog of snapshots from now on is lit by what the first one's air, and the shadows of
+ * others, leave of the sun at the scene's origin and, where the file has no ambient light, by the first one's sky there: `environment` becomes a map of it. Without this call, and for the light of
+ * fog before it, there is no air. Idempotent. Some 0.25 s a planet with air on one thread, 1 s with quality "precise". Not thread safe against readers of
  * the same scene. Errors: MEMORY; there is no air then. */
 nebel_result nebel_load_scene_planet(nebel_scene *scene);
 

@@ -1,5 +1,7 @@
 #include "air.h"
 
+#include "base/eclipse.h"
+
 #include <nebel/render.h>
 
 #include <math.h>
@@ -9,41 +11,139 @@
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
+/* The power of a place with regard to the ball of a planet's air: the square of a tangent's length. Where two balls that do
+ * not overlap have the same is a plane between them, so that seen from a place a ball is never behind one of larger power
+ * (Edelsbrunner, An acyclicity theorem for cell complexes in d dimension, 1990). */
+static double power_of(const nb_world *world, const double place[3])
+{
+    double from[3];
+    for (int c = 0; c < 3; c++) from[c] = place[c] - world->center[c];
+    const double far = nb_vector_length(from);
+    return (far - world->top) * (far + world->top);
+}
+
+static void set_world(const nebel_planet *planet, nb_world *world)
+{
+    *world =
+        (nb_world){.planet = planet, .radius = planet->air.radius, .top = planet->air.radius + planet->air.thickness};
+    for (int c = 0; c < 3; c++) world->center[c] = planet->air.ground[c] - (c == 1 ? planet->air.radius : 0);
+}
+
+/* Planets that are loaded, in the order in which rays pass them. */
+static void set_worlds(nb_air *air, const nebel_scene_data *scene, const double position[3])
+{
+    air->count = 0;
+    for (size_t i = 0; i < scene->planet_count && i < NEBEL_MAX_PLANETS; i++) {
+        nb_world world;
+        if (scene->planets[i].atmosphere == NULL) continue;
+        set_world(&scene->planets[i], &world);
+        int place = air->count++;
+        for (; place > 0 && power_of(&air->worlds[place - 1], position) > power_of(&world, position); place--)
+            air->worlds[place] = air->worlds[place - 1];
+        air->worlds[place] = world;
+    }
+}
+
+static nebel_result set_daylight(const nb_air *air, const nebel_planet *home, nb_world *world)
+{
+    world->daylight = nb_allocate(air->allocator, 1, sizeof *world->daylight);
+    if (world->daylight == NULL) return NEBEL_ERROR_MEMORY;
+    nb_daylight_set(world->daylight, world->planet, home, air->to_sun);
+    return NEBEL_OK;
+}
+
+static void set_sun(nb_air *air, const nebel_scene_data *scene, const double to_sun[3], nebel_air_view_desc *desc)
+{
+    memcpy(air->to_sun, to_sun, sizeof air->to_sun);
+    air->sun_radius = scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (PI / 180) : 0;
+    for (int c = 0; c < 3 && air->sun_radius > 0; c++)
+        air->sun_light[c] = scene->sun_irradiance[c] / (PI * pow(sin(air->sun_radius), 2));
+    if (!scene->has_sun) return;
+    memcpy(desc->sun.direction, scene->sun_direction, sizeof desc->sun.direction);
+    memcpy(desc->sun.irradiance, scene->sun_irradiance, sizeof desc->sun.irradiance);
+}
+
 nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
                         const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads)
 {
-    const nebel_planet *planet = scene->planets;
-    nebel_air_view_desc desc = {.atmosphere = planet->atmosphere,
-                                .sun = {.direction = {0, 1, 0}},
-                                .has_distances = ends,
+    nebel_air_view_desc desc = {.sun = {.direction = {0, 1, 0}},
                                 .run = nebel_run_parts,
                                 .run_user = &threads,
                                 .allocator = *allocator,
                                 .log = *log};
-    const double *ground = planet->air.ground;
-    const double over =
-        hypot(hypot(position[0] - ground[0], position[2] - ground[2]), position[1] - ground[1] + planet->air.radius);
-    air->planet = planet;
-    air->ends = ends;
-    air->reach = over + planet->air.radius + planet->air.thickness;
+    nebel_result result = NEBEL_OK;
+    air->allocator = allocator;
+    set_worlds(air, scene, position);
+    set_sun(air, scene, to_sun, &desc);
+    memcpy(air->position, position, sizeof air->position);
     memcpy(desc.position, position, sizeof desc.position);
-    if (scene->has_sun) {
-        memcpy(desc.sun.direction, scene->sun_direction, sizeof desc.sun.direction);
-        memcpy(desc.sun.irradiance, scene->sun_irradiance, sizeof desc.sun.irradiance);
-    }
-    air->sun_radius = scene->has_sun ? 0.5 * planet->sun_diameter * (PI / 180) : 0;
-    for (int c = 0; c < 3 && air->sun_radius > 0; c++)
-        air->sun_light[c] = scene->sun_irradiance[c] / (PI * pow(sin(air->sun_radius), 2));
-    const nebel_result result = nebel_create_air_view(&desc, &air->view);
-    air->has_daylight = result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0;
+    air->ends = desc.has_distances = ends || air->count > 1; /* the ground of one planet ends the air of others */
     air->owns_ambient = scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
-    if (air->has_daylight) nb_daylight_set(&air->daylight, planet, to_sun);
+    for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
+        nb_world *world = &air->worlds[i];
+        desc.atmosphere = world->planet->atmosphere;
+        result = nebel_create_air_view(&desc, &world->view);
+        if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0 &&
+            set_daylight(air, &scene->planets[0], world) != NEBEL_OK)
+            result = nb_fail(log, NEBEL_ERROR_MEMORY, "frame: out of memory for the light of models on planets");
+        air->reach = fmax(air->reach, sqrt(power_of(world, position) + world->top * world->top) + world->top);
+    }
     return result;
 }
 
 void nb_air_free(nb_air *air)
 {
-    nebel_destroy_air_view(air->view);
+    for (int i = 0; i < air->count; i++) {
+        nebel_destroy_air_view(air->worlds[i].view);
+        nb_release(air->allocator, air->worlds[i].daylight);
+    }
+}
+
+/* ---- along rays ------------------------------------------------------------------------------ */
+
+/* Light of one planet's air. */
+typedef struct nb_air_part {
+    float left[3][NB_BATCH], light[3][NB_BATCH], error[NB_BATCH];
+} nb_air_part;
+
+static void lay_behind(const nb_air_part *part, size_t n, const nebel_light_planes *lights)
+{
+    for (size_t i = 0; i < n; i++) {
+        float most = 0;
+        for (int c = 0; c < 3; c++) {
+            most = fmaxf(most, lights->transmittance[c][i]);
+            lights->in_scattering[c][i] += lights->transmittance[c][i] * part->light[c][i];
+            lights->transmittance[c][i] *= part->left[c][i];
+        }
+        if (lights->error != NULL) lights->error[i] += most * part->error[i];
+    }
+}
+
+nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
+                          const nebel_light_planes *lights)
+{
+    nb_air_part part;
+    nebel_light_planes planes = {.error = part.error};
+    for (int c = 0; c < 3; c++) {
+        planes.transmittance[c] = part.left[c];
+        planes.in_scattering[c] = part.light[c];
+    }
+    nebel_result result = nebel_trace_air_view(air->worlds[0].view, n, direction, t_max, lights);
+    for (int k = 1; k < air->count && result == NEBEL_OK; k++) {
+        result = nebel_trace_air_view(air->worlds[k].view, n, direction, t_max, &planes);
+        if (result == NEBEL_OK) lay_behind(&part, n, lights);
+    }
+    return result;
+}
+
+/* What other planets leave of the sun's disc. */
+static double uneclipsed(const nb_air *air, int world, const double place[3])
+{
+    double left = 1;
+    for (int k = 0; k < air->count; k++)
+        if (k != world)
+            left *= nb_eclipse_left(place, air->worlds[k].center, air->worlds[k].radius, air->to_sun, air->sun_radius);
+    return left;
 }
 
 /* ---- the ground ------------------------------------------------------------------------------ */
@@ -54,22 +154,48 @@ static float behind(float t)
     return 1e-5f * t + 1e-3f;
 }
 
+static void find_ground_of(const nb_world *world, const nb_rays *rays, nb_ground *ground)
+{
+    const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
+    const nebel_ground_planes planes = {.distance = ground->distance,
+                                        .normal = {ground->normal[0], ground->normal[1], ground->normal[2]},
+                                        .sun = {ground->sun[0], ground->sun[1], ground->sun[2]},
+                                        .sky = {ground->sky[0], ground->sky[1], ground->sky[2]}};
+    nebel_find_ground(world->view, NB_BATCH, direction, &planes);
+}
+
+static void keep_nearer(int world, const nb_ground *next, nb_air_scratch *scratch)
+{
+    nb_ground *ground = &scratch->ground;
+    for (int i = 0; i < NB_BATCH; i++) {
+        if (!(next->distance[i] < ground->distance[i])) continue;
+        scratch->world[i] = world;
+        ground->distance[i] = next->distance[i];
+        for (int c = 0; c < 3; c++) {
+            ground->normal[c][i] = next->normal[c][i];
+            ground->sun[c][i] = next->sun[c][i];
+            ground->sky[c][i] = next->sky[c][i];
+        }
+    }
+}
+
 void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, const int *inside, nb_hits *hits,
                         nb_air_scratch *scratch)
 {
-    const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
-    const nebel_ground_planes planes = {.distance = scratch->distance,
-                                        .normal = {scratch->normal[0], scratch->normal[1], scratch->normal[2]},
-                                        .sun = {scratch->sun[0], scratch->sun[1], scratch->sun[2]},
-                                        .sky = {scratch->sky[0], scratch->sky[1], scratch->sky[2]}};
-    nebel_find_ground(air->view, NB_BATCH, direction, &planes);
+    float *distance = scratch->ground.distance;
+    find_ground_of(&air->worlds[0], rays, &scratch->ground);
+    memset(scratch->world, 0, sizeof scratch->world);
+    for (int k = 1; k < air->count; k++) {
+        find_ground_of(&air->worlds[k], rays, &scratch->next);
+        keep_nearer(k, &scratch->next, scratch);
+    }
     for (int i = 0; i < NB_BATCH; i++) {
         const int is_hit = hits->surface[i] != NB_NONE;
         const float t = (float)(advance * (double)rays->length[i]) + hits->t[i];
         /* From on the ground or below it all surfaces are seen before it. */
-        if (!inside[i] || (is_hit && (scratch->distance[i] == 0 || scratch->distance[i] + behind(t) >= t)))
-            scratch->distance[i] = HUGE_VALF;
-        else if (scratch->distance[i] < HUGE_VALF)
+        if (!inside[i] || (is_hit && (distance[i] == 0 || distance[i] + behind(t) >= t)))
+            distance[i] = HUGE_VALF;
+        else if (distance[i] < HUGE_VALF)
             hits->surface[i] = NB_NONE;
     }
 }
@@ -77,28 +203,34 @@ void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, 
 int nb_air_sees_ground(const nb_air_scratch *scratch)
 {
     int any = 0;
-    for (int i = 0; i < NB_BATCH; i++) any |= scratch->distance[i] < HUGE_VALF;
+    for (int i = 0; i < NB_BATCH; i++) any |= scratch->ground.distance[i] < HUGE_VALF;
     return any;
 }
 
-void nb_air_set_points(const nb_air *air, double advance, const double position[3], const float sun[3],
-                       const nb_rays *rays, const nb_air_scratch *scratch, nb_hits *hits, nb_points *points)
+void nb_air_set_points(const nb_air *air, double advance, const double position[3], const double origin[3],
+                       const float sun[3], const nb_rays *rays, nb_air_scratch *scratch, nb_hits *hits,
+                       nb_points *points)
 {
+    nb_ground *ground = &scratch->ground;
     for (int i = 0; i < NB_BATCH; i++) {
-        const float distance = scratch->distance[i];
+        const float distance = ground->distance[i];
+        const int world = scratch->world[i];
         if (!(distance < HUGE_VALF)) continue;
         float cosine = 0, largest = 0, place[3];
+        double in_scene[3];
         for (int c = 0; c < 3; c++) {
             const double unit = rays->direction[c][i] / (double)rays->length[i];
+            in_scene[c] = origin[c] + position[c] + (double)distance * unit;
             place[c] = nb_clamp_coordinate((float)(position[c] + (double)distance * unit));
             largest = fmaxf(largest, fabsf(place[c]));
-            cosine += scratch->normal[c][i] * sun[c];
+            cosine += ground->normal[c][i] * sun[c];
         }
-        const float height = 0x1p-20f * (distance + largest);
+        const float height = 0x1p-20f * (distance + largest), left = (float)uneclipsed(air, world, in_scene);
         for (int c = 0; c < 3; c++) {
-            points->normal[c][i] = points->side[c][i] = scratch->normal[c][i];
-            points->reflectance[c][i] = (float)air->planet->air.ground_albedo[c];
-            points->start[c][i] = nb_clamp_coordinate(place[c] + height * scratch->normal[c][i]);
+            points->normal[c][i] = points->side[c][i] = ground->normal[c][i];
+            points->reflectance[c][i] = (float)air->worlds[world].planet->air.ground_albedo[c];
+            points->start[c][i] = nb_clamp_coordinate(place[c] + height * ground->normal[c][i]);
+            ground->sun[c][i] *= left;
         }
         points->cosine[i] = cosine;
         points->lit[i] = -(cosine > 0);
@@ -108,6 +240,24 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
     }
 }
 
+/* Whose shadow, and whose sky, a place is in. */
+static int nearest_to(const nb_air *air, const double place[3])
+{
+    int nearest = 0;
+    for (int k = 1; k < air->count; k++)
+        if (power_of(&air->worlds[k], place) < power_of(&air->worlds[nearest], place)) nearest = k;
+    return nearest;
+}
+
+static void light_model(const nb_air *air, const double place[3], double sun[3], double sky[3])
+{
+    const int nearest = nearest_to(air, place);
+    if (air->worlds[nearest].daylight == NULL) return;
+    nb_daylight_at(air->worlds[nearest].daylight, place, sun, sky);
+    const double left = uneclipsed(air, nearest, place);
+    for (int c = 0; c < 3; c++) sun[c] *= left;
+}
+
 void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hits *hits, const nb_points *points,
                          nb_air_scratch *scratch)
 {
@@ -115,7 +265,7 @@ void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hit
         double place[3], sun[3] = {0, 0, 0}, sky[3] = {1, 1, 1};
         const int is_model = hits->surface[i] != NB_NONE && hits->surface[i] != NB_GROUND;
         for (int c = 0; c < 3; c++) place[c] = origin[c] + (double)points->start[c][i];
-        if (is_model && air->has_daylight) nb_daylight_at(&air->daylight, place, sun, sky);
+        if (is_model) light_model(air, place, sun, sky);
         for (int c = 0; c < 3; c++) {
             scratch->sun_left[c][i] = (float)sun[c];
             scratch->sky_there[c][i] = air->owns_ambient ? (float)sky[c] : 1;
@@ -129,7 +279,7 @@ void nb_air_dim_sun(const float *sunlight, const nb_hits *hits, const nb_air_scr
         /* The ground's is irradiance already; color holds irradiance over pi. */
         const float ground = sunlight[c] > 0 ? 0.31830988618379067f / sunlight[c] : 0;
         for (int i = 0; i < NB_BATCH; i++)
-            color[c][i] *= hits->surface[i] == NB_GROUND ? ground * scratch->sun[c][i] : scratch->sun_left[c][i];
+            color[c][i] *= hits->surface[i] == NB_GROUND ? ground * scratch->ground.sun[c][i] : scratch->sun_left[c][i];
     }
 }
 
@@ -179,6 +329,29 @@ int nb_air_sees_sun(const nb_air *air, const nb_lighting *lighting, const nb_ray
         for (int c = 0; c < 3; c++) along += rays->direction[c][i] * lighting->sun_direction[c];
         if (!(along < near * (double)rays->length[i])) return 1;
     }
+    return 0;
+}
+
+/* Near the edge of one planet, seen as a disc. */
+static int passes_rim(const nb_world *world, const double position[3], double pixel, const nb_rays *rays)
+{
+    double to[3];
+    for (int c = 0; c < 3; c++) to[c] = world->center[c] - position[c];
+    const double far = nb_vector_length(to), half = asin(fmin(1, world->radius / far));
+    const double within = cos(fmin(PI, half + 2 * pixel)), without = cos(fmax(0, half - 2 * pixel));
+    for (int i = 0; i < NB_BATCH; i++) {
+        double along = 0;
+        for (int c = 0; c < 3; c++) along += rays->direction[c][i] * to[c];
+        along /= far * (double)rays->length[i];
+        if (along > within && !(along > without && half > 2 * pixel)) return 1;
+    }
+    return 0;
+}
+
+int nb_air_sees_rim(const nb_air *air, const nb_rays *rays)
+{
+    for (int k = 0; k < air->count && air->count > 1; k++)
+        if (passes_rim(&air->worlds[k], air->position, air->pixel, rays)) return 1;
     return 0;
 }
 

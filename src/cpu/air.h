@@ -1,4 +1,4 @@
-/* The air of a planet in pictures: its ground, the haze before surfaces, the sky and the sun behind everything. */
+/* The air of planets in pictures: their ground, the haze before surfaces, the sky and the sun behind everything. */
 #ifndef NB_CPU_AIR_H
 #define NB_CPU_AIR_H
 
@@ -10,22 +10,31 @@
 
 #include <nebel/scene.h>
 
-/* Of hits: the planet's ground, which belongs to no mesh. */
+/* Of hits: the ground of a planet, which belongs to no mesh. */
 #define NB_GROUND (NB_NONE - 1)
+
+/* A planet as the camera sees it. */
+typedef struct nb_world {
+    const nebel_planet *planet;
+    double center[3], radius, top; /* m; top: of its air, from the centre */
+    nebel_air_view *view;
+    nb_daylight *daylight; /* NULL: there are no models in sunlight */
+} nb_world;
 
 /* All that is the same for the rays of a frame. */
 typedef struct nb_air {
-    const nebel_planet *planet; /* NULL: none, and the rest means nothing */
-    nebel_air_view *view;
-    double sun_radius, sun_light[3]; /* of its disc: radians, mean radiance above the air */
-    double pixel;                    /* radians, in the middle of the picture */
-    int ends;                        /* rays may end before the ground */
+    const nebel_allocator *allocator;
+    nb_world worlds[NEBEL_MAX_PLANETS]; /* whatever ray leaves the camera, it passes none after a later one */
+    int count;                          /* 0: none, and the rest means nothing */
+    double sun_radius, sun_light[3];    /* of its disc: radians, mean radiance above the air */
+    double pixel;                       /* radians, in the middle of the picture */
+    int ends;                           /* rays may end before the ground */
     int has_fog;
     float tolerance;
-    double reach;     /* m, from the camera: no air is beyond */
-    int has_daylight; /* there are models in sunlight */
-    int owns_ambient; /* ambient light is the planet's sky */
-    nb_daylight daylight;
+    double reach;       /* m, from the camera: no air is beyond */
+    int owns_ambient;   /* ambient light is the planet's sky */
+    double to_sun[3];   /* of length 1 */
+    double position[3]; /* of the camera */
 } nb_air;
 
 enum { NB_AIR_KNOTS = 34 };
@@ -37,31 +46,43 @@ typedef struct nb_air_knots {
     float air_error[NB_BATCH];
 } nb_air_knots;
 
+/* Ground that rays meet, as nebel_find_ground says it. */
+typedef struct nb_ground {
+    float distance[NB_BATCH]; /* INFINITY where none is seen */
+    float normal[3][NB_BATCH], sun[3][NB_BATCH], sky[3][NB_BATCH];
+} nb_ground;
+
 /* What a thread works in. */
 typedef struct nb_air_scratch {
-    float distance[NB_BATCH]; /* of the ground; INFINITY where it is not seen */
-    float normal[3][NB_BATCH], sun[3][NB_BATCH], sky[3][NB_BATCH];
+    nb_ground ground, next;                              /* the nearest one; that of one planet */
+    int world[NB_BATCH];                                 /* whose ground it is */
     float sun_left[3][NB_BATCH], sky_there[3][NB_BATCH]; /* of models: see nb_daylight_at */
     nb_air_knots knots[NB_AIR_KNOTS];                    /* the first where rays end */
     uint8_t order[NB_BATCH][NB_AIR_KNOTS];               /* of a ray's knots along it */
     int count[NB_BATCH];
 } nb_air_scratch;
 
-/* Makes the table for a place to look from, and those of the light on models. `to_sun`: of length 1. `ends`: whether rays
+/* Makes the tables for a place to look from, and those of the light on models. `to_sun`: of length 1. `ends`: whether rays
  * may end before the ground. Errors: MEMORY. */
 nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
                         const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads);
 void nb_air_free(nb_air *air);
 
-/* Where the ground is seen, to scratch->distance; what lies behind it is no hit any more. `advance` as of nb_view. */
+/* nebel_trace_air_view, through the air of all planets; at most NB_BATCH rays. */
+nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
+                          const nebel_light_planes *lights);
+
+/* Where the nearest ground is seen, to scratch->ground; what lies behind it is no hit any more. `advance` as of nb_view. */
 void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, const int *inside, nb_hits *hits,
                         nb_air_scratch *scratch);
 
 int nb_air_sees_ground(const nb_air_scratch *scratch);
 
-/* Makes hits and points of where the ground is seen. `position` is the camera's, relative to the origin of the geometry. */
-void nb_air_set_points(const nb_air *air, double advance, const double position[3], const float sun[3],
-                       const nb_rays *rays, const nb_air_scratch *scratch, nb_hits *hits, nb_points *points);
+/* Makes hits and points of where the ground is seen, which other planets may hide from the sun. `position` is the camera's,
+ * relative to `origin`, that of the geometry. */
+void nb_air_set_points(const nb_air *air, double advance, const double position[3], const double origin[3],
+                       const float sun[3], const nb_rays *rays, nb_air_scratch *scratch, nb_hits *hits,
+                       nb_points *points);
 
 /* The light at the places of models. `origin`: of the geometry. */
 void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hits *hits, const nb_points *points,
@@ -73,6 +94,9 @@ void nb_air_dim_sun(const float *sunlight, const nb_hits *hits, const nb_air_scr
 
 /* Whether any of the rays sees the disc of the sun, or is within two pixels of it. The middle's pixels are the widest. */
 int nb_air_sees_sun(const nb_air *air, const nb_lighting *lighting, const nb_rays *rays);
+
+/* Whether any of the rays passes within two pixels of the edge of a planet, where there are several. */
+int nb_air_sees_rim(const nb_air *air, const nb_rays *rays);
 
 /* Radiance behind all air and fog in one direction: the scene's background, and the sun. */
 void nb_air_background(const nb_air *air, const nb_lighting *lighting, const nb_rays *rays, int lane, double light[3]);

@@ -115,7 +115,7 @@ static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
 static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_light_samples *samples = &scratch->samples;
-    const int has_air = frame->air.planet != NULL;
+    const int has_air = frame->air.count > 0;
     if (frame->renderer->method != NEBEL_METHOD_EXACT) {
         nb_classic_fog_trace(frame, scratch);
         return NEBEL_OK;
@@ -126,7 +126,7 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     if (!has_fog && has_shells) return nb_shells_trace(frame, NULL, NULL, scratch);
     if (!has_fog && !has_air) return NEBEL_OK;
     set_distances(frame->view.advance, &scratch->rays, &scratch->hits, scratch->inside, scratch->distance);
-    if (has_air) end_at_ground(scratch->air.distance, scratch->distance);
+    if (has_air) end_at_ground(scratch->air.ground.distance, scratch->distance);
     if (has_shells) end_at_ground(scratch->shells.ground, scratch->distance);
     if (!has_fog) return nb_haze_add(frame, NULL, NULL, scratch);
     const nebel_ray_planes rays = camera_rays(frame, scratch);
@@ -209,7 +209,7 @@ static int dims_sun(const nebel_renderer *renderer)
 static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 {
     set_clear_sunlight(frame->lighting.sunlight, scratch);
-    if (frame->air.planet != NULL)
+    if (frame->air.count > 0)
         nb_air_dim_sun(frame->lighting.sunlight, &scratch->hits, &scratch->air, scratch->samples.color);
     nebel_result result = NEBEL_OK;
     if (frame->cloud_view != NULL) result = nb_cloudscape_shade(frame, scratch, scratch->samples.color);
@@ -331,7 +331,7 @@ static void set_colors_in_air(const nb_frame *frame, nb_scratch *scratch)
             double normal[3], ambient[3];
             for (int c = 0; c < 3; c++) {
                 normal[c] = (double)scratch->points.normal[c][i];
-                ambient[c] = 0.31830988618379067 * (double)scratch->air.sky[c][i];
+                ambient[c] = 0.31830988618379067 * (double)scratch->air.ground.sky[c][i];
             }
             if (surface != NB_GROUND) {
                 nebel_environment_reflected(&frame->lighting.environment, normal, ambient);
@@ -371,10 +371,10 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     const nb_lighting *lighting = &frame->lighting;
     nb_surface_points(geometry, renderer->scene, &renderer->table, &scratch->rays, &scratch->hits, lighting->sun,
                       &scratch->points);
-    if (frame->air.planet != NULL)
-        nb_air_set_points(&frame->air, frame->view.advance, frame->view.start, lighting->sun, &scratch->rays,
-                          &scratch->air, &scratch->hits, &scratch->points);
-    if (frame->air.planet != NULL)
+    if (frame->air.count > 0)
+        nb_air_set_points(&frame->air, frame->view.advance, frame->view.start, geometry->origin, lighting->sun,
+                          &scratch->rays, &scratch->air, &scratch->hits, &scratch->points);
+    if (frame->air.count > 0)
         nb_air_set_daylight(&frame->air, geometry->origin, &scratch->hits, &scratch->points, &scratch->air);
     if (lighting->has_sun) {
         nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
@@ -385,7 +385,7 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
 
 static void find_ground(const nb_frame *frame, nb_scratch *scratch)
 {
-    if (frame->air.planet != NULL)
+    if (frame->air.count > 0)
         nb_air_find_ground(&frame->air, frame->view.advance, &scratch->rays, scratch->inside, &scratch->hits,
                            &scratch->air);
 }
@@ -407,7 +407,7 @@ void nb_batch_find_centers(const nb_frame *frame, const nb_place *place, nb_scra
 
 nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch)
 {
-    const int has_air = frame->air.planet != NULL;
+    const int has_air = frame->air.count > 0;
     nebel_result result = frame->layers != NULL ? nb_shells_find(frame, scratch) : NEBEL_OK;
     if (result == NEBEL_OK) result = trace_camera_fog(frame, scratch);
     if (result == NEBEL_OK && frame->cloud_view != NULL) result = nb_cloudscape_add(frame, trace_haze, scratch);

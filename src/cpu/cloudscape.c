@@ -9,7 +9,7 @@ nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
 {
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
-    if (frame->air.planet == NULL || scene->planets[0].clouds == NULL) return NEBEL_OK;
+    if (frame->air.count == 0 || scene->planets[0].clouds == NULL) return NEBEL_OK;
     nebel_cloud_view_desc view = {.clouds = scene->planets[0].clouds,
                                   .sun = {.direction = {0, 1, 0}},
                                   .time = desc->time,
@@ -103,7 +103,7 @@ static void find_air(const nb_frame *frame, const nb_cloud_scratch *clouds, int 
         lights.in_scattering[c] = haze->light[c];
     }
     const double *const directions[3] = {direction[0], direction[1], direction[2]};
-    nebel_trace_air_view(frame->air.view, knots->count, directions, knots->t, &lights);
+    nb_air_trace(&frame->air, knots->count, directions, knots->t, &lights);
 }
 
 /* Fog is mostly before all clouds: what is not counts as spread evenly over the way between the first knot and the last. */

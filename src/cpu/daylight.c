@@ -8,6 +8,9 @@
 /* Deeper than this counts as night. */
 #define MOST_DEPTH 80.
 
+/* Of a sun of irradiance 1: less counts as none. */
+#define LEAST_SKY 2e-30
+
 /* Skies lie evenly over this function of the cosine of the sun's angle to the zenith. */
 #define TWILIGHT 0.05
 
@@ -16,12 +19,12 @@ static double spread(double sun)
     return copysign(log(1 + fabs(sun) / TWILIGHT), sun);
 }
 
-static nebel_air_light light_at(const nb_daylight *daylight, const double place[3])
+static nebel_air_light light_at(const nb_daylight *daylight, const nebel_atmosphere *atmosphere, const double place[3])
 {
     nebel_air_light light;
     /* Places and suns are in order, so that it cannot fail. */
     memset(&light, 0, sizeof light);
-    (void)nebel_light_air(daylight->atmosphere, &daylight->sun, 1, (const double(*)[3])place, 0, &light, 0);
+    (void)nebel_light_air(atmosphere, &daylight->sun, 1, (const double(*)[3])place, 0, &light, 0);
     return light;
 }
 
@@ -32,7 +35,7 @@ static nebel_air_light light_under(const nb_daylight *daylight, const double acr
     double place[3];
     for (int c = 0; c < 3; c++)
         place[c] = daylight->center[c] + radius * (sun * daylight->sun.direction[c] + side * across[c]);
-    return light_at(daylight, place);
+    return light_at(daylight, daylight->atmosphere, place);
 }
 
 static void set_depths(nb_daylight *daylight, const double across[3])
@@ -49,20 +52,22 @@ static void set_depths(nb_daylight *daylight, const double across[3])
     }
 }
 
-static void set_skies(nb_daylight *daylight, const double across[3])
+static void set_skies(nb_daylight *daylight, const nebel_atmosphere *home, const double across[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light there = light_at(daylight, origin);
+    const nebel_air_light there = light_at(daylight, home, origin);
     for (int s = 0; s < NB_DAYLIGHT_SKIES; s++) {
         const double place = (2. * s / (NB_DAYLIGHT_SKIES - 1) - 1) * spread(1);
         const nebel_air_light light =
             light_under(daylight, across, 0, fmax(-1, fmin(1, copysign(TWILIGHT * expm1(fabs(place)), place))));
         for (int c = 0; c < 3; c++)
-            daylight->sky[s][c] = (float)log(fmax(light.sky[c], 1e-30) / fmax(there.sky[c], 1e-30));
+            daylight->sky[s][c] =
+                (float)(there.sky[c] > LEAST_SKY ? log(fmax(light.sky[c], LEAST_SKY) / there.sky[c]) : 0);
     }
 }
 
-void nb_daylight_set(nb_daylight *daylight, const nebel_planet *planet, const double to_sun[3])
+void nb_daylight_set(nb_daylight *daylight, const nebel_planet *planet, const nebel_planet *home,
+                     const double to_sun[3])
 {
     daylight->atmosphere = planet->atmosphere;
     daylight->radius = planet->air.radius;
@@ -75,7 +80,7 @@ void nb_daylight_set(nb_daylight *daylight, const nebel_planet *planet, const do
     nb_vector_cross(to_sun, axis, across);
     nb_vector_make_unit(across);
     set_depths(daylight, across);
-    set_skies(daylight, across);
+    set_skies(daylight, home->atmosphere, across);
 }
 
 static double part_of(double place, int count, int *first)
@@ -113,7 +118,7 @@ void nb_daylight_at(const nb_daylight *daylight, const double place[3], double s
     if (height <= daylight->thickness && cosine >= 0) {
         find_sun(daylight, height, cosine, sun);
     } else {
-        const nebel_air_light light = light_at(daylight, place);
+        const nebel_air_light light = light_at(daylight, daylight->atmosphere, place);
         memcpy(sun, light.sun, sizeof light.sun);
     }
 }

@@ -16,8 +16,10 @@ typedef struct nb_daylight {
     float sky[NB_DAYLIGHT_SKIES][3]; /* logarithm of the sky's irradiance, as parts of that at the scene's origin */
 } nb_daylight;
 
-/* Tables for a sun in a direction of length 1. The planet has its atmosphere. */
-void nb_daylight_set(nb_daylight *daylight, const nebel_planet *planet, const double to_sun[3]);
+/* Tables for a sun in a direction of length 1. `home` is the planet whose sky is that of the scene's origin. Both have
+ * their atmosphere. */
+void nb_daylight_set(nb_daylight *daylight, const nebel_planet *planet, const nebel_planet *home,
+                     const double to_sun[3]);
 
 /* What is left of the sun, 0 in the planet's shadow, and how much brighter the sky is than at the scene's origin. */
 void nb_daylight_at(const nb_daylight *daylight, const double place[3], double sun[3], double sky[3]);

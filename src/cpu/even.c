@@ -7,7 +7,7 @@
 
 int nb_even_may_be(const nb_frame *frame)
 {
-    return frame->air.planet != NULL && !frame->air.has_fog && frame->samples > 1 && !frame->lighting.shows_ambient &&
+    return frame->air.count > 0 && !frame->air.has_fog && frame->samples > 1 && !frame->lighting.shows_ambient &&
            frame->renderer->method == NEBEL_METHOD_EXACT;
 }
 
@@ -28,7 +28,7 @@ static int sees_borders(const nb_frame *frame, const nb_scratch *scratch)
 {
     int ground = 0, sky = 0;
     for (int i = 0; i < NB_BATCH; i++) {
-        const int is_ground = scratch->air.distance[i] < HUGE_VALF;
+        const int is_ground = scratch->air.ground.distance[i] < HUGE_VALF;
         ground |= scratch->inside[i] && is_ground;
         sky |= scratch->inside[i] && !is_ground;
     }
@@ -85,7 +85,9 @@ nebel_result nb_even_render(const nb_frame *frame, const nb_place *place, uint32
     *is_even = 0;
     if (columns < 3 || rows < 3 || sees_models(frame, place, count, scratch)) return NEBEL_OK;
     nb_batch_find_centers(frame, place, scratch);
-    if (sees_borders(frame, scratch) || nb_air_sees_sun(&frame->air, &frame->lighting, &scratch->rays)) return NEBEL_OK;
+    if (sees_borders(frame, scratch) || nb_air_sees_sun(&frame->air, &frame->lighting, &scratch->rays) ||
+        nb_air_sees_rim(&frame->air, &scratch->rays))
+        return NEBEL_OK;
     const nebel_result result = nb_batch_light(frame, scratch);
     /* Clouds and their shadows are means over pixels already. */
     *is_even = result == NEBEL_OK && (frame->cloud_view != NULL || is_smooth(columns, rows, &scratch->samples));

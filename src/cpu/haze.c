@@ -89,7 +89,7 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
         air.in_scattering[c] = knot->air_light[c];
     }
     const nebel_result result = nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &lights);
-    return result == NEBEL_OK ? nebel_trace_air_view(frame->air.view, NB_BATCH, direction, knot->at, &air) : result;
+    return result == NEBEL_OK ? nb_air_trace(&frame->air, NB_BATCH, direction, knot->at, &air) : result;
 }
 
 /* Of light, which is as uncertain as it is bright where that is more than 1. */
@@ -181,8 +181,7 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
         lights.in_scattering[c] = first->air_light[c];
     }
     set_first(frame, scratch);
-    nebel_result result =
-        nebel_trace_air_view(frame->air.view, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &lights);
+    nebel_result result = nb_air_trace(&frame->air, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &lights);
     if (fog == NULL) {
         take_air(scratch);
         return result;

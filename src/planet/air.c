@@ -26,6 +26,14 @@ static void add_shell(nb_airs *airs, double height)
 }
 
 /* The edges of layers; else shells are thin near the ground, where the air changes most. */
+int nb_airs_are_empty(const nb_airs *airs)
+{
+    for (int k = 0; k < airs->count; k++)
+        for (int c = 0; c < 3; c++)
+            if (airs->airs[k].extinction[c] > 0) return 0;
+    return 1;
+}
+
 void nb_airs_cut(nb_airs *airs)
 {
     airs->shell_count = 0;

@@ -37,6 +37,9 @@ typedef struct nb_track {
 
 double nb_air_density(const nb_air *air, double height);
 
+/* Whether there is no air at all. */
+int nb_airs_are_empty(const nb_airs *airs);
+
 /* Sets the shells of airs that have everything else. */
 void nb_airs_cut(nb_airs *airs);
 

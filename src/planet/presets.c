@@ -63,6 +63,13 @@ static const struct {
                 .scale_height = 1200 / TOY}},
       .air_count = 2,
       .ground_albedo = ALIKE(0.3)}},
+    /* The Moon: no air; its geometric mean radius and Bond albedo (NASA's fact sheet of the Moon). */
+    {"moon",
+     {.radius = 1.7374e6,
+      .thickness = 1000,
+      .airs = {{.scale_height = 1000}},
+      .air_count = 1,
+      .ground_albedo = ALIKE(0.11)}},
 };
 
 const nebel_atmosphere_desc *nebel_find_atmosphere(const char *name)

@@ -313,8 +313,9 @@ static void add_rest(nb_scatter *sum, const nb_scatter *last, const double befor
 static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_scatter *sum, nb_scatter *last, nb_scatter *next)
 {
     static const double once[3] = {1, 1, 1};
+    const int orders = nb_airs_are_empty(maker->airs) ? 0 : maker->effort->orders;
     double before[3] = {0, 0, 0};
-    for (int order = 1; order <= maker->effort->orders; order++) {
+    for (int order = 1; order <= orders; order++) {
         maker->first = order == 1;
         maker->scatter = last;
         maker->next = next;
@@ -322,7 +323,7 @@ static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_scatter *sum, 
         memset(next->ground, 0, (size_t)next->suns * sizeof *next->ground);
         nb_parts_run(parts, (size_t)maker->effort->heights, add_height, maker);
         add_table(sum, next, once);
-        if (order == maker->effort->orders) add_rest(sum, next, before);
+        if (order == orders) add_rest(sum, next, before);
         for (int c = 0; c < 3; c++) before[c] = light_of(next, c);
         seal(next);
         const nb_scatter other = *last;

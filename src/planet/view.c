@@ -257,9 +257,11 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
         return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
     }
     const nb_parts parts = {desc->run, desc->run_user};
-    nb_parts_run(&parts, NB_VIEW_ROWS, fill_row, made);
-    nb_parts_run(&parts, NB_VIEW_ROWS, estimate_row, made);
-    made->brightest = brightest_of(made);
+    if (!nb_airs_are_empty(&made->atmosphere->airs)) {
+        nb_parts_run(&parts, NB_VIEW_ROWS, fill_row, made);
+        nb_parts_run(&parts, NB_VIEW_ROWS, estimate_row, made);
+        made->brightest = brightest_of(made);
+    }
     set_sunlight(made);
     *view = made;
     return NEBEL_OK;

@@ -1,5 +1,7 @@
-/* The planet of a scene: its layers; or its air, and what that does to the light at the scene's origin. */
+/* The planets of a scene: layers; or air, and what that does to the light at the scene's origin. */
 #include "scene/scene_internal.h"
+
+#include "base/eclipse.h"
 
 #include <math.h>
 #include <string.h>
@@ -105,36 +107,53 @@ static nebel_result set_environment(nebel_scene *scene, const nebel_planet *plan
     return NEBEL_OK;
 }
 
+/* What planets but the first leave of the sun at the scene's origin. */
+static double uneclipsed(const nebel_scene_data *data, const double to_sun[3])
+{
+    static const double origin[3] = {0, 0, 0};
+    const double sun = 0.5 * data->planets[0].sun_diameter * (pi / 180);
+    double left = 1;
+    for (size_t i = 1; i < data->planet_count; i++) {
+        const nebel_atmosphere_desc *air = &data->planets[i].air;
+        const double center[3] = {air->ground[0], air->ground[1] - air->radius, air->ground[2]};
+        left *= nb_eclipse_left(origin, center, air->radius, to_sun, sun);
+    }
+    return left;
+}
+
 nebel_result nb_planet_light(nebel_scene *scene)
 {
     static const double origin[1][3] = {{0, 0, 0}};
-    nebel_planet *planet = scene->planet;
+    nebel_planet *planet = scene->planets;
     if (planet == NULL || planet->atmosphere == NULL) return NEBEL_OK;
     const nebel_sun sun = sun_of(&scene->data),
                     white = {{sun.direction[0], sun.direction[1], sun.direction[2]}, {1, 1, 1}};
     nebel_air_light light;
     nebel_result result = nebel_light_air(planet->atmosphere, &white, 1, origin, 0, &light, 0);
     if (result == NEBEL_OK && !scene->has_ambient) result = set_environment(scene, planet, &sun);
-    if (result == NEBEL_OK) memcpy(planet->sun_left, light.sun, sizeof planet->sun_left);
+    const double seen = uneclipsed(&scene->data, white.direction);
+    for (int c = 0; c < 3 && result == NEBEL_OK; c++) planet->sun_left[c] = seen * light.sun[c];
     return result;
 }
 
-static nebel_result set_air(nebel_scene *scene, nebel_planet *planet)
+static nebel_result set_air(nebel_scene *scene, size_t number)
 {
+    nebel_planet *planet = &scene->planets[number];
     nebel_atmosphere_desc desc = planet->air;
     desc.run = scene->run;
     desc.run_user = scene->run_user;
     desc.allocator = scene->allocator;
     desc.log = scene->log;
-    const nebel_result result = nebel_create_atmosphere(&desc, &scene->atmosphere);
-    if (result != NEBEL_OK) return result;
-    planet->atmosphere = scene->atmosphere;
-    return nb_planet_light(scene);
+    const nebel_result result = nebel_create_atmosphere(&desc, &scene->atmospheres[number]);
+    planet->atmosphere = scene->atmospheres[number];
+    return result;
 }
 
-static nebel_result set_clouds(nebel_scene *scene, nebel_planet *planet)
+/* The first planet alone has clouds. */
+static nebel_result set_clouds(nebel_scene *scene)
 {
-    nebel_clouds_desc desc = {.atmosphere = scene->atmosphere,
+    nebel_planet *planet = scene->planets;
+    nebel_clouds_desc desc = {.atmosphere = planet->atmosphere,
                               .layer_count = planet->cloud_layer_count,
                               .allocator = scene->allocator,
                               .log = scene->log};
@@ -170,34 +189,44 @@ nebel_result nb_planet_sun_left(const nebel_scene *scene, double frame, double l
     float part = 1;
     nebel_result result = NEBEL_OK;
     if (scene->clouds != NULL) result = shade_origin(scene, frame, &part);
-    for (int c = 0; c < 3; c++) left[c] = scene->atmosphere != NULL ? (double)part * scene->planet->sun_left[c] : 1;
+    for (int c = 0; c < 3; c++)
+        left[c] = scene->atmospheres[0] != NULL ? (double)part * scene->planets->sun_left[c] : 1;
     return result;
 }
 
 static nebel_result load_layers(nebel_scene *scene)
 {
-    nebel_layers_desc desc = scene->planet->shells;
+    nebel_layers_desc desc = scene->planets->shells;
     desc.allocator = scene->allocator;
     desc.log = scene->log;
     if (scene->layers != NULL) return NEBEL_OK;
     const nebel_result result = nebel_create_layers(&desc, &scene->layers);
-    scene->planet->layers = scene->layers;
+    scene->planets->layers = scene->layers;
     return result;
+}
+
+static void forget_air(nebel_scene *scene)
+{
+    nebel_destroy_clouds(scene->clouds);
+    scene->clouds = NULL;
+    scene->planets->clouds = NULL;
+    for (size_t i = 0; i < scene->data.planet_count; i++) {
+        nebel_destroy_atmosphere(scene->atmospheres[i]);
+        scene->atmospheres[i] = NULL;
+        scene->planets[i].atmosphere = NULL;
+    }
 }
 
 nebel_result nebel_load_scene_planet(nebel_scene *scene)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
-    if (scene->planet != NULL && scene->planet->model == NEBEL_PLANET_LAYERS) return load_layers(scene);
-    if (scene->planet == NULL || scene->planet->atmosphere != NULL) return NEBEL_OK;
-    nebel_result result = set_air(scene, scene->planet);
-    if (result == NEBEL_OK) result = set_clouds(scene, scene->planet);
+    if (scene->planets != NULL && scene->planets->model == NEBEL_PLANET_LAYERS) return load_layers(scene);
+    if (scene->planets == NULL || scene->planets->atmosphere != NULL) return NEBEL_OK;
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < scene->data.planet_count && result == NEBEL_OK; i++) result = set_air(scene, i);
+    if (result == NEBEL_OK) result = nb_planet_light(scene);
+    if (result == NEBEL_OK) result = set_clouds(scene);
     if (result == NEBEL_OK) return NEBEL_OK;
-    nebel_destroy_clouds(scene->clouds);
-    nebel_destroy_atmosphere(scene->atmosphere);
-    scene->clouds = NULL;
-    scene->planet->clouds = NULL;
-    scene->atmosphere = NULL;
-    scene->planet->atmosphere = NULL;
-    return nb_fail(&scene->log, result, "the air of the scene's planet: %s", nebel_result_text(result));
+    forget_air(scene);
+    return nb_fail(&scene->log, result, "the air of the scene's planets: %s", nebel_result_text(result));
 }

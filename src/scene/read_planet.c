@@ -1,6 +1,8 @@
 /* The section "planet". */
 #include "scene/scene_internal.h"
 
+#include "base/vector.h"
+
 #include <string.h>
 
 static const nb_range length_range = {
@@ -60,8 +62,8 @@ static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmos
                                 "is one too many; a planet has at most %d kinds of air", NEBEL_MAX_AIRS);
         if (!read_air(in, one, &desc->airs[count++])) return false;
     }
-    if (count == 0)
-        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for the air of the preset");
+    /* None is one that does nothing to light. */
+    if (count == 0) desc->airs[count++] = (nebel_air){.scale_height = desc->thickness};
     desc->air_count = count;
     return true;
 }
@@ -79,12 +81,12 @@ static const nb_keys planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANE
 static const struct {
     const char *name;
     double sun_diameter;
-} presets[] = {{"earth", 0.5334}, {"mars", 0.3501}, {"toy", 0.5334}};
+} presets[] = {{"earth", 0.5334}, {"mars", 0.3501}, {"toy", 0.5334}, {"moon", 0.5334}};
 
 static bool read_preset(nb_json *json, const nb_json_node *node, nebel_planet *planet)
 {
-    static const char *const preset_names[] = {"earth", "mars", "toy"};
-    const int preset = node != NULL ? nb_value_choice(json, node, preset_names, 3) : 0;
+    static const char *const preset_names[] = {"earth", "mars", "toy", "moon"};
+    const int preset = node != NULL ? nb_value_choice(json, node, preset_names, 4) : 0;
     if (preset < 0) return false;
     planet->air = *nebel_find_atmosphere(presets[preset].name);
     planet->sun_diameter = presets[preset].sun_diameter;
@@ -153,7 +155,7 @@ static int read_model(nb_json *json, const nb_json_node *node)
 
 static bool read_planet(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
-    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"model\": ...}")) return false;
+    if (!nb_value_is(in->json, node, NB_JSON_OBJECT, "an object {\"model\": ...}, or an array of those")) return false;
     const int model = read_model(in->json, node);
     if (model < 0) return false;
     planet->model = (nebel_planet_model)model;
@@ -161,14 +163,56 @@ static bool read_planet(nb_scene_reader *in, const nb_json_node *node, nebel_pla
     return model == NEBEL_PLANET_LAYERS ? nb_read_layers(in, node, &planet->shells) : read_physical(in, node, planet);
 }
 
+/* Planets that overlap would need air of air. */
+static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planets, size_t number)
+{
+    const nebel_atmosphere_desc *air = &planets[number].air;
+    for (size_t i = 0; i < number; i++) {
+        const nebel_atmosphere_desc *other = &planets[i].air;
+        const double between[3] = {air->ground[0] - other->ground[0],
+                                   air->ground[1] - air->radius - (other->ground[1] - other->radius),
+                                   air->ground[2] - other->ground[2]};
+        if (nb_vector_length(between) > air->radius + air->thickness + other->radius + other->thickness) continue;
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
+                            "overlaps planet[%zu], air included; give it a \"center\" of its own", i);
+    }
+    return true;
+}
+
+static bool read_one_of_many(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planets, size_t number)
+{
+    if (!read_planet(in, node, &planets[number])) return false;
+    if (planets[number].model != NEBEL_PLANET_PHYSICAL)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is a planet of layers, which stands alone");
+    if (number > 0 && planets[number].cloud_layer_count > 0)
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "has clouds; the first planet alone may");
+    return check_apart(in, node, planets, number);
+}
+
+static bool read_planets(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planets, size_t *count)
+{
+    if (node->type != NB_JSON_ARRAY) {
+        *count = 1;
+        return read_planet(in, node, planets);
+    }
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
+        if (*count == NEBEL_MAX_PLANETS)
+            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one, "is one too many; a scene has at most %d planets",
+                                NEBEL_MAX_PLANETS);
+        if (!read_one_of_many(in, one, planets, (*count)++)) return false;
+    }
+    return *count > 0 || nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for no planet");
+}
+
 bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node)
 {
-    nebel_planet *planet = nb_arena_allocate(&in->scene->arena, 1, sizeof *planet);
-    if (planet == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
-    *planet = (nebel_planet){.model = NEBEL_PLANET_PHYSICAL};
-    if (!read_planet(in, node, planet)) return false;
-    in->scene->planet = planet;
-    in->scene->data.planets = planet;
-    in->scene->data.planet_count = 1;
+    size_t count = 0;
+    nebel_planet *planets = nb_arena_allocate(&in->scene->arena, NEBEL_MAX_PLANETS, sizeof *planets);
+    if (planets == NULL) return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    memset(planets, 0, NEBEL_MAX_PLANETS * sizeof *planets);
+    if (!read_planets(in, node, planets, &count)) return false;
+    in->scene->planets = planets;
+    in->scene->data.planets = planets;
+    in->scene->data.planet_count = count;
     return true;
 }

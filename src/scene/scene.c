@@ -419,7 +419,7 @@ void nebel_destroy_scene(nebel_scene *scene)
     nb_release(&allocator, (void *)scene->files);
     nebel_release_environment_map(scene->environment_map);
     nebel_destroy_clouds(scene->clouds);
-    nebel_destroy_atmosphere(scene->atmosphere);
+    for (int i = 0; i < NEBEL_MAX_PLANETS; i++) nebel_destroy_atmosphere(scene->atmospheres[i]);
     nebel_destroy_layers(scene->layers);
     for (size_t i = 0; i < scene->map_count; i++) nb_image_release(&allocator, &scene->maps[i]);
     for (size_t i = 0; i < scene->grid_count; i++) nebel_release_grid(scene->grids[i]);

@@ -64,8 +64,8 @@ struct nebel_scene {
     nebel_environment_map *environment_map; /* NULL: none */
     bool has_ambient;                       /* the file says what it is */
 
-    nebel_planet *planet; /* NULL: none */
-    nebel_atmosphere *atmosphere;
+    nebel_planet *planets; /* those of the contents; NULL: none */
+    nebel_atmosphere *atmospheres[NEBEL_MAX_PLANETS];
     nebel_layers *layers;
     nebel_clouds *clouds;
     nebel_image maps[NB_MOST_MAPS]; /* that the planet's layers were read from */

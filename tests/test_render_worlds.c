@@ -1,0 +1,322 @@
+/* Several planets in one picture of the CPU: each ray through the air of all in the order of their distances, to the
+ * nearest ground, against nebel_trace_air planet by planet; eclipses against rays to all of the sun's disc. */
+#include "near.h"
+#include "planet_help.h"
+#include "test_render_scene.h"
+
+#include "base/eclipse.h"
+
+enum { WIDTH = 40, HEIGHT = 24, MOST = 3 };
+
+typedef struct worlds {
+    size_t count;
+    nebel_atmosphere *atmospheres[MOST];
+    nebel_planet planets[MOST];
+    nebel_scene_data scene;
+    nebel_sun sun;
+} worlds;
+
+typedef struct body {
+    const char *name;
+    double center[3], radius, thickness; /* 0: the preset's; center: of those behind the first */
+} body;
+
+static void make_worlds(size_t count, const body *bodies, const double to_sun[3], double sun_diameter, worlds *s)
+{
+    *s = (worlds){.count = count, .sun = {.irradiance = {5, 4, 3}}};
+    memcpy(s->sun.direction, to_sun, sizeof s->sun.direction);
+    assert_true(nb_vector_make_unit(s->sun.direction));
+    for (size_t i = 0; i < count; i++) {
+        nebel_planet *planet = &s->planets[i];
+        planet->air = *nebel_find_atmosphere(bodies[i].name);
+        if (bodies[i].radius > 0) planet->air.radius = bodies[i].radius;
+        if (bodies[i].thickness > 0) planet->air.thickness = bodies[i].thickness;
+        for (int c = 0; c < 3 && i > 0; c++)
+            planet->air.ground[c] = bodies[i].center[c] + (c == 1 ? planet->air.radius : 0);
+        assert_int_equal(nebel_create_atmosphere(&planet->air, &s->atmospheres[i]), NEBEL_OK);
+        planet->atmosphere = s->atmospheres[i];
+        planet->sun_diameter = sun_diameter;
+    }
+    s->scene =
+        (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = count, .planets = s->planets};
+    memcpy(s->scene.sun_direction, s->sun.direction, sizeof s->scene.sun_direction);
+}
+
+static void free_worlds(worlds *s)
+{
+    for (size_t i = 0; i < s->count; i++) nebel_destroy_atmosphere(s->atmospheres[i]);
+}
+
+static test_picture render(const worlds *s, const nebel_camera *camera, int threads, uint32_t samples)
+{
+    nebel_renderer *renderer;
+    const test_picture picture = test_picture_make(WIDTH, HEIGHT);
+    assert_int_equal(nebel_create_renderer(&s->scene, NULL, &(nebel_renderer_desc){.threads = threads}, &renderer),
+                     NEBEL_OK);
+    const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = samples};
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    return picture;
+}
+
+static void center_of(const nebel_planet *planet, double center[3])
+{
+    memcpy(center, planet->air.ground, 3 * sizeof *center);
+    center[1] -= planet->air.radius;
+}
+
+/* From where to where a ray is within a ball; HUGE_VAL where never. Its direction has the length 1. */
+static void cross_ball(const double origin[3], const double unit[3], const double center[3], double radius,
+                       double at[2])
+{
+    double from[3], aside[3];
+    for (int c = 0; c < 3; c++) from[c] = origin[c] - center[c];
+    const double along = nb_vector_dot(from, unit);
+    for (int c = 0; c < 3; c++) aside[c] = from[c] - along * unit[c];
+    const double far = nb_vector_length(aside), square = (radius - far) * (radius + far);
+    at[0] = at[1] = HUGE_VAL;
+    if (!(square > 0) || !(-along + sqrt(square) > 0)) return;
+    at[0] = -along - sqrt(square);
+    at[1] = -along + sqrt(square);
+}
+
+/* The part of rays to a disc of suns that meet no planet but one. */
+static double count_suns(const worlds *s, size_t but, const double place[3])
+{
+    enum { ACROSS = 60 };
+    const double radius = .5 * s->planets[0].sun_diameter * test_pi / 180;
+    const double axis[3] = {fabs(s->sun.direction[0]) < .5, 0, !(fabs(s->sun.direction[0]) < .5)};
+    double side[3], up[3];
+    int all = 0, seen = 0;
+    nb_vector_cross(s->sun.direction, axis, side);
+    assert_true(nb_vector_make_unit(side));
+    nb_vector_cross(s->sun.direction, side, up);
+    for (int i = 0; i < ACROSS * ACROSS; i++) {
+        const double x = 2 * (i % ACROSS + .5) / ACROSS - 1, y = 2 * (i / ACROSS + .5) / ACROSS - 1;
+        const double out = hypot(x, y), angle = radius * out;
+        double to[3];
+        int hidden = 0;
+        if (!(out < 1)) continue;
+        for (int c = 0; c < 3; c++)
+            to[c] = cos(angle) * s->sun.direction[c] + sin(angle) * (x / out * side[c] + y / out * up[c]);
+        for (size_t k = 0; k < s->count; k++) {
+            double center[3], at[2];
+            center_of(&s->planets[k], center);
+            cross_ball(place, to, center, s->planets[k].air.radius, at);
+            hidden |= k != but && at[1] < HUGE_VAL;
+        }
+        all++;
+        seen += !hidden;
+    }
+    return (double)seen / all;
+}
+
+/* Light along a ray, planet by planet as it enters their air. */
+static double look(const worlds *s, const nebel_ray *camera_ray, double light[3])
+{
+    double unit[3], entry[MOST], end = HUGE_VAL, left[3] = {1, 1, 1};
+    size_t order[MOST], ground = 0;
+    memcpy(unit, camera_ray->direction, sizeof unit);
+    assert_true(nb_vector_make_unit(unit));
+    for (size_t k = 0; k < s->count; k++) {
+        double center[3], air[2], ball[2];
+        size_t place = k;
+        center_of(&s->planets[k], center);
+        cross_ball(camera_ray->origin, unit, center, s->planets[k].air.radius + s->planets[k].air.thickness, air);
+        cross_ball(camera_ray->origin, unit, center, s->planets[k].air.radius, ball);
+        entry[k] = air[0];
+        if (ball[0] > 0 && ball[0] < end) {
+            end = ball[0];
+            ground = k;
+        }
+        for (; place > 0 && entry[order[place - 1]] > entry[k]; place--) order[place] = order[place - 1];
+        order[place] = k;
+    }
+    memset(light, 0, 3 * sizeof *light);
+    for (size_t k = 0; k < s->count; k++) {
+        nebel_ray ray = *camera_ray;
+        nebel_light part;
+        ray.t_max = end;
+        assert_int_equal(nebel_trace_air(s->atmospheres[order[k]], &s->sun, 1, &ray, 0, &part, 0), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            light[c] += left[c] * part.in_scattering[c];
+            left[c] *= part.transmittance[c];
+        }
+    }
+    if (!(end < HUGE_VAL)) return end;
+    double place[1][3], center[3], cosine = 0;
+    nebel_air_light arrives;
+    center_of(&s->planets[ground], center);
+    for (int c = 0; c < 3; c++) {
+        place[0][c] = camera_ray->origin[c] + end * unit[c];
+        cosine += (place[0][c] - center[c]) / s->planets[ground].air.radius * s->sun.direction[c];
+    }
+    assert_int_equal(nebel_light_air(s->atmospheres[ground], &s->sun, 1, (const double(*)[3])place, 0, &arrives, 0),
+                     NEBEL_OK);
+    const double seen = count_suns(s, ground, place[0]);
+    for (int c = 0; c < 3; c++)
+        light[c] += left[c] * s->planets[ground].air.ground_albedo[c] / test_pi *
+                    (fmax(0, cosine) * seen * arrives.sun[c] + arrives.sky[c]);
+    return end;
+}
+
+static const body near_bodies[] = {{.name = "earth"},
+                                   {.name = "moon", .center = {-4e6, 9e6, -2.4e7}},
+                                   {.name = "earth", .center = {-2e6, 6e6, -1.2e7}, .radius = 8e5}};
+static const body before_sun[] = {{.name = "earth"}, {.name = "moon", .center = {-6e6, 6e6, -2.1e7}}};
+static const body between[] = {{.name = "earth"}, {.name = "moon", .center = {5e6, 8.66e6, 0}}};
+static const body of_a_moon[] = {{.name = "moon"}, {.name = "earth", .center = {-1e7, 1.2e7, -3e7}}};
+
+static void worlds_are_seen_one_behind_the_other(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        size_t count;
+        const body *bodies;
+        double sun[3], diameter, height, pitch;
+    } views[] = {{"by day", 3, near_bodies, {.8, .6, .2}, .53, 2, .35},
+                 {"before the sun", 2, before_sun, {-6e6, 6e6, -2.1e7}, 3, 2, .25},
+                 {"an eclipse from space", 2, between, {.5, .8660254, 0}, 10, 2e7, -1.5},
+                 {"from a moon", 2, of_a_moon, {.8, .6, .2}, .53, 2, .25}};
+    for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
+        worlds s;
+        make_worlds(views[v].count, views[v].bodies, views[v].sun, views[v].diameter, &s);
+        const nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
+        test_picture picture = render(&s, &camera, 2, 1);
+        double brightest = 0, worst = 0, least = 1;
+        int untold = 0, grounds = 0;
+        for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+            const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
+            double light[3], off = 0;
+            const double way = look(&s, &ray, light), depth = (double)picture.planes.depth[i];
+            if (way < HUGE_VAL) assert_true(fabs(depth - way) <= 1e-5 * way + 1e-3);
+            if (!(way < HUGE_VAL)) assert_true(!(depth < HUGE_VAL));
+            for (int c = 0; c < 3; c++) {
+                off = fmax(off, fabs((double)picture.planes.color[3 * i + (uint32_t)c] - light[c]));
+                brightest = fmax(brightest, light[c]);
+                least = fmin(least, light[c]);
+            }
+            grounds += way < HUGE_VAL;
+            worst = fmax(worst, off);
+            untold += off > (double)picture.planes.error[i] * 2 + 2e-3 * brightest; /* of the suns, too */
+        }
+        print_message("%s: %.1e of the brightest, %d of %d told too little\n", views[v].text, worst / brightest, untold,
+                      WIDTH * HEIGHT);
+        assert_true(brightest > .05 && worst <= .02 * brightest && untold <= WIDTH * HEIGHT / 200);
+        assert_true(grounds > 40 && grounds < WIDTH * HEIGHT);
+        test_picture_free(&picture);
+        free_worlds(&s);
+    }
+}
+
+/* Worlds in another order, and threads, make the same picture. */
+static void order_does_not_matter(void **state)
+{
+    (void)state;
+    const body other[] = {near_bodies[0], near_bodies[2], near_bodies[1]};
+    const double sun[3] = {.8, .6, .2};
+    const nebel_camera camera = planet_camera(2, .35);
+    test_picture pictures[2];
+    for (int i = 0; i < 2; i++) {
+        worlds s;
+        make_worlds(3, i ? other : near_bodies, sun, .53, &s);
+        pictures[i] = render(&s, &camera, 1 + i, 4);
+        free_worlds(&s);
+    }
+    assert_memory_equal(pictures[0].planes.color, pictures[1].planes.color, WIDTH * HEIGHT * 3 * sizeof(float));
+    for (int i = 0; i < 2; i++) test_picture_free(&pictures[i]);
+}
+
+/* A moon of four fifths of a pixel at a corner of four, where no middle of a pixel meets it: Lambert's ball, which has of the
+ * light of a disc that faces the sun 2 / 3 (sin a + (pi - a) cos a) / pi. At a = 0 it would be in the other one's shadow. */
+static void moons_of_less_than_a_pixel_are_seen(void **state)
+{
+    (void)state;
+    const double pixel = 2 * tan(30 * test_pi / 180) / HEIGHT, pitch = .8, far = 1e8, a = .3;
+    const double sun[3] = {sin(a), -sin(pitch) * cos(a), cos(pitch) * cos(a)};
+    const body bodies[] = {
+        {.name = "moon"},
+        {.name = "moon", .center = {0, 2 + far * sin(pitch), -far * cos(pitch)}, .radius = .4 * pixel * far}};
+    worlds s;
+    make_worlds(2, bodies, sun, .53, &s);
+    const nebel_camera camera = planet_camera(2, pitch);
+    test_picture picture = render(&s, &camera, 1, 64);
+    double sum = 0;
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) sum += (double)picture.planes.color[3 * i];
+    const double phase = 2. / 3 * (sin(a) + (test_pi - a) * cos(a)) / test_pi;
+    const double expected = .11 / test_pi * 5 * phase * test_pi * .4 * .4;
+    print_message("%.4g of %.4g\n", sum, expected);
+    assert_near(sum / expected, 1, .05); /* by about 32 samples of 256 */
+    test_picture_free(&picture);
+    free_worlds(&s);
+}
+
+/* The disc that is left: by area, at all sizes and distances. */
+static void eclipses_are_areas_of_discs(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 400; i++) {
+        const double sun = .004 * (1 + i % 5), ball = .002 * (1 + i / 5 % 8), apart = (sun + ball) * (i / 40) / 9;
+        enum { ACROSS = 400 };
+        int all = 0, seen = 0;
+        for (int k = 0; k < ACROSS * ACROSS; k++) {
+            const double x = sun * (2 * (k % ACROSS + .5) / ACROSS - 1), y = sun * (2 * (k / ACROSS + .5) / ACROSS - 1);
+            if (!(hypot(x, y) < sun)) continue;
+            all++;
+            seen += hypot(x - apart, y) > ball;
+        }
+        /* Cells that the edges cut are at most 4 ACROSS of some .785 ACROSS^2. */
+        assert_near(nb_eclipse_discs(sun, ball, apart), (double)seen / all, 4. / ACROSS);
+    }
+    assert_true(nb_eclipse_discs(0, .01, .02) == 1 && nb_eclipse_discs(0, .01, .005) == 0);
+    const double inside[3] = {0, 0, 0}, to_sun[3] = {0, 1, 0};
+    assert_true(nb_eclipse_left(inside, inside, 1, to_sun, .01) == 0);
+}
+
+static const float quad[4][3] = {{-40, 0, -40}, {-40, 0, 40}, {40, 0, 40}, {40, 0, -40}};
+static const uint32_t quad_indices[6] = {0, 1, 2, 0, 2, 3};
+
+/* A white plate over the Earth, in the full sun, in the half shadow of a moon and behind it. */
+static void models_are_in_the_shadow_of_moons(void **state)
+{
+    (void)state;
+    static const double aside[] = {0, 1.6e6, 1.9e6, 4e6};
+    const double up[3] = {0, 1, 0};
+    int half = 0;
+    for (int i = 0; i < 4; i++) {
+        const body bodies[] = {{.name = "earth"}, {.name = "moon", .center = {aside[i], 1.2e7, 0}}};
+        const nebel_mesh plate = {.origin = {0, 5e5, 0},
+                                  .positions = quad[0],
+                                  .indices = quad_indices,
+                                  .vertex_count = 4,
+                                  .triangle_count = 2,
+                                  .base_color = {1, 1, 1},
+                                  .texture = -1};
+        worlds s;
+        make_worlds(2, bodies, up, 5, &s);
+        s.scene.mesh_count = 1;
+        s.scene.meshes = &plate;
+        const nebel_camera camera = {
+            .position = {0, 500020, 0}, .look_at = {0, 5e5, 0}, .up = {0, 0, 1}, .vertical_fov = 10};
+        test_picture picture = render(&s, &camera, 1, 1);
+        const double place[3] = {0, 5e5, 0}, left = count_suns(&s, 0, place);
+        const double got = (double)test_color(&picture, WIDTH / 2, HEIGHT / 2)[1];
+        print_message("a moon %g m aside leaves %.3f of %.3f\n", aside[i], got / 4 * test_pi, left);
+        assert_near(got / 4 * test_pi, left, 5e-3);
+        half += left > .05 && left < .95;
+        test_picture_free(&picture);
+        free_worlds(&s);
+    }
+    assert_true(half > 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(worlds_are_seen_one_behind_the_other), cmocka_unit_test(order_does_not_matter),
+        cmocka_unit_test(moons_of_less_than_a_pixel_are_seen),  cmocka_unit_test(eclipses_are_areas_of_discs),
+        cmocka_unit_test(models_are_in_the_shadow_of_moons),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
