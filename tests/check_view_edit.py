@@ -2,6 +2,7 @@
 """Changes scenes in `nebel view` as people do: controls, files that change on the disk, saving."""
 
 import json
+import math
 import re
 import time
 import unittest
@@ -379,6 +380,39 @@ class SceneTest(ViewTest):
         viewer.key("ctrl+y")
         self.assertEqual(viewer.save()["models"], [])
         self.assertTrue(self.same(viewer.take_picture(), self.draw_like("none.png", "--device", "gl"), ROUNDING_TOGETHER))
+        viewer.end()
+
+    def test_lamps_shine_elsewhere(self):
+        lamps = [{"type": "point", "position": [0, 1, 1], "intensity": [4, 2, 1]},
+                 {"type": "spot", "name": "stage", "position": [2, 2, 2], "intensity": 9, "direction": [-1, -1, -1], "outer_angle": 40}]
+        fog = {"shape": {"type": "box", "min": [-3, -3, -3], "max": [3, 3, 3]}, "extinction": 0.2, "albedo": 0.9}
+        self.scene = self.write_scene("scene.json", [fog], lights=lamps, models=[{"file": "triangle.obj"}],
+                                      camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
+        viewer = self.open("--size", "200x450", "--ui-scale", 0.5)
+        first = viewer.take_picture()
+        viewer.press("lights[0].open")
+        viewer.type("lights[0].strength", "8")
+        viewer.type("lights[0].radius", "0.5")
+        viewer.type("lights[0].position", "1.5", 0.1)
+        viewer.press("lights[0].open")
+        viewer.press("lights[1].open")
+        viewer.type("lights[1].inner angle", "70")
+        viewer.type("lights[1].height", "30")
+        drawn = viewer.take_picture()
+        self.assertFalse(self.same(drawn, first, 0.01))
+        viewer.key("c")
+        viewer.key("c")
+        viewer.key("c")
+        by_cpu = viewer.take_picture()
+        saved = viewer.save()["lights"]
+        self.assertEqual(saved[0], {**lamps[0], "position": [1.5, 1, 1], "intensity": [8, 4, 2], "radius": 0.5})
+        self.assertEqual((saved[1]["inner_angle"], saved[1]["name"]), (40, "stage"), "no further than the outer one")
+        self.assertAlmostEqual(saved[1]["direction"][1], math.sin(math.radians(30)), 12)
+        self.assertTrue(self.same(drawn, self.draw_like("gl.png", "--device", "gl", "--size", "200x450"), ROUNDING_TOGETHER))
+        self.assertTrue(self.same(by_cpu, self.draw_like("cpu.png", "--size", "200x450"), ROUNDING_TOGETHER))
+        viewer.key("ctrl+z")
+        viewer.settle()
+        viewer.say(LEAVING, lambda: viewer.key("ctrl+q"))
         viewer.end()
 
     def test_sun_camera_and_classic_fog(self):

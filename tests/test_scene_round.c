@@ -32,6 +32,7 @@ typedef struct change {
     nebel_d3d9_fog device;
     float table[NEBEL_CURVE_ENTRIES];
     nebel_model models[MOST];
+    nebel_lamp lamps[MOST];
     nebel_camera_key camera_keys[MOST];
     char names[3 * MOST][32];
     int name_count;
@@ -251,6 +252,23 @@ static void change_models(change *c)
     c->data.models = c->models;
 }
 
+static void change_lamps(change *c)
+{
+    for (size_t i = 0; i < c->data.lamp_count; i++) {
+        nebel_lamp *lamp = &c->lamps[i];
+        *lamp = c->data.lamps[i];
+        nb_space_convert_place(&half, lamp->position);
+        dim(lamp->intensity);
+        lamp->radius = lamp->radius > 0 ? 2 * lamp->radius : .25;
+        if (lamp->type != NEBEL_LAMP_SPOT) continue;
+        const double direction[3] = {lamp->direction[1], lamp->direction[2], lamp->direction[0]};
+        memcpy(lamp->direction, direction, sizeof direction);
+        lamp->outer_angle = (lamp->outer_angle + 180) / 2;
+        lamp->inner_angle = (lamp->inner_angle + 1) / 2;
+    }
+    c->data.lamps = c->lamps;
+}
+
 static void change_all(change *c)
 {
     nebel_scene_data *data = &c->data;
@@ -260,6 +278,7 @@ static void change_all(change *c)
     change_classic(c);
     change_camera(c);
     change_models(c);
+    change_lamps(c);
     dim(data->background);
     dim(data->ambient);
     dim(data->environment.zenith);
@@ -463,6 +482,21 @@ static void same_models(const nebel_scene_data *a, const nebel_scene_data *b)
     }
 }
 
+/* Directions are made unit ones, which rounds all their numbers alike. */
+static void same_lamps(const nebel_scene_data *a, const nebel_scene_data *b)
+{
+    WHOLE(a->lamp_count, b->lamp_count);
+    for (size_t i = 0; i < a->lamp_count; i++) {
+        const nebel_lamp *x = &a->lamps[i], *y = &b->lamps[i];
+        SAME(&x->position, &y->position);
+        SAME(&x->intensity, &y->intensity);
+        SAME(&x->radius, &y->radius);
+        SAME(&x->direction, &y->direction);
+        SAME(&x->inner_angle, &y->inner_angle);
+        SAME(&x->outer_angle, &y->outer_angle);
+    }
+}
+
 static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     same_camera(a, b);
@@ -483,6 +517,7 @@ static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
     same_nebulae(a, b);
     same_cells(a, b);
     same_models(a, b);
+    same_lamps(a, b);
     WHOLE(a->classic == NULL, b->classic == NULL);
     if (a->classic == NULL) return;
     SAME(&a->classic->start, &b->classic->start);
@@ -542,60 +577,25 @@ static void test_good_scenes(void **state)
 {
     (void)state;
     static const char *const names[] = {
-        "examples/scenes/cells-grouped",
-        "examples/scenes/cells-portals",
-        "examples/scenes/cells-printed",
-        "examples/scenes/cells-seam",
-        "examples/scenes/clearing",
-        "examples/scenes/cloud",
-        "examples/scenes/curve-table",
-        "examples/scenes/device-depth",
-        "examples/scenes/device-range",
-        "examples/scenes/forty-volumes",
-        "examples/scenes/glowing-sphere",
-        "examples/scenes/ground-fog",
-        "examples/scenes/linear-plane",
-        "examples/scenes/linear-radial",
-        "examples/scenes/morning-mist",
-        "examples/scenes/nebula",
-        "examples/scenes/soft-edges",
-        "examples/scenes/sun-shafts",
-        "examples/scenes/vertex-coarse",
-        "examples/scenes/vertex-sphere",
-        "examples/engines/bevy",
-        "examples/engines/godot",
-        "examples/engines/hdrp",
-        "examples/engines/unreal",
-        "fuzz/corpus/scene/camera_keys",
-        "fuzz/corpus/scene/capsule",
-        "fuzz/corpus/scene/cells",
-        "fuzz/corpus/scene/classic",
-        "fuzz/corpus/scene/classic_device",
-        "fuzz/corpus/scene/classic_table",
-        "fuzz/corpus/scene/colors",
-        "fuzz/corpus/scene/cone",
-        "fuzz/corpus/scene/contract",
-        "fuzz/corpus/scene/convex",
-        "fuzz/corpus/scene/presets",
-        "fuzz/corpus/scene/cylinder",
-        "fuzz/corpus/scene/ellipsoid",
-        "fuzz/corpus/scene/every_import",
-        "fuzz/corpus/scene/every_key",
-        "fuzz/corpus/scene/fog_keys",
-        "fuzz/corpus/scene/gradient",
-        "fuzz/corpus/scene/half_space",
-        "fuzz/corpus/scene/heightfield",
-        "fuzz/corpus/scene/import",
-        "fuzz/corpus/scene/linear",
-        "fuzz/corpus/scene/minimal",
-        "fuzz/corpus/scene/nebula",
-        "fuzz/corpus/scene/numbers",
-        "fuzz/corpus/scene/scattering",
-        "fuzz/corpus/scene/soft_edge",
-        "fuzz/corpus/scene/space",
-        "fuzz/corpus/scene/sphere_radial",
-        "fuzz/corpus/scene/text",
-        "fuzz/corpus/scene/turntable",
+        "examples/scenes/cells-grouped",   "examples/scenes/cells-portals",  "examples/scenes/cells-printed",
+        "examples/scenes/cells-seam",      "examples/scenes/clearing",       "examples/scenes/cloud",
+        "examples/scenes/curve-table",     "examples/scenes/device-depth",   "examples/scenes/device-range",
+        "examples/scenes/forty-volumes",   "examples/scenes/glowing-sphere", "examples/scenes/ground-fog",
+        "examples/scenes/linear-plane",    "examples/scenes/linear-radial",  "examples/scenes/morning-mist",
+        "examples/scenes/nebula",          "examples/scenes/soft-edges",     "examples/scenes/street-lamps",
+        "examples/scenes/sun-shafts",      "examples/scenes/vertex-coarse",  "examples/scenes/vertex-sphere",
+        "examples/engines/bevy",           "examples/engines/godot",         "examples/engines/hdrp",
+        "examples/engines/unreal",         "fuzz/corpus/scene/camera_keys",  "fuzz/corpus/scene/capsule",
+        "fuzz/corpus/scene/cells",         "fuzz/corpus/scene/classic",      "fuzz/corpus/scene/classic_device",
+        "fuzz/corpus/scene/classic_table", "fuzz/corpus/scene/colors",       "fuzz/corpus/scene/cone",
+        "fuzz/corpus/scene/contract",      "fuzz/corpus/scene/convex",       "fuzz/corpus/scene/presets",
+        "fuzz/corpus/scene/cylinder",      "fuzz/corpus/scene/ellipsoid",    "fuzz/corpus/scene/every_import",
+        "fuzz/corpus/scene/every_key",     "fuzz/corpus/scene/fog_keys",     "fuzz/corpus/scene/gradient",
+        "fuzz/corpus/scene/half_space",    "fuzz/corpus/scene/heightfield",  "fuzz/corpus/scene/import",
+        "fuzz/corpus/scene/lights",        "fuzz/corpus/scene/linear",       "fuzz/corpus/scene/minimal",
+        "fuzz/corpus/scene/nebula",        "fuzz/corpus/scene/numbers",      "fuzz/corpus/scene/point_light",
+        "fuzz/corpus/scene/scattering",    "fuzz/corpus/scene/soft_edge",    "fuzz/corpus/scene/space",
+        "fuzz/corpus/scene/sphere_radial", "fuzz/corpus/scene/text",         "fuzz/corpus/scene/turntable",
         "fuzz/corpus/scene/union",
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {

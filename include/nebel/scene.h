@@ -321,7 +321,8 @@ void nebel_destroy_scene(nebel_scene *scene);
 /* Writes changes back into a scene file. `before` is what nebel_scene_contents gave for this file; `changed` is a copy
  * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that the file names, or of none), max_opacity, the
  * classic fog, noise (by nebel_change_scene_noise), the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
- * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), and with
+ * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), the lamps (as many, each of the same
+ * type), and with
  * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and
  * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or

@@ -75,12 +75,13 @@ typedef struct nb_lost_keys {
 
 void nb_save_lose(nb_lost_keys *lost, const char *key);
 
-/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model or the
- * cells have been read, while the tree is there. */
+/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model, a lamp
+ * or the cells have been read, while the tree is there. */
 void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
 bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t first);
 bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
+bool nb_save_lamp(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
 
 /* The section "classic", in the file or not yet. */

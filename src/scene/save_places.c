@@ -90,6 +90,16 @@ const nb_place nb_model_places[] = {
     END,
 };
 
+const nb_place nb_lamp_places[] = {
+    PLACE(nebel_lamp, position, 3, NB_EDIT_EACH),
+    PLACE(nebel_lamp, intensity, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_lamp, radius, 1, NB_EDIT_EACH),
+    PLACE(nebel_lamp, direction, 3, NB_EDIT_WHOLE),
+    PLACE(nebel_lamp, inner_angle, 1, NB_EDIT_EACH),
+    PLACE(nebel_lamp, outer_angle, 1, NB_EDIT_EACH),
+    END,
+};
+
 const nb_place nb_height_field_places[] = {
     PLACE(nebel_model, size, 2, NB_EDIT_EACH),
     PLACE(nebel_model, height, 1, NB_EDIT_EACH),

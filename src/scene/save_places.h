@@ -14,7 +14,8 @@ typedef struct nb_place {
 
 /* Tables of places, which end in one without a key; masks say which places a type has, bit i for places[i]. */
 extern const nb_place nb_volume_places[], nb_shape_places[], nb_transform_places[], nb_density_places[],
-    nb_nebula_places[], nb_strewn_places[], nb_cell_places[], nb_model_places[], nb_height_field_places[];
+    nb_nebula_places[], nb_strewn_places[], nb_cell_places[], nb_model_places[], nb_height_field_places[],
+    nb_lamp_places[];
 extern const unsigned nb_shape_masks[NEBEL_SHAPE_COUNT], nb_density_masks[NEBEL_DENSITY_COUNT];
 extern const char *const nb_shape_names[NEBEL_SHAPE_COUNT],
     *const nb_density_names[NEBEL_DENSITY_COUNT], *const nb_operation_names[NEBEL_OPERATION_COUNT],

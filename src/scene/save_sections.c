@@ -36,6 +36,34 @@ static void add_sun(nb_save *save, const nb_space *space)
     nb_edit_add(&save->edit, &save->root, "sun", words);
 }
 
+/* ---- lamps ----------------------------------------------------------------------------------- */
+
+static void restore_lamp(const nb_space *space, nebel_lamp *lamp)
+{
+    nb_space_restore_place(space, lamp->position);
+    nb_space_restore_direction(space, lamp->direction);
+    lamp->radius /= space->unit;
+}
+
+static void change_lamp(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, nebel_lamp was,
+                        nebel_lamp now)
+{
+    const nb_edit_object object = nb_edit_find(in->json, node);
+    restore_lamp(&in->space, &was);
+    restore_lamp(&in->space, &now);
+    nb_save_places(save, in->json, &object, nb_lamp_places, NB_ALL_PLACES, &was, &now);
+}
+
+bool nb_save_lamp(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index)
+{
+    const nebel_scene_data *before = save->before;
+    if (index >= before->lamp_count || in->scene->lamps[index].type != before->lamps[index].type)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
+                            "is another lamp than the one to be written; the file has changed, load it again");
+    change_lamp(save, in, node, before->lamps[index], save->changed->lamps[index]);
+    return true;
+}
+
 /* ---- models ---------------------------------------------------------------------------------- */
 
 static const nebel_model *find_model(const nebel_scene_data *scene, size_t source)
@@ -175,6 +203,10 @@ static bool check_counts(const nb_scene_reader *in, const nb_save *save, const n
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "has %zu models where %zu were; the file has changed, load it again",
                             in->scene->model_count, before->model_count);
+    if (now->lamp_count != before->lamp_count)
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
+                            "has %zu lamps where %zu were; the file has changed, load it again", now->lamp_count,
+                            before->lamp_count);
     /* The sky of a planet is in no file. */
     const bool is_sky = before->environment.type == NEBEL_ENVIRONMENT_MAP && before->environment_file == NULL;
     if (now->environment.type != before->environment.type && !is_sky)

@@ -107,12 +107,18 @@ static bool read_model(nb_scene_reader *in, const nb_json_node *node)
     return nb_read_model(in, node) && (in->save == NULL || nb_save_model(in->save, in, node, index));
 }
 
+static bool read_light(nb_scene_reader *in, const nb_json_node *node)
+{
+    const size_t index = in->scene->data.lamp_count;
+    return nb_read_light(in, node) && (in->save == NULL || nb_save_lamp(in->save, in, node, index));
+}
+
 static bool read_element(nb_scene_reader *in, const nb_json_node *array, const nb_json_node *node)
 {
     if (nb_json_has_key(array, "fog")) return read_fog(in, node);
     if (nb_json_has_key(array, "nebula")) return read_nebula(in, node);
     if (nb_json_has_key(array, "models")) return read_model(in, node);
-    return nb_read_light(in, node);
+    return read_light(in, node);
 }
 
 /* Sections come in any order, so what joins two of them waits for the end. */

@@ -97,7 +97,7 @@ static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition,
     nebel_result result = nebel_create_fog(&desc, fog);
     const nebel_environment environment = nb_edition_environment(edition, find_light(draft)->environment.map);
     if (result == NEBEL_OK) result = nebel_set_environment(*fog, &environment);
-    if (result == NEBEL_OK) result = nebel_set_lamps(*fog, file->lamp_count, file->lamps);
+    if (result == NEBEL_OK) result = nebel_set_lamps(*fog, edition->lamp_count, edition->lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
     if (result != NEBEL_OK) nebel_destroy_fog(*fog);
     return result;
@@ -207,6 +207,7 @@ static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_
     if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
     const nebel_sun sun = sun_of(draft, now);
     if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
+    if (result == NEBEL_OK) result = nebel_set_lamps(draft->fog, now->lamp_count, now->lamps);
     if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
     return result == NEBEL_OK ? commit_fog(draft) : result;
 }
@@ -532,7 +533,8 @@ int nb_draft_is_changed(const nb_draft *draft)
     const nb_edition *const now = &draft->now, *const was = &draft->written;
     if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
         !nb_edition_has_same_cells(now, was) || !nb_edition_has_same_models(now, was) ||
-        !nb_edition_has_same_light(now, was) || !nb_edition_has_same_camera_keys(now, was))
+        !nb_edition_has_same_lamps(now, was) || !nb_edition_has_same_light(now, was) ||
+        !nb_edition_has_same_camera_keys(now, was))
         return 1;
     for (size_t i = 0; i < now->count; i++) {
         if (!is_saved(draft, i)) continue;

@@ -192,6 +192,13 @@ static int add_models(nb_edition *edition, const nebel_model *models, size_t cou
     return edition->models != NULL ? 0 : -1;
 }
 
+static int add_lamps(nb_edition *edition, const nebel_lamp *lamps, size_t count)
+{
+    edition->lamps = copy_array(lamps, count, sizeof *lamps);
+    edition->lamp_count = edition->lamps != NULL ? count : 0;
+    return edition->lamps != NULL ? 0 : -1;
+}
+
 static int add_camera_keys(nb_edition *edition, const nebel_camera_key *keys, size_t count)
 {
     edition->camera_keys = copy_array(keys, count, sizeof *keys);
@@ -231,6 +238,7 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
     memcpy(made.sun_irradiance, scene->sun_irradiance, sizeof made.sun_irradiance);
     int result = add_nebulae(&made, scene->nebulae, scene->nebula_places, scene->nebula_count);
     if (result == 0) result = add_models(&made, scene->models, scene->model_count);
+    if (result == 0) result = add_lamps(&made, scene->lamps, scene->lamp_count);
     if (result == 0) result = add_camera_keys(&made, scene->camera_keys, scene->camera_key_count);
     if (result == 0) result = add_cells(&made, scene->cells);
     for (size_t i = 0; i < scene->volume_count && result == 0; i++)
@@ -250,12 +258,14 @@ int nb_edition_copy(const nb_edition *from, nb_edition *to)
     made.nebulae = NULL;
     made.nebula_places = NULL;
     made.models = NULL;
+    made.lamps = NULL;
     made.camera_keys = NULL;
     made.cells = NULL;
     made.cells_desc.cell_count = 0;
-    made.count = made.capacity = made.nebula_count = made.model_count = made.camera_key_count = 0;
+    made.count = made.capacity = made.nebula_count = made.model_count = made.lamp_count = made.camera_key_count = 0;
     int result = add_nebulae(&made, from->nebulae, from->nebula_places, from->nebula_count);
     if (result == 0) result = add_models(&made, from->models, from->model_count);
+    if (result == 0) result = add_lamps(&made, from->lamps, from->lamp_count);
     if (result == 0) result = add_camera_keys(&made, from->camera_keys, from->camera_key_count);
     if (result == 0 && from->cells != NULL) result = add_cells(&made, &from->cells_desc);
     for (size_t i = 0; i < from->count && result == 0; i++)
@@ -286,6 +296,7 @@ void nb_edition_free(nb_edition *edition)
     free(edition->nebulae);
     free(edition->nebula_places);
     free(edition->models);
+    free(edition->lamps);
     free(edition->camera_keys);
     free(edition->cells);
     *edition = (nb_edition){.volumes = NULL};
@@ -316,6 +327,8 @@ void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
     scene->nebula_places = edition->nebula_places;
     scene->models = edition->models;
     scene->model_count = edition->model_count;
+    scene->lamps = edition->lamps;
+    scene->lamp_count = edition->lamp_count;
     scene->camera_keys = edition->camera_keys;
     scene->camera_key_count = edition->camera_key_count;
     scene->cells = edition->cells != NULL ? &edition->cells_desc : NULL;
@@ -337,6 +350,7 @@ size_t nb_edition_size(const nb_edition *edition)
         size += sizeof *edition->volumes + sizeof *edition->entries + nb_shape_size(&edition->volumes[i].shape) +
                 (edition->entries[i].key_count + 1) * sizeof(nebel_volume_key) + strlen(edition->names[i]);
     size += edition->model_count * sizeof *edition->models;
+    size += edition->lamp_count * sizeof *edition->lamps;
     size += edition->camera_key_count * sizeof *edition->camera_keys;
     for (size_t i = 0; i < edition->nebula_count; i++)
         size += sizeof *edition->nebulae + nb_shape_size(&edition->nebulae[i].shape);
@@ -452,6 +466,19 @@ int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
+static int is_same_lamp(const nebel_lamp *a, const nebel_lamp *b)
+{
+    return a->type == b->type && HAS_SAME(a, b, nebel_lamp, position, outer_angle) && a->outer_angle == b->outer_angle;
+}
+
+int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b)
+{
+    if (a->lamp_count != b->lamp_count) return 0;
+    for (size_t i = 0; i < a->lamp_count; i++)
+        if (!is_same_lamp(&a->lamps[i], &b->lamps[i])) return 0;
+    return 1;
+}
+
 int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b)
 {
     if (a->camera_key_count != b->camera_key_count) return 0;
@@ -506,7 +533,8 @@ int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b)
 int nb_edition_is_same(const nb_edition *a, const nb_edition *b)
 {
     if (!nb_edition_has_same_sources(a, b) || !nb_edition_has_same_nebulae(a, b) || !nb_edition_has_same_cells(a, b) ||
-        !nb_edition_has_same_models(a, b) || !nb_edition_has_same_light(a, b) || !nb_edition_has_same_camera_keys(a, b))
+        !nb_edition_has_same_models(a, b) || !nb_edition_has_same_lamps(a, b) || !nb_edition_has_same_light(a, b) ||
+        !nb_edition_has_same_camera_keys(a, b))
         return 0;
     for (size_t i = 0; i < a->count; i++)
         if (!nb_edition_is_same_volume(&a->volumes[i], &b->volumes[i]) ||

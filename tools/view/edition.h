@@ -21,6 +21,8 @@ typedef struct nb_edition {
     size_t nebula_count;
     nebel_model *models; /* their file names are those of the file that was read: not to be used */
     size_t model_count;
+    nebel_lamp *lamps; /* as many as the file has */
+    size_t lamp_count;
     nebel_cell *cells;
     nebel_cells_desc cells_desc;   /* of them; its portals are the scene's */
     nebel_camera_key *camera_keys; /* all of one projection */
@@ -60,11 +62,12 @@ int nb_edition_is_same_entry(const nebel_volume_entry *a, const nebel_volume_ent
 int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b);
+int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b);
 
-/* Puts light, camera keys, volumes, nebulae, cells and models in the place of the scene's, which points to the edition then. */
+/* Puts light, lamps, camera keys, volumes, nebulae, cells and models in the place of the scene's, which points to the edition then. */
 void nb_edition_show(nb_edition *edition, nebel_scene_data *scene);
 
 /* Bytes that it takes, more or less. */

@@ -30,22 +30,27 @@ void add_sun(nb_edition *now)
     }
 }
 
+bool slide_direction(double d[3], const char *turn_name, const char *turn_help, const char *height_name,
+                     const char *height_help)
+{
+    double height = asin(fmax(-1, fmin(1, d[1]))) / degree, turn = atan2(d[0], d[2]) / degree;
+    bool changed = slide(turn_name, &turn, -180, 180, "%.1f deg", false, turn_help);
+    changed |= slide(height_name, &height, -89, 89, "%.1f deg", false, height_help);
+    if (!changed) return false;
+    d[0] = cos(height * degree) * sin(turn * degree);
+    d[1] = sin(height * degree);
+    d[2] = cos(height * degree) * cos(turn * degree);
+    return true;
+}
+
 bool draw_sun(nb_edition *now, bool moves)
 {
     if (moves) {
         ImGui::TextDisabled("the sun moves by keys of the file");
         return false;
     }
-    double *const d = now->sun_direction;
-    double height = asin(fmax(-1, fmin(1, d[1]))) / degree, turn = atan2(d[0], d[2]) / degree;
-    bool changed =
-        slide("sun turn", &turn, -180, 180, "%.1f deg", false, "Where it stands, seen from above: 0 is along z.");
-    changed |= slide("sun height", &height, -89, 89, "%.1f deg", false, "How high it stands above the horizon.");
-    if (changed) {
-        d[0] = cos(height * degree) * sin(turn * degree);
-        d[1] = sin(height * degree);
-        d[2] = cos(height * degree) * cos(turn * degree);
-    }
+    bool changed = slide_direction(now->sun_direction, "sun turn", "Where it stands, seen from above: 0 is along z.",
+                                   "sun height", "How high it stands above the horizon.");
     changed |= pick("sun", now->sun_irradiance, false,
                     "Irradiance on a surface that faces the sun, before any fog. It lights fog with an albedo, too.");
     if (!press("Remove the sun", "Takes it out of the scene. Ctrl + Z brings it back.")) return changed;
@@ -93,6 +98,67 @@ bool draw_background(nb_edition *now)
                                "Where no surface is one sees what ambient light comes from there.");
     if (now->shows_ambient) return switched;
     return pick("background", now->background, false, "Radiance where no surface is: the sky.") || switched;
+}
+
+/* ---- lamps
+ * -----------------------------------------------------------------------------------------------------------
+ */
+
+// Of the brightest colour; the others keep their share of it.
+bool slide_strength(double intensity[3])
+{
+    const double before = fmax(intensity[0], fmax(intensity[1], intensity[2]));
+    double strength = before;
+    if (!slide("strength", &strength, 1e-3, 1e6, "%.4g W/sr", true, "How bright it is; the colour stays."))
+        return false;
+    strength = fmax(0, fmin(1e9, strength));
+    for (int c = 0; c < 3; c++) intensity[c] = before > 0 ? intensity[c] * (strength / before) : strength;
+    return true;
+}
+
+// The light falls off between the two angles.
+bool draw_cone(nebel_lamp *lamp)
+{
+    bool changed = slide_direction(lamp->direction, "turn", "Where it shines to, seen from above: 0 is along z.",
+                                   "height", "How far above the horizon it shines to.");
+    if (slide("outer angle", &lamp->outer_angle, 0.1, 180, "%.1f deg", false, "From the axis: no light beyond.")) {
+        lamp->outer_angle = fmax(0.1, fmin(180, lamp->outer_angle));
+        changed = true;
+    }
+    changed |= slide("inner angle", &lamp->inner_angle, 0, 180, "%.1f deg", false, "From the axis: full light within.");
+    lamp->inner_angle = fmax(0, fmin(lamp->outer_angle, lamp->inner_angle));
+    return changed;
+}
+
+bool draw_lamp(nebel_lamp *lamp, double reach)
+{
+    double radius = lamp->radius > 0 ? lamp->radius : 1e-3;
+    bool changed = slide_strength(lamp->intensity);
+    changed |=
+        pick("intensity", lamp->intensity, false, "W/sr, as one sees it from far away; of a spot along its axis.");
+    changed |= drag_place("position", lamp->position, reach, "Where it is.");
+    if (slide("radius", &radius, 1e-3, 100, "%.4g m", true,
+              "Of the ball that shines: nothing is brighter than its surface.")) {
+        lamp->radius = fmax(1e-3, fmin(1e6, radius));
+        changed = true;
+    }
+    return (lamp->type == NEBEL_LAMP_SPOT && draw_cone(lamp)) || changed;
+}
+
+bool draw_lamp_header(nb_panel *panel, size_t index, double reach)
+{
+    const Owner owner("lights", index);
+    const char *const name = panel->data->lamp_names[index];
+    nebel_lamp *const lamp = &panel->now->lamps[index];
+    char title[160];
+    snprintf(title, sizeof title, "%.100s%s%u###lamp", name, name[0] != '\0' ? ", lamp " : "lamp ", unsigned(index));
+    const bool is_open = ImGui::CollapsingHeader(title);
+    note_place("open");
+    if (!is_open) return false;
+    ImGui::Indent(4 * scale);
+    const bool changed = draw_lamp(lamp, reach);
+    ImGui::Unindent(4 * scale);
+    return changed;
 }
 
 /* ---- models
@@ -241,6 +307,14 @@ void draw_models(nb_panel *panel, double reach)
     memmove(now->models + gone, now->models + gone + 1, (now->model_count - gone - 1) * sizeof *now->models);
     now->model_count--;
     panel->fog_changed = 1;
+}
+
+void draw_lamps(nb_panel *panel, double reach)
+{
+    const size_t count = panel->now->lamp_count;
+    if (count == 0) return;
+    ImGui::Text("Lamps: %u", unsigned(count));
+    for (size_t i = 0; i < count; i++) panel->fog_changed |= draw_lamp_header(panel, i, reach);
 }
 
 void draw_lights(nb_panel *panel)

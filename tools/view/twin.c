@@ -103,8 +103,11 @@ static int make_picture(work *w, uint32_t by)
 }
 
 /* The light goes over here, where no frame is under way. */
-static void take_light(nebel_scene_data *scene, const nebel_scene_data *light)
+static void take_light(nebel_scene_data *scene, const nb_twin_wish *wish)
 {
+    const nebel_scene_data *const light = &wish->light;
+    scene->lamps = wish->lamps;
+    scene->lamp_count = light->lamp_count;
     memcpy(scene->background, light->background, sizeof scene->background);
     memcpy(scene->ambient, light->ambient, sizeof scene->ambient);
     scene->environment = light->environment;
@@ -127,7 +130,7 @@ static nebel_result prepare(work *w)
 {
     nb_twin *const twin = w->twin;
     const nebel_renderer_desc desc = {.threads = 0};
-    take_light(&twin->scene, &w->wish.light);
+    take_light(&twin->scene, &w->wish);
     const nebel_result result = w->renderer != NULL
                                     ? nebel_set_renderer_fog(w->renderer, w->wish.fog)
                                     : nebel_create_renderer(&twin->scene, w->wish.fog, &desc, &w->renderer);
@@ -138,8 +141,10 @@ static void forget(nb_twin_wish *wish)
 {
     nebel_release_snapshot(wish->fog);
     nebel_destroy_cells(wish->cells);
+    free(wish->lamps);
     wish->fog = NULL;
     wish->cells = NULL;
+    wish->lamps = NULL;
 }
 
 /* Waits for a wish; 0 at the end. */
@@ -155,6 +160,7 @@ static int take_wish(work *w)
         w->wish = twin->wish;
         twin->wish.fog = NULL;
         twin->wish.cells = NULL;
+        twin->wish.lamps = NULL;
         twin->is_asked = 0;
         twin->is_working = 1;
     }
@@ -170,7 +176,7 @@ static int run(void *user)
         if (prepare(&w) == NEBEL_OK) {
             while (make_picture(&w, by) && by > 1) by /= 2;
         }
-        /* The renderer does not look at cells between frames. */
+        /* The renderer looks neither at cells nor at lamps between frames. */
         forget(&w.wish);
     }
     nebel_destroy_renderer(w.renderer);

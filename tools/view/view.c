@@ -604,6 +604,14 @@ static nebel_result make_cells(viewer *all, nebel_cells **cells)
     return nebel_create_cells(&desc, cells);
 }
 
+/* To be freed. */
+static nebel_lamp *copy_lamps(const nebel_scene_data *scene)
+{
+    nebel_lamp *const lamps = malloc((scene->lamp_count + 1) * sizeof *lamps);
+    if (lamps != NULL && scene->lamp_count > 0) memcpy(lamps, scene->lamps, scene->lamp_count * sizeof *lamps);
+    return lamps;
+}
+
 static nebel_result ask_twin(viewer *all)
 {
     nb_twin_wish wish = {.camera = all->draft.data.camera,
@@ -622,6 +630,11 @@ static nebel_result ask_twin(viewer *all)
     }
     if (result == NEBEL_OK) result = make_cells(all, &wish.cells);
     if (result != NEBEL_OK) return result;
+    wish.lamps = copy_lamps(&all->draft.data);
+    if (wish.lamps == NULL) {
+        nebel_destroy_cells(wish.cells);
+        return NEBEL_ERROR_MEMORY;
+    }
     nb_twin_ask(all->twin, &wish);
     all->twin_is_stale = 0;
     return NEBEL_OK;
