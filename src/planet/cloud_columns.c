@@ -42,7 +42,7 @@ static void fill(const nebel_clouds *clouds, int layer, double spacing, float wi
 typedef struct nb_grid {
     int layer, level;
     uint32_t key;
-    double wide, spacing; /* m, and on the face */
+    double wide, spacing, per_spacing; /* m, and on the face */
 } nb_grid;
 
 static nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, int face)
@@ -50,8 +50,10 @@ static nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, int fac
     const nb_cloud_layer *of = &clouds->layers[layer];
     nb_grid grid = {.layer = layer, .level = level};
     grid.key = UINT32_C(0x80000000) | (uint32_t)(level * NEBEL_MAX_CLOUD_LAYERS + layer) << 3 | (uint32_t)face;
-    grid.wide = ldexp((double)of->grid, level);
-    grid.spacing = grid.wide / of->low;
+    const double times = (double)(UINT64_C(1) << level);
+    grid.wide = (double)of->grid * times;
+    grid.spacing = of->spacing * times;
+    grid.per_spacing = of->per_spacing / times;
     return grid;
 }
 
@@ -83,7 +85,7 @@ static void read_grid(nebel_cloud_workspace *workspace, int layer, const nb_cube
                       nb_cloud_column *sum)
 {
     const nb_grid grid = grid_of(workspace->view->clouds, layer, level, place->face);
-    const double per = 1 / grid.spacing, x = place->at[0] * per, y = place->at[1] * per;
+    const double per = grid.per_spacing, x = place->at[0] * per, y = place->at[1] * per;
     const double left = floor(x), low = floor(y);
     const float u = (float)(x - left), v = (float)(y - low);
     const nb_cloud_patch *patch = patch_at(workspace, &grid, (int)left, (int)low);
@@ -182,6 +184,9 @@ float nb_cloud_most_rank(nebel_cloud_workspace *workspace, int layer, int size, 
     return most;
 }
 
+/* Who looks from within a heap sees no gaps of it. */
+#define HEAP_PART 0.45f
+
 float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width)
 {
     const nb_cloud_layer *of = &workspace->view->clouds->layers[layer];
@@ -193,7 +198,10 @@ float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double
         unit[i] = own[i] * per;
     }
     const nb_cloud_column column = nb_cloud_column_near(workspace, layer, unit, width);
+    const float height = (float)(radius - of->low) * of->per_thickness;
     float missing[NB_CLOUD_BILLOWS + 1];
-    return nb_cloud_in_column(&workspace->view->clouds->noise, of, &column, own,
-                              (float)(radius - of->low) * of->per_thickness, width, missing);
+    nb_cloud_drops drops;
+    if (!nb_cloud_in_column(&workspace->view->clouds->noise, of, &column, own, height, width, missing, &drops))
+        return 0;
+    return nb_cloud_through(of, &drops, width - HEAP_PART * of->size, 1).whole;
 }

@@ -28,8 +28,12 @@
 /* Where there may be cloud and is none, of a sixteenth of the smallest heaps. */
 #define LEAST_STEP 0.5
 
-/* Noise hardly ever rises by a quarter of its largest slope all the way to the next cloud. */
-#define SLOPE_PART 0.25
+/* Noise hardly ever rises by a fifth of its largest slope all the way to the next cloud. */
+#define SLOPE_PART 0.2
+
+/* What a pixel hides is so long along the ray, in pixels: then as much comes through as through the pixel's parts
+ * (test_clouds). */
+#define HIDDEN_LENGTH 0.55f
 
 enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
 
@@ -81,26 +85,27 @@ static nb_spot spot_at(const nb_walk *walk, int k, double t)
 
 /* *clear: where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first
  * scales, whatever the others do. */
-static float extinction_of(const nb_walk *walk, int k, const nb_spot *spot, double *clear)
+static nb_cloud_seen extinction_of(const nb_walk *walk, int k, const nb_spot *spot, double *clear)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     float missing[NB_CLOUD_BILLOWS + 1];
+    nb_cloud_drops drops;
     *clear = 0;
-    if (!(spot->height > 0 && spot->height < 1)) return 0;
+    if (!(spot->height > 0 && spot->height < 1)) return (nb_cloud_seen){0, 0};
     const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->unit, spot->width);
-    const float found =
-        nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing);
-    if (found > 0) return found;
+    if (nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing,
+                           &drops))
+        return nb_cloud_through(layer, &drops, HIDDEN_LENGTH * spot->width, walk->ray.apart[k]);
     const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k])) * layer->per_thickness;
     float slope = layer->slope * column.scale + NB_CLOUD_RANK_SLOPE * climb;
     for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
         *clear = fmax(*clear, (double)(missing[n] / slope));
         slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
     }
-    return found;
+    return (nb_cloud_seen){0, 0};
 }
 
-static float look(const nb_walk *walk, int k, double t)
+static nb_cloud_seen look(const nb_walk *walk, int k, double t)
 {
     const nb_spot spot = spot_at(walk, k, t);
     double clear;
@@ -186,14 +191,14 @@ static void add_light(nb_walk *walk, int k)
     walk->stretch = (nb_stretch){.weight = 0};
 }
 
-static void take_piece(nb_walk *walk, int k, double t, double length, double depth)
+static void take_piece(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
 {
     nb_stretch *stretch = &walk->stretch;
     if (!(depth > 0)) return;
     if (walk->knots->count == 0) add_knot(walk, t);
     if (t - stretch->end > walk->least) add_light(walk, k);
     const double apart = (double)walk->ray.apart[k], seen = nb_exp(-walk->depth) * (1 - nb_exp(-depth));
-    const double seen_apart = nb_exp(-walk->apart) * (1 - nb_exp(-apart * depth)) / apart;
+    const double seen_apart = nb_exp(-walk->apart) * (1 - nb_exp(-depth_apart)) / apart;
     stretch->depth += depth;
     stretch->end = t + length;
     stretch->seen += seen;
@@ -201,13 +206,13 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     stretch->weight += seen + seen_apart;
     stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
     walk->depth += depth;
-    walk->apart += apart * depth;
+    walk->apart += depth_apart;
     if (stretch->depth > STRETCH_DEPTH / (0.15 + nb_exp(-walk->depth))) add_light(walk, k);
     pass(walk, t + length);
 }
 
 /* Goes on until there is cloud, by as much as there can be none, or by the least step. */
-static double skip(const nb_walk *walk, int k, double t, double end, float *far, double *length)
+static double skip(const nb_walk *walk, int k, double t, double end, nb_cloud_seen *far, double *length)
 {
     double clear = 0, known = 0; /* up to where no block is clear */
     nb_spot spot = spot_at(walk, k, t);
@@ -226,7 +231,7 @@ static double skip(const nb_walk *walk, int k, double t, double end, float *far,
         *length = fmin(end - t, fmax(clear / SLOPE_PART, fmax(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
         spot = spot_at(walk, k, t + *length);
         *far = extinction_of(walk, k, &spot, &clear);
-        if (*far > 0) return t;
+        if (far->whole > 0) return t;
         t += *length;
     }
     return end;
@@ -237,20 +242,21 @@ static void walk_layer(nb_walk *walk, int k, double begin, double end)
 {
     const double tolerance = PIECES * walk->view->tolerance;
     double t = begin, length = walk->least;
-    float here = look(walk, k, t), far = 0;
+    nb_cloud_seen here = look(walk, k, t), far = {0, 0};
     int has_far = 0;
     for (int i = 0; i < MOST_PIECES && t < end && nb_exp(-walk->apart) > UNSEEN; i++) {
-        if (!has_far && here == 0) {
+        if (!has_far && here.whole == 0) {
             t = skip(walk, k, t, end, &far, &length);
             has_far = 1;
             if (!(t < end)) return;
         }
         length = fmin(length, end - t);
         if (!has_far) far = look(walk, k, t + length);
-        const float middle = look(walk, k, t + 0.5 * length);
-        const double depth = length / 6 * (double)(here + 4 * middle + far);
+        const nb_cloud_seen middle = look(walk, k, t + 0.5 * length);
+        const double depth = length / 6 * (double)(here.whole + 4 * middle.whole + far.whole);
+        const double depth_apart = length / 6 * (double)(here.apart + 4 * middle.apart + far.apart);
         const double seen = nb_exp(-walk->depth), least = fmax(0.25 * walk->spread * t, 1e-3 * walk->least);
-        const double missed = seen * length / 6 * fabs((double)(here - 2 * middle + far));
+        const double missed = seen * length / 6 * fabs((double)(here.whole - 2 * middle.whole + far.whole));
         has_far = 1;
         if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + seen)) && length > 2 * least) {
             length *= 0.5;
@@ -259,7 +265,7 @@ static void walk_layer(nb_walk *walk, int k, double begin, double end)
         }
         has_far = 0;
         walk->missed += missed / PIECES;
-        take_piece(walk, k, t, length, depth);
+        take_piece(walk, k, t, length, depth, depth_apart);
         t += length;
         here = far;
         if (missed < 0.2 * tolerance) length *= 1.7;

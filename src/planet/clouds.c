@@ -6,10 +6,20 @@
 #include <math.h>
 #include <string.h>
 
+#define NB_DOUBLE
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
 #define PI 3.14159265358979323846
 
 /* Each scale of billows is so much smaller than the one before. */
 #define BILLOW_RATIO 6.1
+#define LOG2_BILLOW_RATIO 2.60880924f
+
+/* What is hidden of heaps is no longer along rays than this part of them, between what rays straight down and flat ones
+ * find best (test_clouds). */
+#define HIDDEN_PART 0.22f
 
 static const float billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
 
@@ -148,20 +158,20 @@ static float ramp_integral(float x)
     return x < 1 ? 0.5f * x * x : x - 0.5f;
 }
 
-/* The mean of x held within 0 and 1 where x has a variance: as if all between -root(3 variance) and root(3 variance) were
- * as likely. */
-static float mean_ramp(float x, float variance)
+/* The mean of x held within 0 and 1 where all within `wide` of x is as likely. */
+static float mean_ramp(float x, float wide)
 {
-    const float wide = sqrtf(3 * variance);
     if (wide < 1e-3f) return fminf(1, fmaxf(0, x));
     return (ramp_integral(x + wide) - ramp_integral(x - wide)) / (2 * wide);
 }
 
-/* How often the table of a scale of billows is halved for a width. */
-static float level_of(const nb_cloud_layer *layer, int scale, float width)
+/* How often the tables of billows are halved for a width. */
+static void set_levels(const nb_cloud_layer *layer, float width, float levels[NB_CLOUD_BILLOWS])
 {
-    const float wide = width * NB_BILLOW_SIZE * (float)layer->per_billow[scale];
-    return wide > 1 ? log2f(wide) : 0;
+    const float finest = width * NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
+    const float last = finest > 1 ? log2f(finest) : 0;
+    for (int k = 0; k < NB_CLOUD_BILLOWS; k++)
+        levels[k] = fmaxf(0, last - (float)(NB_CLOUD_BILLOWS - 1 - k) * LOG2_BILLOW_RATIO);
 }
 
 static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int scale, const double place[3],
@@ -179,8 +189,9 @@ static void set_missing(float missing[NB_CLOUD_BILLOWS + 1], int first, float va
 
 /* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
  * left of them can neither make cloud nor thin it. */
-float nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
-                         const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1])
+int nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
+                       const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1],
+                       nb_cloud_drops *drops)
 {
     const float whole = column->rank - nb_cloud_least_rank(layer, height), softness = layer->softness;
     set_missing(missing, 0, -whole - sqrtf(3 * column->variance));
@@ -191,10 +202,9 @@ float nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *laye
     /* What is far within is whole. */
     if (deep > 0 && whole - deep < softness + sqrtf(3 * variance)) {
         float most = deep; /* with all that is not read */
-        for (int k = 0; k < NB_CLOUD_BILLOWS; k++) {
-            levels[k] = level_of(layer, k, width);
+        set_levels(layer, width, levels);
+        for (int k = 0; k < NB_CLOUD_BILLOWS; k++)
             variance += deep * deep * billow_weights[k] * billow_weights[k] * nb_billows_lost(noise, levels[k]);
-        }
         const float spread = sqrtf(3 * variance);
         for (int k = 0; k < NB_CLOUD_BILLOWS && whole - most < softness + spread; k++) {
             const float billows = billows_at(noise, layer, k, place, levels[k]);
@@ -204,8 +214,40 @@ float nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *laye
             if (missing[k + 1] >= 0) return 0;
         }
     }
-    return layer->extinction * thin_out(layer, height) *
-           mean_ramp((whole - cut) / softness, variance / (softness * softness));
+    *drops = (nb_cloud_drops){.most = layer->extinction * thin_out(layer, height),
+                              .part = (whole - cut) / softness,
+                              .spread = sqrtf(3 * variance) / softness};
+    return 1;
+}
+
+float nb_cloud_mean(const nb_cloud_drops *drops)
+{
+    return drops->most * mean_ramp(drops->part, drops->spread);
+}
+
+/* Where a part is full and another clear, between them evenly all that lies between: mean of exp(-depth x). */
+static double mean_left(const nb_cloud_drops *drops, double depth)
+{
+    const double low = (double)(drops->part - drops->spread), high = (double)(drops->part + drops->spread);
+    const double clear = fmax(0, -low) - fmax(0, -high), full = fmax(0, high - 1) - fmax(0, low - 1);
+    const double from = nb_exp(-depth * fmax(0, fmin(1, low))), to = nb_exp(-depth * fmax(0, fmin(1, high)));
+    return (clear + (from - to) / depth + full * nb_exp(-depth)) / (high - low);
+}
+
+/* Never more than the mean, whatever is too little for a number. */
+static float through(const nb_cloud_drops *drops, float depth, float length, float mean)
+{
+    return fminf(mean, (float)-nb_log(mean_left(drops, (double)depth)) / length);
+}
+
+nb_cloud_seen nb_cloud_through(const nb_cloud_layer *layer, const nb_cloud_drops *drops, float length, float apart)
+{
+    const float bounded = fminf(length, layer->hidden), depth = drops->most * bounded, mean = nb_cloud_mean(drops);
+    const int is_full = drops->part - drops->spread >= 1;
+    /* Then the mean is right to a thousandth of what a full place has. */
+    const int is_even = drops->spread < 1e-3f || !(depth * drops->spread * drops->spread > 6e-3f);
+    if (is_full || is_even) return (nb_cloud_seen){mean, apart * mean};
+    return (nb_cloud_seen){through(drops, depth, bounded, mean), through(drops, apart * depth, bounded, apart * mean)};
 }
 
 float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
@@ -217,9 +259,10 @@ float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, cons
     turn(pose->turn, place, own);
     for (int i = 0; i < 3; i++) unit[i] = own[i] / radius;
     float missing[NB_CLOUD_BILLOWS + 1];
+    nb_cloud_drops drops;
     const nb_cloud_column column = nb_cloud_column_at(noise, layer, unit, width);
-    return nb_cloud_in_column(noise, layer, &column, own, (float)(radius - layer->low) * layer->per_thickness, width,
-                              missing);
+    const float height = (float)(radius - layer->low) * layer->per_thickness;
+    return nb_cloud_in_column(noise, layer, &column, own, height, width, missing, &drops) ? nb_cloud_mean(&drops) : 0;
 }
 
 /* ---- descriptions ---------------------------------------------------------------------------- */
@@ -334,6 +377,8 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
         layer->billow_slopes[i] = billow_weights[i] * (float)fmax(0, desc->detail) * NB_BILLOW_SLOPE / (float)period;
     }
     layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
+    layer->spacing = (double)layer->grid / layer->low;
+    layer->per_spacing = layer->low / (double)layer->grid;
     /* Wisps are bent, and that noise has a slope, too. */
     if (desc->kind == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
 }
@@ -381,6 +426,8 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->per_time = speed / layer->low;
     layer->phase = nb_phase_resolve(&phase);
     layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
+    layer->size = (float)desc->size;
+    layer->hidden = HIDDEN_PART * (float)desc->size;
     set_octaves(desc, radius, layer);
     set_ranks(&clouds->noise, layer);
     return desc->weather.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather, &layer->weather)

@@ -25,6 +25,7 @@ typedef struct nb_cloud_layer {
     double low, high;    /* m from the planet's centre */
     float per_thickness; /* 1/m */
     float extinction, detail, softness;
+    float size, hidden;       /* m, of heaps; of what a width hides along a ray, at most */
     double axis[3], per_time; /* the shell turns by that angle in a unit of time */
     nb_cloud_octave octaves[NB_CLOUD_OCTAVES];
     double billow_shift[3], per_billow[NB_CLOUD_BILLOWS]; /* 1/m, of the largest first */
@@ -32,6 +33,7 @@ typedef struct nb_cloud_layer {
     float ranks[NB_CLOUD_RANKS]; /* of the octaves' sum over the planet: what a part of it is below of */
     float slope;                 /* of that sum, at most, per m */
     float grid;                  /* m, between columns that are kept */
+    double spacing, per_spacing; /* the same on faces of a cube */
     float coverage;
     nb_layer_map weather; /* level_count 0: none */
     nb_phase phase;
@@ -66,12 +68,31 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
 #define NB_CLOUD_RANK_SLOPE 2.8f /* of it over height, at most */
 float nb_cloud_least_rank(const nb_cloud_layer *layer, float height);
 
-/* Extinction at `place` (from the centre, in the layer's axes) in its column, at a part of the layer's height; where it is
- * 0, missing[n] is by how much the rank is at least too low, whatever billows behind the first n scales do. */
-float nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
-                         const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1]);
+/* Drops at a place: extinction is `most` times `part` held within 0 and 1; where a width hides some of it, all within
+ * `spread` of `part` is as likely. */
+typedef struct nb_cloud_drops {
+    float most, part, spread;
+} nb_cloud_drops;
 
-/* All of it: 0 outside the layer. */
+/* Drops at `place` (from the centre, in the layer's axes) in its column, at a part of the layer's height. Returns whether
+ * there are any: if not, missing[n] is by how much the rank is at least too low, whatever billows behind the first n
+ * scales do. */
+int nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
+                       const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1],
+                       nb_cloud_drops *drops);
+
+/* Their mean extinction. */
+float nb_cloud_mean(const nb_cloud_drops *drops);
+
+/* What extinction lets as much through as the mean of all that is hidden, which is as long along a ray as `length`; apart:
+ * of that part of extinction. Where half of it is cloud half of the light comes through, however thick that is. */
+typedef struct nb_cloud_seen {
+    float whole, apart;
+} nb_cloud_seen;
+
+nb_cloud_seen nb_cloud_through(const nb_cloud_layer *layer, const nb_cloud_drops *drops, float length, float apart);
+
+/* Mean extinction over a width, 0 outside the layer. */
 float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
                   const double place[3], float width);
 
