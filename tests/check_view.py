@@ -5,6 +5,7 @@ import math
 import os
 import pathlib
 import re
+import signal
 import struct
 import subprocess
 import time
@@ -143,6 +144,11 @@ class SizeTest(ViewTest):
             viewer.key("Tab")
             viewer.settle()
             self.assertEqual(viewer.shows_controls(), shown)
+        viewer.process.send_signal(signal.SIGSTOP)
+        viewer.xdotool("key", "--delay", 50, "Tab", "Tab")
+        viewer.process.send_signal(signal.SIGCONT)
+        viewer.settle()
+        self.assertFalse(viewer.shows_controls(), "there and back in one slow turn")
         x, y, width, height = viewer.place("Controls")
         share = (x + width) * (y + height) / (256 * 144)
         self.assertLess(share, 0.1)

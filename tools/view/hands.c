@@ -33,8 +33,9 @@ static void press(nb_hands *hands, nb_look *look, int key, int modifiers)
         return;
     }
     hands->wants_home |= key == GLFW_KEY_HOME || key == GLFW_KEY_H;
-    hands->wants_help |= key == GLFW_KEY_F1;
-    hands->wants_panel |= key == GLFW_KEY_TAB;
+    /* Two presses in one slow turn are none. */
+    hands->wants_help ^= key == GLFW_KEY_F1;
+    hands->wants_panel ^= key == GLFW_KEY_TAB;
     hands->wants_play ^= key == GLFW_KEY_SPACE;
     hands->steps = key == GLFW_KEY_COMMA ? -1 : key == GLFW_KEY_PERIOD ? 1 : hands->steps;
     hands->wants_reload |= key == GLFW_KEY_F5;
