@@ -139,6 +139,57 @@ static void pictures_are_still(void **state)
     free_world(&w);
 }
 
+/* A wall that stands in clouds is seen through as much of them as a ray to it meets, also beside its edge. */
+static void clouds_end_at_surfaces(void **state)
+{
+    (void)state;
+    static const float corners[4][3] = {{-3e3f, -3e3f, 0}, {0, -3e3f, 0}, {0, 3e3f, 0}, {-3e3f, 3e3f, 0}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const double height = 1500, way = 2000;
+    world w;
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    make_world(&(nebel_cloud_layer){.coverage = .9, .extinction = .002}, &w);
+    const nebel_mesh wall = {.origin = {0, height, -way},
+                             .positions = corners[0],
+                             .indices = indices,
+                             .vertex_count = 4,
+                             .triangle_count = 2,
+                             .base_color = {1, 1, 1},
+                             .texture = -1};
+    w.scene.mesh_count = 1;
+    w.scene.meshes = &wall;
+    nebel_sun sun = {.irradiance = {5, 4, 3}};
+    memcpy(sun.direction, w.scene.sun_direction, sizeof sun.direction);
+    assert_int_equal(nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = w.clouds, .sun = sun}, &view),
+                     NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+    const nebel_camera camera = planet_camera(height, 0);
+    test_picture picture = render(&w, &camera, 2, 4, 0);
+    double worst = 0;
+    int cloudy = 0;
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+        nebel_ray ray = planet_ray(&camera, 0, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
+        const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
+        nebel_cloud_knots knots;
+        if (i % WIDTH >= WIDTH / 2) continue;
+        ray.t_max = way * length / fabs(ray.direction[2]);
+        assert_int_equal(
+            nebel_trace_clouds(workspace, 1, &ray, 0, 2 * tan(30 * test_pi / 180) / HEIGHT / length, &knots, 0),
+            NEBEL_OK);
+        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        const nebel_light air = air_to(&w, &sun, ray, ray.t_max);
+        cloudy += left > .05 && left < .95;
+        worst = fmax(worst, fabs((double)picture.planes.transmittance[3 * i + 1] - left * air.transmittance[1]));
+    }
+    print_message("a wall in clouds: %d pixels see it through some, off by %.2g at most\n", cloudy, worst);
+    assert_true(cloudy > 60 && worst < 1e-2);
+    test_picture_free(&picture);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    free_world(&w);
+}
+
 static void the_ground_has_shadows(void **state)
 {
     (void)state;
@@ -178,9 +229,8 @@ static void bad_times_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(clouds_and_air_are_one),
-        cmocka_unit_test(pictures_are_still),
-        cmocka_unit_test(the_ground_has_shadows),
+        cmocka_unit_test(clouds_and_air_are_one), cmocka_unit_test(pictures_are_still),
+        cmocka_unit_test(clouds_end_at_surfaces), cmocka_unit_test(the_ground_has_shadows),
         cmocka_unit_test(bad_times_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -47,7 +47,19 @@ void nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratc
     for (int i = 0; i < NB_BATCH; i++) clouds->knots[i].count = 0;
 }
 
-/* As far as the sample goes, and somewhat farther for those to come. Returns whether there are clouds. */
+#define NEAR_END 0.98f
+
+/* Whether what was found for another sample of a pixel does for one: it goes no farther, and ends before clouds, behind
+ * them or near the end of what was found. Between two knots clouds are a straight line, which shows on surfaces. */
+static int is_found(const nb_cloud_scratch *clouds, int lane, float distance)
+{
+    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    if (distance > clouds->reach[lane]) return 0;
+    if (knots->count == 0 || distance <= knots->t[0]) return 1;
+    return distance >= NEAR_END * fminf(clouds->reach[lane], knots->t[knots->count - 1]);
+}
+
+/* As far as the sample goes. *any: whether there are clouds. */
 static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
@@ -55,8 +67,8 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
     *any = 0;
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         clouds->is_new[i] = 0;
-        if (!scratch->inside[i] || !(scratch->distance[i] > clouds->reach[i])) continue;
-        nebel_ray ray = {.t_max = 1.25 * (double)scratch->distance[i]};
+        if (!scratch->inside[i] || is_found(clouds, i, scratch->distance[i])) continue;
+        nebel_ray ray = {.t_max = (double)scratch->distance[i]};
         for (int c = 0; c < 3; c++) {
             ray.origin[c] = frame->view.position[c];
             ray.direction[c] = clouds->rays.direction[c][i];
