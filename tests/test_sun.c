@@ -415,6 +415,92 @@ static void closed_forms_are_what_marches_find(void **state)
     }
 }
 
+/* ---- many balls ------------------------------------------------------------------------------ */
+
+enum { MOST_BALLS = 80, BALL_RAYS = 4, HALVES = 30000 };
+
+static const double sun_of_balls[3] = {0.6, 0.64, 0.48}; /* of length 1 */
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The length of p + t d, t from 0 to `far`, in a ball; d of length 1. */
+static double chord(const nebel_shape *ball, const double p[3], const double d[3], double far)
+{
+    const double q[3] = {p[0] - ball->center[0], p[1] - ball->center[1], p[2] - ball->center[2]};
+    const double middle = -dot(q, d), square = ball->radius * ball->radius - (dot(q, q) - middle * middle);
+    if (square <= 0) return 0;
+    return fmax(fmin(middle + sqrt(square), far) - fmax(middle - sqrt(square), 0), 0);
+}
+
+/* The midpoint rule in `count` steps, every optical depth by chords: isotropic, of one channel. */
+static double light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_ray *ray, int c, int count)
+{
+    const double step = ray->t_max / count;
+    double light = 0;
+    for (int i = 0; i < count; i++) {
+        const double t = (i + 0.5) * step;
+        double depth = 0, glow = 0, p[3];
+        for (int k = 0; k < 3; k++) p[k] = ray->origin[k] + t * ray->direction[k];
+        for (size_t k = 0; k < ball_count; k++) {
+            const nebel_volume_desc *v = &balls[k];
+            const nebel_shape *ball = &v->shape;
+            const double apart[3] = {p[0] - ball->center[0], p[1] - ball->center[1], p[2] - ball->center[2]};
+            depth +=
+                v->extinction[c] * (chord(ball, ray->origin, ray->direction, t) + chord(ball, p, sun_of_balls, 1e9));
+            if (dot(apart, apart) < ball->radius * ball->radius) glow += v->extinction[c] * v->albedo[c];
+        }
+        light += glow * exp(-depth) * step;
+    }
+    return light / (4 * acos(-1));
+}
+
+/* Balls over each other, each in the shadow of the others: few that are asked one by one, and many that a tree finds. */
+static void many_balls_are_what_brute_force_finds(void **state)
+{
+    static const size_t counts[] = {20, 40, MOST_BALLS};
+    (void)state;
+    for (size_t n = 0; n < sizeof counts / sizeof counts[0]; n++) {
+        static nebel_volume_desc balls[MOST_BALLS];
+        uint64_t numbers = 31 + n;
+        nebel_ray rays[RAYS];
+        nebel_light lights[RAYS];
+        nebel_fog_desc desc = {.sun = {.irradiance = {1, 1, 1}}};
+        memcpy(desc.sun.direction, sun_of_balls, sizeof sun_of_balls);
+        for (size_t i = 0; i < counts[n]; i++) {
+            balls[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = dice(&numbers, 2, 6)},
+                                           .albedo = {1, 0.9, 0.8}};
+            for (int c = 0; c < 3; c++) {
+                balls[i].shape.center[c] = dice(&numbers, -5, 5);
+                balls[i].extinction[c] = dice(&numbers, 0.1, 1) / (double)counts[n];
+            }
+        }
+        for (int i = 0; i < RAYS; i++) {
+            rays[i] = (nebel_ray){.origin = {dice(&numbers, -4, 4), dice(&numbers, -4, 4), -12}, .t_max = 24};
+            const double lean = dice(&numbers, -0.3, 0.3), size = sqrt(1 + lean * lean);
+            rays[i].direction[0] = lean / size;
+            rays[i].direction[2] = 1 / size;
+        }
+        nebel_snapshot *snapshot = fog_commit(&desc, balls, counts[n]);
+        for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+            const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-5};
+            trace(snapshot, &asked, rays, lights);
+            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(snapshot, &asked, rays, lights);
+            for (int i = 0; i < BALL_RAYS; i++) {
+                const int c = i % 3;
+                const double fine = light_by_force(balls, counts[n], &rays[i], c, HALVES);
+                const double off = fabs(fine - light_by_force(balls, counts[n], &rays[i], c, HALVES / 2));
+                assert_true(fine > 0.01 && off < 1e-5);
+                assert_true(fabs(lights[i].in_scattering[c] - fine) <= lights[i].error + off);
+                assert_true(fabs(lights[i].in_scattering[c] - fine) < 3e-5);
+            }
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
 /* ---- rules ----------------------------------------------------------------------------------- */
 
 static void suns_are_checked(void **state)
@@ -491,8 +577,8 @@ static void endless_fog_is_answered(void **state)
     nebel_release_snapshot(height);
 }
 
-/* More volumes than the stack has room for. */
-enum { CROWD = 40 };
+/* More volumes than the stack has room for, and than are asked without a tree. */
+enum { CROWD = 80 };
 
 static void expect_no_loss(const nebel_volume_desc volumes[CROWD])
 {
@@ -552,6 +638,7 @@ int main(void)
         cmocka_unit_test(pieces_that_are_none_are_refused),
         cmocka_unit_test(pieces_are_the_same_in_any_set_and_split),
         cmocka_unit_test(closed_forms_are_what_marches_find),
+        cmocka_unit_test(many_balls_are_what_brute_force_finds),
         cmocka_unit_test(suns_are_checked),
         cmocka_unit_test(sunlit_fog_is_bounded),
         cmocka_unit_test(endless_fog_is_answered),

@@ -246,8 +246,8 @@ static int is_gray(const nebel_snapshot *s)
     return 1;
 }
 
-/* More bodies than these are found by a tree. */
-#define MOST_ADDED 8
+/* More bodies with flat faces than these have so many turns that steps are better adaptive. */
+#define MOST_FLAT 8
 
 static int is_flat(const nb_volume *body)
 {
@@ -256,21 +256,32 @@ static int is_flat(const nb_volume *body)
            (leaf->type == NB_LEAF_PLANES && leaf->face_count <= NB_MOST_EDGED_FACES);
 }
 
-static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
+/* Whether all media are convex bodies of constant density that add. */
+static int is_added(const nebel_snapshot *s)
 {
-    if (!s->is_sunlit || s->medium_count > MOST_ADDED) return NB_WAY_MARCHED;
-    int flat = 1, even = 1;
     for (size_t i = 0; i < s->medium_count; i++) {
         const nb_volume *body = &s->media[i].body;
-        if (nb_volume_covers(body) || body->leaf_count != 1) return NB_WAY_MARCHED;
-        even = even && body->density.type == NEBEL_DENSITY_CONSTANT;
-        flat = flat && is_flat(body);
+        if (nb_volume_covers(body) || body->leaf_count != 1 || body->density.type != NEBEL_DENSITY_CONSTANT) return 0;
     }
-    if (even) return flat ? NB_WAY_FLAT : NB_WAY_ADDED;
+    return 1;
+}
+
+static int are_flat(const nebel_snapshot *s)
+{
+    for (size_t i = 0; i < s->medium_count; i++)
+        if (!is_flat(&s->media[i].body)) return 0;
+    return 1;
+}
+
+static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
+{
+    if (!s->is_sunlit) return NB_WAY_MARCHED;
+    if (s->is_added) return s->medium_count <= MOST_FLAT && are_flat(s) ? NB_WAY_FLAT : NB_WAY_ADDED;
     const nb_volume *body = &s->media[0].body;
-    if (s->medium_count == 1 && body->density.type == NEBEL_DENSITY_GRID) return NB_WAY_GRID;
-    const int is_height = s->medium_count == 1 && body->leaves[0].type == NB_LEAF_WORLD &&
-                          body->density.type == NEBEL_DENSITY_HEIGHT && body->density.below == NEBEL_BELOW_GROW;
+    if (s->medium_count != 1 || nb_volume_covers(body) || body->leaf_count != 1) return NB_WAY_MARCHED;
+    if (body->density.type == NEBEL_DENSITY_GRID) return NB_WAY_GRID;
+    const int is_height = body->leaves[0].type == NB_LEAF_WORLD && body->density.type == NEBEL_DENSITY_HEIGHT &&
+                          body->density.below == NEBEL_BELOW_GROW;
     return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;
 }
 
@@ -333,6 +344,7 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
         qsort(s->media, s->medium_count, sizeof *s->media, compare_media);
         join_media(s);
         s->is_gray = is_gray(s);
+        s->is_added = is_added(s);
         s->way_to_sun = find_way_to_sun(s);
         result = take_lattices(fog, s) ? index_media(s) : NEBEL_ERROR_MEMORY;
     }

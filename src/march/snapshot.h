@@ -36,8 +36,8 @@ typedef struct nb_medium {
 /* How the optical depth from a place to the sun is had. */
 typedef enum nb_way_to_sun {
     NB_WAY_MARCHED = 0, /* by a march of its own */
-    NB_WAY_ADDED,       /* few convex bodies of constant density that add: what they cut out of the way, summed */
-    NB_WAY_FLAT,        /* the same where all faces are flat: along any ray it is linear between turns */
+    NB_WAY_ADDED,       /* convex bodies of constant density that add: what they cut out of the way, summed */
+    NB_WAY_FLAT,        /* few of them, where all faces are flat: along any ray it is linear between turns */
     NB_WAY_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
     NB_WAY_GRID         /* one box of voxels: they are walked through from the place on */
 } nb_way_to_sun;
@@ -61,7 +61,8 @@ struct nebel_snapshot {
     double irradiance[3];     /* of the sun */
     int is_gray;              /* no fog has a colour in its extinction */
     nb_way_to_sun way_to_sun; /* the same */
-    int is_lamplit;           /* whether any medium is */
+    int is_added;   /* all media are convex bodies of constant density that add: any way's depth is a sum over them */
+    int is_lamplit; /* whether any medium is */
     size_t lamp_count;
     nb_lamp *lamps;
     nebel_environment sky;    /* one owner of its map */

@@ -70,7 +70,8 @@ static sun_node lamp_node(sunlight *sun, const march *m, const piece *p, const g
     const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
     const nb_wvec3 towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
     const nb_wide reach = nb_wselect(lanes, nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0)), NB_W(0.0));
-    const light_depth to_lamp = depth_to_light(sun, m, t, towards, reach);
+    const light_depth to_lamp = sun->snapshot->is_added ? depth_of_bodies(sun, m, t, towards, reach)
+                                                        : depth_by_march(sun, m, t, towards, reach);
     const nb_turn turn = nb_turn_between(m->rays.direction, towards);
     const nb_wide speed = (pass->aside * pass->aside + from * from) * nb_swing_rate(s->swing, w) *
                           nb_widen(s->length * scaled_speed(s, at));
