@@ -24,7 +24,7 @@ static nebel_frame make_frame(const picture_pair *pair)
 
 picture_pair picture_make(uint32_t width, uint32_t height)
 {
-    picture_pair pair = {.width = width, .height = height};
+    picture_pair pair = {.width = width, .height = height, .tolerance = 1e-4};
     pair.cpu = make_frame(&pair);
     pair.gl = make_frame(&pair);
     return pair;
@@ -60,7 +60,7 @@ static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const
                                     .width = pair->width,
                                     .height = pair->height,
                                     .samples = samples,
-                                    .tolerance = 1e-4,
+                                    .tolerance = pair->tolerance,
                                     .time = pair->time};
     assert_int_equal(nebel_create_renderer(scene, fog, &desc, &renderer), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &frame, &pair->cpu), NEBEL_OK);
@@ -77,6 +77,7 @@ static void render_gl(const nebel_scene_data *scene, nebel_snapshot *fog, const 
                                        .height = pair->height,
                                        .samples = samples,
                                        .time = pair->time,
+                                       .clouds_by_processor = 1,
                                        .particles_leave_sun = particles != NULL && particles->leave_sun};
     const nebel_gl_planes planes = {pair->gl.color, pair->gl.transmittance, pair->gl.in_scattering, pair->gl.depth,
                                     pair->gl.normal};

@@ -12,7 +12,8 @@
 /* All planes, at the same pixels. */
 typedef struct picture_pair {
     uint32_t width, height;
-    double time; /* of both frames; 0 at first */
+    double time;      /* of both frames; 0 at first */
+    double tolerance; /* of the CPU; 1e-4 at first */
     nebel_frame cpu, gl;
 } picture_pair;
 

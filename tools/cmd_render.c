@@ -293,6 +293,7 @@ static nebel_result draw_frame(studio *all)
         .vertex = &look,
         .d3d9 = scene->classic_d3d9,
         .time = all->frame,
+        .clouds_by_processor = 1,
     };
     const nebel_gl_planes wanted = {
         .color = all->samples[NB_LAYER_COLOR],

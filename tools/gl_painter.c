@@ -40,7 +40,7 @@ static void note_driver(const nb_gl_painter *painter, nebel_method method)
 int nb_gl_painter_open(nb_gl_painter *painter, const char *name, const nb_load_result *loaded,
                        const nebel_scene_data *scene, nebel_method method, nb_report_listener *listener)
 {
-    const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener)};
+    const nebel_gl_renderer_desc desc = {.log = nb_report_log(listener), .run = nebel_run_parts};
     *painter = (nb_gl_painter){.loaded = loaded, .scene = scene, .log = desc.log};
     const int fixed = is_of_fixed(method) && suits_fixed(scene);
     painter->is_fixed = fixed && nb_gl_context_open(&painter->context, NB_GL_API_FIXED) == 0;

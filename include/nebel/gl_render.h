@@ -46,6 +46,8 @@ typedef struct nebel_gl_renderer_desc {
     uint32_t shadow_size; /* texels of a side of each of the sun's four shadow maps, and of eight more where it lights
                              fog, 64 to 16384; 0: 2048. A lamp's six have a quarter of it, less where they would take
                              more than 128 MiB together, but 64 */
+    nebel_air_run_fn run; /* for threads that walk through clouds; NULL: one part after the other */
+    void *run_user;
 } nebel_gl_renderer_desc;
 
 /* Copies meshes and textures of `scene` to the graphics processor; they are not read again. Light, lamps, background and
@@ -130,14 +132,17 @@ typedef struct nebel_gl_frame_desc {
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
                                   some microseconds each. Not where `fog` excludes, replaces or limits what particles
                                   do. Nonzero: sunlight passes particles by: for many of them and an eye that moves */
-    double time;             /* s, within 1e12: what a planet's layers have turned by */
+    double time;             /* s, within 1e12: what a planet's layers have turned by, and its clouds have moved by */
+    int clouds_by_processor; /* 0: a planet with clouds of volume is refused. Nonzero: the processor walks through them along
+                                the ray of each pixel, and dims the sun's light, which takes as long as on the CPU: for
+                                pictures and films, not for windows */
 } nebel_gl_frame_desc;
 
 /* Draws a frame into textures of the renderer. Errors: ARGUMENT (also a method that there is not, or without what it
  * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
  * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; more than 4,096 lamps; stopped by progress),
  * MEMORY, UNSUPPORTED (more than one sample, or a planet of layers, where OpenGL ES cannot blend floats; a planet with
- * clouds of volume, several of them, one by another method than EXACT, or one with air in an orthographic view or with
+ * clouds of volume where the processor may not walk through them, several planets, one by another method than EXACT, or one with air in an orthographic view or with
  * particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
  * meshes: 108 bytes each, with fog per vertex 48 more. */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);

@@ -1,5 +1,7 @@
 #include "cloudscape.h"
 
+#include "base/cloud_haze.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -99,59 +101,23 @@ static nebel_result find_haze(const nb_frame *frame, int is_last, nb_haze_fn haz
     return result;
 }
 
-/* Of one ray, at its knots. */
-typedef struct nb_haze_knots {
-    float left[3][NEBEL_MAX_CLOUD_KNOTS], light[3][NEBEL_MAX_CLOUD_KNOTS];
-} nb_haze_knots;
-
-static void find_air(const nb_frame *frame, const nb_cloud_scratch *clouds, int lane, nb_haze_knots *haze)
+/* Of one ray. */
+static void mix_lane(const nb_frame *frame, nb_cloud_scratch *clouds, int lane)
 {
     const nebel_cloud_knots *knots = &clouds->knots[lane];
-    double direction[3][NEBEL_MAX_CLOUD_KNOTS];
-    nebel_light_planes lights = {.error = NULL};
+    const double direction[3] = {clouds->rays.direction[0][lane], clouds->rays.direction[1][lane],
+                                 clouds->rays.direction[2][lane]};
+    nb_cloud_haze haze;
+    nb_cloud_rays rays;
+    nb_cloud_haze_ask(knots, direction, &haze, &rays);
+    nb_air_trace(&frame->air, knots->count, rays.direction, knots->t, &rays.lights);
     for (int c = 0; c < 3; c++) {
-        for (uint32_t k = 0; k < knots->count; k++) direction[c][k] = clouds->rays.direction[c][lane];
-        lights.transmittance[c] = haze->left[c];
-        lights.in_scattering[c] = haze->light[c];
-    }
-    const double *const directions[3] = {direction[0], direction[1], direction[2]};
-    nb_air_trace(&frame->air, knots->count, directions, knots->t, &lights);
-}
-
-/* Fog is mostly before all clouds: what is not counts as spread evenly over the way between the first knot and the last. */
-static void add_fog(const nb_cloud_scratch *clouds, int lane, nb_haze_knots *haze)
-{
-    const nebel_cloud_knots *knots = &clouds->knots[lane];
-    const uint32_t last = knots->count - 1;
-    const float begin = knots->t[0], way = knots->t[last] - begin;
-    for (int c = 0; c < 3; c++) {
-        const float air_light = haze->light[c][0];
-        const float from = haze->left[c][0] > 0 ? clouds->left[0][c][lane] / haze->left[c][0] : 0;
-        const float to = haze->left[c][last] > 0 ? clouds->left[1][c][lane] / haze->left[c][last] : 0;
-        const float rest =
-            clouds->light[1][c][lane] - clouds->light[0][c][lane] - from * (haze->light[c][last] - air_light);
-        for (uint32_t k = 0; k <= last; k++) {
-            const float part = way > 0 ? (knots->t[k] - begin) / way : 0;
-            haze->left[c][k] *= from + part * (to - from);
-            haze->light[c][k] = clouds->light[0][c][lane] + from * (haze->light[c][k] - air_light) + part * rest;
-        }
-    }
-}
-
-/* Light up to each knot, without what of the haze before it clouds leave. */
-static void sum_up(nb_cloud_scratch *clouds, int lane, const nb_haze_knots *haze)
-{
-    const nebel_cloud_knots *knots = &clouds->knots[lane];
-    for (int c = 0; c < 3; c++) {
-        float sum = haze->light[c][0];
-        clouds->over[0][c][lane] = 0;
-        for (uint32_t k = 1; k < knots->count; k++) {
-            sum += 0.5f * (haze->left[c][k] + haze->left[c][k - 1]) *
-                   (knots->in_scattering[k][c] - knots->in_scattering[k - 1][c]);
-            sum += 0.5f * (knots->transmittance[k] + knots->transmittance[k - 1]) *
-                   (haze->light[c][k] - haze->light[c][k - 1]);
-            clouds->over[k][c][lane] = sum - knots->transmittance[k] * haze->light[c][k];
-        }
+        const float left[2] = {clouds->left[0][c][lane], clouds->left[1][c][lane]};
+        const float light[2] = {clouds->light[0][c][lane], clouds->light[1][c][lane]};
+        float over[NEBEL_MAX_CLOUD_KNOTS];
+        if (frame->air.has_fog) nb_cloud_haze_add_fog(knots, c, left, light, &haze);
+        nb_cloud_haze_sum(knots, c, &haze, over);
+        for (uint32_t k = 0; k < knots->count; k++) clouds->over[k][c][lane] = over[k];
     }
 }
 
@@ -167,13 +133,8 @@ static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scra
         scratch->samples = clouds->samples;
         memcpy(scratch->distance, clouds->end, sizeof clouds->end);
     }
-    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        nb_haze_knots knots;
-        if (!clouds->is_new[i]) continue;
-        find_air(frame, clouds, i, &knots);
-        if (frame->air.has_fog) add_fog(clouds, i, &knots);
-        sum_up(clouds, i, &knots);
-    }
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++)
+        if (clouds->is_new[i]) mix_lane(frame, clouds, i);
     return result;
 }
 
@@ -184,13 +145,9 @@ static void lay_over(nb_scratch *scratch, int lane)
     const nebel_cloud_knots *knots = &clouds->knots[lane];
     nb_light_samples *samples = &scratch->samples;
     const float end = scratch->distance[lane];
-    uint32_t k = knots->count - 1;
-    float part = 0;
+    float part;
     if (!(end > knots->t[0])) return;
-    if (end < knots->t[k]) {
-        while (k > 0 && knots->t[k] > end) k--;
-        part = (end - knots->t[k]) / (knots->t[k + 1] - knots->t[k]);
-    }
+    const uint32_t k = nb_cloud_haze_find(knots->count, knots->t, end, &part);
     const uint32_t next = part > 0 ? k + 1 : k;
     const float left = (1 - part) * knots->transmittance[k] + part * knots->transmittance[next];
     for (int c = 0; c < 3; c++) {

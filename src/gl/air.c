@@ -16,7 +16,7 @@ const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
 
 /* ---- the table ------------------------------------------------------------------------------- */
 
-static nebel_sun sun_of(const nebel_scene_data *scene)
+nebel_sun nb_gl_air_sun(const nebel_scene_data *scene)
 {
     nebel_sun sun = {.direction = {0, 1, 0}};
     for (int c = 0; c < 3 && scene->has_sun; c++) {
@@ -54,22 +54,20 @@ static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const
 nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
                            const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends)
 {
-    nebel_air_view *view = NULL;
     nebel_air_view_desc desc = {.atmosphere = nb_gl_air_planet(scene)->atmosphere,
-                                .sun = sun_of(scene),
+                                .sun = nb_gl_air_sun(scene),
                                 .position = {eye[0], eye[1], eye[2]},
                                 .has_distances = ends,
                                 .allocator = *allocator,
                                 .log = *log};
     glBindTexture(GL_TEXTURE_2D, air->texture);
     if (are_same(&air->of, &desc)) return NEBEL_OK;
-    air->of.atmosphere = NULL;
-    nebel_result result = nebel_create_air_view(&desc, &view);
+    nb_gl_air_release(air);
+    nebel_result result = nebel_create_air_view(&desc, &air->view);
     if (result == NEBEL_ERROR_ARGUMENT)
         result =
             nb_fail(log, NEBEL_ERROR_VALUE, "the planet's air: the camera or the sun is at no place that it knows");
-    if (result == NEBEL_OK) result = fill(air, allocator, log, context, view);
-    nebel_destroy_air_view(view);
+    if (result == NEBEL_OK) result = fill(air, allocator, log, context, air->view);
     if (result == NEBEL_OK) air->of = desc;
     return result;
 }
@@ -77,6 +75,13 @@ nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, con
 void nb_gl_air_delete(const nb_gl_air *air)
 {
     glDeleteTextures(1, &air->texture);
+}
+
+void nb_gl_air_release(nb_gl_air *air)
+{
+    nebel_destroy_air_view(air->view);
+    air->view = NULL;
+    air->of.atmosphere = NULL;
 }
 
 /* ---- the sun --------------------------------------------------------------------------------- */

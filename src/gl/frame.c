@@ -42,6 +42,7 @@ static nebel_result set_frame(frame *f)
     f->shafts = find_shafts(f);
     f->planet = nb_gl_air_planet(r->scene);
     f->layers = nb_gl_shells_planet(r->scene);
+    f->clouds = f->planet != NULL ? f->planet->clouds : NULL;
     return result;
 }
 
@@ -472,7 +473,8 @@ static nebel_result draw_dimming(const frame *f)
 static nebel_result prepare_air(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const int ends = r->meshes.count > 0 || (r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0);
+    const int ends =
+        r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0);
     if (f->planet == NULL) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
     nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends);
@@ -529,6 +531,7 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     if (nb_frame_has_particles(f)) nb_frame_bind_texture(NB_UNIT_VEIL, GL_TEXTURE_2D_ARRAY, t->veil);
     bind_fog(f, fog, program);
     if (f->layers != NULL) nb_frame_set_shells(f, program);
+    if (f->clouds != NULL) nb_frame_bind_clouds(f);
     glUniform1i(glGetUniformLocation(program, "scene_shows_ambient"), f->light.shows_ambient);
     if (has_environment(f)) nb_frame_bind_texture(NB_UNIT_ENVIRONMENT, GL_TEXTURE_2D, r->environment.name);
 }
@@ -554,7 +557,8 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
                                 .air = f->planet != NULL,
                                 .shells = f->layers != NULL,
                                 .lamplit = has_lamps(f),
-                                .dimmed = f->dims,
+                                .dimmed = f->dims || f->clouds != NULL,
+                                .clouds = f->clouds != NULL,
                                 .in_fog = nb_frame_has_fog(f),
                                 .environment = has_environment(f),
                                 .veil_layers = nb_frame_count_veil_layers(f)};
@@ -581,6 +585,13 @@ static nebel_result set_sample(frame *f, nb_pixel_point point)
                    "camera: it is too far out, or its view too narrow, for numbers");
 }
 
+static nebel_result draw_clouds(frame *f, uint32_t sample)
+{
+    if (f->clouds == NULL) return NEBEL_OK;
+    const nebel_result result = sample == 0 ? nb_frame_trace_clouds(f) : NEBEL_OK;
+    return result == NEBEL_OK ? nb_frame_end_clouds(f) : result;
+}
+
 static nebel_result draw_sample(frame *f, uint32_t sample)
 {
     nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
@@ -588,6 +599,7 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     draw_surfaces(f);
     if (sample == 0 && f->casts) result = nb_frame_prepare_sun(f);
     if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_draw_shells(f);
+    if (result == NEBEL_OK) result = draw_clouds(f, sample);
     f->place = f->renderer->targets.place;
     f->depth = f->renderer->targets.depth;
     if (result == NEBEL_OK) result = nb_frame_draw_fog(f);

@@ -16,6 +16,7 @@ typedef struct nb_gl_frame {
     int panorama;
     const nebel_planet *planet; /* with air; NULL: none */
     const nebel_layers *layers; /* a planet of them; NULL: none */
+    const nebel_clouds *clouds; /* with volume, in that air; NULL: none */
     unsigned place, depth;      /* where rays end now: as those of the targets */
     nb_method method;
     nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
@@ -71,5 +72,16 @@ nebel_result nb_frame_draw_shells(nb_gl_frame *f);
 
 /* What light_text asks for. */
 void nb_frame_set_shells(const nb_gl_frame *f, unsigned program);
+
+/* ---- clouds with volume ---------------------------------------------------------------------- */
+
+/* Of the whole frame; changes where rays end, and what is in the targets of fog. VALUE, MEMORY. */
+nebel_result nb_frame_trace_clouds(nb_gl_frame *f);
+
+/* Up to the surfaces of the present sample. */
+nebel_result nb_frame_end_clouds(const nb_gl_frame *f);
+
+/* For light_text. */
+void nb_frame_bind_clouds(const nb_gl_frame *f);
 
 #endif

@@ -83,8 +83,8 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
 {
     const int has_air = nb_gl_air_planet(r->scene) != NULL, has_layers = nb_gl_shells_planet(r->scene) != NULL;
     if (r->scene->planet_count > 1) return refuse(&r->log, "several planets");
-    if (r->scene->planet_count > 0 && r->scene->planets[0].cloud_layer_count > 0)
-        return refuse(&r->log, "clouds with volume");
+    if (has_air && r->scene->planets[0].cloud_layer_count > 0 && !desc->clouds_by_processor)
+        return refuse(&r->log, "clouds with volume by itself");
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
     if (has_layers) return check_layers(r, desc);

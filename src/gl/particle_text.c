@@ -205,6 +205,26 @@ const char nb_particle_text[] =
     "    write_veil(brightness() * blend.source, blend.factor);\n"
     "}\n";
 
+/* Particles are blended as if fog and surface behind them were black and transparent. */
+const char nb_veil_text[] =
+    "uniform highp sampler2DArray scene_veil;\n"
+    "void see_through_veil(ivec2 texel, inout vec3 transmittance, inout vec3 in_scattering)\n"
+    "{\n"
+    "#if SCENE_VEIL_LAYERS == 3\n"
+    "    vec2 red = texelFetch(scene_veil, ivec3(texel, 0), 0).xy, green = texelFetch(scene_veil, ivec3(texel, 1), "
+    "0).xy;\n"
+    "    vec2 blue = texelFetch(scene_veil, ivec3(texel, 2), 0).xy;\n"
+    "    vec3 light = vec3(red.x, green.x, blue.x), left = vec3(red.y, green.y, blue.y);\n"
+    "#elif SCENE_VEIL_LAYERS == 1\n"
+    "    vec4 veil = texelFetch(scene_veil, ivec3(texel, 0), 0);\n"
+    "    vec3 light = veil.rgb, left = veil.aaa;\n"
+    "#else\n"
+    "    vec3 light = vec3(0.0), left = vec3(1.0);\n"
+    "#endif\n"
+    "    transmittance *= left;\n"
+    "    in_scattering = light + left * in_scattering;\n"
+    "}\n";
+
 const char nb_five_tap_text[] = "#define SCENE_FIVE_TAPS\n"
                                 "#define NEBEL_OPAQUE_DEPTH(at) opaque_depth(at)\n"
                                 "uniform highp sampler2D scene_place;\n"

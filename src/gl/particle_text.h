@@ -8,6 +8,9 @@ extern const char nb_particle_vertex_text[], nb_round_particle_vertex_text[];
 /* Of fragments: both, one after the other. */
 extern const char nb_particle_start_text[], nb_particle_text[];
 
+/* Of what lies behind: see_through_veil. */
+extern const char nb_veil_text[];
+
 /* The comparison of depth at five places asks this of the host: it stands before the fog's text. */
 extern const char nb_five_tap_text[];
 

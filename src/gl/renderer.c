@@ -69,7 +69,9 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_gl_renderer *const made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory");
-    made->allocator = made->meshes.allocator = allocator;
+    made->allocator = made->meshes.allocator = made->clouds.allocator = allocator;
+    made->clouds.run = desc->run;
+    made->clouds.run_user = desc->run_user;
     made->log = made->meshes.log = desc->log;
     made->scene = scene;
     made->context = context;
@@ -105,6 +107,9 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
         nb_environment_delete(&r->environment);
         nb_gl_air_delete(&r->air);
         nb_gl_shells_delete(&r->shells);
+        glDeleteTextures(1, &r->cloud_ends);
+        glDeleteTextures(1, &r->cloud_over);
+        glDeleteTextures(1, &r->cloud_shade);
         glDeleteVertexArrays(1, &r->vertex_array);
     }
     nebel_destroy_gl(r->eye_fog);
@@ -117,6 +122,8 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nb_release(&r->allocator, r->shadows.blocks);
     nb_lamps_release(&r->allocator, &r->lamps);
     nb_particles_release(&r->allocator, &r->particles);
+    nb_gl_clouds_release(&r->clouds);
+    nb_gl_air_release(&r->air);
     const nebel_allocator allocator = r->allocator;
     nb_release(&allocator, r);
 }

@@ -399,26 +399,6 @@ static const char dimming_text[] = "uniform mat3 scene_light;\n"
                                    "    if (t > 0.0) out_dimming.rgb = sun_transmittance(at, (scene_light * at).xy);\n"
                                    "}\n";
 
-/* Particles are blended as if fog and surface behind them were black and transparent. */
-static const char veil_text[] =
-    "uniform highp sampler2DArray scene_veil;\n"
-    "void see_through_veil(ivec2 texel, inout vec3 transmittance, inout vec3 in_scattering)\n"
-    "{\n"
-    "#if SCENE_VEIL_LAYERS == 3\n"
-    "    vec2 red = texelFetch(scene_veil, ivec3(texel, 0), 0).xy, green = texelFetch(scene_veil, ivec3(texel, 1), "
-    "0).xy;\n"
-    "    vec2 blue = texelFetch(scene_veil, ivec3(texel, 2), 0).xy;\n"
-    "    vec3 light = vec3(red.x, green.x, blue.x), left = vec3(red.y, green.y, blue.y);\n"
-    "#elif SCENE_VEIL_LAYERS == 1\n"
-    "    vec4 veil = texelFetch(scene_veil, ivec3(texel, 0), 0);\n"
-    "    vec3 light = veil.rgb, left = veil.aaa;\n"
-    "#else\n"
-    "    vec3 light = vec3(0.0), left = vec3(1.0);\n"
-    "#endif\n"
-    "    transmittance *= left;\n"
-    "    in_scattering = light + left * in_scattering;\n"
-    "}\n";
-
 static const char light_text[] =
     "uniform highp sampler2D scene_place;\n"
     "uniform highp sampler2D scene_normal;\n"
@@ -440,6 +420,9 @@ static const char light_text[] =
     "uniform vec3 scene_ambient;\n"
     "vec3 background(vec3 direction) { return scene_background; }\n"
     "vec3 ambient(vec3 normal) { return scene_ambient; }\n"
+    "#endif\n"
+    "#ifdef SCENE_CLOUDS\n"
+    "uniform highp sampler2D scene_clouds;\n"
     "#endif\n"
     "#ifdef SCENE_SHELLS\n"
     "uniform highp sampler2D scene_shells;\n"
@@ -488,6 +471,11 @@ static const char light_text[] =
     "    vec3 transmittance = vec3(1.0), in_scattering = vec3(0.0);\n"
     "#endif\n"
     "    see_through_veil(texel, transmittance, in_scattering);\n"
+    "#ifdef SCENE_CLOUDS\n"
+    "    vec4 clouds = texelFetch(scene_clouds, texel, 0);\n"
+    "    transmittance *= clouds.a;\n"
+    "    in_scattering = max(clouds.a * in_scattering + clouds.rgb, 0.0);\n"
+    "#endif\n"
     "    vec4 normal = texelFetch(scene_normal, texel, 0);\n"
     "    vec3 direction = ray_direction(gl_FragCoord.xy), surface;\n"
     "    if (!(place.x > 0.0)) {\n"
@@ -674,7 +662,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
     char limits[128];
     (void)snprintf(
         text, size,
-        "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
+        "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
         "NB_CASCADES "
         "%d\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
@@ -686,8 +674,9 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
         (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
         kind->environment || (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
-        kind->air ? "#define NEBEL_AIR\n" : "", kind->shells ? "#define SCENE_SHELLS\n" : "", kind->of_particles,
-        kind->veil_layers, NB_CASCADES, (unsigned)kind->features, precision_of(context));
+        kind->air ? "#define NEBEL_AIR\n" : "", kind->shells ? "#define SCENE_SHELLS\n" : "",
+        kind->clouds ? "#define SCENE_CLOUDS\n" : "", kind->of_particles, kind->veil_layers, NB_CASCADES,
+        (unsigned)kind->features, precision_of(context));
 }
 
 static void set_units(unsigned program)
@@ -713,6 +702,7 @@ static void set_units(unsigned program)
     set_unit(program, "lamp_maps", NB_UNIT_LAMP_MAPS);
     set_unit(program, "nebel_air_texture", NB_UNIT_AIR);
     set_unit(program, "scene_shells", NB_UNIT_SHELLS);
+    set_unit(program, "scene_clouds", NB_UNIT_CLOUDS);
     set_unit(program, "shell_seen", NB_UNIT_REFLECTANCE);
 }
 
@@ -734,10 +724,10 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const nb_texts light = {{head, kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
                              shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_light_text : "", veil_text,
+                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_light_text : "", nb_veil_text,
                              light_text},
                             11};
-    const nb_texts shell = {{head, veil_text, nb_shell_over_text}, 3};
+    const nb_texts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
     const nb_texts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,
                                 nb_words_text, ray, tile, nb_particle_start_text, nb_particle_text},
@@ -760,7 +750,8 @@ static int is_same(const nb_light_kind *a, const nb_light_kind *b)
            a->five_taps == b->five_taps && a->veil_layers == b->veil_layers && a->panorama == b->panorama &&
            a->has_surfaces == b->has_surfaces && a->in_fog == b->in_fog && a->has_fog == b->has_fog &&
            a->shafts == b->shafts && a->air == b->air && a->shells == b->shells && a->of_shells == b->of_shells &&
-           a->in_texture == b->in_texture && a->tiled == b->tiled && a->features == b->features;
+           a->clouds == b->clouds && a->in_texture == b->in_texture && a->tiled == b->tiled &&
+           a->features == b->features;
 }
 
 nebel_result nb_shading_find_light(nb_shading *shading, const nb_context *context, const nebel_allocator *allocator,

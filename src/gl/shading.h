@@ -17,9 +17,10 @@ enum {
     NB_UNIT_VEIL,
     NB_UNIT_LAMPS,
     NB_UNIT_LAMP_MAPS,
-    NB_SCENE_UNIT_END,            /* at most NB_UNIT_AIR */
-    NB_UNIT_SHELLS = NB_UNIT_AIR, /* a planet has layers or air */
-    NB_UNIT_MASK = NB_UNIT_NORMAL /* while surfaces are drawn nothing reads normals */
+    NB_SCENE_UNIT_END,             /* at most NB_UNIT_AIR */
+    NB_UNIT_SHELLS = NB_UNIT_AIR,  /* a planet has layers or air */
+    NB_UNIT_CLOUDS = NB_UNIT_VEIL, /* where there are clouds there are no particles */
+    NB_UNIT_MASK = NB_UNIT_NORMAL  /* while surfaces are drawn nothing reads normals */
 };
 
 enum { NB_CASCADES = 4, NB_MOST_MAPS = 8 };
@@ -43,6 +44,7 @@ typedef struct nb_light_kind {
     int shafts; /* surfaces shade fog */
     int air;    /* of a planet, with its ground and sun */
     int shells; /* of a planet of layers, over everything */
+    int clouds; /* with volume, whose shadow is what dims */
     int in_texture, tiled;
     uint32_t features;
 } nb_light_kind;

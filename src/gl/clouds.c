@@ -1,0 +1,246 @@
+/* What src/cpu/cloudscape.c does, for whole pictures. */
+#include "clouds.h"
+
+#include "panorama.h"
+
+#include "base/cloud_haze.h"
+#include "base/vector.h"
+
+#include <string.h>
+
+/* ---- parts ----------------------------------------------------------------------------------- */
+
+typedef struct job {
+    nb_gl_clouds *clouds;
+    const nb_cloud_picture *picture;
+    void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);
+    float *const *ends;
+    const nebel_air_view *air;
+    const nb_cloud_fog *fog;
+    const float *places;
+    float *over, *shade;
+} job;
+
+static uint32_t first_row(const job *j, size_t part)
+{
+    return (uint32_t)((uint64_t)j->picture->view->height * part / NB_CLOUD_PARTS);
+}
+
+static void do_part(void *data, size_t i)
+{
+    const job *const j = data;
+    nb_cloud_part *const part = &j->clouds->parts[i];
+    part->result = NEBEL_OK;
+    if (part->workspace == NULL) part->result = nebel_create_cloud_workspace(j->clouds->view, &part->workspace);
+    for (uint32_t y = first_row(j, i); y < first_row(j, i + 1) && part->result == NEBEL_OK; y++) j->row(j, part, y);
+}
+
+static nebel_result do_parts(job *j)
+{
+    nebel_result result = NEBEL_OK;
+    if (j->clouds->run != NULL)
+        j->clouds->run(NB_CLOUD_PARTS, do_part, j, j->clouds->run_user);
+    else
+        for (size_t i = 0; i < NB_CLOUD_PARTS; i++) do_part(j, i);
+    for (size_t i = 0; i < NB_CLOUD_PARTS && result == NEBEL_OK; i++) result = j->clouds->parts[i].result;
+    return result;
+}
+
+/* In double, as the CPU renderer has it: the walk through clouds may take other pieces where a digit is another. Returns its
+ * length, which is 1 along the camera's axis, or in a panorama. */
+static double direction_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, double direction[3])
+{
+    const nebel_view *const view = picture->view;
+    const double *const clip = view->clip_from_eye, *const eye = view->eye_from_world;
+    if (picture->rays != NULL) {
+        nb_panorama_direction(picture->rays, x + .5, y + .5, direction);
+        return 1;
+    }
+    const double right = ((2 * x + 1.) / view->width - 1 + clip[8]) / clip[0];
+    const double up = ((2 * y + 1.) / view->height - 1 + clip[9]) / clip[5];
+    for (int i = 0; i < 3; i++) direction[i] = right * eye[4 * i] + up * eye[4 * i + 1] - eye[4 * i + 2];
+    return nb_vector_length(direction);
+}
+
+/* ---- the view -------------------------------------------------------------------------------- */
+
+static int are_same(const nebel_cloud_view_desc *a, const nebel_cloud_view_desc *b)
+{
+    return a->clouds == b->clouds && a->time == b->time && memcmp(&a->sun, &b->sun, sizeof a->sun) == 0;
+}
+
+static void forget(nb_gl_clouds *clouds)
+{
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) {
+        nebel_destroy_cloud_workspace(clouds->parts[i].workspace);
+        clouds->parts[i].workspace = NULL;
+    }
+    nebel_destroy_cloud_view(clouds->view);
+    clouds->view = NULL;
+    clouds->of.clouds = NULL;
+}
+
+nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
+                              const nebel_log *log)
+{
+    const nebel_cloud_view_desc desc = {
+        .clouds = of, .sun = *sun, .time = time, .allocator = clouds->allocator, .log = *log};
+    if (are_same(&clouds->of, &desc)) return NEBEL_OK;
+    forget(clouds);
+    const nebel_result result = nebel_create_cloud_view(&desc, &clouds->view);
+    if (result == NEBEL_OK) clouds->of = desc;
+    return result;
+}
+
+void nb_gl_clouds_release(nb_gl_clouds *clouds)
+{
+    forget(clouds);
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) nb_release(&clouds->allocator, clouds->parts[i].knots);
+    nb_release(&clouds->allocator, clouds->pixels);
+}
+
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+static void keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knots *knots, nb_cloud_pixel *pixel)
+{
+    void *list = part->knots;
+    if (!nb_grow(&j->clouds->allocator, &list, sizeof *part->knots, part->count, &part->capacity,
+                 part->count + knots->count)) {
+        part->result = NEBEL_ERROR_MEMORY;
+        return;
+    }
+    part->knots = list;
+    *pixel = (nb_cloud_pixel){(uint32_t)part->count, knots->count};
+    for (uint32_t k = 0; k < knots->count; k++) {
+        nb_cloud_knot *const knot = &part->knots[part->count++];
+        *knot = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
+        memcpy(knot->light, knots->in_scattering[k], sizeof knot->light);
+    }
+}
+
+static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)
+{
+    const nb_cloud_picture *const picture = j->picture;
+    for (uint32_t x = 0; x < picture->view->width && part->result == NEBEL_OK; x++) {
+        const size_t i = (size_t)y * picture->view->width + x;
+        nebel_ray ray = {.t_max = HUGE_VAL};
+        nebel_cloud_knots knots;
+        const double length = direction_at(picture, x, y, ray.direction);
+        memcpy(ray.origin, picture->eye, sizeof ray.origin);
+        part->result = nebel_trace_clouds(part->workspace, 1, &ray, 0, picture->pixel / length, &knots, 0);
+        if (part->result == NEBEL_OK) keep_knots(j, part, &knots, &j->clouds->pixels[i]);
+        for (int k = 0; k < 2 && j->ends[k] != NULL; k++)
+            j->ends[k][i] = knots.count == 0 ? 0 : knots.t[k == 0 ? 0 : knots.count - 1];
+    }
+}
+
+nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *ends[2])
+{
+    void *list = clouds->pixels;
+    const size_t count = (size_t)picture->view->width * picture->view->height;
+    if (!nb_grow(&clouds->allocator, &list, sizeof *clouds->pixels, 0, &clouds->pixel_capacity, count))
+        return NEBEL_ERROR_MEMORY;
+    clouds->pixels = list;
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].count = 0;
+    job j = {.clouds = clouds, .picture = picture, .row = trace_row, .ends = ends};
+    return do_parts(&j);
+}
+
+/* ---- among air and fog ----------------------------------------------------------------------- */
+
+static nebel_cloud_knots knots_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
+{
+    nebel_cloud_knots knots = {.count = pixel->count};
+    for (uint32_t k = 0; k < pixel->count; k++) {
+        const nb_cloud_knot *const knot = &part->knots[pixel->first + k];
+        knots.t[k] = knot->t;
+        knots.transmittance[k] = knot->left;
+        memcpy(knots.in_scattering[k], knot->light, sizeof knot->light);
+    }
+    return knots;
+}
+
+static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const double direction[3])
+{
+    const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
+    const nebel_cloud_knots knots = knots_of(part, pixel);
+    const nb_cloud_fog *const fog = j->fog;
+    nb_cloud_haze haze;
+    nb_cloud_rays rays;
+    nb_cloud_haze_ask(&knots, direction, &haze, &rays);
+    const nebel_result result = nebel_trace_air_view(j->air, knots.count, rays.direction, knots.t, &rays.lights);
+    for (int c = 0; c < 3 && result == NEBEL_OK; c++) {
+        const size_t at = 4 * i + (size_t)c;
+        float over[NEBEL_MAX_CLOUD_KNOTS];
+        if (fog != NULL) {
+            const float left[2] = {fog->left[0][at], fog->left[1][at]},
+                        light[2] = {fog->light[0][at], fog->light[1][at]};
+            nb_cloud_haze_add_fog(&knots, c, left, light, &haze);
+        }
+        nb_cloud_haze_sum(&knots, c, &haze, over);
+        for (uint32_t k = 0; k < knots.count; k++) part->knots[pixel->first + k].light[c] = over[k];
+    }
+    return result;
+}
+
+static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
+{
+    for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
+        const size_t i = (size_t)y * j->picture->view->width + x;
+        double direction[3];
+        (void)direction_at(j->picture, x, y, direction);
+        if (j->clouds->pixels[i].count > 0) part->result = mix_pixel(j, part, i, direction);
+    }
+}
+
+nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nebel_air_view *air,
+                              const nb_cloud_fog *fog)
+{
+    job j = {.clouds = clouds, .picture = picture, .row = mix_row, .air = air, .fog = fog};
+    return do_parts(&j);
+}
+
+/* ---- ends ------------------------------------------------------------------------------------ */
+
+/* Before a surface within the clouds they are as between the knots around it. */
+static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, float over[4])
+{
+    static const float clear[4] = {0, 0, 0, 1};
+    float t[NEBEL_MAX_CLOUD_KNOTS], part;
+    memcpy(over, clear, sizeof clear);
+    if (count == 0 || !(end > knots[0].t)) return;
+    for (uint32_t i = 0; i < count; i++) t[i] = knots[i].t;
+    const uint32_t k = nb_cloud_haze_find(count, t, end, &part);
+    const nb_cloud_knot *const a = &knots[k], *const b = &knots[part > 0 ? k + 1 : k];
+    for (int c = 0; c < 3; c++) over[c] = (1 - part) * a->light[c] + part * b->light[c];
+    over[3] = (1 - part) * a->left + part * b->left;
+}
+
+static nebel_result shade(const job *j, nb_cloud_part *part, uint32_t x, uint32_t y, double t, float *left)
+{
+    double direction[3], place[1][3];
+    (void)direction_at(j->picture, x, y, direction);
+    const double length = nb_vector_length(direction);
+    for (int c = 0; c < 3; c++) place[0][c] = j->picture->eye[c] + t * direction[c] / length;
+    return nebel_shade_clouds(part->workspace, 4 * j->picture->pixel * t, 1, (const double(*)[3])place, 0, left);
+}
+
+static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
+{
+    for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
+        const size_t i = (size_t)y * j->picture->view->width + x;
+        const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
+        const float t = j->places[4 * i];
+        lay_over(part->knots + pixel->first, pixel->count, t > 0 ? t : HUGE_VALF, j->over + 4 * i);
+        j->shade[i] = 1;
+        if (t > 0) part->result = shade(j, part, x, y, (double)t, &j->shade[i]);
+    }
+}
+
+nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *places, float *over,
+                              float *shade_plane)
+{
+    job j = {
+        .clouds = clouds, .picture = picture, .row = end_row, .places = places, .over = over, .shade = shade_plane};
+    return do_parts(&j);
+}

@@ -1,0 +1,74 @@
+/* Clouds with volume by the processor: what they do along the ray of each pixel, and to sunlight. No OpenGL. */
+#ifndef NB_GL_CLOUDS_H
+#define NB_GL_CLOUDS_H
+
+#include "base/base.h"
+
+#include <nebel/clouds.h>
+#include <nebel/shader.h>
+
+/* Parts of a picture, which threads take; each keeps some 19 MB of what it found. */
+enum { NB_CLOUD_PARTS = 8 };
+
+/* Of a ray, at some place of it. */
+typedef struct nb_cloud_knot {
+    float t, left;  /* m; transmittance of clouds */
+    float light[3]; /* of clouds alone; once they are mixed with air and fog: what is added to `left` of the haze's */
+} nb_cloud_knot;
+
+typedef struct nb_cloud_part {
+    nebel_cloud_workspace *workspace;
+    nb_cloud_knot *knots;
+    size_t count, capacity;
+    nebel_result result;
+} nb_cloud_part;
+
+/* The knots of a pixel in those of its part. */
+typedef struct nb_cloud_pixel {
+    uint32_t first, count;
+} nb_cloud_pixel;
+
+typedef struct nb_gl_clouds {
+    nebel_allocator allocator;
+    nebel_air_run_fn run; /* NULL: one part after the other */
+    void *run_user;
+    nebel_cloud_view_desc of; /* what the view is made of; no clouds: of nothing */
+    nebel_cloud_view *view;
+    nb_cloud_part parts[NB_CLOUD_PARTS];
+    nb_cloud_pixel *pixels; /* the lowest row first */
+    size_t pixel_capacity;
+} nb_gl_clouds;
+
+/* Rays through a picture, the lowest row first. */
+typedef struct nb_cloud_picture {
+    const nebel_view *view; /* perspective; of a panorama its size */
+    const nebel_rays *rays; /* of a panorama; NULL: it is none */
+    double eye[3];
+    double pixel; /* width of a pixel per metre of the camera's axis, or of the way in a panorama */
+} nb_cloud_picture;
+
+/* Clouds at a moment under a sun. VALUE, MEMORY. */
+nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
+                              const nebel_log *log);
+
+/* Finds all pixels' knots, in clear space. ends[0] and ends[1], if they are wanted: of each pixel where clouds begin, and
+ * where they end; 0: there are none. MEMORY. */
+nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *ends[2]);
+
+/* What air and fog do before both ends of a pixel's clouds: 4 numbers for each pixel. */
+typedef struct nb_cloud_fog {
+    float *left[2], *light[2];
+} nb_cloud_fog;
+
+/* Mixes them with the air, which is that of the eye, and fog; NULL: there is none. MEMORY. */
+nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nebel_air_view *air,
+                              const nb_cloud_fog *fog);
+
+/* For rays that end at places[4 i], 0: nowhere, what is left of haze and added to it, 4 numbers for each; and what clouds
+ * leave of the sunlight there. MEMORY. */
+nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *places, float *over,
+                              float *shade);
+
+void nb_gl_clouds_release(nb_gl_clouds *clouds);
+
+#endif

@@ -1,0 +1,145 @@
+/* Clouds with volume in a frame, by the processor: once for the rays through the middles of pixels, among air and fog; then for
+ * each sample what they do up to where its rays end, and to the sun's light there. */
+#include "clouds.h"
+#include "frame.h"
+#include "gl.h"
+#include "panorama.h"
+#include "words.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double pi = 3.14159265358979323846;
+
+static const nebel_log *log_of(const nb_gl_frame *f)
+{
+    return &f->renderer->log;
+}
+
+static nebel_result fail_memory(const nb_gl_frame *f, nebel_result result)
+{
+    return result == NEBEL_ERROR_MEMORY ? nb_fail(log_of(f), result, "frame: out of memory for clouds") : result;
+}
+
+static size_t count_pixels(const nb_gl_frame *f)
+{
+    return (size_t)f->view.width * f->view.height;
+}
+
+static float *make_plane(const nb_gl_frame *f, size_t channels)
+{
+    return nb_allocate(&f->renderer->allocator, count_pixels(f) * channels, sizeof(float));
+}
+
+static nb_cloud_picture picture_of(const nb_gl_frame *f, const nebel_view *view, const nebel_rays *around)
+{
+    nb_cloud_picture picture = {
+        .view = view, .rays = f->panorama ? around : NULL, .eye = {f->eye[0], f->eye[1], f->eye[2]}};
+    picture.pixel = f->panorama ? pi / view->height : 2 / (view->clip_from_eye[5] * view->height);
+    return picture;
+}
+
+/* The usual unpacking. A plane of 4 numbers, or of 1, which is that of all colours. */
+static nebel_result upload(const nb_gl_frame *f, unsigned *texture, int channels, const float *texels)
+{
+    glActiveTexture(GL_TEXTURE0);
+    nb_words_bind(texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, channels == 4 ? GL_RGBA32F : GL_R32F, (GLsizei)f->view.width,
+                 (GLsizei)f->view.height, 0, channels == 4 ? GL_RGBA : GL_RED, GL_FLOAT, texels);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_G, channels == 4 ? GL_GREEN : GL_RED);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_B, channels == 4 ? GL_BLUE : GL_RED);
+    return nb_context_check_memory(log_of(f), "clouds; ask for fewer pixels");
+}
+
+static void read_back(const nb_gl_frame *f, unsigned framebuffer, int attachment, float *texels)
+{
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+    glReadBuffer((GLenum)(GL_COLOR_ATTACHMENT0 + attachment));
+    glReadPixels(0, 0, (GLsizei)f->view.width, (GLsizei)f->view.height, GL_RGBA, GL_FLOAT, texels);
+}
+
+/* ---- the whole frame ------------------------------------------------------------------------- */
+
+static int has_fog(const nb_gl_frame *f)
+{
+    return f->renderer->fog != NULL && nebel_snapshot_volume_count(f->renderer->fog) > 0;
+}
+
+/* Where there are no clouds rays end at once. */
+static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *light)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    for (size_t i = 0; i < count_pixels(f); i++) ends[i] = fmaxf(ends[i], 1e-30f);
+    nebel_result result = upload(f, &r->cloud_ends, 1, ends);
+    f->place = r->cloud_ends;
+    if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
+    if (result != NEBEL_OK) return result;
+    read_back(f, r->targets.fog_buffer, 0, light);
+    read_back(f, r->targets.fog_buffer, 1, left);
+    return NEBEL_OK;
+}
+
+static nebel_result trace_in_fog(nb_gl_frame *f, const nb_cloud_picture *picture)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    float *ends[2] = {make_plane(f, 1), make_plane(f, 1)};
+    nb_cloud_fog fog;
+    int all = ends[0] != NULL && ends[1] != NULL;
+    for (int i = 0; i < 2; i++) {
+        fog.left[i] = make_plane(f, 4);
+        fog.light[i] = make_plane(f, 4);
+        all = all && fog.left[i] != NULL && fog.light[i] != NULL;
+    }
+    nebel_result result = all ? nb_gl_clouds_trace(&r->clouds, picture, ends) : NEBEL_ERROR_MEMORY;
+    for (int i = 0; i < 2 && result == NEBEL_OK; i++) result = find_fog(f, ends[i], fog.left[i], fog.light[i]);
+    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, picture, r->air.view, &fog);
+    for (int i = 0; i < 2; i++) {
+        nb_release(&r->allocator, ends[i]);
+        nb_release(&r->allocator, fog.left[i]);
+        nb_release(&r->allocator, fog.light[i]);
+    }
+    return result;
+}
+
+nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    float *none[2] = {NULL, NULL};
+    const nebel_sun sun = nb_gl_air_sun(r->scene);
+    nebel_rays middles;
+    if (f->panorama) nb_panorama_rays(&f->view, f->eye, nb_pixel_sample(0, 1), &middles);
+    const nb_cloud_picture picture = picture_of(f, &f->view, &middles);
+    nebel_result result = nb_gl_clouds_set(&r->clouds, f->clouds, &sun, f->desc->time, log_of(f));
+    if (result != NEBEL_OK) return fail_memory(f, result);
+    if (has_fog(f)) return fail_memory(f, trace_in_fog(f, &picture));
+    result = nb_gl_clouds_trace(&r->clouds, &picture, none);
+    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.view, NULL);
+    return fail_memory(f, result);
+}
+
+/* ---- samples --------------------------------------------------------------------------------- */
+
+nebel_result nb_frame_end_clouds(const nb_gl_frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, &f->rays);
+    float *const places = make_plane(f, 4), *const over = make_plane(f, 4), *const shade = make_plane(f, 1);
+    nebel_result result = places != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    if (result == NEBEL_OK) {
+        read_back(f, r->targets.surface_buffer, 0, places);
+        result = nb_gl_clouds_end(&r->clouds, &picture, places, over, shade);
+    }
+    result = fail_memory(f, result);
+    if (result == NEBEL_OK) result = upload(f, &r->cloud_over, 4, over);
+    if (result == NEBEL_OK) result = upload(f, &r->cloud_shade, 1, shade);
+    nb_release(&r->allocator, places);
+    nb_release(&r->allocator, over);
+    nb_release(&r->allocator, shade);
+    return result;
+}
+
+void nb_frame_bind_clouds(const nb_gl_frame *f)
+{
+    nb_frame_bind_texture(NB_UNIT_CLOUDS, GL_TEXTURE_2D, f->renderer->cloud_over);
+    nb_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, f->renderer->cloud_shade);
+}

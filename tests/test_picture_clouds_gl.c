@@ -1,0 +1,269 @@
+/* Clouds with volume in OpenGL, where the processor walks through them, are those of the CPU renderer: from below, within and
+ * above, behind and before models, in fog. With an argument in pictures so many times wider. */
+#include "pass_help.h"
+#include "picture_help.h"
+#include "planet_help.h"
+
+#include <nebel/clouds.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t scale = 1;
+
+static const float wall[4][3] = {{-400, -20, 0}, {400, -20, 0}, {400, 300, 0}, {-400, 300, 0}};
+static const uint32_t wall_indices[6] = {0, 1, 2, 0, 2, 3};
+
+typedef struct world {
+    nebel_atmosphere *atmosphere;
+    nebel_clouds *clouds;
+    nebel_planet planet;
+    nebel_mesh mesh;
+    nebel_scene_data scene;
+} world;
+
+/* `lift`: of the origin above the ground. Models are lit in OpenGL by what the air leaves of the sun at the origin. */
+static void make_world(double coverage, double lift, world *w)
+{
+    static const double sun[3] = {.6, .64, .48}, origin[1][3] = {{0, 0, 0}};
+    const nebel_sun white = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {1, 1, 1}};
+    nebel_air_light light;
+    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_diameter = .53, .cloud_layer_count = 1},
+                 .mesh = {.origin = {200, -100, -2500},
+                          .positions = wall[0],
+                          .indices = wall_indices,
+                          .vertex_count = 4,
+                          .triangle_count = 2,
+                          .base_color = {.8f, .8f, .8f},
+                          .texture = -1}};
+    w->planet.air.ground[1] = -lift;
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, origin, 0, &light, 0), NEBEL_OK);
+    memcpy(w->planet.sun_left, light.sun, sizeof light.sun);
+    const nebel_clouds_desc desc = {
+        .atmosphere = w->atmosphere, .layers = {{.coverage = coverage, .wind = {100, 0}}}, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    w->planet.clouds = w->clouds;
+    w->scene = (nebel_scene_data){.has_sun = 1,
+                                  .sun_irradiance = {5, 4, 3},
+                                  .ambient = {.1, .1, .1},
+                                  .planet_count = 1,
+                                  .planets = &w->planet,
+                                  .meshes = &w->mesh};
+    memcpy(w->scene.sun_direction, sun, sizeof sun);
+}
+
+static void free_world(world *w)
+{
+    nebel_destroy_clouds(w->clouds);
+    nebel_destroy_atmosphere(w->atmosphere);
+}
+
+/* Whether clouds are there at all: without them transmittance is as smooth as the air. */
+static double least_transmittance(const picture_pair *pair)
+{
+    double least = 1;
+    for (size_t i = 0; i < (size_t)pair->width * pair->height; i++)
+        least = fmin(least, (double)pair->cpu.transmittance[3 * i]);
+    return least;
+}
+
+static void compare(const char *name, const picture_pair *pair)
+{
+    const double shown = picture_shown_apart(pair);
+    size_t apart = 0;
+    for (size_t i = 0; i < 3 * (size_t)pair->width * pair->height; i++)
+        apart += fabs((double)pair->cpu.transmittance[i] - (double)pair->gl.transmittance[i]) > 1. / 255;
+    const double left = (double)apart / (3. * pair->width * pair->height);
+    print_message("%s: of 1000 pixels %.2f are shown 2/255 apart, %.2f have another transmittance\n", name, 1e3 * shown,
+                  1e3 * left);
+    assert_true(least_transmittance(pair) < .05);
+    assert_true(shown <= 1e-3 && left <= 5e-3); /* a wisp within a pixel is met or missed as the steps of a walk lie */
+}
+
+static void check(const char *name, const world *w, nebel_snapshot *fog, const nebel_camera *camera)
+{
+    picture_pair pair = picture_make(96 * scale, 54 * scale);
+    const int objects = pass_count_objects();
+    pair.time = 5;
+    pair.tolerance = NEBEL_DEFAULT_TOLERANCE; /* that OpenGL takes for clouds */
+    picture_render(&w->scene, fog, camera, 1, &pair);
+    assert_int_equal(pass_count_objects(), objects);
+    compare(name, &pair);
+    picture_free(&pair);
+}
+
+static void clouds_are_the_same_from_everywhere(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.5, 1500, &w);
+    pass_open(&context, NB_GL_330);
+    nebel_camera camera = planet_camera(-1200, .4);
+    check("from below", &w, NULL, &camera);
+    camera = planet_camera(7500, -.3);
+    check("from above", &w, NULL, &camera);
+    w.scene.mesh_count = 1;
+    camera = planet_camera(0, .02);
+    check("within, a wall in them", &w, NULL, &camera);
+    pass_close(&context);
+    pass_open(&context, NB_GL_300ES);
+    camera.projection = NEBEL_PROJECTION_PANORAMA;
+    check("all around", &w, NULL, &camera);
+    pass_close(&context);
+    free_world(&w);
+}
+
+static void clouds_lie_in_fog(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.4, 0, &w);
+    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
+    pass_open(&context, NB_GL_330);
+    const nebel_camera camera = planet_camera(120, .25);
+    check("in fog", &w, fog, &camera);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
+/* ---- threads, refusals, memory --------------------------------------------------------------- */
+
+enum { WIDTH = 24, HEIGHT = 16 };
+
+static const nebel_gl_frame_desc small = {.width = WIDTH, .height = HEIGHT, .samples = 2, .clouds_by_processor = 1};
+
+static void draw(nebel_gl_renderer *renderer, double time, float *color)
+{
+    nebel_gl_frame_desc frame = small;
+    frame.camera = planet_camera(300, .4);
+    frame.time = time;
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_OK);
+    assert_int_equal(nebel_gl_read_planes(renderer, &(nebel_gl_planes){.color = color}), NEBEL_OK);
+}
+
+static void threads_and_frames_change_nothing(void **state)
+{
+    (void)state;
+    static float once[3 * WIDTH * HEIGHT], later[3 * WIDTH * HEIGHT], again[3 * WIDTH * HEIGHT];
+    nb_gl context;
+    nebel_gl_renderer *renderer;
+    world w;
+    make_world(.5, 0, &w);
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &(nebel_gl_renderer_desc){0}, &renderer), NEBEL_OK);
+    draw(renderer, 0, once);
+    nebel_destroy_gl_renderer(renderer);
+    const nebel_gl_renderer_desc threaded = {.run = nebel_run_parts};
+    assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &threaded, &renderer), NEBEL_OK);
+    draw(renderer, 7, later);
+    draw(renderer, 0, again);
+    assert_memory_equal(once, again, sizeof once);
+    assert_memory_not_equal(once, later, sizeof once);
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+    free_world(&w);
+}
+
+static void keep(nebel_result result, const char *message, void *user)
+{
+    (void)result;
+    snprintf(user, 256, "%s", message);
+}
+
+static void the_processor_must_be_asked(void **state)
+{
+    (void)state;
+    char said[256] = "";
+    nb_gl context;
+    nebel_gl_renderer *renderer;
+    world w;
+    make_world(.5, 0, &w);
+    pass_open(&context, NB_GL_330);
+    const nebel_gl_renderer_desc desc = {.log = {keep, said}};
+    assert_int_equal(nebel_create_gl_renderer(&w.scene, NULL, &desc, &renderer), NEBEL_OK);
+    nebel_gl_frame_desc frame = small;
+    frame.camera = planet_camera(300, .4);
+    frame.clouds_by_processor = 0;
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(said, "clouds"));
+    frame.clouds_by_processor = 1;
+    frame.time = (double)NAN;
+    assert_int_equal(nebel_gl_render_frame(renderer, &frame), NEBEL_ERROR_VALUE);
+    assert_non_null(strstr(said, "time"));
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+    free_world(&w);
+}
+
+typedef struct memory {
+    size_t in_use, calls, fails_at; /* the call that fails, from 1; 0: none */
+} memory;
+
+static void *allocate(size_t size, void *user)
+{
+    memory *const m = user;
+    if (++m->calls == m->fails_at) return NULL;
+    m->in_use++;
+    return malloc(size);
+}
+
+static void release(void *block, void *user)
+{
+    memory *const m = user;
+    if (block != NULL) m->in_use--;
+    free(block);
+}
+
+/* Each of the allocations of a frame fails once; the next frame is whole. */
+static void memory_that_runs_out_is_told(void **state)
+{
+    (void)state;
+    nb_gl context;
+    nebel_gl_renderer *renderer;
+    world w;
+    memory m = {0};
+    size_t failed = 0;
+    make_world(.5, 0, &w);
+    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
+    pass_open(&context, NB_GL_330);
+    const nebel_gl_renderer_desc desc = {.allocator = {allocate, release, &m}};
+    assert_int_equal(nebel_create_gl_renderer(&w.scene, fog, &desc, &renderer), NEBEL_OK);
+    nebel_gl_frame_desc frame = small;
+    frame.camera = planet_camera(300, .4);
+    frame.width = frame.height = 2;
+    frame.samples = 1;
+    for (size_t i = 1;; i++) {
+        m.calls = 0;
+        m.fails_at = i;
+        w.scene.sun_irradiance[0] += .01; /* tables and clouds are made anew */
+        const nebel_result result = nebel_gl_render_frame(renderer, &frame);
+        if (result == NEBEL_OK) break;
+        assert_int_equal(result, NEBEL_ERROR_MEMORY);
+        failed++;
+    }
+    print_message("%zu failures\n", failed);
+    assert_true(failed > 15);
+    nebel_destroy_gl_renderer(renderer);
+    pass_close(&context);
+    assert_int_equal(m.in_use, 0);
+    nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(clouds_are_the_same_from_everywhere), cmocka_unit_test(clouds_lie_in_fog),
+        cmocka_unit_test(threads_and_frames_change_nothing),   cmocka_unit_test(the_processor_must_be_asked),
+        cmocka_unit_test(memory_that_runs_out_is_told),
+    };
+    if (argc > 1) scale = (uint32_t)atoi(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
