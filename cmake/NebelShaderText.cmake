@@ -13,7 +13,7 @@ set(march ${formulas}/prelude_shader.glsl ${order} ${shader}/layout.h)
 
 set(dialects glsl_330 glsl_300_es glsl_450 hlsl)
 set(last ${shader}/view.glsl ${shader}/grid.glsl ${shader}/media.glsl ${shader}/environment.glsl ${shader}/air.glsl ${shader}/sun_lattice.glsl
-         ${shader}/light.glsl ${shader}/sun.glsl ${shader}/slots.glsl ${shader}/fog.glsl ${shader}/voxels.glsl ${shader}/lamp.glsl
+         ${shader}/slots.glsl ${shader}/light.glsl ${shader}/sun.glsl ${shader}/fog.glsl ${shader}/voxels.glsl ${shader}/lamp.glsl
          ${shader}/diffusion.glsl ${shader}/walk.glsl ${shader}/transparent.glsl)
 set(files_glsl_330 ${formulas}/prelude_glsl.glsl ${march} ${shader}/words.glsl ${last})
 set(files_glsl_300_es ${formulas}/prelude_300es.glsl ${files_glsl_330})

@@ -23,14 +23,16 @@
  * Which state is touched: every function leaves all state of the context as it found it. While it runs it changes
  *
  *   - the program, the vertex array, the active texture unit;
- *   - on texture units 0 to 6: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler;
+ *   - on texture units 0 to 6: the bindings of TEXTURE_2D and TEXTURE_2D_MULTISAMPLE and the sampler; of TEXTURE_2D_ARRAY
+ *     on 5 and 6;
  *   - the bindings UNIFORM_BUFFER (general and index 0) and PIXEL_UNPACK_BUFFER, and the parameters UNPACK_*;
  *   - the viewport (the first of an array); SCISSOR_TEST (of all viewports), STENCIL_TEST, DEPTH_TEST, CULL_FACE,
  *     RASTERIZER_DISCARD, SAMPLE_COVERAGE, SAMPLE_SHADING, SAMPLE_MASK, SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE,
  *     COLOR_LOGIC_OP, POLYGON_SMOOTH, MULTISAMPLE, PRIMITIVE_RESTART, CLIP_DISTANCEi, all switched off where they are;
  *   - the polygon mode;
  *   - of draw buffers 0 to 3: BLEND, the colour mask, the blend function and equation;
- *   - the sample mask; the draw framebuffer, to ask where the samples of a multisampled texture are.
+ *   - the sample mask; the draw framebuffer, to ask where the samples of a multisampled texture are, or to draw in several
+ *     passes, with a query of ANY_SAMPLES_PASSED where none of the host's is under way.
  *
  * What stays as the host has set it, because it belongs to the target: FRAMEBUFFER_SRGB, DITHER, the draw buffers, the
  * clip control, conditional rendering, and occlusion queries. Depth and stencil are never written.
@@ -76,9 +78,7 @@ void nebel_destroy_gl(nebel_gl *gl);
  * ARGUMENT (also a view that nebel_view_rays refuses, with a width or height of 0 among them), MEMORY, LIMIT (more
  * volumes, larger grids or more phase functions of an environment than the largest texture holds), UNSUPPORTED (the
  * context is another one, or lost). On an error there is no fog.
- *
- * Mesa's llvmpipe ends loops early: where a tile lists so many volumes of different light that this may matter, the log
- * is told once, with NEBEL_OK; see docs/shaders.md. */
+ */
 nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view);
 
 typedef enum nebel_gl_output {
@@ -91,7 +91,11 @@ typedef enum nebel_gl_output {
     NEBEL_GL_OUTPUT_COUNT
 } nebel_gl_output;
 
-/* A full-screen pass into the bound draw framebuffer. Texture names are of the host. */
+/* A full-screen pass into the bound draw framebuffer. Texture names are of the host.
+ *
+ * Mesa's llvmpipe ends loops early: where a tile lists so many volumes that this may matter, the fog is drawn in several
+ * passes, and waits for each. Where that does not suffice, or several samples of a pixel or the air of a planet keep it
+ * from that, the log is told once, with NEBEL_OK; see docs/shaders.md. */
 typedef struct nebel_gl_pass {
     nebel_gl_output output;
     unsigned depth_texture; /* two-dimensional; a depth format, or the first component of a float format */

@@ -234,6 +234,12 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 /* The feature of fog whose volumes are of different light: rays may have to be walked, from event to event. */
 #define NEBEL_FEATURE_MIXED 512u
 
+/* The feature of fog of which volumes exclude or replace others. */
+#define NEBEL_FEATURE_COVER 256u
+
+/* The feature of fog that the sun lights. */
+#define NEBEL_FEATURE_SUN 524288u
+
 /* The feature of fog that has grids: the text needs NEBEL_VOXELS, or NEBEL_VOXEL, defined before it. */
 #define NEBEL_FEATURE_GRID 1048576u
 

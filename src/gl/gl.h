@@ -4,6 +4,7 @@
 
 #include "environment.h"
 #include "program.h"
+#include "steps.h"
 
 struct nebel_gl {
     nebel_allocator allocator;
@@ -17,10 +18,11 @@ struct nebel_gl {
     uint32_t texture_rows, voxel_rows, node_rows, tile_rows; /* allocated */
     nb_environment environment;
     nb_programs programs;
+    nb_steps steps;
 
-    int dims_alone; /* the fog is asked for transmittance alone: nothing of it is mixed */
-    int has_warned; /* of the turns of loops */
-    int has_warned_of_lamps;
+    int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
+    int has_warned;            /* of the turns of loops */
+    int is_crowded;            /* rays may take more of them than this driver has */
     int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_snapshot *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
     nebel_snapshot *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */
@@ -60,6 +62,9 @@ typedef struct nb_gl_picture {
 
 /* nebel_gl_draw_fog along these. */
 nebel_result nb_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass, const nb_gl_picture *picture);
+
+/* Tells once, of fog that is crowded, what this driver leaves out of its light, and `why`. */
+void nb_gl_warn_of_turns(nebel_gl *gl, const char *why);
 
 /* The number of a tile's pixels in a row is 2 to this. */
 enum { NB_GL_TILE_SHIFT = 4 };

@@ -270,14 +270,20 @@ static void draw_triangles(const task *t)
     }
 }
 
-static nebel_result draw(const task *t, GLuint target_framebuffer)
+/* What is drawn next goes there. */
+static void set_target(const task *t, const nb_band *band)
 {
     const nb_context *const context = &t->gl->context;
-    const nebel_result result = bind_textures(t);
-    if (result != NEBEL_OK) return result;
-    nb_state_clear(context, t->pass->x, t->pass->y, t->picture->width, t->picture->height);
+    nb_state_clear(context, band->x, band->y, band->width, band->height);
     if (t->pass->output == NEBEL_GL_OUTPUT_BLEND) nb_state_blend(context, GL_ONE, GL_SRC1_COLOR);
     if (t->pass->output == NEBEL_GL_OUTPUT_BLEND_GREY) nb_state_blend(context, GL_ONE, GL_SRC_ALPHA);
+}
+
+static nebel_result draw(const task *t, GLuint target_framebuffer)
+{
+    const nebel_result result = bind_textures(t);
+    if (result != NEBEL_OK) return result;
+    set_target(t, &(nb_band){t->pass->x, t->pass->y, t->picture->width, t->picture->height});
     glUseProgram(t->program->name);
     glBindVertexArray(t->gl->vertex_array);
     set_uniforms(t, target_framebuffer);
@@ -285,23 +291,101 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
     return NEBEL_OK;
 }
 
+/* ---- in steps -------------------------------------------------------------------------------- */
+
+/* Samples of a pixel, and pieces of air, share its turns. */
+static int is_in_steps(const task *t)
+{
+    return t->gl->is_crowded && t->pass->samples <= 1 && !t->picture->air;
+}
+
+void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)
+{
+    if (gl->has_warned) return;
+    gl->has_warned = 1;
+    (void)nb_fail(&gl->log, NEBEL_OK,
+                  "warning: nebel_gl_draw_fog: this driver (%s) ends long loops, and %s: light of what is far behind "
+                  "others on a ray of up to %u volumes may be summed in coarse steps, in each of which they count as "
+                  "evenly mixed, and that of lamps left out there. A graphics processor or the CPU renderer has no "
+                  "such bound",
+                  (const char *)glGetString(GL_RENDERER), why,
+                  (unsigned)(gl->fog.tiles != 0 ? gl->fog.tile_most : nebel_snapshot_volume_count(gl->packed)));
+}
+
+/* Units that have textures of several layers while steps are drawn. */
+static const GLenum layered[] = {GL_TEXTURE0 + NB_UNIT_COLOR, GL_TEXTURE0 + NB_UNIT_DEPTH};
+
+static nebel_result fit_steps(const task *t, uint32_t rows)
+{
+    nebel_gl *const gl = t->gl;
+    nb_unpacking unpacking;
+    nb_state_save_unpacking(&gl->context, &unpacking);
+    glActiveTexture(layered[0]);
+    const nebel_result result =
+        nb_steps_fit(&gl->steps, &gl->context, &gl->log, t->pass->output, t->picture->width, rows);
+    nb_state_restore_unpacking(&gl->context, &unpacking);
+    return result;
+}
+
+static nebel_result draw_bands(const task *t, GLuint target_framebuffer)
+{
+    nebel_gl *const gl = t->gl;
+    const uint32_t height = t->picture->height, rows = nb_steps_rows(t->picture->width, height);
+    int is_cut = 0;
+    nebel_result result = fit_steps(t, rows);
+    if (result == NEBEL_OK) result = bind_textures(t);
+    glBindVertexArray(gl->vertex_array);
+    for (uint32_t y = 0; y < height && result == NEBEL_OK; y += rows) {
+        const nb_band band = {t->pass->x, t->pass->y + y, t->picture->width, height - y < rows ? height - y : rows};
+        glUseProgram(t->program->name);
+        set_uniforms(t, target_framebuffer);
+        if (nb_steps_trace(&gl->steps, &gl->context, t->program->name, &band)) is_cut = 1;
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target_framebuffer);
+        set_target(t, &band);
+        nb_steps_compose(&gl->steps, t->pass->output, &band);
+    }
+    if (is_cut) nb_gl_warn_of_turns(gl, "all passes together did not suffice");
+    return result;
+}
+
+static nebel_result draw_in_steps(const task *t, GLuint target_framebuffer)
+{
+    GLint bound[2];
+    for (int i = 0; i < 2; i++) {
+        glActiveTexture(layered[i]);
+        glGetIntegerv(GL_TEXTURE_BINDING_2D_ARRAY, &bound[i]);
+    }
+    const nebel_result result = draw_bands(t, target_framebuffer);
+    for (int i = 0; i < 2; i++) {
+        glActiveTexture(layered[i]);
+        glBindTexture(GL_TEXTURE_2D_ARRAY, (GLuint)bound[i]);
+    }
+    return result;
+}
+
 static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
 {
     nebel_gl *const gl = t->gl;
+    const int in_steps = is_in_steps(t);
     const nb_program_kind kind = {.in_texture = gl->fog.texture != 0,
                                   .tiled = gl->fog.tiles != 0,
                                   .multisampled = t->pass->samples > 1,
-                                  .output = t->pass->output,
+                                  .output = in_steps ? NEBEL_GL_OUTPUT_SPLIT : t->pass->output,
                                   .depth = t->pass->depth.kind,
                                   .from_eye = t->picture->rays.from_eye,
                                   .panorama = t->picture->panorama,
                                   .shafts = t->picture->shafts != NULL,
+                                  .step = in_steps,
                                   .air = t->picture->air,
                                   .features = gl->fog.features,
                                   .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =
         nb_programs_find(&gl->programs, &gl->context, &gl->allocator, &gl->log, &kind, &t->program);
-    return result == NEBEL_OK ? draw(t, target_framebuffer) : result;
+    if (result != NEBEL_OK) return result;
+    if (in_steps) return draw_in_steps(t, target_framebuffer);
+    if (gl->is_crowded)
+        nb_gl_warn_of_turns(gl, "several samples of a pixel, or pieces of air, share what it gives to a ray");
+    return draw(t, target_framebuffer);
 }
 
 nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)

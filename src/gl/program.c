@@ -3,6 +3,7 @@
 #include "air_text.h"
 #include "panorama.h"
 #include "shafts.h"
+#include "steps.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -36,11 +37,39 @@ static const char fragment_text[] =
     "#ifdef PASS_COMPOSE\n"
     "uniform PASS_COLOR pass_color;\n"
     "#endif\n"
+    "#ifndef PASS_STEP\n"
     "layout(location = 0 PASS_FIRST) out highp vec4 pass_first;\n"
+    "#endif\n"
     "#ifdef PASS_SECOND\n"
     "layout(location = PASS_SECOND) out highp vec4 pass_second;\n"
     "#endif\n"
     "\n"
+    "nebel_sight pass_sight(vec2 pixel, float depth)\n"
+    "{\n"
+    "#ifdef PASS_PANORAMA\n"
+    "    nebel_sight sight;\n"
+    "    sight.origin = vec3(0.0);\n"
+    "    sight.direction = ray_direction(pixel);\n"
+    "    sight.t_max = depth > 0.0 && depth < 1e18 ? depth : 1e18;\n"
+    "    return sight;\n"
+    "#else\n"
+    "    return nebel_see(pixel, depth);\n"
+    "#endif\n"
+    "}\n"
+    "\n"
+    "int pass_entry(nebel_sight sight, vec2 pixel)\n"
+    "{\n"
+    "    int entry = 0;\n"
+    "#if defined(NEBEL_TILES) && defined(PASS_PANORAMA)\n"
+    "    entry = face_entry(sight.direction);\n"
+    "#elif defined(NEBEL_TILES)\n"
+    "    ivec2 tile = ivec2(pixel) >> pass_tiling.x;\n"
+    "    entry = 2 * (tile.x + tile.y * pass_tiling.y);\n"
+    "#endif\n"
+    "    return entry;\n"
+    "}\n";
+
+static const char whole_text[] =
     "nebel_light pass_up_to(nebel_sight sight, int entry, float t)\n"
     "{\n"
     "#ifdef NEBEL_TILES\n"
@@ -52,21 +81,8 @@ static const char fragment_text[] =
     "\n"
     "nebel_light pass_fog(vec2 pixel, float depth)\n"
     "{\n"
-    "#ifdef PASS_PANORAMA\n"
-    "    nebel_sight sight;\n"
-    "    sight.origin = vec3(0.0);\n"
-    "    sight.direction = ray_direction(pixel);\n"
-    "    sight.t_max = depth > 0.0 && depth < 1e18 ? depth : 1e18;\n"
-    "#else\n"
-    "    nebel_sight sight = nebel_see(pixel, depth);\n"
-    "#endif\n"
-    "    int entry = 0;\n"
-    "#if defined(NEBEL_TILES) && defined(PASS_PANORAMA)\n"
-    "    entry = face_entry(sight.direction);\n"
-    "#elif defined(NEBEL_TILES)\n"
-    "    ivec2 tile = ivec2(pixel) >> pass_tiling.x;\n"
-    "    entry = 2 * (tile.x + tile.y * pass_tiling.y);\n"
-    "#endif\n"
+    "    nebel_sight sight = pass_sight(pixel, depth);\n"
+    "    int entry = pass_entry(sight, pixel);\n"
     "#ifdef NEBEL_AIR\n"
     "    return pass_haze(sight, entry);\n"
     "#else\n"
@@ -126,41 +142,56 @@ const char *nb_program_limits(const nb_context *context, const char *shares, cha
 {
     text[0] = '\0';
     if (context->most_turns > 0) {
-        (void)snprintf(text, size, "#define NEBEL_MOST_TURNS (%d / %s)\n", context->most_turns, shares);
+        (void)snprintf(text, size, "#define NEBEL_MOST_TURNS (%d %s)\n", context->most_turns, shares);
     }
     return text;
 }
 
-/* What comes before the shader text. */
-static void write_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
+const char *nb_program_output(nebel_gl_output output)
 {
-    const char *const output[NEBEL_GL_OUTPUT_COUNT] = {
+    static const char *const texts[NEBEL_GL_OUTPUT_COUNT] = {
         [NEBEL_GL_OUTPUT_COMPOSE] = "#define PASS_COMPOSE\n#define PASS_FIRST\n",
         [NEBEL_GL_OUTPUT_SPLIT] = "#define PASS_FIRST\n#define PASS_SECOND 1\n",
         [NEBEL_GL_OUTPUT_BLEND] = "#define PASS_FIRST , index = 0\n#define PASS_SECOND 0, index = 1\n",
         [NEBEL_GL_OUTPUT_BLEND_GREY] = "#define PASS_FIRST\n",
     };
+    return texts[output];
+}
+
+const char *nb_program_extension(const nb_context *context, nebel_gl_output output)
+{
+    const int extended = output == NEBEL_GL_OUTPUT_BLEND && context->dual_source == 2;
+    return extended ? "#extension GL_EXT_blend_func_extended : require\n" : "";
+}
+
+/* What comes before the shader text. */
+static void write_head(const nb_context *context, const nb_program_kind *kind, char *text, size_t size)
+{
     /* The first sample, and the one behind the last: which ones a fragment walks through is told before the text. */
     const char *const samples = "#define PASS_MULTISAMPLED\nuniform ivec2 pass_sample_range;\n";
-    const int extended = kind->output == NEBEL_GL_OUTPUT_BLEND && context->dual_source == 2;
+    /* Turns that are not known before are counted one by one, so that a walk through cells ends in time; others may be too
+       many once: what a driver has not let end is found again in the next step. */
+    const int is_counted = (kind->features & NEBEL_FEATURE_GRID) != 0;
+    const char *const step = "#define PASS_STEP\n#define NEBEL_RESUMES\n";
     char limits[128];
-    const char *const shares = kind->multisampled ? "(pass_sample_range.y - pass_sample_range.x)"
-                               : kind->air        ? "32" /* PASS_KNOTS */
-                                                  : "1";
+    const char *const shares = kind->multisampled          ? "/ (pass_sample_range.y - pass_sample_range.x)"
+                               : kind->air                 ? "/ 32" /* PASS_KNOTS */
+                               : kind->step && !is_counted ? "* 2"
+                                                           : "";
     (void)snprintf(
         text, size,
         "%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
         "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
         "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
-        nb_program_version(context), extended ? "#extension GL_EXT_blend_func_extended : require\n" : "",
+        nb_program_version(context), kind->step ? "" : nb_program_extension(context, kind->output),
         nb_program_limits(context, shares, limits, sizeof limits), kind->in_texture ? "#define NEBEL_TEXTURE\n" : "",
         kind->tiled ? "#define NEBEL_TILES\n" : "",
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
         (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
         (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
-        kind->air ? "#define NEBEL_AIR\n" : "", kind->multisampled ? samples : "", output[kind->output],
-        kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
-        kind->panorama ? "#define PASS_PANORAMA\n" : "");
+        kind->air ? "#define NEBEL_AIR\n" : "", kind->multisampled ? samples : "",
+        kind->step ? step : nb_program_output(kind->output), kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "",
+        (int)kind->depth, (unsigned)kind->features, kind->panorama ? "#define PASS_PANORAMA\n" : "");
 }
 
 /* A message is one line. */
@@ -244,7 +275,7 @@ static void set_uniforms(nb_program *program)
     glUniform1i(glGetUniformLocation(name, "nebel_environment_texture"), NB_UNIT_ENVIRONMENT);
     glUniform1i(glGetUniformLocation(name, "nebel_air_texture"), NB_UNIT_AIR);
     glUniform1i(glGetUniformLocation(name, "pass_depth"), NB_UNIT_DEPTH);
-    glUniform1i(glGetUniformLocation(name, "pass_color"), NB_UNIT_COLOR);
+    glUniform1i(glGetUniformLocation(name, program->kind.step ? "pass_progress" : "pass_color"), NB_UNIT_COLOR);
 }
 
 /* The fog's text has its own. */
@@ -262,8 +293,9 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const int is_shaded = kind->shade[0] != NULL;
     const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
                                 is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "", fog, ray, tile,
-                                kind->air ? nb_air_haze_text : "", fragment_text},
-                               10};
+                                kind->air ? nb_air_haze_text : "", fragment_text,
+                                kind->step ? nb_step_text : whole_text},
+                               11};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
@@ -274,8 +306,8 @@ static int is_same(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
            a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
-           a->shafts == b->shafts && a->air == b->air && a->features == b->features && a->shade[0] == b->shade[0] &&
-           a->shade[1] == b->shade[1];
+           a->shafts == b->shafts && a->air == b->air && a->step == b->step && a->features == b->features &&
+           a->shade[0] == b->shade[0] && a->shade[1] == b->shade[1];
 }
 
 nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,

@@ -22,8 +22,12 @@ typedef struct nb_texts {
 const char *nb_program_version(const nb_context *context);
 
 /* What the fog's text is told of the context's limits, in `text`; "" where there are none. `shares` is what divides
- * them in GLSL. Returns text. */
+ * them in GLSL, with its operator. Returns text. */
 const char *nb_program_limits(const nb_context *context, const char *shares, char *text, size_t size);
+
+/* What the first texts of a program say of its output: "" or an extension, behind the version; what is defined. */
+const char *nb_program_extension(const nb_context *context, nebel_gl_output output);
+const char *nb_program_output(nebel_gl_output output);
 
 /* Compiles and links. UNSUPPORTED, with the driver's words, where it refuses; *name is 0 then. */
 nebel_result nb_program_build(const nebel_log *log, const nb_texts *vertex, const nb_texts *fragment, unsigned *name);
@@ -35,6 +39,7 @@ typedef struct nb_program_kind {
     int from_eye;         /* all rays start where the fog was packed for */
     int panorama;         /* rays go all around, and tiles are of six faces; depth is the distance */
     int shafts;           /* surfaces shade fog */
+    int step;             /* one of several passes; its output counts for the last program alone */
     int air;              /* the fog lies in that of a planet, which is bound */
     uint32_t features;    /* of the fog: what the text leaves out makes it faster */
     const char *shade[2]; /* texts before that of the fog; NULL: none */

@@ -665,7 +665,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
         "NB_CASCADES "
         "%d\n#define NEBEL_FEATURES %u\n%s",
-        nb_program_version(context), nb_program_limits(context, "1", limits, sizeof limits),
+        nb_program_version(context), nb_program_limits(context, "", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
         kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
         kind->sunlit ? "#define SCENE_SUNLIT\n" : "", kind->lamplit ? "#define SCENE_LAMPLIT\n" : "",

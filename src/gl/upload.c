@@ -110,41 +110,30 @@ static uint32_t fullest_tile(const nebel_gl *gl)
     return most;
 }
 
-/* So many overlapping volumes are walked in full. */
-enum { SURELY_WALKED = 60 };
-
-static void warn_of_turns(nebel_gl *gl)
+/* Of the loops of the fog's text, about, where `listed` volumes of `all` overlap on a ray; each begins and ends. Between
+ * two such places all are read some three times where there are more than slots, seven times where their density varies;
+ * in sunlight each has as many turns again, and the way to the sun is asked for five times; each lamp takes two steps of
+ * eight places, at which all that are there are asked, and all there are on the way to it. */
+static double most_turns_of(const nebel_gl *gl, double listed, double all, double lamps)
 {
-    const int walks = (gl->fog.features & NEBEL_FEATURE_MIXED) != 0 && gl->fog.tile_most > SURELY_WALKED;
-    if (gl->context.most_turns == 0 || gl->has_warned || gl->dims_alone || !walks) return;
-    gl->has_warned = 1;
-    (void)nb_fail(
-        &gl->log, NEBEL_OK,
-        "warning: nebel_gl_set_fog: a tile of the picture lists %u volumes of different light. This driver (%s) ends "
-        "long loops: where more than %d of them overlap on a ray, light behind them is summed in coarser steps, in "
-        "each "
-        "of which they count as evenly mixed. A graphics processor or the CPU renderer has no such bound",
-        (unsigned)gl->fog.tile_most, (const char *)glGetString(GL_RENDERER), (int)SURELY_WALKED);
+    const uint32_t features = gl->fog.features;
+    const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_COVER)) != 0;
+    const double walk = is_walked ? 2 * listed * 8 * listed : 0;
+    const double sunlight = (features & NEBEL_FEATURE_SUN) != 0 ? 4 * listed * (8 * listed + 14 * all) : 0;
+    const double lamplight = (features & NEBEL_FEATURE_LAMPS) != 0 ? lamps * 2 * listed * 16 * (listed + all) : 0;
+    return walk + sunlight + lamplight;
 }
 
-/* Each stretch between the ends of volumes takes some two steps for each lamp, of eight places, at which all volumes of
- * the tile are asked, and all there are on the way to the lamp. How many cells of voxels a ray passes is not known. */
-static void warn_of_lamps(nebel_gl *gl, const nebel_snapshot *snapshot)
+/* How many cells of voxels a ray passes is not known. */
+static int find_crowd(const nebel_gl *gl, const nebel_snapshot *snapshot)
 {
-    const double lamps = (double)nebel_snapshot_lamp_count(snapshot),
-                 all = (double)nebel_snapshot_volume_count(snapshot);
+    const uint32_t lit = NEBEL_FEATURE_SUN | NEBEL_FEATURE_LAMPS | NEBEL_FEATURE_MIXED;
+    const double all = (double)nebel_snapshot_volume_count(snapshot);
     const double listed = gl->fog.tiles != 0 ? (double)gl->fog.tile_most : all;
-    const int voxels = (gl->fog.features & NEBEL_FEATURE_GRID) != 0;
-    const int is_much = voxels || lamps * (2 * listed) * 2 * 8 * (listed + all) > (double)gl->context.most_turns;
-    const int is_lit = (gl->fog.features & NEBEL_FEATURE_LAMPS) != 0 && !gl->dims_alone;
-    if (gl->context.most_turns == 0 || gl->has_warned_of_lamps || !is_lit || !is_much) return;
-    gl->has_warned_of_lamps = 1;
-    (void)nb_fail(
-        &gl->log, NEBEL_OK,
-        "warning: nebel_gl_set_fog: %.0f lamps light up to %.0f volumes on a ray%s. This driver (%s) ends long loops: "
-        "light of lamps that is far behind others' may be missing. A graphics processor or the CPU renderer "
-        "has no such bound",
-        lamps, listed, voxels ? ", some of them voxels" : "", (const char *)glGetString(GL_RENDERER));
+    if (gl->context.most_turns == 0 || gl->dims_alone) return 0;
+    if ((gl->fog.features & NEBEL_FEATURE_GRID) != 0 && (gl->fog.features & lit) != 0) return 1;
+    const double lamps = (double)nebel_snapshot_lamp_count(snapshot);
+    return most_turns_of(gl, listed, all, lamps) > (double)gl->context.most_turns;
 }
 
 /* ---- textures -------------------------------------------------------------------------------- */
@@ -345,8 +334,7 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     }
     if (result == NEBEL_OK) result = upload(gl, has_words ? NULL : snapshot, entry_count);
     keep(&gl->packed, result == NEBEL_OK ? snapshot : NULL);
-    if (result == NEBEL_OK) warn_of_turns(gl);
-    if (result == NEBEL_OK) warn_of_lamps(gl, snapshot);
+    gl->is_crowded = result == NEBEL_OK && find_crowd(gl, snapshot);
     gl->has_fog = result == NEBEL_OK;
     return result;
 }

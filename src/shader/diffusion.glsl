@@ -30,14 +30,17 @@ void nb_add_two_depths(inout nb_two_depths sum, int at, nb_ray ray, nb_stretch s
     sum.scaled += depth * (nb_splat3(1.0) - albedo * NEBEL_WORD(at + NB_MEDIUM_AHEAD).w);
 }
 
-/* Between two places of a ray, where no medium covers another. */
-void nb_add_depths_between(inout nb_two_depths sum, nb_ray ray, int first, int count, bool listed, float from, inout int turns)
+/* From `from` to the end of the ray, of what ranks from `floor` on. */
+void nb_add_depths_between(inout nb_two_depths sum, nb_ray ray, nb_media media, float from, int floor, inout int turns)
 {
-    for (int i = 0; i < count; i++) {
-        int at = nb_medium_at(first + i, listed);
+    for (int i = 0; i < media.count; i++) {
+        int at = nb_medium_at(media.first + i, media.listed);
         int leaves = int(NEBEL_WORD(at + 2).w);
         float t = from;
-        turns++;
+        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_WORD(at).w) == NB_KIND_EXCLUDE)) {
+            turns++;
+            continue;
+        }
         for (int part = 0; part < (NB_HAS(NB_HAS_GROUP) ? leaves : 1); part++) {
             nb_stretch s = nb_next_stretch(at, leaves, ray, t);
             turns += nb_stretch_turns(leaves, s);
@@ -48,49 +51,30 @@ void nb_add_depths_between(inout nb_two_depths sum, nb_ray ray, int first, int c
     }
 }
 
-/* Where some may: see nb_covered_depth. */
-void nb_add_covered_between(inout nb_two_depths sum, nb_ray ray, int first, int count, bool listed, float from, inout int turns)
+/* Where some may cover others: see nb_depth_of. */
+void nb_add_covered_between(inout nb_two_depths sum, nb_ray ray, nb_media media, float from, inout int turns)
 {
     float t = from;
-    float end = ray.t_max;
-    int floor = 0;
-    bool summing = false;
+    nb_ray part = ray;
     while (t < ray.t_max && !nb_is_tired(turns)) {
-        for (int i = 0; i < count; i++) {
-            int at = nb_medium_at(first + i, listed);
-            int leaves = int(NEBEL_WORD(at + 2).w);
-            int flags = int(NEBEL_WORD(at + 1).w);
-            turns++;
-            if (summing && flags / NB_LIGHT_RANK < floor) continue;
-            nb_stretch s = nb_next_stretch(at, leaves, ray, t);
-            turns += nb_stretch_turns(leaves, s);
-            if (!(s.enter < s.leave)) continue;
-            if (!summing) {
-                end = min(end, s.enter > t ? s.enter : s.leave);
-                if (s.enter <= t && (flags & NB_LIGHT_COVERS) != 0) floor = max(floor, flags / NB_LIGHT_RANK);
-            } else if (s.enter <= t && int(NEBEL_WORD(at).w) != NB_KIND_EXCLUDE) {
-                nb_add_two_depths(sum, at, ray, nb_stretch_of(t, end));
-            }
-        }
-        if (summing) {
-            t = end;
-            end = ray.t_max;
-            floor = 0;
-        }
-        summing = !summing;
+        nb_cover cover = nb_cover_at(ray, media, t, turns);
+        part.t_max = cover.end;
+        nb_add_depths_between(sum, part, media, t, cover.floor, turns);
+        t = cover.end;
     }
 }
 
-nb_two_depths nb_depths_between(nb_ray ray, int first, int count, bool listed, float from, float to, inout int turns)
+nb_two_depths nb_depths_between(nb_ray ray, nb_media media, float from, float to, inout int turns)
 {
     nb_two_depths sum;
     sum.whole = nb_splat3(0.0);
     sum.scaled = nb_splat3(0.0);
     ray.t_max = to;
+    if (!NB_HAS(NB_HAS_SEVERAL)) media.count = min(media.count, 1);
     if (NB_HAS(NB_HAS_COVER))
-        nb_add_covered_between(sum, ray, first, count, listed, from, turns);
+        nb_add_covered_between(sum, ray, media, from, turns);
     else
-        nb_add_depths_between(sum, ray, first, NB_HAS(NB_HAS_SEVERAL) ? count : min(count, 1), listed, from, turns);
+        nb_add_depths_between(sum, ray, media, from, 0, turns);
     return sum;
 }
 
@@ -298,7 +282,7 @@ nb_vec3 nb_light_between(nb_vec3 first, nb_vec3 last, nb_vec3 depth)
 #define NB_TURNS_OF_PIECE 8
 
 /* A piece is in one lattice; where it is another one than that of the piece before, and at first, an empty piece looks at it. */
-nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
+nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
 {
     nb_lattice l = nb_lattice_of(int(NEBEL_WORD(NB_HEADER_LATTICE).x));
     nb_turn to_sun = nb_turn_between(ray.direction, nb_to_sun());
@@ -319,7 +303,7 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, int first, int count, bool listed)
         nb_lattice within = nb_lattice_at(l, ray.origin + ray.direction * (t + 0.5 * step));
         float end = within.word == word ? min(t + step, span.y) : t;
         word = within.word;
-        nb_two_depths depth = nb_depths_between(ray, first, count, listed, t, end, turns);
+        nb_two_depths depth = nb_depths_between(ray, media, t, end, turns);
         float left = nb_smallest(nb_exp3(-depth.scaled));
         turns += NB_TURNS_OF_PIECE;
         if (left < NB_THICK_PIECE && halvings < NB_MOST_HALVINGS) {

@@ -178,11 +178,6 @@ nb_piece nb_note_profile(nb_piece piece, nb_profile profile)
     return piece;
 }
 
-bool nb_is_covered(int medium, int floor)
-{
-    return NB_HAS(NB_HAS_COVER) && int(NEBEL_WORD(medium + 1).w) / NB_LIGHT_RANK < floor;
-}
-
 /* Whether a slot's medium is at t and not covered. */
 bool nb_is_there(nb_vec3 slot, nb_piece piece)
 {
@@ -364,9 +359,40 @@ struct nb_gathered {
     nb_vec3 light; /* if nothing attenuated it */
     nb_vec3 radiance;
     nb_vec3 sunlight; /* of the radiance */
-    bool is_cut; /* there was no end to it, and it is all up to here: */
+    bool is_cut; /* there is more behind what it is all up to: */
     float reached;
 };
+
+nb_gathered nb_open_gathered()
+{
+    nb_gathered g;
+    g.depth = nb_splat3(0.0);
+    g.light = nb_splat3(0.0);
+    g.radiance = nb_splat3(0.0);
+    g.sunlight = nb_splat3(0.0);
+    g.is_cut = false;
+    g.reached = 0.0;
+    return g;
+}
+
+void nb_keep_gathered(int count, nb_gathered g)
+{
+    nb_keep(count, 0, g.radiance, g.reached);
+    nb_keep(count, 1, g.depth, 0.0);
+    nb_keep(count, 2, g.light, 0.0);
+    nb_keep(count, 3, g.sunlight, 0.0);
+}
+
+nb_gathered nb_kept_gathered(int count)
+{
+    nb_gathered g = nb_open_gathered();
+    g.radiance = nb_kept_word(count, 0).xyz;
+    g.reached = nb_kept_word(count, 0).w;
+    g.depth = nb_kept_word(count, 1).xyz;
+    g.light = nb_kept_word(count, 2).xyz;
+    g.sunlight = nb_kept_word(count, 3).xyz;
+    return g;
+}
 
 /* Light through what lies before it, if the quotient of light and extinction were the same all along the way. */
 nb_vec3 nb_light_even(nb_vec3 light, nb_vec3 depth, nb_vec3 before)

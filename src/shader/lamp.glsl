@@ -166,11 +166,12 @@ float nb_even_voxels(nb_ray ray, int medium, float t)
     return length;
 }
 
-nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float t, inout int turns)
+/* `end`: it goes no farther. */
+nb_lamp_piece nb_next_piece(nb_ray ray, int first, int count, bool listed, float t, float end, inout int turns)
 {
     nb_lamp_piece piece;
     piece.start = t;
-    piece.end = ray.t_max;
+    piece.end = end;
     piece.floor = 0;
     piece.media = 0;
     piece.crowd = false;
@@ -378,27 +379,80 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
 /* What lamps that are left out may give, of that. */
 #define NB_FAINT_SHARE 0.05
 
-nb_vec3 nb_lamplight(nb_ray ray, int first, int count, bool listed)
+/* How far along a ray light of lamps has been found. */
+struct nb_lamplit {
+    float reached;
+    float most; /* metres that a piece may take; 0: any number */
+    nb_vec3 before; /* depth up to there */
+    nb_vec3 light;
+};
+
+nb_lamplit nb_open_lamplit()
 {
-    nb_vec3 sum = nb_splat3(0.0);
-    nb_vec3 before = nb_splat3(0.0);
+    nb_lamplit l;
+    l.reached = 0.0;
+    l.most = 0.0;
+    l.before = nb_splat3(0.0);
+    l.light = nb_splat3(0.0);
+    return l;
+}
+
+/* Adds a piece. */
+void nb_light_piece(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
+{
     float tolerance = NEBEL_WORD(0).y * NB_LAMP_TOLERANCE;
     int lamps = int(NEBEL_WORD(0).w);
-    int turns = 0;
-    float t = 0.0;
-    nb_grid_turns = 0;
-    while (t < ray.t_max && nb_smallest(before) < NB_OPAQUE && !nb_is_tired(turns + nb_grid_turns)) {
-        nb_lamp_piece piece = nb_next_piece(ray, first, count, listed, t, turns);
-        nb_vec3 drop = nb_exp3(-before) - nb_exp3(-(before + piece.depth));
-        for (int i = 0; i < (piece.scatters ? lamps : 0); i++) {
-            nb_lamp_pass by = nb_pass_lamp(ray, i);
-            float most = nb_most_fluence(by, piece.start, piece.end) * piece.scatter * nb_largest(drop);
-            turns += 1;
-            if (most * float(lamps) <= tolerance * NB_FAINT_SHARE) continue;
-            sum += nb_light_past_lamp(ray, first, listed, piece, by, before, tolerance, turns);
-        }
-        before += piece.depth;
-        t = piece.end;
+    float end = l.most > 0.0 ? min(ray.t_max, l.reached + l.most) : ray.t_max;
+    nb_lamp_piece piece = nb_next_piece(ray, first, count, listed, l.reached, end, turns);
+    nb_vec3 drop = nb_exp3(-l.before) - nb_exp3(-(l.before + piece.depth));
+    for (int i = 0; i < (piece.scatters ? lamps : 0); i++) {
+        nb_lamp_pass by = nb_pass_lamp(ray, i);
+        float most = nb_most_fluence(by, piece.start, piece.end) * piece.scatter * nb_largest(drop);
+        turns += 1;
+        if (most * float(lamps) <= tolerance * NB_FAINT_SHARE) continue;
+        l.light += nb_light_past_lamp(ray, first, listed, piece, by, l.before, tolerance, turns);
     }
-    return sum;
+    l.before += piece.depth;
+    l.reached = piece.end;
+    l.most *= 2.0;
+}
+
+void nb_keep_lamplit(int count, nb_lamplit l)
+{
+    nb_keep(count, 0, l.light, l.reached);
+    nb_keep(count, 1, l.before, l.most);
+}
+
+nb_lamplit nb_kept_lamplit(int count)
+{
+    nb_lamplit l = nb_open_lamplit();
+    l.light = nb_kept_word(count, 0).xyz;
+    l.reached = nb_kept_word(count, 0).w;
+    l.before = nb_kept_word(count, 1).xyz;
+    l.most = nb_kept_word(count, 1).w;
+    return l;
+}
+
+/* As far as turns suffice. In several passes a piece that they do not suffice for is begun again in the next one, shorter if it was the
+ * first. */
+void nb_lamplight(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
+{
+    float from = l.reached;
+    nb_grid_turns = 0;
+    if (NB_RESUMES) nb_keep_lamplit(count, l);
+    while (l.reached < ray.t_max && nb_smallest(l.before) < NB_OPAQUE && !nb_is_tired(turns + nb_grid_turns)) {
+        nb_lamplit before = l;
+        nb_light_piece(l, ray, first, count, listed, turns);
+        if (NB_RESUMES && (nb_is_tired(turns + nb_grid_turns) || !nb_has_loops(count))) {
+            if (before.reached > from) break;
+            float most = before.most > 0.0 ? before.most : l.reached - from;
+            l = before;
+            l.most = 0.25 * (most > 0.0 ? most : 1.0); /* it may be anything where loops were ended */
+            nb_keep_lamplit(count, l);
+            break;
+        }
+        if (NB_RESUMES) nb_keep_lamplit(count, l);
+    }
+    if (NB_RESUMES) l = nb_kept_lamplit(count);
+    turns += nb_grid_turns;
 }

@@ -36,55 +36,74 @@ nb_vec3 nb_depth_to_light_within(int at, nb_ray ray, nb_stretch s, bool to_sun)
     return depth;
 }
 
-/* Where no medium covers another. */
-nb_vec3 nb_added_depth(nb_ray ray, int count, bool to_sun, inout int turns)
+/* The media from `first` on that a depth asks for. */
+struct nb_media {
+    int first, count;
+    bool listed;
+    bool to_sun; /* that is where the ray goes */
+};
+
+/* From `from` to the end of the ray, of what ranks from `floor` on. */
+nb_vec3 nb_added_depth(nb_ray ray, nb_media media, float from, int floor, inout int turns)
 {
     nb_vec3 depth = nb_splat3(0.0);
-    for (int i = 0; i < count; i++) {
-        int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
+    for (int i = 0; i < media.count; i++) {
+        int at = nb_medium_at(media.first + i, media.listed);
         int leaves = int(NEBEL_WORD(at + 2).w);
-        float from = 0.0;
+        float t = from;
+        if (NB_HAS(NB_HAS_COVER) && (nb_is_covered(at, floor) || int(NEBEL_WORD(at).w) == NB_KIND_EXCLUDE)) {
+            turns++;
+            continue;
+        }
         for (int part = 0; part < (NB_HAS(NB_HAS_GROUP) ? leaves : 1); part++) {
-            nb_stretch s = nb_next_stretch(at, leaves, ray, from);
+            nb_stretch s = nb_next_stretch(at, leaves, ray, t);
             turns += nb_stretch_turns(leaves, s);
             if (!(s.enter < s.leave)) break;
-            depth += nb_depth_to_light_within(at, ray, s, to_sun);
-            from = s.leave;
+            depth += nb_depth_to_light_within(at, ray, s, media.to_sun);
+            t = s.leave;
         }
     }
     return depth;
 }
 
-/* Where some may: from event to event, each time first to find the next event and what covers, then to sum. Media come by rank. */
-nb_vec3 nb_covered_depth(nb_ray ray, int count, bool to_sun, inout int turns)
+/* The highest rank that covers at t, and up to where on the ray it is that. */
+struct nb_cover {
+    int floor;
+    float end;
+};
+
+nb_cover nb_cover_at(nb_ray ray, nb_media media, float t, inout int turns)
+{
+    nb_cover cover;
+    cover.floor = 0;
+    cover.end = ray.t_max;
+    for (int i = 0; i < media.count; i++) {
+        int at = nb_medium_at(media.first + i, media.listed);
+        int flags = int(NEBEL_WORD(at + 1).w);
+        turns++;
+        if ((flags & NB_LIGHT_COVERS) == 0) continue;
+        int leaves = int(NEBEL_WORD(at + 2).w);
+        nb_stretch s = nb_next_stretch(at, leaves, ray, t);
+        turns += nb_stretch_turns(leaves, s);
+        if (!(s.enter < s.leave)) continue;
+        cover.end = min(cover.end, s.enter > t ? s.enter : s.leave);
+        if (s.enter <= t) cover.floor = max(cover.floor, flags / NB_LIGHT_RANK);
+    }
+    return cover;
+}
+
+/* Where some may cover others: a sum between each two places where what covers changes. */
+nb_vec3 nb_depth_of(nb_ray ray, nb_media media, inout int turns)
 {
     nb_vec3 depth = nb_splat3(0.0);
     float t = 0.0;
-    float end = ray.t_max;
-    int floor = 0;
-    bool summing = false;
+    nb_ray part = ray;
+    if (!NB_HAS(NB_HAS_COVER)) return nb_added_depth(ray, media, 0.0, 0, turns);
     while (t < ray.t_max) {
-        for (int i = 0; i < count; i++) {
-            int at = NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
-            int leaves = int(NEBEL_WORD(at + 2).w);
-            int flags = int(NEBEL_WORD(at + 1).w);
-            if (summing && flags / NB_LIGHT_RANK < floor) continue;
-            nb_stretch s = nb_next_stretch(at, leaves, ray, t);
-            turns += nb_stretch_turns(leaves, s);
-            if (!(s.enter < s.leave)) continue;
-            if (!summing) {
-                end = min(end, s.enter > t ? s.enter : s.leave);
-                if (s.enter <= t && (flags & NB_LIGHT_COVERS) != 0) floor = max(floor, flags / NB_LIGHT_RANK);
-            } else if (s.enter <= t && int(NEBEL_WORD(at).w) != NB_KIND_EXCLUDE) {
-                depth += nb_depth_to_light_within(at, ray, nb_stretch_of(t, end), to_sun);
-            }
-        }
-        if (summing) {
-            t = end;
-            end = ray.t_max;
-            floor = 0;
-        }
-        summing = !summing;
+        nb_cover cover = nb_cover_at(ray, media, t, turns);
+        part.t_max = cover.end;
+        depth += nb_added_depth(part, media, t, cover.floor, turns);
+        t = cover.end;
     }
     return depth;
 }
@@ -98,7 +117,10 @@ nb_vec3 nb_depth_to_light(nb_vec3 place, nb_vec3 direction, float reach, bool to
     ray.direction = direction;
     ray.t_max = reach;
     ray.from_eye = false;
-    int count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
-    if (NB_HAS(NB_HAS_COVER)) return nb_covered_depth(ray, count, to_sun, turns);
-    return nb_added_depth(ray, count, to_sun, turns);
+    nb_media media;
+    media.first = 0;
+    media.count = NB_HAS(NB_HAS_SEVERAL) ? int(NEBEL_WORD(0).x) : 1;
+    media.listed = false;
+    media.to_sun = to_sun;
+    return nb_depth_of(ray, media, turns);
 }

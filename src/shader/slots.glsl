@@ -1,4 +1,4 @@
-/* The media that a walk along a ray has at hand. fog.glsl follows. */
+/* The media that a walk along a ray has at hand. light.glsl and fog.glsl follow. */
 
 /* The word of the medium that stands at `i` of all media, or of the host's list. */
 int nb_medium_at(int i, bool listed)
@@ -10,6 +10,11 @@ int nb_medium_at(int i, bool listed)
 #else
     return NB_HEADER_WORDS + NB_MEDIUM_WORDS * i;
 #endif
+}
+
+bool nb_is_covered(int medium, int floor)
+{
+    return NB_HAS(NB_HAS_COVER) && int(NEBEL_WORD(medium + 1).w) / NB_LIGHT_RANK < floor;
 }
 
 /* Stretches that the walk keeps at hand, the next ones of their media: enter, leave, the medium's word. The mask keeps drivers from
@@ -61,6 +66,30 @@ bool nb_is_tired(int turns) { return turns >= NEBEL_MOST_TURNS; }
 #else
 #define NB_MAY_TIRE false
 bool nb_is_tired(int turns) { return false; }
+#endif
+
+/* A host that draws a ray in several passes, each from where the one before has come to, defines NEBEL_RESUMES. What is found when the
+ * driver has ended the loops is not kept then; and as variables are anything behind a loop that was ended, what is kept lies in memory:
+ * in an array whose index is no constant. */
+#ifdef NEBEL_RESUMES
+#define NB_RESUMES true
+/* Ended loops run once, whatever they are for. `count` is no constant, so that this one stays. */
+bool nb_has_loops(int count)
+{
+    int turns = 0;
+    for (int i = 0; i < max(2, -count); i++) turns++;
+    return turns > 1;
+}
+
+NB_GLOBAL nb_vec4 nb_kept[8];
+
+void nb_keep(int count, int i, nb_vec3 v, float last) { nb_kept[i + (count < 0 ? 4 : 0)] = nb_vec4(v, last); }
+nb_vec4 nb_kept_word(int count, int i) { return nb_kept[i + (count < 0 ? 4 : 0)]; }
+#else
+#define NB_RESUMES false
+bool nb_has_loops(int count) { return true; }
+void nb_keep(int count, int i, nb_vec3 v, float last) {}
+nb_vec4 nb_kept_word(int count, int i) { return nb_vec4(0.0, 0.0, 0.0, 0.0); }
 #endif
 
 /* How many sums over `count` media are made of a ray that was too much to walk. */

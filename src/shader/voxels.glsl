@@ -97,8 +97,8 @@ nb_vec2 nb_sunlight_from(nb_piece piece, nb_ray ray, float t, bool turns, inout 
 /* What a step bears: optical depth, and change of that to the sun. */
 #define NB_CELL_BEARS 1.0
 
-/* `lit` is the host's last answer. Returns the turns of loops so far. */
-int nb_walk_voxels(inout nb_gathered g, nb_piece piece, nb_ray ray, int used, float tolerance, inout nb_vec2 lit, int turns)
+/* `lit` is the host's last answer. Ends the piece where turns do not suffice for all of it. Returns those so far. */
+int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int used, float tolerance, inout nb_vec2 lit, int turns)
 {
     int at = piece.voxels;
     nb_profile profile = nb_profile_of(at, NB_KIND_GRID, ray, piece.start);
@@ -174,5 +174,6 @@ int nb_walk_voxels(inout nb_gathered g, nb_piece piece, nb_ray ray, int used, fl
         }
         guess = faint || strain < 0.01 ? most : clamp(0.9 * NB_CELL_BEARS / strain * h, t * (4.0 * NB_EPSILON), most);
     }
+    if (NB_MAY_TIRE && t < length) piece.end = piece.start + t;
     return turns;
 }

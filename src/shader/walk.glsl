@@ -81,20 +81,14 @@ nb_gathered nb_pass_rest(nb_gathered g, nb_media_sum all, nb_ray ray, int first,
 }
 
 /* Each turn of the outer loop looks once at all media on the ray: to find the end of the next piece, or to sum a leg within one of
- * varying density. So the shapes and profiles stand in the program once, not once for each purpose. */
-nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
+ * varying density. So the shapes and profiles stand in the program once, not once for each purpose. Goes on
+ * from what `g` has reached. */
+void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed, bool lit, inout int turns)
 {
     float tolerance = NEBEL_WORD(0).y;
-    float t = 0.0;
+    float t = g.reached;
     bool crowd = false;
     bool stepping = false;
-    nb_gathered g;
-    g.depth = nb_splat3(0.0);
-    g.light = nb_splat3(0.0);
-    g.radiance = nb_splat3(0.0);
-    g.sunlight = nb_splat3(0.0);
-    g.is_cut = false;
-    int turns = count; /* of the sums */
     nb_vec2 sunlit = nb_vec2(1.0, 0.0);
     nb_piece piece = nb_open_piece(0.0, 0.0);
     nb_leg leg = nb_open_leg(0.0, 0.0, false, 0);
@@ -103,6 +97,7 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
     window.rest = count;
     window.end = 0.0;
     window.turns = 0;
+    if (NB_RESUMES) nb_keep_gathered(count, g);
     while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
         bool on_leg = NB_HAS(NB_HAS_PROFILE | NB_HAS_SUN) && stepping;
         if (NB_HAS(NB_HAS_SUN) && on_leg && lit && piece.sunlit) {
@@ -152,12 +147,42 @@ nb_gathered nb_walk(nb_ray ray, int first, int count, bool listed, bool lit)
             if (crowd) window.end = t;
             crowd = false;
         }
+        g.reached = t + (stepping ? leg.from : 0.0);
+        if (!nb_has_loops(count)) break;
+        if (NB_RESUMES) nb_keep_gathered(count, g);
     }
+    if (NB_RESUMES) g = nb_kept_gathered(count);
     /* by itself, or because the driver has ended its loops */
-    if (NB_MAY_TIRE) g.is_cut = nb_is_tired(turns) || (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE);
-    g.reached = t + (stepping ? leg.from : 0.0);
-    return g;
+    if (NB_MAY_TIRE) g.is_cut = nb_is_tired(turns) || (g.reached < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE);
 }
+
+/* What is known of a ray, pass after pass. */
+struct nb_progress {
+    int stage;
+    nb_gathered walked;
+    nb_lamplit lamps;
+};
+
+#define NB_STAGE_WALK 0
+#define NB_STAGE_LAMPS 1
+#define NB_STAGE_DIFFUSION 2
+#define NB_STAGE_DONE 3
+
+nb_progress nb_open_progress()
+{
+    nb_progress p;
+    p.stage = NB_STAGE_WALK;
+    p.walked = nb_open_gathered();
+    p.lamps = nb_open_lamplit();
+    return p;
+}
+
+#ifdef NEBEL_RESUMES
+/* A stage that may take many turns begins where most are left. */
+bool nb_is_fresh(int turns) { return turns < NEBEL_MOST_TURNS / 4; }
+#else
+bool nb_is_fresh(int turns) { return true; }
+#endif
 
 /* ---- the face -------------------------------------------------------------------------------- */
 
@@ -170,40 +195,166 @@ nebel_light nb_limit_opacity(nebel_light light, float most)
     return light;
 }
 
-/* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
-nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
-                           bool from_eye)
+/* Goes on with a ray. `last`: what is left of it counts as even. */
+nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bool lit, bool last)
+{
+    int first = media.first;
+    int count = media.count;
+    bool listed = media.listed;
+    int turns = count; /* of the sums */
+    nb_media_sum sum = nb_sum_media(ray, first, count, listed);
+    nb_attenuation attenuation = nb_attenuate(sum.depth);
+    nebel_light light;
+    light.transmittance = attenuation.left;
+    light.in_scattering = sum.light * attenuation.mean;
+    bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
+    bool mixed = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
+    bool walks = lit && (covers || mixed);
+    if (covers && (!lit || (NB_MAY_TIRE && last))) {
+        nb_vec3 depth = nb_depth_of(ray, media, turns);
+        sum.light *= depth / max(sum.depth, nb_splat3(NB_TINY)); /* what is not walked is as bright as all together */
+        sum.depth = depth;
+        light.transmittance = nb_exp3(-depth);
+    }
+    if (walks && p.stage == NB_STAGE_WALK && !(NB_RESUMES && last)) nb_walk(p.walked, ray, first, count, listed, lit, turns);
+    if (walks && p.stage == NB_STAGE_WALK && NB_MAY_TIRE && last && (NB_RESUMES || p.walked.is_cut)) {
+        p.walked = covers ? nb_pass_even(p.walked, sum) : nb_pass_rest(p.walked, sum, ray, first, count, listed);
+        p.walked.is_cut = false;
+    }
+    if (walks) light.in_scattering = p.walked.radiance;
+    if (walks && covers) light.transmittance = nb_exp3(-p.walked.depth);
+    if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LAMPS;
+    if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) {
+        int lamp_turns = NB_RESUMES ? turns : 0;
+        if (p.stage == NB_STAGE_LAMPS && nb_is_fresh(turns) && nb_has_loops(count)) nb_lamplight(p.lamps, ray, first, count, listed, lamp_turns);
+        turns = lamp_turns;
+        light.in_scattering += p.lamps.light;
+        bool is_lit = !(p.lamps.reached < ray.t_max && nb_smallest(p.lamps.before) < NB_OPAQUE);
+        if (p.stage == NB_STAGE_LAMPS && (last || is_lit)) p.stage = NB_STAGE_DIFFUSION;
+    } else if (p.stage == NB_STAGE_LAMPS) {
+        p.stage = NB_STAGE_DIFFUSION;
+    }
+    if (p.stage == NB_STAGE_DIFFUSION && (last || nb_is_fresh(turns))) {
+        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x > 0.0)
+            light.in_scattering = max(light.in_scattering + nb_gather_diffuse(ray, media), nb_splat3(0.0));
+        if (last || nb_has_loops(count)) p.stage = NB_STAGE_DONE;
+    }
+    if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
+    light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
+    return light;
+}
+
+nb_media nb_media_of(int first, int count, bool listed)
+{
+    nb_media media;
+    media.first = first;
+    media.count = count;
+    media.listed = listed;
+    media.to_sun = false;
+    return media;
+}
+
+nb_ray nb_ray_up_to(nb_vec3 origin, nb_vec3 direction, float t_max, bool from_eye)
 {
     nb_ray ray;
     ray.origin = origin;
     ray.direction = direction;
     ray.t_max = min(t_max, NB_FAR);
     ray.from_eye = from_eye;
+    return ray;
+}
+
+bool nb_is_ray(nb_vec3 origin, nb_vec3 direction, float t_max)
+{
+    float square = dot(direction, direction);
+    return t_max > 0.0 && square > 0.0 && nb_is_number(dot(origin, origin) + square + t_max);
+}
+
+nebel_light nb_clear()
+{
     nebel_light light;
     light.transmittance = nb_splat3(1.0);
     light.in_scattering = nb_splat3(0.0);
-    float square = dot(direction, direction);
-    if (t_max > 0.0 && square > 0.0 && nb_is_number(dot(origin, origin) + square + t_max)) {
-        nb_media_sum sum = nb_sum_media(ray, first, count, listed);
-        nb_attenuation attenuation = nb_attenuate(sum.depth);
-        light.transmittance = attenuation.left;
-        light.in_scattering = sum.light * attenuation.mean;
-        bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
-        bool walks = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
-        if (covers || (lit && walks)) {
-            nb_gathered walked = nb_walk(ray, first, count, listed, lit);
-            if (NB_MAY_TIRE && lit && walked.is_cut && !covers) walked = nb_pass_rest(walked, sum, ray, first, count, listed);
-            light.in_scattering = walked.radiance;
-            if (covers) light.transmittance = nb_exp3(-walked.depth);
-        }
-        if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) light.in_scattering += nb_lamplight(ray, first, count, listed);
-        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x > 0.0)
-            light.in_scattering = max(light.in_scattering + nb_gather_diffuse(ray, first, count, listed), nb_splat3(0.0));
-        if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
-        light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
+    return light;
+}
+
+/* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
+nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
+                           bool from_eye)
+{
+    nebel_light light = nb_clear();
+    if (nb_is_ray(origin, direction, t_max)) {
+        nb_progress progress = nb_open_progress();
+        nb_ray ray = nb_ray_up_to(origin, direction, t_max, from_eye);
+        light = nb_trace_further(progress, ray, nb_media_of(first, count, listed), lit, true);
     }
     return light;
 }
+
+#ifdef NEBEL_RESUMES
+/* How far a ray has come, in words from pass to pass; all 0 at first. First of them: light or what there is of it, and up to where;
+ * second: transmittance or depth, and the stage. */
+#define NB_PROGRESS_WORDS 4
+struct nb_progress_words {
+    nb_vec4 word[NB_PROGRESS_WORDS];
+};
+
+bool nb_is_done(nb_progress_words words) { return int(words.word[1].w) == NB_STAGE_DONE; }
+
+/* The walk's light and depth go on with the ray; the rest of a stage's words is its own. */
+nb_progress nb_read_progress(nb_progress_words words)
+{
+    nb_progress p = nb_open_progress();
+    p.stage = int(words.word[1].w);
+    p.walked.depth = words.word[1].xyz;
+    if (p.stage == NB_STAGE_WALK) {
+        p.walked.radiance = words.word[0].xyz;
+        p.walked.reached = words.word[0].w;
+        p.walked.light = words.word[2].xyz;
+        p.walked.sunlight = words.word[3].xyz;
+    } else {
+        p.walked.radiance = words.word[3].xyz;
+        p.lamps.light = words.word[0].xyz;
+        p.lamps.reached = words.word[0].w;
+        p.lamps.before = words.word[2].xyz;
+        p.lamps.most = words.word[2].w;
+    }
+    return p;
+}
+
+nb_progress_words nb_write_progress(nb_progress p, nebel_light light)
+{
+    nb_progress_words words;
+    if (p.stage == NB_STAGE_DONE) {
+        words.word[0] = nb_vec4(light.in_scattering, 0.0);
+        words.word[1] = nb_vec4(light.transmittance, float(p.stage));
+        words.word[2] = nb_vec4(0.0, 0.0, 0.0, 0.0);
+        words.word[3] = words.word[2];
+    } else if (p.stage == NB_STAGE_WALK) {
+        words.word[0] = nb_vec4(p.walked.radiance, p.walked.reached);
+        words.word[1] = nb_vec4(p.walked.depth, float(p.stage));
+        words.word[2] = nb_vec4(p.walked.light, 0.0);
+        words.word[3] = nb_vec4(p.walked.sunlight, 0.0);
+    } else {
+        words.word[0] = nb_vec4(p.lamps.light, p.lamps.reached);
+        words.word[1] = nb_vec4(p.walked.depth, float(p.stage));
+        words.word[2] = nb_vec4(p.lamps.before, p.lamps.most);
+        words.word[3] = nb_vec4(p.walked.radiance, 0.0);
+    }
+    return words;
+}
+
+nb_progress_words nb_resume(nb_progress_words words, nb_vec3 origin, nb_vec3 direction, float t_max, nb_media media, bool last)
+{
+    nebel_light light = nb_clear();
+    nb_progress progress = nb_read_progress(words);
+    if (nb_is_ray(origin, direction, t_max))
+        light = nb_trace_further(progress, nb_ray_up_to(origin, direction, t_max, true), media, true, last);
+    else
+        progress.stage = NB_STAGE_DONE;
+    return nb_write_progress(progress, light);
+}
+#endif
 
 nebel_light nebel_trace(nb_vec3 origin, nb_vec3 direction, float t_max)
 {
