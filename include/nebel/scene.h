@@ -144,7 +144,7 @@ typedef struct nebel_scene_data {
     double sun_direction[3];       /* towards the sun, unit length */
     double sun_irradiance[3];      /* on a surface that faces it, before any fog */
     size_t sun_key_count;          /* 0: the sun stands still */
-    const nebel_sun_key *sun_keys; /* ascending frames; the sun above is the section's own until the scene is lit by another */
+    const nebel_sun_key *sun_keys; /* ascending frames; until a frame is lit, the sun above is the section's */
     double ambient[3];             /* radiance, the same from everywhere, */
     nebel_environment environment; /* or where it is not CONSTANT this in its place; a map is the scene's */
     const char *environment_file;  /* of a map, as it is opened; NULL: none */
