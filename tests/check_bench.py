@@ -76,7 +76,7 @@ class BenchTest(unittest.TestCase):
             self.skipTest("built without OpenGL")
         self.assertEqual(done.returncode, 0, done.stderr)
         figures = json.loads(self.file.read_text())["figures"]
-        self.assertEqual([figure["floor"]["name"] for figure in figures], 3 * ["a copy of the picture"])
+        self.assertEqual([figure["floor"]["name"] for figure in figures], 4 * ["a copy of the picture"])
 
     def test_wrong_calls(self):
         for words in (["--group", "nothing"], ["scene.json"], ["--fast"], ["--device", "none"],
