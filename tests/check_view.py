@@ -62,6 +62,21 @@ class CameraTest(ViewTest):
         self.assertTrue(self.same(first, viewer.take_picture(), ROUNDING))
         viewer.end()
 
+    def test_a_slow_turn_loses_no_events(self):
+        """The wheel goes as far back as forth, while the viewer can take nothing."""
+        viewer = Viewer(self)
+        first = viewer.take_picture()
+        viewer.xdotool("mousemove", "--window", viewer.window, 500, 300)
+        viewer.settle()
+        for buttons in ((4,), (5,), (5, 4)):
+            viewer.process.send_signal(signal.SIGSTOP)
+            for button in buttons:
+                viewer.xdotool("click", "--repeat", 50, "--delay", 2, button)
+            viewer.process.send_signal(signal.SIGCONT)
+            viewer.settle()
+            self.assertEqual(self.same(first, viewer.take_picture(), ROUNDING), buttons != (4,))
+        viewer.end()
+
     def test_the_window_changes_its_size(self):
         viewer = Viewer(self)
         viewer.take_picture()

@@ -188,7 +188,8 @@ void nb_hands_move(nb_hands *hands, nb_window *window, nebel_camera *camera, nb_
         keys |= hands->keys_down;
     }
     window->event_count -= taken;
-    memmove(window->events, window->events + taken, (size_t)window->event_count * sizeof *window->events);
+    if (taken > 0)
+        memmove(window->events, window->events + taken, (size_t)window->event_count * sizeof *window->events);
     fly(hands, keys, window, camera);
 }
 

@@ -8,6 +8,7 @@
 #include <GLFW/glfw3.h>
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Where nothing happens a turn is this long [s]: often enough to see that the file has changed. */
@@ -25,7 +26,18 @@ static nb_window *find_window(GLFWwindow *handle)
  * ----------------------------------------------------------------------------------------------------------
  */
 
-/* Motions that follow each other are one. Where more wait than fit, the latest are lost. */
+static int make_room(nb_window *window)
+{
+    const int wanted = window->event_capacity > 0 ? 2 * window->event_capacity : 64;
+    if (window->event_count < window->event_capacity) return 0;
+    nb_window_event *const larger = realloc(window->events, (size_t)wanted * sizeof *larger);
+    if (larger == NULL) return -1;
+    window->events = larger;
+    window->event_capacity = wanted;
+    return 0;
+}
+
+/* Motions that follow each other are one. Where memory is out the latest events are lost. */
 static void add_event(GLFWwindow *handle, nb_window_event event)
 {
     nb_window *const window = find_window(handle);
@@ -33,7 +45,7 @@ static void add_event(GLFWwindow *handle, nb_window_event event)
     nb_window_event *const last = window->event_count > 0 ? &window->events[window->event_count - 1] : NULL;
     if (event.kind == NB_WINDOW_MOTION && last != NULL && last->kind == NB_WINDOW_MOTION) {
         *last = event;
-    } else if (window->event_count < NB_WINDOW_EVENTS) {
+    } else if (make_room(window) == 0) {
         window->events[window->event_count++] = event;
     }
 }
@@ -169,7 +181,10 @@ void nb_window_close(nb_window *window)
 {
     if (window->handle == NULL) return;
     glfwDestroyWindow(window->handle);
+    free(window->events);
     window->handle = NULL;
+    window->events = NULL;
+    window->event_count = window->event_capacity = 0;
 }
 
 /* ---- turns

@@ -19,8 +19,6 @@ typedef struct nb_window_event {
     double x, y;         /* of the cursor, in the window's coordinates; of the wheel, notches */
 } nb_window_event;
 
-enum { NB_WINDOW_EVENTS = 64 };
-
 typedef struct nb_window {
     void *handle; /* GLFWwindow */
     int has_panel;
@@ -29,8 +27,8 @@ typedef struct nb_window {
     double time;                   /* s */
     double elapsed;                /* s since the turn before */
     int was_resized;
-    nb_window_event events[NB_WINDOW_EVENTS]; /* that wait; who takes them sets event_count to 0 */
-    int event_count;
+    nb_window_event *events; /* that wait, as many as a slow turn brings; who takes them leaves event_count */
+    int event_count, event_capacity;
     double cursor_x, cursor_y; /* after the events so far: where the cursor is by now says nothing about a press */
     int news;                  /* events since the turn began */
     int awake;                 /* turns that do not wait */
