@@ -306,6 +306,18 @@ class PlanetTest(FilmTest):
         self.assertTrue(self.same(viewer.take_picture(), first, ROUNDING))
         viewer.end()
 
+    def test_fog_stands_in_the_shadow_of_clouds(self):
+        """Which the wind has moved by the next frame."""
+        sun = {"direction": [0, 1, 0.2], "irradiance": 4}
+        fog = {"shape": {"type": "box", "min": [-500, 0, -900], "max": [500, 800, -100]}, "extinction": 0.002, "albedo": 0.9}
+        planet = {"model": "physical", "preset": "earth", "clouds": [{"wind": [500, 0]}]}
+        camera = {"position": [0, 30, 0], "look_at": [0, 40, -100], "vertical_fov": 25}
+        viewer = self.open([fog], camera=camera, sun=sun, planet=planet, ambient=0)
+        first = self.assert_frame(viewer, 0, "cpu", BOTH_DRAW)
+        viewer.type("frame", "9")
+        self.assertFalse(self.same(self.assert_frame(viewer, 9, "cpu", BOTH_DRAW), first, 0.02), "another shadow")
+        viewer.end()
+
     def test_a_planet_of_layers_turns(self):
         camera = {"position": [0, 0, 0], "look_at": [0, 0, -1], "vertical_fov": 25}
         planet = {"model": "layers", "center": [0, 0, -500], "radius": 300, "day": 400, "clouds": [{"height": 10, "day": -300}]}

@@ -109,7 +109,7 @@ static void test_fog_has_their_shadow(void **state)
         "\"physical\", \"clouds\": [{\"wind\": [500, 0]}]}, \"fog\": [{\"shape\": {\"type\": \"sphere\", \"center\": "
         "[0, 10, 0], \"radius\": 5}, \"extinction\": 0.01, \"albedo\": 1}]}");
     const nebel_ray ray = {{0, 10, 9}, {0, 0, -1}, 20};
-    double darkest = HUGE_VAL, brightest = 0;
+    double darkest = HUGE_VAL, brightest = 0, per_sunlight = 0;
     assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
     for (int frame = 0; frame < 24; frame++) {
         nebel_snapshot *fog;
@@ -118,9 +118,20 @@ static void test_fog_has_their_shadow(void **state)
         assert_int_equal(nebel_trace(fog, NULL, 1, &ray, sizeof ray, &light, sizeof light), NEBEL_OK);
         darkest = fmin(darkest, light.in_scattering[1]);
         brightest = fmax(brightest, light.in_scattering[1]);
+        /* What a caller who makes fog of its own asks for. */
+        nebel_sun sunlight;
+        assert_int_equal(nebel_find_scene_sunlight(scene, frame, &sunlight), NEBEL_OK);
+        if (frame == 0) per_sunlight = light.in_scattering[1] / sunlight.irradiance[1];
+        assert_near(light.in_scattering[1], per_sunlight * sunlight.irradiance[1], 1e-6);
+        assert_true(sunlight.irradiance[1] < 3 * nebel_scene_contents(scene)->planets->sun_left[1] * (1 + 1e-12));
         nebel_release_snapshot(fog);
     }
     assert_true(darkest > 0 && brightest > 2.5 * darkest);
+    nebel_sun untouched = {{1, 2, 3}, {4, 5, 6}};
+    assert_int_equal(nebel_find_scene_sunlight(scene, 1e13, &untouched), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_find_scene_sunlight(NULL, 0, &untouched), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_find_scene_sunlight(scene, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_vector(untouched.irradiance, 4, 5, 6);
     nebel_destroy_scene(scene);
 }
 

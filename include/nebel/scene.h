@@ -254,6 +254,12 @@ nebel_result nebel_light_scene_at(nebel_scene *scene, double frame);
  * finite, without a direction, or of less than no light. */
 nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun);
 
+/* The light of the sun that fog of a snapshot has: of the sun of the contents what the planets' air, their shadows and, as
+ * the wind has moved them until the frame, their clouds leave at the scene's origin. Without a sun one of no light. Where
+ * there are clouds, some 10 ms. Errors: ARGUMENT, MEMORY, VALUE (a frame beyond 1e12, with clouds); *sunlight is then
+ * untouched. */
+nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight);
+
 /* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
 nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);

@@ -184,14 +184,16 @@ static nebel_result shade_origin(const nebel_scene *scene, double frame, float *
     return result;
 }
 
-nebel_result nb_planet_sun_left(const nebel_scene *scene, double frame, double left[3])
+nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight)
 {
     float part = 1;
-    nebel_result result = NEBEL_OK;
-    if (scene->clouds != NULL) result = shade_origin(scene, frame, &part);
-    for (int c = 0; c < 3; c++)
-        left[c] = scene->atmospheres[0] != NULL ? (double)part * scene->planets->sun_left[c] : 1;
-    return result;
+    if (scene == NULL || sunlight == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result result = scene->clouds != NULL ? shade_origin(scene, frame, &part) : NEBEL_OK;
+    if (result != NEBEL_OK) return result;
+    *sunlight = sun_of(&scene->data);
+    for (int c = 0; c < 3 && scene->atmospheres[0] != NULL; c++)
+        sunlight->irradiance[c] *= (double)part * scene->planets->sun_left[c];
+    return NEBEL_OK;
 }
 
 static nebel_result load_layers(nebel_scene *scene)

@@ -370,13 +370,9 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
     *snapshot = NULL;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
-    memcpy(desc.sun.direction, scene->data.sun_direction, sizeof desc.sun.direction);
-    memcpy(desc.sun.irradiance, scene->data.sun_irradiance, sizeof desc.sun.irradiance);
-    double left[3];
-    nebel_result result = nb_planet_sun_left(scene, frame, left);
-    if (result != NEBEL_OK) return result;
-    for (int c = 0; c < 3; c++) desc.sun.irradiance[c] *= left[c];
     desc.max_opacity = scene->data.max_opacity;
+    nebel_result result = nebel_find_scene_sunlight(scene, frame, &desc.sun);
+    if (result != NEBEL_OK) return result;
     result = nebel_create_fog(&desc, &fog);
     if (result == NEBEL_OK && scene->data.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
         result = nebel_set_environment(fog, &scene->data.environment);

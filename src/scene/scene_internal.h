@@ -131,9 +131,6 @@ bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc);
-/* What the planet's air and clouds leave of the sun at the scene's origin. Errors: MEMORY, VALUE (frame). */
-nebel_result nb_planet_sun_left(const nebel_scene *scene, double frame, double left[3]);
-
 bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet);
 
 /* A picture as a map of 1 or 3 channels, which the scene owns; and the seed of noise. */

@@ -20,7 +20,7 @@ static nebel_result fail_memory(const nb_draft *draft)
  * -------------------------------------------------------------------------------------------------------------
  */
 
-/* The sky, and what a planet's air leaves of the sun, as light_scene has made them. */
+/* The sky, as light_scene has made it. */
 static const nebel_scene_data *find_light(const nb_draft *draft)
 {
     return nebel_scene_contents(draft->scene);
@@ -38,15 +38,6 @@ static nebel_sun find_sun(const nb_draft *draft, const nb_edition *edition)
     return sun;
 }
 
-/* What the air of a planet leaves of it. */
-static nebel_sun sun_of(const nb_draft *draft, const nb_edition *edition)
-{
-    const nebel_scene_data *const light = find_light(draft);
-    nebel_sun sun = find_sun(draft, edition);
-    for (int c = 0; c < 3 && light->planet_count > 0; c++) sun.irradiance[c] *= light->planets[0].sun_left[c];
-    return sun;
-}
-
 /* The scene's direction has been made a unit one, which rounds it. */
 static int is_lit_by(const nebel_scene_data *scene, int has_sun, const nebel_sun *sun)
 {
@@ -56,7 +47,7 @@ static int is_lit_by(const nebel_scene_data *scene, int has_sun, const nebel_sun
     return memcmp(scene->sun_irradiance, sun->irradiance, sizeof sun->irradiance) == 0;
 }
 
-/* Nobody may render the scene meanwhile. */
+/* Before the fog is made or changed. Nobody may render the scene meanwhile. */
 static nebel_result light_scene(nb_draft *draft, const nb_edition *edition)
 {
     const nebel_sun sun = find_sun(draft, edition);
@@ -89,17 +80,17 @@ void nb_draft_show(nb_draft *draft)
     memcpy(data->sun_irradiance, sun.irradiance, sizeof sun.irradiance);
 }
 
+/* Also where it fails the fog is the caller's. */
 static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
-    desc.sun = sun_of(draft, edition);
     const nebel_scene_data *const file = nebel_scene_contents(draft->file);
-    nebel_result result = nebel_create_fog(&desc, fog);
+    nebel_result result = nebel_find_scene_sunlight(draft->scene, draft->frame, &desc.sun);
+    if (result == NEBEL_OK) result = nebel_create_fog(&desc, fog);
     const nebel_environment environment = nb_edition_environment(edition, find_light(draft)->environment.map);
     if (result == NEBEL_OK) result = nebel_set_environment(*fog, &environment);
     if (result == NEBEL_OK) result = nebel_set_lamps(*fog, edition->lamp_count, edition->lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
-    if (result != NEBEL_OK) nebel_destroy_fog(*fog);
     return result;
 }
 
@@ -205,7 +196,8 @@ static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_
         if (has_changed(draft, &was->volumes[i], &now->volumes[i])) result = change_volume(draft, now, i);
     const nebel_environment environment = nb_edition_environment(now, find_light(draft)->environment.map);
     if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
-    const nebel_sun sun = sun_of(draft, now);
+    nebel_sun sun;
+    if (result == NEBEL_OK) result = nebel_find_scene_sunlight(draft->scene, draft->frame, &sun);
     if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
     if (result == NEBEL_OK) result = nebel_set_lamps(draft->fog, now->lamp_count, now->lamps);
     if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);
