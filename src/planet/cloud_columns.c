@@ -50,16 +50,25 @@ static nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, int fac
     const nb_cloud_layer *of = &clouds->layers[layer];
     nb_grid grid = {.layer = layer, .level = level};
     grid.key = UINT32_C(0x80000000) | (uint32_t)(level * NEBEL_MAX_CLOUD_LAYERS + layer) << 3 | (uint32_t)face;
-    const double times = (double)(UINT64_C(1) << level);
+    const double times = (double)(INT64_C(1) << level);
     grid.wide = (double)of->grid * times;
     grid.spacing = of->spacing * times;
-    grid.per_spacing = of->per_spacing / times;
+    grid.per_spacing = of->per_spacing * (0x1p-40 * (double)(INT64_C(1) << (40 - level)));
     return grid;
 }
 
+/* Tables hold 4 x 4 neighbours one behind the other, which share lines of the processor's cache. */
 static uint32_t hash_of(uint32_t key, int x, int y)
 {
-    return nb_mix_bits(key + (uint32_t)x * UINT32_C(0x9e3779b1) + (uint32_t)y * UINT32_C(0x85ebca77));
+    const uint32_t tile_x = (uint32_t)x >> 2, tile_y = (uint32_t)y >> 2;
+    const uint32_t tile = nb_mix_bits(key + tile_x * UINT32_C(0x9e3779b1) + tile_y * UINT32_C(0x85ebca77));
+    return tile << 4 | ((uint32_t)y & 3) << 2 | ((uint32_t)x & 3);
+}
+
+static double whole_below(double x)
+{
+    const double toward_zero = (double)(int64_t)x;
+    return toward_zero - (toward_zero > x);
 }
 
 static const nb_cloud_column *point_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int x, int y)
@@ -86,7 +95,7 @@ static void read_grid(nebel_cloud_workspace *workspace, int layer, const nb_cube
 {
     const nb_grid grid = grid_of(workspace->view->clouds, layer, level, place->face);
     const double per = grid.per_spacing, x = place->at[0] * per, y = place->at[1] * per;
-    const double left = floor(x), low = floor(y);
+    const double left = whole_below(x), low = whole_below(y);
     const float u = (float)(x - left), v = (float)(y - low);
     const nb_cloud_patch *patch = patch_at(workspace, &grid, (int)left, (int)low);
     for (int k = 0; k < 4; k++) {
@@ -105,8 +114,8 @@ static int levels_of(const nb_cloud_layer *layer, float width, float *part)
     int exponent = 0;
     *part = 0;
     if (!(wide > 0.75f)) return 0;
-    const float mantissa = frexpf(fminf(wide, 1e9f), &exponent); /* 0.5 to 1 */
-    *part = fmaxf(0, 4 * (mantissa - 0.75f));
+    const float mantissa = frexpf(nb_smaller(wide, 1e9f), &exponent); /* 0.5 to 1 */
+    *part = nb_larger(0, 4 * (mantissa - 0.75f));
     return exponent;
 }
 
@@ -134,52 +143,57 @@ static float block_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int
     float most = -HUGE_VALF;
     if (size > 0) {
         for (int i = 0; i < BLOCKS * BLOCKS; i++)
-            most = fmaxf(most, block_at(workspace, grid, size - 1, x * BLOCKS + i % BLOCKS, y * BLOCKS + i / BLOCKS));
+            most =
+                nb_larger(most, block_at(workspace, grid, size - 1, x * BLOCKS + i % BLOCKS, y * BLOCKS + i / BLOCKS));
     } else {
         for (int i = 0; i < (POINTS + 1) * (POINTS + 1); i++) {
             const nb_cloud_column *column =
                 point_at(workspace, grid, x * POINTS + i % (POINTS + 1), y * POINTS + i / (POINTS + 1));
-            most = fmaxf(most, column->rank + sqrtf(3 * column->variance));
+            most = nb_larger(most, column->rank + sqrtf(3 * column->variance));
         }
     }
     *block = (nb_cloud_block){.key = key, .at = {x, y}, .most = most};
     return most;
 }
 
-/* How far a ray goes until its place on a face passes one of two lines. */
-static double way_to(const double place[3], const double direction[3], int axis, int across, double low, double high)
-{
-    double way = HUGE_VAL;
-    for (int i = 0; i < 2; i++) {
-        const double edge = i == 0 ? low : high;
-        const double ahead = (edge * place[axis] - place[across]) / (direction[across] - edge * direction[axis]);
-        if (ahead > 0) way = fmin(way, ahead);
-    }
-    return way;
-}
-
 /* Beyond a face's edge there are points, too: blocks that lie across need no more than others. */
-float nb_cloud_most_rank(nebel_cloud_workspace *workspace, int layer, int size, const double place[3],
-                         const double direction[3], float width, double *way)
+nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                   const double direction[3], float width)
 {
-    const nebel_clouds *clouds = workspace->view->clouds;
     const nb_cube_place at = cube_of(place);
     const int axis = at.face / 2, across[2] = {axis == 0, axis == 2 ? 1 : 2};
     const double sign = at.face & 1 ? -1 : 1;
-    float part, most = -HUGE_VALF;
-    const int level = levels_of(&clouds->layers[layer], width, &part);
+    nb_cloud_outlook out = {
+        .layer = layer, .face = at.face, .over = sign * place[axis], .rise = sign * direction[axis]};
+    out.level = levels_of(&workspace->view->clouds->layers[layer], width, &out.part);
+    for (int i = 0; i < 2; i++) {
+        out.at[i] = at.at[i];
+        out.place[i] = place[across[i]];
+        out.direction[i] = direction[across[i]];
+        /* A place on a face moves one way along all of a ray. */
+        out.grows[i] = out.direction[i] * out.over > out.place[i] * out.rise;
+    }
+    return out;
+}
+
+float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way)
+{
+    static const double sides[3] = {POINTS, POINTS * BLOCKS, POINTS * BLOCKS * BLOCKS};
+    float most = -HUGE_VALF;
     *way = HUGE_VAL;
     for (int k = 0; k < 2; k++) {
-        if (k == 0 ? part >= 1 : part <= 0) continue;
-        const nb_grid grid = grid_of(clouds, layer, level + k, at.face);
-        const double side = grid.spacing * POINTS * (size > 1 ? BLOCKS * BLOCKS : size > 0 ? BLOCKS : 1);
+        if (k == 0 ? out->part >= 1 : out->part <= 0) continue;
+        const nb_grid grid = grid_of(workspace->view->clouds, out->layer, out->level + k, out->face);
+        const double side = grid.spacing * sides[size], per_side = grid.per_spacing * (1 / sides[size]);
         int block[2];
         for (int i = 0; i < 2; i++) {
-            const double low = floor(at.at[i] / side);
+            const double low = whole_below(out->at[i] * per_side), edge = (low + out->grows[i]) * side;
+            const double ahead = (edge * out->over - out->place[i]) / (out->direction[i] - edge * out->rise);
+            if (ahead > 0 && ahead < *way) *way = ahead;
             block[i] = (int)low;
-            *way = fmin(*way, way_to(place, direction, axis, across[i], sign * low * side, sign * (low + 1) * side));
         }
-        most = fmaxf(most, block_at(workspace, &grid, size, block[0], block[1]));
+        const float here = block_at(workspace, &grid, size, block[0], block[1]);
+        if (here > most) most = here;
     }
     return most;
 }

@@ -109,7 +109,7 @@ static float billow_at(const int at[3])
         sum += weight * (1 - distance_to_point(cells, place));
         weight *= 0.5f;
     }
-    return fminf(1, fmaxf(0, sum / 1.75f));
+    return nb_smaller(1, nb_larger(0, sum / 1.75f));
 }
 
 static void halve(const float *fine, int size, float *coarse)
@@ -174,7 +174,7 @@ static float read_level(const nb_cloud_noise *noise, const double place[3], int 
 /* Levels blend over the last quarter before the next. */
 static inline float next_part(float level, int low)
 {
-    return fmaxf(0, 4 * (level - (float)low) - 3);
+    return nb_larger(0, 4 * (level - (float)low) - 3);
 }
 
 float nb_billows_lost(const nb_cloud_noise *noise, float level)

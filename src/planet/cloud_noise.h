@@ -12,6 +12,17 @@ enum {
     NB_BILLOW_CELLS = 4,  /* the largest billows, before they repeat */
 };
 
+/* Of numbers; fminf and fmaxf are calls. */
+static inline float nb_smaller(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float nb_larger(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 typedef struct nb_cloud_noise {
     uint8_t *turns; /* [z][y][x]: which direction */
     float (*directions)[4];

@@ -88,10 +88,22 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
 
 /* nb_cloud_column_at and nb_cloud_at, linear between columns that are found once. */
 nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double unit[3], float width);
-/* No column that a ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts variance in. Place and direction in
- * the layer's axes. */
-float nb_cloud_most_rank(nebel_cloud_workspace *workspace, int layer, int size, const double place[3],
-                         const double direction[3], float width, double *way);
+
+/* A place of a ray on a face of the cube, on which blocks of columns are. */
+typedef struct nb_cloud_outlook {
+    int layer, face, level;
+    float part;                           /* of the next level */
+    double over, rise;                    /* along the face's axis: of the place, of the direction */
+    double at[2], place[2], direction[2]; /* across; at: on the face */
+    int grows[2];                         /* whether that does */
+} nb_cloud_outlook;
+
+/* Place and direction in the layer's axes. */
+nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
+                                   const double direction[3], float width);
+/* No column that the ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts
+ * variance in. */
+float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way);
 float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
 
 nebel_result nb_cloud_light_make(nebel_cloud_view *view);

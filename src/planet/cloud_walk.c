@@ -43,15 +43,20 @@ typedef struct nb_stretch {
     double weight, moment;               /* of places by what is seen */
 } nb_stretch;
 
+/* A ray in a layer's axes. */
+typedef struct nb_turned {
+    double from[3], direction[3];
+} nb_turned;
+
 typedef struct nb_walk {
     const nebel_cloud_view *view;
     nebel_cloud_workspace *workspace;
     double from[3], unit[3], spread; /* from the planet's centre */
     double least;                    /* m, of pieces that are not yet known to be smooth */
     nb_cloud_ray ray;
-    double turned[NEBEL_MAX_CLOUD_LAYERS][3]; /* the direction in layers' axes */
-    int layer;                                /* the only one here */
-    double depth, apart;                      /* so far: optical depths, of all scattering and of what leads away */
+    nb_turned turned[NEBEL_MAX_CLOUD_LAYERS];
+    int layer;           /* the only one here */
+    double depth, apart; /* so far: optical depths, of all scattering and of what leads away */
     double light[3], missed;
     nb_stretch stretch;
     nebel_cloud_knots *knots;
@@ -72,34 +77,34 @@ typedef struct nb_spot {
 static nb_spot spot_at(const nb_walk *walk, int k, double t)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    double place[3];
-    nb_spot spot = {.radius = radius_at(walk, t, place), .width = (float)(walk->spread * t)};
+    const nb_turned *turned = &walk->turned[k];
+    nb_spot spot = {.width = (float)(walk->spread * t)};
+    for (int i = 0; i < 3; i++) spot.place[i] = turned->from[i] + t * turned->direction[i];
+    spot.radius = nb_vector_length(spot.place);
     const double per = 1 / spot.radius;
-    for (int i = 0; i < 3; i++) {
-        spot.place[i] = nb_vector_dot(walk->view->poses[k].turn[i], place);
-        spot.unit[i] = spot.place[i] * per;
-    }
+    for (int i = 0; i < 3; i++) spot.unit[i] = spot.place[i] * per;
     spot.height = (float)(spot.radius - layer->low) * layer->per_thickness;
     return spot;
 }
 
-/* *clear: where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first
+/* *clear, if asked: where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first
  * scales, whatever the others do. */
 static nb_cloud_seen extinction_of(const nb_walk *walk, int k, const nb_spot *spot, double *clear)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     float missing[NB_CLOUD_BILLOWS + 1];
     nb_cloud_drops drops;
-    *clear = 0;
+    if (clear != NULL) *clear = 0;
     if (!(spot->height > 0 && spot->height < 1)) return (nb_cloud_seen){0, 0};
     const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->unit, spot->width);
     if (nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing,
                            &drops))
         return nb_cloud_through(layer, &drops, HIDDEN_LENGTH * spot->width, walk->ray.apart[k]);
-    const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k])) * layer->per_thickness;
+    if (clear == NULL) return (nb_cloud_seen){0, 0};
+    const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k].direction)) * layer->per_thickness;
     float slope = layer->slope * column.scale + NB_CLOUD_RANK_SLOPE * climb;
     for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
-        *clear = fmax(*clear, (double)(missing[n] / slope));
+        *clear = nb_max(*clear, (double)(missing[n] / slope));
         slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
     }
     return (nb_cloud_seen){0, 0};
@@ -108,30 +113,34 @@ static nb_cloud_seen extinction_of(const nb_walk *walk, int k, const nb_spot *sp
 static nb_cloud_seen look(const nb_walk *walk, int k, double t)
 {
     const nb_spot spot = spot_at(walk, k, t);
-    double clear;
-    return extinction_of(walk, k, &spot, &clear);
+    return extinction_of(walk, k, &spot, NULL);
 }
 
 /* The least rank on the way between two places: curves of rays sag below the line between their heights. */
 static float least_between(const nb_walk *walk, int k, const nb_spot *a, double way)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    const double climb = nb_vector_dot(a->place, walk->turned[k]) / a->radius, sag = way * way / a->radius;
+    const double climb = nb_vector_dot(a->unit, walk->turned[k].direction), sag = way * way / a->radius;
     const float end = a->height + (float)(climb * way) * layer->per_thickness;
-    const float low = fminf(a->height, end) - (float)sag * layer->per_thickness;
-    const float high = fmaxf(a->height, end) + (float)sag * layer->per_thickness;
-    if (layer->kind == NEBEL_CLOUD_CUMULUS) return nb_cloud_least_rank(layer, fmaxf(0, low));
+    const float low = nb_smaller(a->height, end) - (float)sag * layer->per_thickness;
+    const float high = nb_larger(a->height, end) + (float)sag * layer->per_thickness;
+    if (layer->kind == NEBEL_CLOUD_CUMULUS) return nb_cloud_least_rank(layer, nb_larger(0, low));
     return low < 0.5f && high > 0.5f ? 0 : nb_cloud_least_rank(layer, high <= 0.5f ? high : low);
 }
 
-/* How far ahead there is no cloud for sure; 0 where that is not known, and then *unknown is how far it is not. */
-static double clear_way(const nb_walk *walk, int k, const nb_spot *spot, double *unknown)
+/* How far ahead there is no cloud for sure; 0 where that is not known. unknown: up to where it is not, of blocks by size; they
+ * are not asked again before that. */
+static double clear_way(const nb_walk *walk, int k, const nb_spot *spot, double t, double unknown[3])
 {
+    const nb_cloud_outlook out =
+        nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
     for (int size = 2; size >= 0; size--) {
-        const float most =
-            nb_cloud_most_rank(walk->workspace, k, size, spot->place, walk->turned[k], spot->width, unknown);
-        *unknown += 1e-3 * walk->least;
-        if (least_between(walk, k, spot, *unknown) >= most) return *unknown;
+        double way;
+        if (t < unknown[size]) continue;
+        const float most = nb_cloud_most_rank(walk->workspace, &out, size, &way);
+        way += 1e-3 * walk->least;
+        if (least_between(walk, k, spot, way) >= most) return way;
+        unknown[size] = t + way;
     }
     return 0;
 }
@@ -214,21 +223,19 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
 /* Goes on until there is cloud, by as much as there can be none, or by the least step. */
 static double skip(const nb_walk *walk, int k, double t, double end, nb_cloud_seen *far, double *length)
 {
-    double clear = 0, known = 0; /* up to where no block is clear */
+    double clear = 0, unknown[3] = {0, 0, 0};
     nb_spot spot = spot_at(walk, k, t);
     while (t < end) {
-        if (t >= known) {
-            double unknown;
-            const double way = clear_way(walk, k, &spot, &unknown);
+        if (t >= unknown[0]) {
+            const double way = clear_way(walk, k, &spot, t, unknown);
             if (way > 0) {
                 t += way;
                 spot = spot_at(walk, k, t);
                 clear = 0;
                 continue;
             }
-            known = t + unknown;
         }
-        *length = fmin(end - t, fmax(clear / SLOPE_PART, fmax(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
+        *length = nb_min(end - t, nb_max(clear / SLOPE_PART, nb_max(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
         spot = spot_at(walk, k, t + *length);
         *far = extinction_of(walk, k, &spot, &clear);
         if (far->whole > 0) return t;
@@ -250,12 +257,12 @@ static void walk_layer(nb_walk *walk, int k, double begin, double end)
             has_far = 1;
             if (!(t < end)) return;
         }
-        length = fmin(length, end - t);
+        length = nb_min(length, end - t);
         if (!has_far) far = look(walk, k, t + length);
         const nb_cloud_seen middle = look(walk, k, t + 0.5 * length);
         const double depth = length / 6 * (double)(here.whole + 4 * middle.whole + far.whole);
         const double depth_apart = length / 6 * (double)(here.apart + 4 * middle.apart + far.apart);
-        const double seen = nb_exp(-walk->depth), least = fmax(0.25 * walk->spread * t, 1e-3 * walk->least);
+        const double seen = nb_exp(-walk->depth), least = nb_max(0.25 * walk->spread * t, 1e-3 * walk->least);
         const double missed = seen * length / 6 * fabs((double)(here.whole - 2 * middle.whole + far.whole));
         has_far = 1;
         if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + seen)) && length > 2 * least) {
@@ -269,7 +276,7 @@ static void walk_layer(nb_walk *walk, int k, double begin, double end)
         t += length;
         here = far;
         if (missed < 0.2 * tolerance) length *= 1.7;
-        length = fmin(length, 8 * walk->least + 0.01 * t);
+        length = nb_min(length, 8 * walk->least + 0.01 * t);
     }
 }
 
@@ -319,7 +326,11 @@ static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     memcpy(walk.unit, unit, sizeof walk.unit);
     walk.ray = nb_cloud_ray_make(workspace->view, unit);
     for (int k = 0; k < workspace->view->clouds->layer_count; k++)
-        for (int i = 0; i < 3; i++) walk.turned[k][i] = nb_vector_dot(workspace->view->poses[k].turn[i], unit);
+        for (int i = 0; i < 3; i++) {
+            const double *turn = workspace->view->poses[k].turn[i];
+            walk.turned[k].from[i] = nb_vector_dot(turn, walk.from);
+            walk.turned[k].direction[i] = nb_vector_dot(turn, unit);
+        }
     knots->count = 0;
     knots->error = 0;
     const double end = fmin(ray->t_max, to_ground(atmosphere->airs.radius, walk.from, unit));

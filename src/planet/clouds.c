@@ -46,7 +46,7 @@ static void turn(const double by[3][3], const double v[3], double out[3])
 /* The part of an octave that is seen where pixels are `width` wide. */
 static float share_of(float width, float cell)
 {
-    return fminf(1, fmaxf(0, 2 - 2 * width / cell));
+    return nb_smaller(1, nb_larger(0, 2 - 2 * width / cell));
 }
 
 static float octave_at(const nb_cloud_noise *noise, const nb_cloud_octave *octave, const double place[3])
@@ -100,7 +100,7 @@ static float weather_at(const nb_cloud_layer *layer, const double unit[3], float
 
 static float rank_of(const nb_cloud_layer *layer, float part)
 {
-    const float place = fminf(1, fmaxf(0, part)) * (NB_CLOUD_RANKS - 1);
+    const float place = nb_smaller(1, nb_larger(0, part)) * (NB_CLOUD_RANKS - 1);
     const int low = place < NB_CLOUD_RANKS - 2 ? (int)place : NB_CLOUD_RANKS - 2;
     return layer->ranks[low] + (place - (float)low) * (layer->ranks[low + 1] - layer->ranks[low]);
 }
@@ -124,7 +124,7 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
 
 static float step_up(float x)
 {
-    const float u = fminf(1, fmaxf(0, x));
+    const float u = nb_smaller(1, nb_larger(0, x));
     return u * u * (3 - 2 * u);
 }
 
@@ -148,7 +148,7 @@ static float thin_out(const nb_cloud_layer *layer, float height)
 {
     const float end = step_up(10 * (1 - height));
     if (layer->kind != NEBEL_CLOUD_CUMULUS) return end * step_up(6 * height);
-    return end * step_up(16 * height) * (0.45f + 0.55f * fminf(1, 2 * height));
+    return end * step_up(16 * height) * (0.45f + 0.55f * nb_smaller(1, 2 * height));
 }
 
 /* Integral of x held within 0 and 1. */
@@ -161,7 +161,7 @@ static float ramp_integral(float x)
 /* The mean of x held within 0 and 1 where all within `wide` of x is as likely. */
 static float mean_ramp(float x, float wide)
 {
-    if (wide < 1e-3f) return fminf(1, fmaxf(0, x));
+    if (wide < 1e-3f) return nb_smaller(1, nb_larger(0, x));
     return (ramp_integral(x + wide) - ramp_integral(x - wide)) / (2 * wide);
 }
 
@@ -171,7 +171,7 @@ static void set_levels(const nb_cloud_layer *layer, float width, float levels[NB
     const float finest = width * NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
     const float last = finest > 1 ? log2f(finest) : 0;
     for (int k = 0; k < NB_CLOUD_BILLOWS; k++)
-        levels[k] = fmaxf(0, last - (float)(NB_CLOUD_BILLOWS - 1 - k) * LOG2_BILLOW_RATIO);
+        levels[k] = nb_larger(0, last - (float)(NB_CLOUD_BILLOWS - 1 - k) * LOG2_BILLOW_RATIO);
 }
 
 static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int scale, const double place[3],
@@ -197,7 +197,7 @@ int nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
     set_missing(missing, 0, -whole - sqrtf(3 * column->variance));
     if (missing[0] >= 0) return 0;
     const float deep =
-        layer->kind == NEBEL_CLOUD_CUMULUS ? layer->detail * (0.5f + 0.5f * fminf(1, 3 * height)) : layer->detail;
+        layer->kind == NEBEL_CLOUD_CUMULUS ? layer->detail * (0.5f + 0.5f * nb_smaller(1, 3 * height)) : layer->detail;
     float variance = column->variance, levels[NB_CLOUD_BILLOWS], cut = 0;
     /* What is far within is whole. */
     if (deep > 0 && whole - deep < softness + sqrtf(3 * variance)) {
@@ -229,20 +229,20 @@ float nb_cloud_mean(const nb_cloud_drops *drops)
 static double mean_left(const nb_cloud_drops *drops, double depth)
 {
     const double low = (double)(drops->part - drops->spread), high = (double)(drops->part + drops->spread);
-    const double clear = fmax(0, -low) - fmax(0, -high), full = fmax(0, high - 1) - fmax(0, low - 1);
-    const double from = nb_exp(-depth * fmax(0, fmin(1, low))), to = nb_exp(-depth * fmax(0, fmin(1, high)));
+    const double clear = nb_max(0, -low) - nb_max(0, -high), full = nb_max(0, high - 1) - nb_max(0, low - 1);
+    const double from = nb_exp(-depth * nb_max(0, nb_min(1, low))), to = nb_exp(-depth * nb_max(0, nb_min(1, high)));
     return (clear + (from - to) / depth + full * nb_exp(-depth)) / (high - low);
 }
 
 /* Never more than the mean, whatever is too little for a number. */
 static float through(const nb_cloud_drops *drops, float depth, float length, float mean)
 {
-    return fminf(mean, (float)-nb_log(mean_left(drops, (double)depth)) / length);
+    return nb_smaller(mean, (float)-nb_log(mean_left(drops, (double)depth)) / length);
 }
 
 nb_cloud_seen nb_cloud_through(const nb_cloud_layer *layer, const nb_cloud_drops *drops, float length, float apart)
 {
-    const float bounded = fminf(length, layer->hidden), depth = drops->most * bounded, mean = nb_cloud_mean(drops);
+    const float bounded = nb_smaller(length, layer->hidden), depth = drops->most * bounded, mean = nb_cloud_mean(drops);
     const int is_full = drops->part - drops->spread >= 1;
     /* Then the mean is right to a thousandth of what a full place has. */
     const int is_even = drops->spread < 1e-3f || !(depth * drops->spread * drops->spread > 6e-3f);
