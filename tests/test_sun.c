@@ -435,70 +435,136 @@ static double chord(const nebel_shape *ball, const double p[3], const double d[3
     return fmax(fmin(middle + sqrt(square), far) - fmax(middle - sqrt(square), 0), 0);
 }
 
-/* The midpoint rule in `count` steps, every optical depth by chords: isotropic, of one channel. */
-static double light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_ray *ray, int c, int count)
+/* What a light brings to a place, and from where: the direction there, how far it is, irradiance per irradiance or intensity of the
+ * light. */
+typedef struct arrival {
+    double towards[3], distance, fluence;
+} arrival;
+
+/* The sun's where `lamp` is NULL. A lamp is a ball that shines alike from everywhere: radiance 1 / (pi r^2) times its solid angle. */
+static arrival light_arrives(const nebel_lamp *lamp, const double p[3])
 {
-    const double step = ray->t_max / count;
-    double light = 0;
+    arrival a = {.distance = 1e9, .fluence = 1};
+    memcpy(a.towards, sun_of_balls, sizeof sun_of_balls);
+    if (lamp == NULL) return a;
+    for (int k = 0; k < 3; k++) a.towards[k] = lamp->position[k] - p[k];
+    const double apart = sqrt(dot(a.towards, a.towards)), sine = fmin(lamp->radius / apart, 1);
+    for (int k = 0; k < 3; k++) a.towards[k] /= apart;
+    a.distance = fmax(apart - lamp->radius, 0);
+    a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (lamp->radius * lamp->radius);
+    return a;
+}
+
+/* What brute force finds, and by how much it may be off where light begins or ends within a step. */
+typedef struct forced {
+    double light, jumps;
+} forced;
+
+/* The midpoint rule in `count` steps, every optical depth by chords: isotropic, of one channel. */
+static forced light_by_force(const nebel_volume_desc *balls, size_t ball_count, const nebel_lamp *lamp,
+                             const nebel_ray *ray, int c, int count)
+{
+    const double step = ray->t_max / count, scale = (lamp != NULL ? lamp->intensity[c] : 1) * step / (4 * acos(-1));
+    double before = 0;
+    forced sum = {0, 0};
     for (int i = 0; i < count; i++) {
         const double t = (i + 0.5) * step;
         double depth = 0, glow = 0, p[3];
         for (int k = 0; k < 3; k++) p[k] = ray->origin[k] + t * ray->direction[k];
+        const arrival from = light_arrives(lamp, p);
         for (size_t k = 0; k < ball_count; k++) {
             const nebel_volume_desc *v = &balls[k];
             const nebel_shape *ball = &v->shape;
             const double apart[3] = {p[0] - ball->center[0], p[1] - ball->center[1], p[2] - ball->center[2]};
-            depth +=
-                v->extinction[c] * (chord(ball, ray->origin, ray->direction, t) + chord(ball, p, sun_of_balls, 1e9));
+            depth += v->extinction[c] *
+                     (chord(ball, ray->origin, ray->direction, t) + chord(ball, p, from.towards, from.distance));
             if (dot(apart, apart) < ball->radius * ball->radius) glow += v->extinction[c] * v->albedo[c];
         }
-        light += glow * exp(-depth) * step;
+        sum.light += glow * from.fluence * exp(-depth) * scale;
+        sum.jumps += fabs(glow - before) * from.fluence * exp(-depth) * scale;
+        before = glow;
     }
-    return light / (4 * acos(-1));
+    return sum;
+}
+
+/* Balls over each other, together `thick` times as dense. */
+static void strew_balls(nebel_volume_desc *balls, size_t count, double thick, uint64_t *numbers)
+{
+    for (size_t i = 0; i < count; i++) {
+        balls[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = dice(numbers, 2, 6)},
+                                       .albedo = {1, 0.9, 0.8}};
+        for (int c = 0; c < 3; c++) {
+            balls[i].shape.center[c] = dice(numbers, -5, 5);
+            balls[i].extinction[c] = thick * dice(numbers, 0.1, 1) / (double)count;
+        }
+    }
+}
+
+/* Through balls about the origin. */
+static void strew_rays(nebel_ray *rays, int count, uint64_t *numbers)
+{
+    for (int i = 0; i < count; i++) {
+        rays[i] = (nebel_ray){.origin = {dice(numbers, -4, 4), dice(numbers, -4, 4), -12}, .t_max = 24};
+        const double lean = dice(numbers, -0.3, 0.3), size = sqrt(1 + lean * lean);
+        rays[i].direction[0] = lean / size;
+        rays[i].direction[2] = 1 / size;
+    }
+}
+
+/* `most`: what the light may be off by at a tolerance of 1e-5. */
+static void expect_brute_force(const nebel_fog_desc *desc, const nebel_lamp *lamp, size_t count, double thick,
+                               double most)
+{
+    static nebel_volume_desc balls[MOST_BALLS];
+    uint64_t numbers = 31 + count;
+    nebel_ray rays[RAYS];
+    nebel_light lights[RAYS];
+    nebel_fog *made = NULL;
+    nebel_snapshot *snapshot = NULL;
+    strew_balls(balls, count, thick, &numbers);
+    strew_rays(rays, RAYS, &numbers);
+    assert_int_equal(nebel_create_fog(desc, &made), NEBEL_OK);
+    for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(made, &balls[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(made, lamp != NULL, lamp), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(made, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(made);
+    for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+        const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-5};
+        trace(snapshot, &asked, rays, lights);
+        if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(snapshot, &asked, rays, lights);
+        for (int i = 0; i < BALL_RAYS; i++) {
+            const int c = i % 3;
+            const forced fine = light_by_force(balls, count, lamp, &rays[i], c, HALVES);
+            const double halved = light_by_force(balls, count, lamp, &rays[i], c, HALVES / 2).light;
+            const double off = fabs(fine.light - halved) + fine.jumps;
+            assert_true(fine.light > 50 * most && off < most / 2);
+            assert_true(fabs(lights[i].in_scattering[c] - fine.light) <= lights[i].error + off);
+            assert_true(fabs(lights[i].in_scattering[c] - fine.light) < most);
+        }
+    }
+    nebel_release_snapshot(snapshot);
 }
 
 /* Balls over each other, each in the shadow of the others: few that are asked one by one, and many that a tree finds. */
 static void many_balls_are_what_brute_force_finds(void **state)
 {
-    static const size_t counts[] = {20, 40, MOST_BALLS};
+    nebel_fog_desc sunny = {.sun = {.irradiance = {1, 1, 1}}};
     (void)state;
-    for (size_t n = 0; n < sizeof counts / sizeof counts[0]; n++) {
-        static nebel_volume_desc balls[MOST_BALLS];
-        uint64_t numbers = 31 + n;
-        nebel_ray rays[RAYS];
-        nebel_light lights[RAYS];
-        nebel_fog_desc desc = {.sun = {.irradiance = {1, 1, 1}}};
-        memcpy(desc.sun.direction, sun_of_balls, sizeof sun_of_balls);
-        for (size_t i = 0; i < counts[n]; i++) {
-            balls[i] = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = dice(&numbers, 2, 6)},
-                                           .albedo = {1, 0.9, 0.8}};
-            for (int c = 0; c < 3; c++) {
-                balls[i].shape.center[c] = dice(&numbers, -5, 5);
-                balls[i].extinction[c] = dice(&numbers, 0.1, 1) / (double)counts[n];
-            }
-        }
-        for (int i = 0; i < RAYS; i++) {
-            rays[i] = (nebel_ray){.origin = {dice(&numbers, -4, 4), dice(&numbers, -4, 4), -12}, .t_max = 24};
-            const double lean = dice(&numbers, -0.3, 0.3), size = sqrt(1 + lean * lean);
-            rays[i].direction[0] = lean / size;
-            rays[i].direction[2] = 1 / size;
-        }
-        nebel_snapshot *snapshot = fog_commit(&desc, balls, counts[n]);
-        for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-            const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-5};
-            trace(snapshot, &asked, rays, lights);
-            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(snapshot, &asked, rays, lights);
-            for (int i = 0; i < BALL_RAYS; i++) {
-                const int c = i % 3;
-                const double fine = light_by_force(balls, counts[n], &rays[i], c, HALVES);
-                const double off = fabs(fine - light_by_force(balls, counts[n], &rays[i], c, HALVES / 2));
-                assert_true(fine > 0.01 && off < 1e-5);
-                assert_true(fabs(lights[i].in_scattering[c] - fine) <= lights[i].error + off);
-                assert_true(fabs(lights[i].in_scattering[c] - fine) < 3e-5);
-            }
-        }
-        nebel_release_snapshot(snapshot);
-    }
+    memcpy(sunny.sun.direction, sun_of_balls, sizeof sun_of_balls);
+    expect_brute_force(&sunny, NULL, 20, 1, 3e-5);
+    expect_brute_force(&sunny, NULL, 40, 1, 3e-5);
+    expect_brute_force(&sunny, NULL, MOST_BALLS, 1, 3e-5);
+}
+
+/* So bright and so thick that rounding of transmittance is more light than the tolerance: steps that were halved for it
+ * came to thousands. */
+static void many_balls_around_lamps_are_what_brute_force_finds(void **state)
+{
+    const nebel_lamp dim = {.position = {3, 4, -2}, .intensity = {40, 40, 40}, .radius = 0.2};
+    const nebel_lamp bright = {.position = {-4, 3, 3}, .intensity = {2000, 2000, 2000}, .radius = 0.2};
+    (void)state;
+    expect_brute_force(&(nebel_fog_desc){0}, &dim, 20, 1, 1e-4);
+    expect_brute_force(&(nebel_fog_desc){0}, &bright, 40, 3, 4e-4);
 }
 
 /* ---- rules ----------------------------------------------------------------------------------- */
@@ -639,6 +705,7 @@ int main(void)
         cmocka_unit_test(pieces_are_the_same_in_any_set_and_split),
         cmocka_unit_test(closed_forms_are_what_marches_find),
         cmocka_unit_test(many_balls_are_what_brute_force_finds),
+        cmocka_unit_test(many_balls_around_lamps_are_what_brute_force_finds),
         cmocka_unit_test(suns_are_checked),
         cmocka_unit_test(sunlit_fog_is_bounded),
         cmocka_unit_test(endless_fog_is_answered),

@@ -105,15 +105,14 @@ static sun_node lamp_node(sunlight *sun, const march *m, const piece *p, const g
 /* ---- steps ----------------------------------------------------------------------------------- */
 
 /* As limit_step, by the most that the lamp brings to the step. */
-static void limit_lamp_step(const lamp_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
+static void limit_lamp_step(const march *m, const lamp_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
 {
     const nb_real most = most_fluence(pass, s->start, end) * pass->scatter;
     s->drop = NB_F(0.0);
     for (int c = 0; c < 3; c++) {
         const nb_real drop = nb_max(before[c] - s->behind[c], NB_F(0.0));
-        const nb_real unseen = nb_abs(s->taken[c] - drop) - NB_F(8.0) * NB_EPSILON * before[c]; /* beyond rounding */
         s->drop = nb_max(s->drop, drop);
-        s->error = nb_max(s->error, most * unseen);
+        s->error = nb_max(s->error, most * unseen_loss(m, s, before[c], drop, c));
     }
     s->error = nb_min(s->error, most * s->drop);
 }
@@ -136,7 +135,7 @@ static void step_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass,
     const sun_origin from = origin_of(along, w);
     end_step(m, &from.p, &from.before, end, &s);
     sum_light_nodes(sun, m, &from.p, &from.before, w->lanes, &s);
-    limit_lamp_step(pass, w->before, end, &s);
+    limit_lamp_step(m, pass, w->before, end, &s);
     const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
     const nb_real length = nb_narrow(end - w->t) / along->whole;
     const nb_real allowed = least + REAL(pass->share) * (NB_F(0.5) * s.drop + NB_F(0.25) * length / along->pieces +

@@ -474,6 +474,16 @@ static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const
     finish_rule(&sum, s);
 }
 
+/* What the rule may miss of the loss of transmittance over the step, beyond the rounding of both: that of depths is of
+ * each medium that they are summed from. */
+static nb_real unseen_loss(const march *m, const sun_step *s, nb_real before, nb_real drop, int c)
+{
+    nb_real terms = NB_F(4.0);
+    for (size_t i = m->present_first; i < m->present_end; i++)
+        terms = terms + nb_select(present(m, i)->inside, NB_F(1.0), NB_F(0.0));
+    return nb_abs(s->taken[c] - drop) - before * (NB_EPSILON * (NB_F(8.0) + terms * s->depth[c]));
+}
+
 /* Sunlight is never more than full sunlight gives: the most radiant medium's times the loss of transmittance. A better
  * bound than the rule's for steps that hardly take light away. And where the rule does not see that loss it has passed
  * over what takes it. */
@@ -493,8 +503,7 @@ static void limit_step(const march *m, const nb_real before[3], sun_step *s)
         s->light[c] = nb_min(s->light[c], most[c] * drop);
         s->drop = nb_max(s->drop, drop);
         crude = nb_max(crude, most[c] * drop);
-        const nb_real unseen = nb_abs(s->taken[c] - drop) - NB_F(8.0) * NB_EPSILON * before[c]; /* beyond rounding */
-        s->error = nb_max(s->error, most[c] * unseen);
+        s->error = nb_max(s->error, most[c] * unseen_loss(m, s, before[c], drop, c));
     }
     s->error = nb_min(s->error, crude);
 }
