@@ -306,6 +306,51 @@ class PlanetTest(FilmTest):
         self.assertTrue(self.same(viewer.take_picture(), first, ROUNDING))
         viewer.end()
 
+    def test_air_of_a_planet_has_other_numbers(self):
+        """The picture is that of a file that has them, before it is saved; what has not changed stays as it stands there."""
+        sun = {"direction": [0, 0.2, 0.8], "irradiance": 4}
+        scene = {"camera": {"position": [0, 30, 0], "look_at": [0, 60, -100], "vertical_fov": 25},
+                 "planet": {"model": "physical", "preset": "earth"}}
+        viewer = self.open([], sun=sun, **scene)
+        before = self.scene.read_text()
+        first = viewer.take_picture()
+        viewer.press("Planet")
+        viewer.press("planet[0].airs[1].open")
+        viewer.type("planet[0].airs[1].density", "0.0001", 0.1)
+        hazy = viewer.take_picture()
+        self.assertFalse(self.same(hazy, first, 0.02))
+        viewer.type("planet[0].ground albedo", "0.75", 0.1)
+        changed = viewer.take_picture()
+        planet = viewer.save()["planet"]
+        self.assertEqual(planet.keys(), {"model", "preset", "ground_albedo", "airs"})
+        self.assertEqual(planet["ground_albedo"][0], 0.75)
+        self.assertEqual([air["type"] for air in planet["airs"]], ["exponential", "exponential", "layer"])
+        self.assertGreater(planet["airs"][1]["scattering"], 1e-5)
+        self.assert_frame(viewer, 0, "gl", BOTH_DRAW)
+        self.assertTrue(self.same(changed, self.folder / "film-gl-0.png", BOTH_DRAW))
+        for _ in range(2):
+            viewer.key("ctrl+z")
+            viewer.settle()
+        self.assertTrue(self.same(viewer.take_picture(), first, ROUNDING))
+        self.assertNotEqual(self.scene.read_text(), before)
+        viewer.say(LEAVING, lambda: viewer.key("ctrl+q"))
+        viewer.end()
+
+    def test_clouds_have_other_numbers(self):
+        """Those that cannot be are undone, and the window says why."""
+        planet = {"model": "physical", "preset": "earth", "clouds": [{}]}
+        camera = {"position": [0, 30, 0], "look_at": [0, 80, -100], "vertical_fov": 25}
+        viewer = self.open([], camera=camera, sun={"direction": [0, 1, 0.2], "irradiance": 4}, planet=planet)
+        first = viewer.take_picture()
+        viewer.press("Planet")
+        viewer.press("planet[0].clouds[0].open")
+        viewer.say("top: must be above the base", lambda: viewer.type("planet[0].clouds[0].top", "500"))
+        viewer.type("planet[0].clouds[0].coverage", "0.9")
+        self.assertFalse(self.same(viewer.take_picture(), first, 0.05))
+        self.assertEqual(viewer.save()["planet"], {**planet, "clouds": [{"coverage": 0.9}]})
+        self.assert_frame(viewer, 0, "cpu", BOTH_DRAW)
+        viewer.end()
+
     def test_fog_stands_in_the_shadow_of_clouds(self):
         """Which the wind has moved by the next frame."""
         sun = {"direction": [0, 1, 0.2], "irradiance": 4}
@@ -327,6 +372,17 @@ class PlanetTest(FilmTest):
         self.assertFalse(self.same(self.assert_frame(viewer, 150, "cpu", BOTH_DRAW), first, 0.1))
         self.assert_frame(viewer, 150, "gl")
         self.assertNotIn("--device", viewer.log.read_text())
+        viewer.press("Time")
+        viewer.press("Planet")
+        viewer.type("planet[0].day", "300")
+        viewer.type("planet[0].air brightness", "0")
+        viewer.press("planet[0].clouds[0].open")
+        viewer.type("planet[0].clouds[0].gain", "1.5")
+        changed = viewer.take_picture()
+        wanted = {**planet, "day": 300, "air": {"brightness": 0}, "clouds": [{**planet["clouds"][0], "gain": 1.5}]}
+        self.assertEqual(viewer.save()["planet"], wanted)
+        self.assert_frame(viewer, 150, "gl")
+        self.assertTrue(self.same(changed, self.folder / "film-gl-150.png", ROUNDING))
         viewer.end()
 
 

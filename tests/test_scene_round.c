@@ -33,6 +33,7 @@ typedef struct change {
     float table[NEBEL_CURVE_ENTRIES];
     nebel_model models[MOST];
     nebel_lamp lamps[MOST];
+    nebel_planet planets[NEBEL_MAX_PLANETS];
     nebel_camera_key camera_keys[MOST];
     char names[3 * MOST][32];
     int name_count;
@@ -269,6 +270,64 @@ static void change_lamps(change *c)
     c->data.lamps = c->lamps;
 }
 
+static void change_air(nebel_air *air)
+{
+    for (int k = 0; k < 3; k++) {
+        air->scattering[k] = air->scattering[k] / 2 + 1e-6;
+        air->absorption[k] = air->absorption[k] / 2 + 1e-7 * k;
+    }
+    air->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = air->phase.g / 2 + .25};
+    if (air->profile == NEBEL_AIR_EXPONENTIAL) air->scale_height *= 1.5;
+    if (air->profile == NEBEL_AIR_LAYER) air->center *= .75, air->width *= .75;
+}
+
+/* Of layers that are one above the other, all of them, so that they stay apart. */
+static void change_cloud(const nebel_planet *planet, nebel_cloud_layer *layer)
+{
+    assert_int_equal(nebel_resolve_cloud_layer(planet->air.thickness, layer, NULL, layer), NEBEL_OK);
+    layer->base *= .75;
+    layer->top *= .75;
+    layer->coverage /= 2;
+    layer->extinction /= 2;
+    layer->size *= 2;
+    layer->detail = layer->detail == NEBEL_CLOUD_NONE ? .5 : NEBEL_CLOUD_NONE;
+    layer->variation = layer->variation == NEBEL_CLOUD_NONE ? .25 : NEBEL_CLOUD_NONE;
+    layer->diameter = 30;
+    layer->wind[0] += 5;
+    layer->wind[1] -= 7;
+}
+
+static void change_layers(nebel_layers_desc *desc)
+{
+    desc->day += 12;
+    desc->coverage = .375;
+    desc->air.height = desc->radius / 16;
+    desc->air.is_absent = !desc->air.is_absent;
+    desc->air.brightness = desc->air.is_absent ? 0 : .75;
+    for (uint32_t i = 0; i < desc->cloud_count; i++) {
+        nebel_cloud_shell *shell = &desc->clouds[i];
+        shell->height = desc->radius / 64 * (i + 1);
+        shell->day -= 3;
+        shell->gain = .25;
+        shell->coverage = .625;
+        for (int k = 0; k < 3; k++) shell->color[k] = .125 * (k + 1), shell->wrap[k] = k + 2;
+    }
+}
+
+static void change_planets(change *c)
+{
+    for (size_t i = 0; i < c->data.planet_count; i++) {
+        nebel_planet *planet = &c->planets[i];
+        *planet = c->data.planets[i];
+        dim(planet->air.ground_albedo);
+        planet->sun_diameter += .25;
+        for (uint32_t k = 0; k < planet->air.air_count; k++) change_air(&planet->air.airs[k]);
+        for (uint32_t k = 0; k < planet->cloud_layer_count; k++) change_cloud(planet, &planet->cloud_layers[k]);
+        change_layers(&planet->shells);
+    }
+    c->data.planets = c->planets;
+}
+
 static void change_all(change *c)
 {
     nebel_scene_data *data = &c->data;
@@ -279,6 +338,7 @@ static void change_all(change *c)
     change_camera(c);
     change_models(c);
     change_lamps(c);
+    change_planets(c);
     dim(data->background);
     dim(data->ambient);
     dim(data->environment.zenith);
@@ -497,6 +557,71 @@ static void same_lamps(const nebel_scene_data *a, const nebel_scene_data *b)
     }
 }
 
+static void same_air(const nebel_air *a, const nebel_air *b)
+{
+    WHOLE(a->profile, b->profile);
+    SAME(&a->scattering, &b->scattering);
+    SAME(&a->absorption, &b->absorption);
+    WHOLE(a->phase.type, b->phase.type);
+    SAME(&a->phase.g, &b->phase.g);
+    SAME(&a->scale_height, &b->scale_height);
+    SAME(&a->center, &b->center);
+    SAME(&a->width, &b->width);
+}
+
+static void same_clouds(const nebel_cloud_layer *a, const nebel_cloud_layer *b)
+{
+    WHOLE(a->kind, b->kind);
+    WHOLE(a->seed, b->seed);
+    SAME(&a->base, &b->base);
+    SAME(&a->top, &b->top);
+    SAME(&a->coverage, &b->coverage);
+    SAME(&a->extinction, &b->extinction);
+    SAME(&a->size, &b->size);
+    SAME(&a->detail, &b->detail);
+    SAME(&a->variation, &b->variation);
+    SAME(&a->diameter, &b->diameter);
+    SAME(&a->wind, &b->wind);
+}
+
+static void same_shells(const nebel_layers_desc *a, const nebel_layers_desc *b)
+{
+    SAME(&a->day, &b->day);
+    SAME(&a->coverage, &b->coverage);
+    SAME(&a->air.height, &b->air.height);
+    SAME(&a->air.brightness, &b->air.brightness);
+    WHOLE(a->air.is_absent, b->air.is_absent);
+    WHOLE(a->cloud_count, b->cloud_count);
+    for (uint32_t i = 0; i < a->cloud_count; i++) {
+        const nebel_cloud_shell *x = &a->clouds[i], *y = &b->clouds[i];
+        SAME(&x->height, &y->height);
+        SAME(&x->day, &y->day);
+        SAME(&x->color, &y->color);
+        SAME(&x->wrap, &y->wrap);
+        SAME(&x->gain, &y->gain);
+        SAME(&x->coverage, &y->coverage);
+    }
+}
+
+static void same_planets(const nebel_scene_data *a, const nebel_scene_data *b)
+{
+    WHOLE(a->planet_count, b->planet_count);
+    for (size_t i = 0; i < a->planet_count; i++) {
+        const nebel_planet *x = &a->planets[i], *y = &b->planets[i];
+        WHOLE(x->model, y->model);
+        if (x->model == NEBEL_PLANET_LAYERS) {
+            same_shells(&x->shells, &y->shells);
+            continue;
+        }
+        SAME(&x->air.ground_albedo, &y->air.ground_albedo);
+        SAME(&x->sun_diameter, &y->sun_diameter);
+        WHOLE(x->air.air_count, y->air.air_count);
+        for (uint32_t k = 0; k < x->air.air_count; k++) same_air(&x->air.airs[k], &y->air.airs[k]);
+        WHOLE(x->cloud_layer_count, y->cloud_layer_count);
+        for (uint32_t k = 0; k < x->cloud_layer_count; k++) same_clouds(&x->cloud_layers[k], &y->cloud_layers[k]);
+    }
+}
+
 static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     same_camera(a, b);
@@ -518,6 +643,7 @@ static void same_data(const nebel_scene_data *a, const nebel_scene_data *b)
     same_cells(a, b);
     same_models(a, b);
     same_lamps(a, b);
+    same_planets(a, b);
     WHOLE(a->classic == NULL, b->classic == NULL);
     if (a->classic == NULL) return;
     SAME(&a->classic->start, &b->classic->start);
@@ -596,7 +722,8 @@ static void test_good_scenes(void **state)
         "fuzz/corpus/scene/nebula",        "fuzz/corpus/scene/numbers",      "fuzz/corpus/scene/point_light",
         "fuzz/corpus/scene/scattering",    "fuzz/corpus/scene/soft_edge",    "fuzz/corpus/scene/space",
         "fuzz/corpus/scene/sphere_radial", "fuzz/corpus/scene/text",         "fuzz/corpus/scene/turntable",
-        "fuzz/corpus/scene/union",
+        "fuzz/corpus/scene/union",         "fuzz/corpus/scene/planet",       "fuzz/corpus/scene/planets",
+        "fuzz/corpus/scene/clouds",        "fuzz/corpus/scene/layers",       "examples/scenes/clouds",
     };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[512];

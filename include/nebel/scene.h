@@ -221,6 +221,13 @@ nebel_result nebel_load_scene_models(nebel_scene *scene);
  * the same scene. Errors: MEMORY; there is no air then. */
 nebel_result nebel_load_scene_planet(nebel_scene *scene);
 
+/* Gives planets other numbers, once nebel_load_scene_planet has made them: as many planets as the contents have, of which airs count but for
+ * their profiles, the ground's albedo and the sun's diameter; of layers of clouds all but kind, seed and weather; of layers day, coverage, the shell of
+ * air, and shells of clouds but for seeds and maps. All else stays. What was made is made anew, at the same cost, with the light at the scene's origin;
+ * the atmospheres, clouds and layers of before are gone. On an error all stays as it was. Not thread safe against readers of the same scene, nor
+ * while a frame of it is rendered; renderers are to be made anew. Errors: ARGUMENT, VALUE (a number out of range; the log says which), MEMORY. */
+nebel_result nebel_change_scene_planets(nebel_scene *scene, const nebel_planet *planets);
+
 /* Loads models again, placed and coloured as `models` says; those of the file that are not among them are left out.
  * Contents have meshes and textures of these then, and what they pointed to before is gone, as nodes with fog are where
  * they were. Where that fails all stays as it was. O(what their files hold). Thread safety and errors: as above;
@@ -328,7 +335,7 @@ void nebel_destroy_scene(nebel_scene *scene);
  * of it with other numbers in the camera and its motion, the background, the sun, the ambient light (of the map that the file names, or of none), max_opacity, the
  * classic fog, noise (by nebel_change_scene_noise), the nebulae (points by their place alone) and their names, the cells with their names, portals, model,
  * span and grouping (as many cells, each of the same kind), the models (fewer may be left, in their order), the lamps (as many, each of the same
- * type), and with
+ * type), the planets (as far as nebel_change_scene_planets takes them), and with
  * other names, numbers or kinds of volumes of origin WRITTEN or MOVING. The sun and the section "classic" may come and
  * go. Its volumes may be others: sources[i] is the place in `before` of what is changed->volumes[i] now, ascending, or
  * NEBEL_NEW_VOLUME; volumes of `before` that are missing leave the file, as long as they are of origin WRITTEN or

@@ -219,16 +219,136 @@ static void forget_air(nebel_scene *scene)
     }
 }
 
+/* The light last: where that fails it is what it was. */
+static nebel_result load_air(nebel_scene *scene)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < scene->data.planet_count && result == NEBEL_OK; i++) result = set_air(scene, i);
+    if (result == NEBEL_OK) result = set_clouds(scene);
+    if (result == NEBEL_OK) result = nb_planet_light(scene);
+    if (result != NEBEL_OK) forget_air(scene);
+    return result;
+}
+
 nebel_result nebel_load_scene_planet(nebel_scene *scene)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
     if (scene->planets != NULL && scene->planets->model == NEBEL_PLANET_LAYERS) return load_layers(scene);
     if (scene->planets == NULL || scene->planets->atmosphere != NULL) return NEBEL_OK;
-    nebel_result result = NEBEL_OK;
-    for (size_t i = 0; i < scene->data.planet_count && result == NEBEL_OK; i++) result = set_air(scene, i);
-    if (result == NEBEL_OK) result = nb_planet_light(scene);
-    if (result == NEBEL_OK) result = set_clouds(scene);
+    const nebel_result result = load_air(scene);
     if (result == NEBEL_OK) return NEBEL_OK;
-    forget_air(scene);
     return nb_fail(&scene->log, result, "the air of the scene's planets: %s", nebel_result_text(result));
+}
+
+/* ---- other numbers --------------------------------------------------------------------------- */
+
+/* What nebel_load_scene_planet makes, and what it is made of. */
+typedef struct nb_made_planets {
+    nebel_planet planets[NEBEL_MAX_PLANETS];
+    nebel_atmosphere *atmospheres[NEBEL_MAX_PLANETS];
+    nebel_clouds *clouds;
+    nebel_layers *layers;
+} nb_made_planets;
+
+static void keep_made(const nebel_scene *scene, nb_made_planets *kept)
+{
+    memcpy(kept->planets, scene->planets, scene->data.planet_count * sizeof *kept->planets);
+    memcpy(kept->atmospheres, scene->atmospheres, sizeof kept->atmospheres);
+    kept->clouds = scene->clouds;
+    kept->layers = scene->layers;
+}
+
+static void put_made_back(nebel_scene *scene, const nb_made_planets *kept)
+{
+    memcpy(scene->planets, kept->planets, scene->data.planet_count * sizeof *kept->planets);
+    memcpy(scene->atmospheres, kept->atmospheres, sizeof kept->atmospheres);
+    scene->clouds = kept->clouds;
+    scene->layers = kept->layers;
+}
+
+static void destroy_made(const nb_made_planets *kept)
+{
+    nebel_destroy_clouds(kept->clouds);
+    nebel_destroy_layers(kept->layers);
+    for (int i = 0; i < NEBEL_MAX_PLANETS; i++) nebel_destroy_atmosphere(kept->atmospheres[i]);
+}
+
+/* As if nothing had been made yet. */
+static void detach_made(nebel_scene *scene)
+{
+    for (size_t i = 0; i < scene->data.planet_count; i++) {
+        scene->atmospheres[i] = NULL;
+        scene->planets[i].atmosphere = NULL;
+        scene->planets[i].clouds = NULL;
+        scene->planets[i].layers = NULL;
+    }
+    scene->clouds = NULL;
+    scene->layers = NULL;
+}
+
+static void take_airs(const nebel_planet *from, nebel_planet *to)
+{
+    for (uint32_t i = 0; i < to->air.air_count; i++) {
+        const nebel_air_profile profile = to->air.airs[i].profile;
+        to->air.airs[i] = from->air.airs[i];
+        to->air.airs[i].profile = profile;
+    }
+    memcpy(to->air.ground_albedo, from->air.ground_albedo, sizeof to->air.ground_albedo);
+    to->sun_diameter = from->sun_diameter;
+}
+
+static void take_clouds(const nebel_planet *from, nebel_planet *to)
+{
+    for (uint32_t i = 0; i < to->cloud_layer_count; i++) {
+        const nebel_cloud_layer own = to->cloud_layers[i];
+        nebel_cloud_layer *layer = &to->cloud_layers[i];
+        *layer = from->cloud_layers[i];
+        layer->kind = own.kind;
+        layer->seed = own.seed;
+        layer->weather = own.weather;
+    }
+}
+
+static void take_shells(const nebel_layers_desc *from, nebel_layers_desc *to)
+{
+    to->day = from->day;
+    to->coverage = from->coverage;
+    to->air = from->air;
+    for (uint32_t i = 0; i < to->cloud_count; i++) {
+        const nebel_cloud_shell own = to->clouds[i];
+        nebel_cloud_shell *shell = &to->clouds[i];
+        *shell = from->clouds[i];
+        shell->map = own.map;
+        shell->detail = own.detail;
+        shell->seed = own.seed;
+    }
+}
+
+static bool has_good_sun(const nebel_planet *planet)
+{
+    return planet->sun_diameter >= 0 && planet->sun_diameter <= 10;
+}
+
+nebel_result nebel_change_scene_planets(nebel_scene *scene, const nebel_planet *planets)
+{
+    if (scene == NULL || planets == NULL || (scene->atmospheres[0] == NULL && scene->layers == NULL))
+        return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < scene->data.planet_count; i++)
+        if (!has_good_sun(&planets[i]))
+            return nb_fail(&scene->log, NEBEL_ERROR_VALUE, "planet: sun_diameter: must be within 0 and 10 degrees");
+    nb_made_planets kept;
+    keep_made(scene, &kept);
+    detach_made(scene);
+    for (size_t i = 0; i < scene->data.planet_count; i++) {
+        take_airs(&planets[i], &scene->planets[i]);
+        take_clouds(&planets[i], &scene->planets[i]);
+        take_shells(&planets[i].shells, &scene->planets[i].shells);
+    }
+    const nebel_result result = kept.layers != NULL ? load_layers(scene) : load_air(scene);
+    if (result == NEBEL_OK)
+        destroy_made(&kept);
+    else
+        put_made_back(scene, &kept);
+    if (result == NEBEL_ERROR_MEMORY) return nb_fail(&scene->log, result, "memory is out for the scene's planets");
+    return result;
 }

@@ -1,4 +1,5 @@
 /* The section "planet". */
+#include "scene/save_places.h"
 #include "scene/scene_internal.h"
 
 #include "base/vector.h"
@@ -24,14 +25,13 @@ static const nb_keys air_keys[NEBEL_AIR_PROFILE_COUNT] = {
 
 static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air *air)
 {
-    static const char *const types[] = {"exponential", "layer"};
     static const nb_range amount_range = {
         .low = 0, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
     static const nb_range middle_range = {.low = 0, .high = 1e12, .dimension = NB_LENGTH, .text = "a height"};
     const nb_json_node *found[AIR_KEY_COUNT];
     nb_json *json = in->json;
     *air = (nebel_air){.scale_height = 0};
-    const int type = nb_value_type(json, node, types, NEBEL_AIR_PROFILE_COUNT);
+    const int type = nb_value_type(json, node, nb_air_profile_names, NEBEL_AIR_PROFILE_COUNT);
     if (type < 0 || !nb_value_members(json, node, &air_keys[type], found) ||
         !nb_value_amount(json, found[SCATTERING], &amount_range, air->scattering) ||
         !nb_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||

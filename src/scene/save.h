@@ -29,6 +29,10 @@ struct nb_save {
 void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *object, const nb_place *places,
                     unsigned mask, const void *was, const void *now);
 
+/* The same for an object that may be empty. */
+void nb_save_entry(nb_save *save, const nb_json *json, const nb_json_node *node, const nb_place *places,
+                   const void *was, const void *now);
+
 /* The same for an object that the file may lack: then it is added, with what has changed. */
 void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key,
                     const nb_place *places, const void *was, const void *now);
@@ -75,14 +79,18 @@ typedef struct nb_lost_keys {
 
 void nb_save_lose(nb_lost_keys *lost, const char *key);
 
-/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model, a lamp
- * or the cells have been read, while the tree is there. */
+/* After a section, an entry of fog, whose volumes begin with number `first` of the scene, a nebula, a model, a lamp,
+ * the cells or the planets have been read, while the tree is there. */
 void nb_save_section(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);
 bool nb_save_volume(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t first);
 bool nb_save_nebula(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_model(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_lamp(nb_save *save, nb_scene_reader *in, const nb_json_node *node, size_t index);
 bool nb_save_cells(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
+bool nb_save_planets(nb_save *save, nb_scene_reader *in, const nb_json_node *node);
+
+/* Whether planets differ in nothing but numbers. */
+bool nb_save_has_same_planets(const nebel_scene_data *a, const nebel_scene_data *b);
 
 /* The section "classic", in the file or not yet. */
 void nb_save_classic(nb_save *save, const nb_scene_reader *in, const nb_json_node *node);

@@ -114,6 +114,7 @@ const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
 const char *const nb_profile_names[NEBEL_PARTICLE_COUNT] = {"soft", "gaussian", "ball"};
+const char *const nb_air_profile_names[NEBEL_AIR_PROFILE_COUNT] = {"exponential", "layer"};
 /* By nebel_phase_type. */
 const char *const nb_phase_names[NEBEL_PHASE_COUNT] = {"isotropic",       "rayleigh", "henyey_greenstein",
                                                        "cornette_shanks", "draine",   "droplets"};

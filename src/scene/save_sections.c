@@ -217,7 +217,7 @@ static bool check_counts(const nb_scene_reader *in, const nb_save *save, const n
         return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                             "names no picture of its ambient light; write one into the file");
     if ((now->cells == NULL) == (before->cells == NULL) && (now->classic == NULL) == (before->classic == NULL) &&
-        now->has_sun == before->has_sun)
+        now->has_sun == before->has_sun && nb_save_has_same_planets(now, before))
         return true;
     return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, root,
                         "has not the sections that it had; the file has changed, load it again");

@@ -15,27 +15,40 @@ void nb_save_places(nb_save *save, const nb_json *json, const nb_edit_object *ob
                             nb_place_numbers(was, &places[i]), nb_place_numbers(now, &places[i]), places[i].style);
 }
 
-void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key,
-                    const nb_place *places, const void *was, const void *now)
+/* What differs, as an object; false: nothing does. */
+static bool write_members(const nb_place *places, const void *was, const void *now, char *words, size_t size)
 {
-    const nb_edit_object object = nb_edit_find(json, nb_edit_member(json, owner->node, key));
-    char words[6 * NB_EDIT_NUMBERS] = "{";
-    if (object.last_end != 0) {
-        nb_save_places(save, json, &object, places, NB_ALL_PLACES, was, now);
-        return;
-    }
+    size_t used = (size_t)snprintf(words, size, "{");
     for (size_t i = 0; places[i].key != NULL; i++) {
         char numbers[NB_EDIT_NUMBERS];
         if (!nb_place_differs(was, now, &places[i])) continue;
-        const size_t used = strlen(words);
         nb_edit_write_numbers(places[i].count, nb_place_numbers(now, &places[i]), places[i].style, numbers);
-        snprintf(words + used, sizeof words - used, "%s\"%s\": %s", used > 1 ? ", " : " ", places[i].key, numbers);
+        snprintf(words + used, size - used, "%s\"%s\": %s", used > 1 ? ", " : " ", places[i].key, numbers);
+        used += strlen(words + used);
     }
-    if (words[1] == '\0') return;
-    strcat(words, " }");
-    if (object.node != NULL)
-        nb_edit_replace(&save->edit, object.node, words);
-    else
+    snprintf(words + used, size - used, " }");
+    return used > 1;
+}
+
+void nb_save_entry(nb_save *save, const nb_json *json, const nb_json_node *node, const nb_place *places,
+                   const void *was, const void *now)
+{
+    const nb_edit_object object = nb_edit_find(json, node);
+    char words[10 * NB_EDIT_NUMBERS];
+    if (object.last_end != 0)
+        nb_save_places(save, json, &object, places, NB_ALL_PLACES, was, now);
+    else if (write_members(places, was, now, words, sizeof words))
+        nb_edit_replace(&save->edit, node, words);
+}
+
+void nb_save_object(nb_save *save, const nb_json *json, const nb_edit_object *owner, const char *key,
+                    const nb_place *places, const void *was, const void *now)
+{
+    const nb_json_node *node = nb_edit_member(json, owner->node, key);
+    char words[10 * NB_EDIT_NUMBERS];
+    if (node != NULL)
+        nb_save_entry(save, json, node, places, was, now);
+    else if (write_members(places, was, now, words, sizeof words))
         nb_edit_add(&save->edit, owner, key, words);
 }
 

@@ -83,7 +83,7 @@ static bool read_section(nb_scene_reader *in, const nb_json_node *node)
     case MULTIPLE_SCATTERING:
         return nb_read_multiple_scattering(in, node);
     case PLANET:
-        return nb_read_planet(in, node);
+        return nb_read_planet(in, node) && (in->save == NULL || nb_save_planets(in->save, in, node));
     default:
         return nb_value_is(in->json, node, NB_JSON_ARRAY, "an array [...]");
     }

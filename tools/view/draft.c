@@ -57,10 +57,20 @@ static nebel_result light_scene(nb_draft *draft, const nb_edition *edition)
     return result;
 }
 
-/* What the file has that moves without end, or noise that does so now. */
+static int does_planet_move(const nebel_planet *planet)
+{
+    int result = planet->model == NEBEL_PLANET_LAYERS && planet->shells.day != 0;
+    for (uint32_t i = 0; i < planet->shells.cloud_count; i++) result |= planet->shells.clouds[i].day != 0;
+    for (uint32_t i = 0; i < planet->cloud_layer_count; i++)
+        result |= planet->cloud_layers[i].wind[0] != 0 || planet->cloud_layers[i].wind[1] != 0;
+    return result;
+}
+
+/* What the file has that moves without end, or noise and planets that do so now. */
 static int moves_on(const nb_draft *draft)
 {
     int result = nebel_scene_contents(draft->file)->moves_on;
+    for (size_t i = 0; i < draft->now.planet_count; i++) result |= does_planet_move(&draft->now.planets[i]);
     for (size_t i = 0; i < draft->now.count && !result; i++) {
         nebel_scene_noise noise;
         if (nebel_find_scene_noise(draft->scene, draft->now.volumes[i].density.grid, &noise))
@@ -73,6 +83,7 @@ void nb_draft_show(nb_draft *draft)
 {
     nebel_scene_data *const data = &draft->data;
     nb_edition_show(&draft->now, data);
+    data->planets = find_light(draft)->planets;
     data->moves_on = moves_on(draft);
     if (!data->has_sun) return;
     const nebel_sun sun = find_sun(draft, &draft->now);
@@ -430,10 +441,21 @@ void nb_draft_close(nb_draft *draft)
  * ---------------------------------------------------------------------------------------------------------
  */
 
+/* Nobody may render the scene meanwhile. */
+static nebel_result make_planets(nb_draft *draft, const nb_edition *edition)
+{
+    const nebel_result result = nebel_change_scene_planets(draft->scene, edition->planets);
+    if (result != NEBEL_OK) return result;
+    draft->planets_are_new = 1;
+    draft->data.environment.map = find_light(draft)->environment.map;
+    return NEBEL_OK;
+}
+
 static nebel_result apply(nb_draft *draft)
 {
     const nb_edition *const now = &draft->now, *const was = &draft->good;
     nebel_result result = light_scene(draft, now);
+    if (result == NEBEL_OK && !nb_edition_has_same_planets(now, was)) result = make_planets(draft, now);
     if (result == NEBEL_OK && !nb_edition_has_same_nebulae(now, was)) result = strew(draft, now);
     const int has_other_cells = !nb_edition_has_same_cells(now, was);
     if (result == NEBEL_OK && has_other_cells) result = make_cells(draft, now);
@@ -447,6 +469,8 @@ static void revert(nb_draft *draft)
 {
     nb_edition back;
     if (nb_edition_copy(&draft->good, &back) != 0) return;
+    if (draft->planets_are_new && !nb_edition_has_same_planets(&draft->now, &draft->good))
+        (void)make_planets(draft, &draft->good);
     if (!nb_edition_has_same_cells(&draft->now, &draft->good)) (void)make_cells(draft, &draft->good);
     if (!nb_edition_has_same_nebulae(&draft->now, &draft->good)) (void)strew(draft, &draft->good);
     nb_edition_free(&draft->now);
@@ -526,7 +550,7 @@ int nb_draft_is_changed(const nb_draft *draft)
     if (!nb_edition_has_same_sources(now, was) || !nb_edition_has_same_nebulae(now, was) ||
         !nb_edition_has_same_cells(now, was) || !nb_edition_has_same_models(now, was) ||
         !nb_edition_has_same_lamps(now, was) || !nb_edition_has_same_light(now, was) ||
-        !nb_edition_has_same_camera_keys(now, was))
+        !nb_edition_has_same_planets(now, was) || !nb_edition_has_same_camera_keys(now, was))
         return 1;
     for (size_t i = 0; i < now->count; i++) {
         if (!is_saved(draft, i)) continue;
@@ -634,7 +658,8 @@ nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera)
 {
     const nebel_scene_desc desc = {.log = draft->log};
     nebel_scene_data before = *nebel_scene_contents(draft->file);
-    /* That of the contents lights the scene as it is now. */
+    /* Those of the contents are as the scene is now. */
+    before.planets = draft->written.planets;
     before.has_sun = draft->written.has_sun;
     memcpy(before.sun_direction, draft->written.sun_direction, sizeof before.sun_direction);
     memcpy(before.sun_irradiance, draft->written.sun_irradiance, sizeof before.sun_irradiance);

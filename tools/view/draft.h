@@ -22,7 +22,8 @@ typedef struct nb_draft {
     size_t particle_count;
     nebel_cells *cells;   /* of `good`; NULL: the scene has none */
     int models_are_stale; /* the scene's meshes are not where the models of `good` are */
-    double frame;         /* of what moves */
+    int planets_are_new; /* the scene's air, clouds and layers are others: renderers that know the old ones are to go */
+    double frame;        /* of what moves */
     nebel_log log;
 } nb_draft;
 
@@ -37,7 +38,8 @@ void nb_draft_close(nb_draft *draft);
 void nb_draft_show(nb_draft *draft);
 
 /* Puts `now` into new snapshots. If it is not valid, all of it is what it was before, and the log says why. Where there is a planet
- * nobody may render `data` meanwhile, here and in what follows: its sky is made anew, where the sun has changed. */
+ * nobody may render `data` meanwhile, here and in what follows: its sky is made anew, where the sun has changed, and its air,
+ * where planets have. */
 nebel_result nb_draft_commit(nb_draft *draft);
 
 /* All fog with its particles, as volumes. The snapshot is the draft's, until the next change. */

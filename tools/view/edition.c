@@ -199,6 +199,19 @@ static int add_lamps(nb_edition *edition, const nebel_lamp *lamps, size_t count)
     return edition->lamps != NULL ? 0 : -1;
 }
 
+/* What is made of them is made anew where they change. */
+static int add_planets(nb_edition *edition, const nebel_planet *planets, size_t count)
+{
+    edition->planets = copy_array(planets, count, sizeof *planets);
+    edition->planet_count = edition->planets != NULL ? count : 0;
+    for (size_t i = 0; i < edition->planet_count; i++) {
+        edition->planets[i].atmosphere = NULL;
+        edition->planets[i].clouds = NULL;
+        edition->planets[i].layers = NULL;
+    }
+    return edition->planets != NULL ? 0 : -1;
+}
+
 static int add_camera_keys(nb_edition *edition, const nebel_camera_key *keys, size_t count)
 {
     edition->camera_keys = copy_array(keys, count, sizeof *keys);
@@ -240,6 +253,7 @@ int nb_edition_make(const nebel_scene_data *scene, nb_edition *edition)
     if (result == 0) result = add_models(&made, scene->models, scene->model_count);
     if (result == 0) result = add_lamps(&made, scene->lamps, scene->lamp_count);
     if (result == 0) result = add_camera_keys(&made, scene->camera_keys, scene->camera_key_count);
+    if (result == 0) result = add_planets(&made, scene->planets, scene->planet_count);
     if (result == 0) result = add_cells(&made, scene->cells);
     for (size_t i = 0; i < scene->volume_count && result == 0; i++)
         result = add(&made, &scene->volumes[i], &scene->volume_entries[i], scene->volume_names[i], i);
@@ -260,13 +274,16 @@ int nb_edition_copy(const nb_edition *from, nb_edition *to)
     made.models = NULL;
     made.lamps = NULL;
     made.camera_keys = NULL;
+    made.planets = NULL;
     made.cells = NULL;
     made.cells_desc.cell_count = 0;
     made.count = made.capacity = made.nebula_count = made.model_count = made.lamp_count = made.camera_key_count = 0;
+    made.planet_count = 0;
     int result = add_nebulae(&made, from->nebulae, from->nebula_places, from->nebula_count);
     if (result == 0) result = add_models(&made, from->models, from->model_count);
     if (result == 0) result = add_lamps(&made, from->lamps, from->lamp_count);
     if (result == 0) result = add_camera_keys(&made, from->camera_keys, from->camera_key_count);
+    if (result == 0) result = add_planets(&made, from->planets, from->planet_count);
     if (result == 0 && from->cells != NULL) result = add_cells(&made, &from->cells_desc);
     for (size_t i = 0; i < from->count && result == 0; i++)
         result = add(&made, &from->volumes[i], &from->entries[i], from->names[i], from->sources[i]);
@@ -298,6 +315,7 @@ void nb_edition_free(nb_edition *edition)
     free(edition->models);
     free(edition->lamps);
     free(edition->camera_keys);
+    free(edition->planets);
     free(edition->cells);
     *edition = (nb_edition){.volumes = NULL};
 }
@@ -331,6 +349,8 @@ void nb_edition_show(nb_edition *edition, nebel_scene_data *scene)
     scene->lamp_count = edition->lamp_count;
     scene->camera_keys = edition->camera_keys;
     scene->camera_key_count = edition->camera_key_count;
+    scene->planets = edition->planets;
+    scene->planet_count = edition->planet_count;
     scene->cells = edition->cells != NULL ? &edition->cells_desc : NULL;
     scene->classic = edition->has_classic ? &edition->classic : NULL;
     scene->has_sun = edition->has_sun;
@@ -352,6 +372,7 @@ size_t nb_edition_size(const nb_edition *edition)
     size += edition->model_count * sizeof *edition->models;
     size += edition->lamp_count * sizeof *edition->lamps;
     size += edition->camera_key_count * sizeof *edition->camera_keys;
+    size += edition->planet_count * sizeof *edition->planets;
     for (size_t i = 0; i < edition->nebula_count; i++)
         size += sizeof *edition->nebulae + nb_shape_size(&edition->nebulae[i].shape);
     for (size_t i = 0; i < edition->cells_desc.cell_count; i++)
@@ -479,6 +500,55 @@ int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b)
     return 1;
 }
 
+static int are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere_desc *b)
+{
+    if (a->air_count != b->air_count || memcmp(a->ground_albedo, b->ground_albedo, sizeof a->ground_albedo) != 0)
+        return 0;
+    for (uint32_t i = 0; i < a->air_count; i++) {
+        const nebel_air *const from = &a->airs[i], *const to = &b->airs[i];
+        if (!HAS_SAME(from, to, nebel_air, scattering, phase) || !is_same_phase(&from->phase, &to->phase) ||
+            from->scale_height != to->scale_height || from->center != to->center || from->width != to->width)
+            return 0;
+    }
+    return 1;
+}
+
+static int are_same_clouds(const nebel_planet *a, const nebel_planet *b)
+{
+    if (a->cloud_layer_count != b->cloud_layer_count) return 0;
+    for (uint32_t i = 0; i < a->cloud_layer_count; i++) {
+        const nebel_cloud_layer *const from = &a->cloud_layers[i], *const to = &b->cloud_layers[i];
+        if (!HAS_SAME(from, to, nebel_cloud_layer, base, seed) || memcmp(from->wind, to->wind, sizeof from->wind) != 0)
+            return 0;
+    }
+    return 1;
+}
+
+static int are_same_shells(const nebel_layers_desc *a, const nebel_layers_desc *b)
+{
+    if (a->day != b->day || a->coverage != b->coverage || a->cloud_count != b->cloud_count ||
+        a->air.is_absent != b->air.is_absent || !HAS_SAME(&a->air, &b->air, nebel_air_shell, height, ramp_count))
+        return 0;
+    for (uint32_t i = 0; i < a->cloud_count; i++) {
+        const nebel_cloud_shell *const from = &a->clouds[i], *const to = &b->clouds[i];
+        if (!HAS_SAME(from, to, nebel_cloud_shell, height, map) || !HAS_SAME(from, to, nebel_cloud_shell, wrap, seed))
+            return 0;
+    }
+    return 1;
+}
+
+int nb_edition_has_same_planets(const nb_edition *a, const nb_edition *b)
+{
+    if (a->planet_count != b->planet_count) return 0;
+    for (size_t i = 0; i < a->planet_count; i++) {
+        const nebel_planet *const from = &a->planets[i], *const to = &b->planets[i];
+        if (from->sun_diameter != to->sun_diameter || !are_same_airs(&from->air, &to->air) ||
+            !are_same_clouds(from, to) || !are_same_shells(&from->shells, &to->shells))
+            return 0;
+    }
+    return 1;
+}
+
 int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b)
 {
     if (a->camera_key_count != b->camera_key_count) return 0;
@@ -534,7 +604,7 @@ int nb_edition_is_same(const nb_edition *a, const nb_edition *b)
 {
     if (!nb_edition_has_same_sources(a, b) || !nb_edition_has_same_nebulae(a, b) || !nb_edition_has_same_cells(a, b) ||
         !nb_edition_has_same_models(a, b) || !nb_edition_has_same_lamps(a, b) || !nb_edition_has_same_light(a, b) ||
-        !nb_edition_has_same_camera_keys(a, b))
+        !nb_edition_has_same_planets(a, b) || !nb_edition_has_same_camera_keys(a, b))
         return 0;
     for (size_t i = 0; i < a->count; i++)
         if (!nb_edition_is_same_volume(&a->volumes[i], &b->volumes[i]) ||

@@ -1,4 +1,4 @@
-/* What of a scene can be changed: fog, nebulae, cells, models and light, with all their parts, planes, keys and names.
+/* What of a scene can be changed: fog, nebulae, cells, models, planets and light, with all their parts, planes, keys and names.
  */
 #ifndef NB_EDITION_H
 #define NB_EDITION_H
@@ -23,6 +23,8 @@ typedef struct nb_edition {
     size_t model_count;
     nebel_lamp *lamps; /* as many as the file has */
     size_t lamp_count;
+    nebel_planet *planets; /* their maps, and what is made of them, are the scene's: not to be used */
+    size_t planet_count;
     nebel_cell *cells;
     nebel_cells_desc cells_desc;   /* of them; its portals are the scene's */
     nebel_camera_key *camera_keys; /* all of one projection */
@@ -63,11 +65,12 @@ int nb_edition_has_same_nebulae(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_cells(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_models(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_lamps(const nb_edition *a, const nb_edition *b);
+int nb_edition_has_same_planets(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_camera_keys(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_light(const nb_edition *a, const nb_edition *b);
 int nb_edition_has_same_sources(const nb_edition *a, const nb_edition *b);
 
-/* Puts light, lamps, camera keys, volumes, nebulae, cells and models in the place of the scene's, which points to the edition then. */
+/* Puts light, lamps, camera keys, volumes, nebulae, cells, models and planets in the place of the scene's, which points to the edition then. */
 void nb_edition_show(nb_edition *edition, nebel_scene_data *scene);
 
 /* Bytes that it takes, more or less. */

@@ -2,6 +2,7 @@
 
 #include "controls.h"
 #include "fog_panel.h"
+#include "planet_panel.h"
 #include "scene_panel.h"
 
 #include <backends/imgui_impl_glfw.h>
@@ -361,6 +362,7 @@ void draw_window(nb_panel *panel)
     draw_models(panel, reach);
     draw_lamps(panel, reach);
     draw_lights(panel);
+    draw_planets(panel);
     draw_classic(panel, reach);
     draw_camera(panel, reach);
     ImGui::PopItemWidth();

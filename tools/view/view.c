@@ -59,8 +59,8 @@ typedef struct viewer {
     int was_playing;
     int blank_turns; /* so many without a picture: it takes long to come, and the window says so first */
     int wants_picture, wants_window_picture;
-    int was_warned;         /* that changes are lost if the window is left */
-    double placing_seconds; /* that models took to be loaded last */
+    int was_warned, has_changes; /* that changes are lost if the window is left; that the draft has not taken yet */
+    double placing_seconds;      /* that models took to be loaded last */
 } viewer;
 
 /* ---- messages
@@ -263,18 +263,20 @@ static nebel_result renew_stage(viewer *all)
     return NEBEL_OK;
 }
 
-/* Models that take longer to be loaded follow once the control is let go [s]. */
+/* Models that take longer to be loaded follow once the control is let go [s]. Renderers cannot be told of them. */
 static const double quick_placing = 0.1;
 
-static nebel_result place_models(viewer *all)
+static nebel_result renew_renderers(viewer *all)
 {
-    if (!all->draft.models_are_stale) return NEBEL_OK;
-    if (all->panel.is_held && all->placing_seconds > quick_placing) return NEBEL_OK;
+    nb_draft *const draft = &all->draft;
+    const int waits = all->panel.is_held && all->placing_seconds > quick_placing;
+    if (!draft->planets_are_new && (!draft->models_are_stale || waits)) return NEBEL_OK;
     const double start = nb_window_now();
     nb_twin_close(all->twin);
     all->twin = NULL;
-    nebel_result result = nb_draft_place_models(&all->draft);
+    nebel_result result = draft->models_are_stale ? nb_draft_place_models(draft) : NEBEL_OK;
     if (result == NEBEL_OK) result = renew_stage(all);
+    draft->planets_are_new = 0;
     all->placing_seconds = nb_window_now() - start;
     note_change(all);
     return forgive(result);
@@ -287,10 +289,10 @@ static nebel_result use_fog(viewer *all, nebel_result committed)
     note_change(all);
     check_method(all);
     const nebel_result result = forgive(set_fog(all));
-    return result == NEBEL_OK ? place_models(all) : result;
+    return result == NEBEL_OK ? renew_renderers(all) : result;
 }
 
-/* It reads the sky of a planet, which another sun may make anew. */
+/* It reads the air and the sky of a planet, which other numbers make anew. */
 static void rest_twin(viewer *all)
 {
     if (all->draft.data.planet_count == 0) return;
@@ -304,8 +306,16 @@ static nebel_result set_frame(viewer *all, double frame)
     return use_fog(all, nb_draft_set_frame(&all->draft, frame));
 }
 
+/* Air is slow to be made: other planets come once the control is let go. */
+static int must_wait(const viewer *all)
+{
+    const nb_draft *const draft = &all->draft;
+    return all->panel.is_held && !nb_edition_has_same_planets(&draft->now, &draft->good);
+}
+
 static nebel_result commit(viewer *all)
 {
+    all->has_changes = 0;
     say(all, "");
     rest_twin(all);
     return use_fog(all, nb_draft_commit(&all->draft));
@@ -483,10 +493,11 @@ static nebel_result obey_panel(viewer *all)
     if (panel->has_read_message) say(all, "");
     if (panel->camera_changed || panel->look_changed) note_change(all);
     if (panel->look_changed) result = forgive(set_fog(all));
-    if (panel->fog_changed && result == NEBEL_OK) result = commit(all);
+    all->has_changes |= panel->fog_changed;
+    if (all->has_changes && !must_wait(all) && result == NEBEL_OK) result = commit(all);
     if (panel->frame_changed && result == NEBEL_OK) result = set_frame(all, all->frame);
     if (!panel->is_held) nb_history_close(&all->draft.history);
-    if (!panel->is_held && result == NEBEL_OK) result = place_models(all);
+    if (!panel->is_held && result == NEBEL_OK) result = renew_renderers(all);
     return result;
 }
 

@@ -1,0 +1,284 @@
+/* Changed planets, back into the file: numbers of their air, clouds and shells. */
+#include "scene/save.h"
+
+#include <string.h>
+
+#define PLACE(type, key, member, count, style)                                                                         \
+    {                                                                                                                  \
+        key, offsetof(type, member), count, style                                                                      \
+    }
+#define NUMBER(type, member) PLACE(type, #member, member, 1, NB_EDIT_EACH)
+#define END                                                                                                            \
+    {                                                                                                                  \
+        NULL, 0, 0, NB_EDIT_EACH                                                                                       \
+    }
+
+static const nb_place physical_places[] = {
+    PLACE(nebel_planet, "ground_albedo", air.ground_albedo, 3, NB_EDIT_AMOUNT),
+    NUMBER(nebel_planet, sun_diameter),
+    END,
+};
+
+static const nb_place air_places[] = {
+    PLACE(nebel_air, "scattering", scattering, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_air, "absorption", absorption, 3, NB_EDIT_AMOUNT),
+    NUMBER(nebel_air, scale_height),
+    PLACE(nebel_air, "middle", center, 1, NB_EDIT_EACH),
+    NUMBER(nebel_air, width),
+    END,
+};
+
+static const unsigned air_masks[NEBEL_AIR_PROFILE_COUNT] = {
+    [NEBEL_AIR_EXPONENTIAL] = 1 | 2 | 4,
+    [NEBEL_AIR_LAYER] = 1 | 2 | 8 | 16,
+};
+
+static const nb_place cloud_places[] = {
+    NUMBER(nebel_cloud_layer, base),
+    NUMBER(nebel_cloud_layer, top),
+    NUMBER(nebel_cloud_layer, coverage),
+    NUMBER(nebel_cloud_layer, extinction),
+    NUMBER(nebel_cloud_layer, size),
+    NUMBER(nebel_cloud_layer, detail),
+    NUMBER(nebel_cloud_layer, variation),
+    NUMBER(nebel_cloud_layer, diameter),
+    PLACE(nebel_cloud_layer, "wind", wind, 2, NB_EDIT_EACH),
+    END,
+};
+
+static const nb_place layers_places[] = {
+    NUMBER(nebel_layers_desc, day),
+    NUMBER(nebel_layers_desc, coverage),
+    END,
+};
+
+static const nb_place shell_places[] = {
+    NUMBER(nebel_cloud_shell, height),
+    NUMBER(nebel_cloud_shell, day),
+    PLACE(nebel_cloud_shell, "color", color, 3, NB_EDIT_AMOUNT),
+    PLACE(nebel_cloud_shell, "wrap", wrap, 3, NB_EDIT_EACH),
+    NUMBER(nebel_cloud_shell, gain),
+    NUMBER(nebel_cloud_shell, coverage),
+    END,
+};
+
+static const nb_place air_shell_places[] = {
+    NUMBER(nebel_air_shell, height),
+    NUMBER(nebel_air_shell, brightness),
+    END,
+};
+
+/* ---- in the file's numbers ------------------------------------------------------------------- */
+
+static void restore_air(const nb_space *space, nebel_air *air)
+{
+    for (int c = 0; c < 3; c++) {
+        air->scattering[c] *= space->unit;
+        air->absorption[c] *= space->unit;
+    }
+    air->scale_height /= space->unit;
+    air->center /= space->unit;
+    air->width /= space->unit;
+}
+
+/* With the numbers of its kind in the place of zeros, which mean others in the file. */
+static void restore_cloud(const nb_space *space, double thickness, nebel_cloud_layer *layer)
+{
+    (void)nebel_resolve_cloud_layer(thickness, layer, NULL, layer);
+    layer->base /= space->unit;
+    layer->top /= space->unit;
+    layer->size /= space->unit;
+    layer->extinction *= space->unit;
+    if (layer->detail == NEBEL_CLOUD_NONE) layer->detail = 0;
+    if (layer->variation == NEBEL_CLOUD_NONE) layer->variation = 0;
+    for (int i = 0; i < 2; i++) layer->wind[i] /= i == 1 && space->z_up ? -space->unit : space->unit;
+}
+
+static void restore_layers(const nb_space *space, nebel_layers_desc *desc)
+{
+    nebel_air_shell *air = &desc->air;
+    for (uint32_t i = 0; i < desc->cloud_count; i++) desc->clouds[i].height /= space->unit;
+    air->height /= space->unit;
+    if (air->is_absent)
+        air->brightness = 0;
+    else if (air->brightness == 0)
+        air->brightness = 1;
+}
+
+static nebel_planet restore(const nb_space *space, const nebel_planet *planet)
+{
+    nebel_planet own = *planet;
+    if (own.model == NEBEL_PLANET_LAYERS) {
+        restore_layers(space, &own.shells);
+        return own;
+    }
+    for (uint32_t i = 0; i < own.air.air_count; i++) restore_air(space, &own.air.airs[i]);
+    for (uint32_t i = 0; i < own.cloud_layer_count; i++) restore_cloud(space, own.air.thickness, &own.cloud_layers[i]);
+    return own;
+}
+
+/* ---- kinds of air ---------------------------------------------------------------------------- */
+
+static bool is_same_phase(const nebel_phase *a, const nebel_phase *b)
+{
+    return a->type == b->type && a->g == b->g && a->alpha == b->alpha && a->diameter == b->diameter;
+}
+
+static bool are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere_desc *b)
+{
+    for (uint32_t i = 0; i < a->air_count; i++) {
+        if (!is_same_phase(&a->airs[i].phase, &b->airs[i].phase)) return false;
+        for (size_t k = 0; air_places[k].key != NULL; k++)
+            if (nb_place_differs(&a->airs[i], &b->airs[i], &air_places[k])) return false;
+    }
+    return true;
+}
+
+static void change_air(nb_save *save, const nb_json *json, const nb_json_node *node, const nebel_air *was,
+                       const nebel_air *now)
+{
+    const nb_edit_object air = nb_edit_find(json, node);
+    const nb_json_node *phase = nb_edit_member(json, node, "phase");
+    char text[NB_EDIT_NUMBERS];
+    nb_save_places(save, json, &air, air_places, air_masks[now->profile], was, now);
+    if (is_same_phase(&was->phase, &now->phase)) return;
+    nb_save_write_phase(&now->phase, text);
+    if (phase != NULL)
+        nb_edit_replace(&save->edit, phase, text);
+    else
+        nb_edit_add(&save->edit, &air, "phase", text);
+}
+
+static void put_air(nb_words *out, const nebel_air *air)
+{
+    char phase[NB_EDIT_NUMBERS];
+    nb_save_write_phase(&air->phase, phase);
+    nb_words_put(out, "{ \"type\": ");
+    nb_words_put_text(out, nb_air_profile_names[air->profile]);
+    nb_words_put(out, ", \"phase\": ");
+    nb_words_put(out, phase);
+    for (size_t k = 0; air_places[k].key != NULL; k++) {
+        if ((air_masks[air->profile] >> k & 1) == 0) continue;
+        nb_words_put(out, ", ");
+        nb_words_put_text(out, air_places[k].key);
+        nb_words_put(out, ": ");
+        nb_words_put_numbers(out, air_places[k].count, nb_place_numbers(air, &air_places[k]), air_places[k].style);
+    }
+    nb_words_put(out, " }");
+}
+
+/* All of a preset's. `array`: the place of an empty one; NULL: there is none. */
+static void write_airs(nb_save *save, const nb_edit_object *planet, const nb_json_node *array,
+                       const nebel_atmosphere_desc *now)
+{
+    nb_words out = {.save = save};
+    nb_words_put(&out, "[");
+    for (uint32_t i = 0; i < now->air_count; i++) {
+        if (i > 0) nb_words_put(&out, ", ");
+        put_air(&out, &now->airs[i]);
+    }
+    nb_words_put(&out, "]");
+    const char *words = nb_words_end(&out);
+    if (words != NULL && array != NULL)
+        nb_edit_replace(&save->edit, array, words);
+    else if (words != NULL)
+        nb_edit_add(&save->edit, planet, "airs", words);
+    nb_release(&save->edit.arena.allocator, out.bytes.data);
+}
+
+static void save_airs(nb_save *save, const nb_json *json, const nb_edit_object *planet,
+                      const nebel_atmosphere_desc *was, const nebel_atmosphere_desc *now)
+{
+    const nb_json_node *array = nb_edit_member(json, planet->node, "airs");
+    if (are_same_airs(was, now)) return;
+    if (array == NULL || array->count != now->air_count) {
+        write_airs(save, planet, array, now);
+        return;
+    }
+    const nb_json_node *node = nb_json_first(json, array);
+    for (uint32_t i = 0; i < now->air_count; i++, node = nb_json_next(json, node))
+        change_air(save, json, node, &was->airs[i], &now->airs[i]);
+}
+
+/* ---- clouds and shells ----------------------------------------------------------------------- */
+
+/* Layers of no coverage are in the file alone. */
+static const nb_json_node *skip_layers(const nb_json *json, const nb_json_node *node)
+{
+    for (; node != NULL; node = nb_json_next(json, node)) {
+        const nb_json_node *coverage = nb_edit_member(json, node, "coverage");
+        if (coverage == NULL || coverage->number != 0) break;
+    }
+    return node;
+}
+
+static void save_clouds(nb_save *save, const nb_json *json, const nb_json_node *planet, const nebel_planet *was,
+                        const nebel_planet *now)
+{
+    if (now->cloud_layer_count == 0) return;
+    const nb_json_node *node = nb_json_first(json, nb_edit_member(json, planet, "clouds"));
+    for (uint32_t i = 0; i < now->cloud_layer_count; i++, node = nb_json_next(json, node)) {
+        node = skip_layers(json, node);
+        nb_save_entry(save, json, node, cloud_places, &was->cloud_layers[i], &now->cloud_layers[i]);
+    }
+}
+
+static void save_shells(nb_save *save, const nb_json *json, const nb_edit_object *planet, const nebel_layers_desc *was,
+                        const nebel_layers_desc *now)
+{
+    nb_save_places(save, json, planet, layers_places, NB_ALL_PLACES, was, now);
+    nb_save_object(save, json, planet, "air", air_shell_places, &was->air, &now->air);
+    if (now->cloud_count == 0) return;
+    const nb_json_node *node = nb_json_first(json, nb_edit_member(json, planet->node, "clouds"));
+    for (uint32_t i = 0; i < now->cloud_count; i++, node = nb_json_next(json, node))
+        nb_save_entry(save, json, node, shell_places, &was->clouds[i], &now->clouds[i]);
+}
+
+/* ---- planets --------------------------------------------------------------------------------- */
+
+static bool is_same_form(const nebel_planet *a, const nebel_planet *b)
+{
+    if (a->model != b->model || a->air.air_count != b->air.air_count || a->cloud_layer_count != b->cloud_layer_count ||
+        a->shells.cloud_count != b->shells.cloud_count)
+        return false;
+    for (uint32_t i = 0; i < a->air.air_count; i++)
+        if (a->air.airs[i].profile != b->air.airs[i].profile) return false;
+    return true;
+}
+
+bool nb_save_has_same_planets(const nebel_scene_data *a, const nebel_scene_data *b)
+{
+    if (a->planet_count != b->planet_count) return false;
+    for (size_t i = 0; i < a->planet_count; i++)
+        if (!is_same_form(&a->planets[i], &b->planets[i])) return false;
+    return true;
+}
+
+static void save_planet(nb_save *save, const nb_scene_reader *in, const nb_json_node *node, size_t index)
+{
+    const nb_edit_object planet = nb_edit_find(in->json, node);
+    const nebel_planet was = restore(&in->space, &save->before->planets[index]),
+                       now = restore(&in->space, &save->changed->planets[index]);
+    if (now.model == NEBEL_PLANET_LAYERS) {
+        save_shells(save, in->json, &planet, &was.shells, &now.shells);
+        return;
+    }
+    nb_save_places(save, in->json, &planet, physical_places, NB_ALL_PLACES, &was, &now);
+    save_airs(save, in->json, &planet, &was.air, &now.air);
+    save_clouds(save, in->json, node, &was, &now);
+}
+
+bool nb_save_planets(nb_save *save, nb_scene_reader *in, const nb_json_node *node)
+{
+    if (!nb_save_has_same_planets(save->before, &in->scene->data) ||
+        !nb_save_has_same_planets(save->before, save->changed))
+        return nb_json_fail(in->json, NEBEL_ERROR_ARGUMENT, node,
+                            "has other planets than those to be written; the file has changed, load it again");
+    const bool is_array = node->type == NB_JSON_ARRAY;
+    const nb_json_node *one = is_array ? nb_json_first(in->json, node) : node;
+    for (size_t i = 0; i < save->before->planet_count; i++) {
+        save_planet(save, in, one, i);
+        if (is_array) one = nb_json_next(in->json, one);
+    }
+    return true;
+}

@@ -1,0 +1,183 @@
+/* Planets of a scene that get other numbers: they become those of a file that has them, or stay as they were. */
+#include "near.h"
+#include "scene_help.h"
+
+#include <math.h>
+
+#define SUN "\"sun\": {\"direction\": [0, 1, 0.2], \"irradiance\": [4, 3, 2]}, "
+#define SCENE(planet) "{\"nebel\": 1, " SUN "\"fog\": [], \"planet\": " planet "}"
+#define TOY(more) SCENE("{\"model\": \"physical\", \"preset\": \"toy\"" more "}")
+
+static nebel_scene *load(const char *text)
+{
+    nebel_scene *const scene = parse_good(text);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    return scene;
+}
+
+static void same_light(const nebel_scene *a, const nebel_scene *b)
+{
+    const double up[3] = {0.6, 0.8, 0};
+    double sky[2][3];
+    nebel_sun sun[2];
+    nebel_environment_radiance(&nebel_scene_contents(a)->environment, up, sky[0]);
+    nebel_environment_radiance(&nebel_scene_contents(b)->environment, up, sky[1]);
+    assert_int_equal(nebel_find_scene_sunlight(a, 3, &sun[0]), NEBEL_OK);
+    assert_int_equal(nebel_find_scene_sunlight(b, 3, &sun[1]), NEBEL_OK);
+    for (int c = 0; c < 3; c++) {
+        assert_near(sky[0][c], sky[1][c], 1e-12);
+        assert_near(sun[0].irradiance[c], sun[1].irradiance[c], 1e-12);
+    }
+}
+
+/* All of it is that of a scene of such numbers. */
+static void test_air_and_clouds(void **state)
+{
+    (void)state;
+    nebel_scene *const scene = load(TOY(", \"clouds\": [{}, {\"kind\": \"cirrus\"}]"));
+    nebel_planet planet = nebel_scene_contents(scene)->planets[0];
+    nebel_sun before, now;
+    assert_int_equal(nebel_find_scene_sunlight(scene, 3, &before), NEBEL_OK);
+    nebel_scene *const other = load(
+        TOY(", \"airs\": [{\"type\": \"exponential\", \"scattering\": 0.001, \"absorption\": [0, 1e-4, 0], \"phase\": "
+            "{\"type\": \"henyey_greenstein\", \"g\": 0.5}, \"scale_height\": 25}, {\"type\": \"exponential\", "
+            "\"scattering\": 0.002, \"scale_height\": 4}], \"ground_albedo\": 0.75, \"sun_diameter\": 2, \"clouds\": "
+            "[{\"coverage\": 0.9, \"size\": "
+            "30, \"detail\": 0, \"wind\": [3, 4]}, {\"kind\": \"cirrus\", \"extinction\": 0.03}]"));
+    const nebel_planet *const wanted = nebel_scene_contents(other)->planets;
+    assert_int_equal(planet.air.air_count, wanted->air.air_count);
+    memcpy(planet.air.airs, wanted->air.airs, sizeof planet.air.airs);
+    memcpy(planet.air.ground_albedo, wanted->air.ground_albedo, sizeof planet.air.ground_albedo);
+    planet.sun_diameter = 2;
+    memcpy(planet.cloud_layers, wanted->cloud_layers, sizeof planet.cloud_layers);
+    /* What does not count stays. */
+    planet.air.radius = 7;
+    planet.cloud_layers[0].kind = NEBEL_CLOUD_STRATUS;
+    planet.cloud_layers[1].seed = 77;
+    assert_int_equal(nebel_change_scene_planets(scene, &planet), NEBEL_OK);
+    const nebel_planet *const made = nebel_scene_contents(scene)->planets;
+    assert_non_null(made->atmosphere);
+    assert_non_null(made->clouds);
+    assert_number(made->air.radius, wanted->air.radius);
+    assert_int_equal(made->cloud_layers[0].kind, NEBEL_CLOUD_CUMULUS);
+    assert_int_equal(made->cloud_layers[1].seed, 2);
+    assert_number(made->sun_diameter, 2);
+    same_light(scene, other);
+    assert_int_equal(nebel_find_scene_sunlight(scene, 3, &now), NEBEL_OK);
+    assert_true(fabs(now.irradiance[1] - before.irradiance[1]) > 1e-3 * before.irradiance[1]);
+    nebel_destroy_scene(other);
+    nebel_destroy_scene(scene);
+}
+
+static void test_layers(void **state)
+{
+    (void)state;
+    nebel_scene *const scene = load(SCENE("{\"model\": \"layers\", \"clouds\": [{}, {\"seed\": 4}]}"));
+    nebel_planet planet = nebel_scene_contents(scene)->planets[0];
+    planet.shells.day = 24;
+    planet.shells.radius = 3;
+    planet.shells.clouds[1].gain = .25;
+    planet.shells.clouds[1].seed = 5;
+    planet.shells.air.brightness = 2;
+    assert_int_equal(nebel_change_scene_planets(scene, &planet), NEBEL_OK);
+    const nebel_planet *const made = nebel_scene_contents(scene)->planets;
+    const nebel_layers_desc *const layers = nebel_describe_layers(made->layers);
+    assert_number(layers->day, 24);
+    assert_number(layers->radius, 6.36e6);
+    assert_number(layers->clouds[0].gain, .6);
+    assert_number(layers->clouds[1].gain, .25);
+    assert_int_equal(layers->clouds[1].seed, 4);
+    assert_number(layers->air.brightness, 2);
+    const nebel_layers *const kept = made->layers;
+    planet.shells.clouds[0].gain = -1;
+    assert_int_equal(nebel_change_scene_planets(scene, &planet), NEBEL_ERROR_VALUE);
+    assert_ptr_equal(made->layers, kept);
+    assert_number(made->shells.clouds[0].gain, 0);
+    nebel_destroy_scene(scene);
+}
+
+typedef struct wrong {
+    nebel_planet planet;
+    const char *message;
+} wrong;
+
+/* All stays, and the log says why. */
+static void test_what_is_wrong(void **state)
+{
+    (void)state;
+    const char *const text = TOY(", \"clouds\": [{}, {\"kind\": \"cirrus\"}]");
+    meter m;
+    journal kept;
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = metered_desc(&m, &kept);
+    assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
+    const nebel_planet *const own = nebel_scene_contents(scene)->planets;
+    assert_int_equal(nebel_change_scene_planets(scene, own), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_change_scene_planets(NULL, own), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_change_scene_planets(scene, NULL), NEBEL_ERROR_ARGUMENT);
+    wrong faults[] = {{*own, "planet: sun_diameter"}, {*own, "ground_albedo"}, {*own, "scale_height"},
+                      {*own, "top: must be above"},   {*own, "overlap"},       {*own, "coverage"}};
+    faults[0].planet.sun_diameter = (double)NAN;
+    faults[1].planet.air.ground_albedo[1] = 1.5;
+    faults[2].planet.air.airs[0].scale_height = -1;
+    faults[3].planet.cloud_layers[0].base = 60;
+    faults[3].planet.cloud_layers[0].top = 50;
+    faults[4].planet.cloud_layers[0].top = own->air.thickness;
+    faults[5].planet.cloud_layers[1].coverage = 2;
+    const nebel_planet before = *own;
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
+        const int said = kept.count;
+        assert_int_equal(nebel_change_scene_planets(scene, &faults[i].planet), NEBEL_ERROR_VALUE);
+        assert_int_equal(kept.count, said + 1);
+        if (strstr(kept.last, faults[i].message) == NULL) fail_msg("%s: %s", faults[i].message, kept.last);
+        assert_ptr_equal(own->atmosphere, before.atmosphere);
+        assert_ptr_equal(own->clouds, before.clouds);
+        assert_number(own->sun_left[0], before.sun_left[0]);
+        assert_number(own->cloud_layers[0].top, before.cloud_layers[0].top);
+    }
+    nebel_destroy_scene(scene);
+    assert_int_equal(m.live, 0);
+}
+
+/* Every seventh allocation, so that it does not take long. */
+static void test_without_memory(void **state)
+{
+    (void)state;
+    const char *const text = TOY(", \"clouds\": [{}]");
+    meter m;
+    journal kept;
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = metered_desc(&m, &kept);
+    assert_int_equal(nebel_parse_scene(text, strlen(text), "-", &desc, &scene), NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    nebel_scene *const other = load(text);
+    const nebel_planet *const own = nebel_scene_contents(scene)->planets;
+    nebel_planet planet = *own;
+    planet.air.airs[1].scattering[0] *= 2;
+    nebel_result result = NEBEL_ERROR_MEMORY;
+    for (long calls = 0; result != NEBEL_OK; calls += 7) {
+        const nebel_atmosphere *const atmosphere = own->atmosphere;
+        m.fail_at = m.made + calls;
+        result = nebel_change_scene_planets(scene, &planet);
+        m.fail_at = 1L << 40;
+        assert_int_equal(result, result == NEBEL_OK ? NEBEL_OK : NEBEL_ERROR_MEMORY);
+        if (result != NEBEL_OK) assert_ptr_equal(own->atmosphere, atmosphere);
+        if (result != NEBEL_OK) same_light(scene, other);
+        assert_true(calls < 200);
+    }
+    nebel_destroy_scene(other);
+    nebel_destroy_scene(scene);
+    assert_int_equal(m.live, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_air_and_clouds),
+        cmocka_unit_test(test_layers),
+        cmocka_unit_test(test_what_is_wrong),
+        cmocka_unit_test(test_without_memory),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
