@@ -78,11 +78,14 @@ static nebel_density random_density(const nebel_shape *shape)
     if (d.type == NEBEL_DENSITY_RADIAL) d.type = NEBEL_DENSITY_GAUSSIAN;
     if (round && pick(2)) d.type = NEBEL_DENSITY_RADIAL;
     if (shape->type == NEBEL_SHAPE_BOX && pick(2)) d.type = NEBEL_DENSITY_SOFT_EDGE;
+    if (pick(6) == 0) d.type = NEBEL_DENSITY_ALTITUDE;
+    d.radius = pick(2) ? dice(6, 20) : 6.36e6;
     d.scale_height = dice(1, 12);
     point(d.from, 8);
     point(d.to, 8);
     d.power = 1 + pick(3);
     point(d.center, 8);
+    if (d.type == NEBEL_DENSITY_ALTITUDE) d.center[1] -= d.radius;
     d.sigma = dice(1, 6);
     d.distance = dice(.3, 4);
     return d;

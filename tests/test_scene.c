@@ -209,6 +209,35 @@ static void test_all_densities(void **state)
     for (int i = 0; i < 4; i++) nebel_destroy_scene(s[i]);
 }
 
+/* Above the ground at the origin, of the Earth unless the file says otherwise, in the file's own terms. */
+static void test_altitudes(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {
+        "{\"nebel\": 1, \"fog\": [{\"extinction\": 1, \"shape\": {\"type\": \"world\"}, \"density\": {\"type\": "
+        "\"altitude\", \"scale_height\": 40}}]}",
+        "{\"nebel\": 1, \"up\": \"z\", \"unit\": 1000, \"fog\": [{\"extinction\": 1, \"shape\": {\"type\": \"world\"}, "
+        "\"density\": {\"type\": \"altitude\", \"scale_height\": 0.04, \"radius\": 2, \"base\": 0.003, \"below\": "
+        "\"constant\"}}]}",
+        "{\"nebel\": 1, \"up\": \"z\", \"fog\": [{\"extinction\": 1, \"shape\": {\"type\": \"world\"}, \"density\": "
+        "{\"type\": \"altitude\", \"scale_height\": 40, \"center\": [1, 2, 3]}}]}"};
+    const nebel_density wanted[] = {
+        {.scale_height = 40, .center = {0, -6.36e6, 0}, .radius = 6.36e6},
+        {.scale_height = 40, .center = {0, -2000, 0}, .radius = 2000, .base = 3, .below = NEBEL_BELOW_CONSTANT},
+        {.scale_height = 40, .center = {1, 3, -2}, .radius = 6.36e6}};
+    for (int i = 0; i < 3; i++) {
+        nebel_scene *s;
+        const nebel_density *density = &one(texts[i], &s)->density, *w = &wanted[i];
+        assert_int_equal(density->type, NEBEL_DENSITY_ALTITUDE);
+        assert_int_equal(density->below, w->below);
+        assert_vector(density->center, w->center[0], w->center[1], w->center[2]);
+        assert_number(density->radius, w->radius);
+        assert_number(density->scale_height, w->scale_height);
+        assert_number(density->base, w->base);
+        nebel_destroy_scene(s);
+    }
+}
+
 static void test_all_amounts(void **state)
 {
     (void)state;
@@ -430,6 +459,7 @@ int main(void)
         cmocka_unit_test(test_all_simple_shapes),
         cmocka_unit_test(test_shapes_are_made_of_shapes),
         cmocka_unit_test(test_all_densities),
+        cmocka_unit_test(test_altitudes),
         cmocka_unit_test(test_all_amounts),
         cmocka_unit_test(test_albedo_takes_every_phase_function),
         cmocka_unit_test(test_operations_priorities_and_distances_are_read),

@@ -252,6 +252,9 @@ static void test_what_no_density_has(void **state)
          "fog[0].density.below: unknown; must be one of: grow, constant"},
         {FORMAT, DENSITY("\"type\": \"linear\", \"from\": [1, 2, 3], \"to\": `[1, 2, 3]"),
          "fog[0].density.to: is the same place"},
+        {FORMAT, DENSITY("\"type\": \"altitude\", \"scale_height\": `40, \"radius\": 1900"),
+         "fog[0].density.scale_height: is 40; must be at most a 50th of the distance of the base from the center, "
+         "1900"},
         {FORMAT, DENSITY("\"type\": \"gaussian\", \"center\": [1, 2, 3], \"sigma\": `-1"),
          "fog[0].density.sigma: is -1"},
         {FORMAT,

@@ -11,7 +11,7 @@ static const char *const shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_sp
                                                            "ellipsoid", "cylinder",   "capsule",     "cone",
                                                            "convex",    "union",      "intersection"};
 static const char *const density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",    "linear", "radial",
-                                                               "gaussian", "soft_edge", "grid"};
+                                                               "gaussian", "soft_edge", "grid",   "altitude"};
 
 enum { X, Y, Z };
 

@@ -246,8 +246,8 @@ nebel_grid *nebel_retain_grid(nebel_grid *grid);
 /* One owner less; the last one frees it. Any thread. NULL is fine. */
 void nebel_release_grid(nebel_grid *grid);
 
-/* What fraction of the stated extinction a place has. Height, linear and gaussian are in world coordinates; radial,
- * soft edge and grid follow the shape and its transform. */
+/* What fraction of the stated extinction a place has. Height, linear, gaussian and altitude are in world coordinates;
+ * radial, soft edge and grid follow the shape and its transform. */
 typedef enum nebel_density_type {
     NEBEL_DENSITY_CONSTANT = 0,
     NEBEL_DENSITY_HEIGHT,    /* exp(-(y - base) / scale_height); `below` says what holds under the base. At most 1e18,
@@ -257,6 +257,8 @@ typedef enum nebel_density_type {
     NEBEL_DENSITY_GAUSSIAN,  /* exp(-r^2 / (2 sigma^2)) around center */
     NEBEL_DENSITY_SOFT_EDGE, /* 0 on the surface, 1 from `distance` within: see below; not world or groups */
     NEBEL_DENSITY_GRID,      /* voxels that fill a box: see nebel_grid_desc; boxes only */
+    NEBEL_DENSITY_ALTITUDE, /* as height, above the ground of a ball: exp(-(|p - center| - radius - base) / scale_height);
+                                optical depth within 4e-9 of itself */
     NEBEL_DENSITY_COUNT
 } nebel_density_type;
 
@@ -283,14 +285,19 @@ typedef enum nebel_below {
     NEBEL_BELOW_CONSTANT  /* 1 under the base */
 } nebel_below;
 
+/* The base of an altitude density is at least so many scale heights from the centre: the optical depth of fog on balls
+ * that bend more would be off by more. */
+#define NEBEL_MIN_CURVATURE 50
+
 typedef struct nebel_density {
     nebel_density_type type;
-    nebel_below below;     /* height */
-    double base;           /* height: m */
-    double scale_height;   /* height: m, > 0 */
+    nebel_below below;     /* height, altitude */
+    double base;           /* height, altitude: m */
+    double scale_height;   /* height, altitude: m, > 0 */
     double from[3], to[3]; /* linear: m, apart */
     int power;             /* radial: 1, 2 or 3 */
-    double center[3];      /* gaussian: m */
+    double center[3];      /* gaussian, altitude: m */
+    double radius;         /* altitude: m, > 0 */
     double sigma;          /* gaussian: m, > 0 */
     double distance;       /* soft edge: m in the shape's own coordinates, > 0 */
     nebel_grid *grid;      /* grid: not NULL; a volume becomes one more owner of it */

@@ -618,7 +618,7 @@ static nebel_result add_part(nb_fog_bound *bound, const mixture *m, size_t leave
 static int is_known_density(const nb_volume *body)
 {
     const nb_leaf *const leaf = &body->leaves[0];
-    if (body->density.type == NEBEL_DENSITY_GRID) return 0;
+    if (body->density.type == NEBEL_DENSITY_GRID || body->density.type == NEBEL_DENSITY_ALTITUDE) return 0;
     if (body->density.type != NEBEL_DENSITY_SOFT_EDGE) return 1;
     return leaf->type == NB_LEAF_BALL || leaf->type == NB_LEAF_BOX ||
            (leaf->type == NB_LEAF_PLANES && leaf->face_count <= MOST_SOFT_PLANES);
@@ -629,6 +629,9 @@ static nebel_result refuse_density(const nebel_log *log, const nb_volume *body)
     if (body->density.type == NEBEL_DENSITY_GRID)
         return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
                        "tessellation: nothing is proven of a grid; give the volume another density");
+    if (body->density.type == NEBEL_DENSITY_ALTITUDE)
+        return nb_fail(log, NEBEL_ERROR_UNSUPPORTED,
+                       "tessellation: nothing is proven of fog above a ball; give the volume another density");
     const nb_leaf_type type = body->leaves[0].type;
     const char *const name = type == NB_LEAF_TUBE      ? "cylinder"
                              : type == NB_LEAF_CONE    ? "cone"

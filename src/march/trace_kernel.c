@@ -22,6 +22,8 @@
 #include "formulas/medium.inc"
 #include "formulas/phase.inc"
 #include "formulas/lamp.inc"
+#include "formulas/planet.inc"
+#include "formulas/altitude.inc"
 
 #include <float.h>
 #include <math.h>

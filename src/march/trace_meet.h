@@ -1,10 +1,18 @@
 /* Meeting the fog: which media any ray of a packet meets, the intervals of all their leaves, and what the ends that may
  * be off can do. Included by trace_kernel.c after trace_packet.h. */
 
+static nb_real end_altitude_density(const contact *k, nb_wide t, nb_real slack)
+{
+    const nb_real u = altitude_coordinate(k, t);
+    const nb_real reach = nb_narrow(k->slope.x) * slack + k->noise + nb_abs(u) * (NB_F(4.0) * NB_EPSILON);
+    return density_of_height(&k->medium->body.density, u - reach);
+}
+
 /* How dense a medium may be within slack of t, for what an uncertain end there may do. */
 static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
 {
     const nebel_density *density = &k->medium->body.density;
+    if (density->type == NEBEL_DENSITY_ALTITUDE) return end_altitude_density(k, t, slack);
     const nb_wide rounding = (nb_wabs(k->offset.x) + nb_wabs(k->slope.x * t)) * (NB_W(4.0) * NB_WEPSILON);
     const nb_real u = coordinate(k, t);
     const nb_real reach =
@@ -12,7 +20,7 @@ static nb_real end_density(const contact *k, nb_wide t, nb_real slack)
     const nb_real nearest = nb_max(nb_abs(u) - reach, NB_F(0.0));
     switch (density->type) {
     case NEBEL_DENSITY_HEIGHT:
-        return density->below == NEBEL_BELOW_GROW ? nb_height_density(u - reach) : nb_height_capped_density(u - reach);
+        return density_of_height(density, u - reach);
     case NEBEL_DENSITY_LINEAR:
         return nb_linear_density(u + reach + k->noise + k->drift * nb_narrow(t));
     case NEBEL_DENSITY_GAUSSIAN:

@@ -128,6 +128,23 @@ static nb_real grid_ceiling(const contact *k, nb_wide middle, nb_real along)
     return nb_load_lanes(value);
 }
 
+/* The real part of the distance from the centre, sqrt(lowest^2 + z^2), is at least that with z its real part and `across`^2 taken
+ * off. Where z may be imaginary and as far as the lowest place from the centre the root has no one branch. */
+static nb_real altitude_ceiling(const contact *k, nb_wide middle, nb_wide along, nb_wide across)
+{
+    const nebel_density *density = &k->medium->body.density;
+    const nb_wide nearest = nb_wclamp(-k->arc.rise, middle - along, middle + along);
+    const nb_wide climb = nb_arc_climb(k->arc, nearest), radius = k->arc.radius + climb, square = radius * radius;
+    const nb_wide less = nb_wsqrt(nb_wmax(square - across * across, NB_W(0.0)));
+    const nb_wide drop = nb_wselect(less > NB_W(0.0), across * across / nb_wmax(radius + less, NB_WTINY), radius);
+    const nb_real u = nb_narrow((k->arc.height + climb - drop) * k->slope.x);
+    const nb_wmask branches = nb_wand(nearest == -k->arc.rise, less <= NB_W(0.0));
+    const nb_real growing = density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_exp(nb_min(-u, NB_F(80.0)));
+    const nb_real most = nb_select(nb_narrow_mask(branches), NB_HUGE, growing);
+    if (density->below == NEBEL_BELOW_GROW) return most;
+    return nb_select(altitude_coordinate(k, middle) < NB_F(0.0), NB_F(1.0), most);
+}
+
 /* A bound of |density| on the ellipse around `middle`, `along` and `across` metres wide. Between kinks a profile that
  * stays level is the same number on all of it. */
 static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, nb_real across)
@@ -159,6 +176,8 @@ static nb_real density_ceiling(const contact *k, nb_wide middle, nb_real along, 
         return nb_narrow(soft_edge_ceiling(k, middle, nb_widen(along)));
     case NEBEL_DENSITY_GRID:
         return grid_ceiling(k, middle, along);
+    case NEBEL_DENSITY_ALTITUDE:
+        return altitude_ceiling(k, middle, nb_widen(along), nb_widen(across));
     default:
         return NB_F(1.0);
     }

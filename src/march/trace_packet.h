@@ -41,11 +41,13 @@ typedef struct contact {
     nb_wvec3 offset, slope; /* affine profile coordinates: offset + slope t */
     nb_wvec3 size;          /* soft edge: half widths of a box; `ends` of a round body */
     nb_real level;          /* gaussian: m; radial: c */
-    nb_real noise;          /* of the density, from the rounding of the frame; height: relative to it */
+    nb_real noise;          /* of the density, from the rounding of the frame; height, altitude: relative to it */
     nb_real drift;          /* linear: what the density may be off by per metre of the ray, besides */
     nb_mask inside;         /* within the current piece of the ray */
     nb_wvec3 side;          /* soft edge of a round body */
     double steepest;        /* soft edge: density per metre at most */
+    nb_arc arc;             /* altitude; slope.x is the most that its coordinate changes by per metre */
+    nb_chord deep;          /* the same: where the density is at its most */
 } contact;
 
 /* What ends that may be off can do to optical depth and to radiance. */

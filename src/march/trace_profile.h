@@ -11,6 +11,30 @@ static void height_contact(contact *k, const packet *rays, const nebel_density *
     k->noise = nb_narrow(nb_wabs(k->offset.x) * (NB_W(8.0) * NB_WEPSILON));
 }
 
+/* How far under the base fog that thins out with the altitude is as thick as it gets, in scale heights. */
+static double depth_of_most(const nebel_density *density)
+{
+    return density->below == NEBEL_BELOW_GROW ? 41.446531673892822 : 0;
+}
+
+static nb_real most_of_altitude(const nebel_density *density)
+{
+    return density->below == NEBEL_BELOW_GROW ? NB_FAR : NB_F(1.0);
+}
+
+/* Rounding moves the ray and the surface by parts of their distances from the centre. */
+static void altitude_contact(contact *k, const packet *rays, const nebel_density *density)
+{
+    const nb_wvec3 p = nb_wsub3(rays->origin, wide_vector(density->center));
+    const nb_wide inverse = NB_W(1.0) / WIDE(density->scale_height), ground = WIDE(density->radius);
+    k->arc.radius = nb_wsqrt(nb_wdot3(p, p));
+    k->arc.rise = nb_wdot3(p, rays->direction);
+    k->arc.height = k->arc.radius - ground - WIDE(density->base);
+    k->deep = nb_arc_chord(k->arc, -WIDE(density->scale_height * depth_of_most(density)));
+    k->slope.x = inverse;
+    k->noise = nb_narrow((k->arc.radius + ground) * inverse * (NB_W(32.0) * NB_WEPSILON));
+}
+
 static void linear_contact(contact *k, const packet *rays, const nebel_density *density)
 {
     const nb_wvec3 from = wide_vector(density->from);
@@ -166,6 +190,9 @@ static void profile_contact(contact *k, const packet *rays)
         break;
     case NEBEL_DENSITY_GRID:
         grid_contact(k, rays, &body->leaves[0]);
+        break;
+    case NEBEL_DENSITY_ALTITUDE:
+        altitude_contact(k, rays, &body->density);
         break;
     default:
         break;
@@ -415,13 +442,25 @@ static nb_real coordinate(const contact *k, nb_wide t)
     return nb_narrow(k->offset.x + k->slope.x * t);
 }
 
+static nb_real altitude_coordinate(const contact *k, nb_wide t)
+{
+    return nb_narrow(nb_arc_height(k->arc, t) * k->slope.x);
+}
+
+/* Of height and altitude, u scale heights above the base. */
+static nb_real density_of_height(const nebel_density *density, nb_real u)
+{
+    return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
+}
+
 static nb_real contact_density(const contact *k, nb_wide t)
 {
     const nebel_density *density = &k->medium->body.density;
     switch (density->type) {
     case NEBEL_DENSITY_HEIGHT:
-        return density->below == NEBEL_BELOW_GROW ? nb_height_density(coordinate(k, t))
-                                                  : nb_height_capped_density(coordinate(k, t));
+        return density_of_height(density, coordinate(k, t));
+    case NEBEL_DENSITY_ALTITUDE:
+        return density_of_height(density, altitude_coordinate(k, t));
     case NEBEL_DENSITY_LINEAR:
         return nb_linear_density(coordinate(k, t));
     case NEBEL_DENSITY_GAUSSIAN:
@@ -462,12 +501,34 @@ static nb_estimate blur_linear(nb_estimate estimate, const contact *k, nb_wide s
     return blur(estimate, nb_select(varies, nb_min(noise, NB_F(1.0)), NB_F(0.0)), length);
 }
 
+static nb_estimate altitude_integral(const contact *k, nb_wide start, nb_wide end)
+{
+    const nebel_density *density = &k->medium->body.density;
+    const nb_estimate along =
+        nb_altitude_integral(k->arc, REAL(density->scale_height), k->deep, most_of_altitude(density), start, end);
+    return blur(along, nb_min(k->noise, NB_F(4.0)), along.value);
+}
+
+/* Where fog of an altitude begins to count, 45 scale heights above its base: behind 1e19 times thinner fog. */
+#define ALTITUDE_COUNTS 45.0
+
+static nb_wide altitude_kink(const contact *k, nb_wide t)
+{
+    const nebel_density *density = &k->medium->body.density;
+    const nb_chord counts = nb_arc_chord(k->arc, WIDE(ALTITUDE_COUNTS * density->scale_height));
+    const nb_wide kinks[] = {counts.enter, k->deep.enter, k->deep.leave, counts.leave};
+    nb_wide next = NB_WFAR;
+    for (int i = 0; i < 4; i++) next = nb_wselect(nb_wand(kinks[i] > t, kinks[i] < next), kinks[i], next);
+    return next;
+}
+
 /* The density integrated from start to end, h metres, of profiles that no polynomial of a low degree describes. In
  * line, so that a caller who does not ask for the error does not pay for it. */
 static inline __attribute__((always_inline)) nb_estimate curved_integral(const contact *k, nb_wide start, nb_wide end,
                                                                          nb_real h)
 {
     const nebel_density *density = &k->medium->body.density;
+    if (density->type == NEBEL_DENSITY_ALTITUDE) return altitude_integral(k, start, end);
     const nb_real u = coordinate(k, start), slope = nb_narrow(k->slope.x);
     if (density->type == NEBEL_DENSITY_RADIAL)
         return blur(nb_radial_integral(k->level, u, slope, h, density->power), k->noise, h);
@@ -500,6 +561,7 @@ static nb_estimate contact_integral(const contact *k, nb_wide start, nb_wide end
     case NEBEL_DENSITY_HEIGHT:
     case NEBEL_DENSITY_GAUSSIAN:
     case NEBEL_DENSITY_RADIAL:
+    case NEBEL_DENSITY_ALTITUDE:
         return curved_integral(k, start, end, h);
     case NEBEL_DENSITY_LINEAR:
         return linear_integral(k, start, end, h);
@@ -518,6 +580,7 @@ static nb_wide contact_kink(const contact *k, nb_wide t)
     const nebel_density *density = &k->medium->body.density;
     if (density->type == NEBEL_DENSITY_SOFT_EDGE) return soft_edge_kink(k, t);
     if (density->type == NEBEL_DENSITY_GRID) return next_in_grid(k, t, nb_grid_kink);
+    if (density->type == NEBEL_DENSITY_ALTITUDE) return altitude_kink(k, t);
     const int linear = density->type == NEBEL_DENSITY_LINEAR;
     if (!linear && !(density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_CONSTANT)) return NB_WFAR;
     const nb_wide inverse = nb_wrcp_bounded(k->slope.x);
@@ -530,5 +593,14 @@ static nb_wide contact_kink(const contact *k, nb_wide t)
 
 static int grows_without_bound(const nebel_density *density)
 {
-    return density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_GROW;
+    return (density->type == NEBEL_DENSITY_HEIGHT || density->type == NEBEL_DENSITY_ALTITUDE) &&
+           density->below == NEBEL_BELOW_GROW;
+}
+
+/* The least coordinate between two places, of fog that grows without bound. */
+static nb_real lowest_coordinate(const contact *k, nb_wide start, nb_wide end)
+{
+    if (k->medium->body.density.type == NEBEL_DENSITY_ALTITUDE)
+        return altitude_coordinate(k, nb_wmin(nb_wmax(-k->arc.rise, start), end));
+    return nb_min(coordinate(k, start), coordinate(k, end));
 }

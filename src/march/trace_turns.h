@@ -160,6 +160,14 @@ static void note_gaussian(sunlight *sun, const packet *rays, const nebel_density
     note_ball(sun, &s, center, WIDE(4 * density->sigma));
 }
 
+/* Within this ball the density is the same everywhere. */
+static void note_altitude(sunlight *sun, const packet *rays, const nebel_density *density, nb_wvec3 towards,
+                          int is_lamp)
+{
+    const ways s = make_ways(rays->origin, rays->direction, towards, is_lamp);
+    note_ball(sun, &s, wide_vector(density->center), WIDE(density->radius + density->base));
+}
+
 static void note_leaf(sunlight *sun, const packet *rays, const nb_volume *body, const nb_leaf *leaf, nb_wvec3 towards,
                       int is_lamp)
 {
@@ -186,5 +194,7 @@ static void note_media(sunlight *sun, const packet *rays, const nb_lamp *lamp)
             note_leaf(sun, rays, body, &body->leaves[k], towards, lamp != NULL);
         if (body->density.type == NEBEL_DENSITY_GAUSSIAN)
             note_gaussian(sun, rays, &body->density, towards, lamp != NULL);
+        if (body->density.type == NEBEL_DENSITY_ALTITUDE && body->density.below == NEBEL_BELOW_CONSTANT)
+            note_altitude(sun, rays, &body->density, towards, lamp != NULL);
     }
 }

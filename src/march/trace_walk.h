@@ -221,7 +221,7 @@ static void note_overflow(const march *m, const piece *p, gathered *g)
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         if (!grows_without_bound(&k->medium->body.density)) continue;
-        const nb_real lowest = nb_min(coordinate(k, p->start), coordinate(k, p->end));
+        const nb_real lowest = lowest_coordinate(k, p->start, p->end);
         const nb_mask overflows = nb_and(nb_and(p->lanes, k->inside), lowest < NB_F(-41.0));
         if (!nb_any(overflows)) continue;
         const nb_real length = contact_integral(k, p->start, p->end, p->length).value;

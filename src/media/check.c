@@ -176,17 +176,37 @@ static nebel_result check_shape(const nebel_log *log, const nebel_shape *shape, 
     }
 }
 
+/* Where fog thins out with y, or with the distance from a centre. */
+static nebel_result check_height(const nebel_log *log, const nebel_density *density)
+{
+    if (!(fabs(density->base) <= NEBEL_MAX_LENGTH))
+        return bad(log, "height base", "must be finite, at most " MOST " m");
+    if (density->below != NEBEL_BELOW_GROW && density->below != NEBEL_BELOW_CONSTANT)
+        return nb_fail(log, NEBEL_ERROR_ARGUMENT, "height below: %d is unknown", (int)density->below);
+    return is_extent(density->scale_height) ? NEBEL_OK : bad(log, "scale height", EXTENT_RULE);
+}
+
+static nebel_result check_altitude(const nebel_log *log, const nebel_density *density)
+{
+    if (!is_place(density->center)) return bad(log, "altitude center", PLACE_RULE);
+    if (!is_extent(density->radius)) return bad(log, "altitude radius", EXTENT_RULE);
+    const nebel_result result = check_height(log, density);
+    if (result != NEBEL_OK) return result;
+    if (!(density->radius + density->base >= NEBEL_MIN_CURVATURE * density->scale_height))
+        return bad(log, "altitude base",
+                   "must be at least " NB_TEXT(NEBEL_MIN_CURVATURE) " scale heights from the center");
+    return NEBEL_OK;
+}
+
 static nebel_result check_density(const nebel_log *log, const nebel_density *density, const nebel_shape *shape)
 {
     switch (density->type) {
     case NEBEL_DENSITY_CONSTANT:
         return NEBEL_OK;
     case NEBEL_DENSITY_HEIGHT:
-        if (!(fabs(density->base) <= NEBEL_MAX_LENGTH))
-            return bad(log, "height base", "must be finite, at most " MOST " m");
-        if (density->below != NEBEL_BELOW_GROW && density->below != NEBEL_BELOW_CONSTANT)
-            return nb_fail(log, NEBEL_ERROR_ARGUMENT, "height below: %d is unknown", (int)density->below);
-        return is_extent(density->scale_height) ? NEBEL_OK : bad(log, "scale height", EXTENT_RULE);
+        return check_height(log, density);
+    case NEBEL_DENSITY_ALTITUDE:
+        return check_altitude(log, density);
     case NEBEL_DENSITY_LINEAR:
         if (!is_place(density->from) || !is_place(density->to)) return bad(log, "linear from and to", PLACE_RULE);
         return is_extent(distance(density->from, density->to)) ? NEBEL_OK : bad(log, "linear from and to", APART_RULE);

@@ -155,10 +155,21 @@ static double edge_density(const nb_volume *volume, const double place[3])
     }
 }
 
+static double density_at_height(const nebel_density *density, double height)
+{
+    const double u = height / density->scale_height;
+    return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
+}
+
 static double height_density(const nebel_density *density, double y)
 {
-    const double u = (y - density->base) / density->scale_height;
-    return density->below == NEBEL_BELOW_GROW ? nb_height_density(u) : nb_height_capped_density(u);
+    return density_at_height(density, y - density->base);
+}
+
+static double altitude_density(const nebel_density *density, const double place[3])
+{
+    const double radius = sqrt(square_distance(place, density->center));
+    return density_at_height(density, radius - density->radius - density->base);
 }
 
 static double gaussian_density(const nebel_density *density, const double place[3])
@@ -194,6 +205,8 @@ double nb_density_within(const nb_volume *volume, const double place[3])
         return edge_density(volume, place);
     case NEBEL_DENSITY_GRID:
         return grid_density(volume, place);
+    case NEBEL_DENSITY_ALTITUDE:
+        return altitude_density(density, place);
     default:
         return 1;
     }
@@ -246,6 +259,9 @@ double nb_density_most(const nb_volume *volume, const nb_line *line, double from
         return gaussian_density(density, place);
     case NEBEL_DENSITY_GRID:
         return nb_grid_peak(density->grid);
+    case NEBEL_DENSITY_ALTITUDE:
+        place_at(line, fmin(fmax(along_line(line, density->center), from), to), place);
+        return altitude_density(density, place);
     default:
         return 1;
     }
@@ -274,6 +290,16 @@ static double linear_scale(const nebel_density *density, const nb_line *line, do
     return (rise > 0 && u > 1) || (rise < 0 && u < 0) ? HUGE_VAL : 0.25 * square / fabs(rise);
 }
 
+/* The height changes by a scale height over this length, or over the scale height divided by the slope. */
+static double altitude_scale(const nebel_density *density, const nb_line *line, double from)
+{
+    double place[3];
+    place_at(line, from, place);
+    const double radius = fmax(sqrt(square_distance(place, density->center)), density->scale_height);
+    const double slope = fabs(from - along_line(line, density->center)) / radius;
+    return density->scale_height / fmax(slope, sqrt(density->scale_height / radius));
+}
+
 double nb_density_scale(const nb_volume *volume, const nb_line *line, double from)
 {
     switch (volume->density.type) {
@@ -283,6 +309,8 @@ double nb_density_scale(const nb_volume *volume, const nb_line *line, double fro
         return linear_scale(&volume->density, line, from);
     case NEBEL_DENSITY_GAUSSIAN:
         return 0.5 * volume->density.sigma;
+    case NEBEL_DENSITY_ALTITUDE:
+        return altitude_scale(&volume->density, line, from);
     default:
         return HUGE_VAL;
     }

@@ -104,6 +104,10 @@ static nebel_density resolve_density(const nebel_density *from)
 {
     nebel_density to = {.type = from->type};
     switch (from->type) {
+    case NEBEL_DENSITY_ALTITUDE:
+        memcpy(to.center, from->center, sizeof to.center);
+        to.radius = from->radius;
+        /* fall through */
     case NEBEL_DENSITY_HEIGHT:
         to.below = from->below;
         to.base = from->base;

@@ -3,13 +3,14 @@
 
 /* ---- density --------------------------------------------------------------------------------- */
 
-enum { TYPE, BASE, SCALE_HEIGHT, BELOW, FROM, TO, POWER, CENTER, SIGMA, DISTANCE, DENSITY_KEY_COUNT };
+enum { TYPE, BASE, SCALE_HEIGHT, BELOW, FROM, TO, POWER, CENTER, SIGMA, DISTANCE, RADIUS, DENSITY_KEY_COUNT };
 
-static const char *const key_names[] = {"type", "base",  "scale_height", "below", "from",
-                                        "to",   "power", "center",       "sigma", "distance"};
+static const char *const key_names[] = {"type",  "base",   "scale_height", "below",    "from",  "to",
+                                        "power", "center", "sigma",        "distance", "radius"};
 
-static const char *const type_names[] = {"constant", "height",    "linear", "radial",
-                                         "gaussian", "soft_edge", "grid",   "noise"};
+/* In the order of nebel_density_type. */
+static const char *const type_names[] = {"constant",  "height", "linear",   "radial", "gaussian",
+                                         "soft_edge", "grid",   "altitude", "noise"};
 
 /* Noise is a grid to the core. */
 enum { TYPE_COUNT = sizeof type_names / sizeof *type_names, NOISE = NEBEL_DENSITY_COUNT };
@@ -28,6 +29,8 @@ static const nb_keys density_keys[NEBEL_DENSITY_COUNT] = {
     DENSITY_KEYS(NB_BIT(CENTER) | NB_BIT(SIGMA), 0, "a gaussian density"),
     DENSITY_KEYS(NB_BIT(DISTANCE), 0, "a soft edge"),
     DENSITY_KEYS(0, 0, "a grid"),
+    DENSITY_KEYS(NB_BIT(SCALE_HEIGHT), NB_BIT(BASE) | NB_BIT(BELOW) | NB_BIT(CENTER) | NB_BIT(RADIUS),
+                 "an altitude density"),
 };
 
 static bool fail_shape(nb_json *json, const nb_json_node *node, const char *wanted)
@@ -42,7 +45,8 @@ static bool check_type(nb_json *json, const nb_json_node *node, int type, nebel_
         return fail_shape(json, node, "a sphere or an ellipsoid");
     if (type == NEBEL_DENSITY_SOFT_EDGE && (shape == NEBEL_SHAPE_WORLD || shape >= NEBEL_SHAPE_UNION))
         return fail_shape(json, node, "a shape with a surface that is no union or intersection");
-    if (type >= NEBEL_DENSITY_GRID && shape != NEBEL_SHAPE_BOX) return fail_shape(json, node, "a box");
+    if ((type == NEBEL_DENSITY_GRID || type == NOISE) && shape != NEBEL_SHAPE_BOX)
+        return fail_shape(json, node, "a box");
     return true;
 }
 
@@ -77,7 +81,23 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
            nb_value_integer(json, found[POWER], 1, 3, &density->power) &&
            nb_value_place(json, found[CENTER], density->center) &&
            nb_value_number(json, found[SIGMA], &nb_range_extent, &density->sigma) &&
-           nb_value_number(json, found[DISTANCE], &nb_range_extent, &density->distance);
+           nb_value_number(json, found[DISTANCE], &nb_range_extent, &density->distance) &&
+           nb_value_number(json, found[RADIUS], &nb_range_extent, &density->radius);
+}
+
+/* The ball of the planet `earth`, in terms of the file; its ground, or that of a radius which is given, is at the origin. */
+static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found, nebel_density *density)
+{
+    density->radius = 6.36e6 / in->space.unit;
+    if (!read_members(in->json, found, density)) return false;
+    if (found[CENTER] == NULL) {
+        density->center[1] = -density->radius * in->space.unit;
+        nb_space_restore_place(&in->space, density->center);
+    }
+    if (density->radius + density->base >= NEBEL_MIN_CURVATURE * density->scale_height) return true;
+    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[SCALE_HEIGHT],
+                        "is %g; must be at most a %dth of the distance of the base from the center, %g",
+                        density->scale_height, NEBEL_MIN_CURVATURE, density->radius + density->base);
 }
 
 bool nb_read_density_key(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
@@ -116,7 +136,7 @@ bool nb_read_density(nb_scene_reader *in, const nb_json_node *node, nebel_shape_
     if (type == NOISE) return nb_read_noise(in, node, density);
     if (!nb_value_members(json, node, &density_keys[type], found)) return false;
     *density = (nebel_density){.type = (nebel_density_type)type, .power = type == NEBEL_DENSITY_RADIAL ? 1 : 0};
-    return read_members(json, found, density);
+    return type == NEBEL_DENSITY_ALTITUDE ? read_altitude(in, found, density) : read_members(json, found, density);
 }
 
 /* ---- phase ----------------------------------------------------------------------------------- */

@@ -49,10 +49,15 @@ const nb_place nb_transform_places[] = {
 const nebel_transform nb_plain_transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
 
 const nb_place nb_density_places[] = {
-    PLACE(nebel_density, base, 1, NB_EDIT_EACH),     PLACE(nebel_density, scale_height, 1, NB_EDIT_EACH),
-    PLACE(nebel_density, from, 3, NB_EDIT_EACH),     PLACE(nebel_density, to, 3, NB_EDIT_EACH),
-    PLACE(nebel_density, center, 3, NB_EDIT_EACH),   PLACE(nebel_density, sigma, 1, NB_EDIT_EACH),
-    PLACE(nebel_density, distance, 1, NB_EDIT_EACH), END,
+    PLACE(nebel_density, base, 1, NB_EDIT_EACH),
+    PLACE(nebel_density, scale_height, 1, NB_EDIT_EACH),
+    PLACE(nebel_density, from, 3, NB_EDIT_EACH),
+    PLACE(nebel_density, to, 3, NB_EDIT_EACH),
+    PLACE(nebel_density, center, 3, NB_EDIT_EACH),
+    PLACE(nebel_density, sigma, 1, NB_EDIT_EACH),
+    PLACE(nebel_density, distance, 1, NB_EDIT_EACH),
+    PLACE(nebel_density, radius, 1, NB_EDIT_EACH),
+    END,
 };
 
 const unsigned nb_density_masks[NEBEL_DENSITY_COUNT] = {
@@ -60,6 +65,7 @@ const unsigned nb_density_masks[NEBEL_DENSITY_COUNT] = {
     [NEBEL_DENSITY_LINEAR] = 4 | 8,
     [NEBEL_DENSITY_GAUSSIAN] = 16 | 32,
     [NEBEL_DENSITY_SOFT_EDGE] = 64,
+    [NEBEL_DENSITY_ALTITUDE] = 1 | 2 | 16 | 128,
 };
 
 const nb_place nb_nebula_places[] = {
@@ -110,7 +116,7 @@ const char *const nb_shape_names[NEBEL_SHAPE_COUNT] = {"world",     "half_space"
                                                        "ellipsoid", "cylinder",   "capsule",     "cone",
                                                        "convex",    "union",      "intersection"};
 const char *const nb_density_names[NEBEL_DENSITY_COUNT] = {"constant", "height",    "linear", "radial",
-                                                           "gaussian", "soft_edge", "grid"};
+                                                           "gaussian", "soft_edge", "grid",   "altitude"};
 const char *const nb_operation_names[NEBEL_OPERATION_COUNT] = {"add", "exclude", "replace"};
 const char *const nb_below_names[2] = {"grow", "constant"};
 const char *const nb_profile_names[NEBEL_PARTICLE_COUNT] = {"soft", "gaussian", "ball"};

@@ -121,7 +121,7 @@ void nb_save_density(nb_save *save, const nb_json *json, const nb_json_node *nod
     if (now->type == NEBEL_DENSITY_GRID) nb_save_noise_grid(save, json, &density, was->grid, now->grid);
     nb_save_places(save, json, &density, nb_density_places, nb_density_masks[now->type], was, now);
     if (now->type == NEBEL_DENSITY_RADIAL) nb_save_integer(save, json, &density, "power", was->power, now->power);
-    if (now->type == NEBEL_DENSITY_HEIGHT && was->below != now->below)
+    if ((now->type == NEBEL_DENSITY_HEIGHT || now->type == NEBEL_DENSITY_ALTITUDE) && was->below != now->below)
         nb_edit_word(&save->edit, json, &density, "below", nb_below_names[now->below]);
 }
 

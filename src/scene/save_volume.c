@@ -136,7 +136,8 @@ static void put_density(writer *out, const nebel_density *density)
     open_object(out, "density");
     put_text(out, "type", nb_density_names[density->type]);
     put_places(out, nb_density_places, nb_density_masks[density->type], density, NULL);
-    if (density->type == NEBEL_DENSITY_HEIGHT) put_text(out, "below", nb_below_names[density->below]);
+    if (density->type == NEBEL_DENSITY_HEIGHT || density->type == NEBEL_DENSITY_ALTITUDE)
+        put_text(out, "below", nb_below_names[density->below]);
     if (density->type == NEBEL_DENSITY_RADIAL) {
         put_key(out, "power");
         put_numbers(out, 1, &(double){density->power}, NB_EDIT_EACH);

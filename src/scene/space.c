@@ -91,6 +91,7 @@ static void convert_density(const nb_space *space, nebel_density *density)
     density->scale_height *= space->unit;
     density->sigma *= space->unit;
     density->distance *= space->unit;
+    density->radius *= space->unit;
 }
 
 void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume)
@@ -194,6 +195,7 @@ static void restore_density(const nb_space *space, nebel_density *density)
     density->scale_height *= back;
     density->sigma *= back;
     density->distance *= back;
+    density->radius *= back;
 }
 
 void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume)

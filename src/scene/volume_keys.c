@@ -39,6 +39,7 @@ static const moving numbers[] = {
     MOVING(density.center, 3, false),
     MOVING(density.sigma, 1, true),
     MOVING(density.distance, 1, true),
+    MOVING(density.radius, 1, true),
     MOVING(extinction, 3, true),
     MOVING(source, 3, true),
     MOVING(albedo, 3, true),
@@ -118,7 +119,7 @@ static void mend_ends(const double from_nearer[3], const double to_nearer[3], co
     for (int i = 0; i < 3; i++) to[i] = from[i] + (to_nearer[i] - from_nearer[i]);
 }
 
-/* False where rounding left nothing of a very small shape. */
+/* False where rounding left nothing of a very small shape, or a base has come near its center. */
 static bool is_sound(const nebel_volume_desc *volume)
 {
     const nebel_shape *shape = &volume->shape;
@@ -130,6 +131,8 @@ static bool is_sound(const nebel_volume_desc *volume)
     for (int i = 0; i < 3; i++)
         if (is_box && !(shape->min[i] < shape->max[i])) return false;
     if (has_axis && axis < NEBEL_MIN_LENGTH && !(is_capsule && axis == 0)) return false;
+    if (density->type == NEBEL_DENSITY_ALTITUDE)
+        return density->radius + density->base >= NEBEL_MIN_CURVATURE * density->scale_height;
     return density->type != NEBEL_DENSITY_LINEAR || distance(density->from, density->to) >= NEBEL_MIN_LENGTH;
 }
 

@@ -343,6 +343,16 @@ static size_t count_words(const nebel_snapshot *snapshot)
     return count + nb_count_lattice_words(snapshot);
 }
 
+static nebel_result check_densities(const nebel_snapshot *snapshot)
+{
+    for (size_t i = 0; i < snapshot->medium_count; i++)
+        if (snapshot->media[i].body.density.type == NEBEL_DENSITY_ALTITUDE)
+            return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
+                           "pack: shaders do not know fog above a ball yet; give the volume another density, or use "
+                           "nebel_trace");
+    return NEBEL_OK;
+}
+
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
                             size_t *count)
 {
@@ -353,7 +363,8 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (!(fabs(eye[i]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
-    nebel_result result = nb_check_voxels(snapshot);
+    nebel_result result = check_densities(snapshot);
+    if (result == NEBEL_OK) result = nb_check_voxels(snapshot);
     if (result == NEBEL_OK) result = nb_check_lattices(snapshot);
     if (result == NEBEL_OK) result = nb_check_environment(snapshot);
     if (result != NEBEL_OK) return result;

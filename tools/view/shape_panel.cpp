@@ -372,6 +372,7 @@ bool draw_density(nb_panel *panel, nebel_density *density, double reach, bool mo
     static const char *const names[] = {"constant", "height", "linear", "radial", "gaussian", "soft edge"};
     int type = density->type;
     if (type == NEBEL_DENSITY_GRID) return draw_noise(panel, density, moves);
+    if (type == NEBEL_DENSITY_ALTITUDE) return draw_height(density, reach); // above the ball of the file
     bool changed = choose("density", &type, names, NEBEL_DENSITY_GRID,
                           "How thick the fog is from place to place. Radial is for spheres and ellipsoids; a soft edge "
                           "is not for the world, unions and intersections.");
