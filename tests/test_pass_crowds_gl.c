@@ -2,114 +2,12 @@
  * among lamps. On Mesa's llvmpipe their rays take many times the turns of loops that a fragment has there. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
-#include "fog_help.h"
-#include "pass_help.h"
+#include "crowd_help.h"
 
 #include <epoxy/gl.h>
 
-enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT, MOST = 1000 };
-
-/* Volumes around one place before the eye, which is inside of some, and what lights them. */
-typedef struct crowd {
-    nebel_volume_desc volumes[MOST + 1];
-    size_t count, lamp_count;
-    nebel_fog_desc desc;
-    nebel_lamp lamps[2];
-} crowd;
-
-static nebel_volume_desc *add(crowd *c, nebel_shape shape)
-{
-    nebel_volume_desc *const v = &c->volumes[c->count++];
-    *v = (nebel_volume_desc){.shape = shape};
-    return v;
-}
-
-/* Of every colour; `depth` is that of all on a ray through the middle, about. */
-static void add_balls(crowd *c, size_t count, double depth)
-{
-    uint64_t state = 9;
-    for (size_t i = 0; i < count; i++) {
-        nebel_shape ball = {.type = NEBEL_SHAPE_SPHERE, .radius = dice(&state, 3, 5)};
-        for (int k = 0; k < 3; k++) ball.center[k] = pass_eye[k] + (k == 2 ? -6 : 0) + dice(&state, -2, 2);
-        nebel_volume_desc *const v = add(c, ball);
-        for (int k = 0; k < 3; k++) {
-            v->extinction[k] = dice(&state, .05, .2) * depth / (double)count;
-            v->source[k] = dice(&state, 0, 1);
-        }
-    }
-}
-
-static void add_boxes(crowd *c, size_t count, double depth)
-{
-    uint64_t state = 5;
-    for (size_t i = 0; i < count; i++) {
-        nebel_shape box = {.type = NEBEL_SHAPE_BOX};
-        for (int k = 0; k < 3; k++) {
-            const double center = pass_eye[k] + (k == 2 ? -6 : 0) + dice(&state, -2, 2), half = dice(&state, 2, 4);
-            box.min[k] = center - half;
-            box.max[k] = center + half;
-        }
-        nebel_volume_desc *const v = add(c, box);
-        for (int k = 0; k < 3; k++) {
-            v->extinction[k] = dice(&state, .05, .2) * depth / (double)count;
-            v->source[k] = dice(&state, 0, 1);
-        }
-    }
-}
-
-/* What is in the middle of them is not there, or there is something else. */
-static void add_hole(crowd *c, nebel_operation operation)
-{
-    nebel_shape ball = {.type = NEBEL_SHAPE_SPHERE, .radius = 1.5};
-    for (int k = 0; k < 3; k++) ball.center[k] = pass_eye[k] + (k == 2 ? -7 : .3);
-    nebel_volume_desc *const v = add(c, ball);
-    v->operation = operation;
-    v->priority = 1;
-    if (operation != NEBEL_OPERATION_REPLACE) return;
-    for (int k = 0; k < 3; k++) {
-        v->extinction[k] = .2;
-        v->source[k] = .3 * k;
-    }
-}
-
-/* They scatter in place of shining. */
-static void set_albedo(crowd *c)
-{
-    for (size_t i = 0; i < c->count; i++) {
-        memcpy(c->volumes[i].albedo, c->volumes[i].source, sizeof c->volumes[i].albedo);
-        memset(c->volumes[i].source, 0, sizeof c->volumes[i].source);
-    }
-}
-
-static void set_sun(crowd *c)
-{
-    set_albedo(c);
-    c->desc.sun = (nebel_sun){{.4, .8, .3}, {3, 2.5, 2}};
-}
-
-static void set_lamps(crowd *c)
-{
-    set_albedo(c);
-    c->lamp_count = 2;
-    for (int i = 0; i < 2; i++) {
-        c->lamps[i] = (nebel_lamp){.intensity = {20 - 5 * i, 15, 10 + 5 * i}, .radius = .1};
-        for (int k = 0; k < 3; k++) c->lamps[i].position[k] = pass_eye[k] + (k == 2 ? -4 - 5 * i : 1 - 2 * i);
-    }
-}
-
-static nebel_snapshot *commit(const crowd *c)
-{
-    nebel_fog *fog = NULL;
-    nebel_snapshot *snapshot = NULL;
-    assert_int_equal(nebel_create_fog(&c->desc, &fog), NEBEL_OK);
-    for (size_t i = 0; i < c->count; i++) assert_int_equal(nebel_add_volume(fog, &c->volumes[i], NULL), NEBEL_OK);
-    assert_int_equal(nebel_set_lamps(fog, c->lamp_count, c->lamps), NEBEL_OK);
-    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
-    nebel_destroy_fog(fog);
-    return snapshot;
-}
+enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT };
 
 typedef struct split {
     float in_scattering[4 * PIXELS], transmittance[4 * PIXELS];
@@ -149,7 +47,7 @@ static void check(const crowd *c, const char *what, nb_gl_language language, int
     static split got;
     static pass_picture picture;
     const int width = WIDTH / share, height = HEIGHT / share;
-    nebel_snapshot *const fog = commit(c);
+    nebel_snapshot *const fog = crowd_commit(c);
     pass_difference light = {0}, transmittance = {0};
     picture = (pass_picture){.view = pass_view(0, (range){-1, 0}, 0, 0), .clip = {-1, 0}};
     picture.view.width = (uint32_t)width;
@@ -179,8 +77,8 @@ static void test_balls_with_a_hole(void **state)
     for (int i = 0; i < 2; i++) {
         static crowd c;
         c = (crowd){.count = 0};
-        add_balls(&c, 70, 8);
-        add_hole(&c, operations[i]);
+        crowd_add_balls(&c, 70, 8);
+        crowd_add_hole(&c, operations[i]);
         check(&c, i == 0 ? "balls, one excludes" : "balls, one replaces", i == 0 ? NB_GL_330 : NB_GL_300ES, 1);
     }
 }
@@ -191,8 +89,8 @@ static void test_balls_in_sunlight(void **state)
     for (size_t count = 20; count <= 40; count += 10) {
         static crowd c;
         c = (crowd){.count = 0};
-        add_balls(&c, count, 4);
-        set_sun(&c);
+        crowd_add_balls(&c, count, 4);
+        crowd_set_sun(&c);
         check(&c, "balls in sunlight", NB_GL_330, 1);
     }
 }
@@ -200,12 +98,12 @@ static void test_balls_in_sunlight(void **state)
 static void test_even_boxes(void **state)
 {
     (void)state;
-    static const size_t counts[] = {300, MOST};
+    static const size_t counts[] = {300, CROWD_MOST};
     for (int i = 0; i < 2; i++) {
         static crowd c;
         c = (crowd){.count = 0};
-        add_boxes(&c, counts[i], 8);
-        check(&c, "boxes", NB_GL_330, counts[i] == MOST ? 4 : 1);
+        crowd_add_boxes(&c, counts[i], 8);
+        check(&c, "boxes", NB_GL_330, counts[i] == CROWD_MOST ? 4 : 1);
     }
 }
 
@@ -214,8 +112,8 @@ static void test_balls_among_lamps(void **state)
     (void)state;
     static crowd c;
     c = (crowd){.count = 0};
-    add_balls(&c, 40, 4);
-    set_lamps(&c);
+    crowd_add_balls(&c, 40, 4);
+    crowd_set_lamps(&c);
     check(&c, "balls and two lamps", NB_GL_330, 1);
 }
 

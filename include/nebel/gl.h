@@ -32,7 +32,7 @@
  *   - the polygon mode;
  *   - of draw buffers 0 to 3: BLEND, the colour mask, the blend function and equation;
  *   - the sample mask; the draw framebuffer, to ask where the samples of a multisampled texture are, or to draw in several
- *     passes, with a query of ANY_SAMPLES_PASSED where none of the host's is under way.
+ *     passes, with a query of ANY_SAMPLES_PASSED.
  *
  * What stays as the host has set it, because it belongs to the target: FRAMEBUFFER_SRGB, DITHER, the draw buffers, the
  * clip control, conditional rendering, and occlusion queries. Depth and stencil are never written.
@@ -94,7 +94,8 @@ typedef enum nebel_gl_output {
 /* A full-screen pass into the bound draw framebuffer. Texture names are of the host.
  *
  * Mesa's llvmpipe ends loops early: where a tile lists so many volumes that this may matter, the fog is drawn in several
- * passes, and waits for each. Where that does not suffice, or several samples of a pixel or the air of a planet keep it
+ * passes, and waits for each, to draw no more than it takes. With an occlusion query of the host's under way, of any kind, it
+ * cannot know: all 256 passes are drawn then, for the same picture, and the query counts them, too. Where that does not suffice, or several samples of a pixel or the air of a planet keep it
  * from that, the log is told once, with NEBEL_OK; see docs/shaders.md. */
 typedef struct nebel_gl_pass {
     nebel_gl_output output;

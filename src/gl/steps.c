@@ -198,14 +198,15 @@ static int draw_step(const nb_steps *s, unsigned program, int source)
     return 1 - source;
 }
 
-/* A query of the host's that is under way leaves no room for another of its kind. */
+/* A query of the host's that is under way, of whatever kind of occlusion, leaves no room for another. */
 static int can_count(const nb_context *context)
 {
-    GLint other = 0, conservative = 0;
-    glGetQueryiv(GL_ANY_SAMPLES_PASSED, GL_CURRENT_QUERY, &other);
-    if (context->es || context->version >= 43)
-        glGetQueryiv(GL_ANY_SAMPLES_PASSED_CONSERVATIVE, GL_CURRENT_QUERY, &conservative);
-    return other == 0 && conservative == 0;
+    const int has_conservative = context->es || context->version >= 43;
+    GLint any = 0, conservative = 0, samples = 0;
+    glGetQueryiv(GL_ANY_SAMPLES_PASSED, GL_CURRENT_QUERY, &any);
+    if (has_conservative) glGetQueryiv(GL_ANY_SAMPLES_PASSED_CONSERVATIVE, GL_CURRENT_QUERY, &conservative);
+    if (!context->es) glGetQueryiv(GL_SAMPLES_PASSED, GL_CURRENT_QUERY, &samples);
+    return any == 0 && conservative == 0 && samples == 0;
 }
 
 /* Draws into the other progress, which the next step writes anew. */
