@@ -316,7 +316,7 @@ class PlanetTest(FilmTest):
         first = viewer.take_picture()
         viewer.press("Planet")
         viewer.press("planet[0].airs[1].open")
-        viewer.type("planet[0].airs[1].density", "0.0001", 0.1)
+        viewer.type("planet[0].airs[1].density", "0.1", 0.1)
         hazy = viewer.take_picture()
         self.assertFalse(self.same(hazy, first, 0.02))
         viewer.type("planet[0].ground albedo", "0.75", 0.1)

@@ -44,11 +44,11 @@ bool slide_amount(nebel_air *air)
 {
     double before = 0;
     for (int c = 0; c < 3; c++) before = fmax(before, air->scattering[c] + air->absorption[c]);
-    double amount = before;
-    if (!slide("density", &amount, 1e-7, 1e-2, "%.4g / m", true,
+    double per_kilometre = before * 1e3;
+    if (!slide("density", &per_kilometre, 1e-4, 100, "%.4g / km", true,
                "What it takes of light at its densest, of the colour that it takes most of; the colour stays."))
         return false;
-    amount = fmax(least_amount, fmin(NEBEL_MAX_AIR_EXTINCTION / 2, amount));
+    const double amount = fmax(least_amount, fmin(NEBEL_MAX_AIR_EXTINCTION / 2, per_kilometre * 1e-3));
     for (int c = 0; c < 3; c++) {
         air->scattering[c] = before > 0 ? air->scattering[c] * (amount / before) : amount;
         air->absorption[c] *= before > 0 ? amount / before : 1;
