@@ -394,3 +394,37 @@ double picture_shown_apart(const picture_pair *pair)
     free(gl);
     return (double)apart / (double)pixels;
 }
+
+double picture_largest_light(const picture_pair *pair)
+{
+    double most = 0;
+    for (size_t i = 0; i < 3 * (size_t)pair->width * pair->height; i++)
+        most = fmax(most, (double)pair->cpu.in_scattering[i]);
+    return most;
+}
+
+double picture_fog_apart(const picture_pair *pair)
+{
+    const double most = picture_largest_light(pair);
+    const size_t pixels = (size_t)pair->width * pair->height;
+    size_t apart = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        double is = 0;
+        for (size_t c = 3 * i; c < 3 * i + 3; c++)
+            is = fmax(is, fmax(fabs((double)pair->cpu.transmittance[c] - (double)pair->gl.transmittance[c]),
+                               fabs((double)pair->cpu.in_scattering[c] - (double)pair->gl.in_scattering[c]) / most));
+        apart += is > 1. / 255;
+    }
+    return (double)apart / (double)pixels;
+}
+
+double picture_depth_apart(const picture_pair *pair, double least)
+{
+    const size_t pixels = (size_t)pair->width * pair->height;
+    size_t apart = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        const double cpu = (double)pair->cpu.depth[i], gl = (double)pair->gl.depth[i];
+        apart += isinf(cpu) != isinf(gl) || (!isinf(cpu) && fabs(cpu - gl) > 1e-3 * fmax(cpu, least));
+    }
+    return (double)apart / (double)pixels;
+}

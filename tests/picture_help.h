@@ -60,6 +60,15 @@ picture_light picture_compare_light(const picture_pair *pair);
 /* Of pixels the share that is more than 2/255 apart as they are shown. */
 double picture_shown_apart(const picture_pair *pair);
 
+/* The largest radiance of air and fog on the CPU. */
+double picture_largest_light(const picture_pair *pair);
+
+/* Of pixels the share of which transmittance or, as a share of that radiance, in-scattering is more than 1/255 apart. */
+double picture_fog_apart(const picture_pair *pair);
+
+/* Of pixels the share of which depth is more than a thousandth apart, of at least `least` metres. */
+double picture_depth_apart(const picture_pair *pair, double least);
+
 /* ---- the report: an HTML page and its pictures in the folder NEBEL_REPORT; nothing without it ---- */
 
 typedef struct picture_report {

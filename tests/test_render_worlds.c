@@ -3,49 +3,11 @@
 #include "near.h"
 #include "planet_help.h"
 #include "test_render_scene.h"
+#include "worlds_help.h"
 
 #include "base/eclipse.h"
 
-enum { WIDTH = 40, HEIGHT = 24, MOST = 3 };
-
-typedef struct worlds {
-    size_t count;
-    nebel_atmosphere *atmospheres[MOST];
-    nebel_planet planets[MOST];
-    nebel_scene_data scene;
-    nebel_sun sun;
-} worlds;
-
-typedef struct body {
-    const char *name;
-    double center[3], radius, thickness; /* 0: the preset's; center: of those behind the first */
-} body;
-
-static void make_worlds(size_t count, const body *bodies, const double to_sun[3], double sun_diameter, worlds *s)
-{
-    *s = (worlds){.count = count, .sun = {.irradiance = {5, 4, 3}}};
-    memcpy(s->sun.direction, to_sun, sizeof s->sun.direction);
-    assert_true(nb_vector_make_unit(s->sun.direction));
-    for (size_t i = 0; i < count; i++) {
-        nebel_planet *planet = &s->planets[i];
-        planet->air = *nebel_find_atmosphere(bodies[i].name);
-        if (bodies[i].radius > 0) planet->air.radius = bodies[i].radius;
-        if (bodies[i].thickness > 0) planet->air.thickness = bodies[i].thickness;
-        for (int c = 0; c < 3 && i > 0; c++)
-            planet->air.ground[c] = bodies[i].center[c] + (c == 1 ? planet->air.radius : 0);
-        assert_int_equal(nebel_create_atmosphere(&planet->air, &s->atmospheres[i]), NEBEL_OK);
-        planet->atmosphere = s->atmospheres[i];
-        planet->sun_diameter = sun_diameter;
-    }
-    s->scene =
-        (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = count, .planets = s->planets};
-    memcpy(s->scene.sun_direction, s->sun.direction, sizeof s->scene.sun_direction);
-}
-
-static void free_worlds(worlds *s)
-{
-    for (size_t i = 0; i < s->count; i++) nebel_destroy_atmosphere(s->atmospheres[i]);
-}
+enum { WIDTH = 40, HEIGHT = 24 };
 
 static test_picture render(const worlds *s, const nebel_camera *camera, int threads, uint32_t samples)
 {
@@ -114,8 +76,8 @@ static double count_suns(const worlds *s, size_t but, const double place[3])
 /* Light along a ray, planet by planet as it enters their air. */
 static double look(const worlds *s, const nebel_ray *camera_ray, double light[3])
 {
-    double unit[3], entry[MOST], end = HUGE_VAL, left[3] = {1, 1, 1};
-    size_t order[MOST], ground = 0;
+    double unit[3], entry[WORLDS_MOST], end = HUGE_VAL, left[3] = {1, 1, 1};
+    size_t order[WORLDS_MOST], ground = 0;
     memcpy(unit, camera_ray->direction, sizeof unit);
     assert_true(nb_vector_make_unit(unit));
     for (size_t k = 0; k < s->count; k++) {
@@ -160,34 +122,18 @@ static double look(const worlds *s, const nebel_ray *camera_ray, double light[3]
     return end;
 }
 
-static const body near_bodies[] = {{.name = "earth"},
-                                   {.name = "moon", .center = {-4e6, 9e6, -2.4e7}},
-                                   {.name = "earth", .center = {-2e6, 6e6, -1.2e7}, .radius = 8e5}};
-static const body before_sun[] = {{.name = "earth"}, {.name = "moon", .center = {-6e6, 6e6, -2.1e7}}};
-static const body between[] = {{.name = "earth"}, {.name = "moon", .center = {5e6, 8.66e6, 0}}};
-static const body of_a_moon[] = {{.name = "moon"}, {.name = "earth", .center = {-1e7, 1.2e7, -3e7}}};
-
 static void worlds_are_seen_one_behind_the_other(void **state)
 {
     (void)state;
-    static const struct {
-        const char *text;
-        size_t count;
-        const body *bodies;
-        double sun[3], diameter, height, pitch;
-    } views[] = {{"by day", 3, near_bodies, {.8, .6, .2}, .53, 2, .35},
-                 {"before the sun", 2, before_sun, {-6e6, 6e6, -2.1e7}, 3, 2, .25},
-                 {"an eclipse from space", 2, between, {.5, .8660254, 0}, 10, 2e7, -1.5},
-                 {"from a moon", 2, of_a_moon, {.8, .6, .2}, .53, 2, .25}};
-    for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
+    for (size_t v = 0; v < WORLDS_VIEWS; v++) {
         worlds s;
-        make_worlds(views[v].count, views[v].bodies, views[v].sun, views[v].diameter, &s);
-        const nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
+        worlds_make(worlds_views[v].count, worlds_views[v].bodies, worlds_views[v].sun, worlds_views[v].diameter, &s);
+        const nebel_camera camera = planet_camera(worlds_views[v].height, worlds_views[v].pitch);
         test_picture picture = render(&s, &camera, 2, 1);
         double brightest = 0, worst = 0, least = 1;
         int untold = 0, grounds = 0;
         for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
-            const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
+            const nebel_ray ray = planet_ray(&camera, worlds_views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             double light[3], off = 0;
             const double way = look(&s, &ray, light), depth = (double)picture.planes.depth[i];
             if (way < HUGE_VAL) assert_true(fabs(depth - way) <= 1e-5 * way + 1e-3);
@@ -201,12 +147,12 @@ static void worlds_are_seen_one_behind_the_other(void **state)
             worst = fmax(worst, off);
             untold += off > (double)picture.planes.error[i] * 2 + 2e-3 * brightest; /* of the suns, too */
         }
-        print_message("%s: %.1e of the brightest, %d of %d told too little\n", views[v].text, worst / brightest, untold,
-                      WIDTH * HEIGHT);
+        print_message("%s: %.1e of the brightest, %d of %d told too little\n", worlds_views[v].text, worst / brightest,
+                      untold, WIDTH * HEIGHT);
         assert_true(brightest > .05 && worst <= .02 * brightest && untold <= WIDTH * HEIGHT / 200);
         assert_true(grounds > 40 && grounds < WIDTH * HEIGHT);
         test_picture_free(&picture);
-        free_worlds(&s);
+        worlds_free(&s);
     }
 }
 
@@ -214,15 +160,15 @@ static void worlds_are_seen_one_behind_the_other(void **state)
 static void order_does_not_matter(void **state)
 {
     (void)state;
-    const body other[] = {near_bodies[0], near_bodies[2], near_bodies[1]};
+    const worlds_body other[] = {worlds_near[0], worlds_near[2], worlds_near[1]};
     const double sun[3] = {.8, .6, .2};
     const nebel_camera camera = planet_camera(2, .35);
     test_picture pictures[2];
     for (int i = 0; i < 2; i++) {
         worlds s;
-        make_worlds(3, i ? other : near_bodies, sun, .53, &s);
+        worlds_make(3, i ? other : worlds_near, sun, .53, &s);
         pictures[i] = render(&s, &camera, 1 + i, 4);
-        free_worlds(&s);
+        worlds_free(&s);
     }
     assert_memory_equal(pictures[0].planes.color, pictures[1].planes.color, WIDTH * HEIGHT * 3 * sizeof(float));
     for (int i = 0; i < 2; i++) test_picture_free(&pictures[i]);
@@ -235,11 +181,11 @@ static void moons_of_less_than_a_pixel_are_seen(void **state)
     (void)state;
     const double pixel = 2 * tan(30 * test_pi / 180) / HEIGHT, pitch = .8, far = 1e8, a = .3;
     const double sun[3] = {sin(a), -sin(pitch) * cos(a), cos(pitch) * cos(a)};
-    const body bodies[] = {
+    const worlds_body bodies[] = {
         {.name = "moon"},
         {.name = "moon", .center = {0, 2 + far * sin(pitch), -far * cos(pitch)}, .radius = .4 * pixel * far}};
     worlds s;
-    make_worlds(2, bodies, sun, .53, &s);
+    worlds_make(2, bodies, sun, .53, &s);
     const nebel_camera camera = planet_camera(2, pitch);
     test_picture picture = render(&s, &camera, 1, 64);
     double sum = 0;
@@ -249,7 +195,7 @@ static void moons_of_less_than_a_pixel_are_seen(void **state)
     print_message("%.4g of %.4g\n", sum, expected);
     assert_near(sum / expected, 1, .05); /* by about 32 samples of 256 */
     test_picture_free(&picture);
-    free_worlds(&s);
+    worlds_free(&s);
 }
 
 /* The disc that is left: by area, at all sizes and distances. */
@@ -285,7 +231,7 @@ static void models_are_in_the_shadow_of_moons(void **state)
     const double up[3] = {0, 1, 0};
     int half = 0;
     for (int i = 0; i < 4; i++) {
-        const body bodies[] = {{.name = "earth"}, {.name = "moon", .center = {aside[i], 1.2e7, 0}}};
+        const worlds_body bodies[] = {{.name = "earth"}, {.name = "moon", .center = {aside[i], 1.2e7, 0}}};
         const nebel_mesh plate = {.origin = {0, 5e5, 0},
                                   .positions = quad[0],
                                   .indices = quad_indices,
@@ -294,7 +240,7 @@ static void models_are_in_the_shadow_of_moons(void **state)
                                   .base_color = {1, 1, 1},
                                   .texture = -1};
         worlds s;
-        make_worlds(2, bodies, up, 5, &s);
+        worlds_make(2, bodies, up, 5, &s);
         s.scene.mesh_count = 1;
         s.scene.meshes = &plate;
         const nebel_camera camera = {
@@ -306,7 +252,7 @@ static void models_are_in_the_shadow_of_moons(void **state)
         assert_near(got / 4 * test_pi, left, 5e-3);
         half += left > .05 && left < .95;
         test_picture_free(&picture);
-        free_worlds(&s);
+        worlds_free(&s);
     }
     assert_true(half > 0);
 }

@@ -46,7 +46,8 @@ typedef struct nebel_gl_renderer_desc {
     uint32_t shadow_size; /* texels of a side of each of the sun's four shadow maps, and of eight more where it lights
                              fog, 64 to 16384; 0: 2048. A lamp's six have a quarter of it, less where they would take
                              more than 128 MiB together, but 64 */
-    nebel_air_run_fn run; /* for threads that walk through clouds; NULL: one part after the other */
+    nebel_air_run_fn
+        run; /* for threads that make tables of air, and walk through clouds; NULL: one part after the other */
     void *run_user;
 } nebel_gl_renderer_desc;
 
@@ -142,8 +143,8 @@ typedef struct nebel_gl_frame_desc {
  * needs), VALUE (a camera, light or time as for nebel_render_frame; taps that are not finite or negative; a factor as for
  * nebel_resolve_factor), LIMIT (a picture, or a map of layers, too large for this context; more than 4,096 lamps; stopped by progress),
  * MEMORY, UNSUPPORTED (more than one sample, or a planet of layers, where OpenGL ES cannot blend floats; a planet with
- * clouds of volume where the processor may not walk through them, several planets, one by another method than EXACT, or one with air in an orthographic view or with
- * particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
+ * clouds of volume where the processor may not walk through them, by another method than EXACT, or, if it has air, in an
+ * orthographic view or with particles; a shader that the driver does not take; the context is another one, or lost). The first panorama copies the triangles of all
  * meshes: 108 bytes each, with fog per vertex 48 more. */
 nebel_result nebel_gl_render_frame(nebel_gl_renderer *renderer, const nebel_gl_frame_desc *desc);
 

@@ -1,5 +1,7 @@
 #include "air.h"
 
+#include "daylight.h"
+
 #include "base/eclipse.h"
 
 #include <nebel/render.h>
@@ -9,40 +11,9 @@
 
 #define PI 3.14159265358979323846
 
+_Static_assert((int)NB_BATCH <= (int)NB_WORLDS_RAYS, "a batch is traced at once");
+
 /* ---- the frame ------------------------------------------------------------------------------- */
-
-/* The power of a place with regard to the ball of a planet's air: the square of a tangent's length. Where two balls that do
- * not overlap have the same is a plane between them, so that seen from a place a ball is never behind one of larger power
- * (Edelsbrunner, An acyclicity theorem for cell complexes in d dimension, 1990). */
-static double power_of(const nb_world *world, const double place[3])
-{
-    double from[3];
-    for (int c = 0; c < 3; c++) from[c] = place[c] - world->center[c];
-    const double far = nb_vector_length(from);
-    return (far - world->top) * (far + world->top);
-}
-
-static void set_world(const nebel_planet *planet, nb_world *world)
-{
-    *world =
-        (nb_world){.planet = planet, .radius = planet->air.radius, .top = planet->air.radius + planet->air.thickness};
-    for (int c = 0; c < 3; c++) world->center[c] = planet->air.ground[c] - (c == 1 ? planet->air.radius : 0);
-}
-
-/* Planets that are loaded, in the order in which rays pass them. */
-static void set_worlds(nb_air *air, const nebel_scene_data *scene, const double position[3])
-{
-    air->count = 0;
-    for (size_t i = 0; i < scene->planet_count && i < NEBEL_MAX_PLANETS; i++) {
-        nb_world world;
-        if (scene->planets[i].atmosphere == NULL) continue;
-        set_world(&scene->planets[i], &world);
-        int place = air->count++;
-        for (; place > 0 && power_of(&air->worlds[place - 1], position) > power_of(&world, position); place--)
-            air->worlds[place] = air->worlds[place - 1];
-        air->worlds[place] = world;
-    }
-}
 
 static nebel_result set_daylight(const nb_air *air, const nebel_planet *home, nb_world *world)
 {
@@ -73,7 +44,7 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
                                 .log = *log};
     nebel_result result = NEBEL_OK;
     air->allocator = allocator;
-    set_worlds(air, scene, position);
+    air->count = nb_worlds_set(air->worlds, scene, position);
     set_sun(air, scene, to_sun, &desc);
     memcpy(air->position, position, sizeof air->position);
     memcpy(desc.position, position, sizeof desc.position);
@@ -86,7 +57,7 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
         if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0 &&
             set_daylight(air, &scene->planets[0], world) != NEBEL_OK)
             result = nb_fail(log, NEBEL_ERROR_MEMORY, "frame: out of memory for the light of models on planets");
-        air->reach = fmax(air->reach, sqrt(power_of(world, position) + world->top * world->top) + world->top);
+        air->reach = fmax(air->reach, sqrt(nb_world_power(world, position) + world->top * world->top) + world->top);
     }
     return result;
 }
@@ -101,39 +72,10 @@ void nb_air_free(nb_air *air)
 
 /* ---- along rays ------------------------------------------------------------------------------ */
 
-/* Light of one planet's air. */
-typedef struct nb_air_part {
-    float left[3][NB_BATCH], light[3][NB_BATCH], error[NB_BATCH];
-} nb_air_part;
-
-static void lay_behind(const nb_air_part *part, size_t n, const nebel_light_planes *lights)
-{
-    for (size_t i = 0; i < n; i++) {
-        float most = 0;
-        for (int c = 0; c < 3; c++) {
-            most = fmaxf(most, lights->transmittance[c][i]);
-            lights->in_scattering[c][i] += lights->transmittance[c][i] * part->light[c][i];
-            lights->transmittance[c][i] *= part->left[c][i];
-        }
-        if (lights->error != NULL) lights->error[i] += most * part->error[i];
-    }
-}
-
 nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,
                           const nebel_light_planes *lights)
 {
-    nb_air_part part;
-    nebel_light_planes planes = {.error = part.error};
-    for (int c = 0; c < 3; c++) {
-        planes.transmittance[c] = part.left[c];
-        planes.in_scattering[c] = part.light[c];
-    }
-    nebel_result result = nebel_trace_air_view(air->worlds[0].view, n, direction, t_max, lights);
-    for (int k = 1; k < air->count && result == NEBEL_OK; k++) {
-        result = nebel_trace_air_view(air->worlds[k].view, n, direction, t_max, &planes);
-        if (result == NEBEL_OK) lay_behind(&part, n, lights);
-    }
-    return result;
+    return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, lights);
 }
 
 /* What other planets leave of the sun's disc. */
@@ -240,18 +182,9 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
     }
 }
 
-/* Whose shadow, and whose sky, a place is in. */
-static int nearest_to(const nb_air *air, const double place[3])
-{
-    int nearest = 0;
-    for (int k = 1; k < air->count; k++)
-        if (power_of(&air->worlds[k], place) < power_of(&air->worlds[nearest], place)) nearest = k;
-    return nearest;
-}
-
 static void light_model(const nb_air *air, const double place[3], double sun[3], double sky[3])
 {
-    const int nearest = nearest_to(air, place);
+    const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
     if (air->worlds[nearest].daylight == NULL) return;
     nb_daylight_at(air->worlds[nearest].daylight, place, sun, sky);
     const double left = uneclipsed(air, nearest, place);

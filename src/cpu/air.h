@@ -2,24 +2,16 @@
 #ifndef NB_CPU_AIR_H
 #define NB_CPU_AIR_H
 
-#include "daylight.h"
 #include "hits.h"
 #include "surface.h"
 
 #include "base/lighting.h"
+#include "base/worlds.h"
 
 #include <nebel/scene.h>
 
 /* Of hits: the ground of a planet, which belongs to no mesh. */
 #define NB_GROUND (NB_NONE - 1)
-
-/* A planet as the camera sees it. */
-typedef struct nb_world {
-    const nebel_planet *planet;
-    double center[3], radius, top; /* m; top: of its air, from the centre */
-    nebel_air_view *view;
-    nb_daylight *daylight; /* NULL: there are no models in sunlight */
-} nb_world;
 
 /* All that is the same for the rays of a frame. */
 typedef struct nb_air {

@@ -14,7 +14,7 @@ const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
     return scene->planet_count > 0 && scene->planets[0].atmosphere != NULL ? &scene->planets[0] : NULL;
 }
 
-/* ---- the table ------------------------------------------------------------------------------- */
+/* ---- the tables ------------------------------------------------------------------------------ */
 
 nebel_sun nb_gl_air_sun(const nebel_scene_data *scene)
 {
@@ -26,25 +26,121 @@ nebel_sun nb_gl_air_sun(const nebel_scene_data *scene)
     return sun;
 }
 
-static int are_same(const nebel_air_view_desc *a, const nebel_air_view_desc *b)
+/* Depths, and behind them skies, of nb_daylight. */
+enum { DEPTHS = NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS, DAYLIGHT_WORDS = DEPTHS + NB_DAYLIGHT_SKIES };
+
+static int are_same(const nb_gl_air *air, const nebel_air_view_desc *desc, const nb_world *worlds, int count,
+                    int is_lit)
 {
-    int same = a->atmosphere == b->atmosphere && a->has_distances == b->has_distances;
+    const nebel_air_view_desc *const of = &air->of;
+    int same = air->count == count && of->has_distances == desc->has_distances && (air->light[0] >= 0) == is_lit;
+    for (int i = 0; i < count; i++) same = same && air->made[i] == worlds[i].planet->atmosphere;
     for (int c = 0; c < 3; c++)
-        same = same && a->position[c] == b->position[c] && a->sun.direction[c] == b->sun.direction[c] &&
-               a->sun.irradiance[c] == b->sun.irradiance[c];
+        same = same && of->position[c] == desc->position[c] && of->sun.direction[c] == desc->sun.direction[c] &&
+               of->sun.irradiance[c] == desc->sun.irradiance[c];
     return same;
 }
 
+static void forget_views(nb_gl_air *air)
+{
+    for (int i = 0; i < air->count; i++) nebel_destroy_air_view(air->worlds[i].view);
+    air->count = 0;
+}
+
+static void forget_daylight(nb_gl_air *air, const nebel_allocator *allocator)
+{
+    for (int i = 0; i < NEBEL_MAX_PLANETS; i++) {
+        nb_release(allocator, air->daylight[i]);
+        air->daylight[i] = NULL;
+    }
+}
+
+static nebel_result make_views(nb_gl_air *air, nebel_air_view_desc desc, int count)
+{
+    nebel_result result = NEBEL_OK;
+    for (int i = 0; i < count && result == NEBEL_OK; i++) {
+        desc.atmosphere = air->made[i] = air->worlds[i].planet->atmosphere;
+        result = nebel_create_air_view(&desc, &air->worlds[i].view);
+        if (result == NEBEL_OK) air->count = i + 1;
+    }
+    if (result != NEBEL_ERROR_ARGUMENT) return result;
+    return nb_fail(&desc.log, NEBEL_ERROR_VALUE,
+                   "the planet's air: the camera or the sun is at no place that it knows");
+}
+
+/* It does not depend on the eye. */
+static nebel_result find_daylight(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
+                                  const nebel_scene_data *scene, const double to_sun[3], nb_world *world)
+{
+    nb_daylight **const kept = &air->daylight[world->planet - scene->planets];
+    if (*kept == NULL) *kept = nb_allocate_zero(allocator, 1, sizeof **kept);
+    if (*kept == NULL)
+        return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the light of models on planets");
+    world->daylight = *kept;
+    if (world->daylight->atmosphere != world->planet->atmosphere ||
+        memcmp(world->daylight->sun.direction, to_sun, sizeof world->daylight->sun.direction) != 0)
+        nb_daylight_set(world->daylight, world->planet, &scene->planets[0], to_sun);
+    return NEBEL_OK;
+}
+
+static nebel_result set_daylights(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
+                                  const nebel_scene_data *scene)
+{
+    double to_sun[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
+    nebel_result result = NEBEL_OK;
+    (void)nb_vector_make_unit(to_sun); /* the views have found it in order */
+    if (air->home != scene->planets[0].atmosphere) forget_daylight(air, allocator);
+    air->home = scene->planets[0].atmosphere;
+    for (int i = 0; i < air->count && result == NEBEL_OK; i++)
+        result = find_daylight(air, allocator, log, scene, to_sun, &air->worlds[i]);
+    return result;
+}
+
+static nebel_result measure(nb_gl_air *air, size_t *total)
+{
+    nebel_result result = NEBEL_OK;
+    *total = 0;
+    for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
+        const nb_world *const world = &air->worlds[i];
+        size_t count = 0;
+        result = nebel_pack_air_view(world->view, NULL, 0, &count);
+        air->first[i] = (int)*total;
+        air->light[i] = world->daylight != NULL ? (int)count : -1;
+        *total += count + (world->daylight != NULL ? DAYLIGHT_WORDS : 0);
+    }
+    return result;
+}
+
+static void pack_daylight(const nb_daylight *daylight, nebel_word *words)
+{
+    const float *const depth = daylight->depth[0][0], *const sky = daylight->sky[0];
+    for (int i = 0; i < DEPTHS; i++) words[i] = (nebel_word){{depth[3 * i], depth[3 * i + 1], depth[3 * i + 2], 0}};
+    for (int i = 0; i < NB_DAYLIGHT_SKIES; i++)
+        words[DEPTHS + i] = (nebel_word){{sky[3 * i], sky[3 * i + 1], sky[3 * i + 2], 0}};
+}
+
+static nebel_result pack(const nb_gl_air *air, nebel_word *words, size_t total)
+{
+    nebel_result result = NEBEL_OK;
+    for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
+        nebel_word *const own = words + air->first[i];
+        size_t count = 0;
+        result = nebel_pack_air_view(air->worlds[i].view, own, total - (size_t)air->first[i], &count);
+        if (air->light[i] >= 0) pack_daylight(air->worlds[i].daylight, own + air->light[i]);
+    }
+    return result;
+}
+
 static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
-                         const nb_context *context, const nebel_air_view *view)
+                         const nb_context *context)
 {
     size_t count = 0;
-    nebel_result result = nebel_pack_air_view(view, NULL, 0, &count);
+    nebel_result result = measure(air, &count);
     if (result != NEBEL_OK) return nb_fail(log, result, "the planet's air: %s", nebel_result_text(result));
     const size_t rows = (count + NEBEL_TEXTURE_WIDTH - 1) / NEBEL_TEXTURE_WIDTH;
     nebel_word *const words = nb_allocate_zero(allocator, rows * NEBEL_TEXTURE_WIDTH, sizeof *words);
     if (words == NULL) return nb_fail(log, NEBEL_ERROR_MEMORY, "OpenGL: out of memory for the planet's air");
-    result = nebel_pack_air_view(view, words, count, &count);
+    result = pack(air, words, count);
     if (result == NEBEL_OK)
         result = nb_words_upload(&air->texture, log, context, words, rows, "the texture of the planet's air", "");
     nb_release(allocator, words);
@@ -54,21 +150,25 @@ static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const
 nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
                            const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends)
 {
-    nebel_air_view_desc desc = {.atmosphere = nb_gl_air_planet(scene)->atmosphere,
-                                .sun = nb_gl_air_sun(scene),
-                                .position = {eye[0], eye[1], eye[2]},
-                                .has_distances = ends,
-                                .allocator = *allocator,
-                                .log = *log};
+    nb_world worlds[NEBEL_MAX_PLANETS];
+    const int count = nb_worlds_set(worlds, scene, eye), is_lit = scene->has_sun && scene->mesh_count > 0;
+    /* The ground of one planet ends the air of others. */
+    const nebel_air_view_desc desc = {.sun = nb_gl_air_sun(scene),
+                                      .position = {eye[0], eye[1], eye[2]},
+                                      .has_distances = ends || count > 1,
+                                      .run = air->run,
+                                      .run_user = air->run_user,
+                                      .allocator = *allocator,
+                                      .log = *log};
     glBindTexture(GL_TEXTURE_2D, air->texture);
-    if (are_same(&air->of, &desc)) return NEBEL_OK;
-    nb_gl_air_release(air);
-    nebel_result result = nebel_create_air_view(&desc, &air->view);
-    if (result == NEBEL_ERROR_ARGUMENT)
-        result =
-            nb_fail(log, NEBEL_ERROR_VALUE, "the planet's air: the camera or the sun is at no place that it knows");
-    if (result == NEBEL_OK) result = fill(air, allocator, log, context, air->view);
-    if (result == NEBEL_OK) air->of = desc;
+    if (are_same(air, &desc, worlds, count, is_lit)) return NEBEL_OK;
+    forget_views(air);
+    memcpy(air->worlds, worlds, (size_t)count * sizeof *worlds);
+    nebel_result result = make_views(air, desc, count);
+    if (result == NEBEL_OK && is_lit) result = set_daylights(air, allocator, log, scene);
+    if (result == NEBEL_OK) result = fill(air, allocator, log, context);
+    if (result != NEBEL_OK) forget_views(air);
+    air->of = desc;
     return result;
 }
 
@@ -77,20 +177,52 @@ void nb_gl_air_delete(const nb_gl_air *air)
     glDeleteTextures(1, &air->texture);
 }
 
-void nb_gl_air_release(nb_gl_air *air)
+void nb_gl_air_release(nb_gl_air *air, const nebel_allocator *allocator)
 {
-    nebel_destroy_air_view(air->view);
-    air->view = NULL;
-    air->of.atmosphere = NULL;
+    forget_views(air);
+    forget_daylight(air, allocator);
 }
 
-/* ---- the sun --------------------------------------------------------------------------------- */
+/* ---- programs -------------------------------------------------------------------------------- */
 
-void nb_gl_air_set_disc(unsigned program, const nebel_scene_data *scene)
+/* As the eye sees it: the way up from its centre, the height above the ground. */
+static void look_from(const nb_gl_air *air, const nb_world *world, float eye[4])
+{
+    double from[3];
+    for (int c = 0; c < 3; c++) from[c] = air->of.position[c] - world->center[c];
+    eye[3] = (float)(nb_vector_length(from) - world->radius);
+    if (!nb_vector_make_unit(from)) from[1] = 1;
+    for (int c = 0; c < 3; c++) eye[c] = (float)from[c];
+}
+
+void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program)
+{
+    GLint words[NEBEL_MAX_PLANETS][3];
+    GLfloat eyes[NEBEL_MAX_PLANETS][4], sizes[NEBEL_MAX_PLANETS][2], albedos[NEBEL_MAX_PLANETS][3];
+    for (int i = 0; i < air->count; i++) {
+        const nebel_atmosphere_desc *const desc = &air->worlds[i].planet->air;
+        words[i][0] = air->first[i];
+        words[i][1] = air->light[i];
+        words[i][2] = desc->air_count > 0;
+        look_from(air, &air->worlds[i], eyes[i]);
+        sizes[i][0] = (float)desc->radius;
+        sizes[i][1] = (float)desc->thickness;
+        for (int c = 0; c < 3; c++) albedos[i][c] = (float)desc->ground_albedo[c];
+    }
+    glUniform3iv(glGetUniformLocation(program, "world_words"), air->count, words[0]);
+    glUniform4fv(glGetUniformLocation(program, "world_eyes"), air->count, eyes[0]);
+    glUniform2fv(glGetUniformLocation(program, "world_sizes"), air->count, sizes[0]);
+    glUniform3fv(glGetUniformLocation(program, "world_albedos"), air->count, albedos[0]);
+}
+
+void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene)
 {
     const double radius = scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (pi / 180) : 0;
+    const int owns_ambient = scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
     float light[3] = {0, 0, 0};
     for (int c = 0; c < 3 && radius > 0; c++) light[c] = (float)(scene->sun_irradiance[c] / (pi * pow(sin(radius), 2)));
+    nb_gl_air_set_worlds(air, program);
     glUniform1f(glGetUniformLocation(program, "disc_radius"), (float)radius);
     glUniform3fv(glGetUniformLocation(program, "disc_light"), 1, light);
+    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), owns_ambient);
 }

@@ -1,18 +1,26 @@
-/* The air of a scene's planet: its table as a texture, its ground, the disc of its sun. */
+/* The air of a scene's planets: their tables as a texture, their ground, the light at places in it, the disc of the sun. */
 #ifndef NB_GL_AIR_H
 #define NB_GL_AIR_H
 
 #include "context.h"
 
-#include <nebel/scene.h>
+#include "base/worlds.h"
 
 typedef struct nb_gl_air {
-    unsigned texture;       /* the table, in OpenGL; 0: not made yet */
-    nebel_air_view_desc of; /* what it is made of; no atmosphere: of nothing */
-    nebel_air_view *view;   /* the same */
+    nebel_air_run_fn run; /* for threads; NULL: none */
+    void *run_user;
+    unsigned texture;                                /* all tables, in OpenGL; 0: not made yet */
+    nebel_air_view_desc of;                          /* what they are made of, but for the planet */
+    const nebel_atmosphere *made[NEBEL_MAX_PLANETS]; /* the same */
+    nb_world worlds[NEBEL_MAX_PLANETS];              /* in the order of their tables */
+    int count;                                       /* 0: nothing is made */
+    int first[NEBEL_MAX_PLANETS];                    /* words of the texture: where the table of a world begins */
+    int light[NEBEL_MAX_PLANETS];                    /* from there on, where the light at places begins; -1: none */
+    nb_daylight *daylight[NEBEL_MAX_PLANETS];        /* of planets as the scene has them; NULL: not made yet */
+    const nebel_atmosphere *home;                    /* of `daylight` */
 } nb_gl_air;
 
-/* The planet of a scene that has air; NULL: there is none. */
+/* The first planet of a scene where it has air; NULL: there is none. */
 const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene);
 
 /* The sun of a scene; where there is none one of no light. */
@@ -23,13 +31,14 @@ nebel_sun nb_gl_air_sun(const nebel_scene_data *scene);
 nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
                            const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends);
 
-/* Uniforms of nb_air_light_text in the current program, which is `program`. */
-void nb_gl_air_set_disc(unsigned program, const nebel_scene_data *scene);
+/* Uniforms of nb_air_worlds_text, and of nb_air_light_text, in the current program, which is `program`. */
+void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program);
+void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene);
 
 /* In OpenGL. */
 void nb_gl_air_delete(const nb_gl_air *air);
 
 /* The rest. */
-void nb_gl_air_release(nb_gl_air *air);
+void nb_gl_air_release(nb_gl_air *air, const nebel_allocator *allocator);
 
 #endif

@@ -1,5 +1,78 @@
 #include "air_text.h"
 
+#include "base/daylight.h"
+
+#include <stdio.h>
+
+const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
+{
+    text[0] = '\0';
+    if (worlds > 0)
+        (void)snprintf(text, NB_AIR_HEAD,
+                       "#define NEBEL_AIR\n#define SCENE_WORLDS %d\n#define NB_DAYLIGHT_HEIGHTS %d.0\n#define "
+                       "NB_DAYLIGHT_SUNS %d.0\n#define NB_DAYLIGHT_SKIES %d.0\n#define NB_DAYLIGHT_TWILIGHT %g\n",
+                       worlds, NB_DAYLIGHT_HEIGHTS, NB_DAYLIGHT_SUNS, NB_DAYLIGHT_SKIES, NB_DAYLIGHT_TWILIGHT);
+    return text;
+}
+
+/* The tables of several planets lie in one texture, one behind the other. */
+const char nb_air_words_text[] = "uniform highp sampler2D nebel_air_texture;\n"
+                                 "highp int air_first = 0;\n" /* of the planet that is asked */
+                                 "#define NEBEL_AIR_WORD(i) texelFetch(nebel_air_texture, ivec2((air_first + (i)) & "
+                                 "1023, (air_first + (i)) >> 10), 0)\n";
+
+const char nb_air_worlds_text[] =
+    "uniform ivec3 world_words[SCENE_WORLDS];\n" /* of its table; from there on of light at places, -1: none; has it air? */
+    "uniform vec4 world_eyes[SCENE_WORLDS];\n"  /* up from its centre to the eye; how high that is above the ground */
+    "uniform vec2 world_sizes[SCENE_WORLDS];\n" /* radius; how thick the air is */
+    "uniform vec3 world_albedos[SCENE_WORLDS];\n"
+    "void choose_world(int world) { air_first = world_words[world].x; }\n"
+    /* The nearest one; and whose it is. */
+    "nebel_ground nearest_ground(vec3 direction, out int world)\n"
+    "{\n"
+    "    world = 0;\n"
+    "    choose_world(0);\n"
+    "    nebel_ground nearest = nebel_find_ground(direction);\n"
+    "    for (int k = 1; k < SCENE_WORLDS; k++) {\n"
+    "        choose_world(k);\n"
+    "        nebel_ground ground = nebel_find_ground(direction);\n"
+    "        if (ground.distance < nearest.distance) {\n"
+    "            nearest = ground;\n"
+    "            world = k;\n"
+    "        }\n"
+    "    }\n"
+    "    return nearest;\n"
+    "}\n"
+    /* In their order, in which rays pass them. */
+    "nb_air_ray world_rays[SCENE_WORLDS];\n"
+    "void find_airs(vec3 direction, out float begin, out float end)\n"
+    "{\n"
+    "    begin = 1e18;\n"
+    "    end = 0.0;\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        choose_world(k);\n"
+    "        world_rays[k] = nb_find_air(direction);\n"
+    "        if (world_words[k].z == 0 || !(world_rays[k].span > 0.0)) continue;\n"
+    "        begin = min(begin, world_rays[k].begin);\n"
+    "        end = max(end, world_rays[k].begin + world_rays[k].span);\n"
+    "    }\n"
+    "    begin = min(begin, end);\n"
+    "}\n"
+    "nebel_light airs_up_to(float t)\n"
+    "{\n"
+    "    nebel_light all;\n"
+    "    all.transmittance = vec3(1.0);\n"
+    "    all.in_scattering = vec3(0.0);\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        if (world_words[k].z == 0) continue;\n"
+    "        choose_world(k);\n"
+    "        nebel_light one = nb_air_light(world_rays[k], t);\n"
+    "        all.in_scattering += all.transmittance * one.in_scattering;\n"
+    "        all.transmittance *= one.transmittance;\n"
+    "    }\n"
+    "    return all;\n"
+    "}\n";
+
 /* Air and fog let through less the farther a ray goes and add light all the way, so that between two places the integral
  * of T_fog dS_air + T_air dS_fog is within what it is with the transmittances of the one place and of the other: the mean
  * is taken, and pieces are shorter where half of the products of differences is more than the tolerance
@@ -23,9 +96,9 @@ const char nb_air_haze_text[] =
     "}\n"
     "nebel_light pass_haze(nebel_sight sight, int entry)\n"
     "{\n"
-    "    nb_air_ray ray = nb_find_air(sight.direction);\n"
     "    pass_knot from, last, here;\n"
-    "    from.at = ray.begin;\n"
+    "    float end;\n"
+    "    find_airs(sight.direction, from.at, end);\n"
     "    from.fog.transmittance = from.air.transmittance = vec3(1.0);\n"
     "    from.fog.in_scattering = from.air.in_scattering = vec3(0.0);\n"
     "    float tolerance = 1.0, way = 0.0, next = sight.t_max;\n"
@@ -33,10 +106,10 @@ const char nb_air_haze_text[] =
     "    for (int i = 0; i < PASS_KNOTS; i++) {\n"
     "        here.at = next;\n"
     "        here.fog = pass_up_to(sight, entry, next);\n"
-    "        here.air = nb_air_light(ray, next);\n"
+    "        here.air = airs_up_to(next);\n"
     "        if (i == 0) {\n"
     "            last = here;\n"
-    "            last.at = min(sight.t_max, ray.begin + ray.span);\n"
+    "            last.at = min(sight.t_max, end);\n"
     "            float brightest = pass_largest(last.air.in_scattering);\n"
     "            float counts = max(brightest, pass_largest(1.0 - last.air.transmittance));\n"
     "            tolerance = 1e-3 * max(1.0, brightest);\n"
@@ -61,25 +134,26 @@ const char nb_air_haze_text[] =
 /* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. From
  * on the ground or below it all surfaces are seen before it. */
 const char nb_air_ground_text[] =
-    "uniform vec3 ground_albedo;\n"
     "layout(location = 0) out highp vec4 out_place;\n"
     "layout(location = 1) out highp vec4 out_normal;\n"
     "layout(location = 2) out highp vec4 out_reflectance;\n"
     "void main()\n"
     "{\n"
-    "    nebel_ground ground = nebel_find_ground(ray_direction(gl_FragCoord.xy));\n"
+    "    int world;\n"
+    "    nebel_ground ground = nearest_ground(ray_direction(gl_FragCoord.xy), world);\n"
     "    if (!(ground.distance < 1e17)) discard;\n"
     "    out_place = vec4(max(ground.distance, 1e-30), ground.normal);\n"
     "    out_normal = vec4(ground.normal, 0.0);\n"
-    "    out_reflectance = vec4(ground_albedo, 1.0);\n"
+    "    out_reflectance = vec4(world_albedos[world], 1.0);\n"
     "    gl_FragDepth = ground.distance > 0.0 ? 1.0 / (1.001 + 1.00001 * ground.distance) : 1e-30;\n"
     "}\n";
 
 /* The disc is darker towards its edge, mu^a (src/cpu/air.c says by whom). Its edge is spread over a pixel, and one of less is
  * widened to that; rings say how much light it would have then. */
-const char nb_air_light_text[] =
+const char nb_air_sun_text[] =
     "uniform float disc_radius;\n" /* radians; 0: there is none */
     "uniform vec3 disc_light;\n"   /* mean radiance above the air */
+    "uniform bool sky_is_ambient;\n"
     "float pixel_width(vec2 pixel)\n"
     "{\n"
     "#ifdef SCENE_PANORAMA\n"
@@ -95,11 +169,33 @@ const char nb_air_light_text[] =
     "    float mu = sqrt(max(1.0 - part * part, 1e-12));\n"
     "    return 0.5 * cover * (powers + 2.0) * pow(vec3(mu), powers);\n"
     "}\n"
-    "void light_ground(vec3 direction, inout vec3 light, inout vec3 shining)\n"
+    /* What of the disc another leaves, as base/eclipse.h has it: both count as flat. */
+    "float disc_left(float ball, float apart)\n"
     "{\n"
-    "    nebel_ground ground = nebel_find_ground(direction);\n"
-    "    light = 0.31830988618379 * ground.sky;\n"
-    "    shining = 0.31830988618379 * ground.sun;\n"
+    "    float sun = disc_radius;\n"
+    "    if (!(apart < sun + ball)) return 1.0;\n"
+    "    if (apart <= ball - sun) return 0.0;\n"
+    "    if (apart <= sun - ball) return 1.0 - ball * ball / (sun * sun);\n"
+    "    float across = (apart - ball) * (apart + ball);\n"
+    "    float a = acos(clamp((across + sun * sun) / (2.0 * apart * sun), -1.0, 1.0));\n"
+    "    float b = acos(clamp((across + 2.0 * ball * ball - sun * sun) / (2.0 * apart * ball), -1.0, 1.0));\n"
+    "    float overlap = sun * sun * (a - sin(a) * cos(a)) + ball * ball * (b - sin(b) * cos(b));\n"
+    "    return clamp(1.0 - overlap / (3.14159265358979 * sun * sun), 0.0, 1.0);\n"
+    "}\n"
+    /* What other planets leave of it at a place, from the eye. */
+    "float uneclipsed(int world, vec3 at)\n"
+    "{\n"
+    "    float left = 1.0;\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        float radius = world_sizes[k].x;\n"
+    "        vec3 to_ball = -(radius + world_eyes[k].w) * world_eyes[k].xyz - at;\n"
+    "        float far = length(to_ball), tangent = sqrt(max((far - radius) * (far + radius), 0.0));\n"
+    "        if (k == world) continue;\n"
+    "        if (!(far > radius)) return 0.0;\n"
+    "        left *= disc_left(atan(radius, tangent),\n"
+    "                          atan(length(cross(to_ball, scene_sun)), dot(to_ball, scene_sun)));\n"
+    "    }\n"
+    "    return left;\n"
     "}\n"
     "vec3 sun_disc(vec3 direction, vec2 pixel)\n"
     "{\n"
@@ -113,4 +209,69 @@ const char nb_air_light_text[] =
     "    }\n"
     "    if (rings == 0) return vec3(0.0);\n"
     "    return disc_light * disc_radius * disc_radius / sum * disc_at(radius, width, angle);\n"
+    "}\n";
+
+const char nb_air_light_text[] =
+    "void light_ground(vec3 direction, vec3 at, inout vec3 light, inout vec3 shining)\n"
+    "{\n"
+    "    int world;\n"
+    "    nebel_ground ground = nearest_ground(direction, world);\n"
+    "    light = 0.31830988618379 * ground.sky;\n"
+    "    shining = 0.31830988618379 * uneclipsed(world, at) * ground.sun;\n"
+    "}\n"
+    /* The square of the tangent from a place to the ball that ends `above` the ground of a planet. */
+    "float world_power(int world, vec3 at, float above)\n"
+    "{\n"
+    "    float radius = world_sizes[world].x, height = world_eyes[world].w;\n"
+    "    return (height - above) * (2.0 * radius + height + above) +\n"
+    "           2.0 * (radius + height) * dot(world_eyes[world].xyz, at) + dot(at, at);\n"
+    "}\n"
+    "float height_of(float radius, float power) { return power / (radius + sqrt(max(radius * radius + power, 0.0))); "
+    "}\n"
+    /* The table of base/daylight.h: of the way to a sun that is not below the level. */
+    "vec3 daylight_depth(int first, float height, float cosine)\n"
+    "{\n"
+    "    vec2 h = nb_air_place(sqrt(clamp(height, 0.0, 1.0)) * (NB_DAYLIGHT_HEIGHTS - 1.0), NB_DAYLIGHT_HEIGHTS);\n"
+    "    vec2 s = nb_air_place(sqrt(clamp(cosine, 0.0, 1.0)) * (NB_DAYLIGHT_SUNS - 1.0), NB_DAYLIGHT_SUNS);\n"
+    "    int at = first + int(h.x) * int(NB_DAYLIGHT_SUNS) + int(s.x), above = at + int(NB_DAYLIGHT_SUNS);\n"
+    "    vec3 low = nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, s.y);\n"
+    "    vec3 high = nb_toward(NEBEL_AIR_WORD(above).xyz, NEBEL_AIR_WORD(above + 1).xyz, s.y);\n"
+    "    return nb_toward(low, high, h.y);\n"
+    "}\n"
+    /* A sun below the level is seen along the whole level ray through the lowest place of the way to it, but for the part
+       behind the eye. */
+    "vec3 daylight_sun(int world, int first, float power, float rise)\n"
+    "{\n"
+    "    float radius = world_sizes[world].x, thickness = world_sizes[world].y;\n"
+    "    float height = height_of(radius, power), cosine = rise / (radius + height);\n"
+    "    vec3 own = vec3(0.0), low = vec3(0.0);\n"
+    "    if (height <= thickness) own = daylight_depth(first, height / thickness, abs(cosine));\n"
+    "    if (cosine >= 0.0) return exp(-own);\n"
+    "    float lowest = height_of(radius, power - rise * rise);\n"
+    "    if (!(lowest >= 0.0)) return vec3(0.0);\n"
+    "    if (lowest <= thickness) low = daylight_depth(first, lowest / thickness, 0.0);\n"
+    "    return exp(min(own - 2.0 * low, 0.0));\n"
+    "}\n"
+    "vec3 daylight_sky(int first, float cosine)\n"
+    "{\n"
+    "    float spread = sign(cosine) * log(1.0 + abs(cosine) / NB_DAYLIGHT_TWILIGHT) / log(1.0 + 1.0 / "
+    "NB_DAYLIGHT_TWILIGHT);\n"
+    "    vec2 s = nb_air_place(0.5 * (spread + 1.0) * (NB_DAYLIGHT_SKIES - 1.0), NB_DAYLIGHT_SKIES);\n"
+    "    int at = first + int(NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS) + int(s.x);\n"
+    "    return exp(nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, s.y));\n"
+    "}\n"
+    /* Models have the sun and the sky of the planet that is nearest by tangents to the balls of air. */
+    "void light_model(vec3 at, inout vec3 light, inout vec3 shining)\n"
+    "{\n"
+    "    int world = 0;\n"
+    "    for (int k = 1; k < SCENE_WORLDS; k++)\n"
+    "        if (world_power(k, at, world_sizes[k].y) < world_power(world, at, world_sizes[world].y)) world = k;\n"
+    "    int first = world_words[world].y;\n"
+    "    if (first < 0) return;\n"
+    "    float radius = world_sizes[world].x, power = world_power(world, at, 0.0);\n"
+    "    float rise = dot((radius + world_eyes[world].w) * world_eyes[world].xyz + at, scene_sun);\n"
+    "    choose_world(world);\n"
+    "    shining *= uneclipsed(world, at) * daylight_sun(world, first, power, rise);\n"
+    "    float far = radius + height_of(radius, power);\n"
+    "    if (sky_is_ambient) light *= daylight_sky(first, far > 0.0 ? clamp(rise / far, -1.0, 1.0) : 1.0);\n"
     "}\n";

@@ -1,6 +1,16 @@
-/* Texts of the air of planets, behind the fog's text with NEBEL_AIR. */
+/* Texts of the air of planets, behind the fog's text with NEBEL_AIR and SCENE_WORLDS, the number of planets. */
 #ifndef NB_GL_AIR_TEXT_H
 #define NB_GL_AIR_TEXT_H
+
+/* In the head of a program; "" where there are no planets. Returns text. */
+enum { NB_AIR_HEAD = 192 };
+const char *nb_air_head(int worlds, char text[NB_AIR_HEAD]);
+
+/* Before the fog's text: where it finds words. */
+extern const char nb_air_words_text[];
+
+/* Behind it and before the other ones: the air and the ground of all. */
+extern const char nb_air_worlds_text[];
 
 /* Declares pass_haze, what fog and air do along a ray; wants nebel_light pass_up_to(nebel_sight, int entry, float t), the fog
  * alone, which it declares. The program takes PASS_KNOTS times as many turns as that at most. */
@@ -9,8 +19,11 @@ extern const char nb_air_haze_text[];
 /* The ground into the targets of surfaces. */
 extern const char nb_air_ground_text[];
 
-/* Declares sun_disc, and light_ground, which says what a white ground reflects of the sky and, where it faces it, of the sun.
- * Behind the texts of rays and of the sun. */
+/* Declares sun_disc, and what planets leave of it. Behind the texts of rays and of the sun. */
+extern const char nb_air_sun_text[];
+
+/* Declares light_ground, which says what a white ground reflects of the sky and, where it faces it, of the sun; and light_model,
+ * which makes of the ambient light and of the sun's what they are at a place. */
 extern const char nb_air_light_text[];
 
 #endif

@@ -15,7 +15,8 @@ typedef struct job {
     const nb_cloud_picture *picture;
     void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);
     float *const *ends;
-    const nebel_air_view *air;
+    const nb_world *worlds;
+    int world_count;
     const nb_cloud_fog *fog;
     const float *places;
     float *over, *shade;
@@ -168,7 +169,8 @@ static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const
     nb_cloud_haze haze;
     nb_cloud_rays rays;
     nb_cloud_haze_ask(&knots, direction, &haze, &rays);
-    const nebel_result result = nebel_trace_air_view(j->air, knots.count, rays.direction, knots.t, &rays.lights);
+    const nebel_result result =
+        nb_worlds_trace(j->worlds, j->world_count, knots.count, rays.direction, knots.t, &rays.lights);
     for (int c = 0; c < 3 && result == NEBEL_OK; c++) {
         const size_t at = 4 * i + (size_t)c;
         float over[NEBEL_MAX_CLOUD_KNOTS];
@@ -193,10 +195,10 @@ static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
     }
 }
 
-nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nebel_air_view *air,
+nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
                               const nb_cloud_fog *fog)
 {
-    job j = {.clouds = clouds, .picture = picture, .row = mix_row, .air = air, .fog = fog};
+    job j = {.clouds = clouds, .picture = picture, .row = mix_row, .worlds = worlds, .world_count = count, .fog = fog};
     return do_parts(&j);
 }
 

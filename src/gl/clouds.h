@@ -3,6 +3,7 @@
 #define NB_GL_CLOUDS_H
 
 #include "base/base.h"
+#include "base/worlds.h"
 
 #include <nebel/clouds.h>
 #include <nebel/shader.h>
@@ -61,7 +62,7 @@ typedef struct nb_cloud_fog {
 } nb_cloud_fog;
 
 /* Mixes them with the air, which is that of the eye, and fog; NULL: there is none. MEMORY. */
-nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nebel_air_view *air,
+nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
                               const nb_cloud_fog *fog);
 
 /* For rays that end at places[4 i], 0: nowhere, what is left of haze and added to it, 4 numbers for each; and what clouds

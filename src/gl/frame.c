@@ -116,11 +116,9 @@ static void draw_ground(const frame *f)
 {
     const nb_shading *const shading = &f->renderer->shading;
     const unsigned program = f->panorama ? shading->round_ground : shading->ground;
-    float albedo[3];
-    for (int i = 0; i < 3; i++) albedo[i] = (float)f->planet->air.ground_albedo[i];
     glUseProgram(program);
     nb_frame_set_rays(f, program);
-    nb_frame_set_vector(program, "ground_albedo", albedo);
+    nb_gl_air_set_worlds(&f->renderer->air, program);
     glBindVertexArray(f->renderer->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }
@@ -249,7 +247,7 @@ static nebel_result draw_exact_fog(const frame *f)
                              .width = f->view.width,
                              .height = f->view.height,
                              .panorama = f->panorama,
-                             .air = f->planet != NULL,
+                             .air = f->planet != NULL ? &r->air : NULL,
                              .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
@@ -481,17 +479,8 @@ static nebel_result prepare_air(const frame *f)
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
     nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends);
     glActiveTexture(GL_TEXTURE0);
-    return result == NEBEL_OK ? nb_shading_make_ground(&r->shading, &r->context, &r->log, f->panorama) : result;
-}
-
-/* Of white surfaces that face the sun; air leaves them what it leaves at the scene's origin. */
-static void set_sunlight(const frame *f, unsigned program)
-{
-    float light[3];
-    for (int i = 0; i < 3; i++)
-        light[i] = f->light.sunlight[i] * (f->planet != NULL ? (float)f->planet->sun_left[i] : 1);
-    nb_frame_set_vector(program, "scene_sunlight", light);
-    if (f->planet != NULL) nb_gl_air_set_disc(program, f->renderer->scene);
+    return result == NEBEL_OK ? nb_shading_make_ground(&r->shading, &r->context, &r->log, f->panorama, r->air.count)
+                              : result;
 }
 
 static int has_environment(const frame *f)
@@ -520,7 +509,8 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     nb_frame_set_vector(program, "scene_background", f->light.background);
     nb_frame_set_vector(program, "scene_ambient", f->light.ambient);
     nb_frame_set_vector(program, "scene_sun", f->light.sun);
-    set_sunlight(f, program);
+    nb_frame_set_vector(program, "scene_sunlight", f->light.sunlight);
+    if (f->planet != NULL) nb_gl_air_set_light(&r->air, program, r->scene);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
     if (f->casts) nb_frame_set_shadows(f, program);
     if (has_lamps(f)) set_lamps(f, program);
@@ -556,7 +546,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
               along_sun = f->casts && f->planet == NULL;
     const nebel_gl *const passes = !is_lit || !dims ? NULL : along_sun ? r->sun_fog : r->eye_fog;
     const nb_light_kind kind = {.sunlit = f->casts,
-                                .air = f->planet != NULL,
+                                .air = f->planet != NULL ? r->air.count : 0,
                                 .shells = f->layers != NULL,
                                 .lamplit = has_lamps(f),
                                 .dimmed = f->dims || f->clouds != NULL,

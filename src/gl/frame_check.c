@@ -82,7 +82,6 @@ static nebel_result check_air(const nebel_gl_renderer *r, const nebel_gl_frame_d
 static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
 {
     const int has_air = nb_gl_air_planet(r->scene) != NULL, has_layers = nb_gl_shells_planet(r->scene) != NULL;
-    if (r->scene->planet_count > 1) return refuse(&r->log, "several planets");
     if (has_air && r->scene->planets[0].cloud_layer_count > 0 && !desc->clouds_by_processor)
         return refuse(&r->log, "clouds with volume by itself");
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)

@@ -92,7 +92,7 @@ static nebel_result trace_in_fog(nb_gl_frame *f, const nb_cloud_picture *picture
     }
     nebel_result result = all ? nb_gl_clouds_trace(&r->clouds, picture, ends) : NEBEL_ERROR_MEMORY;
     for (int i = 0; i < 2 && result == NEBEL_OK; i++) result = find_fog(f, ends[i], fog.left[i], fog.light[i]);
-    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, picture, r->air.view, &fog);
+    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, picture, r->air.worlds, r->air.count, &fog);
     for (int i = 0; i < 2; i++) {
         nb_release(&r->allocator, ends[i]);
         nb_release(&r->allocator, fog.left[i]);
@@ -113,7 +113,7 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
     if (result != NEBEL_OK) return fail_memory(f, result);
     if (has_fog(f)) return fail_memory(f, trace_in_fog(f, &picture));
     result = nb_gl_clouds_trace(&r->clouds, &picture, none);
-    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.view, NULL);
+    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, NULL);
     return fail_memory(f, result);
 }
 

@@ -56,7 +56,7 @@ typedef struct nb_gl_picture {
     uint32_t width, height;
     int panorama;
     nb_gl_shade shade;
-    int air;                        /* NB_UNIT_AIR has that of a planet, for the same eye; one sample a pixel */
+    const struct nb_gl_air *air;    /* on NB_UNIT_AIR, for the same eye; one sample a pixel. NULL: none */
     const struct nb_shafts *shafts; /* where surfaces shade fog; NULL: nowhere. Changes their units */
 } nb_gl_picture;
 

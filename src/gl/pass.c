@@ -1,4 +1,5 @@
 /* Fog over the host's picture: checks, state, one triangle. */
+#include "air.h"
 #include "gl.h"
 #include "shafts.h"
 #include "state.h"
@@ -255,6 +256,7 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     if (t->gl->fog.tiles != 0) set_tiling(t);
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
     if (t->picture->shade.set != NULL) t->picture->shade.set(t->picture->shade.of, p->name);
+    if (t->picture->air != NULL) nb_gl_air_set_worlds(t->picture->air, p->name);
     if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
 }
 
@@ -296,7 +298,7 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
 /* Samples of a pixel, and pieces of air, share its turns. */
 static int is_in_steps(const task *t)
 {
-    return t->gl->is_crowded && t->pass->samples <= 1 && !t->picture->air;
+    return t->gl->is_crowded && t->pass->samples <= 1 && t->picture->air == NULL;
 }
 
 void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)
@@ -376,7 +378,7 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .panorama = t->picture->panorama,
                                   .shafts = t->picture->shafts != NULL,
                                   .step = in_steps,
-                                  .air = t->picture->air,
+                                  .air = t->picture->air != NULL ? t->picture->air->count : 0,
                                   .features = gl->fog.features,
                                   .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =

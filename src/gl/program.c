@@ -173,7 +173,7 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
        many once: what a driver has not let end is found again in the next step. */
     const int is_counted = (kind->features & NEBEL_FEATURE_GRID) != 0;
     const char *const step = "#define PASS_STEP\n#define NEBEL_RESUMES\n";
-    char limits[128];
+    char limits[128], air[NB_AIR_HEAD];
     const char *const shares = kind->multisampled          ? "/ (pass_sample_range.y - pass_sample_range.x)"
                                : kind->air                 ? "/ 32" /* PASS_KNOTS */
                                : kind->step && !is_counted ? "* 2"
@@ -189,7 +189,7 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
         (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
         (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
-        kind->air ? "#define NEBEL_AIR\n" : "", kind->multisampled ? samples : "",
+        nb_air_head(kind->air, air), kind->multisampled ? samples : "",
         kind->step ? step : nb_program_output(kind->output), kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "",
         (int)kind->depth, (unsigned)kind->features, kind->panorama ? "#define PASS_PANORAMA\n" : "");
 }
@@ -284,7 +284,7 @@ static const char precision_text[] = "#ifdef GL_ES\nprecision highp float;\nprec
 static nebel_result make(const nb_context *context, const nebel_log *log, const nb_program_kind *kind,
                          nb_program *program)
 {
-    char head[768];
+    char head[1024];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const nb_texts vertex = {{nb_program_version(context), vertex_text}, 2};
@@ -292,10 +292,11 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
     const int is_shaded = kind->shade[0] != NULL;
     const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
-                                is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "", fog, ray, tile,
+                                is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "",
+                                kind->air ? nb_air_words_text : "", fog, ray, tile, kind->air ? nb_air_worlds_text : "",
                                 kind->air ? nb_air_haze_text : "", fragment_text,
                                 kind->step ? nb_step_text : whole_text},
-                               11};
+                               13};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);

@@ -70,8 +70,8 @@ nebel_result nebel_create_gl_renderer(const nebel_scene_data *scene, nebel_snaps
     nebel_gl_renderer *const made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "OpenGL renderer: out of memory");
     made->allocator = made->meshes.allocator = made->clouds.allocator = allocator;
-    made->clouds.run = desc->run;
-    made->clouds.run_user = desc->run_user;
+    made->clouds.run = made->air.run = desc->run;
+    made->clouds.run_user = made->air.run_user = desc->run_user;
     made->log = made->meshes.log = desc->log;
     made->scene = scene;
     made->context = context;
@@ -123,7 +123,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nb_lamps_release(&r->allocator, &r->lamps);
     nb_particles_release(&r->allocator, &r->particles);
     nb_gl_clouds_release(&r->clouds);
-    nb_gl_air_release(&r->air);
+    nb_gl_air_release(&r->air, &r->allocator);
     const nebel_allocator allocator = r->allocator;
     nb_release(&allocator, r);
 }

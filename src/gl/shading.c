@@ -488,7 +488,8 @@ static const char light_text[] =
     "        vec4 reflectance = texelFetch(scene_reflectance, texel, 0);\n"
     "        vec3 light = ambient(normal.xyz), shining = scene_sunlight;\n"
     "#ifdef NEBEL_AIR\n"
-    "        if (reflectance.a > 0.5) light_ground(direction, light, shining);\n"
+    "        if (reflectance.a > 0.5) light_ground(direction, at, light, shining);\n"
+    "        else light_model(at, light, shining);\n"
     "#endif\n"
     "        light += sunlight(at, normal.xyz, normal.w, place.yzw, place.x, shining);\n"
     "#ifdef SCENE_LAMPLIT\n"
@@ -614,14 +615,23 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
     return NEBEL_OK;
 }
 
-nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama)
+nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama,
+                                    int worlds)
 {
-    const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
-    const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
-    const nb_texts fragment = {
-        {version, "#define NEBEL_AIR\n", precision_of(context), fog, nb_words_text, ray, nb_air_ground_text}, 7};
+    char head[NB_AIR_HEAD];
+    const nb_texts vertex = {{nb_program_version(context), nb_whole_vertex_text}, 2};
+    const nb_texts fragment = {{nb_program_version(context), nb_air_head(worlds, head), precision_of(context),
+                                nb_air_words_text, fog, nb_words_text, panorama ? nb_panorama_ray_text : nb_ray_text,
+                                nb_air_worlds_text, nb_air_ground_text},
+                               9};
     unsigned *const name = panorama ? &shading->round_ground : &shading->ground;
+    if (shading->ground_worlds != worlds) {
+        glDeleteProgram(shading->ground);
+        glDeleteProgram(shading->round_ground);
+        shading->ground = shading->round_ground = 0;
+        shading->ground_worlds = worlds;
+    }
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;
@@ -659,7 +669,7 @@ nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *contex
 
 static void write_head(const nb_context *context, const nb_light_kind *kind, char *text, size_t size)
 {
-    char limits[128];
+    char limits[128], air[NB_AIR_HEAD];
     (void)snprintf(
         text, size,
         "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
@@ -674,7 +684,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
         (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
         kind->environment || (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
-        kind->air ? "#define NEBEL_AIR\n" : "", kind->shells ? "#define SCENE_SHELLS\n" : "",
+        nb_air_head(kind->air, air), kind->shells ? "#define SCENE_SHELLS\n" : "",
         kind->clouds ? "#define SCENE_CLOUDS\n" : "", kind->of_particles, kind->veil_layers, NB_CASCADES,
         (unsigned)kind->features, precision_of(context));
 }
@@ -722,11 +732,12 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts light = {{head, kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
-                             shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_light_text : "", nb_veil_text,
-                             light_text},
-                            11};
+    const nb_texts light = {
+        {head, kind->air ? nb_air_words_text : "", kind->has_fog || kind->environment || kind->air ? fog : "",
+         nb_words_text, ray, shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
+         kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "", kind->air ? nb_air_sun_text : "",
+         kind->air ? nb_air_light_text : "", nb_veil_text, light_text},
+        14};
     const nb_texts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
     const nb_texts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,

@@ -42,7 +42,7 @@ typedef struct nb_light_kind {
     int in_fog;       /* that the pass, or vertices, made for all pixels */
     int has_fog;
     int shafts; /* surfaces shade fog */
-    int air;    /* of a planet, with its ground and sun */
+    int air;    /* of so many planets, with their ground and the sun */
     int shells; /* of a planet of layers, over everything */
     int clouds; /* with volume, whose shadow is what dims */
     int in_texture, tiled;
@@ -59,6 +59,7 @@ typedef struct nb_shading {
     unsigned vertex_fog, round_surface, round_vertex_fog; /* 0 until they are needed; round: of panoramas */
     unsigned factor, round_factor;
     unsigned ground, round_ground;
+    int ground_worlds; /* that they are made for */
     unsigned lamp_map;
     nb_light_program *lights;
     size_t light_count, light_capacity;
@@ -86,8 +87,9 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
 /* Surfaces of panoramas, and the fog that vertices bring to them. */
 nebel_result nb_shading_make_round(nb_shading *shading, const nb_context *context, const nebel_log *log, int with_fog);
 
-/* The ground of a planet. */
-nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama);
+/* The ground of so many planets. */
+nebel_result nb_shading_make_ground(nb_shading *shading, const nb_context *context, const nebel_log *log, int panorama,
+                                    int worlds);
 
 /* In OpenGL. */
 void nb_shading_delete(const nb_shading *shading);

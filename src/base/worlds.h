@@ -1,0 +1,103 @@
+/* Planets with air as a camera sees them, in the order in which rays pass them. */
+#ifndef NB_WORLDS_H
+#define NB_WORLDS_H
+
+#include "daylight.h"
+#include "vector.h"
+
+#include <nebel/scene.h>
+
+typedef struct nb_world {
+    const nebel_planet *planet;
+    double center[3], radius, top; /* m; top: of its air, from the centre */
+    nebel_air_view *view;
+    nb_daylight *daylight; /* NULL: there are no models in sunlight */
+} nb_world;
+
+/* The power of a place with regard to the ball of a planet's air: the square of a tangent's length. Where two balls that do
+ * not overlap have the same is a plane between them, so that seen from a place a ball is never behind one of larger power
+ * (Edelsbrunner, An acyclicity theorem for cell complexes in d dimension, 1990). */
+static inline double nb_world_power(const nb_world *world, const double place[3])
+{
+    double from[3];
+    for (int c = 0; c < 3; c++) from[c] = place[c] - world->center[c];
+    const double far = nb_vector_length(from);
+    return (far - world->top) * (far + world->top);
+}
+
+static inline nb_world nb_world_of(const nebel_planet *planet)
+{
+    nb_world world = {
+        .planet = planet, .radius = planet->air.radius, .top = planet->air.radius + planet->air.thickness};
+    for (int c = 0; c < 3; c++) world.center[c] = planet->air.ground[c] - (c == 1 ? planet->air.radius : 0);
+    return world;
+}
+
+/* Planets that are loaded: whatever ray leaves the position, it passes none after a later one. Without view and daylight.
+ * Returns how many. */
+static inline int nb_worlds_set(nb_world worlds[NEBEL_MAX_PLANETS], const nebel_scene_data *scene,
+                                const double position[3])
+{
+    int count = 0;
+    for (size_t i = 0; i < scene->planet_count && i < NEBEL_MAX_PLANETS; i++) {
+        if (scene->planets[i].atmosphere == NULL) continue;
+        const nb_world world = nb_world_of(&scene->planets[i]);
+        int place = count++;
+        for (; place > 0 && nb_world_power(&worlds[place - 1], position) > nb_world_power(&world, position); place--)
+            worlds[place] = worlds[place - 1];
+        worlds[place] = world;
+    }
+    return count;
+}
+
+/* Whose shadow, and whose sky, a place is in. */
+static inline int nb_worlds_nearest(const nb_world *worlds, int count, const double place[3])
+{
+    int nearest = 0;
+    for (int k = 1; k < count; k++)
+        if (nb_world_power(&worlds[k], place) < nb_world_power(&worlds[nearest], place)) nearest = k;
+    return nearest;
+}
+
+/* ---- their air ------------------------------------------------------------------------------- */
+
+enum { NB_WORLDS_RAYS = 256 };
+
+/* Light of one planet's air. */
+typedef struct nb_worlds_part {
+    float left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS], error[NB_WORLDS_RAYS];
+} nb_worlds_part;
+
+static inline void nb_worlds_lay_behind(const nb_worlds_part *part, size_t n, const nebel_light_planes *lights)
+{
+    for (size_t i = 0; i < n; i++) {
+        float most = 0;
+        for (int c = 0; c < 3; c++) {
+            most = fmaxf(most, lights->transmittance[c][i]);
+            lights->in_scattering[c][i] += lights->transmittance[c][i] * part->light[c][i];
+            lights->transmittance[c][i] *= part->left[c][i];
+        }
+        if (lights->error != NULL) lights->error[i] += most * part->error[i];
+    }
+}
+
+/* nebel_trace_air_view, through the air of all; at most NB_WORLDS_RAYS rays. */
+static inline nebel_result nb_worlds_trace(const nb_world *worlds, int count, size_t n,
+                                           const double *const direction[3], const float *t_max,
+                                           const nebel_light_planes *lights)
+{
+    nb_worlds_part part;
+    nebel_light_planes planes = {.error = part.error};
+    for (int c = 0; c < 3; c++) {
+        planes.transmittance[c] = part.left[c];
+        planes.in_scattering[c] = part.light[c];
+    }
+    nebel_result result = nebel_trace_air_view(worlds[0].view, n, direction, t_max, lights);
+    for (int k = 1; k < count && result == NEBEL_OK; k++) {
+        result = nebel_trace_air_view(worlds[k].view, n, direction, t_max, &planes);
+        if (result == NEBEL_OK) nb_worlds_lay_behind(&part, n, lights);
+    }
+    return result;
+}
+
+#endif
