@@ -14,12 +14,14 @@ typedef struct nb_question {
     nebel_snapshot *fog;
     nebel_precision precision;
     int repetitions; /* in one run, so that it is long enough to be measured */
+    int transmittance_only;
 } nb_question;
 
 static double run_rays(void *user)
 {
     const nb_question *const question = user;
-    const nebel_trace_desc desc = {.precision = question->precision};
+    const nebel_trace_desc desc = {.precision = question->precision,
+                                   .transmittance_only = question->transmittance_only};
     nebel_ray rays[RAYS];
     nebel_light lights[RAYS];
     for (int i = 0; i < RAYS; i++)
@@ -68,10 +70,73 @@ static nebel_snapshot *commit(int count, int power)
     return snapshot;
 }
 
+/* Balls that sun or lamps light: all over each other, or scattered so that a ray meets some thirty. */
+static nebel_volume_desc lit_ball(int i, int count, int is_scattered)
+{
+    const double x = fmod(.6180339887 * i, 1), y = fmod(.7548776662 * i, 1), z = fmod(.5698402910 * i, 1);
+    const double size = is_scattered ? 28 : 10, radius = is_scattered ? size * sqrt(30 / (3.14159265 * count)) : 5;
+    const double amount = is_scattered ? .03 : 1. / (5 * count);
+    return (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_SPHERE,
+                                         .center = {size * (x - .5), size * (y - .5) + 1.7, size * (z - .5) - 20},
+                                         .radius = radius * (.7 + .6 * z)},
+                               .extinction = {amount, amount * (.5 + x), amount * (.5 + y)},
+                               .albedo = {1, .9, .8}};
+}
+
+static nebel_snapshot *commit_lit(int count, int is_scattered, int lamps)
+{
+    const nebel_lamp around[2] = {{.position = {3, 5, -18}, .intensity = {40, 40, 30}, .radius = .2},
+                                  {.position = {-4, -1, -23}, .intensity = {30, 40, 40}, .radius = .2}};
+    nebel_fog_desc desc = {.sun = {.direction = {.6, .64, .48}}};
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    for (int c = 0; c < 3 && lamps == 0; c++) desc.sun.irradiance[c] = 1;
+    nebel_result result = nebel_create_fog(&desc, &fog);
+    for (int i = 0; i < count && result == NEBEL_OK; i++) {
+        const nebel_volume_desc volume = lit_ball(i, count, is_scattered);
+        result = nebel_add_volume(fog, &volume, NULL);
+    }
+    if (result == NEBEL_OK) result = nebel_set_lamps(fog, (size_t)lamps, around);
+    if (result == NEBEL_OK) (void)nebel_commit_fog(fog, &snapshot);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* A lit crowd beside the same rays through it without light. */
+static int add_crowd(nb_figures *figures, int count, int is_scattered, int lamps, int quick)
+{
+    nb_question lit = {commit_lit(count, is_scattered, lamps), NEBEL_PRECISION_FLOAT, quick ? 1 : 10, 0};
+    nb_question dark = lit;
+    dark.transmittance_only = 1;
+    nb_contest contests[2] = {{.run = run_rays, .user = &dark}, {.run = run_rays, .user = &lit}};
+    const int fault = lit.fog == NULL || nb_measure(contests, 2, quick ? 1 : 5) != 0;
+    nebel_release_snapshot(lit.fog);
+    if (fault) return -1;
+    nb_figure figure = {.group = "A crowd of lit balls of constant density on one ray, float, one thread, CPU time",
+                        .unit = "us a ray",
+                        .value = 1e6 * contests[1].seconds,
+                        .floor_name = "transmittance alone",
+                        .floor = 1e6 * contests[0].seconds};
+    (void)snprintf(figure.name, sizeof figure.name, "crowd: %d %s, %s", count,
+                   is_scattered ? "scattered" : "in one place", lamps > 0 ? "two lamps" : "sun");
+    nb_figures_add(figures, &figure);
+    return 0;
+}
+
+static int add_crowds(nb_figures *figures, int quick)
+{
+    int fault = 0;
+    for (int lamps = 0; lamps <= 2 && fault == 0; lamps += 2) {
+        for (int n = 10; n <= (quick ? 40 : 320) && fault == 0; n *= 2) fault = add_crowd(figures, n, 0, lamps, quick);
+        if (fault == 0) fault = add_crowd(figures, quick ? 100 : 1000, 1, lamps, quick);
+    }
+    return fault;
+}
+
 /* One line: a ray through `count` volumes. */
 static int add_line(nb_figures *figures, const char *what, int count, int power, nebel_precision precision, int quick)
 {
-    nb_question question = {commit(count, power), precision, quick || count > 100 ? 1 : 100};
+    nb_question question = {commit(count, power), precision, quick || count > 100 ? 1 : 100, 0};
     nb_contest contest = {.run = run_rays, .user = &question};
     const int fault = question.fog == NULL || nb_measure(&contest, 1, quick ? 1 : 5) != 0;
     nebel_release_snapshot(question.fog);
@@ -97,5 +162,6 @@ const char *nb_bench_overlap(const nb_bench_desc *desc, nb_figures *figures)
         for (int n = 10; n <= (desc->quick ? 20 : 40) && fault == 0; n *= 2)
             fault = add_line(figures, "balls of different density", n, 2, p, desc->quick);
     }
+    if (fault == 0) fault = add_crowds(figures, desc->quick);
     return fault == 0 ? NULL : "overlap: out of memory";
 }

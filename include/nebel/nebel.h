@@ -598,8 +598,9 @@ typedef struct nebel_trace_desc {
  * apart, O(N) where all lie over each other. Then O(n log n), however they overlap, for volumes of constant density
  * that add, are of one priority, neither emit nor are lit by the sun, and are neither union nor intersection, from 64
  * of them on a ray. For other volumes O(n k) in float and O(n^2) in double; where k of them differ in light and their
- * density varies each piece of the ray between two ends is integrated, mostly in one to ten steps of O(k). The sun asks
- * for as much again at each place where its light is looked at. */
+ * density varies each piece of the ray between two ends is integrated, mostly in one to ten steps of O(k). Lights ask for
+ * as much again at each place where they are looked at; where nine volumes or more add, of no voxels, altitudes or parts, for O(N)
+ * at once and the j of N in whose shadow it is at each place, of which there are not more for more volumes. */
 nebel_result nebel_trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t n, const nebel_ray *rays,
                          size_t ray_stride, nebel_light *lights, size_t light_stride);
 

@@ -266,6 +266,34 @@ static int is_added(const nebel_snapshot *s)
     return 1;
 }
 
+/* Fewer media than these are better asked from turn to turn. */
+#define LEAST_LIT_CROWD 9
+
+/* Whether depths of the body are a sum over others and it, and have a closed form whose ends slack moves by no more than
+ * itself. */
+static int adds_depth(const nb_volume *body)
+{
+    const nebel_density *density = &body->density;
+    const int grows = density->type == NEBEL_DENSITY_HEIGHT && density->below == NEBEL_BELOW_GROW;
+    if (density->type == NEBEL_DENSITY_GRID || density->type == NEBEL_DENSITY_ALTITUDE) return 0;
+    return !nb_volume_covers(body) && body->leaf_count == 1 && (!grows || body->leaves[0].type == NB_LEAF_WORLD);
+}
+
+/* What lamps light has one phase function, which is a part of what is seen from places. */
+static int is_lit_crowd(const nebel_snapshot *s)
+{
+    const nb_phase *phase = NULL;
+    if (s->medium_count < LEAST_LIT_CROWD || !(s->is_sunlit || s->is_lamplit)) return 0;
+    for (size_t i = 0; i < s->medium_count; i++) {
+        const nb_volume *body = &s->media[i].body;
+        if (!adds_depth(body)) return 0;
+        if (!s->media[i].is_lamplit) continue;
+        if (phase != NULL && nb_phase_compare(phase, &body->phase) != 0) return 0;
+        phase = &body->phase;
+    }
+    return 1;
+}
+
 static int are_flat(const nebel_snapshot *s)
 {
     for (size_t i = 0; i < s->medium_count; i++)
@@ -346,6 +374,7 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
         s->is_gray = is_gray(s);
         s->is_added = is_added(s);
         s->way_to_sun = find_way_to_sun(s);
+        s->is_lit_crowd = is_lit_crowd(s);
         result = take_lattices(fog, s) ? index_media(s) : NEBEL_ERROR_MEMORY;
     }
     if (result == NEBEL_OK)

@@ -61,8 +61,9 @@ struct nebel_snapshot {
     double irradiance[3];     /* of the sun */
     int is_gray;              /* no fog has a colour in its extinction */
     nb_way_to_sun way_to_sun; /* the same */
-    int is_added;   /* all media are convex bodies of constant density that add: any way's depth is a sum over them */
-    int is_lamplit; /* whether any medium is */
+    int is_added;     /* all media are convex bodies of constant density that add: any way's depth is a sum over them */
+    int is_lit_crowd; /* many media whose depths add are lit: see trace_lit_crowd.h */
+    int is_lamplit;   /* whether any medium is */
     size_t lamp_count;
     nb_lamp *lamps;
     nebel_environment sky;    /* one owner of its map */

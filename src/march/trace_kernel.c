@@ -213,6 +213,11 @@ static gathered nothing_gathered(void)
                       {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
 }
 
+static void select_reals(nb_mask mask, nb_real to[3], const nb_real from[3])
+{
+    for (int c = 0; c < 3; c++) to[c] = nb_select(mask, from[c], to[c]);
+}
+
 /* The fog before the first large doubt, as far as it is in the piece. */
 static void note_clear(const march *m, const piece *p, gathered *g)
 {
@@ -231,10 +236,12 @@ static void note_clear(const march *m, const piece *p, gathered *g)
 
 #include "trace_lamp.h"
 
+#include "trace_lit_crowd.h"
+
 /* Sunlight that is found while voxels are crossed anyway. Returns the lanes that it is still to be added in. */
 static nb_mask cross_sunlit_voxels(march *m, const piece *p, gathered *g, nb_estimate *along)
 {
-    if (m->sun == NULL) return nb_mask_false;
+    if (m->sun == NULL || m->sun->snapshot->is_lit_crowd) return nb_mask_false;
 #if !defined(NB_DOUBLE)
     if (has_lattice(m)) {
         m->whole = along;
@@ -258,7 +265,7 @@ static void gather_piece(march *m, const piece *p, const allowance *may, gathere
         return;
     }
     *unbounded = nb_or(*unbounded, is_unbounded(m, p, &sum));
-    if (m->sun != NULL) gather_lights(m->sun, m, p, sunlit, g);
+    if (m->sun != NULL && !m->sun->snapshot->is_lit_crowd) gather_lights(m->sun, m, p, sunlit, g);
     const nb_mask closed = nb_and(p->lanes, nb_not(sum.mixed));
     const nb_mask mixed = nb_and(p->lanes, sum.mixed);
     if (nb_any(closed)) gather_closed(g, &sum, closed);
@@ -322,11 +329,6 @@ static gathered walk_lanes(march *m, const allowance *may, nb_mask which, nb_mas
         t = nb_wselect(nb_wand(nb_wor(lanes, to_the_end), nb_widen_mask(here)), p.end, t);
     }
     return g;
-}
-
-static void select_reals(nb_mask mask, nb_real to[3], const nb_real from[3])
-{
-    for (int c = 0; c < 3; c++) to[c] = nb_select(mask, from[c], to[c]);
 }
 
 /* *to = *from in the lanes of the mask. */
@@ -562,6 +564,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     nb_mask unbounded;
     if (w->m.sun != NULL) begin_lights(w->m.sun, job, first, count);
     *g = gather_light(&w->m, &share, &unbounded);
+    if (w->m.sun != NULL && job->snapshot->is_lit_crowd) gather_crowd_lights(w->m.sun, &w->m, g);
     if (w->m.sun != NULL && w->m.sun->out_of_memory) return NEBEL_ERROR_MEMORY;
     limit_radiance(&w->m, g);
     for (size_t i = 0; i < count && nb_any(unbounded); i++)
@@ -626,17 +629,21 @@ static nebel_result trace_lit(nb_trace_job *job, workspace *w)
     const nebel_snapshot *snapshot = job->snapshot;
     workspace way;
     nb_wide turns[STACK_TURNS];
+    lit_shadow shadows[STACK_SHADOWS];
     sunlight sun = {.snapshot = snapshot,
                     .direction = unit_vector(wide_vector(snapshot->to_sun)),
                     .way = &way,
                     .turns = turns,
                     .turn_capacity = STACK_TURNS,
+                    .shadows = shadows,
+                    .shadow_capacity = STACK_SHADOWS,
                     .share = 0.3 * job->budget / (double)(snapshot->is_sunlit + snapshot->is_lamplit)};
     if (!open_lamp_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
     open_workspace(&way);
     w->m.sun = &sun;
     const nebel_result result = trace_job(job, w);
     nb_release(&snapshot->allocator, sun.turn_memory);
+    nb_release(&snapshot->allocator, sun.shadow_memory);
     nb_release(&snapshot->allocator, sun.shade_memory);
     close_workspace(&way, &snapshot->allocator);
     return result;

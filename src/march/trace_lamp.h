@@ -26,15 +26,20 @@ static void note_cone(sunlight *sun, const lamp_pass *pass, nb_wvec3 direction, 
     note_roots(sun, pass->closest, d * d - square, f * d, f * f - square * pass->aside2);
 }
 
-/* Those of the media, and of the lamp itself. */
-static void find_lamp_turns(sunlight *sun, const march *m, const lamp_pass *pass)
+/* Turns of the lamp itself: its surface and its cones. */
+static void note_lamp(sunlight *sun, const march *m, const lamp_pass *pass)
 {
     const nb_lamp *lamp = pass->lamp;
-    if (!find_turns(sun, &m->rays, lamp)) return;
     note_roots(sun, pass->closest, NB_W(1.0), NB_W(0.0), pass->aside2 - WIDE(lamp->radius2));
     if (!lamp->is_spot) return;
     note_cone(sun, pass, m->rays.direction, lamp->edge);
     note_cone(sun, pass, m->rays.direction, lamp->inner);
+}
+
+/* Those of the media, too. */
+static void find_lamp_turns(sunlight *sun, const march *m, const lamp_pass *pass)
+{
+    if (find_turns(sun, &m->rays, pass->lamp)) note_lamp(sun, m, pass);
 }
 
 static lamp_pass pass_lamp(const march *m, const nb_lamp *lamp)

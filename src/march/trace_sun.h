@@ -47,6 +47,9 @@ typedef struct sunlight {
     int has_turns;          /* of the packet at hand */
     const nb_lamp *turning; /* they are this lamp's; NULL: the sun's */
     void *turn_memory;
+    struct lit_shadow *shadows; /* see trace_lit_crowd.h */
+    size_t shadow_count, shadow_capacity;
+    void *shadow_memory;
     shade shade;
     shade *lamp_shades; /* of each lamp; NULL: surfaces keep none away */
     void *shade_memory;

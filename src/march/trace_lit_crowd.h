@@ -1,0 +1,603 @@
+/* Sunlight and lamplight in many bodies that lie over each other and shade each other: those of which depths add.
+ *
+ * From piece to piece, as trace_sun.h and trace_lamp.h go, the cost is quadratic in the bodies: each has two ends and two turns on the ray, and
+ * after each of them places are asked for the depth to the light, of all bodies. Here steps know nothing of ends. In
+ *
+ *     sum over bodies of the integral of glow density(t) seen(t),    seen = fluence e^-(depth(t) + depth to the light(t)),
+ *
+ * `seen` is continuous, as all its depths are, and a density that begins or ends has an integral in closed form. So a step
+ * takes `seen` at five places, and between three of them the parabola through it, of which a body needs the integral of its
+ * density and its first two moments: nothing but sums over bodies. The error that is told is by how much the parabola through
+ * the first, third and fifth place misses the others, and what bodies may do that are too small to be seen from place to place.
+ *
+ * Included by trace_kernel.c after trace_lamp.h. */
+
+/* What part of the error all steps together may be off by is left to what lies beyond the last. */
+#define TAIL_SHARE 0.01
+
+/* More steps of bodies over each other than of one: around each edge of a shadow they are halved. */
+#define MOST_CROWD_STEPS (16 * MOST_SUN_STEPS)
+
+/* What a root that begins within a step is off by, more or less. */
+#define EDGE_ERROR NB_F(0.02)
+
+/* Where the ways from a ray to a light may meet a body: nowhere else on the ray; nowhere where first > last. */
+typedef struct lit_shadow {
+    nb_wide first, last;
+    nb_real amount; /* the most optical depth in it */
+    const nb_medium *medium;
+} lit_shadow;
+
+/* More than these take memory once. */
+#define STACK_SHADOWS 32
+
+/* ---- shadows --------------------------------------------------------------------------------- */
+
+static int is_endless(const nb_volume *body)
+{
+    int endless = 0;
+    for (int c = 0; c < 3; c++) endless = endless || !isfinite(body->low[c]) || !isfinite(body->high[c]);
+    return endless;
+}
+
+/* The radius of a ball about the middle of a body's bounds that holds it. */
+static double radius_around(const nb_volume *body)
+{
+    const double x = body->high[0] - body->low[0], y = body->high[1] - body->low[1], z = body->high[2] - body->low[2];
+    const int is_ball = body->leaves[0].type == NB_LEAF_BALL && body->leaves[0].aligned;
+    return 0.5 * (is_ball ? fmax(fmax(x, y), z) : sqrt(x * x + y * y + z * z));
+}
+
+static double most_extinction(const nb_volume *body)
+{
+    return fmax(fmax(body->extinction[0], body->extinction[1]), body->extinction[2]);
+}
+
+/* No way through the body is deeper. */
+static nb_real most_depth(const nb_volume *body)
+{
+    return is_endless(body) ? NB_HUGE : REAL(fmin(2 * most_extinction(body) * radius_around(body), 1e18));
+}
+
+/* Where a t^2 + 2 b t + c <= 0; where a is not above `least` that may be anywhere. The plane of the ways cuts a disc out of a
+ * ball, whose shadow is no narrower than it: no way through it is longer. */
+static void set_between_roots(lit_shadow *s, nb_wide a, nb_wide b, nb_wide c, nb_wide least)
+{
+    const nb_wide square = b * b - a * c, inverse = nb_wrcp_bounded(nb_wmax(a, least));
+    const nb_wide root = nb_wsqrt(nb_wmax(square, NB_W(0.0)));
+    const nb_wmask curved = a > least, some = square >= NB_W(0.0);
+    s->first = nb_wselect(curved, nb_wselect(some, (-b - root) * inverse, NB_WFAR), NB_W(0.0));
+    s->last = nb_wselect(curved, nb_wselect(some, (root - b) * inverse, -NB_WFAR), NB_WFAR);
+    const nb_real width = nb_narrow(nb_wclamp(s->last - s->first, NB_W(0.0), NB_WFAR));
+    s->amount = nb_min(s->amount, REAL(most_extinction(&s->medium->body)) * width);
+}
+
+/* Of a ball in the sun, its centre from where the rays start. */
+static void set_sun_shadow(lit_shadow *s, const packet *rays, nb_wvec3 sun, nb_wvec3 center, nb_wide radius)
+{
+    const nb_wvec3 moment = nb_wcross3(center, sun), rate = nb_wcross3(rays->direction, sun);
+    const nb_wide beside = nb_wdot3(moment, moment) - radius * radius, level = NB_W(1e-12);
+    set_between_roots(s, nb_wdot3(rate, rate), -nb_wdot3(moment, rate), beside, level);
+    /* and ahead of the way, not behind it */
+    const nb_wide along = nb_wdot3(rays->direction, sun), ahead = nb_wdot3(center, sun) + radius;
+    const nb_wide passed = ahead * nb_wrcp_bounded(along);
+    s->last = nb_wselect(along > level, nb_wmin(s->last, passed), s->last);
+    s->first = nb_wselect(along < -level, nb_wmax(s->first, passed), s->first);
+}
+
+/* The ways to a lamp are in the plane of lamp and ray: those that meet a ball are between two of them, on its side of the lamp
+ * where it does not hold the lamp, and as long as the way there. */
+static void set_lamp_shadow(lit_shadow *s, const packet *rays, nb_wvec3 lamp, nb_wvec3 center, nb_wide radius)
+{
+    const nb_wvec3 from = nb_wsub3(nb_wvec3(NB_W(0.0), NB_W(0.0), NB_W(0.0)), lamp), apart = nb_wsub3(center, lamp);
+    const nb_wvec3 moment = nb_wcross3(apart, from), rate = nb_wcross3(apart, rays->direction);
+    const nb_wide r2 = radius * radius, along = nb_wdot3(apart, rays->direction), least = r2 * NB_W(1e-6);
+    set_between_roots(s, nb_wdot3(rate, rate) - r2, nb_wdot3(moment, rate) - r2 * nb_wdot3(from, rays->direction),
+                      nb_wdot3(moment, moment) - r2 * nb_wdot3(from, from), least);
+    const nb_wide clear = nb_wsqrt(nb_wdot3(apart, apart)) - radius;
+    const nb_wmask beside = clear > radius * NB_W(1e-3);
+    const nb_wide passed = -nb_wdot3(apart, from) * nb_wrcp_bounded(along), level = radius * NB_W(1e-6);
+    s->first = nb_wselect(nb_wand(beside, along > level), nb_wmax(s->first, passed), s->first);
+    s->last = nb_wselect(nb_wand(beside, along < -level), nb_wmin(s->last, passed), s->last);
+    /* nearer to the lamp than the ball is */
+    const nb_wide closest = -nb_wdot3(from, rays->direction);
+    const nb_wide square = clear * clear - (nb_wdot3(from, from) - closest * closest);
+    const nb_wide reach = nb_wsqrt(nb_wmax(square, NB_W(0.0)));
+    const nb_wmask some = nb_wand(beside, square > NB_W(0.0));
+    const nb_wide in = closest - reach, out = closest + reach, first = s->first, last = s->last;
+    s->first = nb_wselect(nb_wand(some, nb_wand(first > in, first < out)), out, first);
+    s->last = nb_wselect(nb_wand(some, nb_wand(last > in, last < out)), in, last);
+}
+
+static lit_shadow shadow_of(const sunlight *sun, const packet *rays, const nb_lamp *lamp, const nb_medium *medium)
+{
+    const nb_volume *body = &medium->body;
+    lit_shadow s = {NB_W(0.0), NB_WFAR, most_depth(body), medium};
+    if (is_endless(body)) return s;
+    const nb_wvec3 low = nb_wsub3(wide_vector(body->low), rays->origin);
+    const nb_wvec3 high = nb_wsub3(wide_vector(body->high), rays->origin);
+    const nb_wide margin = (sum_of_sizes(low) + sum_of_sizes(high)) * WIDE(SCENE_MARGIN * medium->proportion);
+    const nb_wide radius = WIDE(radius_around(body)) + margin;
+    const nb_wvec3 center = nb_wscale3(nb_wadd3(low, high), NB_W(0.5));
+    if (lamp == NULL)
+        set_sun_shadow(&s, rays, sun->direction, center, radius);
+    else
+        set_lamp_shadow(&s, rays, nb_wsub3(wide_vector(lamp->place), rays->origin), center, radius);
+    return s;
+}
+
+/* Those that lie on the rays; `lamp` NULL: in the sun. */
+static void list_shadows(sunlight *sun, const packet *rays, const nb_lamp *lamp)
+{
+    const nebel_snapshot *snapshot = sun->snapshot;
+    sun->shadow_count = 0;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const lit_shadow s = shadow_of(sun, rays, lamp, &snapshot->media[i]);
+        if (!nb_wany(nb_wand(s.first <= nb_wmin(s.last, rays->t_max), s.last >= NB_W(0.0)))) continue;
+        if (sun->shadow_count == sun->shadow_capacity) {
+            void *grown = grow_aligned(&snapshot->allocator, sun->shadows, sun->shadow_count, sizeof *sun->shadows,
+                                       &sun->shadow_capacity, sun->shadow_count + 1, &sun->shadow_memory);
+            sun->out_of_memory = sun->out_of_memory || grown == NULL;
+            if (grown == NULL) return;
+            sun->shadows = grown;
+        }
+        sun->shadows[sun->shadow_count++] = s;
+    }
+}
+
+/* What a body of any profile takes of the way. */
+static void add_profile(light_depth *sum, const packet *way, const nb_medium *medium)
+{
+    const nb_volume *body = &medium->body;
+    const stretch_ahead s = ahead_in(way, body, 0);
+    const nb_wide leave = nb_wmax(s.leave, s.enter);
+    contact k = {.medium = medium, .inside = nb_narrow_mask(s.enter < leave)};
+    profile_contact(&k, way);
+    const nb_estimate along = contact_integral(&k, s.enter, leave, nb_narrow(leave - s.enter));
+    const nb_real value = nb_select(k.inside, along.value, NB_F(0.0));
+    const nb_real error = nb_select(k.inside, along.error, NB_F(0.0)) + s.error;
+    for (int c = 0; c < 3; c++) {
+        sum->depth[c] = sum->depth[c] + REAL(body->extinction[c]) * value;
+        sum->error[c] = sum->error[c] + REAL(body->extinction[c]) * error;
+    }
+}
+
+/* From t of each ray; of the bodies in whose shadow that is, lane by lane: slack beside them depends on no company. */
+static light_depth depth_through_shadows(const sunlight *sun, const march *m, nb_wide t, nb_wvec3 direction,
+                                         nb_wide reach)
+{
+    const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), direction, reach};
+    light_depth sum = no_depth();
+    nb_real terms = NB_F(4.0);
+    for (size_t i = 0; i < sun->shadow_count; i++) {
+        const lit_shadow *s = &sun->shadows[i];
+        const nb_mask near = nb_narrow_mask(nb_wand(s->first <= t, s->last >= t));
+        if (!nb_any(near)) continue;
+        const nb_volume *body = &s->medium->body;
+        light_depth with = sum;
+        if (body->density.type != NEBEL_DENSITY_CONSTANT) {
+            add_profile(&with, &way, s->medium);
+        } else {
+            add_body(&with, &way, body);
+            if (m->wants_error) add_body_error(&with, &way, body, 0, NB_F(4.0) * NB_EPSILON);
+        }
+        terms = terms + nb_select(near, NB_F(1.0), NB_F(0.0));
+        select_reals(near, sum.depth, with.depth);
+        select_reals(near, sum.error, with.error);
+    }
+    for (int c = 0; c < 3; c++) sum.error[c] = sum.error[c] + sum.depth[c] * (terms * NB_EPSILON);
+    return sum;
+}
+
+/* ---- places ---------------------------------------------------------------------------------- */
+
+/* A place on each ray: optical depth up to it, and what light comes from it to the eye where it is scattered alike from everywhere. */
+typedef struct lit_place {
+    nb_wide t;
+    nb_real depth[3], depth_error[3];
+    nb_real behind[3]; /* e^-depth */
+    nb_real seen[3];
+    nb_real doubt; /* by what factor that may be off */
+} lit_place;
+
+/* What a lamp brings to t, and from where; how far it is. */
+static nb_real lamp_arrives(const march *m, const lamp_pass *pass, const nb_phase *phase, nb_wide t, nb_wvec3 *towards,
+                            nb_wide *reach)
+{
+    const nb_lamp *lamp = pass->lamp;
+    const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
+    const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
+    *towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
+    *reach = nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0));
+    const nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)));
+    const nb_real light = fluence * scattered(phase, nb_turn_between(m->rays.direction, *towards));
+    if (!lamp->is_spot) return light;
+    const nb_real cosine = nb_narrow(-nb_wdot3(*towards, wide_vector(lamp->axis)));
+    return light * nb_lamp_cone(cosine, REAL(lamp->edge), REAL(lamp->rise));
+}
+
+/* The light that is scattered: of the sun where `pass` is NULL. */
+typedef struct crowd_light {
+    const lamp_pass *pass;
+    const nb_phase *phase; /* of a lamp: all media that it lights have this one */
+    nb_real most;          /* radiance of fog that is opaque, at most */
+    double share;          /* what its steps may add to the error */
+} crowd_light;
+
+static void look_from(const sunlight *sun, const march *m, const crowd_light *light, lit_place *at)
+{
+    nb_wvec3 towards = sun->direction;
+    nb_wide reach = NB_WFAR;
+    nb_real arriving = NB_F(1.0), all[3], through[3];
+    if (light->pass != NULL) arriving = lamp_arrives(m, light->pass, light->phase, at->t, &towards, &reach);
+    const light_depth way = depth_through_shadows(sun, m, at->t, towards, reach);
+    at->doubt = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        all[c] = at->depth[c] + way.depth[c];
+        const nb_real rounding = (all[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
+        at->doubt = nb_max(at->doubt, nb_min(at->depth_error[c] + way.error[c], NB_F(1.0)) + rounding);
+    }
+    map_channels(sun->snapshot, transmitted, all, through);
+    map_channels(sun->snapshot, transmitted, at->depth, at->behind);
+    for (int c = 0; c < 3; c++) {
+        const double intensity = light->pass != NULL ? light->pass->lamp->intensity[c] : 1;
+        at->seen[c] = through[c] * arriving * REAL(intensity);
+    }
+}
+
+/* ---- what bodies scatter between places ------------------------------------------------------ */
+
+/* Half a step: glow times the density's integral, and its moments over places from 0 to 2. */
+typedef struct lit_half {
+    nb_real sum[3], first[3], second[3];
+} lit_half;
+
+/* Of the sun its radiance per metre; of a lamp what scatters. */
+static nb_real glow_in(const contact *k, const crowd_light *light, int c)
+{
+    if (light->pass == NULL) return k->glow[c];
+    return k->medium->is_lamplit ? k->extinction[c] * REAL(k->medium->body.albedo[c]) : NB_F(0.0);
+}
+
+/* The mean place and the mean of its square within a part from s on, of length l. Densities are linear from end to end of it: what that
+ * misses is in the moments alone. */
+static void find_moments_of(const contact *k, nb_wide enter, nb_wide leave, nb_real s, nb_real l, nb_real *first,
+                            nb_real *second)
+{
+    nb_real last = NB_F(0.5);
+    if (k->medium->body.density.type != NEBEL_DENSITY_CONSTANT) {
+        const nb_real a = contact_density(k, enter), b = contact_density(k, leave);
+        last = nb_select(a + b > NB_TINY, b / nb_max(a + b, NB_TINY), last);
+    }
+    const nb_real mean = (NB_F(1.0) + last) * REAL(1.0 / 3), square = (NB_F(1.0) + last + last) * REAL(1.0 / 6);
+    *first = s + l * mean;
+    *second = s * (s + NB_F(2.0) * l * mean) + l * l * square;
+}
+
+/* What bodies add between two places: optical depth and its error, how many depths are summed, light that is not seen from places. */
+typedef struct lit_between {
+    nb_real depth[3], error[3], terms, unresolved;
+} lit_between;
+
+/* Adds what a body gives from `from` to `to`, which has the places from `place` to place + 1 of its half. */
+static void add_part(const contact *k, const leaf_span *span, const crowd_light *light, const lit_place *from,
+                     nb_wide to, int place, nb_real quarter, lit_half *half, lit_between *sum)
+{
+    const nb_wide enter = nb_wmin(nb_wmax(span->enter, from->t), to);
+    const nb_wide leave = nb_wmax(nb_wmin(span->leave, to), enter);
+    const nb_mask some = nb_narrow_mask(enter < leave);
+    if (!nb_any(some)) return;
+    const nb_real zero = NB_F(0.0), h = nb_narrow(leave - enter);
+    const nb_estimate along = contact_integral(k, enter, leave, h);
+    const nb_real value = nb_select(some, along.value, zero), error = nb_select(some, along.error, zero);
+    const nb_real scale = nb_rcp_bounded(quarter), most = nb_min(most_depth(&k->medium->body), NB_F(1.0));
+    const nb_mask narrow = nb_narrow_mask(span->leave - span->enter < nb_widen(quarter + quarter));
+    nb_real first, second, hidden = zero;
+    find_moments_of(k, enter, leave, nb_narrow(enter - from->t) * scale + REAL(place), h * scale, &first, &second);
+    for (int c = 0; c < 3; c++) {
+        const nb_real glow = glow_in(k, light, c) * value;
+        sum->depth[c] = sum->depth[c] + k->extinction[c] * value;
+        sum->error[c] = sum->error[c] + k->extinction[c] * error;
+        half->sum[c] = half->sum[c] + glow;
+        half->first[c] = half->first[c] + glow * nb_select(some, first, zero);
+        half->second[c] = half->second[c] + glow * nb_select(some, second, zero);
+        hidden = nb_max(hidden, glow * most * from->seen[c]);
+    }
+    sum->terms = sum->terms + nb_select(some, NB_F(1.0), zero);
+    sum->unresolved = sum->unresolved + nb_select(narrow, hidden, zero);
+}
+
+/* All of them. */
+static void add_parts(const march *m, const crowd_light *light, const lit_place *from, lit_place *to, int place,
+                      nb_real quarter, lit_half *half, nb_real *unresolved)
+{
+    const nb_real zero = NB_F(0.0);
+    lit_between sum = {{zero, zero, zero}, {zero, zero, zero}, NB_F(2.0), zero};
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        add_part(k, &m->spans[k->first_span], light, from, to->t, place, quarter, half, &sum);
+    }
+    for (int c = 0; c < 3; c++) {
+        to->depth[c] = from->depth[c] + sum.depth[c];
+        const nb_real rounding = (sum.depth[c] * sum.terms + to->depth[c]) * NB_EPSILON;
+        to->depth_error[c] = from->depth_error[c] + sum.error[c] + rounding;
+    }
+    *unresolved = *unresolved + sum.unresolved;
+}
+
+static lit_half nothing_scattered(void)
+{
+    const nb_real zero = NB_F(0.0);
+    return (lit_half){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+}
+
+/* What the parabola through what is seen at three places makes of a half. */
+static nb_real light_of_half(const lit_half *half, int c, nb_real a, nb_real b, nb_real e)
+{
+    const nb_real slope = NB_F(2.0) * b - NB_F(0.5) * (NB_F(3.0) * a + e), bend = NB_F(0.5) * (a + e) - b;
+    return a * half->sum[c] + slope * half->first[c] + bend * half->second[c];
+}
+
+/* ---- steps ----------------------------------------------------------------------------------- */
+
+typedef struct crowd_step {
+    lit_place end;
+    nb_real light[3], error, rounding, drop;
+} crowd_step;
+
+/* What shadows may do that the places of a step do not show, as a part of its light: all of them that are too narrow, and where
+ * they begin or end, which is as steep as a root. The root of x - a, x and a from 0 to 1, is integrated here to 0.042, in the mean over a to 0.015;
+ * as a shadow begins its depth is amount 2 sqrt(x / width). Some are too large and others too small: the root of their squares. */
+static nb_real hidden_in_shadows(const sunlight *sun, nb_wide start, nb_wide end, nb_real length)
+{
+    const nb_real zero = NB_F(0.0), one = NB_F(1.0);
+    nb_real hidden = zero, edges = zero;
+    for (size_t i = 0; i < sun->shadow_count; i++) {
+        const lit_shadow *s = &sun->shadows[i];
+        const nb_mask begins = nb_narrow_mask(nb_wand(s->first > start, s->first < end));
+        const nb_mask stops = nb_narrow_mask(nb_wand(s->last > start, s->last < end));
+        const nb_mask some = nb_and(nb_or(begins, stops), nb_narrow_mask(s->first < s->last));
+        if (!nb_any(some)) continue;
+        const nb_real width = nb_narrow(nb_wmax(s->last - s->first, NB_W(0.0))), most = nb_min(s->amount, one);
+        const nb_real longer = nb_min(length * nb_rcp_bounded(width), one / NB_TINY);
+        const nb_mask narrow = nb_and(some, longer > NB_F(2.0));
+        const nb_real count = nb_select(begins, one, zero) + nb_select(stops, one, zero);
+        const nb_mask steep = nb_and(some, nb_not(narrow));
+        hidden = hidden + nb_select(narrow, most * width * nb_rcp_bounded(length), zero);
+        edges = edges + nb_select(steep, count * (most * most) * (NB_F(4.0) * EDGE_ERROR * EDGE_ERROR) * longer, zero);
+    }
+    return nb_min(hidden + nb_sqrt(edges), one);
+}
+
+static crowd_step try_crowd_step(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *start,
+                                 nb_real length, nb_wide end)
+{
+    const nb_real quarter = NB_F(0.25) * length;
+    lit_place at[5] = {*start};
+    lit_half half[2] = {nothing_scattered(), nothing_scattered()};
+    nb_real unresolved = NB_F(0.0);
+    for (int i = 1; i < 5; i++) {
+        at[i].t = i == 4 ? end : nb_wmin(start->t + nb_widen(quarter * REAL(i)), end);
+        add_parts(m, light, &at[i - 1], &at[i], (i - 1) % 2, quarter, &half[(i - 1) / 2], &unresolved);
+        look_from(sun, m, light, &at[i]);
+    }
+    crowd_step s = {.end = at[4], .error = NB_F(0.0), .rounding = NB_F(0.0), .drop = NB_F(0.0)};
+    nb_real doubt = NB_F(0.0), full = NB_F(0.0);
+    for (int i = 0; i < 5; i++) doubt = nb_max(doubt, at[i].doubt);
+    for (int c = 0; c < 3; c++) {
+        const nb_real a = at[0].seen[c], b = at[2].seen[c], e = at[4].seen[c], eighth = NB_F(0.125);
+        const nb_real first = nb_abs(at[1].seen[c] - eighth * (NB_F(3.0) * a + NB_F(6.0) * b - e));
+        const nb_real last = nb_abs(at[3].seen[c] - eighth * (NB_F(3.0) * e + NB_F(6.0) * b - a));
+        const nb_real most = nb_max(nb_max(nb_max(a, at[1].seen[c]), b), nb_max(at[3].seen[c], e));
+        const nb_real light_of_all =
+            light_of_half(&half[0], c, a, at[1].seen[c], b) + light_of_half(&half[1], c, b, at[3].seen[c], e);
+        s.light[c] = nb_max(light_of_all, NB_F(0.0));
+        s.error = nb_max(s.error, first * half[0].sum[c] + last * half[1].sum[c]);
+        s.rounding = nb_max(s.rounding, (half[0].sum[c] + half[1].sum[c]) * most * doubt);
+        full = nb_max(full, (half[0].sum[c] + half[1].sum[c]) * most);
+        s.drop = nb_max(s.drop, at[0].behind[c] - at[4].behind[c]);
+    }
+    s.error = s.error + unresolved + full * hidden_in_shadows(sun, start->t, end, length);
+    return s;
+}
+
+/* Where a lane has come to. */
+typedef struct crowd_walk {
+    lit_place at;
+    nb_wide last;
+    nb_wmask lanes;
+    nb_real guess, left, whole; /* length of the next step; steps that may still be tried; of all */
+} crowd_walk;
+
+static void select_place(nb_mask mask, lit_place *to, const lit_place *from)
+{
+    to->t = nb_wselect(nb_widen_mask(mask), from->t, to->t);
+    select_reals(mask, to->depth, from->depth);
+    select_reals(mask, to->depth_error, from->depth_error);
+    select_reals(mask, to->behind, from->behind);
+    select_reals(mask, to->seen, from->seen);
+    to->doubt = nb_select(mask, from->doubt, to->doubt);
+}
+
+/* The place at t behind one that is known. */
+static lit_place place_behind(const sunlight *sun, const march *m, const crowd_light *light, const lit_place *from,
+                              nb_wide t)
+{
+    lit_half none = nothing_scattered();
+    nb_real unresolved = NB_F(0.0);
+    lit_place at = {.t = t};
+    add_parts(m, light, from, &at, 0, NB_F(1.0), &none, &unresolved);
+    look_from(sun, m, light, &at);
+    return at;
+}
+
+/* After a step: twice as long where its error was far below what was allowed, shorter where it was near or beyond. The
+ * error goes with the third power of the length, and where bodies begin and end with less. */
+static nb_real next_length(nb_real length, nb_real error, nb_real allowed)
+{
+    const nb_real two = NB_F(2.0), half = NB_F(0.5);
+    const nb_real next = nb_select(error * NB_F(8.0) <= allowed, two, NB_F(1.0));
+    return length * nb_select(error <= allowed, next, half);
+}
+
+static void step_through_crowd(const sunlight *sun, const march *m, const crowd_light *light, nb_wide bright,
+                               crowd_walk *w, gathered *g)
+{
+    const nb_mask final = w->left <= NB_F(1.0); /* the rest is one step, whatever its error */
+    const nb_real rest = nb_narrow(bright - w->at.t);
+    const nb_real length = nb_select(final, rest, nb_min(w->guess, rest));
+    const nb_wide end = nb_wselect(nb_widen_mask(length >= rest), bright, w->at.t + nb_widen(length));
+    const crowd_step s = try_crowd_step(sun, m, light, &w->at, length, end);
+    const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
+    const nb_real allowed =
+        least + REAL(light->share * (1 - TAIL_SHARE)) * NB_F(0.5) * (s.drop + length * nb_rcp_bounded(w->whole));
+    const nb_mask taken = nb_and(nb_or(final, s.error <= allowed), nb_narrow_mask(w->lanes));
+    nb_real most = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        g->radiance[c] = g->radiance[c] + nb_select(taken, s.light[c], NB_F(0.0));
+        most = nb_max(most, g->radiance[c]);
+    }
+    const nb_real error = s.error + s.rounding + most * NB_EPSILON;
+    g->radiance_error = g->radiance_error + nb_select(taken, error, NB_F(0.0));
+    select_place(taken, &w->at, &s.end);
+    w->guess = nb_select(nb_narrow_mask(w->lanes), next_length(length, s.error, allowed), w->guess);
+    w->left = w->left - NB_F(1.0);
+}
+
+/* ---- the walk -------------------------------------------------------------------------------- */
+
+/* From the first lit body of each ray to the last. */
+static nb_mask find_lit_stretch(const march *m, int by_lamp, nb_wide *first, nb_wide *last)
+{
+    *first = NB_WFAR;
+    *last = NB_W(0.0);
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        if (!(by_lamp ? k->medium->is_lamplit : k->medium->is_sunlit)) continue;
+        const nb_wmask met = k->hull_enter < k->hull_leave;
+        *first = nb_wselect(met, nb_wmin(*first, k->hull_enter), *first);
+        *last = nb_wselect(met, nb_wmax(*last, k->hull_leave), *last);
+    }
+    return nb_narrow_mask(*first < *last);
+}
+
+static void transmittance_at(const march *m, nb_wide t, nb_real behind[3])
+{
+    nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        const leaf_span *span = &m->spans[k->first_span];
+        const nb_wide leave = nb_wmax(nb_wmin(span->leave, t), span->enter);
+        const nb_mask some = nb_narrow_mask(span->enter < leave);
+        if (!nb_any(some)) continue;
+        const nb_real value = contact_integral(k, span->enter, leave, nb_narrow(leave - span->enter)).value;
+        for (int c = 0; c < 3; c++) depth[c] = depth[c] + nb_select(some, k->extinction[c] * value, NB_F(0.0));
+    }
+    map_channels(m->sun->snapshot, transmitted, depth, behind);
+}
+
+/* What fog between two places may give at most. */
+static nb_real most_between(const march *m, const crowd_light *light, nb_wide start, nb_wide end)
+{
+    nb_real before[3], behind[3], drop = NB_F(0.0);
+    transmittance_at(m, start, before);
+    transmittance_at(m, end, behind);
+    for (int c = 0; c < 3; c++) drop = nb_max(drop, before[c] - behind[c]);
+    const nb_real arriving = light->pass != NULL ? most_fluence(light->pass, start, end) : NB_F(1.0);
+    return drop * arriving * light->most;
+}
+
+/* The least `last` behind which nothing matters, but for a factor of 2: rays without an end would have steps that are halved for ever. */
+static nb_wide trim_stretch(const march *m, const crowd_light *light, nb_wide first, nb_wide last, nb_real allowed)
+{
+    nb_wmask lanes = first < last;
+    for (int i = 0; i < 64 && nb_wany(lanes); i++) {
+        const nb_wide middle = first + NB_W(0.5) * (last - first);
+        lanes = nb_wand(lanes, nb_widen_mask(most_between(m, light, middle, last) <= allowed));
+        last = nb_wselect(lanes, middle, last);
+    }
+    return last;
+}
+
+/* Steps end where a surface's shadow begins or ends, and pass over it. */
+static void walk_through_crowd(const sunlight *sun, const march *m, const crowd_light *light, shade *shadows,
+                               nb_mask lanes, nb_wide first, nb_wide last, gathered *g)
+{
+    const nb_real zero = NB_F(0.0);
+    const lit_place origin = {NB_W(0.0),          {zero, zero, zero}, {zero, zero, zero},
+                              {zero, zero, zero}, {zero, zero, zero}, zero};
+    crowd_walk w = {.last = last, .lanes = nb_wand(nb_widen_mask(lanes), first < last), .left = REAL(MOST_CROWD_STEPS)};
+    w.at = place_behind(sun, m, light, &origin, nb_wselect(w.lanes, first, NB_W(0.0)));
+    w.whole = nb_max(nb_narrow(last - first), NB_TINY);
+    w.guess = NB_F(0.5) * w.whole;
+    while (nb_wany(w.lanes)) {
+        if (shadows != NULL) pass_toggles(shadows, w.at.t, w.lanes);
+        const nb_wide bright = shadows != NULL ? nb_wmin(shadows->toggle, last) : last;
+        const nb_wmask dark = shadows != NULL ? nb_wand(w.lanes, shadows->is_dark) : nb_wmask_false;
+        if (nb_wany(dark)) {
+            const lit_place behind = place_behind(sun, m, light, &w.at, nb_wselect(dark, bright, w.at.t));
+            select_place(nb_narrow_mask(dark), &w.at, &behind);
+            w.left = nb_select(nb_narrow_mask(dark), REAL(MOST_CROWD_STEPS), w.left);
+        } else {
+            step_through_crowd(sun, m, light, next_turn(sun, w.at.t, bright), &w, g);
+        }
+        w.lanes = nb_wand(w.lanes, w.at.t < last);
+    }
+}
+
+static void gather_light_of_crowd(sunlight *sun, const march *m, const crowd_light *light, shade *shadows, gathered *g)
+{
+    nb_wide first, last;
+    const nb_mask lit = find_lit_stretch(m, light->pass != NULL, &first, &last);
+    if (!nb_any(lit)) return;
+    const nb_wide end = trim_stretch(m, light, first, last, REAL(0.5 * TAIL_SHARE * light->share));
+    const nb_real beyond = most_between(m, light, end, last);
+    g->radiance_error = g->radiance_error + nb_select(lit, beyond, NB_F(0.0));
+    sun->turn_count = 0;
+    if (light->pass != NULL) {
+        note_lamp(sun, m, light->pass);
+        note_turn(sun, light->pass->closest, nb_wmask_true); /* on either side what arrives rises or falls */
+    }
+    list_shadows(sun, &m->rays, light->pass != NULL ? light->pass->lamp : NULL);
+    if (sun->out_of_memory) return;
+    walk_through_crowd(sun, m, light, shadows, lit, first, end, g);
+}
+
+/* ---- all lights ------------------------------------------------------------------------------ */
+
+static nb_real most_sunlight(const march *m)
+{
+    nb_real most = NB_F(0.0);
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        const nb_mask met = is_met(k);
+        for (int c = 0; c < 3; c++) {
+            const nb_real radiance = k->glow[c] / nb_max(k->extinction[c], NB_TINY);
+            most = nb_max(most, nb_select(met, radiance, NB_F(0.0)));
+        }
+    }
+    return most;
+}
+
+/* Adds what all lights give along the rays. */
+static void gather_crowd_lights(sunlight *sun, const march *m, gathered *g)
+{
+    const nebel_snapshot *snapshot = sun->snapshot;
+    if (snapshot->is_sunlit) {
+        const crowd_light light = {.most = most_sunlight(m), .share = sun->share};
+        gather_light_of_crowd(sun, m, &light, sun->shade.toggles != NULL ? &sun->shade : NULL, g);
+    }
+    nb_real most = NB_F(0.0);
+    const nb_phase *phase = NULL;
+    for (size_t i = 0; i < m->contact_count; i++) {
+        const contact *k = &m->contacts[i];
+        if (!k->medium->is_lamplit) continue;
+        phase = &k->medium->body.phase;
+        most = nb_max(most, nb_select(is_met(k), REAL(most_scattered(&k->medium->body)), NB_F(0.0)));
+    }
+    for (size_t i = 0; i < snapshot->lamp_count && phase != NULL; i++) {
+        lamp_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+        const crowd_light light = {&pass, phase, most, sun->share / (double)snapshot->lamp_count};
+        gather_light_of_crowd(sun, m, &light, sun->lamp_shades != NULL ? &sun->lamp_shades[i] : NULL, g);
+    }
+}

@@ -1,0 +1,318 @@
+/* Sunlight and lamplight in many bodies over each other, of all profiles, against brute force: the midpoint rule over
+ * nebel_sample_fog, with transmittances of nebel_trace, which know nothing of light. */
+#include "unit.h"
+
+#include "fog_help.h"
+
+#include <math.h>
+
+enum { BODIES = 30, RAYS = 17, FORCED = 3, PLACES = 16000 };
+
+static const double sun_direction[3] = {0.6, 0.64, 0.48}; /* of length 1 */
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* ---- fog ------------------------------------------------------------------------------------- */
+
+typedef struct crowd {
+    nebel_volume_desc bodies[BODIES];
+    size_t count;
+    nebel_fog_desc desc;
+    nebel_lamp lamp;
+    int has_lamp;
+} crowd;
+
+static void choose_shape(nebel_volume_desc *v, int kind, uint64_t *numbers)
+{
+    nebel_shape *s = &v->shape;
+    const double radius = dice(numbers, 1, 5);
+    for (int c = 0; c < 3; c++) s->center[c] = dice(numbers, -5, 5);
+    if (kind % 3 < 2) {
+        s->type = NEBEL_SHAPE_SPHERE;
+        s->radius = radius;
+        return;
+    }
+    s->type = NEBEL_SHAPE_BOX;
+    for (int c = 0; c < 3; c++) {
+        const double half = dice(numbers, 0.5, 4);
+        s->min[c] = s->center[c] - half;
+        s->max[c] = s->center[c] + half;
+    }
+}
+
+static void choose_density(nebel_volume_desc *v, int kind, uint64_t *numbers)
+{
+    nebel_density *d = &v->density;
+    const double size = dice(numbers, 0.5, 2);
+    switch (kind) {
+    case 1:
+        *d = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 1 + (int)(size * 10) % 3};
+        break;
+    case 2:
+        *d = (nebel_density){.type = NEBEL_DENSITY_SOFT_EDGE, .distance = 0.4};
+        break;
+    case 3:
+        *d = (nebel_density){.type = NEBEL_DENSITY_GAUSSIAN, .sigma = size};
+        memcpy(d->center, v->shape.center, sizeof d->center);
+        break;
+    case 4:
+        *d = (nebel_density){.type = NEBEL_DENSITY_LINEAR, .from = {0, -2, 0}, .to = {1, 2 * size, 1}};
+        break;
+    case 5:
+        *d = (nebel_density){
+            .type = NEBEL_DENSITY_HEIGHT, .below = NEBEL_BELOW_CONSTANT, .base = -1, .scale_height = 2 * size};
+        break;
+    default:
+        break;
+    }
+}
+
+/* `mixed`: of all profiles, one without an end among them, and some with distances; together of optical depth 1 or 2. */
+static void make_crowd(crowd *made, size_t count, int mixed, int light, uint64_t seed)
+{
+    uint64_t numbers = seed;
+    *made = (crowd){.count = count, .has_lamp = light > 0};
+    for (size_t i = 0; i < count; i++) {
+        nebel_volume_desc *v = &made->bodies[i];
+        *v = (nebel_volume_desc){.albedo = {1, 0.9, 0.5}};
+        choose_shape(v, mixed && i % 6 != 1 ? (int)i : 0, &numbers);
+        if (mixed) choose_density(v, (int)(i % 6), &numbers);
+        for (int c = 0; c < 3; c++) v->extinction[c] = dice(&numbers, 0.2, 2) / (double)count;
+        if (light == 0 && i % 2 == 0) v->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = 0.5};
+        if (light == 0 && i % 5 == 3) v->albedo[0] = v->albedo[1] = v->albedo[2] = 0;
+    }
+    if (mixed) {
+        made->bodies[0] = (nebel_volume_desc){.extinction = {0.01, 0.02, 0.03},
+                                              .albedo = {1, 1, 1},
+                                              .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -4, .scale_height = 3}};
+        made->bodies[6].start = 9;
+        made->bodies[7].cutoff = 11;
+    }
+    made->lamp = (nebel_lamp){.position = {1, 2, -1}, .intensity = {30, 20, 10}, .radius = 0.1};
+    if (light == 2) {
+        const nebel_lamp spot = {.type = NEBEL_LAMP_SPOT,
+                                 .position = {2, 6, 1},
+                                 .intensity = {90, 60, 30},
+                                 .radius = 0.2,
+                                 .direction = {-0.2, -1, 0},
+                                 .inner_angle = 10,
+                                 .outer_angle = 35};
+        made->lamp = spot;
+    }
+    if (light == 0) {
+        made->desc.sun = (nebel_sun){.irradiance = {3, 2, 1}};
+        memcpy(made->desc.sun.direction, sun_direction, sizeof sun_direction);
+    }
+}
+
+static nebel_snapshot *commit_crowd(const crowd *of)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    assert_int_equal(nebel_create_fog(&of->desc, &fog), NEBEL_OK);
+    for (size_t i = 0; i < of->count; i++) assert_int_equal(nebel_add_volume(fog, &of->bodies[i], NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, (size_t)of->has_lamp, &of->lamp), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static void make_rays(nebel_ray rays[RAYS], uint64_t seed)
+{
+    uint64_t numbers = seed;
+    for (int i = 0; i < RAYS; i++) {
+        const double x = dice(&numbers, -0.3, 0.3), y = dice(&numbers, -0.3, 0.3), size = sqrt(x * x + y * y + 1);
+        rays[i] = (nebel_ray){.origin = {dice(&numbers, -3, 3), dice(&numbers, -3, 3), -9},
+                              .direction = {x / size, y / size, 1 / size},
+                              .t_max = dice(&numbers, 12, 24)};
+    }
+}
+
+/* ---- brute force ----------------------------------------------------------------------------- */
+
+/* What a light brings to a place: from where, how far, and how much of its irradiance or intensity. */
+typedef struct arrival {
+    double towards[3], distance, fluence;
+} arrival;
+
+static arrival light_arrives(const crowd *of, const double p[3])
+{
+    const nebel_lamp *lamp = &of->lamp;
+    arrival a = {.distance = HUGE_VAL, .fluence = 1};
+    memcpy(a.towards, sun_direction, sizeof sun_direction);
+    if (!of->has_lamp) return a;
+    for (int k = 0; k < 3; k++) a.towards[k] = lamp->position[k] - p[k];
+    const double apart = sqrt(dot(a.towards, a.towards)), sine = fmin(lamp->radius / apart, 1);
+    for (int k = 0; k < 3; k++) a.towards[k] /= apart;
+    a.distance = fmax(apart - lamp->radius, 0);
+    a.fluence = 2 * (1 - sqrt(1 - sine * sine)) / (lamp->radius * lamp->radius);
+    if (lamp->type != NEBEL_LAMP_SPOT) return a;
+    const double degree = acos(-1) / 180, edge = cos(lamp->outer_angle * degree);
+    const double cosine = -dot(a.towards, lamp->direction) / sqrt(dot(lamp->direction, lamp->direction));
+    const double s = fmin(fmax((cosine - edge) / (cos(lamp->inner_angle * degree) - edge), 0), 1);
+    a.fluence *= s * s * (3 - 2 * s);
+    return a;
+}
+
+/* Henyey-Greenstein, by its published formula; 0: alike into all directions. */
+static double phase_value(double g, double cosine)
+{
+    return (1 - g * g) / (4 * acos(-1) * pow(1 + g * g - 2 * g * cosine, 1.5));
+}
+
+/* What the lit bodies of a snapshot scatter at a place. */
+static void scattering_at(const nebel_snapshot *snapshot, const nebel_ray *ray, double t, double out[3])
+{
+    nebel_place place = {.distance = t};
+    nebel_matter matter;
+    for (int k = 0; k < 3; k++) place.position[k] = ray->origin[k] + t * ray->direction[k];
+    assert_int_equal(nebel_sample_fog(snapshot, 1, &place, 0, &matter, 0), NEBEL_OK);
+    memcpy(out, matter.scattering, sizeof matter.scattering);
+}
+
+/* Transmittance of a ray to or from the eye. */
+static nebel_light pass_through(const nebel_snapshot *snapshot, const nebel_ray *ray, int from_eye)
+{
+    const nebel_trace_desc asked = {.transmittance_only = 1, .ignore_distances = !from_eye};
+    nebel_light light;
+    assert_int_equal(nebel_trace(snapshot, &asked, 1, ray, 0, &light, 0), NEBEL_OK);
+    return light;
+}
+
+typedef struct forced {
+    double light[3], off[3]; /* what it may be off by where fog begins or ends within its steps */
+} forced;
+
+/* `turned`: the same bodies, those alone lit whose phase function is turned; in `snapshot` all are. */
+static forced light_by_force(const crowd *of, const nebel_snapshot *snapshot, const nebel_snapshot *turned,
+                             const nebel_ray *ray, const float *dark)
+{
+    const double step = ray->t_max / PLACES;
+    double before[3] = {0, 0, 0};
+    forced sum = {{0, 0, 0}, {0, 0, 0}};
+    for (int i = 0; i < PLACES; i++) {
+        const double t = (i + 0.5) * step;
+        nebel_ray here = *ray, there = *ray;
+        double all[3], some[3];
+        here.t_max = t;
+        for (int k = 0; k < 3; k++) there.origin[k] += t * ray->direction[k];
+        const arrival from = light_arrives(of, there.origin);
+        memcpy(there.direction, from.towards, sizeof there.direction);
+        there.t_max = from.distance;
+        scattering_at(snapshot, ray, t, all);
+        scattering_at(turned, ray, t, some);
+        const nebel_light seen = pass_through(snapshot, &here, 1), lit = pass_through(snapshot, &there, 0);
+        const double forward = phase_value(0.5, dot(ray->direction, from.towards));
+        const int shines = dark == NULL || t < (double)dark[0] || t >= (double)dark[1];
+        for (int c = 0; c < 3; c++) {
+            const double glow = (all[c] - some[c]) * phase_value(0, 0) + some[c] * forward;
+            const double source = of->has_lamp ? of->lamp.intensity[c] : of->desc.sun.irradiance[c];
+            const double light = glow * shines * source * from.fluence * step;
+            sum.light[c] += light * seen.transmittance[c] * lit.transmittance[c];
+            sum.off[c] += 0.5 * fabs(light - before[c]) * seen.transmittance[c] * lit.transmittance[c];
+            before[c] = light;
+        }
+    }
+    return sum;
+}
+
+/* The bodies whose phase function is turned are lit, the others are not. */
+static nebel_snapshot *commit_turned(const crowd *of)
+{
+    crowd only = *of;
+    for (size_t i = 0; i < only.count; i++)
+        if (only.bodies[i].phase.type == NEBEL_PHASE_ISOTROPIC)
+            memset(only.bodies[i].albedo, 0, sizeof only.bodies[i].albedo);
+    return commit_crowd(&only);
+}
+
+/* ---- tests ----------------------------------------------------------------------------------- */
+
+static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, const nebel_ray *rays,
+                  nebel_light *lights)
+{
+    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
+/* Alone and in any company. */
+static void expect_the_same_bits(const nebel_snapshot *snapshot, const nebel_trace_desc *asked, const nebel_ray *rays,
+                                 const nebel_light *expected)
+{
+    nebel_light other[RAYS];
+    nebel_trace_desc desc = *asked;
+    for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
+        if (!nebel_isa_available(desc.isa)) continue;
+        trace(snapshot, &desc, rays, other);
+        assert_memory_equal(expected, other, sizeof other);
+    }
+    if (asked->sunlit != NULL || asked->lamplit != NULL) return;
+    for (int i = 0; i < RAYS; i++) {
+        assert_int_equal(nebel_trace(snapshot, asked, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
+        assert_memory_equal(&expected[i], &other[i], sizeof other[i]);
+    }
+}
+
+static void expect_brute_force(size_t count, int mixed, int light, int in_shadow)
+{
+    float toggles[2 * RAYS];
+    static crowd of;
+    uint32_t first[RAYS + 1];
+    nebel_ray rays[RAYS];
+    nebel_light lights[RAYS];
+    forced force[FORCED];
+    for (uint32_t i = 0; i <= RAYS; i++) first[i] = 2 * i;
+    for (int i = 0; i < 2 * RAYS; i++) toggles[i] = i % 2 == 0 ? 7 : 9.5f;
+    const nebel_lit_pieces pieces = {first, toggles};
+    make_crowd(&of, count, mixed, light, 17 * count + (uint64_t)light);
+    make_rays(rays, 5 * count + 3);
+    nebel_snapshot *snapshot = commit_crowd(&of), *turned = commit_turned(&of);
+    for (int i = 0; i < FORCED; i++)
+        force[i] = light_by_force(&of, snapshot, turned, &rays[i], in_shadow ? toggles : NULL);
+    for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
+        for (int fine = 0; fine < 2; fine++) {
+            nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = fine ? 2e-5 : 0};
+            if (in_shadow && light == 0) asked.sunlit = &pieces;
+            if (in_shadow && light > 0) asked.lamplit = &pieces;
+            trace(snapshot, &asked, rays, lights);
+            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(snapshot, &asked, rays, lights);
+            for (int i = 0; i < FORCED; i++) {
+                assert_true(lights[i].error < (fine ? 2e-5 : 1e-3));
+                for (int c = 0; c < 3; c++) {
+                    assert_true(force[i].light[c] > 100 * force[i].off[c]);
+                    const double off = fabs(lights[i].in_scattering[c] - force[i].light[c]);
+                    assert_true(off <= lights[i].error + force[i].off[c]);
+                }
+            }
+        }
+    }
+    nebel_release_snapshot(turned);
+    nebel_release_snapshot(snapshot);
+}
+
+static void sunlight_is_what_brute_force_finds(void **state)
+{
+    (void)state;
+    expect_brute_force(12, 0, 0, 0);
+    expect_brute_force(12, 1, 0, 0);
+    expect_brute_force(BODIES, 1, 0, 1);
+}
+
+static void lamplight_is_what_brute_force_finds(void **state)
+{
+    (void)state;
+    expect_brute_force(12, 0, 1, 0);
+    expect_brute_force(BODIES, 1, 1, 1);
+    expect_brute_force(BODIES, 1, 2, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sunlight_is_what_brute_force_finds),
+        cmocka_unit_test(lamplight_is_what_brute_force_finds),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
