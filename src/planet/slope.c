@@ -32,7 +32,8 @@ static nb_slope rise_slope(const nb_outlook *outlook, double row)
         const double sine = (outlook->ground + row * row * outlook->thickness) / outlook->radius;
         return (nb_slope){-sqrt((1 - sine) * (1 + sine)), sine};
     }
-    const double half = outlook->horizon * (1 - row * row);
+    const double crowd = nb_row_crowd(*outlook), left = row * row / (crowd - (crowd - 1) * row * row);
+    const double half = outlook->horizon * (1 - left);
     return (nb_slope){1 - 2 * half * half, 2 * half * sqrt((1 - half) * (1 + half))};
 }
 
