@@ -14,7 +14,7 @@ static void height_contact(contact *k, const packet *rays, const nebel_density *
 /* How far under the base fog that thins out with the altitude is as thick as it gets, in scale heights. */
 static double depth_of_most(const nebel_density *density)
 {
-    return density->below == NEBEL_BELOW_GROW ? 41.446531673892822 : 0;
+    return density->below == NEBEL_BELOW_GROW ? NB_GROWTH_DEPTH : 0;
 }
 
 static nb_real most_of_altitude(const nebel_density *density)

@@ -66,6 +66,9 @@ typedef struct nb_edge {
     double gain, steepness, inner;
 } nb_edge;
 
+/* How far under its base fog that thins out with the altitude is as thick as it gets, 1e18, in scale heights. */
+#define NB_GROWTH_DEPTH 41.446531673892822
+
 typedef struct nb_volume {
     nebel_operation operation;
     int64_t rank; /* one that covers takes away the fog of every lower rank: see nb_volume_covers */

@@ -101,6 +101,42 @@ float nb_sun_weight(int j)
     return j == 4 ? 0.0 : j == 1 || j == 2 ? 0.32607257743127307131 : 0.17392742256872692869;
 }
 
+/* Fog that thins out with the altitude counts up to so many scale heights above its base; from the other level on down most of it
+ * is, so that neither piece of a level way takes too many legs. */
+#define NB_ALTITUDE_COUNTS 20.0
+#define NB_ALTITUDE_THICK 8.0
+
+float nb_nearer_end(nb_chord chord, float near, float kink)
+{
+    if (chord.enter > near) kink = min(kink, chord.enter);
+    if (chord.leave > near) kink = min(kink, chord.leave);
+    return kink;
+}
+
+/* The next of the places where it begins and ends to count, where it is lowest, and where it gets no thicker. */
+float nb_altitude_kink(nb_profile profile, float near)
+{
+    nb_arc arc = nb_profile_arc(profile);
+    float kink = nb_nearer_end(nb_arc_chord(arc, NB_ALTITUDE_COUNTS * profile.size.x), near, NB_FAR);
+    kink = nb_nearer_end(nb_arc_chord(arc, NB_ALTITUDE_THICK * profile.size.x), near, kink);
+    kink = nb_nearer_end(nb_arc_chord(arc, -profile.size.y), near, kink);
+    if (-arc.rise > near) kink = min(kink, -arc.rise);
+    return kink;
+}
+
+/* The most of it on the way to the next kink; over a level way it is a bell curve. Pieces begin where the shell does in which fog
+ * counts, but for what float loses of that place. */
+float nb_altitude_rate(nb_profile profile)
+{
+    nb_arc arc = nb_profile_arc(profile);
+    nb_chord counts = nb_arc_chord(arc, NB_ALTITUDE_COUNTS * profile.size.x);
+    if (!(counts.enter <= profile.size.x && counts.leave > 0.0)) return 0.0;
+    float lowest = max(arc.radius + nb_arc_climb(arc, -arc.rise), profile.size.x);
+    float end = arc.rise + nb_altitude_kink(profile, profile.size.x);
+    float slope = max(abs(arc.rise), abs(end)) / lowest;
+    return (min(slope, 1.0) + sqrt(profile.size.x / lowest)) / profile.size.x;
+}
+
 /* How fast the logarithm of the density changes along the ray [1/m], for the profiles that are no polynomials, as fast as a step of
  * the rule above can bear: it takes 3 of an exponential, 1.2 units of a bell curve. */
 float nb_profile_rate(nb_profile profile)
@@ -111,6 +147,8 @@ float nb_profile_rate(nb_profile profile)
         rate = slope;
     else if (NB_HAS(NB_HAS_GAUSSIAN) && profile.kind == NB_KIND_GAUSSIAN)
         rate = 2.5 * slope;
+    else if (NB_HAS(NB_HAS_ALTITUDE) && profile.kind == NB_KIND_ALTITUDE)
+        rate = nb_altitude_rate(profile);
     else if (NB_HAS(NB_HAS_RADIAL) && profile.kind >= NB_KIND_RADIAL)
         rate = slope;
     return rate;
@@ -127,6 +165,7 @@ float nb_profile_kink(nb_profile profile, float near)
     if (NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES) kink = nb_planes_kink(profile, near);
     if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID)
         kink = nb_grid_kink(profile.offset, profile.slope, profile.first, near);
+    if (NB_HAS(NB_HAS_ALTITUDE) && profile.kind == NB_KIND_ALTITUDE) kink = nb_altitude_kink(profile, near);
     if (NB_HAS(NB_HAS_SLOPE) && (profile.kind == NB_KIND_LINEAR || profile.kind == NB_KIND_HEIGHT_CAPPED)) {
         float inverse = nb_rcp_bounded(profile.slope.x);
         float zero = -profile.offset.x * inverse;
@@ -325,7 +364,8 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
     nb_vec3 light = nb_light_per_metre(at, nb_slot_radiance(k, at));
     nb_vec3 glow = nb_splat3(0.0);
     if (nb_is_sunlit(leg)) glow = nb_sunlit_radiance(at, ray.direction) * extinction.xyz;
-    nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start);
+    bool curved = NB_HAS(NB_HAS_ALTITUDE) && int(extinction.w) == NB_KIND_ALTITUDE;
+    nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start + (curved ? leg.from : 0.0));
     profile.offset += profile.slope * leg.from;
     if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID) {
         nb_add_grid(leg, profile, extinction.xyz, light, glow, 0.5 * (piece.end - piece.start) - leg.from);

@@ -16,12 +16,15 @@
  *     2  radiance of opaque fog, leaves; where an environment lights it, albedo instead, and word 1 has emission alone
  *     3  the density's coordinate: gradient and value at the eye; gaussian: the way from its centre to the eye,
  *        1 / (sqrt(2) sigma); soft edge of a box: three unused, 1 / distance; of a round body: gain, steepness and
- *        inner of nb_edge, one unused; of planes: unused; grid: cells per unit of the box along each axis, first texel
+ *        inner of nb_edge, one unused; of planes: unused; grid: cells per unit of the box along each axis, first texel;
+ *        altitude: the way from its centre to the eye, the word of its other numbers: scale height, how far under the
+ *        base the density is the same everywhere, what it is there, the eye's height above the base
  *     4  its only leaf; of a body of several: bounds low, first leaf's word; bounds high
  *        The last number of words 5 and 6 is where along a ray it starts to act and where it ends, 1e18 where it does
  *        not [m]; that of word 7 its first scattering word, 0 where it scatters no light of sun or lamps; that of word 8
  *        what part of the light it scatters diffusion takes to go straight on; that of word 9 the first environment word of
  *        its phase function's filter, 0 where no environment lights it.
+ *
  *
  * A leaf, NB_LEAF_WORDS words:
  *     0  leaf type (plus NB_LEAF_TURNED), a, b, folds
@@ -133,6 +136,7 @@
 #define NB_KIND_GRID 8
 #define NB_KIND_RADIAL 9 /* plus power - 1, 0 to 2 */
 #define NB_KIND_EXCLUDE 12
+#define NB_KIND_ALTITUDE 13
 
 #define NB_SUN_STEPS 0  /* in steps */
 #define NB_SUN_FLAT 1   /* in closed form: flat faces, constant densities */
@@ -195,8 +199,9 @@
 #define NB_HAS_LAMPS 2097152       /* as the sun does */
 #define NB_HAS_DIFFUSION 4194304   /* light scattered more than once */
 #define NB_HAS_ENVIRONMENT 8388608 /* which lights fog */
-#define NB_HAS_ALL 16777215
+#define NB_HAS_ALTITUDE 16777216
+#define NB_HAS_ALL 33554431
 #define NB_HAS_SOFT (NB_HAS_SOFT_EDGE | NB_HAS_SOFT_ROUND | NB_HAS_SOFT_PLANES)
-#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL | NB_HAS_GRID)
+#define NB_HAS_PROFILE (NB_HAS_SLOPE | NB_HAS_GAUSSIAN | NB_HAS_SOFT | NB_HAS_RADIAL | NB_HAS_GRID | NB_HAS_ALTITUDE)
 
 #endif

@@ -277,6 +277,32 @@ nb_profile nb_leaf_profile(nb_profile profile, int leaf, float width, nb_ray ray
     return profile;
 }
 
+/* The ray over a ball, from its start on: height, radius and rise of nb_arc are the offset; the scale height, how deep and
+ * how thick it gets are the size. Heights are that of the eye and what the way from there climbs. */
+nb_profile nb_altitude_profile(nb_profile profile, nb_vec4 word, nb_ray ray, float start)
+{
+    nb_vec3 place = ray.origin + ray.direction * start;
+    nb_vec4 more = NEBEL_WORD(int(word.w));
+    nb_arc way;
+    way.height = more.w;
+    way.radius = sqrt(dot(word.xyz, word.xyz));
+    float far = sqrt(dot(place, place));
+    way.rise = dot(place, word.xyz) / max(far, NB_TINY);
+    float climb = nb_arc_climb(way, far);
+    profile.offset = nb_vec3(more.w + climb, way.radius + climb, dot(word.xyz + place, ray.direction));
+    profile.size = more.xyz;
+    return profile;
+}
+
+nb_arc nb_profile_arc(nb_profile profile)
+{
+    nb_arc arc;
+    arc.height = profile.offset.x;
+    arc.radius = profile.offset.y;
+    arc.rise = profile.offset.z;
+    return arc;
+}
+
 /* Nothing behind so much optical depth adds a bit to a picture. */
 #define NB_ENOUGH 20.0
 
@@ -297,6 +323,8 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
         if (NB_HAS(NB_HAS_SLOPE) && kind <= NB_KIND_LINEAR) {
             profile.slope.x = dot(word.xyz, ray.direction);
             profile.offset.x = word.w + dot(word.xyz, ray.origin) + profile.slope.x * start;
+        } else if (NB_HAS(NB_HAS_ALTITUDE) && kind == NB_KIND_ALTITUDE) {
+            profile = nb_altitude_profile(profile, word, ray, start);
         } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
             profile = nb_round_profile(profile, word.xyz + ray.origin, ray.direction, word.w, start);
         } else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND) {
@@ -387,6 +415,8 @@ float nb_density(nb_profile profile, float s)
             density = nb_round_edge_density(profile.side, profile.offset + profile.slope * s, profile.size.x, profile.form);
         else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES)
             density = nb_planes_density(profile, s);
+        else if (NB_HAS(NB_HAS_ALTITUDE) && kind == NB_KIND_ALTITUDE)
+            density = min(nb_height_density(nb_arc_height(nb_profile_arc(profile), s) / profile.size.x), profile.size.z);
         else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE)
             density = nb_radial_density(profile.level, u, kind - NB_KIND_RADIAL + 1);
     }
@@ -424,6 +454,10 @@ float nb_integral(nb_profile profile, float h)
             integral = nb_planes_integral(profile, h);
         } else if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID) {
             integral = nb_grid_integral(profile.offset, profile.slope, profile.first, h, profile.level);
+        } else if (NB_HAS(NB_HAS_ALTITUDE) && kind == NB_KIND_ALTITUDE) {
+            nb_arc arc = nb_profile_arc(profile);
+            nb_chord deep = nb_arc_chord(arc, -profile.size.y);
+            integral = nb_altitude_integral(arc, profile.size.x, deep, profile.size.z, 0.0, h).value;
         } else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE) {
             integral = nb_radial_integral(profile.level, u, slope, h, kind - NB_KIND_RADIAL + 1).value;
         }

@@ -191,6 +191,8 @@ static int kind_of(const nb_volume *body)
                                                         : NB_KIND_SOFT_ROUND;
     case NEBEL_DENSITY_GRID:
         return NB_KIND_GRID;
+    case NEBEL_DENSITY_ALTITUDE:
+        return NB_KIND_ALTITUDE;
     case NEBEL_DENSITY_RADIAL:
         return NB_KIND_RADIAL + body->density.power - 1;
     default:
@@ -218,7 +220,24 @@ static void pack_grid(const nb_volume *body, nebel_word *word)
     for (int i = 0; i < 3; i++) word->v[i] = narrow((long double)rate[i]);
 }
 
-static void pack_density(const packer *p, const nb_volume *body, nebel_word *word)
+/* The height in all its digits: the shader's have none left of a planet's radius. */
+static void pack_altitude(packer *p, const nebel_density *density, nebel_word *word)
+{
+    const long double scale = (long double)density->scale_height;
+    long double way[3], square = 0;
+    for (int i = 0; i < 3; i++) {
+        way[i] = p->eye[i] - (long double)density->center[i];
+        square += way[i] * way[i];
+        word->v[i] = narrow(way[i]);
+    }
+    const int grows = density->below == NEBEL_BELOW_GROW;
+    const long double height = sqrtl(square) - (long double)density->radius - (long double)density->base;
+    word->v[3] = (float)p->used;
+    p->words[p->used++] = (nebel_word){
+        {narrow(scale), grows ? narrow(scale * (long double)NB_GROWTH_DEPTH) : 0, grows ? 1e18f : 1, narrow(height)}};
+}
+
+static void pack_density(packer *p, const nb_volume *body, nebel_word *word)
 {
     const nebel_density *density = &body->density;
     const long double height = density->type == NEBEL_DENSITY_HEIGHT ? (long double)density->scale_height : 1;
@@ -243,6 +262,9 @@ static void pack_density(const packer *p, const nb_volume *body, nebel_word *wor
         break;
     case NEBEL_DENSITY_GRID:
         pack_grid(body, word);
+        break;
+    case NEBEL_DENSITY_ALTITUDE:
+        pack_altitude(p, density, word);
         break;
     default:
         break;
@@ -338,19 +360,10 @@ static size_t count_words(const nebel_snapshot *snapshot)
         const nb_volume *body = &snapshot->media[i].body;
         count += body->face_count + (body->leaf_count > 1 ? body->leaf_count * NB_LEAF_WORDS : 0);
         count += scatters(snapshot, &snapshot->media[i]) ? NB_SCATTERING_WORDS : 0;
+        count += body->density.type == NEBEL_DENSITY_ALTITUDE;
     }
     if (snapshot->is_lamplit) count += snapshot->lamp_count * NB_LAMP_WORDS;
     return count + nb_count_lattice_words(snapshot);
-}
-
-static nebel_result check_densities(const nebel_snapshot *snapshot)
-{
-    for (size_t i = 0; i < snapshot->medium_count; i++)
-        if (snapshot->media[i].body.density.type == NEBEL_DENSITY_ALTITUDE)
-            return nb_fail(&snapshot->log, NEBEL_ERROR_UNSUPPORTED,
-                           "pack: shaders do not know fog above a ball yet; give the volume another density, or use "
-                           "nebel_trace");
-    return NEBEL_OK;
 }
 
 nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3], nebel_word *words, size_t capacity,
@@ -363,8 +376,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         if (!(fabs(eye[i]) <= 1e15))
             return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT,
                            "pack: the eye must be finite and at most 1e15 m away");
-    nebel_result result = check_densities(snapshot);
-    if (result == NEBEL_OK) result = nb_check_voxels(snapshot);
+    nebel_result result = nb_check_voxels(snapshot);
     if (result == NEBEL_OK) result = nb_check_lattices(snapshot);
     if (result == NEBEL_OK) result = nb_check_environment(snapshot);
     if (result != NEBEL_OK) return result;
@@ -426,6 +438,7 @@ static uint32_t features_of_kind(int kind)
     if (kind == NB_KIND_SOFT_ROUND) return NB_HAS_SOFT_ROUND;
     if (kind == NB_KIND_SOFT_PLANES) return NB_HAS_SOFT_PLANES;
     if (kind == NB_KIND_GRID) return NB_HAS_GRID;
+    if (kind == NB_KIND_ALTITUDE) return NB_HAS_ALTITUDE;
     return kind == NB_KIND_EXCLUDE ? 0 : NB_HAS_RADIAL;
 }
 
