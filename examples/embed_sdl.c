@@ -39,7 +39,7 @@ static nebel_result upload_fog(const nebel_snapshot *snapshot, const double eye[
 /* The text leaves out what this fog does not have: without NEBEL_FEATURES drivers compile all that fog can be. */
 static engine open_engine(const nebel_snapshot *snapshot)
 {
-    char head[80];
+    char head[128];
     const char *const texts[] = {head, nebel_shader_text(NEBEL_DIALECT_GLSL_330),
                                  "flat in vec3 color;\n"
                                  "in vec3 place;\n"
@@ -49,7 +49,8 @@ static engine open_engine(const nebel_snapshot *snapshot)
                                  "    nebel_light fog = nebel_trace(vec3(0.0), normalize(place), length(place));\n"
                                  "    pixel = vec4(fog.transmittance * color + fog.in_scattering, 1.0);\n"
                                  "}\n"};
-    snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_FEATURES %u\n", nebel_pack_features(snapshot));
+    snprintf(head, sizeof head, "#version 330 core\n#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
+             nebel_pack_features(snapshot));
     host_say_compiling("embed_sdl");
     return engine_open(3, texts);
 }

@@ -58,10 +58,10 @@ try_opengl() {
     verdict "$1 $3" glslangValidator "$work/fog.frag"
 }
 
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
     try_opengl glsl_330 "330 core" "$defines"
 done
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
+for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2097154\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 4194306\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do
     try_opengl glsl_300_es "300 es" "$defines"
 done
 
@@ -130,7 +130,7 @@ HLSL
     verdict "hlsl $1" glslangValidator -D -S frag -e main -V "$work/fog.hlsl" -o "$work/fog.spv"
 }
 
-for defines in "" "#define NEBEL_FEATURES 2u\n"; do
+for defines in "" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n"; do
     try_vulkan "$defines"
     try_hlsl "$defines"
 done

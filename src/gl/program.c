@@ -178,20 +178,21 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
                                : kind->air                 ? "/ 32" /* PASS_KNOTS */
                                : kind->step && !is_counted ? "* 2"
                                                            : "";
-    (void)snprintf(
-        text, size,
-        "%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define NEBEL_FEATURES %u\n"
-        "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
-        "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
-        nb_program_version(context), kind->step ? "" : nb_program_extension(context, kind->output),
-        nb_program_limits(context, shares, limits, sizeof limits), kind->in_texture ? "#define NEBEL_TEXTURE\n" : "",
-        kind->tiled ? "#define NEBEL_TILES\n" : "",
-        (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
-        (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
-        (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
-        nb_air_head(kind->air, air), kind->multisampled ? samples : "",
-        kind->step ? step : nb_program_output(kind->output), kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "",
-        (int)kind->depth, (unsigned)kind->features, kind->panorama ? "#define PASS_PANORAMA\n" : "");
+    (void)snprintf(text, size,
+                   "%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define "
+                   "NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n"
+                   "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
+                   "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
+                   nb_program_version(context), kind->step ? "" : nb_program_extension(context, kind->output),
+                   nb_program_limits(context, shares, limits, sizeof limits),
+                   kind->in_texture ? "#define NEBEL_TEXTURE\n" : "", kind->tiled ? "#define NEBEL_TILES\n" : "",
+                   (kind->features & NEBEL_FEATURE_GRID) != 0 ? "#define NEBEL_VOXELS\n" : "",
+                   (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
+                   (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
+                   nb_air_head(kind->air, air), kind->multisampled ? samples : "",
+                   kind->step ? step : nb_program_output(kind->output),
+                   kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
+                   kind->panorama ? "#define PASS_PANORAMA\n" : "");
 }
 
 /* A message is one line. */

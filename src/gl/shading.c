@@ -674,7 +674,7 @@ static void write_head(const nb_context *context, const nb_light_kind *kind, cha
         text, size,
         "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define SCENE_PARTICLES %d\n#define SCENE_VEIL_LAYERS %d\n#define "
         "NB_CASCADES "
-        "%d\n#define NEBEL_FEATURES %u\n%s",
+        "%d\n#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n%s",
         nb_program_version(context), nb_program_limits(context, "", limits, sizeof limits),
         kind->has_fog ? "#define SCENE_FOG\n" : "", kind->has_surfaces ? "#define SCENE_SURFACES\n" : "",
         kind->in_fog ? "#define SCENE_IN_FOG\n" : "", kind->dimmed ? "#define SCENE_DIMMED\n" : "",
@@ -727,7 +727,7 @@ static nb_texts light_vertex(const nb_context *context, const nb_light_kind *kin
 static nebel_result make_light(const nb_context *context, const nebel_log *log, const nb_light_kind *kind,
                                unsigned *name)
 {
-    char head[1024];
+    char head[1280];
     write_head(context, kind, head, sizeof head);
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;

@@ -4,6 +4,8 @@
 #define NEBEL_NODE(i) nb_vec4(0.0, 0.0, 0.0, 0.0)
 #endif
 
+#ifndef NB_DECLARES_NO_DIFFUSION
+
 /* Pieces that leave less than this are halved, so often at most: fog may begin anywhere in them. Where they leave more than that they
  * grow again. */
 #define NB_THICK_PIECE 0.5
@@ -327,3 +329,9 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
     }
     return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz - dimmed * NEBEL_WORD(l.word + 9).xyz;
 }
+
+#else
+
+nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media) { return nb_splat3(0.0); }
+
+#endif

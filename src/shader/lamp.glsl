@@ -11,6 +11,26 @@
 #define NEBEL_LAMP_LIT(lamp, origin, direction, t, end) nb_vec2(1.0, end)
 #endif
 
+/* How far along a ray light of lamps has been found. */
+struct nb_lamplit {
+    float reached;
+    float most; /* metres that a piece may take; 0: any number */
+    nb_vec3 before; /* depth up to there */
+    nb_vec3 light;
+};
+
+nb_lamplit nb_open_lamplit()
+{
+    nb_lamplit l;
+    l.reached = 0.0;
+    l.most = 0.0;
+    l.before = nb_splat3(0.0);
+    l.light = nb_splat3(0.0);
+    return l;
+}
+
+#ifndef NB_DECLARES_NO_LAMPS
+
 /* A lamp that is passed by a ray. */
 struct nb_lamp_pass {
     int number;
@@ -379,24 +399,6 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
 /* What lamps that are left out may give, of that. */
 #define NB_FAINT_SHARE 0.05
 
-/* How far along a ray light of lamps has been found. */
-struct nb_lamplit {
-    float reached;
-    float most; /* metres that a piece may take; 0: any number */
-    nb_vec3 before; /* depth up to there */
-    nb_vec3 light;
-};
-
-nb_lamplit nb_open_lamplit()
-{
-    nb_lamplit l;
-    l.reached = 0.0;
-    l.most = 0.0;
-    l.before = nb_splat3(0.0);
-    l.light = nb_splat3(0.0);
-    return l;
-}
-
 /* Adds a piece. */
 void nb_light_piece(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns)
 {
@@ -456,3 +458,9 @@ void nb_lamplight(inout nb_lamplit l, nb_ray ray, int first, int count, bool lis
     if (NB_RESUMES) l = nb_kept_lamplit(count);
     turns += nb_grid_turns;
 }
+
+#else
+
+void nb_lamplight(inout nb_lamplit l, nb_ray ray, int first, int count, bool listed, inout int turns) {}
+
+#endif

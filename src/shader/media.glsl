@@ -3,6 +3,15 @@
 #ifndef NEBEL_FEATURES
 #define NEBEL_FEATURES NB_HAS_ALL
 #endif
+/* Compilers take long for functions that are left out later, too; but not every preprocessor can reckon with 123u. */
+#ifdef NEBEL_PLAIN_FEATURES
+#if (NEBEL_FEATURES & NB_HAS_LAMPS) == 0
+#define NB_DECLARES_NO_LAMPS
+#endif
+#if (NEBEL_FEATURES & NB_HAS_DIFFUSION) == 0
+#define NB_DECLARES_NO_DIFFUSION
+#endif
+#endif
 #ifndef NEBEL_MOST_LIGHT
 #define NEBEL_MOST_LIGHT 65504.0
 #endif
