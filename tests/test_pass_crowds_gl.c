@@ -95,6 +95,43 @@ static void test_balls_in_sunlight(void **state)
     }
 }
 
+/* A slope of height fog in other such fog, both without end. */
+static void add_slopes(crowd *c)
+{
+    for (int i = 0; i < 2; i++) {
+        nebel_volume_desc *const v = &c->volumes[c->count++];
+        *v = (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_WORLD}, .extinction = {.02, .02, .03}};
+        v->density =
+            (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .base = pass_eye[1] - 2 * i, .scale_height = 4 + 3 * i};
+        v->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .7};
+        for (int k = 0; k < 3; k++) v->source[k] = .8 - .3 * i;
+    }
+}
+
+/* Few, but of profiles over which light is walked in many legs, and of two leaves. */
+static void test_few_uneven_in_sunlight(void **state)
+{
+    (void)state;
+    static crowd c;
+    static nebel_shape parts[2];
+    c = (crowd){.count = 0};
+    add_slopes(&c);
+    crowd_add_balls(&c, 5, 4);
+    for (size_t i = 2; i < c.count; i++) {
+        nebel_volume_desc *const v = &c.volumes[i];
+        const double *const middle = v->shape.center;
+        v->density = (nebel_density){
+            .type = NEBEL_DENSITY_GAUSSIAN, .center = {middle[0], middle[1], middle[2]}, .sigma = 1 + .2 * (double)i};
+    }
+    crowd_add_hole(&c, NEBEL_OPERATION_EXCLUDE);
+    nebel_shape *const hole = &c.volumes[c.count - 1].shape;
+    parts[0] = parts[1] = *hole;
+    parts[1].center[0] += 1;
+    *hole = (nebel_shape){.type = NEBEL_SHAPE_UNION, .parts = parts, .part_count = 2};
+    crowd_set_sun(&c);
+    check(&c, "uneven volumes in sunlight, two leaves exclude", NB_GL_330, 1);
+}
+
 static void test_even_boxes(void **state)
 {
     (void)state;
@@ -120,9 +157,8 @@ static void test_balls_among_lamps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_balls_with_a_hole),
-        cmocka_unit_test(test_balls_in_sunlight),
-        cmocka_unit_test(test_even_boxes),
+        cmocka_unit_test(test_balls_with_a_hole),      cmocka_unit_test(test_balls_in_sunlight),
+        cmocka_unit_test(test_few_uneven_in_sunlight), cmocka_unit_test(test_even_boxes),
         cmocka_unit_test(test_balls_among_lamps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -237,6 +237,9 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot);
 /* The feature of fog of which volumes exclude or replace others. */
 #define NEBEL_FEATURE_COVER 256u
 
+/* The feature of fog that has bodies of several leaves: unions and the like, and intersections. */
+#define NEBEL_FEATURE_GROUP 128u
+
 /* The feature of fog that the sun lights. */
 #define NEBEL_FEATURE_SUN 524288u
 

@@ -22,7 +22,8 @@ struct nebel_gl {
 
     int dims_alone;            /* the fog is asked for transmittance alone: nothing of it is mixed */
     int has_warned;            /* of the turns of loops */
-    int is_crowded;            /* rays may take more of them than this driver has */
+    int may_tire;              /* rays may take more of them than this driver has */
+    int is_crowded;            /* some will */
     int has_fog;               /* what follows is of the last nebel_gl_set_fog, and that went well */
     nebel_snapshot *packed;    /* what words and tiles are made of, as `view` sees it; NULL: of nothing */
     nebel_snapshot *voxels_of; /* what the texture of voxels is made of; NULL: of nothing */

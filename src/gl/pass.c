@@ -298,7 +298,7 @@ static nebel_result draw(const task *t, GLuint target_framebuffer)
 /* Samples of a pixel, and pieces of air, share its turns. */
 static int is_in_steps(const task *t)
 {
-    return t->gl->is_crowded && t->pass->samples <= 1 && t->picture->air == NULL;
+    return t->gl->may_tire && t->pass->samples <= 1 && t->picture->air == NULL;
 }
 
 void nb_gl_warn_of_turns(nebel_gl *gl, const char *why)

@@ -124,6 +124,17 @@ static double most_turns_of(const nebel_gl *gl, double listed, double all, doubl
     return walk + sunlight + lamplight;
 }
 
+/* How many legs a ray in light is cut into is known to the ray alone: uneven profiles make ten of one. The same holds
+ * for the cuts of bodies of several leaves. */
+static int may_tire(const nebel_gl *gl)
+{
+    const uint32_t features = gl->fog.features;
+    const int is_walked = (features & (NEBEL_FEATURE_MIXED | NEBEL_FEATURE_COVER)) != 0;
+    const int is_lit = (features & (NEBEL_FEATURE_SUN | NEBEL_FEATURE_LAMPS)) != 0;
+    return gl->context.most_turns > 0 && !gl->dims_alone &&
+           (is_lit || (is_walked && (features & NEBEL_FEATURE_GROUP) != 0));
+}
+
 /* How many cells of voxels a ray passes is not known. */
 static int find_crowd(const nebel_gl *gl, const nebel_snapshot *snapshot)
 {
@@ -335,6 +346,7 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     if (result == NEBEL_OK) result = upload(gl, has_words ? NULL : snapshot, entry_count);
     keep(&gl->packed, result == NEBEL_OK ? snapshot : NULL);
     gl->is_crowded = result == NEBEL_OK && find_crowd(gl, snapshot);
+    gl->may_tire = gl->is_crowded || (result == NEBEL_OK && may_tire(gl));
     gl->has_fog = result == NEBEL_OK;
     return result;
 }

@@ -54,7 +54,7 @@ static void set_color(nebel_word *word, const double v[3], double last)
 _Static_assert(NEBEL_FEATURE_MIXED == NB_HAS_MIXED && NEBEL_FEATURE_GRID == NB_HAS_GRID &&
                    NEBEL_FEATURE_LAMPS == NB_HAS_LAMPS && NEBEL_FEATURE_DIFFUSION == NB_HAS_DIFFUSION &&
                    NEBEL_FEATURE_ENVIRONMENT == NB_HAS_ENVIRONMENT && NEBEL_FEATURE_COVER == NB_HAS_COVER &&
-                   NEBEL_FEATURE_SUN == NB_HAS_SUN,
+                   NEBEL_FEATURE_GROUP == NB_HAS_GROUP && NEBEL_FEATURE_SUN == NB_HAS_SUN,
                "the public names of features");
 
 /* ---- leaves ---------------------------------------------------------------------------------- */
