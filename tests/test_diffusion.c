@@ -412,13 +412,8 @@ static void test_transmittance_stays_and_light_is_added(void **unused)
     nebel_release_snapshot(all);
 }
 
-static void test_same_bits_for_every_isa_and_split(void **unused)
+static void assert_same_bits(const nebel_snapshot *snapshot)
 {
-    (void)unused;
-    nebel_volume_desc volume = ball(&white, 3);
-    volume.extinction[1] = 2;
-    volume.albedo[2] = .9;
-    nebel_snapshot *snapshot = commit(&white, &volume, &by_default);
     nebel_light first[RAYS], other[RAYS];
     nebel_ray rays[RAYS];
     set_rays(rays);
@@ -437,7 +432,107 @@ static void test_same_bits_for_every_isa_and_split(void **unused)
     }
     trace(snapshot, &(nebel_trace_desc){0}, other);
     for (int i = 0; i < RAYS; i++) assert_true(fog_difference(&first[i], &other[i]) < 1e-3);
+}
+
+static void test_same_bits_for_every_isa_and_split(void **unused)
+{
+    (void)unused;
+    nebel_volume_desc volume = ball(&white, 3);
+    volume.extinction[1] = 2;
+    volume.albedo[2] = .9;
+    nebel_snapshot *snapshot = commit(&white, &volume, &by_default);
+    assert_same_bits(snapshot);
     nebel_release_snapshot(snapshot);
+}
+
+/* ---- own light ------------------------------------------------------------------------------- */
+
+/* A ball of fog that scatters all light, in the dark, with a lamp or a fire in its middle. */
+static nebel_snapshot *commit_glowing(double g, const nebel_lamp *lamp, const nebel_volume_desc *fire)
+{
+    nebel_fog *fog = NULL;
+    nebel_snapshot *snapshot = NULL;
+    nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = 1},
+                                .extinction = {5, 5, 5},
+                                .albedo = {1, 1, 1},
+                                .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = g}};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    if (fire != NULL) assert_int_equal(nebel_add_volume(fog, fire, NULL), NEBEL_OK);
+    if (lamp != NULL) assert_int_equal(nebel_set_lamps(fog, 1, lamp), NEBEL_OK);
+    assert_int_equal(nebel_set_diffusion(fog, &by_default), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* What goes out along z, W/sr: radiance over the ball's area. Straight light of a lamp is no fog's. */
+static void find_intensity(const nebel_snapshot *snapshot, double intensity[3])
+{
+    enum { SIDE = 40 };
+    for (int c = 0; c < 3; c++) intensity[c] = 0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const double x = 2. * (i % SIDE + .5) / SIDE - 1, y = 2. * (i / SIDE + .5) / SIDE - 1;
+        const nebel_ray ray = {{x, y, 3}, {0, 0, -1}, 6};
+        nebel_light seen;
+        assert_int_equal(nebel_trace(snapshot, NULL, 1, &ray, sizeof ray, &seen, sizeof seen), NEBEL_OK);
+        for (int c = 0; c < 3; c++) intensity[c] += seen.in_scattering[c] * 4 / (SIDE * SIDE);
+    }
+}
+
+static const nebel_lamp green = {.intensity = {0, 2, 1}, .radius = .004};
+static const nebel_volume_desc fire = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = .3}, .emission = {3, 1, 0}};
+
+/* White fog sends out all that begins in it; as it is around its middle, the same to everywhere. */
+static void test_white_fog_keeps_own_light(void **unused)
+{
+    (void)unused;
+    for (int k = 0; k < 4; k++) {
+        const double g = k % 2 ? .85 : 0, volume = 4 * 3.14159265358979323846 / 3 * .027;
+        nebel_snapshot *snapshot = commit_glowing(g, k < 2 ? &green : NULL, k < 2 ? NULL : &fire);
+        const double straight = k < 2 ? exp(-5) : 0;
+        double intensity[3];
+        find_intensity(snapshot, intensity);
+        for (int c = 0; c < 3; c++) {
+            const double all = k < 2 ? green.intensity[c] * (1 - straight) : fire.emission[c] * volume;
+            assert_true(fabs(intensity[c] - all) <= .06 * all);
+        }
+        nebel_release_snapshot(snapshot);
+    }
+}
+
+static void test_own_light_of_several_colours_adds(void **unused)
+{
+    (void)unused;
+    nebel_snapshot *both = commit_glowing(.85, &green, &fire), *one = commit_glowing(.85, &green, NULL),
+                   *other = commit_glowing(.85, NULL, &fire);
+    double sum[3], first[3], second[3];
+    find_intensity(both, sum);
+    find_intensity(one, first);
+    find_intensity(other, second);
+    for (int c = 0; c < 3; c++) assert_true(fabs(sum[c] - first[c] - second[c]) < .03 * sum[c]);
+    assert_same_bits(both);
+    nebel_release_snapshot(both);
+    nebel_release_snapshot(one);
+    nebel_release_snapshot(other);
+}
+
+/* Fog between the eye and the lattice dims what comes from there: a wall of soot. */
+static void test_fog_before_the_lattice_dims(void **unused)
+{
+    (void)unused;
+    static const nebel_volume_desc soot = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-2, -2, 2}, .max = {2, 2, 2.5}},
+                                           .extinction = {2, 2, 2}};
+    for (int k = 0; k < 2; k++) {
+        nebel_snapshot *clear = commit_glowing(k ? .85 : 0, &green, NULL),
+                       *dimmed = commit_glowing(k ? .85 : 0, &green, &soot);
+        double before[3], behind[3];
+        find_intensity(clear, before);
+        find_intensity(dimmed, behind);
+        assert_true(fabs(behind[1] / before[1] / exp(-1) - 1) < 1e-3);
+        nebel_release_snapshot(clear);
+        nebel_release_snapshot(dimmed);
+    }
 }
 
 /* A finer lattice is no other light. */
@@ -559,6 +654,8 @@ static void test_random_fog(void **unused)
             assert_int_equal(nebel_add_volume(made, &fog.volumes[i], NULL), NEBEL_OK);
         const nebel_diffusion_desc few = {.cells = 1000, .has_ground = seed % 3 == 0, .ground_albedo = {.5, .5, 1}};
         assert_int_equal(nebel_set_diffusion(made, &few), NEBEL_OK);
+        const nebel_lamp lamp = {.position = {.1, .2, .3}, .intensity = {3, 2, 1}, .radius = (double)(seed % 3)};
+        if (seed % 2 == 0) assert_int_equal(nebel_set_lamps(made, 1, &lamp), NEBEL_OK);
         const nebel_result result = nebel_commit_fog(made, &snapshot);
         assert_true(result == NEBEL_OK || result == NEBEL_ERROR_UNSUPPORTED);
         for (uint64_t i = 0; i < 20 && result == NEBEL_OK; i++) {
@@ -600,6 +697,35 @@ static void test_far_away(void **unused)
     }
 }
 
+/* Lamps at the limits of places, of light and of size. */
+static void test_lamps_far_away(void **unused)
+{
+    (void)unused;
+    static const nebel_lamp far[] = {
+        {.position = {NEBEL_MAX_LENGTH, -NEBEL_MAX_LENGTH, 0}, .intensity = {1e9, 1e9, 0}, .radius = 1e6},
+        {.position = {0, 1, 0}, .intensity = {1e9, 0, 0}},
+        {.type = NEBEL_LAMP_SPOT,
+         .position = {3, NEBEL_MAX_LENGTH, 3},
+         .intensity = {1, 1, 1},
+         .direction = {0, -1, 0},
+         .outer_angle = 1e-6}};
+    nebel_volume_desc volumes[] = {volume_of(&white, 1e-15), volume_of(&white, .5), ball(&white, 3)};
+    volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 2};
+    for (size_t i = 0; i < 3 * sizeof volumes / sizeof *volumes; i++) {
+        nebel_fog *fog = start(&white, &volumes[i / 3], &(nebel_diffusion_desc){.cells = 1000, .has_ground = i < 3});
+        nebel_snapshot *snapshot = NULL;
+        nebel_light lights[RAYS];
+        assert_int_equal(nebel_set_lamps(fog, i % 3 + 1, far), NEBEL_OK);
+        assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+        trace(snapshot, &(nebel_trace_desc){0}, lights);
+        for (int k = 0; k < RAYS; k++)
+            for (int c = 0; c < 3; c++)
+                assert_true(lights[k].in_scattering[c] >= 0 && isfinite(lights[k].in_scattering[c]));
+        nebel_release_snapshot(snapshot);
+        nebel_destroy_fog(fog);
+    }
+}
+
 static void test_memory_runs_out(void **unused)
 {
     (void)unused;
@@ -611,6 +737,7 @@ static void test_memory_runs_out(void **unused)
                                  .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}};
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_set_lamps(fog, 1, &green), NEBEL_OK);
     assert_int_equal(nebel_set_diffusion(fog, &(nebel_diffusion_desc){.cells = 512}), NEBEL_OK);
     const size_t live = memory.live;
     size_t tries = 0;
@@ -647,6 +774,10 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(test_endless_depth_in_even_light),
                                        cmocka_unit_test(test_transmittance_stays_and_light_is_added),
                                        cmocka_unit_test(test_same_bits_for_every_isa_and_split),
+                                       cmocka_unit_test(test_white_fog_keeps_own_light),
+                                       cmocka_unit_test(test_own_light_of_several_colours_adds),
+                                       cmocka_unit_test(test_fog_before_the_lattice_dims),
+                                       cmocka_unit_test(test_lamps_far_away),
                                        cmocka_unit_test(test_cells_do_not_matter_much),
                                        cmocka_unit_test(test_bodies_in_height_fog),
                                        cmocka_unit_test(test_bad_descriptions),

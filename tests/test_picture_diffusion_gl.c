@@ -53,6 +53,7 @@ typedef struct trial {
     nebel_projection projection;
     double far;      /* where all is, along x [m] */
     int is_overcast; /* a coloured gradient in place of sun and even light */
+    int is_night;    /* two lamps in place of both */
 } trial;
 
 static const trial trials[] = {
@@ -112,7 +113,32 @@ static const trial trials[] = {
                   .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
      .diffusion = {.cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.1, .3, .1}},
      .is_overcast = 1},
+    {.name = "lamps in coloured droplets",
+     .count = 1,
+     .volumes = {{.shape = BALL,
+                  .extinction = {1, 1.2, 1.5},
+                  .albedo = {1, 1, .9},
+                  .phase = {.type = NEBEL_PHASE_DROPLETS, .diameter = 16}}},
+     .diffusion = {.cells = 2048},
+     .is_night = 1},
+    {.name = "lamps and fire in height fog",
+     .count = 2,
+     .volumes = {{.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {-.5, -1, 0}, .radius = .5}, .emission = {3, 1, .2}},
+                 {.extinction = {.8, .8, .8},
+                  .albedo = {1, 1, 1},
+                  .density = {.type = NEBEL_DENSITY_HEIGHT, .base = -2, .scale_height = 1}}},
+     .diffusion = {.cells = 2048, .has_ground = 1, .ground_height = -2, .ground_albedo = {.5, .5, .5}},
+     .is_night = 1},
 };
+
+static const nebel_lamp lamps[] = {{.position = {.5, .3, .4}, .intensity = {4, 3, 1}, .radius = .1},
+                                   {.type = NEBEL_LAMP_SPOT,
+                                    .position = {-1.5, 1.6, .5},
+                                    .intensity = {2, 3, 4},
+                                    .radius = .1,
+                                    .direction = {1, -1, 0},
+                                    .inner_angle = 20,
+                                    .outer_angle = 40}};
 
 static const nebel_environment overcast = {
     .type = NEBEL_ENVIRONMENT_GRADIENT, .zenith = {.9, 1, 1.2}, .horizon = {.5, .4, .3}, .ground = {.1, .1, 0}};
@@ -124,8 +150,10 @@ static nebel_snapshot *commit(const trial *t)
     const nebel_fog_desc desc = {.ambient = {.1, .1, .12},
                                  .sun = {.direction = {1, .6, .5}, .irradiance = {3, 2.8, 2.5}}};
     nebel_diffusion_desc diffusion = t->diffusion;
-    assert_int_equal(nebel_create_fog(t->is_overcast ? &(nebel_fog_desc){.max_opacity = 0} : &desc, &fog), NEBEL_OK);
+    assert_int_equal(
+        nebel_create_fog(t->is_overcast || t->is_night ? &(nebel_fog_desc){.max_opacity = 0} : &desc, &fog), NEBEL_OK);
     if (t->is_overcast) assert_int_equal(nebel_set_environment(fog, &overcast), NEBEL_OK);
+    if (t->is_night) assert_int_equal(nebel_set_lamps(fog, sizeof lamps / sizeof *lamps, lamps), NEBEL_OK);
     for (size_t i = 0; i < t->count; i++) {
         nebel_volume_desc volume = t->volumes[i];
         volume.shape.center[0] += t->far;

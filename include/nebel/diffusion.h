@@ -28,13 +28,14 @@ typedef struct nebel_diffusion_desc {
 
 /* Makes snapshots from now on hold what becomes of the sun's light after fog has scattered it once, which queries then
  * add to in-scattering; NULL: no longer. What is scattered once stays as exact as it is. Ambient light, which without it
- * nothing dims, is dimmed by what fog and ground take from it. `error` says nothing of this model's own error. Lamps'
- * light is scattered once, as without it; surfaces and their shadows are not known to it.
+ * nothing dims, is dimmed by what fog and ground take from it. So lamps' light is scattered again, and what fog emits, which
+ * without it nothing scatters. `error` says nothing of this model's own error. Surfaces and their shadows are not known to it.
  *
  * A commit then costs a march to the sun from each node of a lattice around all fog that is lit, and the
  * solution of one linear equation for each cell (for each channel, where fog or the sky has colour; once more where ambient
  * light is dimmed), in all about a second for 65536 cells; the snapshot keeps 36 bytes a node, or 100 where there is
- * colour, and 32 or 96 more where ambient light is dimmed. A query asks for the transmittance of each piece of its ray
+ * colour, and 32 or 96 more where ambient light is dimmed. For lamps and what is emitted there is a second lattice, of 84 or 244
+ * bytes a node, where each lamp costs what the sun costs. A query asks for the transmittance of each piece of its ray
  * from cell to cell. Same bits for every isa and any number of threads.
  *
  * nebel_commit_fog then refuses (UNSUPPORTED) fog with max_opacity, start or cutoff, and lit fog that goes on

@@ -15,13 +15,6 @@
 /* Nodes whose sunlight is asked for at once. */
 enum { BATCH = 256 };
 
-static void node_place(const nb_lattice *l, size_t node, double place[3])
-{
-    const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
-    const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
-    for (int a = 0; a < 3; a++) place[a] = at[a] == l->size[a] ? l->high[a] : l->low[a] + (double)at[a] * l->spacing[a];
-}
-
 /* ---- sunlight at the nodes ------------------------------------------------------------------- */
 
 static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, size_t first, size_t count,
@@ -39,7 +32,7 @@ static nebel_result trace_sun(const nb_diffusion *d, const nebel_snapshot *fog, 
     }
     for (size_t i = 0; i < count; i++) {
         double place[3];
-        node_place(l, first + i, place);
+        nb_lattice_node(l, first + i, place);
         for (int a = 0; a < 3; a++) offset[a][i] = (float)(place[a] - rays.origin[a]);
     }
     return nebel_trace_planes(fog, &(nebel_trace_desc){.ignore_distances = 1}, count, &rays, &lights);
@@ -66,40 +59,23 @@ static nebel_result light_nodes(const nb_diffusion *d, const nebel_snapshot *fog
 
 /* ---- sources at the nodes -------------------------------------------------------------------- */
 
-/* What the cells around a node hold together. */
-static nb_transport around(const nb_lattice *l, const nb_transport *cells, size_t node)
-{
-    const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
-    const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
-    nb_transport sum = {{0}, {0}, {0}, {0}};
-    for (size_t octant = 0; octant < 8; octant++) {
-        size_t cell[3];
-        for (int a = 0; a < 3; a++) {
-            const size_t up = at[a] + (octant >> a & 1u);
-            cell[a] = up == 0 ? 0 : up > l->size[a] ? l->size[a] - 1u : up - 1;
-        }
-        const nb_transport *t = &cells[cell[0] + l->size[0] * (cell[1] + l->size[1] * cell[2])];
-        for (int c = 0; c < 3; c++) {
-            sum.extinction[c] += t->extinction[c];
-            sum.scattering[c] += t->scattering[c];
-            sum.turned[c] += t->turned[c];
-            sum.forward[c] += t->forward[c];
-        }
-    }
-    return sum;
-}
-
 static double share(double part, double whole)
 {
     return whole > 0 ? part / whole : 0;
 }
 
-/* g of what went almost straight on `n` times, where the rest has the mean cosine `turned`: the second moment of what is
- * taken to go straight on is that of this lobe for n = 1. */
-static double width_of(double turned, double n)
+double nb_lobe_width(double turned, double n)
 {
     const double g = turned > 0 ? turned / (1 - turned) : 0;
     return g > 0 && g < 1 ? nb_exp(n / 2 * nb_log(2 * g / (1 + g))) : 0;
+}
+
+/* How often light that went almost straight on did so is a Poisson number that is not 0. */
+double nb_glow_width(double turned, double scaled, double whole)
+{
+    const double mean = whole > 0 ? fmin(nb_log(fmax(scaled / whole, 1)), 50) : 50;
+    const double times = mean > 1e-6 ? mean / nb_one_minus_exp(mean) : 1;
+    return nb_lobe_width(turned, times + 1);
 }
 
 /* Where there is no light the least that is told. */
@@ -115,15 +91,12 @@ static void set_node(const nb_transport *t, int c, const nb_node_sun *sun, const
     const double turned = share(t->turned[c], scaled), cosine = share(t->forward[c], t->turned[c]);
     const double ahead = share(t->scattering[c] - t->turned[c], t->extinction[c]);
     const double straight = fmax(sun->scaled[c] - sun->whole[c], 0);
-    /* How often light that went almost straight on did so: a Poisson number that is not 0. */
-    const double mean = sun->whole[c] > 0 ? fmin(nb_log(fmax(sun->scaled[c] / sun->whole[c], 1)), 50) : 50;
-    const double times = mean > 1e-6 ? mean / nb_one_minus_exp(mean) : 1;
     out[NB_NODE_DIFFUSE] = (float)(turned * light[0] / (4 * PI));
     for (int a = 0; a < 3; a++) out[NB_NODE_FLUX + a] = (float)(cosine * turned * light[1 + a] / (4 * PI));
     out[NB_NODE_TURNED] = (float)log_of(turned * sun->scaled[c]);
     out[NB_NODE_ONCE] = (float)log_of(share(t->turned[c], t->extinction[c]) * sun->whole[c]);
     out[NB_NODE_GLOW] = (float)(ahead * straight);
-    out[NB_NODE_WIDTH] = (float)width_of(cosine, times + 1);
+    out[NB_NODE_WIDTH] = (float)nb_glow_width(cosine, sun->scaled[c], sun->whole[c]);
 }
 
 /* `light`: fluence and flux of what the sky lacks. What goes straight on dims no light: of that, the sky's own light is what
@@ -143,6 +116,29 @@ static void set_sky_node(const nb_transport *t, int c, const nb_sky_moments *sky
     }
 }
 
+static void set_moments(double part, double cosine, const double light[4], float out[4])
+{
+    for (int k = 0; k < 4; k++) out[k] = (float)(part * (k == 0 ? 1 : cosine) / (4 * PI) * light[k]);
+}
+
+/* `light`: fluence and flux. */
+static void set_own_node(const nb_transport *t, int c, const nb_node_own *own, const double light[4], float *out,
+                         float *straight)
+{
+    const double scaled = t->extinction[c] - t->scattering[c] + t->turned[c];
+    const double turned = share(t->turned[c], scaled), cosine = share(t->forward[c], t->turned[c]);
+    set_moments(turned, cosine, light, &out[NB_NODE_DIFFUSE]);
+    set_moments(turned, cosine, own->scaled[c], &straight[NB_NODE_OWN_TURNED]);
+    set_moments(share(t->turned[c], t->extinction[c]), cosine, own->whole[c], &straight[NB_NODE_OWN_ONCE]);
+    set_moments(share(t->scattering[c] - t->turned[c], t->extinction[c]), 1, own->glow[c], &straight[NB_NODE_OWN_GLOW]);
+}
+
+/* Of what is turned, in all channels. */
+static double mean_cosine(const nb_transport *t)
+{
+    return share(t->forward[0] + t->forward[1] + t->forward[2], t->turned[0] + t->turned[1] + t->turned[2]);
+}
+
 static int has_colour(const nebel_snapshot *snapshot, const nebel_diffusion_desc *desc)
 {
     const double *ground = desc->ground_albedo;
@@ -152,6 +148,12 @@ static int has_colour(const nebel_snapshot *snapshot, const nebel_diffusion_desc
         if (albedo[0] != albedo[1] || albedo[1] != albedo[2]) return 1;
     }
     return !snapshot->is_gray;
+}
+
+static int find_has_colour(const nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot)
+{
+    if (has_colour(snapshot, &fog->diffusion) || (d->has_sky && nb_sky_has_colour(&fog->sky))) return 1;
+    return d->is_own && nb_find_own_light(snapshot).has_colour;
 }
 
 static int has_peaks(const nebel_snapshot *snapshot)
@@ -178,11 +180,10 @@ static nebel_result fill_sun(nb_diffusion *d, const nebel_fog *fog, const nebel_
                                 &made->light[c]))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_transport t = around(&d->lattice, made->cells, i);
+            const nb_transport t = nb_lattice_around(&d->lattice, made->cells, i);
             float *node = &d->nodes[i * d->node_numbers];
             set_node(&t, c, &made->sun[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS);
-            node[NB_NODE_NUMBERS * d->channel_count] =
-                (float)share(t.forward[0] + t.forward[1] + t.forward[2], t.turned[0] + t.turned[1] + t.turned[2]);
+            node[NB_NODE_NUMBERS * d->channel_count] = (float)mean_cosine(&t);
         }
     }
     return result;
@@ -199,12 +200,66 @@ static nebel_result fill_sky(nb_diffusion *d, const nebel_fog *fog, draft *made)
                                 &made->sky))
             return NEBEL_ERROR_MEMORY;
         for (size_t i = 0; i < nodes; i++) {
-            const nb_transport t = around(&d->lattice, made->cells, i);
-            float *node = &d->nodes[i * d->node_numbers + nb_diffusion_sky_number(d, c)];
+            const nb_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            float *node = &d->nodes[i * d->node_numbers + nb_diffusion_second_number(d, c)];
             set_sky_node(&t, c, &moments[c], &made->sky.nodes[4 * i], node);
         }
     }
     return NEBEL_OK;
+}
+
+/* Where nothing goes straight on the exact light has all of lamps' that was scattered once. */
+static void forget_exact_light(const nb_diffusion *d)
+{
+    const size_t all = d->has_peaks ? 0 : nb_lattice_nodes(&d->lattice) * (size_t)d->channel_count;
+    for (size_t i = 0; i < all; i++) {
+        const size_t node = i / (size_t)d->channel_count, channel = i % (size_t)d->channel_count;
+        float *straight = &d->nodes[node * d->node_numbers + nb_diffusion_second_number(d, (int)channel)];
+        for (int k = 0; k < 4; k++) {
+            straight[NB_NODE_OWN_TURNED + k] -= straight[NB_NODE_OWN_ONCE + k];
+            straight[NB_NODE_OWN_ONCE + k] = 0;
+        }
+    }
+}
+
+static nebel_result solve_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot,
+                              const nb_own_light *own, const nb_beams *beams, nb_node_own *straight, draft *made)
+{
+    const size_t nodes = nb_lattice_nodes(&d->lattice);
+    const nb_diffuse_source source = {.beams = beams};
+    for (int c = 0; c < d->channel_count; c++) {
+        nb_cast_beams(&d->lattice, snapshot, made->cells, c, own, beams);
+        nb_light_nodes_by_cells(&d->lattice, made->cells, beams, c, straight);
+        if (!nb_diffusion_solve(&fog->allocator, &d->lattice, made->cells, &source, fog->diffusion.ground_albedo[c], c,
+                                &made->light[c]))
+            return NEBEL_ERROR_MEMORY;
+        for (size_t i = 0; i < nodes; i++) {
+            const nb_transport t = nb_lattice_around(&d->lattice, made->cells, i);
+            float *node = &d->nodes[i * d->node_numbers];
+            set_own_node(&t, c, &straight[i], &made->light[c].nodes[4 * i], node + c * NB_NODE_NUMBERS,
+                         node + nb_diffusion_second_number(d, c));
+            node[NB_NODE_NUMBERS * d->channel_count] = (float)mean_cosine(&t);
+        }
+    }
+    return NEBEL_OK;
+}
+
+static nebel_result fill_own(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
+{
+    const nebel_allocator *allocator = &fog->allocator;
+    const nb_own_light own = nb_find_own_light(snapshot);
+    nb_node_own *straight = nb_allocate_zero(allocator, nb_lattice_nodes(&d->lattice), sizeof *straight);
+    nb_beams beams;
+    const int all = nb_beams_open(allocator, &d->lattice, &beams) && straight != NULL;
+    nebel_result result = all ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    memcpy(d->irradiance, own.unit, sizeof d->irradiance);
+    if (all) result = nb_light_nodes_by_lamps(d, snapshot, made->cells, &own, straight);
+    if (result == NEBEL_OK) result = solve_own(d, fog, snapshot, &own, &beams, straight, made);
+    if (result == NEBEL_OK) result = nb_diffusion_balance(snapshot, d, made->light);
+    if (result == NEBEL_OK) forget_exact_light(d);
+    nb_beams_close(allocator, &beams);
+    nb_release(allocator, straight);
+    return result;
 }
 
 static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snapshot *snapshot, draft *made)
@@ -213,6 +268,7 @@ static nebel_result fill(nb_diffusion *d, const nebel_fog *fog, const nebel_snap
     nb_lattice_mean(&d->lattice, snapshot, made->cells);
     if (d->has_sun) result = fill_sun(d, fog, snapshot, made);
     if (result == NEBEL_OK && d->has_sky) result = fill_sky(d, fog, made);
+    if (result == NEBEL_OK && d->is_own) result = fill_own(d, fog, snapshot, made);
     if (result == NEBEL_OK && d->has_sun) result = nb_diffusion_balance(snapshot, d, made->light);
     return result;
 }
@@ -236,26 +292,26 @@ static nebel_result solve(nb_diffusion *d, const nebel_fog *fog, const nebel_sna
     return result;
 }
 
-nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled,
+nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled, int is_own,
                                nb_diffusion **made)
 {
     nb_lattice lattice;
     int lit;
     *made = NULL;
-    nebel_result result = nb_lattice_place(fog, snapshot, scaled, &lattice, &lit);
+    nebel_result result = nb_lattice_place(fog, snapshot, scaled, is_own, &lattice, &lit);
     if (result != NEBEL_OK || !lit) return result;
     nb_diffusion *d = nb_allocate_zero(&fog->allocator, 1, sizeof *d);
     if (d == NULL) return NEBEL_ERROR_MEMORY;
     d->lattice = lattice;
     d->scaled = nebel_retain_snapshot(scaled);
     d->has_peaks = has_peaks(snapshot);
-    d->has_sun = snapshot->is_sunlit;
-    d->has_sky = nb_sky_is_dimmed(fog, snapshot);
-    d->channel_count = has_colour(snapshot, &fog->diffusion) || (d->has_sky && nb_sky_has_colour(&fog->sky)) ? 3 : 1;
-    d->node_numbers =
-        (size_t)d->channel_count * (d->has_sky ? NB_NODE_NUMBERS + NB_NODE_SKY_NUMBERS : NB_NODE_NUMBERS) + 1;
+    d->has_sun = !is_own && snapshot->is_sunlit;
+    d->has_sky = !is_own && nb_sky_is_dimmed(fog, snapshot);
+    d->is_own = is_own;
+    d->channel_count = find_has_colour(d, fog, snapshot) ? 3 : 1;
+    d->node_numbers = nb_diffusion_second_number(d, nb_diffusion_has_second(d) ? d->channel_count : 0);
     memcpy(d->to_sun, snapshot->to_sun, sizeof d->to_sun);
-    memcpy(d->irradiance, fog->sun.irradiance, sizeof d->irradiance);
+    memcpy(d->irradiance, fog->sun.irradiance, sizeof d->irradiance); /* own light says otherwise */
     result = solve(d, fog, snapshot);
     if (result == NEBEL_OK)
         *made = d;

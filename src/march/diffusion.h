@@ -46,15 +46,27 @@ enum {
     NB_NODE_SKY_NUMBERS = NB_NODE_ABSORBED + 4
 };
 
+/* The same of own light that went straight on, source radiance with its mean over directions and its flux: as NB_NODE_TURNED,
+ * NB_NODE_ONCE and NB_NODE_GLOW. Without what is
+ * the same in both of the former. */
+enum {
+    NB_NODE_OWN_TURNED,
+    NB_NODE_OWN_ONCE = NB_NODE_OWN_TURNED + 4,
+    NB_NODE_OWN_GLOW = NB_NODE_OWN_ONCE + 4,
+    NB_NODE_OWN_NUMBERS = NB_NODE_OWN_GLOW + 4
+};
+
 typedef struct nb_diffusion {
     nb_lattice lattice;
     int channel_count;    /* 1: all channels are alike */
     int has_peaks;        /* some fog scatters forwards, so that `scaled` is another fog */
     int has_sun, has_sky; /* whether the sun lights it; whether it dims the sky */
+    int is_own;           /* it is of own light (nb_own_light), and neither of the sun nor of the sky */
     double to_sun[3];     /* of length 1 */
-    double irradiance[3]; /* of the sun */
+    double irradiance[3]; /* of the sun; the unit of own light */
     double skylight[3];   /* mean radiance of the sky */
-    size_t node_numbers;  /* of all channels, one more: g of what is turned; behind it the sky's of all channels */
+    size_t
+        node_numbers; /* of all channels, one more: g of what is turned; behind it the sky's or own light's of all channels */
     double gain[3][3][2]; /* of channels: of NB_NODE_DIFFUSE and NB_NODE_FLUX, in light that leaves along an axis
                                   to one side: see nb_diffusion_balance */
     float *nodes;         /* x fastest, then y; size + 1 along each axis */
@@ -63,10 +75,24 @@ typedef struct nb_diffusion {
     nebel_snapshot *scaled; /* takes from light what does not go straight on; scatters nothing */
 } nb_diffusion;
 
-/* The first of the sky's numbers of a channel at a node; where it has any. */
-static inline size_t nb_diffusion_sky_number(const nb_diffusion *diffusion, int channel)
+/* The first of the sky's numbers of a channel at a node, or of own light's; where it has any. */
+static inline size_t nb_diffusion_second_number(const nb_diffusion *diffusion, int channel)
 {
-    return (size_t)diffusion->channel_count * NB_NODE_NUMBERS + 1 + (size_t)channel * NB_NODE_SKY_NUMBERS;
+    return (size_t)diffusion->channel_count * NB_NODE_NUMBERS + 1 +
+           (size_t)channel * (diffusion->is_own ? NB_NODE_OWN_NUMBERS : NB_NODE_SKY_NUMBERS);
+}
+
+static inline int nb_diffusion_has_second(const nb_diffusion *diffusion)
+{
+    return diffusion->has_sky || diffusion->is_own;
+}
+
+/* How many faces lie across an axis, x fastest. */
+static inline size_t nb_lattice_faces(const nb_lattice *lattice, int axis)
+{
+    size_t count = 1;
+    for (int a = 0; a < 3; a++) count *= lattice->size[a] + (a == axis ? 1u : 0u);
+    return count;
 }
 
 static inline size_t nb_lattice_cells(const nb_lattice *lattice)
@@ -90,12 +116,67 @@ typedef struct nb_sky_moments {
     double above, below; /* irradiance of a level plane from above, and from below */
 } nb_sky_moments;
 
-/* What fog scatters: the sun's light, or the sky's, of which that is solved for which it lacks. */
+/* Own light in one channel on its straight way. */
+typedef struct nb_beams {
+    double *through[3]; /* through scaled fog: power through each face, along the axis; */
+    double *taken;      /* power that fog takes from it in each cell */
+    double *scaled,
+        *whole; /* what is emitted, through scaled fog and through the fog as it is: four for each cell, the means of
+                               fluence and flux, times the cell's volume */
+} nb_beams;
+
+/* 0 when memory is out. To be closed in any case. */
+int nb_beams_open(const nebel_allocator *allocator, const nb_lattice *lattice, nb_beams *beams);
+
+void nb_beams_close(const nebel_allocator *allocator, const nb_beams *beams);
+
+/* What fog scatters: the sun's light, own light, or the sky's, of which that is solved for which it lacks. */
 typedef struct nb_diffuse_source {
-    const nb_node_sun *sun; /* of each node; NULL: the sky */
+    const nb_node_sun *sun; /* of each node; NULL: not the sun */
     const double *to_sun;
+    const nb_beams *beams; /* NULL: not own light */
     nb_sky_moments sky;
 } nb_diffuse_source;
+
+static inline int nb_source_is_sky(const nb_diffuse_source *source)
+{
+    return source->sun == NULL && source->beams == NULL;
+}
+
+/* Light that begins in the fog or beside it: lamps', and what fog emits. */
+typedef struct nb_own_light {
+    int has; /* whether any fog scatters any */
+    int has_colour;
+    double unit[3]; /* the colour of all where they have one, else 1 */
+} nb_own_light;
+
+nb_own_light nb_find_own_light(const nebel_snapshot *snapshot);
+
+/* Of a lamp's intensity or of what is emitted, per unit. */
+double nb_own_amount(const nb_own_light *own, const double color[3], int channel);
+
+/* Follows own light on straight ways to the lattice's ends, in one channel. */
+void nb_cast_beams(const nb_lattice *lattice, const nebel_snapshot *snapshot, const nb_transport *cells, int channel,
+                   const nb_own_light *own, const nb_beams *beams);
+
+/* What own light gives a node on straight ways in each channel, fluence and flux: through scaled fog; what the exact light has of it,
+ * through the fog as it is; the difference, with as much flux as is left where it goes almost straight on again. */
+typedef struct nb_node_own {
+    double scaled[3][4], whole[3][4], glow[3][4];
+} nb_node_own;
+
+/* Fills the nodes, which are all 0, with lamps' light. */
+nebel_result nb_light_nodes_by_lamps(const nb_diffusion *diffusion, const nebel_snapshot *fog,
+                                     const nb_transport *cells, const nb_own_light *own, nb_node_own *nodes);
+
+/* Adds what is emitted, as beams have it, in one channel. */
+void nb_light_nodes_by_cells(const nb_lattice *lattice, const nb_transport *cells, const nb_beams *beams, int channel,
+                             nb_node_own *nodes);
+
+/* Where the scattered light of lamps and of what fog emits matters, in fog without an end [m]. 0: nowhere. */
+int nb_find_reach(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, double low[3], double high[3]);
+
+int nb_medium_scatters(const nb_medium *medium);
 
 /* Whether the medium scatters the sun's light or ambient light. */
 int nb_medium_is_lit(const nb_medium *medium);
@@ -109,12 +190,30 @@ void nb_sky_find_moments(const nebel_environment *sky, double mean[3], nb_sky_mo
 /* Whether the moments are not the same in all channels. */
 int nb_sky_has_colour(const nebel_environment *sky);
 
-/* Where the lattice is, and its cells. *lit: 0 where there is nothing to be solved. Errors: UNSUPPORTED. */
+/* Where the lattice is, and its cells: of own light, or of the sun and the sky. *lit: 0 where there is nothing to be solved.
+ * Errors: UNSUPPORTED. */
 nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
-                              nb_lattice *lattice, int *lit);
+                              int is_own, nb_lattice *lattice, int *lit);
 
 /* Whether it holds bodies in fog that goes on beside it. */
 int nb_lattice_has_bodies(const nb_lattice *lattice);
+
+/* The place of a node. */
+void nb_lattice_node(const nb_lattice *lattice, size_t node, double place[3]);
+
+/* One of the eight cells around a node, or the nearest one where there is none. */
+size_t nb_lattice_cell_beside(const nb_lattice *lattice, size_t node, int octant);
+
+/* What the cells around a node hold together. */
+nb_transport nb_lattice_around(const nb_lattice *lattice, const nb_transport *cells, size_t node);
+
+/* g of what went almost straight on `n` times, where the rest has the mean cosine `turned`: the second moment of what is
+ * taken to go straight on is that of this lobe for n = 1. */
+double nb_lobe_width(double turned, double n);
+
+/* Power through scaled fog, and through the fog as it is: g of the lobe of light that went almost straight on between, and
+ * does so again, where the rest has the mean cosine `turned`. */
+double nb_glow_width(double turned, double scaled, double whole);
 
 /* Means over the cells. */
 void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, nb_transport *cells);
@@ -149,8 +248,9 @@ nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *
 /* How many rays are gathered at once, at most. */
 enum { NB_DIFFUSION_RAYS = 64 };
 
-/* *made: NULL where the sun lights no fog that scatters. `snapshot` is complete but for this. */
-nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled,
+/* Of the sun and the sky, or of own light. *made: NULL where that lights no fog that scatters. `snapshot` is complete but for
+ * this. */
+nebel_result nb_diffusion_make(const nebel_fog *fog, const nebel_snapshot *snapshot, nebel_snapshot *scaled, int is_own,
                                nb_diffusion **made);
 
 void nb_diffusion_free(const nebel_allocator *allocator, nb_diffusion *diffusion);

@@ -17,9 +17,18 @@
 #define FAR_HEIGHT 1e7
 #define GAUSSIAN_END 5
 
-/* Cells along an axis: so many for an optical depth of 1, within limits; of fog that varies with height alone. */
+/* Cells along an axis: so many for an optical depth of 1, within limits; of own light, which begins at places; of fog that varies with
+ * height alone. */
 #define CELLS_PER_DEPTH 3
-enum { LEAST_CELLS = 20, MOST_CELLS = 64, LEAST_LEVEL_CELLS = 64, MOST_LEVEL_CELLS = 256, PROBES = 8, SHARES = 3 };
+enum {
+    LEAST_CELLS = 20,
+    LEAST_OWN_CELLS = 32,
+    MOST_CELLS = 64,
+    LEAST_LEVEL_CELLS = 64,
+    MOST_LEVEL_CELLS = 256,
+    PROBES = 8,
+    SHARES = 3
+};
 
 typedef struct span {
     double low, high;
@@ -57,15 +66,23 @@ static int is_level(const nb_medium *medium, int axis)
     return density->type == NEBEL_DENSITY_CONSTANT || density->type == NEBEL_DENSITY_HEIGHT;
 }
 
-/* The span of all lit fog that ends, and whether there is any that does not. NULL, or what goes on and changes. */
-static const nb_medium *gather(const nebel_snapshot *snapshot, int axis, span *all)
+/* Fog without an end that scatters nothing has no place in it. */
+static int takes_part_in_own(const nb_medium *medium, int goes_on)
+{
+    double glow = 0;
+    for (int c = 0; c < 3; c++) glow += nb_volume_glow(&medium->body, c);
+    return nb_medium_scatters(medium) || (glow > 0 && !goes_on);
+}
+
+/* The span of all fog that ends and is lit, or scatters or gives own light, and whether there is any that does not. NULL, or what goes on and changes. */
+static const nb_medium *gather(const nebel_snapshot *snapshot, int is_own, int axis, span *all)
 {
     *all = (span){HUGE_VAL, -HUGE_VAL, {0, 0}};
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_medium *medium = &snapshot->media[i];
-        if (!nb_medium_is_lit(medium)) continue;
         const span s = span_of(medium, axis);
         const int goes_on = s.is_endless[0] || s.is_endless[1];
+        if (!(is_own ? takes_part_in_own(medium, goes_on) : nb_medium_is_lit(medium))) continue;
         if (goes_on && axis != 1 && !is_level(medium, axis)) return medium;
         for (int side = 0; side < 2; side++) all->is_endless[side] |= axis != 1 ? goes_on : s.is_endless[side];
         if (!s.is_endless[0]) all->low = fmin(all->low, s.low);
@@ -122,12 +139,35 @@ static void set_height(const nebel_snapshot *scaled, const span *s, const nebel_
     }
 }
 
+/* In fog without an end a lattice of own light holds lamps and bodies that emit, with what lies around them, and ends there. */
+static void hold_own_light(const nebel_snapshot *snapshot, const nebel_snapshot *scaled, nb_lattice *l)
+{
+    double low[3], high[3];
+    const int is_everywhere = !(l->low[1] < l->high[1]);
+    if (!nb_find_reach(snapshot, scaled, low, high)) return;
+    for (int a = 0; a < 3; a += 2) {
+        const int is_one = l->high[a] - l->low[a] == 1;
+        if (l->ends[a][0] != NB_END_LEVEL) continue;
+        l->low[a] = is_one ? low[a] : fmin(l->low[a], low[a]);
+        l->high[a] = is_one ? high[a] : fmax(l->high[a], high[a]);
+        l->ends[a][0] = l->ends[a][1] = NB_END_OPEN;
+    }
+    if (is_everywhere || l->low[1] < low[1]) {
+        l->low[1] = low[1];
+        l->ends[1][0] = NB_END_OPEN;
+    }
+    if (is_everywhere || l->high[1] > high[1]) {
+        l->high[1] = high[1];
+        l->ends[1][1] = NB_END_OPEN;
+    }
+}
+
 /* ---- how fine it is -------------------------------------------------------------------------- */
 
 /* The most of all channels that fog takes after scaling, in the mean. */
 static double mean_extinction(const nb_lattice *l, const nebel_snapshot *snapshot)
 {
-    nb_transport sum = {{0}, {0}, {0}, {0}};
+    nb_transport sum = {.extinction = {0}};
     double most = 0;
     for (int k = 0; k < PROBES * PROBES * PROBES; k++) {
         const int at[3] = {k % PROBES, k / PROBES % PROBES, k / (PROBES * PROBES)};
@@ -139,7 +179,7 @@ static double mean_extinction(const nb_lattice *l, const nebel_snapshot *snapsho
     return most / (PROBES * PROBES * PROBES);
 }
 
-static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, nb_lattice *l)
+static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, int is_own, nb_lattice *l)
 {
     const double extinction = mean_extinction(l, snapshot);
     const int is_flat = l->ends[0][0] == NB_END_LEVEL && l->high[0] - l->low[0] == 1 && l->ends[2][0] == NB_END_LEVEL &&
@@ -147,7 +187,10 @@ static void set_cells(const nebel_snapshot *snapshot, uint32_t limit, nb_lattice
     double count[3], all = 1;
     for (int a = 0; a < 3; a++) {
         const double wanted = ceil(CELLS_PER_DEPTH * extinction * (l->high[a] - l->low[a]));
-        const int least = is_flat ? LEAST_LEVEL_CELLS : LEAST_CELLS, most = is_flat ? MOST_LEVEL_CELLS : MOST_CELLS;
+        const int least = is_flat  ? LEAST_LEVEL_CELLS
+                          : is_own ? LEAST_OWN_CELLS
+                                   : LEAST_CELLS,
+                  most = is_flat ? MOST_LEVEL_CELLS : MOST_CELLS;
         const int is_one = l->ends[a][0] == NB_END_LEVEL && a != 1 && l->high[a] - l->low[a] == 1;
         count[a] = is_one ? 1 : fmin(fmax(wanted, least), most);
         all *= count[a];
@@ -169,13 +212,13 @@ int nb_lattice_has_bodies(const nb_lattice *l)
 }
 
 nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapshot, const nebel_snapshot *scaled,
-                              nb_lattice *lattice, int *lit)
+                              int is_own, nb_lattice *lattice, int *lit)
 {
     span spans[3];
     memset(lattice, 0, sizeof *lattice);
     *lit = 0;
     for (int a = 0; a < 3; a++) {
-        const nb_medium *uneven = gather(snapshot, a, &spans[a]);
+        const nb_medium *uneven = gather(snapshot, is_own, a, &spans[a]);
         if (uneven != NULL)
             return nb_fail(&fog->log, NEBEL_ERROR_UNSUPPORTED,
                            "fog[%zu]: is endless along %c, but not the same all along, which diffusion (multiple "
@@ -188,9 +231,12 @@ nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapsh
         if (spans[a].is_endless[0]) set_level_axis(lattice, a, &spans[a]);
     }
     set_height(scaled, &spans[1], &fog->diffusion, lattice);
+    if (is_own &&
+        (spans[0].is_endless[0] || spans[2].is_endless[0] || spans[1].is_endless[0] || spans[1].is_endless[1]))
+        hold_own_light(snapshot, scaled, lattice);
     for (int a = 0; a < 3; a++)
         if (!(lattice->low[a] < lattice->high[a])) return NEBEL_OK;
-    set_cells(snapshot, fog->diffusion.cells, lattice);
+    set_cells(snapshot, fog->diffusion.cells, is_own, lattice);
     *lit = 1;
     return NEBEL_OK;
 }
@@ -200,7 +246,7 @@ nebel_result nb_lattice_place(const nebel_fog *fog, const nebel_snapshot *snapsh
 static void mean_of_cell(const nb_lattice *l, const nebel_snapshot *snapshot, const uint32_t at[3], nb_transport *mean)
 {
     const double part = 1. / (SHARES * SHARES * SHARES);
-    nb_transport sum = {{0}, {0}, {0}, {0}};
+    nb_transport sum = {.extinction = {0}};
     for (int k = 0; k < SHARES * SHARES * SHARES; k++) {
         const int share[3] = {k % SHARES, k / SHARES % SHARES, k / (SHARES * SHARES)};
         double place[3];
@@ -212,6 +258,7 @@ static void mean_of_cell(const nb_lattice *l, const nebel_snapshot *snapshot, co
         mean->scattering[c] = sum.scattering[c] * part;
         mean->turned[c] = sum.turned[c] * part;
         mean->forward[c] = sum.forward[c] * part;
+        mean->emission[c] = sum.emission[c] * part;
     }
 }
 
@@ -222,4 +269,40 @@ void nb_lattice_mean(const nb_lattice *lattice, const nebel_snapshot *snapshot, 
         const uint32_t at[3] = {(uint32_t)(i % nx), (uint32_t)(i / nx % ny), (uint32_t)(i / (nx * ny))};
         mean_of_cell(lattice, snapshot, at, &cells[i]);
     }
+}
+
+/* ---- its nodes ------------------------------------------------------------------------------- */
+
+void nb_lattice_node(const nb_lattice *l, size_t node, double place[3])
+{
+    const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
+    const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
+    for (int a = 0; a < 3; a++) place[a] = at[a] == l->size[a] ? l->high[a] : l->low[a] + (double)at[a] * l->spacing[a];
+}
+
+size_t nb_lattice_cell_beside(const nb_lattice *l, size_t node, int octant)
+{
+    const size_t nx = l->size[0] + 1u, ny = l->size[1] + 1u;
+    const size_t at[3] = {node % nx, node / nx % ny, node / (nx * ny)};
+    size_t cell[3];
+    for (int a = 0; a < 3; a++) {
+        const size_t up = at[a] + ((size_t)octant >> a & 1u);
+        cell[a] = up == 0 ? 0 : up > l->size[a] ? l->size[a] - 1u : up - 1;
+    }
+    return cell[0] + l->size[0] * (cell[1] + l->size[1] * cell[2]);
+}
+
+nb_transport nb_lattice_around(const nb_lattice *l, const nb_transport *cells, size_t node)
+{
+    nb_transport sum = {.extinction = {0}};
+    for (int octant = 0; octant < 8; octant++) {
+        const nb_transport *t = &cells[nb_lattice_cell_beside(l, node, octant)];
+        for (int c = 0; c < 3; c++) {
+            sum.extinction[c] += t->extinction[c];
+            sum.scattering[c] += t->scattering[c];
+            sum.turned[c] += t->turned[c];
+            sum.forward[c] += t->forward[c];
+        }
+    }
+    return sum;
 }

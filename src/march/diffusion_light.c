@@ -25,13 +25,16 @@ enum { MOST_HALVINGS = 5 };
 /* What fog leaves less of does not matter. */
 #define DARK 1e-4
 
+/* g of no lobe of lamps' light that went almost straight on is more. */
+#define MOST_GLOW 0.999
+
 /* Rays that go on together, a step each. */
 enum { BLOCK = NB_DIFFUSION_RAYS };
 
 typedef struct walker {
     double origin[3], direction[3]; /* from the lattice's middle; of length 1 */
     double cosine;                  /* between it and the way to the sun */
-    double t, end;                  /* m; t >= end: done */
+    double t, enter, end;           /* m; the lattice begins at `enter`, if not at t; t >= end: done */
     double scaled[3], whole[3];     /* transmittance up to t, of scaled fog and of fog as it is */
     double source[3], once[3];      /* source radiance at t, of each of them */
     double diffuse[3];              /* of the former: what is diffuse */
@@ -128,9 +131,34 @@ static void look_at_sky(const nb_diffusion *d, const size_t nodes[8], const doub
 {
     double numbers[NB_NODE_SKY_NUMBERS];
     for (size_t k = 0; k < NB_NODE_SKY_NUMBERS; k++)
-        numbers[k] = mix(d, nodes, weights, nb_diffusion_sky_number(d, own) + k);
+        numbers[k] = mix(d, nodes, weights, nb_diffusion_second_number(d, own) + k);
     w->lack[c] = along(&numbers[NB_NODE_DIMMED], w->direction);
     w->taken[c] = along(&numbers[NB_NODE_ABSORBED], w->direction);
+}
+
+static double look_at_moments(const nb_diffusion *d, const size_t nodes[8], const double weights[8], size_t first,
+                              double most, const double direction[3])
+{
+    double numbers[4];
+    for (size_t k = 0; k < 4; k++) numbers[k] = mix(d, nodes, weights, first + k);
+    return diffuse_source(numbers, most, direction);
+}
+
+/* `g`: of what is turned. */
+static void look_at_own(const nb_diffusion *d, const size_t nodes[8], const double weights[8], double g, int is_rest,
+                        walker *w)
+{
+    const double most = fmax(g, 0);
+    for (int c = 0; c < d->channel_count; c++) {
+        const size_t first = (size_t)c * NB_NODE_NUMBERS + NB_NODE_DIFFUSE, second = nb_diffusion_second_number(d, c);
+        w->diffuse[c] = gain_of(d, c, w->direction) * look_at_moments(d, nodes, weights, first, most, w->direction);
+        w->source[c] =
+            w->diffuse[c] + look_at_moments(d, nodes, weights, second + NB_NODE_OWN_TURNED, most, w->direction);
+        w->lack[c] = w->taken[c] = w->once[c] = 0;
+        if (!is_rest) continue;
+        w->once[c] = look_at_moments(d, nodes, weights, second + NB_NODE_OWN_GLOW, MOST_GLOW, w->direction) -
+                     look_at_moments(d, nodes, weights, second + NB_NODE_OWN_ONCE, most, w->direction);
+    }
 }
 
 /* In the lattice that the piece is in. */
@@ -142,6 +170,10 @@ static void look(const block *b, walker *w)
     const nb_diffusion *d = w->in;
     find_nodes(&d->lattice, place, nodes, weights);
     const double g = mix(d, nodes, weights, (size_t)d->channel_count * NB_NODE_NUMBERS), turned = lobe(g, w->cosine);
+    if (d->is_own) {
+        look_at_own(d, nodes, weights, g, b->is_rest, w);
+        return;
+    }
     for (int c = 0; c < b->diffusion->channel_count; c++) {
         const int own = d->channel_count == 1 ? 0 : c;
         w->lack[c] = w->taken[c] = 0;
@@ -149,9 +181,8 @@ static void look(const block *b, walker *w)
         w->source[c] = w->once[c] = w->diffuse[c] = 0;
         if (!d->has_sun) continue;
         const size_t first = (size_t)own * NB_NODE_NUMBERS;
-        double numbers[4];
-        for (size_t k = 0; k < 4; k++) numbers[k] = mix(d, nodes, weights, first + NB_NODE_DIFFUSE + k);
-        w->diffuse[c] = gain_of(d, own, w->direction) * diffuse_source(numbers, fmax(g, 0), w->direction);
+        w->diffuse[c] = gain_of(d, own, w->direction) *
+                        look_at_moments(d, nodes, weights, first + NB_NODE_DIFFUSE, fmax(g, 0), w->direction);
         w->source[c] = w->diffuse[c] + turned * nb_exp(mix(d, nodes, weights, first + NB_NODE_TURNED));
         if (!b->is_rest) continue;
         w->once[c] = -turned * nb_exp(mix(d, nodes, weights, first + NB_NODE_ONCE));
@@ -177,17 +208,19 @@ static void clip(const nb_lattice *l, const double middle[3], walker *w)
             if (outwards > 0)
                 w->end = fmin(w->end, (face - from) / d);
             else if (outwards < 0)
-                w->t = fmax(w->t, (face - from) / d);
+                w->enter = fmax(w->enter, (face - from) / d);
             else if (side ? from > face : from < face)
                 w->end = 0;
         }
     }
+    if (!(w->enter < w->end)) w->end = 0;
 }
 
 /* To the next cell, about: a cell's width along each axis where there are any. */
 static double find_step(const nb_lattice *l, const double middle[3], const walker *w)
 {
     double step = w->end - w->t;
+    if (w->t < w->enter) return w->enter - w->t;
     for (int a = 0; a < 3; a++) {
         const double at = middle[a] + w->origin[a] + w->t * w->direction[a], d = w->direction[a];
         if (l->size[a] == 1 || d == 0) continue;
@@ -239,7 +272,7 @@ static int is_fine(const block *b, size_t i)
     const walker *w = &b->walkers[i];
     int is_thick = 0;
     for (int c = 0; c < b->diffusion->channel_count; c++) is_thick |= (double)b->scaled[c][i] < THICK;
-    return !is_thick || w->halvings == MOST_HALVINGS || isinf(b->step[i]);
+    return !is_thick || w->t < w->enter || w->halvings == MOST_HALVINGS || isinf(b->step[i]);
 }
 
 /* Which lattice a piece is in, and its nodes at where it begins. Bodies end at the faces of their lattice, as pieces do. */
@@ -263,12 +296,29 @@ static int is_empty(const block *b, size_t i)
     return is;
 }
 
+/* To where the lattice begins, through fog that gives nothing of its light. */
+static void go_to_lattice(block *b, size_t i)
+{
+    walker *w = &b->walkers[i];
+    int is_dark = 1;
+    for (int c = 0; c < b->diffusion->channel_count; c++) {
+        w->scaled[c] = (double)b->scaled[c][i];
+        w->whole[c] = b->diffusion->has_peaks ? (double)b->whole[c][i] : w->scaled[c];
+        is_dark = is_dark && w->scaled[c] < DARK;
+    }
+    w->t = is_dark ? w->end : w->enter;
+}
+
 /* From t to the end of its step. */
 static void advance(block *b, size_t i)
 {
     walker *w = &b->walkers[i];
     const nb_diffusion *d = b->diffusion;
     int is_dark = 1, is_thin = 1;
+    if (w->t < w->enter) {
+        go_to_lattice(b, i);
+        return;
+    }
     if (is_empty(b, i)) {
         w->t += b->step[i];
         w->in = NULL;
@@ -385,9 +435,8 @@ static void add(const nb_trace_job *job, size_t i, int c, double light)
     *out = fmaxf(*out + (float)light, 0);
 }
 
-nebel_result nb_diffusion_add(const nb_trace_job *job)
+static nebel_result add_all(const nb_trace_job *job, const nb_diffusion *d)
 {
-    const nb_diffusion *d = job->snapshot->diffusion;
     for (size_t first = 0; first < job->count; first += NB_DIFFUSION_RAYS) {
         const size_t n = job->count - first < NB_DIFFUSION_RAYS ? job->count - first : NB_DIFFUSION_RAYS;
         nebel_ray rays[NB_DIFFUSION_RAYS];
@@ -401,4 +450,11 @@ nebel_result nb_diffusion_add(const nb_trace_job *job)
                     gathered[i].light[c] * d->irradiance[c] - gathered[i].dimmed[c] * d->skylight[c]);
     }
     return NEBEL_OK;
+}
+
+nebel_result nb_diffusion_add(const nb_trace_job *job)
+{
+    const nebel_snapshot *s = job->snapshot;
+    const nebel_result result = s->diffusion != NULL ? add_all(job, s->diffusion) : NEBEL_OK;
+    return result == NEBEL_OK && s->own_diffusion != NULL ? add_all(job, s->own_diffusion) : result;
 }

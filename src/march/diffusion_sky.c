@@ -5,6 +5,14 @@
 
 #define PI 3.14159265358979323846
 
+int nb_medium_scatters(const nb_medium *medium)
+{
+    int scatters = 0;
+    for (int c = 0; c < 3; c++)
+        scatters |= medium->body.lit && medium->body.albedo[c] > 0 && medium->body.extinction[c] > 0;
+    return scatters;
+}
+
 int nb_medium_is_lit(const nb_medium *medium)
 {
     int is_lit = medium->is_sunlit;

@@ -14,6 +14,8 @@
  *     div F + (s - w) phi = 4 pi (s - w)        phi' / 3 + (s - g w) F = (s - g w) A
  *
  * so that white fog under a white sky lacks nothing, exactly.
+ *
+ * Own light has the sun's equations, with its fluence and flux on straight ways for E and E d.
  */
 #include "diffusion.h"
 
@@ -54,13 +56,6 @@ typedef struct solver {
     double *diagonal, *phi, *residual, *way, *product;
     faces faces[3];
 } solver;
-
-static size_t face_count(const nb_lattice *l, int axis)
-{
-    size_t n = 1;
-    for (int a = 0; a < 3; a++) n *= l->size[a] + (a == axis ? 1u : 0u);
-    return n;
-}
 
 /* ---- places of numbers ----------------------------------------------------------------------- */
 
@@ -112,7 +107,9 @@ static index3 shifted(const index3 *i, int axis, int by)
 static double beam_through(const solver *s, int axis, const index3 *face)
 {
     double sum = 0;
-    if (s->source->sun == NULL) return s->source->sky.flux[axis];
+    if (nb_source_is_sky(s->source)) return s->source->sky.flux[axis];
+    if (s->source->beams != NULL)
+        return s->source->beams->through[axis][face_index(s->lattice, axis, face)] / s->area[axis];
     for (int k = 0; k < 4; k++) {
         index3 node = *face;
         node.at[(axis + 1) % 3] += (uint32_t)k & 1u;
@@ -146,7 +143,7 @@ static void join_cells(solver *s, int axis, const index3 *face)
 static double returned_by_ground(const solver *s, double beam)
 {
     const nb_sky_moments *sky = &s->source->sky;
-    return s->source->sun != NULL ? s->ground_albedo * fmax(beam, 0) : sky->below - s->ground_albedo * sky->above;
+    return nb_source_is_sky(s->source) ? sky->below - s->ground_albedo * sky->above : s->ground_albedo * fmax(beam, 0);
 }
 
 /* At an end the flux outwards is part * phi - returned. */
@@ -197,10 +194,11 @@ static double outflow(const solver *s, const index3 *cell)
     return sum;
 }
 
-/* What fog takes from sunlight in a cell, by what goes in and out: exact however thick it is. */
+/* What fog takes from light on its straight way in a cell; from sunlight, by what goes in and out: exact however thick it is. */
 static double taken_from_beam(const solver *s, const index3 *cell)
 {
     double sum = 0;
+    if (s->source->beams != NULL) return s->source->beams->taken[cell_index(s->lattice, cell)];
     for (int axis = 0; axis < 3; axis++) {
         const index3 next = shifted(cell, axis, 1);
         sum += s->area[axis] * (beam_through(s, axis, cell) - beam_through(s, axis, &next));
@@ -229,7 +227,7 @@ static void set_cells(solver *s, const nb_transport *cells)
         const double clear = mean > 0 ? fmax(1 - transport / (CLEAR_DENSITY * mean), 0) : 1;
         const double resisting = transport + clear / (3 * CLEAR_WAY * least);
         s->diffusivity[i] = 1 / (3 * fmax(resisting, 1e-12));
-        s->ahead[i] = (s->source->sun != NULL ? cells[i].forward[c] : transport) / fmax(resisting, 1e-12);
+        s->ahead[i] = (nb_source_is_sky(s->source) ? transport : cells[i].forward[c]) / fmax(resisting, 1e-12);
         s->lost[i] = clear / (8 * CLEAR_WAY * least);
     }
 }
@@ -247,7 +245,7 @@ static void set_balance(solver *s, const nb_transport *cells)
         const double turned = extinction > 0 ? cells[i].turned[c] / extinction : 0;
         const double absorption = fmax(cells[i].extinction[c] - cells[i].scattering[c], 0);
         const double begun =
-            s->source->sun != NULL ? turned * taken_from_beam(s, &cell) : volume * absorption * (4 * PI);
+            nb_source_is_sky(s->source) ? volume * absorption * (4 * PI) : turned * taken_from_beam(s, &cell);
         s->diagonal[i] = volume * (absorption + s->lost[i]);
         for (int axis = 0; axis < 3; axis++) {
             const index3 next = shifted(&cell, axis, 1);
@@ -431,7 +429,7 @@ static void set_nodes(const solver *s, double *light)
     do {
         double *out = &light[4 * node_index(l, &node)];
         const double fluence = fluence_at(s, &node);
-        out[0] = s->source->sun != NULL ? fmax(fluence, 0) : fluence; /* more light than the sky's is no fault */
+        out[0] = nb_source_is_sky(s->source) ? fluence : fmax(fluence, 0); /* more light than the sky's is no fault */
         for (int axis = 0; axis < 3; axis++) out[1 + axis] = flux_at(s, axis, &node);
     } while (step(&node, size));
 }
@@ -461,7 +459,7 @@ static int allocate(const nebel_allocator *allocator, solver *s)
         all = all && *of_cells[i] != NULL;
     }
     for (int a = 0; a < 3; a++) {
-        const size_t n = face_count(s->lattice, a);
+        const size_t n = nb_lattice_faces(s->lattice, a);
         s->faces[a] = (faces){nb_allocate(allocator, n, sizeof(double)), nb_allocate(allocator, n, sizeof(double))};
         all = all && s->faces[a].conductance != NULL && s->faces[a].drive != NULL;
     }

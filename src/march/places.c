@@ -71,12 +71,6 @@ static int shows_at(const nb_medium *medium, const nebel_place *place, int64_t c
     return nb_volume_has_fog(body) && body->rank >= cover && is_at(body, place);
 }
 
-/* Radiance per metre where the density is 1. */
-static double glow_of(const nb_volume *body, int channel)
-{
-    return body->emission[channel] + (body->lit ? 0 : body->source[channel] * body->extinction[channel]);
-}
-
 static void sample(const nebel_snapshot *snapshot, const nebel_place *place, nebel_matter *matter)
 {
     const int64_t cover = find_cover(snapshot, place);
@@ -90,7 +84,7 @@ static void sample(const nebel_snapshot *snapshot, const nebel_place *place, neb
         for (int c = 0; c < 3; c++) {
             matter->extinction[c] += density * body->extinction[c];
             matter->scattering[c] += density * body->extinction[c] * body->albedo[c];
-            matter->emission[c] += density * glow_of(body, c);
+            matter->emission[c] += density * nb_volume_glow(body, c);
         }
     }
 }
@@ -112,6 +106,7 @@ void nb_sample_transport(const nebel_snapshot *snapshot, const double position[3
             sum->scattering[c] += scattering;
             sum->turned[c] += turned;
             sum->forward[c] += turned * medium->turned_cosine;
+            sum->emission[c] += density * nb_volume_glow(body, c);
         }
     }
 }
@@ -279,7 +274,7 @@ static void bound_piece(const asked *a, nebel_bound *bound)
         const double most = (1 + ROUNDING) * nb_density_most(body, &a->line, a->from, bound->end);
         for (int c = 0; c < 3; c++) {
             bound->extinction[c] += most * body->extinction[c];
-            bound->emission[c] += most * glow_of(body, c);
+            bound->emission[c] += most * nb_volume_glow(body, c);
         }
     }
 }

@@ -7,8 +7,9 @@
 /* Sums over volumes [1/m]. Of what a volume scatters, a part (nb_medium.ahead) is taken to go straight on. */
 typedef struct nb_transport {
     double extinction[3], scattering[3];
-    double turned[3];  /* what is scattered and does not go straight on */
-    double forward[3]; /* the same times its mean cosine */
+    double turned[3];   /* what is scattered and does not go straight on */
+    double forward[3];  /* the same times its mean cosine */
+    double emission[3]; /* radiance per metre: emission, and source times extinction */
 } nb_transport;
 
 /* Adds what is at the place. `start` and `cutoff` do not count. */

@@ -62,6 +62,7 @@ static void free_snapshot(nebel_snapshot *s)
         nb_grid_lattice_release(s->media[i].lattice);
     }
     nb_diffusion_free(&allocator, s->diffusion);
+    nb_diffusion_free(&allocator, s->own_diffusion);
     for (size_t i = 0; i < s->skylight_count; i++) nb_sky_filter_release(s->skylights[i].filter);
     nebel_release_environment_map(s->sky.map);
     nb_bvh_free(&allocator, &s->bvh);
@@ -401,11 +402,12 @@ static nebel_result refuse_looks(const nebel_fog *fog, const nebel_snapshot *s)
     return NEBEL_OK;
 }
 
-static nebel_result diffuse_selected(const nebel_fog *fog, const nebel_snapshot *s, int level, nb_diffusion **made)
+static nebel_result diffuse_selected(const nebel_fog *fog, const nebel_snapshot *s, int level, int is_own,
+                                     nb_diffusion **made)
 {
     nebel_snapshot *scaled = NULL;
     nebel_result result = make_snapshot(fog, (selection){.is_scaled = 1, .is_level = level}, &scaled);
-    if (result == NEBEL_OK) result = nb_diffusion_make(fog, s, scaled, made);
+    if (result == NEBEL_OK) result = nb_diffusion_make(fog, s, scaled, is_own, made);
     nebel_release_snapshot(scaled);
     return result;
 }
@@ -414,15 +416,17 @@ static nebel_result diffuse_level(const nebel_fog *fog, nb_diffusion **made)
 {
     nebel_snapshot *level = NULL;
     nebel_result result = make_snapshot(fog, (selection){.is_level = 1}, &level);
-    if (result == NEBEL_OK) result = diffuse_selected(fog, level, 1, made);
+    if (result == NEBEL_OK) result = diffuse_selected(fog, level, 1, 0, made);
     nebel_release_snapshot(level);
     return result;
 }
 
 static nebel_result diffuse(const nebel_fog *fog, nebel_snapshot *s)
 {
-    nebel_result result = refuse_looks(fog, s);
-    if (result == NEBEL_OK) result = diffuse_selected(fog, s, 0, &s->diffusion);
+    const int has_sun = s->is_sunlit || nb_sky_is_dimmed(fog, s), has_own = nb_find_own_light(s).has;
+    nebel_result result = has_sun || has_own ? refuse_looks(fog, s) : NEBEL_OK;
+    if (result == NEBEL_OK && has_own) result = diffuse_selected(fog, s, 0, 1, &s->own_diffusion);
+    if (result == NEBEL_OK && has_sun) result = diffuse_selected(fog, s, 0, 0, &s->diffusion);
     if (result != NEBEL_OK || s->diffusion == NULL || !nb_lattice_has_bodies(&s->diffusion->lattice)) return result;
     return diffuse_level(fog, &s->diffusion->beside);
 }
@@ -435,8 +439,7 @@ nebel_result nebel_commit_fog(nebel_fog *fog, nebel_snapshot **snapshot)
         return nb_fail(&fog->log, NEBEL_ERROR_ARGUMENT, "snapshot: the place for it must not be NULL");
     nebel_snapshot *s;
     nebel_result result = make_snapshot(fog, (selection){0}, &s);
-    if (result == NEBEL_OK && fog->diffusion.cells > 0 && (s->is_sunlit || nb_sky_is_dimmed(fog, s)))
-        result = diffuse(fog, s);
+    if (result == NEBEL_OK && fog->diffusion.cells > 0) result = diffuse(fog, s);
     if (result == NEBEL_OK) {
         *snapshot = s;
         return NEBEL_OK;

@@ -74,9 +74,10 @@ struct nebel_snapshot {
     size_t covering_count;    /* media that cover others */
     size_t endless_count;     /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
-    struct nb_diffusion *diffusion; /* light that is scattered more than once; NULL: left out */
-    nb_bvh bvh;                     /* over the others */
-    uint32_t *bounded;              /* the media that the tree's boxes stand for */
+    struct nb_diffusion *diffusion;     /* light that is scattered more than once, of sun and sky; NULL: left out */
+    struct nb_diffusion *own_diffusion; /* the same of lamps, and of what fog emits and scatters */
+    nb_bvh bvh;                         /* over the others */
+    uint32_t *bounded;                  /* the media that the tree's boxes stand for */
     size_t bounded_count;
 };
 

@@ -185,7 +185,8 @@ static nebel_result run(const nebel_snapshot *snapshot, const nebel_trace_desc *
     job->count = n;
     const unsigned precision = nb_full_precision();
     const nebel_result result = kernel(job);
-    const int is_diffuse = result == NEBEL_OK && snapshot->diffusion != NULL && !job->transmittance_only;
+    const int is_diffuse = result == NEBEL_OK && (snapshot->diffusion != NULL || snapshot->own_diffusion != NULL) &&
+                           !job->transmittance_only;
     const nebel_result added = is_diffuse ? nb_diffusion_add(job) : NEBEL_OK; /* which has said what is wrong */
     nb_restore_precision(precision);
     return added == NEBEL_OK ? explain(job, result, desc->failed_ray) : added;

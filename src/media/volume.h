@@ -96,6 +96,12 @@ static inline int nb_volume_has_fog(const nb_volume *volume)
     return volume->operation != NEBEL_OPERATION_EXCLUDE;
 }
 
+/* Radiance per metre where the density is 1. */
+static inline double nb_volume_glow(const nb_volume *volume, int channel)
+{
+    return volume->emission[channel] + (volume->lit ? 0 : volume->source[channel] * volume->extinction[channel]);
+}
+
 static inline int nb_volume_covers(const nb_volume *volume)
 {
     return volume->operation != NEBEL_OPERATION_ADD;

@@ -12,6 +12,9 @@
 #define NB_THIN_PIECE 0.8
 #define NB_MOST_HALVINGS 5
 
+/* g of no lobe of own light that went almost straight on is more. */
+#define NB_MOST_GLOW 0.999
+
 /* What fog leaves less of does not matter. */
 #define NB_DARK_DEPTH 9.2103
 
@@ -107,6 +110,8 @@ nb_lattice nb_lattice_of(int word)
 bool nb_goes_on(nb_lattice l, int axis, int high) { return (l.flags >> (2 * axis + high) & 1) != 0; }
 
 bool nb_dims_sky(nb_lattice l) { return (l.flags & NB_LATTICE_SKY) != 0; }
+
+bool nb_is_own(nb_lattice l) { return (l.flags & NB_LATTICE_OWN) != 0; }
 
 bool nb_is_beside(float place, float low, float extent) { return place < low || place > low + extent; }
 
@@ -221,7 +226,7 @@ nb_nodes nb_nodes_around(nb_lattice l, nb_vec3 place)
     nb_vec3 at = clamp((place - l.low) / l.spacing, nb_splat3(0.0), l.cells);
     nb_vec3 base = min(floor(at), l.cells - nb_splat3(1.0));
     nb_nodes n;
-    n.right = nb_dims_sky(l) ? 4 * l.channels + 1 : 2 * l.channels + 1;
+    n.right = (nb_is_own(l) ? 5 : nb_dims_sky(l) ? 4 : 2) * l.channels + 1;
     n.up = n.right * (int(l.cells.x) + 1);
     n.deep = n.up * (int(l.cells.y) + 1);
     n.texel = l.texel + int(base.x) * n.right + int(base.y) * n.up + int(base.z) * n.deep;
@@ -254,8 +259,15 @@ nb_node_light nb_look_at_nodes(nb_lattice l, nb_ray ray, float t, nb_turn to_sun
     for (int c = 0; c < l.channels; c++) {
         nb_vec3 own = nb_vec3(c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0);
         if (l.channels == 1) own = nb_splat3(1.0);
-        nb_vec4 sun = nb_mix_nodes(n, 2 * c + 1);
         float diffuse = nb_diffuse_source(nb_mix_nodes(n, 2 * c), max(g, 0.0), ray.direction);
+        if (nb_is_own(l)) {
+            int straight = 2 * l.channels + 1 + 3 * c;
+            light.source += own * (gain * diffuse + nb_splat3(nb_diffuse_source(nb_mix_nodes(n, straight), max(g, 0.0), ray.direction)));
+            light.once += own * (nb_diffuse_source(nb_mix_nodes(n, straight + 2), NB_MOST_GLOW, ray.direction) -
+                                 nb_diffuse_source(nb_mix_nodes(n, straight + 1), max(g, 0.0), ray.direction));
+            continue;
+        }
+        nb_vec4 sun = nb_mix_nodes(n, 2 * c + 1);
         light.source += own * (gain * diffuse + nb_splat3(turned * nb_exp(sun.x)));
         light.once += own * (sun.z * nb_lattice_lobe(sun.w, to_sun) - turned * nb_exp(sun.y));
         if (!nb_dims_sky(l)) continue;
@@ -284,20 +296,16 @@ nb_vec3 nb_light_between(nb_vec3 first, nb_vec3 last, nb_vec3 depth)
 #define NB_TURNS_OF_PIECE 8
 
 /* A piece is in one lattice; where it is another one than that of the piece before, and at first, an empty piece looks at it. */
-nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
+nb_vec3 nb_gather_in_lattice(nb_lattice l, nb_ray ray, nb_media media, inout int turns)
 {
-    nb_lattice l = nb_lattice_of(int(NEBEL_WORD(NB_HEADER_LATTICE).x));
     nb_turn to_sun = nb_turn_between(ray.direction, nb_to_sun());
     nb_vec2 span = nb_clip_to_lattice(l, ray);
     nb_vec3 light = nb_splat3(0.0);
     nb_vec3 dimmed = nb_splat3(0.0); /* of ambient light, per unit of its mean radiance */
-    nb_two_depths before;
-    before.whole = nb_splat3(0.0);
-    before.scaled = nb_splat3(0.0);
+    nb_two_depths before = nb_depths_between(ray, media, 0.0, span.x < span.y ? span.x : 0.0, turns); /* up to the lattice */
     float t = span.x;
     float smaller = 1.0;
     int halvings = 0;
-    int turns = 0;
     int word = 0;
     nb_node_light here = nb_no_node_light();
     while (t < span.y && nb_smallest(before.scaled) < NB_DARK_DEPTH && !nb_is_tired(turns)) {
@@ -327,7 +335,21 @@ nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
         here = there;
         t = end;
     }
-    return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz - dimmed * NEBEL_WORD(l.word + 9).xyz;
+    nb_vec3 unit = NEBEL_WORD(l.word + 9).xyz;
+    if (nb_is_own(l)) return max(light, nb_splat3(0.0)) * unit;
+    return max(light, nb_splat3(0.0)) * NEBEL_WORD(NB_HEADER_SUN + 1).xyz - dimmed * unit;
+}
+
+/* Of the sun and the sky, and own light. */
+nb_vec3 nb_gather_diffuse(nb_ray ray, nb_media media)
+{
+    nb_vec3 light = nb_splat3(0.0);
+    int turns = 0;
+    for (int i = 0; i < 2; i++) {
+        float word = i == 0 ? NEBEL_WORD(NB_HEADER_LATTICE).x : NEBEL_WORD(NB_HEADER_LATTICE).y;
+        if (word > 0.0) light += nb_gather_in_lattice(nb_lattice_of(int(word)), ray, media, turns);
+    }
+    return light;
 }
 
 #else

@@ -8,19 +8,26 @@
 
 #define MOST_TEXELS ((size_t)1 << 24) /* indices are exact floats */
 
-/* The lattice, and the one of what is beside it. */
-enum { MOST_LATTICES = 2 };
+/* The lattice, the one of what is beside it, and that of own light. */
+enum { MOST_LATTICES = 3 };
 
 static size_t list_lattices(const nebel_snapshot *snapshot, const nb_diffusion *all[MOST_LATTICES])
 {
     size_t count = 0;
     for (const nb_diffusion *d = snapshot->diffusion; d != NULL; d = d->beside) all[count++] = d;
+    if (snapshot->own_diffusion != NULL) all[count++] = snapshot->own_diffusion;
     return count;
+}
+
+/* Behind the number of all channels. */
+static size_t second_texels(const nb_diffusion *d)
+{
+    return (d->is_own ? 3 : d->has_sky ? 2 : 0) * (size_t)d->channel_count;
 }
 
 static size_t texels_of_node(const nb_diffusion *d)
 {
-    return (d->has_sky ? 4 : 2) * (size_t)d->channel_count + 1;
+    return 2 * (size_t)d->channel_count + 1 + second_texels(d);
 }
 
 static size_t count_texels(const nebel_snapshot *snapshot)
@@ -52,7 +59,8 @@ size_t nb_count_lattice_words(const nebel_snapshot *snapshot)
 
 static int flags_of(const nb_diffusion *d)
 {
-    int flags = (d->beside != NULL ? NB_LATTICE_BESIDE : 0) | (d->has_sky ? NB_LATTICE_SKY : 0);
+    int flags = (d->beside != NULL ? NB_LATTICE_BESIDE : 0) | (d->has_sky ? NB_LATTICE_SKY : 0) |
+                (d->is_own ? NB_LATTICE_OWN : 0);
     for (int i = 0; i < 6; i++) flags |= (d->lattice.ends[i / 2][i % 2] == NB_END_LEVEL) << i;
     return flags;
 }
@@ -72,7 +80,13 @@ static void pack_lattice(const nb_diffusion *d, const long double eye[3], size_t
         word[3 + i] = (nebel_word){{0}};
         for (int c = 0; c < 3; c++) word[3 + i].v[c] = (float)d->gain[d->channel_count == 1 ? 0 : c][i / 2][i % 2];
     }
-    word[9] = (nebel_word){{(float)d->skylight[0], (float)d->skylight[1], (float)d->skylight[2]}};
+    const double *light = d->is_own ? d->irradiance : d->skylight;
+    word[9] = (nebel_word){{(float)light[0], (float)light[1], (float)light[2]}};
+}
+
+size_t nb_own_lattice_word(const nebel_snapshot *snapshot)
+{
+    return snapshot->own_diffusion != NULL ? nb_count_lattice_words(snapshot) - NB_LATTICE_WORDS : 0;
 }
 
 void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye[3], nebel_word *words)
@@ -89,7 +103,9 @@ void nb_pack_lattice_words(const nebel_snapshot *snapshot, const long double eye
 /* ---- texels ---------------------------------------------------------------------------------- */
 
 _Static_assert(NB_NODE_DIFFUSE == 0 && NB_NODE_FLUX == 1 && NB_NODE_TURNED == 4 && NB_NODE_WIDTH == 7 &&
-                   NB_NODE_NUMBERS == 8 && NB_NODE_DIMMED == 0 && NB_NODE_ABSORBED == 4 && NB_NODE_SKY_NUMBERS == 8,
+                   NB_NODE_NUMBERS == 8 && NB_NODE_DIMMED == 0 && NB_NODE_ABSORBED == 4 && NB_NODE_SKY_NUMBERS == 8 &&
+                   NB_NODE_OWN_TURNED == 0 && NB_NODE_OWN_ONCE == 4 && NB_NODE_OWN_GLOW == 8 &&
+                   NB_NODE_OWN_NUMBERS == 12,
                "what layout.h says");
 
 static nebel_word *pack_numbers(const float *numbers, size_t texels, nebel_word *word)
@@ -107,7 +123,7 @@ static nebel_word *pack_nodes(const nb_diffusion *d, nebel_word *word)
         const float *numbers = &d->nodes[i * d->node_numbers];
         word = pack_numbers(numbers, texels, word);
         *word++ = (nebel_word){{numbers[4 * texels]}};
-        if (d->has_sky) word = pack_numbers(&numbers[4 * texels + 1], texels, word);
+        word = pack_numbers(&numbers[4 * texels + 1], second_texels(d), word);
     }
     return word;
 }

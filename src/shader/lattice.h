@@ -7,6 +7,9 @@
 /* 0 where there is none. */
 size_t nb_count_lattice_words(const nebel_snapshot *snapshot);
 
+/* Where that of own light begins among them. */
+size_t nb_own_lattice_word(const nebel_snapshot *snapshot);
+
 /* LIMIT, with a message, where the nodes are more than can be addressed. */
 nebel_result nb_check_lattices(const nebel_snapshot *snapshot);
 

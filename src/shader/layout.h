@@ -6,7 +6,7 @@
  *         fog.
  * Word 1: the direction towards the sun, of length 1; how what the sun adds is had between turns, NB_SUN_.
  * Word 2: the sun's irradiance; the first word of the lamps. The sun's numbers are 0 where no medium is sunlit.
- * Word 3: the first word of the lattice of diffuse light, 0 where there is none; three unused.
+ * Word 3: the first word of the lattice of diffuse light, and of that of own light, 0 where there is none; two unused.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind
@@ -47,7 +47,8 @@
  *     1  the size of a cell [m], channels: 1 or 3
  *     2  cells along each axis, flags: 1 << (2 axis) where fog goes on beyond the low end, twice that for the high one
  *     3  gains of diffuse light that leaves along x upwards; downwards; along y, along z
- *     9  mean radiance of the sky; where NB_LATTICE_SKY says that fog dims it
+ *     9  mean radiance of the sky; where NB_LATTICE_SKY says that fog dims it. The unit of own light, where NB_LATTICE_OWN says that the
+ *        lattice is of that and not of the sun and the sky
  *
  * Folds are what the program does once the leaf is on its stack: a bit for each step, the first one lowest, 1 where
  * both must hold; above them all a 1. a and b: of the box of a grid in sunlit fog its first
@@ -74,7 +75,8 @@
  *
  * Nodes of lattices are texels of four floats, the same for every eye: of each node, x fastest, two for each channel,
  * source radiance and flux of diffuse light; NB_NODE_TURNED, _ONCE, _GLOW and _WIDTH of march/diffusion.h; then one that
- * holds g of what is turned. Where NB_LATTICE_SKY is set two more for each channel: NB_NODE_DIMMED and NB_NODE_ABSORBED.
+ * holds g of what is turned. Where NB_LATTICE_SKY is set two more for each channel: NB_NODE_DIMMED and NB_NODE_ABSORBED; where NB_LATTICE_OWN is,
+ * three: NB_NODE_OWN_TURNED, _ONCE and _GLOW.
  *
  * Environment words are vectors of floats, the same for every eye:
  *     0  NB_ENVIRONMENT_; of a map cosine and sine of its rotation, intensity
@@ -124,6 +126,7 @@
 
 #define NB_LATTICE_BESIDE 64
 #define NB_LATTICE_SKY 128
+#define NB_LATTICE_OWN 256
 
 #define NB_KIND_CONSTANT 0
 #define NB_KIND_HEIGHT 1        /* grows below the base */

@@ -276,7 +276,8 @@ static void pack_density(packer *p, const nb_volume *body, nebel_word *word)
 /* Whether anything needs to know what it scatters: of ambient light diffusion does. */
 static int scatters(const nebel_snapshot *snapshot, const nb_medium *medium)
 {
-    const int is_diffuse = snapshot->diffusion != NULL && nb_medium_is_lit(medium);
+    const int is_diffuse = (snapshot->diffusion != NULL && nb_medium_is_lit(medium)) ||
+                           (snapshot->own_diffusion != NULL && nb_medium_scatters(medium));
     return medium->is_sunlit || medium->is_lamplit || is_diffuse;
 }
 
@@ -407,6 +408,8 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
     }
     pack_lamps(&p, snapshot);
     if (snapshot->diffusion != NULL) words[NB_HEADER_LATTICE].v[0] = (float)p.used;
+    if (snapshot->own_diffusion != NULL)
+        words[NB_HEADER_LATTICE].v[1] = (float)(p.used + nb_own_lattice_word(snapshot));
     nb_pack_lattice_words(snapshot, p.eye, &words[p.used]);
     nb_restore_precision(precision);
     nb_place_voxels(snapshot, words);
@@ -466,7 +469,7 @@ uint32_t nebel_pack_features(const nebel_snapshot *snapshot)
     uint32_t features = (snapshot->medium_count > 1 ? NB_HAS_SEVERAL : 0) | (is_mixed(snapshot) ? NB_HAS_MIXED : 0) |
                         (snapshot->max_opacity < 1 ? NB_HAS_MAX_OPACITY : 0) | (snapshot->is_sunlit ? NB_HAS_SUN : 0) |
                         (snapshot->is_lamplit ? NB_HAS_LAMPS : 0) |
-                        (snapshot->diffusion != NULL ? NB_HAS_DIFFUSION : 0) |
+                        (snapshot->diffusion != NULL || snapshot->own_diffusion != NULL ? NB_HAS_DIFFUSION : 0) |
                         (snapshot->skylight_count > 0 ? NB_HAS_ENVIRONMENT : 0);
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;

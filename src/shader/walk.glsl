@@ -235,7 +235,7 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
         p.stage = NB_STAGE_DIFFUSION;
     }
     if (p.stage == NB_STAGE_DIFFUSION && (last || nb_is_fresh(turns))) {
-        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x > 0.0)
+        if (NB_HAS(NB_HAS_DIFFUSION) && lit && sum.met && NEBEL_WORD(NB_HEADER_LATTICE).x + NEBEL_WORD(NB_HEADER_LATTICE).y > 0.0)
             light.in_scattering = max(light.in_scattering + nb_gather_diffuse(ray, media), nb_splat3(0.0));
         if (last || nb_has_loops(count)) p.stage = NB_STAGE_DONE;
     }
