@@ -452,6 +452,47 @@ static void test_shadows(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* Means along a ray over pieces in order; no step from ray to ray shows. Air above all clouds has all of its light. */
+static void test_air_in_the_shade(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.coverage = .8}, {.kind = NEBEL_CLOUD_CIRRUS}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_air_shade shade;
+    const nebel_ray over = {{0, 1e4, 0}, {1, .1, 0}, HUGE_VAL};
+    double last = 0, step = 0, least = 1;
+    assert_int_equal(nebel_shade_air(workspace, 1, &over, 0, &shade, 0), NEBEL_OK);
+    assert_int_equal(shade.count, 0);
+    for (int i = 0; i < 4000; i++) {
+        const double angle = .002 + 1e-4 * i;
+        const nebel_ray ray = {{0, 2, 0}, {cos(angle), sin(angle), 0}, HUGE_VAL};
+        double sum = 0, all = 0;
+        assert_int_equal(nebel_shade_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
+        for (uint32_t k = 0; k < shade.count; k++) {
+            /* Air's light as it is near the ground. */
+            const double seen = exp(-(double)shade.t[k] / 2e4) - exp(-(double)shade.t[k + 1] / 2e4);
+            assert_true(shade.t[k] <= shade.t[k + 1] && shade.part[k][1] >= 0 && shade.part[k][1] <= 1);
+            sum += (double)shade.part[k][1] * seen;
+            all += seen;
+        }
+        const double part = all > 0 ? sum / all : 1;
+        if (i > 0) step = fmax(step, fabs(part - last));
+        least = fmin(least, part);
+        last = part;
+    }
+    print_message("air has %.3f of its light or more; %.4f more or less in a ray's neighbour at most\n", least, step);
+    assert_true(least < .8 && step < .01);
+    assert_int_equal(nebel_shade_air(NULL, 1, &over, 0, &shade, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_air(workspace, 1, NULL, 0, &shade, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_air(workspace, 1, &over, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    const nebel_ray none = {{0, 1e4, 0}, {0, 0, 0}, HUGE_VAL};
+    assert_int_equal(nebel_shade_air(workspace, 1, &none, 0, &shade, 0), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* ---- bad input ------------------------------------------------------------------------------- */
 
 static void test_bad_layers_are_refused(void **state)
@@ -573,6 +614,7 @@ int main(void)
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
         cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_air_in_the_shade),
         cmocka_unit_test(test_bad_layers_are_refused),
         cmocka_unit_test(test_bad_calls_are_refused),
         cmocka_unit_test(test_without_memory),

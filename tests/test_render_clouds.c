@@ -52,14 +52,28 @@ static nebel_light air_to(const world *w, const nebel_sun *sun, nebel_ray ray, d
     return light;
 }
 
+/* Air up to t in the shade of clouds. */
+static nebel_light shaded_to(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_air_shade *shade,
+                             double t)
+{
+    nebel_light light = air_to(w, sun, *ray, t);
+    for (uint32_t k = 0; k < shade->count && (double)shade->t[k] < t; k++) {
+        const nebel_light a = air_to(w, sun, *ray, (double)shade->t[k]),
+                          b = air_to(w, sun, *ray, fmin(t, (double)shade->t[k + 1]));
+        for (int c = 0; c < 3; c++)
+            light.in_scattering[c] -= (1 - (double)shade->part[k][c]) * (b.in_scattering[c] - a.in_scattering[c]);
+    }
+    return light;
+}
+
 /* The table of air in pictures is off by up to 2.7e-2 for rays that end in it. Clouds and air in short pieces: sum of T_air dS_cloud + T_cloud dS_air, with clouds as a straight line between knots. */
 static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, const nebel_cloud_knots *knots,
-                    double light[3])
+                    const nebel_air_shade *shade, double light[3])
 {
     enum { STEPS = 24 };
-    const nebel_light all = air_to(w, sun, *ray, HUGE_VAL);
+    const nebel_light all = shaded_to(w, sun, ray, shade, HUGE_VAL);
     const uint32_t last = knots->count - 1;
-    nebel_light before = air_to(w, sun, *ray, knots->count > 0 ? (double)knots->t[0] : 0);
+    nebel_light before = shaded_to(w, sun, ray, shade, knots->count > 0 ? (double)knots->t[0] : 0);
     for (int c = 0; c < 3; c++) light[c] = knots->count > 0 ? before.in_scattering[c] : 0;
     for (uint32_t k = 1; k < knots->count; k++)
         for (int i = 1; i <= STEPS; i++) {
@@ -67,7 +81,7 @@ static void compose(const world *w, const nebel_sun *sun, const nebel_ray *ray, 
                          t = (double)knots->t[k - 1] * (1 - part) + (double)knots->t[k] * part;
             const double left = (double)knots->transmittance[k - 1] +
                                 (part - .5 / STEPS) * (double)(knots->transmittance[k] - knots->transmittance[k - 1]);
-            const nebel_light here = air_to(w, sun, *ray, t);
+            const nebel_light here = shaded_to(w, sun, ray, shade, t);
             for (int c = 0; c < 3; c++)
                 light[c] += left * (here.in_scattering[c] - before.in_scattering[c]) +
                             .5 * (here.transmittance[c] + before.transmittance[c]) / STEPS *
@@ -104,9 +118,11 @@ static void clouds_and_air_are_one(void **state)
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             const double length = sqrt(pow(ray.direction[0], 2) + pow(ray.direction[1], 2) + pow(ray.direction[2], 2));
             nebel_cloud_knots knots;
+            nebel_air_shade shade;
             double light[3];
+            assert_int_equal(nebel_shade_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
             assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spread / length, &knots, 0), NEBEL_OK);
-            compose(&w, &sun, &ray, &knots, light);
+            compose(&w, &sun, &ray, &knots, &shade, light);
             cloudy += knots.count > 0;
             for (int c = 0; c < 3; c++)
                 worst = fmax(worst, fabs((double)picture.planes.in_scattering[3 * i + (uint32_t)c] - light[c]));
@@ -208,6 +224,96 @@ static void the_ground_has_shadows(void **state)
     free_world(&w);
 }
 
+/* A black wall under clouds. */
+static test_picture render_wall(world *w, double way, const nebel_camera *camera)
+{
+    static const float corners[4][3] = {{-3e4f, -3e4f, 0}, {3e4f, -3e4f, 0}, {3e4f, 3e4f, 0}, {-3e4f, 3e4f, 0}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const nebel_mesh wall = {.origin = {0, 0, -way},
+                             .positions = corners[0],
+                             .indices = indices,
+                             .vertex_count = 4,
+                             .triangle_count = 2,
+                             .texture = -1};
+    w->scene.mesh_count = 1;
+    w->scene.meshes = &wall;
+    return render(w, camera, 2, 1, 0);
+}
+
+/* Of sunlight straight down: the optical depth in short steps, and the slab of delta-Eddington's slab (Joseph, Wiscombe and Weinman 1976). */
+static double let_through(const nebel_clouds *clouds, double x, double z)
+{
+    enum { STEPS = 200 };
+    const double g = .86, wide = g / (1 + g), low = 1500, high = 2500;
+    double depth = 0;
+    for (int i = 0; i < STEPS; i++) {
+        const double place[1][3] = {{x, low + (high - low) * (i + .5) / STEPS, z}};
+        float extinction;
+        assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, place, 0, &extinction), NEBEL_OK);
+        depth += (double)extinction * (high - low) / STEPS;
+    }
+    const double apart = (1 - g * g) * depth;
+    return (5 - exp(-apart)) / (4 + 3 * (1 - wide) * apart);
+}
+
+/* Under closed clouds air before a wall has that part of its light which they let through from above, where the sun is, too. */
+static void air_under_clouds_is_dim(void **state)
+{
+    (void)state;
+    enum { PLACES = 24 };
+    const double way = 4000;
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
+    memcpy(w.scene.sun_direction, (const double[3]){0, 1, 0}, sizeof w.scene.sun_direction);
+    const nebel_camera camera = planet_camera(100, 0);
+    test_picture under = render_wall(&w, way, &camera);
+    w.planet.clouds = NULL;
+    test_picture clear = render_wall(&w, way, &camera);
+    w.planet.clouds = w.clouds;
+    double sum[3] = {0, 0, 0}, of[3] = {0, 0, 0}, through = 0;
+    int count = 0;
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++) {
+            const size_t i = (size_t)y * WIDTH + x;
+            const nebel_ray ray = planet_ray(&camera, 0, x, y, WIDTH, HEIGHT);
+            if (clear.planes.depth[i] < 3900 || ray.direction[1] > .3) continue; /* the ground; clouds */
+            for (int c = 0; c < 3; c++) {
+                sum[c] += (double)under.planes.in_scattering[3 * i + (size_t)c];
+                of[c] += (double)clear.planes.in_scattering[3 * i + (size_t)c];
+            }
+            for (int k = 0; k < PLACES && y == HEIGHT / 2; k++, count++) {
+                const double t = way * (k + .5) / PLACES;
+                through += let_through(w.clouds, t * ray.direction[0], t * ray.direction[2]);
+            }
+        }
+    through /= count;
+    print_message("closed clouds let %.3f through; air has %.3f %.3f %.3f of its light\n", through, sum[0] / of[0],
+                  sum[1] / of[1], sum[2] / of[2]);
+    assert_true(count > 0 && through < .5);
+    for (int c = 0; c < 3; c++) assert_true(fabs(sum[c] / of[c] / through - 1) < .1);
+    test_picture_free(&under);
+    test_picture_free(&clear);
+    free_world(&w);
+}
+
+/* Where the weather has no clouds, all is as without them, to the last bit. */
+static void no_clouds_change_nothing(void **state)
+{
+    (void)state;
+    static const float none = 0;
+    world w;
+    make_world(&(nebel_cloud_layer){.weather = {1, 1, 1, &none}}, &w);
+    const nebel_camera camera = planet_camera(2, .4);
+    test_picture with = render_wall(&w, 4000, &camera); /* with it both have tables for rays that end in the air */
+    w.planet.clouds = NULL;
+    test_picture without = render_wall(&w, 4000, &camera);
+    w.planet.clouds = w.clouds;
+    assert_memory_equal(with.planes.color, without.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
+    test_picture_free(&with);
+    test_picture_free(&without);
+    free_world(&w);
+}
+
 static void bad_times_are_refused(void **state)
 {
     (void)state;
@@ -229,8 +335,9 @@ static void bad_times_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(clouds_and_air_are_one), cmocka_unit_test(pictures_are_still),
-        cmocka_unit_test(clouds_end_at_surfaces), cmocka_unit_test(the_ground_has_shadows),
+        cmocka_unit_test(clouds_and_air_are_one),  cmocka_unit_test(pictures_are_still),
+        cmocka_unit_test(clouds_end_at_surfaces),  cmocka_unit_test(the_ground_has_shadows),
+        cmocka_unit_test(air_under_clouds_is_dim), cmocka_unit_test(no_clouds_change_nothing),
         cmocka_unit_test(bad_times_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

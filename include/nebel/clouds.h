@@ -25,6 +25,7 @@ extern "C" {
 
 #define NEBEL_MAX_CLOUD_LAYERS 4
 #define NEBEL_MAX_CLOUD_KNOTS 16
+#define NEBEL_MAX_AIR_SHADES 6
 #define NEBEL_MAX_CLOUD_RATIO 1e6 /* of the air's thickness to a layer's */
 #define NEBEL_CLOUD_NONE (-1.)    /* where 0 would mean the number of the kind */
 
@@ -99,7 +100,8 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
 /* NULL is fine. */
 void nebel_destroy_cloud_view(nebel_cloud_view *view);
 
-/* What was found so far of shadows in a view, which must outlive it: some 19 MB. Results do not hang on it. One thread at
+/* What was found so far of shadows in a view, which must outlive it: some 13 MB
+ * and 6 for each layer. Results do not hang on it. One thread at
  * a time. */
 typedef struct nebel_cloud_workspace nebel_cloud_workspace;
 
@@ -127,6 +129,18 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
  * nebel_cloud_extinction. Errors: ARGUMENT. */
 nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
                                 size_t place_stride, float *parts);
+
+/* What part of its light the air has along a ray, under clouds and between them. */
+typedef struct nebel_air_shade {
+    uint32_t count;                    /* of pieces; 0: all of its light everywhere */
+    float t[NEBEL_MAX_AIR_SHADES + 1]; /* m, ascending: piece k is from t[k] to t[k + 1]; elsewhere there is no shade */
+    float part[NEBEL_MAX_AIR_SHADES][3]; /* of what clear air has there, 0 to 1 */
+} nebel_air_shade;
+
+/* Along n rays up to t_max or the ground, as means over pieces: of sunlight what comes through clouds on the way to the sun, of
+ * the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes. Errors: ARGUMENT. */
+nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
+                             nebel_air_shade *shades, size_t shade_stride);
 
 #ifdef __cplusplus
 }

@@ -40,13 +40,51 @@ void nb_cloudscape_free(nb_frame *frame)
 
 /* ---- along the middles of pixels ------------------------------------------------------------- */
 
-void nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+static nebel_ray ray_of(const nb_frame *frame, const nb_cloud_scratch *clouds, uint32_t lane)
 {
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    for (int c = 0; c < 3; c++) {
+        ray.origin[c] = frame->view.position[c];
+        ray.direction[c] = clouds->rays.direction[c][lane];
+    }
+    return ray;
+}
+
+static nebel_result shade_air(const nb_frame *frame, nb_cloud_scratch *clouds, uint32_t lane)
+{
+    const nebel_ray ray = ray_of(frame, clouds, lane);
+    nebel_air_shade shade;
+    float left[3][NB_SHADED_PIECES], light[3][NB_SHADED_PIECES];
+    double along[3][NB_SHADED_PIECES];
+    const double *const direction[3] = {along[0], along[1], along[2]};
+    nebel_light_planes lights = {.error = NULL};
+    nebel_result result = nebel_shade_air(clouds->workspace, 1, &ray, 0, &shade, 0);
+    clouds->shaded_count[lane] = 0;
+    if (result != NEBEL_OK || shade.count == 0) return result;
+    for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < NB_SHADED_PIECES; k++) along[c][k] = ray.direction[c];
+        lights.transmittance[c] = left[c];
+        lights.in_scattering[c] = light[c];
+    }
+    result = nb_air_trace(&frame->air, shade.count + 1, direction, shade.t, &lights);
+    if (result == NEBEL_OK) clouds->shaded_count[lane] = nb_shaded_set(&shade, light, clouds->shaded[lane]);
+    return result;
+}
+
+nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
+{
+    nebel_result result = NEBEL_OK;
     nb_cloud_scratch *clouds = &scratch->clouds;
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
                  scratch->centers.y + place->first, &clouds->rays);
     memset(clouds->reach, 0, sizeof clouds->reach);
-    for (int i = 0; i < NB_BATCH; i++) clouds->knots[i].count = 0;
+    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        const int in_row = nb_lane_x(place->first + i) < frame->width - place->left;
+        const int in_column = nb_lane_y(place->first + i) < frame->height - place->top;
+        clouds->knots[i].count = clouds->shaded_count[i] = 0;
+        if (in_row && in_column) result = shade_air(frame, clouds, i);
+    }
+    return result;
 }
 
 #define NEAR_END 0.98f
@@ -70,11 +108,8 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         clouds->is_new[i] = 0;
         if (!scratch->inside[i] || is_found(clouds, i, scratch->distance[i])) continue;
-        nebel_ray ray = {.t_max = (double)scratch->distance[i]};
-        for (int c = 0; c < 3; c++) {
-            ray.origin[c] = frame->view.position[c];
-            ray.direction[c] = clouds->rays.direction[c][i];
-        }
+        nebel_ray ray = ray_of(frame, clouds, (uint32_t)i);
+        ray.t_max = (double)scratch->distance[i];
         result = nebel_trace_clouds(clouds->workspace, 1, &ray, 0, frame->air.pixel / (double)clouds->rays.length[i],
                                     &clouds->knots[i], 0);
         clouds->reach[i] = (float)ray.t_max;
@@ -112,6 +147,9 @@ static void mix_lane(const nb_frame *frame, nb_cloud_scratch *clouds, int lane)
     nb_cloud_haze_ask(knots, direction, &haze, &rays);
     nb_air_trace(&frame->air, knots->count, rays.direction, knots->t, &rays.lights);
     for (int c = 0; c < 3; c++) {
+        for (uint32_t k = 0; k < knots->count; k++)
+            haze.light[c][k] =
+                nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k], haze.light[c][k]);
         const float left[2] = {clouds->left[0][c][lane], clouds->left[1][c][lane]};
         const float light[2] = {clouds->light[0][c][lane], clouds->light[1][c][lane]};
         float over[NEBEL_MAX_CLOUD_KNOTS];

@@ -127,8 +127,8 @@ static nebel_result render_batch(const nb_frame *frame, const nb_place *place, u
 {
     nb_place now = *place;
     int is_even = 0;
-    if (frame->cloud_view != NULL) nb_cloudscape_start(frame, place, scratch);
-    nebel_result result = nb_even_may_be(frame) ? nb_even_render(frame, place, count, scratch, &is_even) : NEBEL_OK;
+    nebel_result result = frame->cloud_view != NULL ? nb_cloudscape_start(frame, place, scratch) : NEBEL_OK;
+    if (result == NEBEL_OK && nb_even_may_be(frame)) result = nb_even_render(frame, place, count, scratch, &is_even);
     for (uint32_t s = 0; s < count && result == NEBEL_OK; s++) {
         now.sample = first + s;
         if (!is_even) result = nb_batch_render(frame, &now, s, scratch);

@@ -74,6 +74,15 @@ static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
     scratch->count[lane]++;
 }
 
+/* By clouds. */
+static void shade(const nb_cloud_scratch *clouds, nb_air_knots *knot)
+{
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < NB_BATCH; i++)
+            knot->air_light[c][i] =
+                nb_shaded_light(clouds->shaded[i], clouds->shaded_count[i], c, knot->at[i], knot->air_light[c][i]);
+}
+
 static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
                                nb_scratch *scratch, nb_air_knots *knot)
 {
@@ -88,8 +97,10 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
         air.transmittance[c] = knot->air_left[c];
         air.in_scattering[c] = knot->air_light[c];
     }
-    const nebel_result result = nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &lights);
-    return result == NEBEL_OK ? nb_air_trace(&frame->air, NB_BATCH, direction, knot->at, &air) : result;
+    nebel_result result = nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &lights);
+    if (result == NEBEL_OK) result = nb_air_trace(&frame->air, NB_BATCH, direction, knot->at, &air);
+    if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, knot);
+    return result;
 }
 
 /* Of light, which is as uncertain as it is bright where that is more than 1. */
@@ -182,6 +193,7 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
     }
     set_first(frame, scratch);
     nebel_result result = nb_air_trace(&frame->air, NB_BATCH, direction, frame->air.ends ? first->at : NULL, &lights);
+    if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, first);
     if (fog == NULL) {
         take_air(scratch);
         return result;

@@ -14,6 +14,7 @@
 #include "surface.h"
 #include "view.h"
 
+#include "base/air_shade.h"
 #include "base/lighting.h"
 
 #include <nebel/render.h>
@@ -49,6 +50,8 @@ typedef struct nb_cloud_scratch {
     float reach[NB_BATCH]; /* m, how far they are known */
     int is_new[NB_BATCH];
     nebel_cloud_knots knots[NB_BATCH];
+    nb_shaded_piece shaded[NB_BATCH][NB_SHADED_PIECES]; /* the air */
+    uint32_t shaded_count[NB_BATCH];
     float over[NEBEL_MAX_CLOUD_KNOTS][3][NB_BATCH]; /* what a knot adds to light that came from behind */
     float left[2][3][NB_BATCH], light[2][3][NB_BATCH],
         end[NB_BATCH]; /* of fog and air before the first knot and the last */

@@ -18,7 +18,7 @@ typedef struct job {
     const nb_world *worlds;
     int world_count;
     const nb_cloud_fog *fog;
-    const float *places;
+    const float *places, *left;
     float *over, *shade;
 } job;
 
@@ -96,7 +96,11 @@ nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, cons
 void nb_gl_clouds_release(nb_gl_clouds *clouds)
 {
     forget(clouds);
-    for (int i = 0; i < NB_CLOUD_PARTS; i++) nb_release(&clouds->allocator, clouds->parts[i].knots);
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) {
+        nb_release(&clouds->allocator, clouds->parts[i].knots);
+        nb_release(&clouds->allocator, clouds->parts[i].pieces);
+        nb_release(&clouds->allocator, clouds->parts[i].dusks);
+    }
     nb_release(&clouds->allocator, clouds->pixels);
 }
 
@@ -111,12 +115,56 @@ static void keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knot
         return;
     }
     part->knots = list;
-    *pixel = (nb_cloud_pixel){(uint32_t)part->count, knots->count};
+    pixel->first = (uint32_t)part->count;
+    pixel->count = knots->count;
     for (uint32_t k = 0; k < knots->count; k++) {
         nb_cloud_knot *const knot = &part->knots[part->count++];
         *knot = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
         memcpy(knot->light, knots->in_scattering[k], sizeof knot->light);
     }
+}
+
+static int grow_pieces(const nebel_allocator *allocator, nb_cloud_part *part)
+{
+    void *pieces = part->pieces, *dusks = part->dusks;
+    const size_t count = part->piece_count, most = count + NB_SHADED_PIECES;
+    const int has_pieces = nb_grow(allocator, &pieces, sizeof *part->pieces, count, &part->piece_capacity, most);
+    part->pieces = pieces;
+    const int has_dusks = nb_grow(allocator, &dusks, sizeof *part->dusks, count, &part->dusk_capacity, most);
+    part->dusks = dusks;
+    return has_pieces && has_dusks;
+}
+
+static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray *ray, nb_cloud_pixel *pixel)
+{
+    nebel_air_shade shade;
+    float left[3][NB_SHADED_PIECES], light[3][NB_SHADED_PIECES];
+    double along[3][NB_SHADED_PIECES];
+    const double *const direction[3] = {along[0], along[1], along[2]};
+    nebel_light_planes lights = {.error = NULL};
+    pixel->first_piece = (uint32_t)part->piece_count;
+    pixel->piece_count = 0;
+    nebel_result result = nebel_shade_air(part->workspace, 1, ray, 0, &shade, 0);
+    if (result != NEBEL_OK || shade.count == 0) return result;
+    if (!grow_pieces(&j->clouds->allocator, part)) return NEBEL_ERROR_MEMORY;
+    for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < NB_SHADED_PIECES; k++) along[c][k] = ray->direction[c];
+        lights.transmittance[c] = left[c];
+        lights.in_scattering[c] = light[c];
+    }
+    result = nb_worlds_trace(j->worlds, j->world_count, shade.count + 1, direction, shade.t, &lights);
+    if (result != NEBEL_OK) return result;
+    nb_shaded_piece *const pieces = part->pieces + part->piece_count;
+    pixel->piece_count = nb_shaded_set(&shade, light, pieces);
+    for (uint32_t k = 0; k < pixel->piece_count; k++)
+        for (int c = 0; c < 3; c++) {
+            nb_cloud_dusk *const dusk = &part->dusks[part->piece_count + k];
+            dusk->fog[c] = 1;
+            dusk->air[c] = left[c][k];
+            dusk->gone[c] = light[c][k] - (pieces[k].rest[c] + pieces[k].part[c] * light[c][k]);
+        }
+    part->piece_count += pixel->piece_count;
+    return NEBEL_OK;
 }
 
 static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)
@@ -129,22 +177,61 @@ static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)
         const double length = direction_at(picture, x, y, ray.direction);
         memcpy(ray.origin, picture->eye, sizeof ray.origin);
         part->result = nebel_trace_clouds(part->workspace, 1, &ray, 0, picture->pixel / length, &knots, 0);
+        if (part->result == NEBEL_OK) part->result = shade_air(j, part, &ray, &j->clouds->pixels[i]);
         if (part->result == NEBEL_OK) keep_knots(j, part, &knots, &j->clouds->pixels[i]);
         for (int k = 0; k < 2 && j->ends[k] != NULL; k++)
             j->ends[k][i] = knots.count == 0 ? 0 : knots.t[k == 0 ? 0 : knots.count - 1];
     }
 }
 
-nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *ends[2])
+nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
+                                int count, float *ends[2])
 {
     void *list = clouds->pixels;
-    const size_t count = (size_t)picture->view->width * picture->view->height;
-    if (!nb_grow(&clouds->allocator, &list, sizeof *clouds->pixels, 0, &clouds->pixel_capacity, count))
+    const size_t pixels = (size_t)picture->view->width * picture->view->height;
+    if (!nb_grow(&clouds->allocator, &list, sizeof *clouds->pixels, 0, &clouds->pixel_capacity, pixels))
         return NEBEL_ERROR_MEMORY;
     clouds->pixels = list;
-    for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].count = 0;
-    job j = {.clouds = clouds, .picture = picture, .row = trace_row, .ends = ends};
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].count = clouds->parts[i].piece_count = 0;
+    job j = {
+        .clouds = clouds, .picture = picture, .row = trace_row, .worlds = worlds, .world_count = count, .ends = ends};
     return do_parts(&j);
+}
+
+/* ---- fog before the shade -------------------------------------------------------------------- */
+
+static nb_cloud_part *part_of(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t y)
+{
+    const job j = {.picture = picture};
+    size_t i = 0;
+    while (y >= first_row(&j, i + 1)) i++;
+    return &clouds->parts[i];
+}
+
+void nb_gl_clouds_write_places(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, float *places)
+{
+    for (uint32_t y = 0; y < picture->view->height; y++) {
+        const nb_cloud_part *const part = part_of(clouds, picture, y);
+        for (uint32_t x = 0; x < picture->view->width; x++) {
+            const size_t i = (size_t)y * picture->view->width + x;
+            const nb_cloud_pixel *const pixel = &clouds->pixels[i];
+            places[i] = k < pixel->piece_count ? part->pieces[pixel->first_piece + k].t : 0;
+        }
+    }
+}
+
+void nb_gl_clouds_keep_fog(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, const float *left)
+{
+    for (uint32_t y = 0; y < picture->view->height; y++) {
+        nb_cloud_part *const part = part_of(clouds, picture, y);
+        for (uint32_t x = 0; x < picture->view->width; x++) {
+            const size_t i = (size_t)y * picture->view->width + x;
+            const nb_cloud_pixel *const pixel = &clouds->pixels[i];
+            if (k >= pixel->piece_count) continue;
+            nb_cloud_dusk *const dusk = &part->dusks[pixel->first_piece + k];
+            for (size_t c = 0; c < 3; c++) dusk->fog[c] = dusk->air[c] > 0 ? left[4 * i + c] / dusk->air[c] : 0;
+        }
+    }
 }
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
@@ -161,6 +248,27 @@ static nebel_cloud_knots knots_of(const nb_cloud_part *part, const nb_cloud_pixe
     return knots;
 }
 
+/* Of one colour: light of air up to a place, which loses some in the shade of clouds. */
+static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, int c, float t, float clear)
+{
+    return nb_shaded_light(part->pieces + pixel->first_piece, pixel->piece_count, c, t, clear);
+}
+
+/* Of one colour: what shade takes from light of air up to t, through fog that leaves `fog` up to there; between two pieces' places fog
+ * counts as the mean of both. */
+static float lost_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, int c, float t, float clear, float fog)
+{
+    const nb_shaded_piece *const pieces = part->pieces + pixel->first_piece;
+    const nb_cloud_dusk *const dusks = part->dusks + pixel->first_piece;
+    float lost = 0;
+    if (pixel->piece_count == 0 || !(t > pieces[0].t)) return 0;
+    uint32_t k = 0;
+    for (; k + 1 < pixel->piece_count && t > pieces[k + 1].t; k++)
+        lost += 0.5f * (dusks[k].fog[c] + dusks[k + 1].fog[c]) * (dusks[k + 1].gone[c] - dusks[k].gone[c]);
+    if (k + 1 == pixel->piece_count) return lost;
+    return lost + 0.5f * (dusks[k].fog[c] + fog) * (clear - shaded_at(part, pixel, c, t, clear) - dusks[k].gone[c]);
+}
+
 static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const double direction[3])
 {
     const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
@@ -173,12 +281,16 @@ static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const
         nb_worlds_trace(j->worlds, j->world_count, knots.count, rays.direction, knots.t, &rays.lights);
     for (int c = 0; c < 3 && result == NEBEL_OK; c++) {
         const size_t at = 4 * i + (size_t)c;
-        float over[NEBEL_MAX_CLOUD_KNOTS];
-        if (fog != NULL) {
-            const float left[2] = {fog->left[0][at], fog->left[1][at]},
-                        light[2] = {fog->light[0][at], fog->light[1][at]};
-            nb_cloud_haze_add_fog(&knots, c, left, light, &haze);
+        float over[NEBEL_MAX_CLOUD_KNOTS], left[2], light[2];
+        for (int end = 0; end < 2 && fog != NULL; end++) {
+            const uint32_t k = end == 0 ? 0 : knots.count - 1;
+            left[end] = fog->left[end][at];
+            light[end] = fog->light[end][at] - lost_at(part, pixel, c, knots.t[k], haze.light[c][k],
+                                                       haze.left[c][k] > 0 ? left[end] / haze.left[c][k] : 0);
         }
+        for (uint32_t k = 0; k < knots.count; k++)
+            haze.light[c][k] = shaded_at(part, pixel, c, knots.t[k], haze.light[c][k]);
+        if (fog != NULL) nb_cloud_haze_add_fog(&knots, c, left, light, &haze);
         nb_cloud_haze_sum(&knots, c, &haze, over);
         for (uint32_t k = 0; k < knots.count; k++) part->knots[pixel->first + k].light[c] = over[k];
     }
@@ -218,13 +330,30 @@ static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, floa
     over[3] = (1 - part) * a->left + part * b->left;
 }
 
-static nebel_result shade(const job *j, nb_cloud_part *part, uint32_t x, uint32_t y, double t, float *left)
+static nebel_result shade(const job *j, nb_cloud_part *part, const double direction[3], double t, float *left)
 {
-    double direction[3], place[1][3];
-    (void)direction_at(j->picture, x, y, direction);
+    double place[1][3];
     const double length = nb_vector_length(direction);
     for (int c = 0; c < 3; c++) place[0][c] = j->picture->eye[c] + t * direction[c] / length;
     return nebel_shade_clouds(part->workspace, 4 * j->picture->pixel * t, 1, (const double(*)[3])place, 0, left);
+}
+
+/* What shade takes from light of air up to the end of a ray, behind clouds that leave over[3] of it. */
+static nebel_result shade_end(const job *j, const nb_cloud_part *part, size_t i, const double direction[3], float t,
+                              float over[4])
+{
+    const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
+    const double *const planes[3] = {direction, direction + 1, direction + 2};
+    float left[3], light[3];
+    const nebel_light_planes lights = {.transmittance = {left, left + 1, left + 2},
+                                       .in_scattering = {light, light + 1, light + 2}};
+    if (pixel->piece_count == 0) return NEBEL_OK;
+    const nebel_result result = nb_worlds_trace(j->worlds, j->world_count, 1, planes, &t, &lights);
+    for (int c = 0; c < 3 && result == NEBEL_OK; c++) {
+        const float fog = j->left == NULL ? 1 : left[c] > 0 ? j->left[4 * i + (size_t)c] / left[c] : 0;
+        over[c] -= over[3] * lost_at(part, pixel, c, t, light[c], fog);
+    }
+    return result;
 }
 
 static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
@@ -233,16 +362,27 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
         const size_t i = (size_t)y * j->picture->view->width + x;
         const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
         const float t = j->places[4 * i];
-        lay_over(part->knots + pixel->first, pixel->count, t > 0 ? t : HUGE_VALF, j->over + 4 * i);
+        const float end = t > 0 ? t : HUGE_VALF;
+        double direction[3];
+        (void)direction_at(j->picture, x, y, direction);
+        lay_over(part->knots + pixel->first, pixel->count, end, j->over + 4 * i);
+        part->result = shade_end(j, part, i, direction, end, j->over + 4 * i);
         j->shade[i] = 1;
-        if (t > 0) part->result = shade(j, part, x, y, (double)t, &j->shade[i]);
+        if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, &j->shade[i]);
     }
 }
 
-nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *places, float *over,
-                              float *shade_plane)
+nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
+                              const float *places, const float *left, float *over, float *shade_plane)
 {
-    job j = {
-        .clouds = clouds, .picture = picture, .row = end_row, .places = places, .over = over, .shade = shade_plane};
+    job j = {.clouds = clouds,
+             .picture = picture,
+             .row = end_row,
+             .worlds = worlds,
+             .world_count = count,
+             .places = places,
+             .left = left,
+             .over = over,
+             .shade = shade_plane};
     return do_parts(&j);
 }

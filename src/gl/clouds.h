@@ -2,6 +2,7 @@
 #ifndef NB_GL_CLOUDS_H
 #define NB_GL_CLOUDS_H
 
+#include "base/air_shade.h"
 #include "base/base.h"
 #include "base/worlds.h"
 
@@ -17,16 +18,24 @@ typedef struct nb_cloud_knot {
     float light[3]; /* of clouds alone; once they are mixed with air and fog: what is added to `left` of the haze's */
 } nb_cloud_knot;
 
+/* Where a piece of shaded air begins: what fog leaves, air leaves, and what shade has taken of the air's light, without fog. */
+typedef struct nb_cloud_dusk {
+    float fog[3], air[3], gone[3];
+} nb_cloud_dusk;
+
 typedef struct nb_cloud_part {
     nebel_cloud_workspace *workspace;
     nb_cloud_knot *knots;
     size_t count, capacity;
+    nb_shaded_piece *pieces;
+    nb_cloud_dusk *dusks; /* of each */
+    size_t piece_count, piece_capacity, dusk_capacity;
     nebel_result result;
 } nb_cloud_part;
 
-/* The knots of a pixel in those of its part. */
+/* The knots of a pixel, and its pieces of shaded air, in those of its part. */
 typedef struct nb_cloud_pixel {
-    uint32_t first, count;
+    uint32_t first, count, first_piece, piece_count;
 } nb_cloud_pixel;
 
 typedef struct nb_gl_clouds {
@@ -52,9 +61,15 @@ typedef struct nb_cloud_picture {
 nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
                               const nebel_log *log);
 
-/* Finds all pixels' knots, in clear space. ends[0] and ends[1], if they are wanted: of each pixel where clouds begin, and
+/* Finds all pixels' knots, in clear space, and their shade on the air, which is that of the eye. ends[0] and ends[1], if they are wanted: of each pixel where clouds begin, and
  * where they end; 0: there are none. MEMORY. */
-nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *ends[2]);
+nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
+                                int count, float *ends[2]);
+
+/* Where piece k of the shaded air of each pixel begins; 0: there is none. */
+void nb_gl_clouds_write_places(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, float *places);
+/* What air and fog leave up to there: 4 numbers for each pixel. */
+void nb_gl_clouds_keep_fog(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, const float *left);
 
 /* What air and fog do before both ends of a pixel's clouds: 4 numbers for each pixel. */
 typedef struct nb_cloud_fog {
@@ -65,10 +80,10 @@ typedef struct nb_cloud_fog {
 nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
                               const nb_cloud_fog *fog);
 
-/* For rays that end at places[4 i], 0: nowhere, what is left of haze and added to it, 4 numbers for each; and what clouds
- * leave of the sunlight there. MEMORY. */
-nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *places, float *over,
-                              float *shade);
+/* For rays that end at places[4 i], 0: nowhere, what is left of haze, which is in no shade, and added to it, 4 numbers for
+ * each; and what clouds leave of the sunlight there. left[4 i]: what fog and air leave; NULL: there is no fog. MEMORY. */
+nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
+                              const float *places, const float *left, float *over, float *shade);
 
 void nb_gl_clouds_release(nb_gl_clouds *clouds);
 

@@ -577,13 +577,6 @@ static nebel_result set_sample(frame *f, nb_pixel_point point)
                    "camera: it is too far out, or its view too narrow, for numbers");
 }
 
-static nebel_result draw_clouds(frame *f, uint32_t sample)
-{
-    if (f->clouds == NULL) return NEBEL_OK;
-    const nebel_result result = sample == 0 ? nb_frame_trace_clouds(f) : NEBEL_OK;
-    return result == NEBEL_OK ? nb_frame_end_clouds(f) : result;
-}
-
 static nebel_result draw_sample(frame *f, uint32_t sample)
 {
     nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
@@ -591,10 +584,11 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     draw_surfaces(f);
     if (sample == 0 && f->casts) result = nb_frame_prepare_sun(f);
     if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_draw_shells(f);
-    if (result == NEBEL_OK) result = draw_clouds(f, sample);
+    if (result == NEBEL_OK && sample == 0 && f->clouds != NULL) result = nb_frame_trace_clouds(f);
     f->place = f->renderer->targets.place;
     f->depth = f->renderer->targets.depth;
     if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
+    if (result == NEBEL_OK && f->clouds != NULL) result = nb_frame_end_clouds(f);
     if (result == NEBEL_OK) result = nb_frame_draw_particles(f);
     if (result == NEBEL_OK) result = draw_dimming(f);
     return result == NEBEL_OK ? draw_light(f, sample) : result;

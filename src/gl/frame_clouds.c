@@ -79,20 +79,36 @@ static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *li
     return NEBEL_OK;
 }
 
+/* What fog leaves where shaded air begins, and where it changes; in planes of the fog at clouds' ends, which are found later. */
+static nebel_result find_dusk(nb_gl_frame *f, const nb_cloud_picture *picture, float *ends, nb_cloud_fog *fog)
+{
+    nb_gl_clouds *const clouds = &f->renderer->clouds;
+    nebel_result result = NEBEL_OK;
+    for (uint32_t k = 0; k < NB_SHADED_PIECES && result == NEBEL_OK; k++) {
+        nb_gl_clouds_write_places(clouds, picture, k, ends);
+        result = find_fog(f, ends, fog->left[0], fog->light[0]);
+        if (result == NEBEL_OK) nb_gl_clouds_keep_fog(clouds, picture, k, fog->left[0]);
+    }
+    return result;
+}
+
 static nebel_result trace_in_fog(nb_gl_frame *f, const nb_cloud_picture *picture)
 {
     nebel_gl_renderer *const r = f->renderer;
-    float *ends[2] = {make_plane(f, 1), make_plane(f, 1)};
+    float *ends[2] = {make_plane(f, 1), make_plane(f, 1)}, *const places = make_plane(f, 1);
     nb_cloud_fog fog;
-    int all = ends[0] != NULL && ends[1] != NULL;
+    int all = ends[0] != NULL && ends[1] != NULL && places != NULL;
     for (int i = 0; i < 2; i++) {
         fog.left[i] = make_plane(f, 4);
         fog.light[i] = make_plane(f, 4);
         all = all && fog.left[i] != NULL && fog.light[i] != NULL;
     }
-    nebel_result result = all ? nb_gl_clouds_trace(&r->clouds, picture, ends) : NEBEL_ERROR_MEMORY;
+    nebel_result result =
+        all ? nb_gl_clouds_trace(&r->clouds, picture, r->air.worlds, r->air.count, ends) : NEBEL_ERROR_MEMORY;
+    if (result == NEBEL_OK) result = find_dusk(f, picture, places, &fog);
     for (int i = 0; i < 2 && result == NEBEL_OK; i++) result = find_fog(f, ends[i], fog.left[i], fog.light[i]);
     if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, picture, r->air.worlds, r->air.count, &fog);
+    nb_release(&r->allocator, places);
     for (int i = 0; i < 2; i++) {
         nb_release(&r->allocator, ends[i]);
         nb_release(&r->allocator, fog.left[i]);
@@ -112,7 +128,7 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
     nebel_result result = nb_gl_clouds_set(&r->clouds, f->clouds, &sun, f->desc->time, log_of(f));
     if (result != NEBEL_OK) return fail_memory(f, result);
     if (has_fog(f)) return fail_memory(f, trace_in_fog(f, &picture));
-    result = nb_gl_clouds_trace(&r->clouds, &picture, none);
+    result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count, none);
     if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, NULL);
     return fail_memory(f, result);
 }
@@ -123,16 +139,21 @@ nebel_result nb_frame_end_clouds(const nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, &f->rays);
-    float *const places = make_plane(f, 4), *const over = make_plane(f, 4), *const shade = make_plane(f, 1);
-    nebel_result result = places != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    float *const places = make_plane(f, 4), *const left = make_plane(f, 4), *const over = make_plane(f, 4),
+                 *const shade = make_plane(f, 1);
+    nebel_result result =
+        places != NULL && left != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK) {
         read_back(f, r->targets.surface_buffer, 0, places);
-        result = nb_gl_clouds_end(&r->clouds, &picture, places, over, shade);
+        if (has_fog(f)) read_back(f, r->targets.fog_buffer, 1, left);
+        result = nb_gl_clouds_end(&r->clouds, &picture, r->air.worlds, r->air.count, places, has_fog(f) ? left : NULL,
+                                  over, shade);
     }
     result = fail_memory(f, result);
     if (result == NEBEL_OK) result = upload(f, &r->cloud_over, 4, over);
     if (result == NEBEL_OK) result = upload(f, &r->cloud_shade, 1, shade);
     nb_release(&r->allocator, places);
+    nb_release(&r->allocator, left);
     nb_release(&r->allocator, over);
     nb_release(&r->allocator, shade);
     return result;

@@ -182,6 +182,39 @@ static float depth_to_sun(nebel_cloud_workspace *workspace, const double from[3]
     return (float)sum + depth_along(workspace, own, from, sun, first, width);
 }
 
+/* Columns next to each other in a layer are as good as one so wide, in sizes of heaps. Wider ones would count what comes through
+ * gaps and what scatters through heaps as if all were as thick as their mean: of those, some across are asked. */
+#define COLUMN_PART 0.2f
+enum { MOST_COLUMNS = 4 };
+
+static void find_roof(nebel_cloud_workspace *workspace, int k, const double place[3], float width, float parts[3])
+{
+    const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
+    const float fine = nb_smaller(width, COLUMN_PART * layer->size),
+                first = nb_smaller(fine, 0.1f / layer->per_thickness);
+    const float cosine = (float)layer->mean_cosine;
+    const int count = width > 2 * fine ? MOST_COLUMNS : width > fine ? 2 : 1;
+    const double axis[3] = {fabs(place[0]) < fabs(place[1]), !(fabs(place[0]) < fabs(place[1])), 0};
+    double across[2][3];
+    nb_vector_cross(place, axis, across[0]);
+    nb_vector_make_unit(across[0]);
+    nb_vector_cross(place, across[0], across[1]);
+    nb_vector_make_unit(across[1]);
+    parts[0] = parts[1] = parts[2] = 0;
+    for (int i = 0; i < count * count; i++) {
+        const double u = ((i % count + 0.5) / count - 0.5) * (double)width,
+                     v = ((i / count + 0.5) / count - 0.5) * (double)width;
+        double up[3], base[3];
+        for (int c = 0; c < 3; c++) up[c] = place[c] + u * across[0][c] + v * across[1][c];
+        nb_vector_make_unit(up);
+        for (int c = 0; c < 3; c++) base[c] = layer->low * up[c];
+        const float sun = depth_along(workspace, -1, base, workspace->view->sun.direction, first, fine);
+        parts[0] += nb_cloud_part_through(sun, cosine) / (float)(count * count);
+        parts[1] +=
+            nb_cloud_part_through(depth_along(workspace, -1, base, up, first, fine), cosine) / (float)(count * count);
+    }
+}
+
 static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const int32_t at[3], int level,
                         float depth[3])
 {
@@ -190,6 +223,10 @@ static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, co
     for (int i = 0; i < 3; i++) place[i] = ldexp((double)at[i], level);
     if (ways == NB_CLOUD_TO_SUN) {
         depth[0] = depth_to_sun(workspace, place, width, width);
+        return;
+    }
+    if (ways >= NB_CLOUD_ROOFS) {
+        find_roof(workspace, (int)ways - NB_CLOUD_ROOFS, place, width, depth);
         return;
     }
     const double radius = fmax(1, nb_vector_length(place));
@@ -279,6 +316,17 @@ float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place
     float depth[3];
     read_nodes(workspace, NB_CLOUD_TO_SUN, place, width, depth);
     return depth[0];
+}
+
+/* Nodes farther apart than that would lie deep in the planet. */
+#define WIDEST_ROOF 0.125f
+
+nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width)
+{
+    float parts[3];
+    read_nodes(workspace, (nb_cloud_ways)(NB_CLOUD_ROOFS + layer), place,
+               nb_smaller(width, WIDEST_ROOF * (float)workspace->view->clouds->layers[layer].low), parts);
+    return (nb_cloud_roof){parts[0], parts[1]};
 }
 
 nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)

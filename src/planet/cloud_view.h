@@ -35,7 +35,7 @@ typedef struct nb_cloud_node {
     int32_t at[3];
     int16_t level; /* nodes are 2^level m apart */
     int16_t is_set;
-    float depth[3];
+    float depth[3]; /* of a roof: not depths but parts of light */
 } nb_cloud_node;
 
 /* The eight nodes around a cell of that lattice, x first. */
@@ -45,8 +45,13 @@ typedef struct nb_cloud_cell {
     float depth[3][8];
 } nb_cloud_cell;
 
-/* Which ways a lattice is of: to the sun; away from it, up and down. */
-typedef enum nb_cloud_ways { NB_CLOUD_TO_SUN, NB_CLOUD_AROUND } nb_cloud_ways;
+/* Which ways a lattice is of: to the sun; away from it, up and down; or through a roof to the sun, and up. */
+typedef enum nb_cloud_ways {
+    NB_CLOUD_TO_SUN,
+    NB_CLOUD_AROUND,
+    NB_CLOUD_ROOFS, /* and so on: of each layer */
+    NB_CLOUD_WAYS = NB_CLOUD_ROOFS + NEBEL_MAX_CLOUD_LAYERS
+} nb_cloud_ways;
 
 typedef struct nb_cloud_lattice {
     nb_cloud_node *nodes;
@@ -76,7 +81,7 @@ typedef struct nb_cloud_block {
 
 struct nebel_cloud_workspace {
     const nebel_cloud_view *view;
-    nb_cloud_lattice lattices[2]; /* nb_cloud_ways */
+    nb_cloud_lattice lattices[NB_CLOUD_WAYS]; /* nb_cloud_ways; those of layers that are */
     nb_cloud_point *points;
     nb_cloud_patch *patches;
     nb_cloud_block *blocks;
@@ -126,6 +131,17 @@ nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const doubl
                                    const nb_cloud_grain *grain);
 /* That to the sun, from nodes that are about `width` apart. */
 float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width);
+
+/* What part of light comes through a layer and those above to its base straight over or under a place, as a mean over a width:
+ * of the sun's, and from straight above. */
+typedef struct nb_cloud_roof {
+    float sun, up;
+} nb_cloud_roof;
+
+nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
+
+/* Where a ray meets the ground; HUGE_VAL: nowhere. */
+double nb_cloud_to_ground(double radius, const double from[3], const double unit[3]);
 
 /* What comes through a slab of such depth, straight or scattered, for a mean cosine. */
 float nb_cloud_part_through(float depth, float mean_cosine);

@@ -305,8 +305,7 @@ static int find_stays(const nb_walk *walk, double t_max, nb_stay stays[2 * NEBEL
     return count;
 }
 
-/* Where the ray meets the ground. */
-static double to_ground(double radius, const double from[3], const double unit[3])
+double nb_cloud_to_ground(double radius, const double from[3], const double unit[3])
 {
     const double along = nb_vector_dot(from, unit);
     double aside[3];
@@ -333,7 +332,7 @@ static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
         }
     knots->count = 0;
     knots->error = 0;
-    const double end = fmin(ray->t_max, to_ground(atmosphere->airs.radius, walk.from, unit));
+    const double end = fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk.from, unit));
     const int count = find_stays(&walk, end, stays);
     double last = 0;
     for (int i = 0; i < count && nb_exp(-walk.apart) > UNSEEN; i++) {
@@ -448,7 +447,7 @@ nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cl
     made->points = nb_allocate_zero(&view->allocator, NB_CLOUD_POINTS, sizeof *made->points);
     made->patches = nb_allocate_zero(&view->allocator, NB_CLOUD_PATCHES, sizeof *made->patches);
     int is_whole = made->blocks != NULL && made->points != NULL && made->patches != NULL;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < NB_CLOUD_ROOFS + view->clouds->layer_count; i++) {
         nb_cloud_lattice *lattice = &made->lattices[i];
         lattice->nodes = nb_allocate_zero(&view->allocator, NB_CLOUD_NODES, sizeof *lattice->nodes);
         lattice->cells = nb_allocate_zero(&view->allocator, NB_CLOUD_CELLS, sizeof *lattice->cells);
@@ -466,7 +465,7 @@ void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace)
 {
     if (workspace == NULL) return;
     const nebel_allocator allocator = workspace->view->allocator;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < NB_CLOUD_WAYS; i++) {
         nb_release(&allocator, workspace->lattices[i].nodes);
         nb_release(&allocator, workspace->lattices[i].cells);
     }

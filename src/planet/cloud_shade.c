@@ -1,0 +1,113 @@
+/* Air under clouds: what they leave of the light that it scatters. Sunlight and the sky's light are alike in that both come
+ * through clouds above; sunlight aslant, the sky's from above. */
+#include "cloud_view.h"
+
+#include "base/vector.h"
+
+#include <math.h>
+
+/* Pieces of rays end so far from where they come under clouds, in heights of the lowest layer's top; the last one has no end. */
+static const double ends[NEBEL_MAX_AIR_SHADES - 1] = {0.75, 2.2, 6, 15, 40};
+
+/* A mean over that part of a piece's length; finer than this part of the clouds' height is too fine. */
+#define WIDTH_PART 0.7
+#define LEAST_WIDTH 0.06
+
+#define PI_F 3.14159265f
+
+/* The lowest layer whose top is above a radius; -1: none. */
+static int layer_over(const nebel_clouds *clouds, double radius)
+{
+    int lowest = -1;
+    for (int k = 0; k < clouds->layer_count; k++)
+        if (clouds->layers[k].high > radius && (lowest < 0 || clouds->layers[k].high < clouds->layers[lowest].high))
+            lowest = k;
+    return lowest;
+}
+
+/* Under a layer: light enters it from where the way to the sun meets its base; the sky's from as wide a place as is far above. */
+static nb_cloud_roof roof_under(nebel_cloud_workspace *workspace, int k, const double place[3], double radius,
+                                float width)
+{
+    const double *sun = workspace->view->sun.direction, low = workspace->view->clouds->layers[k].low;
+    const double along = nb_vector_dot(place, sun), below = low - radius;
+    const double way = sqrt(along * along + below * (low + radius)) - along;
+    double entry[3];
+    for (int c = 0; c < 3; c++) entry[c] = place[c] + way * sun[c];
+    return (nb_cloud_roof){nb_cloud_roof_at(workspace, k, entry, width).sun,
+                           nb_cloud_roof_at(workspace, k, place, nb_larger(width, (float)below)).up};
+}
+
+/* Within a layer light fades evenly from its top to its base. */
+static nb_cloud_roof roof_over(nebel_cloud_workspace *workspace, int k, const double place[3], double radius,
+                               float width)
+{
+    const nebel_clouds *clouds = workspace->view->clouds;
+    const nb_cloud_layer *layer = &clouds->layers[k];
+    if (radius <= layer->low) return roof_under(workspace, k, place, radius, width);
+    const int next = layer_over(clouds, layer->high);
+    const float part = (float)(layer->high - radius) * layer->per_thickness;
+    nb_cloud_roof roof = nb_cloud_roof_at(workspace, k, place, width), above = {1, 1};
+    if (next >= 0) above = nb_cloud_roof_at(workspace, next, place, width);
+    roof.sun = above.sun + part * (roof.sun - above.sun);
+    roof.up = above.up + part * (roof.up - above.up);
+    return roof;
+}
+
+/* Sunlight and the sky's light count as what a drop of air has of them from all sides. */
+static void find_parts(nebel_cloud_workspace *workspace, const double place[3], float width, float part[3])
+{
+    const nebel_cloud_view *view = workspace->view;
+    const double radius = nb_vector_length(place);
+    const int k = layer_over(view->clouds, radius);
+    part[0] = part[1] = part[2] = 1;
+    if (k < 0) return;
+    const nb_cloud_roof roof = roof_over(workspace, k, place, radius, width);
+    if (!(roof.sun < 1 || roof.up < 1)) return;
+    const nb_cloud_light light = nb_cloud_clear_light(view, place, radius);
+    for (int c = 0; c < 3; c++) {
+        const float around = 2 * PI_F * (light.above[c] + light.below[c]), all = light.sun[c] + around;
+        if (all > 0) part[c] = (light.sun[c] * roof.sun + around * roof.up) / all;
+    }
+}
+
+static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], nebel_air_shade *shade)
+{
+    const nebel_cloud_view *view = workspace->view;
+    const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
+    const double ground = atmosphere->airs.radius;
+    double from[3], piece[2][2];
+    int is_shaded = 0;
+    shade->count = 0;
+    for (int c = 0; c < 3; c++) from[c] = ray->origin[c] - atmosphere->center[c];
+    const double end = fmin(ray->t_max, nb_cloud_to_ground(ground, from, unit));
+    const int lowest = layer_over(view->clouds, 0);
+    if (lowest < 0 || !nb_cloud_pieces(0, view->high, from, unit, end, piece)) return;
+    const double scale = view->clouds->layers[lowest].high - ground, begin = piece[0][0], far = piece[0][1];
+    double t = begin;
+    shade->t[0] = (float)begin;
+    for (int i = 0; i < NEBEL_MAX_AIR_SHADES && t < far; i++) {
+        const double next = i < NEBEL_MAX_AIR_SHADES - 1 ? fmin(far, begin + ends[i] * scale) : far;
+        double place[3];
+        for (int c = 0; c < 3; c++) place[c] = from[c] + 0.5 * (t + next) * unit[c];
+        find_parts(workspace, place, (float)fmax(LEAST_WIDTH * scale, WIDTH_PART * (next - t)), shade->part[i]);
+        for (int c = 0; c < 3; c++) is_shaded |= shade->part[i][c] < 1;
+        shade->t[i + 1] = (float)next;
+        shade->count++;
+        t = next;
+    }
+    if (!is_shaded) shade->count = 0;
+}
+
+nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
+                             nebel_air_shade *shades, size_t shade_stride)
+{
+    if (workspace == NULL || (n > 0 && (rays == NULL || shades == NULL))) return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++) {
+        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
+        double unit[3];
+        if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
+        shade(workspace, ray, unit, (nebel_air_shade *)(void *)((char *)shades + i * shade_stride));
+    }
+    return NEBEL_OK;
+}
