@@ -8,7 +8,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_ambient", "read_camera", "read_cells", "read_classic", "read_clouds", "read_diffusion", "read_density", "read_grid", "read_layers", "read_light", "read_model", "read_nebula", "read_noise", "read_planet", "read_shape", "read_volume"]
+READERS = ["import", "import_bevy", "import_godot", "import_unity", "import_unreal", "node_shape", "scene", "read_ambient", "read_camera", "read_cells", "read_classic", "read_clouds", "read_diffusion", "read_density", "read_grid", "read_layers", "read_light", "read_model", "read_nebula", "read_noise", "read_planet", "read_shape", "read_volume", "save_places"]
 TABLE = re.compile(r"^ *(?:static )?const char \*const (?:\w+_)?(?:names|types)\[\w*\] = \{(.*?)\}", re.S | re.M)
 COMMENT = re.compile(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', re.S)
 BAD = ["[]", '{"nebel": 1}', '{"nebel": 2, "fog": []}', '{"nebel": 1, "fog": [], "planet": {}}', '{"nebel": 1, "fog": [], "planet": []}', '{"nebel": 1, "fog": [], "planet": [{"model": "layers"}]}',
