@@ -83,6 +83,21 @@ static void test_balls_with_a_hole(void **state)
     }
 }
 
+/* What takes the place of others does so where it is empty itself: here its density begins behind all of it. */
+static void test_empty_hole(void **state)
+{
+    (void)state;
+    static crowd c;
+    c = (crowd){.count = 0};
+    crowd_add_balls(&c, 1, 8);
+    crowd_add_hole(&c, NEBEL_OPERATION_REPLACE);
+    const double *const middle = c.volumes[1].shape.center;
+    c.volumes[1].density = (nebel_density){.type = NEBEL_DENSITY_LINEAR,
+                                           .from = {middle[0] + 2, middle[1], middle[2]},
+                                           .to = {middle[0] + 3, middle[1], middle[2]}};
+    check(&c, "ball with an empty hole", NB_GL_330, 1);
+}
+
 static void test_balls_in_sunlight(void **state)
 {
     (void)state;
@@ -157,9 +172,9 @@ static void test_balls_among_lamps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_balls_with_a_hole),      cmocka_unit_test(test_balls_in_sunlight),
-        cmocka_unit_test(test_few_uneven_in_sunlight), cmocka_unit_test(test_even_boxes),
-        cmocka_unit_test(test_balls_among_lamps),
+        cmocka_unit_test(test_balls_with_a_hole), cmocka_unit_test(test_empty_hole),
+        cmocka_unit_test(test_balls_in_sunlight), cmocka_unit_test(test_few_uneven_in_sunlight),
+        cmocka_unit_test(test_even_boxes),        cmocka_unit_test(test_balls_among_lamps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

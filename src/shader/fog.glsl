@@ -50,14 +50,14 @@ nb_media_sum nb_sum_media(nb_ray ray, int first, int count, bool listed)
             from = s.leave;
         }
         if (from < ray.t_max) sum.last = max(sum.last, from);
-        if (!(length > 0.0)) continue;
+        if (!(from > 0.0)) continue;
         int flags = int(NEBEL_WORD(at + 1).w);
-        if (NB_HAS(NB_HAS_COVER)) {
+        if (NB_HAS(NB_HAS_COVER)) { /* without density, too */
             sum.covers = sum.covers || (any && (covering || (flags & NB_LIGHT_COVERS) != 0));
             covering = covering || (flags & NB_LIGHT_COVERS) != 0;
             any = true;
         }
-        if (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE) {
+        if (length > 0.0 && (!NB_HAS(NB_HAS_COVER) || kind != NB_KIND_EXCLUDE)) {
             nb_vec3 radiance = nb_opaque_radiance(at, ray.direction);
             bool emits = (flags & NB_LIGHT_EMITS) != 0;
             bool other = radiance.x != sum.radiance.x || radiance.y != sum.radiance.y || radiance.z != sum.radiance.z;
