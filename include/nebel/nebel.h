@@ -442,7 +442,7 @@ typedef enum nebel_lamp_type {
 
 /* A ball that shines. Its light reaches a place through all fog on the straight way there, scattered once, as the
  * sun's. What it brings is the irradiance from all sides of a ball that is equally bright everywhere; phase functions
- * take it for light from the ball's centre. */
+ * take it for light from the ball's centre, and fog dims it from the ball's surface on. */
 typedef struct nebel_lamp {
     nebel_lamp_type type;
     double position[3];  /* m */
@@ -578,7 +578,7 @@ typedef struct nebel_trace_desc {
                              transmittance. Much cheaper where fog of different light varies along the ray; same bits of
                              transmittance. */
     int ignore_distances;   /* nonzero: volumes act wherever their shape is. For rays that do not begin at the eye, as
-                             those to a   light, since `start` and `cutoff` of a volume count from where a ray starts. */
+                             those to a light, since `start` and `cutoff` of a volume count from where a ray starts. */
     const nebel_lit_pieces *sunlit;  /* of the rays of the call: where the sun reaches them past surfaces. NULL:
                              everywhere. Fog in shadow scatters no sunlight; transmittance stays as it is, to the bit.
                              The ends of pieces are taken as exact: `error` says nothing of them */
