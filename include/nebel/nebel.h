@@ -442,7 +442,8 @@ typedef enum nebel_lamp_type {
 
 /* A ball that shines. Its light reaches a place through all fog on the straight way there, scattered once, as the
  * sun's. What it brings is the irradiance from all sides of a ball that is equally bright everywhere; phase functions
- * take it for light from the ball's centre, and fog dims it from the ball's surface on. */
+ * take it for light from the ball's centre, and fog dims it from the ball's surface on, with
+ * radius 0 from its centre. */
 typedef struct nebel_lamp {
     nebel_lamp_type type;
     double position[3];  /* m */
