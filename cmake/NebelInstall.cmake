@@ -43,7 +43,8 @@ function(nebel_install_library name)
     install(EXPORT ${name}_targets NAMESPACE nebel:: DESTINATION ${nebel_package_dir})
 endfunction()
 
-nebel_install_library(nebel nebel.h cells.h classic.h clouds.h diffusion.h environment.h layers.h nebula.h planet.h shader.h)
+nebel_install_library(nebel nebel.h cells.h classic.h clouds.h diffusion.h environment.h layers.h nebula.h places.h planet.h
+    shader.h)
 nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
     nebel_install_library(nebel_scene scene.h)

@@ -3,6 +3,8 @@
 #include "fog_help.h"
 #include "gauss_rule.h"
 
+#include <nebel/places.h>
+
 #include <float.h>
 
 #define EARTH 6.36e6

@@ -4,6 +4,7 @@
 #include "fog_help.h"
 #include "near.h"
 
+#include <nebel/places.h>
 #include <nebel/shader.h>
 
 #include <math.h>

@@ -4,6 +4,8 @@
 
 #include "fog_help.h"
 
+#include <nebel/places.h>
+
 #include <math.h>
 
 enum { BODIES = 30, RAYS = 17, FORCED = 3, PLACES = 16000 };

@@ -2,6 +2,8 @@
 #include "fog_help.h"
 #include "near.h"
 
+#include <nebel/places.h>
+
 enum { NOISE_SIDE = 24 };
 
 static nebel_snapshot *noise_fog(const nebel_noise_desc *desc)

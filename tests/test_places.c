@@ -4,6 +4,8 @@
 #include "fog_help.h"
 #include "random_fog.h"
 
+#include <nebel/places.h>
+
 #include <math.h>
 
 enum { SEEDS = 8, RAYS = 12, PLACES = 8, MOST_PIECES = 4000 };

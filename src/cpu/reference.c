@@ -1,6 +1,8 @@
 /* The reference renderer's part of a batch: a path for each pixel, and what their spread says of the error. */
 #include "renderer.h"
 
+#include <nebel/places.h>
+
 #include <math.h>
 #include <string.h>
 

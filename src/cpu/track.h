@@ -6,6 +6,8 @@
 #include "base/base.h"
 #include "chance.h"
 
+#include <nebel/places.h>
+
 /* A way through the fog. One channel's extinction rules. */
 typedef struct nb_track {
     const nebel_snapshot *fog;

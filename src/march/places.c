@@ -4,6 +4,8 @@
 #include "base/vector.h"
 #include "media/density.h"
 
+#include <nebel/places.h>
+
 #include <math.h>
 
 /* Bounds are this part higher than computed: densities and their bounds are rounded differently. */
