@@ -80,11 +80,11 @@ class Viewer:
             self.press("Controls")
 
     def shows_controls(self):
-        """Rather than the button that brings them. The list may be read while it is written."""
+        """Rather than the button that brings them."""
         found = []
 
         def find():
-            found[:] = re.findall(" (Home|Controls)\n", self.controls.read_text())
+            found[:] = re.findall(" (Home|Controls)\n", self.read_controls()[0])
             return found
 
         self.wait(find, "the controls, or their button")
@@ -144,12 +144,22 @@ class Viewer:
         self.say("view: saved nebel-", lambda: self.key(key))
         return self.case.folder / re.findall(r"saved (nebel-\d+\.png)", self.log.read_text())[-1]
 
+    def read_controls(self):
+        """A whole list: the file is emptied and filled each time the window is drawn."""
+        found = []
+
+        def read():
+            found[:] = re.findall(r"\A((?:.*\n)*)0 0 0 0 \(list (\d+)\)\n\Z", self.controls.read_text())
+            return found
+
+        self.wait(read, "a list of the controls")
+        return found[0][0], int(found[0][1])
+
     def settle(self, times=5):
         """Waits until the window has been drawn five times: a press and its end take a turn each, what follows two more, and one
-        may be under way. Each time the list is emptied and filled."""
-        for _ in range(2 * times):
-            before = self.controls.stat().st_mtime_ns
-            self.wait(lambda: self.controls.stat().st_mtime_ns != before, "another frame")
+        may be under way."""
+        first = self.read_controls()[1]
+        self.wait(lambda: self.read_controls()[1] >= first + times, "another frame")
 
     def place(self, name):
         """Where a control is and stays: x, y, width, height. Messages come and go, and what lies below moves."""
@@ -163,7 +173,7 @@ class Viewer:
         found = []
 
         def find():
-            lines = self.controls.read_text().splitlines()
+            lines = self.read_controls()[0].splitlines()
             found.extend(line[:-len(name) - 1] for line in lines if line.endswith(" " + name))
             return found
 
@@ -185,10 +195,10 @@ class Viewer:
         x, y, width, height = self.place(name)
         self.xdotool("mousemove", "--window", self.window, int(x + share * width), y + height // 2, "sleep", PAUSE, "keydown",
                      "ctrl", "mousedown", 1, "sleep", PAUSE, "mouseup", 1, "keyup", "ctrl")
-        self.wait(lambda: "(typing)" in self.controls.read_text(), f"a cursor in {name}")
+        self.wait(lambda: "(typing)" in self.read_controls()[0], f"a cursor in {name}")
         self.xdotool("type", "--delay", 20, text)
         self.xdotool("key", "Return")
-        self.wait(lambda: re.match(r"(?!.*\(typing\))(?s:.*)Save", self.controls.read_text()), f"the end of {name}")
+        self.wait(lambda: "(typing)" not in self.read_controls()[0], f"the end of {name}")
         self.settle()
 
     def save(self):

@@ -43,6 +43,15 @@ void note_window(const char *name)
     if (places != nullptr) fprintf(places, "%d %d %d %d %s\n", int(low.x), int(low.y), int(size.x), int(size.y), name);
 }
 
+// The last line, with a number of its own for each list: who has read it has read them all, and can count drawings.
+void end_places()
+{
+    static unsigned number;
+    if (places == nullptr) return;
+    fprintf(places, "0 0 0 0 (list %u)\n", ++number);
+    fclose(places);
+}
+
 /* ---- what is shown
  * ---------------------------------------------------------------------------------------------------
  */
@@ -451,7 +460,7 @@ extern "C" void nb_panel_draw(nb_panel *panel, const char *controls)
     if (!panel->is_held) panel->held_noise.owner = 0;
     ImGui::Render();
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-    if (places != nullptr) fclose(places);
+    end_places();
 }
 
 /* ImGui's own answer is that of the last turn: too late for a cursor that came and pressed since. */

@@ -64,7 +64,7 @@ void nb_panel_close(void);
 
 /* Draws over the picture and fills in the answers. `controls` is NULL, or takes a line "x y width height name", in
  * pixels, for each control; the name of the first is "(typing)" while keys go into one, "(notice)" and "(keys)" are
- * the windows with messages and with the list of keys. */
+ * the windows with messages and with the list of keys, and the last is "(list N)", which counts drawings. */
 void nb_panel_draw(nb_panel *panel, const char *controls);
 
 /* Tells of a key, or a button of the mouse, that went down, by GLFW's numbers: it, or Ctrl, may have come up before the

@@ -147,7 +147,7 @@ static int open_window(viewer *all, uint32_t width, uint32_t height)
     nb_window *const window = &all->window;
     if (nb_window_open(window, settings->scene, width, height) != NB_DONE) return NB_FAILED;
     /* Who reads where the controls are waits for them. */
-    if (settings->controls != NULL) window->patience = 0.05;
+    if (settings->controls != NULL) window->patience = 0.02;
     nebel_result result = nb_screen_open(&all->log, &all->screen);
     if (result == NEBEL_OK) result = open_stage(all);
     if (result != NEBEL_OK) return fail(all, result);
