@@ -698,6 +698,9 @@ class RenderTest(PictureCase):
         moving = dict(FOG, keys=[{"frame": 0}, {"frame": 3, "extinction": 0}])
         self.scene = self.write_scene("fog.json", [moving], background=1, camera={"position": [0, 0, 6], "look_at": [0, 0, 0]})
         self.assert_misused(self.render("a.webp"), "--output", "--frames 0-95")
+        unknown = self.render("a.mp4", "--frames", "0-3")
+        self.assert_misused(unknown, "--output", "is no name that ends in .png, .exr or .webp")
+        self.assertNotIn("%04d", unknown.err, "pictures are not what was wanted")
         self.assert_misused(self.render("a%03d.webp", "--frames", "0-3"), "--output", "one film")
         self.assert_misused(self.render("a.webp", "--frames", "0-3", "--aov"), "--output", ".exr")
         self.assert_misused(self.render("a.webp", "--frames", "0-3", "--size", "16384x10"), "--size", "16383")
@@ -942,7 +945,8 @@ class InfoTest(PictureCase):
             warned = "warning: no sunlight reaches fog or models: fog[1] 'haze' has no end" in nebel("info", scene).out
             self.assertEqual(warned, is_dark, (shape, density, sun))
             done = nebel("render", scene, "-o", self.folder / "dim.png", "-s", "8x8")
-            self.assertEqual("no sunlight reaches fog or models: fog[1]" in done.err, is_dark)
+            for said in (done.err, nebel("trace", scene, text=RAY).err):
+                self.assertEqual("no sunlight reaches fog or models: fog[1]" in said, is_dark)
 
     def test_a_scene_or_a_model_that_is_wrong(self):
         self.assert_failed(nebel("info", self.folder / "none.json"), "none.json")

@@ -350,7 +350,10 @@ static void test_views_that_are_none(void **state)
     expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "96 x 0 pixels");
     view = s.picture.view;
     view.clip_from_eye[3] = (double)NAN;
-    expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "finite");
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "clip_from_eye must be a projection");
+    view = s.picture.view;
+    view.eye_from_world[3] = 1;
+    expect_message(nebel_gl_set_fog(s.gl, s.fog, &view), NEBEL_ERROR_ARGUMENT, "eye_from_world must be a rotation");
     expect_message(nebel_gl_set_fog(s.gl, s.fog, NULL), NEBEL_ERROR_ARGUMENT, "view is missing");
     expect_message(nebel_gl_get_fog(s.gl, &fog), NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog first");
     assert_int_equal(nebel_gl_set_fog(NULL, s.fog, &view), NEBEL_ERROR_ARGUMENT);
@@ -370,6 +373,28 @@ static void refuse_texture(const stage *s, nebel_gl_pass pass, const char *part)
     expect_message(nebel_gl_draw_fog(s->gl, &pass), NEBEL_ERROR_ARGUMENT, part);
     assert_int_equal(pass_take_errors(), 1);
     pass_expect_no_errors();
+}
+
+/* Each message names the field, whatever the others are. */
+static void refuse_depths(stage *s)
+{
+    const struct {
+        nebel_depth_desc depth;
+        const char *field;
+    } cases[] = {
+        {{.range = {.5, .5}}, "depth.range must"},
+        {{.range = {0, (double)INFINITY}}, "depth.range must"},
+        {{.sky = (nebel_sky)3}, "depth.sky must"},
+        {{.start = (nebel_start)2}, "depth.start must"},
+        {{.kind = NEBEL_DEPTH_KIND_COUNT}, "depth.kind must"},
+        {{.kind = NEBEL_DEPTH_KIND_LOGARITHM}, "depth.log_far must"},
+        {{.kind = NEBEL_DEPTH_KIND_LOGARITHM, .log_scale = -1, .log_far = 9}, "depth.log_scale must"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        nebel_gl_pass pass = pass_of(s);
+        pass.depth = cases[i].depth;
+        refuse(s, pass, NEBEL_ERROR_ARGUMENT, cases[i].field);
+    }
 }
 
 static void test_passes_that_cannot_be_drawn(void **state)
@@ -392,9 +417,7 @@ static void test_passes_that_cannot_be_drawn(void **state)
     pass = pass_of(&s);
     pass.x = 1;
     refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "reaches to 97, 64");
-    pass = pass_of(&s);
-    pass.depth.kind = NEBEL_DEPTH_KIND_LOGARITHM;
-    refuse(&s, pass, NEBEL_ERROR_ARGUMENT, "depth convention");
+    refuse_depths(&s);
     pass = pass_of(&s);
     pass.samples = 4;
     pass.output = NEBEL_GL_OUTPUT_BLEND;

@@ -382,10 +382,7 @@ static void note_stillness(const nebel_scene *scene, const nb_render_call *wante
 
 static void note_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
 {
-    const size_t endless = nb_find_endless(scene);
-    if (wanted->quiet || wanted->method != NEBEL_METHOD_EXACT || endless == scene->volume_count) return;
-    nb_report_message("note: %s: no sunlight reaches fog or models: fog[%zu] %s", wanted->scene, endless,
-                      nb_endless_advice);
+    if (!wanted->quiet && wanted->method == NEBEL_METHOD_EXACT) nb_note_endless(scene, wanted->scene);
 }
 
 /* What the scene has beside its cells is not drawn. */

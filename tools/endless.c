@@ -1,5 +1,7 @@
 #include "endless.h"
 
+#include "report.h"
+
 const char nb_endless_advice[] =
     "has no end towards the sun; give it a shape that ends, such as a box, or a density of "
     "type height and a sun above the horizon";
@@ -48,4 +50,11 @@ size_t nb_find_endless(const nebel_scene_data *scene)
     if (!scene->has_sun || is_black(scene->sun_irradiance)) return scene->volume_count;
     while (i < scene->volume_count && !is_endless(&scene->volumes[i], scene->sun_direction)) i++;
     return i;
+}
+
+void nb_note_endless(const nebel_scene_data *scene, const char *path)
+{
+    const size_t endless = nb_find_endless(scene);
+    if (endless == scene->volume_count) return;
+    nb_report_message("note: %s: no sunlight reaches fog or models: fog[%zu] %s", path, endless, nb_endless_advice);
 }

@@ -11,4 +11,7 @@ size_t nb_find_endless(const nebel_scene_data *scene);
 /* What to say of it, behind its name. */
 extern const char nb_endless_advice[];
 
+/* Says so on standard error, where it is so. `path` is the scene's. */
+void nb_note_endless(const nebel_scene_data *scene, const char *path);
+
 #endif

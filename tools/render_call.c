@@ -174,8 +174,10 @@ static void read_output(nb_arguments *arguments, nb_render_call *wanted)
     wanted->is_film = nebel_is_film_path(wanted->output);
     if (wanted->is_film) return;
     wanted->format = nebel_find_image_format(wanted->output);
-    if (wanted->format == NEBEL_IMAGE_NONE)
+    if (wanted->format == NEBEL_IMAGE_NONE) {
         nb_options_reject(arguments, OUTPUT, "is no name that ends in .png, .exr or .webp");
+        return;
+    }
     const char *const fault = wanted->many_frames ? nb_pattern_find_fault(wanted->output) : NULL;
     if (fault != NULL) nb_options_reject(arguments, OUTPUT, fault);
     if (wanted->format == NEBEL_IMAGE_PNG && wanted->aov)

@@ -390,6 +390,30 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
     return draw(t, target_framebuffer);
 }
 
+/* Says which field of a convention that nebel_view_rays refuses is the first that it refuses by itself. */
+static const char *find_depth_fault(const nebel_view *view, const nebel_depth_desc *depth)
+{
+    const struct {
+        nebel_depth_desc alone;
+        const char *fault;
+    } fields[] = {
+        {{.range = {depth->range[0], depth->range[1]}},
+         "depth.range must be two different finite numbers, or both 0, which stands for 0 and 1"},
+        {{.sky = depth->sky}, "depth.sky must be NEBEL_SKY_FAR, VALUE or NONE"},
+        {{.start = depth->start}, "depth.start must be NEBEL_START_EYE or NEAR"},
+        {{.kind = depth->kind, .log_far = 1},
+         "depth.kind must be a nebel_depth_kind that fits clip_from_eye: LOGARITHM needs rays that meet in a point, "
+         "AXIS a middle ray that is not across the axis"},
+        {{.kind = depth->kind, .log_far = 1, .log_scale = depth->log_scale},
+         "depth.log_scale must be finite and more than 0, or 0, which stands for 1"},
+    };
+    nebel_rays rays;
+    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
+        if (nebel_view_rays(view, &fields[i].alone, &rays) != NEBEL_OK) return fields[i].fault;
+    }
+    return "depth.log_far must be finite and more than 0: the distance that is stored as 1";
+}
+
 nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
 {
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -397,7 +421,7 @@ nebel_result nebel_gl_draw_fog(nebel_gl *gl, const nebel_gl_pass *pass)
     if (!gl->has_fog) return fail(gl, NEBEL_ERROR_ARGUMENT, "call nebel_gl_set_fog first");
     nb_gl_picture picture = {.width = gl->views[0].width, .height = gl->views[0].height};
     if (nebel_view_rays(&gl->views[0], &pass->depth, &picture.rays) != NEBEL_OK) {
-        return fail(gl, NEBEL_ERROR_ARGUMENT, "the depth convention is none, or does not fit the view's projection");
+        return fail(gl, NEBEL_ERROR_ARGUMENT, find_depth_fault(&gl->views[0], &pass->depth));
     }
     return nb_gl_draw_fog(gl, pass, &picture);
 }

@@ -351,6 +351,19 @@ static nebel_result prepare(nebel_gl *gl, nebel_snapshot *snapshot, const double
     return result;
 }
 
+/* Says which matrix of a view that nebel_view_rays refuses is the first that it refuses by itself. */
+static const char *find_view_fault(const nebel_view *view)
+{
+    static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    nebel_view turned = *view;
+    nebel_rays rays;
+    memcpy(turned.eye_from_world, identity, sizeof identity);
+    if (nebel_view_rays(&turned, NULL, &rays) != NEBEL_OK)
+        return "clip_from_eye must be a projection: finite numbers, rays that meet in a point or are parallel, and a "
+               "depth that changes along them";
+    return "eye_from_world must be a rotation and a translation: finite numbers, 0 0 0 1 in the last row";
+}
+
 nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebel_view *view)
 {
     if (gl == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -364,9 +377,7 @@ nebel_result nebel_gl_set_fog(nebel_gl *gl, nebel_snapshot *snapshot, const nebe
                        (unsigned)view->width, (unsigned)view->height);
     }
     if (nebel_view_rays(view, NULL, &rays) != NEBEL_OK) {
-        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT,
-                       "nebel_gl_set_fog: the matrices make no view: all numbers must be finite, eye_from_world a "
-                       "rotation and a translation, clip_from_eye a projection");
+        return nb_fail(&gl->log, NEBEL_ERROR_ARGUMENT, "nebel_gl_set_fog: %s", find_view_fault(view));
     }
     return prepare(gl, snapshot != NULL ? snapshot : gl->empty, rays.eye, view, 1);
 }

@@ -21,10 +21,12 @@ nebel_result nb_voxels_allocate(const nb_codec *codec, nb_voxels *voxels)
     const size_t *size = voxels->size;
     voxels->data = NULL;
     for (int i = 0; i < 3; i++) {
-        if (size[i] < 1 || size[i] > NEBEL_MAX_GRID_SIZE || count > NEBEL_MAX_GRID_VOXELS / size[i])
-            return nb_fail(&codec->log, NEBEL_ERROR_LIMIT,
-                           "%s: %zu x %zu x %zu voxels; must be 1 to %d on each axis, at most %d in all", codec->name,
-                           size[0], size[1], size[2], NEBEL_MAX_GRID_SIZE, NEBEL_MAX_GRID_VOXELS);
+        if (size[i] < 1 || size[i] > NEBEL_MAX_GRID_SIZE)
+            return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu x %zu x %zu voxels; must be 1 to %d on each axis",
+                           codec->name, size[0], size[1], size[2], NEBEL_MAX_GRID_SIZE);
+        if (count > NEBEL_MAX_GRID_VOXELS / size[i])
+            return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: %zu x %zu x %zu voxels; at most %d in all", codec->name,
+                           size[0], size[1], size[2], NEBEL_MAX_GRID_VOXELS);
         count *= size[i];
     }
     voxels->data = nb_allocate_zero(&codec->allocator, count, size_of_voxel(voxels->type));
