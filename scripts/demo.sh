@@ -22,7 +22,7 @@ for scene in "${scenes[@]}"; do
     case $name in
         # Thousands of shafts, voxels that light goes through, air along with lit fog, nebulae between shells: small, and with one sample, they take a few seconds as the
         # others do.
-        foliage | cloud | wisps | sunset | moonrise | flight | clouds | cloud-valley | planet-night) method=exact options=(--size 640x360 --samples 1) ;;
+        foliage | cloud | wisps | sunset | moonrise | flight | clouds | cloud-valley | mist-sea | planet-night) method=exact options=(--size 640x360 --samples 1) ;;
         cells-*) method=cells ;;
         linear-*) method=linear ;;
         vertex-*) method=vertex ;;

@@ -158,6 +158,29 @@ static void fog_lies_in_air(void **state)
     nebel_destroy_atmosphere(w.atmosphere);
 }
 
+/* Rays to the horizon go through it level: the walk through fog is long, and air counts all along it. */
+static void mist_bends_with_the_ground(void **state)
+{
+    (void)state;
+    nb_gl context;
+    nebel_scene *scene = NULL;
+    nebel_snapshot *fog = NULL;
+    pass_open(&context, NB_GL_330);
+    assert_int_equal(nebel_load_scene(NEBEL_SOURCE "/examples/scenes/mist-sea.json", &(nebel_scene_desc){0}, &scene),
+                     NEBEL_OK);
+    assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    nebel_scene_data data = *nebel_scene_contents(scene);
+    data.mesh_count = 0;
+    picture_pair pair = make_pair(64, 36);
+    render(&data, fog, &data.camera, &pair);
+    compare("mist without its hills", &pair);
+    picture_free(&pair);
+    nebel_release_snapshot(fog);
+    nebel_destroy_scene(scene);
+    pass_close(&context);
+}
+
 /* ---- what is kept, and what is refused ------------------------------------------------------- */
 
 /* Allocations of the size of a table. */
@@ -249,6 +272,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(scenes_are_the_same),
         cmocka_unit_test(a_flight_is_the_same),
         cmocka_unit_test(fog_lies_in_air),
+        cmocka_unit_test(mist_bends_with_the_ground),
         cmocka_unit_test(the_table_stays_while_the_camera_turns),
         cmocka_unit_test(what_is_not_drawn_is_refused_by_name),
     };

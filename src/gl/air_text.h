@@ -12,8 +12,7 @@ extern const char nb_air_words_text[];
 /* Behind it and before the other ones: the air and the ground of all. */
 extern const char nb_air_worlds_text[];
 
-/* Declares pass_haze, what fog and air do along a ray; wants nebel_light pass_up_to(nebel_sight, int entry, float t), the fog
- * alone, which it declares. The program takes PASS_KNOTS times as many turns as that at most. */
+/* Declares pass_haze, what fog and air do along a ray. `entry`: of its tile's list, if there are tiles. */
 extern const char nb_air_haze_text[];
 
 /* The ground into the targets of surfaces. */

@@ -70,23 +70,17 @@ static const char fragment_text[] =
     "}\n";
 
 static const char whole_text[] =
-    "nebel_light pass_up_to(nebel_sight sight, int entry, float t)\n"
-    "{\n"
-    "#ifdef NEBEL_TILES\n"
-    "    return nebel_trace_list(sight.origin, sight.direction, t, NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1));\n"
-    "#else\n"
-    "    return nebel_trace(sight.origin, sight.direction, t);\n"
-    "#endif\n"
-    "}\n"
-    "\n"
     "nebel_light pass_fog(vec2 pixel, float depth)\n"
     "{\n"
     "    nebel_sight sight = pass_sight(pixel, depth);\n"
     "    int entry = pass_entry(sight, pixel);\n"
     "#ifdef NEBEL_AIR\n"
     "    return pass_haze(sight, entry);\n"
+    "#elif defined(NEBEL_TILES)\n"
+    "    return nebel_trace_list(sight.origin, sight.direction, sight.t_max, NEBEL_INDEX(entry), NEBEL_INDEX(entry + "
+    "1));\n"
     "#else\n"
-    "    return pass_up_to(sight, entry, sight.t_max);\n"
+    "    return nebel_trace(sight.origin, sight.direction, sight.t_max);\n"
     "#endif\n"
     "}\n"
     "\n"
@@ -174,8 +168,8 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
     const int is_counted = (kind->features & NEBEL_FEATURE_GRID) != 0;
     const char *const step = "#define PASS_STEP\n#define NEBEL_RESUMES\n";
     char limits[128], air[NB_AIR_HEAD];
-    const char *const shares = kind->multisampled          ? "/ (pass_sample_range.y - pass_sample_range.x)"
-                               : kind->air                 ? "/ 32" /* PASS_KNOTS */
+    const char *const shares = kind->multisampled ? "/ (pass_sample_range.y - pass_sample_range.x)"
+                               : kind->air        ? "* 3 / 4" /* what is left of a ray that was cut is summed twice */
                                : kind->step && !is_counted ? "* 2"
                                                            : "";
     (void)snprintf(text, size,

@@ -161,6 +161,7 @@ struct nb_progress {
     int stage;
     nb_gathered walked;
     nb_lamplit lamps;
+    int turns; /* of loops, in this shader */
 };
 
 #define NB_STAGE_WALK 0
@@ -174,6 +175,7 @@ nb_progress nb_open_progress()
     p.stage = NB_STAGE_WALK;
     p.walked = nb_open_gathered();
     p.lamps = nb_open_lamplit();
+    p.turns = 0;
     return p;
 }
 
@@ -201,7 +203,8 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
     int first = media.first;
     int count = media.count;
     bool listed = media.listed;
-    int turns = count; /* of the sums */
+    int before = p.turns;
+    int turns = before + count; /* of the sums */
     nb_media_sum sum = nb_sum_media(ray, first, count, listed);
     nb_attenuation attenuation = nb_attenuate(sum.depth);
     nebel_light light;
@@ -225,9 +228,9 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
     if (walks && covers) light.transmittance = nb_exp3(-p.walked.depth);
     if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LAMPS;
     if (NB_HAS(NB_HAS_LAMPS) && lit && sum.scatters) {
-        int lamp_turns = NB_RESUMES ? turns : 0;
+        int lamp_turns = NB_RESUMES ? turns : before;
         if (p.stage == NB_STAGE_LAMPS && nb_is_fresh(turns) && nb_has_loops(count)) nb_lamplight(p.lamps, ray, first, count, listed, lamp_turns);
-        turns = lamp_turns;
+        turns = NB_RESUMES ? lamp_turns : turns + lamp_turns - before;
         light.in_scattering += p.lamps.light;
         bool is_lit = !(p.lamps.reached < ray.t_max && nb_smallest(p.lamps.before) < NB_OPAQUE);
         if (p.stage == NB_STAGE_LAMPS && (last || is_lit)) p.stage = NB_STAGE_DIFFUSION;
@@ -239,6 +242,7 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
             light.in_scattering = max(light.in_scattering + nb_gather_diffuse(ray, media), nb_splat3(0.0));
         if (last || nb_has_loops(count)) p.stage = NB_STAGE_DONE;
     }
+    p.turns = turns;
     if (NB_HAS(NB_HAS_MAX_OPACITY)) light = nb_limit_opacity(light, NEBEL_WORD(0).z);
     light.in_scattering = min(light.in_scattering, nb_splat3(NEBEL_MOST_LIGHT));
     return light;
