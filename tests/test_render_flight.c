@@ -141,8 +141,11 @@ static nebel_snapshot *make_mist(const world *w, const double place[3])
         .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {place[0], place[1] + 1, place[2] - 6}, .radius = 1},
         .extinction = {1, 1, 1},
         .albedo = {.9, .8, .7}};
-    nebel_fog_desc desc = {.sun = {.irradiance = {9, 9, 9}}};
-    memcpy(desc.sun.direction, w->sun.direction, sizeof desc.sun.direction);
+    nebel_fog_desc desc = {.sun = w->sun};
+    nebel_air_light light;
+    const double middle[1][3] = {{place[0], place[1] + 1, place[2] - 6}};
+    assert_int_equal(nebel_light_air(w->atmosphere, &w->sun, 1, middle, 0, &light, 0), NEBEL_OK);
+    memcpy(desc.sun.irradiance, light.sun, sizeof light.sun);
     assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
     assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);

@@ -527,6 +527,22 @@ int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *
  * no end, and returns 1; or returns 0 where they light no fog, with min and max untouched. Cost O(n). Any thread. */
 int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
 
+/* The same of all fog that scatters, whatever light there is, but level fog without end along x or z, which is made for
+ * places near the origin. */
+int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
+
+/* The same fog lit by one light each, for renderers in which light changes from place to place: what the three add to a
+ * ray comes to what a snapshot with `sun` adds, and each has its transmittance. */
+typedef struct nebel_split_fog {
+    nebel_snapshot *sun, *sky; /* lit by the sun alone, by ambient light alone */
+    nebel_snapshot *own;       /* by lamps, and what the fog emits and its source; NULL where there is none of it */
+} nebel_split_fog;
+
+/* Makes the three, for nebel_release_split_light. `sun` takes the place of the snapshot's. Cost of each as nebel_commit_fog.
+ * On an error *split is all NULL. Any thread. Errors: ARGUMENT, MEMORY and those of nebel_commit_fog. */
+nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_split_fog *split);
+void nebel_release_split_light(nebel_split_fog *split);
+
 /* How many lamps the snapshot has. */
 size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot);
 

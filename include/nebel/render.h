@@ -5,8 +5,9 @@
  *     nebel_render_frame(renderer, &(nebel_frame_desc){.camera = camera, .width = 1280, .height = 720}, &frame);
  *
  * Lambert surfaces lit by the sun and the scene's lamps (ray-traced shadows; their light is attenuated by all fog on
- * its way) and by the ambient radiance; transmittance and in-scattering from nebel_trace in float. The same picture, bit for bit, for every
- * thread count. Link with libnebel_cpu and libnebel.
+ * its way) and by the ambient radiance; transmittance and in-scattering from nebel_trace in float. On planets with air, fog far from the
+ * origin that scatters has the scene's sun and the fog's ambient light as they are at its place (docs/planet.md). The same
+ * picture, bit for bit, for every thread count. Link with libnebel_cpu and libnebel.
  */
 #ifndef NEBEL_RENDER_H
 #define NEBEL_RENDER_H
@@ -112,6 +113,7 @@ typedef struct nebel_frame_desc {
     uint32_t bounces, seed;
     double
         time; /* of a planet of layers, whose balls turn: within 1e12, in the unit of its days, which is frames in scenes */
+    int even_daylight; /* nonzero: all fog on planets has the light of the origin, as in OpenGL */
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not

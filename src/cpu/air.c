@@ -15,11 +15,16 @@ _Static_assert((int)NB_BATCH <= (int)NB_WORLDS_RAYS, "a batch is traced at once"
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
-static nebel_result set_daylight(const nb_air *air, const nebel_planet *home, nb_world *world)
+nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const nebel_log *log)
 {
-    world->daylight = nb_allocate(air->allocator, 1, sizeof *world->daylight);
-    if (world->daylight == NULL) return NEBEL_ERROR_MEMORY;
-    nb_daylight_set(world->daylight, world->planet, home, air->to_sun);
+    for (int i = 0; i < air->count; i++) {
+        nb_world *world = &air->worlds[i];
+        if (world->daylight != NULL) continue;
+        world->daylight = nb_allocate(air->allocator, 1, sizeof *world->daylight);
+        if (world->daylight == NULL)
+            return nb_fail(log, NEBEL_ERROR_MEMORY, "frame: out of memory for daylight on planets");
+        nb_daylight_set(world->daylight, world->planet, home, air->to_sun);
+    }
     return NEBEL_OK;
 }
 
@@ -54,11 +59,10 @@ nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_
         nb_world *world = &air->worlds[i];
         desc.atmosphere = world->planet->atmosphere;
         result = nebel_create_air_view(&desc, &world->view);
-        if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0 &&
-            set_daylight(air, &scene->planets[0], world) != NEBEL_OK)
-            result = nb_fail(log, NEBEL_ERROR_MEMORY, "frame: out of memory for the light of models on planets");
         air->reach = fmax(air->reach, sqrt(nb_world_power(world, position) + world->top * world->top) + world->top);
     }
+    if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0)
+        result = nb_air_set_daylights(air, &scene->planets[0], log);
     return result;
 }
 
@@ -68,6 +72,7 @@ void nb_air_free(nb_air *air)
         nebel_destroy_air_view(air->worlds[i].view);
         nb_release(air->allocator, air->worlds[i].daylight);
     }
+    nebel_release_split_light(&air->fog);
 }
 
 /* ---- along rays ------------------------------------------------------------------------------ */
@@ -182,13 +187,25 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
     }
 }
 
-static void light_model(const nb_air *air, const double place[3], double sun[3], double sky[3])
+void nb_air_light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])
 {
     const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
-    if (air->worlds[nearest].daylight == NULL) return;
     nb_daylight_at(air->worlds[nearest].daylight, place, sun, sky);
     const double left = uneclipsed(air, nearest, place);
     for (int c = 0; c < 3; c++) sun[c] *= left;
+}
+
+nebel_air_light nb_air_ask(const nb_air *air, const double place[3])
+{
+    const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
+    const nebel_sun sun = {.direction = {air->to_sun[0], air->to_sun[1], air->to_sun[2]}, .irradiance = {1, 1, 1}};
+    nebel_air_light light;
+    /* Places and suns are in order, so that it cannot fail. */
+    memset(&light, 0, sizeof light);
+    (void)nebel_light_air(air->worlds[nearest].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0, &light, 0);
+    const double left = uneclipsed(air, nearest, place);
+    for (int c = 0; c < 3; c++) light.sun[c] *= left;
+    return light;
 }
 
 void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hits *hits, const nb_points *points,
@@ -198,7 +215,7 @@ void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hit
         double place[3], sun[3] = {0, 0, 0}, sky[3] = {1, 1, 1};
         const int is_model = hits->surface[i] != NB_NONE && hits->surface[i] != NB_GROUND;
         for (int c = 0; c < 3; c++) place[c] = origin[c] + (double)points->start[c][i];
-        if (is_model) light_model(air, place, sun, sky);
+        if (is_model && air->worlds[0].daylight != NULL) nb_air_light_at(air, place, sun, sky);
         for (int c = 0; c < 3; c++) {
             scratch->sun_left[c][i] = (float)sun[c];
             scratch->sky_there[c][i] = air->owns_ambient ? (float)sky[c] : 1;

@@ -23,10 +23,14 @@ typedef struct nb_air {
     int ends;                           /* rays may end before the ground */
     int has_fog;
     float tolerance;
-    double reach;       /* m, from the camera: no air is beyond */
-    int owns_ambient;   /* ambient light is the planet's sky */
-    double to_sun[3];   /* of length 1 */
-    double position[3]; /* of the camera */
+    double reach;        /* m, from the camera: no air is beyond */
+    int owns_ambient;    /* ambient light is the planet's sky */
+    double to_sun[3];    /* of length 1 */
+    double position[3];  /* of the camera */
+    nebel_split_fog fog; /* all NULL: daylight does not change over it, and the rest means nothing */
+    int is_fog_even;     /* daylight is the same all over it: that at the eye, below */
+    float cloud_shade;   /* part of the sun that clouds leave to fog */
+    double sun_at_eye[3], sky_at_eye[3];
 } nb_air;
 
 enum { NB_AIR_KNOTS = 34 };
@@ -36,6 +40,9 @@ typedef struct nb_air_knots {
     float at[NB_BATCH];
     float fog_left[3][NB_BATCH], fog_light[3][NB_BATCH], air_left[3][NB_BATCH], air_light[3][NB_BATCH];
     float air_error[NB_BATCH];
+    /* Of daylit fog, whose fog_light is its own: its light in the full light of the sun, in the origin's sky, and what there
+     * is of both at the place. */
+    float fog_sun[3][NB_BATCH], fog_sky[3][NB_BATCH], sun[3][NB_BATCH], sky[3][NB_BATCH];
 } nb_air_knots;
 
 /* Ground that rays meet, as nebel_find_ground says it. */
@@ -59,6 +66,15 @@ typedef struct nb_air_scratch {
 nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
                         const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads);
 void nb_air_free(nb_air *air);
+
+/* Makes tables of daylight where there are none. Errors: MEMORY. */
+nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const nebel_log *log);
+
+/* By these: what is left of the sun at a place, and how much brighter the sky is than at the origin. */
+void nb_air_light_at(const nb_air *air, const double place[3], double sun[3], double sky[3]);
+
+/* Without tables: for a sun of irradiance 1. */
+nebel_air_light nb_air_ask(const nb_air *air, const double place[3]);
 
 /* nebel_trace_air_view, through the air of all planets; at most NB_BATCH rays. */
 nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direction[3], const float *t_max,

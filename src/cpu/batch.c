@@ -1,6 +1,7 @@
 /* One sample of 64 x 4 pixels: rays, hits, shadows, fog, light. Everything is an array over the batch. */
 #include "classic_fog.h"
 #include "cloudscape.h"
+#include "daylit_fog.h"
 #include "haze.h"
 #include "shells.h"
 
@@ -108,7 +109,7 @@ static nebel_result trace_haze(const nb_frame *frame, nb_scratch *scratch)
     nebel_trace_desc trace = frame->trace;
     nebel_lit_pieces pieces;
     nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
-    if (result == NEBEL_OK) result = nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    if (result == NEBEL_OK) result = nb_daylit_fog_trace(frame, &rays, &trace, &lights, &scratch->air.knots[0]);
     return result == NEBEL_OK ? nb_haze_add(frame, &rays, &trace, scratch) : result;
 }
 
@@ -135,7 +136,7 @@ static nebel_result trace_camera_fog(const nb_frame *frame, nb_scratch *scratch)
     nebel_lit_pieces pieces;
     const nebel_result result = find_shafts(frame, scratch, &pieces, &trace);
     if (result != NEBEL_OK) return result;
-    const nebel_result traced = nebel_trace_planes(frame->renderer->fog, &trace, NB_BATCH, &rays, &lights);
+    const nebel_result traced = nb_daylit_fog_trace(frame, &rays, &trace, &lights, &scratch->air.knots[0]);
     if (traced == NEBEL_OK && has_air) return nb_haze_add(frame, &rays, &trace, scratch);
     return traced == NEBEL_OK && has_shells ? nb_shells_trace(frame, &rays, &trace, scratch) : traced;
 }

@@ -1,5 +1,6 @@
 #include "classic_fog.h"
 #include "cloudscape.h"
+#include "daylit_fog.h"
 #include "even.h"
 #include "shells.h"
 
@@ -53,7 +54,8 @@ static nebel_result set_shafts(nb_frame *frame)
     nebel_sunlit_fog fog;
     double min[3], max[3];
     nebel_result result = NEBEL_OK;
-    frame->has_shafts = may && nebel_snapshot_sunlit_fog(renderer->fog, &fog);
+    const nebel_snapshot *sunlit = nb_daylit_fog_is(&frame->air) ? frame->air.fog.sun : renderer->fog;
+    frame->has_shafts = may && nebel_snapshot_sunlit_fog(sunlit, &fog);
     frame->has_lamp_shafts = may && nebel_snapshot_lamplit_fog(renderer->fog, min, max);
     if (frame->has_shafts) {
         frame->sunlit_box = box_of(geometry, fog.min, fog.max);
@@ -114,9 +116,10 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     if (result != NEBEL_OK)
         return nb_fail(&renderer->log, result, "frame: fog at a vertex: %s", nebel_result_text(result));
     result = nb_reference_set(frame, desc);
-    if (result == NEBEL_OK) result = set_shafts(frame);
     if (result == NEBEL_OK) result = set_air(frame, desc);
     if (result == NEBEL_OK) result = nb_cloudscape_set(frame, desc);
+    if (result == NEBEL_OK) result = nb_daylit_fog_set(frame, desc);
+    if (result == NEBEL_OK) result = set_shafts(frame);
     return result == NEBEL_OK ? nb_shells_set(frame, desc) : result;
 }
 

@@ -1,26 +1,58 @@
 #include "haze.h"
 
+#include "daylit_fog.h"
+
 #include <math.h>
 #include <string.h>
 
 /* The knot 0 of a lane is where its ray ends. The start is none: nothing is before it. */
 typedef struct nb_knot {
     float at, fog_left[3], fog_light[3], air_left[3], air_light[3];
+    float fog_sun[3], fog_sky[3], sun[3], sky[3]; /* of daylit fog, else 0 */
 } nb_knot;
 
-static nb_knot knot_of(const nb_air_scratch *scratch, int lane, int place)
+static nb_knot start_of(const nb_air *air)
 {
     nb_knot knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}};
-    if (place < 0) return knot;
+    for (int c = 0; c < 3 && nb_daylit_fog_is(air); c++) {
+        knot.sun[c] = (float)air->sun_at_eye[c];
+        knot.sky[c] = (float)air->sky_at_eye[c];
+    }
+    return knot;
+}
+
+static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lane, int place)
+{
+    if (place < 0) return start_of(air);
     const nb_air_knots *knots = &scratch->knots[scratch->order[lane][place]];
-    knot.at = knots->at[lane];
+    nb_knot knot = {.at = knots->at[lane]};
     for (int c = 0; c < 3; c++) {
         knot.fog_left[c] = knots->fog_left[c][lane];
         knot.fog_light[c] = knots->fog_light[c][lane];
         knot.air_left[c] = knots->air_left[c][lane];
         knot.air_light[c] = knots->air_light[c][lane];
     }
+    for (int c = 0; c < 3 && nb_daylit_fog_is(air); c++) {
+        knot.fog_sun[c] = knots->fog_sun[c][lane];
+        knot.fog_sky[c] = knots->fog_sky[c][lane];
+        knot.sun[c] = knots->sun[c][lane];
+        knot.sky[c] = knots->sky[c][lane];
+    }
     return knot;
+}
+
+/* The light of fog between two knots, in the mean of the light of both. */
+static float fog_between(const nb_knot *a, const nb_knot *b, int c)
+{
+    return (b->fog_light[c] - a->fog_light[c]) + 0.5f * (a->sun[c] + b->sun[c]) * (b->fog_sun[c] - a->fog_sun[c]) +
+           0.5f * (a->sky[c] + b->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]);
+}
+
+/* By how much that may be off: all fog may be at one of both. */
+static float fog_doubt(const nb_knot *a, const nb_knot *b, int c)
+{
+    return 0.5f * fabsf((b->sun[c] - a->sun[c]) * (b->fog_sun[c] - a->fog_sun[c])) +
+           0.5f * fabsf((b->sky[c] - a->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]));
 }
 
 /* What is in doubt of the light between two knots. */
@@ -29,19 +61,20 @@ static float doubt(const nb_knot *a, const nb_knot *b)
     float most = 0;
     for (int c = 0; c < 3; c++)
         most = fmaxf(most, 0.5f * fabsf((a->fog_left[c] - b->fog_left[c]) * (b->air_light[c] - a->air_light[c])) +
-                               0.5f * fabsf((a->air_left[c] - b->air_left[c]) * (b->fog_light[c] - a->fog_light[c])));
+                               0.5f * fabsf((a->air_left[c] - b->air_left[c]) * fog_between(a, b, c)) +
+                               0.5f * (a->air_left[c] + b->air_left[c]) * fog_doubt(a, b, c));
     return most;
 }
 
 /* The piece of a lane that is in doubt most, and all doubts. */
-static int find_worst(const nb_air_scratch *scratch, int lane, float *all)
+static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane, float *all)
 {
     int worst = 0;
     float most = -1;
-    nb_knot before = knot_of(scratch, lane, -1);
+    nb_knot before = knot_of(air, scratch, lane, -1);
     *all = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_knot here = knot_of(scratch, lane, i);
+        const nb_knot here = knot_of(air, scratch, lane, i);
         const float is = doubt(&before, &here);
         *all += is;
         if (is > most) {
@@ -55,8 +88,13 @@ static int find_worst(const nb_air_scratch *scratch, int lane, float *all)
 
 /* Fog is mostly near and air far: what begins at the eye is cut where air begins to count, other long pieces nearer to
  * their start. */
-static float cut(const nb_knot *a, const nb_knot *b, float tolerance)
+static float cut(const nb_frame *frame, const nb_rays *rays, int lane, const nb_knot *a, const nb_knot *b,
+                 float tolerance)
 {
+    if (a->at == 0 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even) {
+        const float enters = nb_daylit_fog_enters(&frame->air, rays, lane);
+        if (enters > 0 && enters < b->at) return enters;
+    }
     if (a->at > 0) return b->at > 8 * a->at ? 4 * a->at : 0.5f * (a->at + b->at);
     float light = 0, gone = 0;
     for (int c = 0; c < 3; c++) {
@@ -97,7 +135,8 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
         air.transmittance[c] = knot->air_left[c];
         air.in_scattering[c] = knot->air_light[c];
     }
-    nebel_result result = nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, &rays, &lights);
+    nebel_result result = nb_daylit_fog_trace(frame, &rays, trace, &lights, knot);
+    if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, knot);
     if (result == NEBEL_OK) result = nb_air_trace(&frame->air, NB_BATCH, direction, knot->at, &air);
     if (result == NEBEL_OK && frame->cloud_view != NULL) shade(&scratch->clouds, knot);
     return result;
@@ -111,20 +150,36 @@ static float tolerance_of(const nb_frame *frame, const nb_air_scratch *air, int 
     return frame->air.tolerance * brightest;
 }
 
+/* The first knot of daylit fog, which light at both ends of a ray does not tell of. */
+static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lane)
+{
+    const nb_air_knots *end = &scratch->air.knots[0];
+    const float place = nb_daylit_fog_lowest(&frame->air, &scratch->rays, lane);
+    float light = 0;
+    for (int c = 0; c < 3; c++) light = fmaxf(light, end->fog_sun[c][lane] + end->fog_sky[c][lane]);
+    return place < end->at[lane] && light > frame->air.tolerance ? place : 0;
+}
+
 /* One more knot for each lane that needs it; returns whether any did. */
 static int choose(const nb_frame *frame, nb_scratch *scratch, int number)
 {
     nb_air_scratch *air = &scratch->air;
+    const int is_first = number == 1 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even;
     int any = 0;
     for (int i = 0; i < NB_BATCH; i++) {
         float all, *at = &air->knots[number].at[i];
         *at = 0;
         if (!scratch->inside[i]) continue;
-        const int worst = find_worst(air, i, &all);
+        if (is_first && (*at = first_cut(frame, scratch, i)) > 0) {
+            insert(air, i, 0, number);
+            any = 1;
+            continue;
+        }
+        const int worst = find_worst(&frame->air, air, i, &all);
         const float tolerance = tolerance_of(frame, air, i);
         if (all <= tolerance) continue;
-        const nb_knot a = knot_of(air, i, worst - 1), b = knot_of(air, i, worst);
-        const float place = cut(&a, &b, tolerance);
+        const nb_knot a = knot_of(&frame->air, air, i, worst - 1), b = knot_of(&frame->air, air, i, worst);
+        const float place = cut(frame, &scratch->rays, i, &a, &b, tolerance);
         if (!(place > a.at && place < b.at)) continue;
         *at = place;
         insert(air, i, worst, number);
@@ -144,18 +199,18 @@ static void take_air(nb_scratch *scratch)
     memcpy(scratch->samples.error, all->air_error, sizeof all->air_error);
 }
 
-static void sum_up(nb_scratch *scratch, int lane)
+static void sum_up(const nb_air *of, nb_scratch *scratch, int lane)
 {
     const nb_air_scratch *air = &scratch->air;
     nb_light_samples *samples = &scratch->samples;
-    nb_knot before = knot_of(air, lane, -1);
+    nb_knot before = knot_of(of, air, lane, -1);
     float light[3] = {0, 0, 0}, all = 0;
-    (void)find_worst(air, lane, &all);
+    (void)find_worst(of, air, lane, &all);
     for (int i = 0; i < air->count[lane]; i++) {
-        const nb_knot here = knot_of(air, lane, i);
+        const nb_knot here = knot_of(of, air, lane, i);
         for (int c = 0; c < 3; c++)
             light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
-                        0.5f * (before.air_left[c] + here.air_left[c]) * (here.fog_light[c] - before.fog_light[c]);
+                        0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
         before = here;
     }
     for (int c = 0; c < 3; c++) {
@@ -198,8 +253,9 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
         take_air(scratch);
         return result;
     }
+    if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, first);
     for (int k = 1; k < NB_AIR_KNOTS && result == NEBEL_OK && choose(frame, scratch, k); k++)
         result = trace_knot(frame, fog, trace, scratch, &scratch->air.knots[k]);
-    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(scratch, i);
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(&frame->air, scratch, i);
     return result;
 }

@@ -364,6 +364,7 @@ static nebel_result make_snapshot(const nebel_fog *fog, selection of, nebel_snap
     s->allocator = fog->allocator;
     s->log = fog->log;
     s->max_opacity = fog->max_opacity > 0 ? fog->max_opacity : 1;
+    s->diffusing = fog->diffusion;
     atomic_init(&s->owners, 1);
     point_to_sun(s, &fog->sun);
     const int is_whole = !of.is_scaled && !of.is_level; /* of others nobody asks the light */

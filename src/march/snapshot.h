@@ -8,6 +8,8 @@
 #include "media/sky.h"
 #include "media/volume.h"
 
+#include <nebel/diffusion.h>
+
 #include <stdatomic.h>
 
 /* A volume and what the integrator wants to know of it at once. */
@@ -74,6 +76,7 @@ struct nebel_snapshot {
     size_t covering_count;    /* media that cover others */
     size_t endless_count;     /* media without finite bounds, by index: every ray may meet them */
     uint32_t *endless;
+    nebel_diffusion_desc diffusing;     /* of the fog; cells 0: off */
     struct nb_diffusion *diffusion;     /* light that is scattered more than once, of sun and sky; NULL: left out */
     struct nb_diffusion *own_diffusion; /* the same of lamps, and of what fog emits and scatters */
     nb_bvh bvh;                         /* over the others */

@@ -1,0 +1,193 @@
+#include "daylit_fog.h"
+
+#include <math.h>
+#include <string.h>
+
+/* As parts of the sun's light and of the sky's: a step of a picture of 255 is 0.9 % of light where it is bright. */
+#define LEAST_CHANGE (1 / 128.)
+
+/* Fog that is all so near the origin along each axis, m and parts of the planet's radius, takes the origin's light, as OpenGL
+ * lights all fog. */
+#define MOST_NEAR 1e4
+#define NEAR_PART (1 / 600.)
+
+/* ---- the frame ------------------------------------------------------------------------------- */
+
+static int is_near(const nebel_planet *home, const double min[3], const double max[3])
+{
+    const double most = fmin(MOST_NEAR, NEAR_PART * home->air.radius);
+    for (int c = 0; c < 3; c++)
+        if (min[c] < -most || max[c] > most) return 0;
+    return 1;
+}
+
+/* Whether two places have another light. */
+static int differ(const nb_air *air, const nebel_air_light *a, const nebel_air_light *b)
+{
+    double brightest = 0, sun = 0;
+    int sky = 0;
+    for (int c = 0; c < 3; c++) {
+        brightest = fmax(brightest, fmax(a->sun[c], b->sun[c]));
+        sun = fmax(sun, fabs(a->sun[c] - b->sun[c]));
+        sky |= fabs(a->sky[c] - b->sky[c]) > LEAST_CHANGE * fmax(a->sky[c], b->sky[c]);
+    }
+    return sun > LEAST_CHANGE * brightest || (air->owns_ambient && sky);
+}
+
+static void find_middle(const double min[3], const double max[3], double middle[3])
+{
+    for (int c = 0; c < 3; c++) middle[c] = 0.5 * (min[c] + max[c]);
+}
+
+/* Whether light is the same all over a box. From corner to corner of one that is thinner than the air it changes steadily. */
+static int is_even(const nb_air *air, const double min[3], const double max[3])
+{
+    double middle[3];
+    for (int c = 0; c < 3; c++)
+        if (!(max[c] - min[c] < air->worlds[0].top - air->worlds[0].radius)) return 0;
+    find_middle(min, max, middle);
+    const nebel_air_light light = nb_air_ask(air, middle);
+    for (int corner = 0; corner < 8; corner++) {
+        double place[3];
+        for (int c = 0; c < 3; c++) place[c] = (corner >> c & 1) != 0 ? max[c] : min[c];
+        const nebel_air_light there = nb_air_ask(air, place);
+        if (differ(air, &light, &there)) return 0;
+    }
+    return 1;
+}
+
+/* Clouds shade all fog as they do the origin, as wide as nebel_find_scene_sunlight takes them. */
+static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
+{
+    enum { WIDE = 200 };
+    static const double origin[1][3] = {{0, 0, 0}};
+    *part = 1;
+    if (frame->cloud_view == NULL) return NEBEL_OK;
+    return nebel_shade_clouds(frame->renderer->scratch[0].clouds.workspace, WIDE, 1, origin, 0, part);
+}
+
+static void light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])
+{
+    nb_air_light_at(air, place, sun, sky);
+    for (int c = 0; c < 3; c++) {
+        sun[c] *= (double)air->cloud_shade;
+        if (!air->owns_ambient) sky[c] = 1;
+    }
+}
+
+/* Without tables, to `sun`, where it is the same everywhere. */
+static void set_even_light(nb_air *air, const double min[3], const double max[3], nebel_sun *sun)
+{
+    static const double origin[3] = {0, 0, 0};
+    double middle[3];
+    find_middle(min, max, middle);
+    const nebel_air_light there = nb_air_ask(air, middle), here = nb_air_ask(air, origin);
+    for (int c = 0; c < 3; c++) {
+        sun->irradiance[c] *= there.sun[c] * (double)air->cloud_shade;
+        air->sun_at_eye[c] = 1;
+        air->sky_at_eye[c] = air->owns_ambient && here.sky[c] > NB_DAYLIGHT_LEAST_SKY ? there.sky[c] / here.sky[c] : 1;
+    }
+}
+
+nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc)
+{
+    nb_air *air = &frame->air;
+    const nebel_renderer *renderer = frame->renderer;
+    const nebel_scene_data *scene = renderer->scene;
+    nebel_sun sun;
+    double min[3], max[3];
+    if (desc->even_daylight || !air->has_fog || !scene->has_sun ||
+        !nebel_snapshot_scattering_fog(renderer->fog, min, max) || is_near(&scene->planets[0], min, max))
+        return NEBEL_OK;
+    memcpy(sun.direction, scene->sun_direction, sizeof sun.direction);
+    memcpy(sun.irradiance, scene->sun_irradiance, sizeof sun.irradiance);
+    air->is_fog_even = is_even(air, min, max);
+    nebel_result result = find_cloud_shade(frame, &air->cloud_shade);
+    if (air->is_fog_even)
+        set_even_light(air, min, max, &sun);
+    else if (result == NEBEL_OK)
+        result = nb_air_set_daylights(air, &scene->planets[0], &renderer->log);
+    if (result == NEBEL_OK && !air->is_fog_even) light_at(air, air->position, air->sun_at_eye, air->sky_at_eye);
+    return result == NEBEL_OK ? nebel_split_light(renderer->fog, &sun, &air->fog) : result;
+}
+
+/* ---- along rays ------------------------------------------------------------------------------ */
+
+/* Adds to the error of all. */
+static nebel_result trace_part(const nebel_snapshot *fog, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
+                               float *error, float *const light[3])
+{
+    float own[NB_BATCH];
+    const nebel_light_planes lights = {.in_scattering = {light[0], light[1], light[2]},
+                                       .error = error != NULL ? own : NULL};
+    const nebel_result result = nebel_trace_planes(fog, trace, NB_BATCH, rays, &lights);
+    for (int i = 0; i < NB_BATCH && error != NULL && result == NEBEL_OK; i++) error[i] += own[i];
+    return result;
+}
+
+nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
+                                 const nebel_light_planes *lights, nb_air_knots *knot)
+{
+    const nebel_split_fog *fog = &frame->air.fog;
+    if (!nb_daylit_fog_is(&frame->air)) return nebel_trace_planes(frame->renderer->fog, trace, NB_BATCH, rays, lights);
+    nebel_trace_desc by_sky = *trace, by_sun = *trace;
+    nebel_light_planes with_sky = *lights;
+    by_sky.sunlit = by_sky.lamplit = by_sun.lamplit = NULL;
+    for (int c = 0; c < 3; c++) with_sky.in_scattering[c] = knot->fog_sky[c];
+    nebel_result result = nebel_trace_planes(fog->sky, &by_sky, NB_BATCH, rays, &with_sky);
+    if (result == NEBEL_OK)
+        result = trace_part(fog->sun, rays, &by_sun, lights->error,
+                            (float *const[]){knot->fog_sun[0], knot->fog_sun[1], knot->fog_sun[2]});
+    if (fog->own != NULL && result == NEBEL_OK)
+        return trace_part(fog->own, rays, trace, lights->error, lights->in_scattering);
+    for (int c = 0; c < 3; c++) memset(lights->in_scattering[c], 0, NB_BATCH * sizeof(float));
+    return result;
+}
+
+void nb_daylit_fog_light(const nb_frame *frame, const nb_rays *rays, nb_air_knots *knot)
+{
+    const nb_air *air = &frame->air;
+    for (int i = 0; i < NB_BATCH; i++) {
+        double place[3], sun[3], sky[3];
+        if (!(knot->at[i] > 0)) continue;
+        for (int c = 0; c < 3; c++)
+            place[c] = air->position[c] + (double)knot->at[i] * rays->direction[c][i] / (double)rays->length[i];
+        if (!air->is_fog_even) light_at(air, place, sun, sky);
+        for (int c = 0; c < 3; c++) {
+            knot->sun[c][i] = (float)(air->is_fog_even ? air->sun_at_eye : sun)[c];
+            knot->sky[c][i] = (float)(air->is_fog_even ? air->sky_at_eye : sky)[c];
+        }
+    }
+}
+
+/* Where a ray is nearest to the middle of a ball, and half of what the ball cuts out of it; 0: it does not meet it. */
+static double pass(const nb_world *world, const double position[3], const double unit[3], double *half)
+{
+    double to[3], square = world->top * world->top;
+    for (int c = 0; c < 3; c++) to[c] = world->center[c] - position[c];
+    const double along = nb_vector_dot(to, unit);
+    for (int c = 0; c < 3; c++) square -= pow(to[c] - along * unit[c], 2);
+    *half = sqrt(fmax(0, square));
+    return square > 0 ? along : 0;
+}
+
+static double pass_first(const nb_air *air, const nb_rays *rays, int lane, double *half)
+{
+    double unit[3], nearest = 0;
+    for (int c = 0; c < 3; c++) unit[c] = rays->direction[c][lane] / (double)rays->length[lane];
+    for (int k = 0; k < air->count && !(nearest > 0); k++) nearest = pass(&air->worlds[k], air->position, unit, half);
+    return nearest;
+}
+
+float nb_daylit_fog_lowest(const nb_air *air, const nb_rays *rays, int lane)
+{
+    double half = 0;
+    return (float)fmax(0, pass_first(air, rays, lane, &half));
+}
+
+float nb_daylit_fog_enters(const nb_air *air, const nb_rays *rays, int lane)
+{
+    double half = 0;
+    const double nearest = pass_first(air, rays, lane, &half);
+    return (float)fmax(0, nearest - half);
+}

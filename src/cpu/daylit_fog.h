@@ -1,0 +1,29 @@
+/* Fog over which daylight changes: traced by its lights apart, each of which is then as bright as at its place. */
+#ifndef NB_CPU_DAYLIT_FOG_H
+#define NB_CPU_DAYLIT_FOG_H
+
+#include "renderer.h"
+
+/* Splits the light of the frame's fog where it needs that, once air and clouds are set. Errors: MEMORY, and those of
+ * nebel_split_light. */
+nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc);
+
+static inline int nb_daylit_fog_is(const nb_air *air)
+{
+    return air->fog.sun != NULL;
+}
+
+/* nebel_trace_planes, of the frame's fog. Where it is daylit, in-scattering is that of its own light, and the others are in
+ * the knot. */
+nebel_result nb_daylit_fog_trace(const nb_frame *frame, const nebel_ray_planes *rays, const nebel_trace_desc *trace,
+                                 const nebel_light_planes *lights, nb_air_knots *knot);
+
+/* What the sun and the sky are at the places of a knot; nothing is asked where that is 0. */
+void nb_daylit_fog_light(const nb_frame *frame, const nb_rays *rays, nb_air_knots *knot);
+
+/* Where a ray is nearest to the middle of the first planet whose air it passes, and where it enters that; 0: nowhere before
+ * it, or at the start. From one to the next daylight changes one way, but in shadows of other planets. */
+float nb_daylit_fog_lowest(const nb_air *air, const nb_rays *rays, int lane);
+float nb_daylit_fog_enters(const nb_air *air, const nb_rays *rays, int lane);
+
+#endif
