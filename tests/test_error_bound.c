@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "dice.h"
 #include "fog_help.h"
 
 enum { RAYS_PER_FOG = 20 };
@@ -101,12 +102,24 @@ static void judge(mode *m, size_t i, const random_fog *fog, const nebel_light *l
     keep_worst(isnan(light->error) ? HUGE_VAL : light->error / promised, i, &m->worst_excess, &m->worst_excess_case);
 }
 
+/* In half of the fog of unions and intersections one volume replaces others and one excludes them. */
+static void make_fog(random_fog *fog, size_t i)
+{
+    uint64_t state = seed_of(i);
+    random_fog_make(fog, kind_of(i), state);
+    if (fog->kind != RANDOM_FOG_PARTS || state % 2 == 0) return;
+    nebel_volume_desc *const v = fog->volumes;
+    v[1].operation = NEBEL_OPERATION_REPLACE;
+    v[2] = (nebel_volume_desc){.shape = v[2].shape, .operation = NEBEL_OPERATION_EXCLUDE};
+    for (size_t k = 0; k < fog->count; k++) v[k].priority = dice_below(&state, 3) - 1;
+}
+
 static void try_fog(size_t from, size_t to)
 {
     static random_fog fog;
     nebel_ray rays[RAYS_PER_FOG];
     nebel_light lights[MODES][RAYS_PER_FOG];
-    random_fog_make(&fog, kind_of(from), seed_of(from));
+    make_fog(&fog, from);
     for (size_t i = from; i < to; i++) rays[i - from] = random_fog_ray(&fog, i % RAYS_PER_FOG);
     nebel_snapshot *const snapshot = commit(&fog);
     for (int m = 0; m < MODES; m++) {
@@ -134,7 +147,7 @@ static void try_fog(size_t from, size_t to)
 static void print_case(const char *why, const mode *m, size_t i)
 {
     static random_fog fog;
-    random_fog_make(&fog, kind_of(i), seed_of(i));
+    make_fog(&fog, i);
     const nebel_ray ray = random_fog_ray(&fog, i % RAYS_PER_FOG);
     nebel_snapshot *const snapshot = commit(&fog);
     nebel_light light;
