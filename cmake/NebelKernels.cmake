@@ -53,10 +53,7 @@ function(nebel_add_kernel file level)
     # gcc's note that vectors wider than the base level change the calling convention: the kernels pass none between objects.
     target_compile_options(${target} PRIVATE -Wno-psabi ${nebel_flags_${level}})
     # The march is full of loops over three colours, which -O2 leaves in memory.
-    # With sanitizers gcc 12 fails in SSE2 there from -O2 on ("internal compiler error: in gimple_expand_vec_cond_expr").
-    if(stem STREQUAL trace_kernel AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NEBEL_SANITIZE)
-        target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
-    elseif(stem STREQUAL trace_kernel AND CMAKE_C_COMPILER_ID STREQUAL GNU)
+    if(stem STREQUAL trace_kernel AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
         target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
     endif()
 endfunction()

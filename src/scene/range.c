@@ -9,6 +9,9 @@
 
 #define FACTORS "a factor from " NB_TEXT(NEBEL_MIN_SCALE) " to " NB_TEXT(NEBEL_MAX_SCALE) ", or the negative of one"
 
+/* Digits, sign, point and exponent of any double, as texts of numbers have them. */
+enum { NUMBER_TEXT = 40 };
+
 /* Distances of frames stay finite, and far from each other in digits. */
 #define MOST_FRAME 1e9
 
@@ -43,9 +46,9 @@ bool nb_range_holds(const nb_range *range, double unit, double number)
 }
 
 /* As it is written by hand: 1e15, not 1e+15. */
-static void write_digits(int digits, double number, char text[32])
+static void write_digits(int digits, double number, char text[NUMBER_TEXT])
 {
-    snprintf(text, 32, "%.*g", digits, number);
+    snprintf(text, NUMBER_TEXT, "%.*g", digits, number);
     char *at = strchr(text, 'e');
     if (at == NULL) return;
     char *exponent = at + 1;
@@ -55,19 +58,19 @@ static void write_digits(int digits, double number, char text[32])
 }
 
 /* And 1e9, not 1000000000. */
-static void write_number(double number, char text[32])
+static void write_number(double number, char text[NUMBER_TEXT])
 {
     int zeros = 0;
     for (double rest = number; zeros < 22 && rest != 0 && fmod(rest, 10) == 0; rest /= 10) zeros++;
     if (zeros >= 6)
-        snprintf(text, 32, "%.15ge%d", number / pow(10, zeros), zeros);
+        snprintf(text, NUMBER_TEXT, "%.15ge%d", number / pow(10, zeros), zeros);
     else
         write_digits(15, number, text);
 }
 
 /* A limit in the numbers of a file, which is in the range as it is written. `inwards` is a little more than 1 for the
  * low one, less for the high one. */
-static void write_limit(const nb_range *range, double unit, double limit, double inwards, char text[32])
+static void write_limit(const nb_range *range, double unit, double limit, double inwards, char text[NUMBER_TEXT])
 {
     double number = limit;
     if (range->dimension == NB_LENGTH) number /= unit;
@@ -79,7 +82,7 @@ static void write_limit(const nb_range *range, double unit, double limit, double
 
 static void describe_limits(const nb_range *range, double unit, char text[96])
 {
-    char low[32], high[32];
+    char low[NUMBER_TEXT], high[NUMBER_TEXT];
     write_limit(range, unit, range->low, 1.000001, low);
     write_limit(range, unit, range->high, 0.999999, high);
     if (isinf(range->high))
@@ -92,7 +95,7 @@ static void describe_limits(const nb_range *range, double unit, char text[96])
 
 const char *nb_range_describe(const nb_range *range, double unit, char text[NB_RANGE_TEXT])
 {
-    char limits[96], metres[64], size[32];
+    char limits[96], metres[64], size[NUMBER_TEXT];
     const bool per = range->dimension == NB_PER_LENGTH;
     if (range->dimension == NB_PURE) return range->text;
     describe_limits(range, unit, limits);
