@@ -1,7 +1,5 @@
 #include "cloudscape.h"
 
-#include "base/cloud_haze.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -121,39 +119,81 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
 
-/* What is before the first knot, or the last one. */
-static nebel_result find_haze(const nb_frame *frame, int is_last, nb_haze_fn haze, nb_scratch *scratch,
-                              float (*left)[NB_BATCH], float (*light)[NB_BATCH])
-{
-    const nb_cloud_scratch *clouds = &scratch->clouds;
-    for (int i = 0; i < NB_BATCH; i++) {
-        const nebel_cloud_knots *knots = &clouds->knots[i];
-        scratch->distance[i] = clouds->is_new[i] ? knots->t[is_last ? knots->count - 1 : 0] : 0;
-    }
-    const nebel_result result = haze(frame, scratch);
-    memcpy(left, scratch->samples.transmittance, sizeof scratch->samples.transmittance);
-    memcpy(light, scratch->samples.in_scattering, sizeof scratch->samples.in_scattering);
-    return result;
-}
-
-/* Of one ray. */
-static void mix_lane(const nb_frame *frame, nb_cloud_scratch *clouds, int lane)
+/* What the air does up to the knots of a ray. */
+static nebel_result find_air(const nb_frame *frame, nb_cloud_scratch *clouds, int lane)
 {
     const nebel_cloud_knots *knots = &clouds->knots[lane];
     const double direction[3] = {clouds->rays.direction[0][lane], clouds->rays.direction[1][lane],
                                  clouds->rays.direction[2][lane]};
-    nb_cloud_haze haze;
+    nb_cloud_haze *air = &clouds->air[lane];
     nb_cloud_rays rays;
-    nb_cloud_haze_ask(knots, direction, &haze, &rays);
-    nb_air_trace(&frame->air, knots->count, rays.direction, knots->t, &rays.lights);
-    for (int c = 0; c < 3; c++) {
+    nb_cloud_haze_ask(knots, direction, air, &rays);
+    const nebel_result result = nb_air_trace(&frame->air, knots->count, rays.direction, knots->t, &rays.lights);
+    for (int c = 0; c < 3; c++)
         for (uint32_t k = 0; k < knots->count; k++)
-            haze.light[c][k] =
-                nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k], haze.light[c][k]);
-        const float left[2] = {clouds->left[0][c][lane], clouds->left[1][c][lane]};
-        const float light[2] = {clouds->light[0][c][lane], clouds->light[1][c][lane]};
+            air->light[c][k] =
+                nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k], air->light[c][k]);
+    return result;
+}
+
+/* Marks the knots that are next. */
+static nebel_result mark(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+{
+    nb_cloud_scratch *clouds = &scratch->clouds;
+    for (int i = 0; i < NB_BATCH; i++)
+        scratch->distance[i] = clouds->next[i] >= 0 ? clouds->knots[i].t[clouds->next[i]] : 0;
+    const nebel_result result = haze(frame, scratch);
+    for (int i = 0; i < NB_BATCH; i++) {
+        float left[3], light[3];
+        if (clouds->next[i] < 0) continue;
+        for (int c = 0; c < 3; c++) {
+            left[c] = scratch->samples.transmittance[c][i];
+            light[c] = scratch->samples.in_scattering[c][i];
+        }
+        nb_cloud_mark(&clouds->marks[i], (uint32_t)clouds->next[i], left, light);
+    }
+    return result;
+}
+
+/* What is next. *any: whether anything is. */
+static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int *any)
+{
+    nebel_result result = NEBEL_OK;
+    *any = 0;
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        nebel_cloud_knots *knots = &clouds->knots[i];
+        const uint32_t count = knots->count;
+        clouds->next[i] = -1;
+        if (!clouds->is_new[i]) continue;
+        clouds->next[i] =
+            nb_cloud_haze_next(knots, &clouds->marks[i], &clouds->air[i], frame->air.tolerance, &clouds->doubt[i]);
+        *any |= clouds->next[i] >= 0;
+        if (knots->count > count) result = find_air(frame, clouds, i);
+    }
+    return result;
+}
+
+static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
+{
+    nebel_result result = NEBEL_OK;
+    int any = 1;
+    memset(scratch->clouds.marks, 0, sizeof scratch->clouds.marks);
+    while (result == NEBEL_OK && any) {
+        result = choose(frame, &scratch->clouds, &any);
+        if (result == NEBEL_OK && any) result = mark(frame, haze, scratch);
+    }
+    return result;
+}
+
+/* Of one ray. */
+static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
+{
+    const nebel_cloud_knots *knots = &clouds->knots[lane];
+    const nb_cloud_haze *air = &clouds->air[lane];
+    nb_cloud_haze haze = *air;
+    for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_KNOTS];
-        if (frame->air.has_fog) nb_cloud_haze_add_fog(knots, c, left, light, &haze);
+        if (has_fog) nb_cloud_haze_add_fog(knots, &clouds->marks[lane], c, air, &haze);
         nb_cloud_haze_sum(knots, c, &haze, over);
         for (uint32_t k = 0; k < knots->count; k++) clouds->over[k][c][lane] = over[k];
     }
@@ -163,16 +203,20 @@ static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scra
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     nebel_result result = NEBEL_OK;
-    if (frame->air.has_fog) {
+    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        if (!clouds->is_new[i]) continue;
+        clouds->doubt[i] = 0;
+        result = find_air(frame, clouds, i);
+    }
+    if (result == NEBEL_OK && frame->air.has_fog) {
         memcpy(clouds->end, scratch->distance, sizeof clouds->end);
         clouds->samples = scratch->samples;
-        for (int i = 0; i < 2 && result == NEBEL_OK; i++)
-            result = find_haze(frame, i, haze, scratch, clouds->left[i], clouds->light[i]);
+        result = find_fog(frame, haze, scratch);
         scratch->samples = clouds->samples;
         memcpy(scratch->distance, clouds->end, sizeof clouds->end);
     }
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++)
-        if (clouds->is_new[i]) mix_lane(frame, clouds, i);
+        if (clouds->is_new[i]) mix_lane(frame->air.has_fog, clouds, i);
     return result;
 }
 
@@ -193,7 +237,7 @@ static void lay_over(nb_scratch *scratch, int lane)
         samples->in_scattering[c][lane] = fmaxf(0, left * samples->in_scattering[c][lane] + over);
         samples->transmittance[c][lane] *= left;
     }
-    samples->error[lane] += knots->error;
+    samples->error[lane] += knots->error + clouds->doubt[lane];
 }
 
 nebel_result nb_cloudscape_add(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)

@@ -15,6 +15,7 @@
 #include "view.h"
 
 #include "base/air_shade.h"
+#include "base/cloud_haze.h"
 #include "base/lighting.h"
 
 #include <nebel/render.h>
@@ -53,8 +54,11 @@ typedef struct nb_cloud_scratch {
     nb_shaded_piece shaded[NB_BATCH][NB_SHADED_PIECES]; /* the air */
     uint32_t shaded_count[NB_BATCH];
     float over[NEBEL_MAX_CLOUD_KNOTS][3][NB_BATCH]; /* what a knot adds to light that came from behind */
-    float left[2][3][NB_BATCH], light[2][3][NB_BATCH],
-        end[NB_BATCH]; /* of fog and air before the first knot and the last */
+    nb_cloud_haze air[NB_BATCH];
+    nb_cloud_marks marks[NB_BATCH];
+    int next[NB_BATCH];    /* the knot to mark; -1: none */
+    float doubt[NB_BATCH]; /* of light, as fog counts as spread evenly between marks */
+    float end[NB_BATCH];
     nb_light_samples samples;
 } nb_cloud_scratch;
 

@@ -14,10 +14,9 @@ typedef struct job {
     nb_gl_clouds *clouds;
     const nb_cloud_picture *picture;
     void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);
-    float *const *ends;
     const nb_world *worlds;
-    int world_count;
-    const nb_cloud_fog *fog;
+    int world_count, has_fog;
+    float *marks; /* where fog is to be known next */
     const float *places, *left;
     float *over, *shade;
 } job;
@@ -98,6 +97,7 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
     forget(clouds);
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
         nb_release(&clouds->allocator, clouds->parts[i].knots);
+        nb_release(&clouds->allocator, clouds->parts[i].before);
         nb_release(&clouds->allocator, clouds->parts[i].pieces);
         nb_release(&clouds->allocator, clouds->parts[i].dusks);
     }
@@ -106,14 +106,12 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
-static void keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knots *knots, nb_cloud_pixel *pixel)
+static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knots *knots, nb_cloud_pixel *pixel)
 {
     void *list = part->knots;
     if (!nb_grow(&j->clouds->allocator, &list, sizeof *part->knots, part->count, &part->capacity,
-                 part->count + knots->count)) {
-        part->result = NEBEL_ERROR_MEMORY;
-        return;
-    }
+                 part->count + knots->count))
+        return NEBEL_ERROR_MEMORY;
     part->knots = list;
     pixel->first = (uint32_t)part->count;
     pixel->count = knots->count;
@@ -122,6 +120,7 @@ static void keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knot
         *knot = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
         memcpy(knot->light, knots->in_scattering[k], sizeof knot->light);
     }
+    return NEBEL_OK;
 }
 
 static int grow_pieces(const nebel_allocator *allocator, nb_cloud_part *part)
@@ -178,14 +177,12 @@ static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)
         memcpy(ray.origin, picture->eye, sizeof ray.origin);
         part->result = nebel_trace_clouds(part->workspace, 1, &ray, 0, picture->pixel / length, &knots, 0);
         if (part->result == NEBEL_OK) part->result = shade_air(j, part, &ray, &j->clouds->pixels[i]);
-        if (part->result == NEBEL_OK) keep_knots(j, part, &knots, &j->clouds->pixels[i]);
-        for (int k = 0; k < 2 && j->ends[k] != NULL; k++)
-            j->ends[k][i] = knots.count == 0 ? 0 : knots.t[k == 0 ? 0 : knots.count - 1];
+        if (part->result == NEBEL_OK) part->result = keep_knots(j, part, &knots, &j->clouds->pixels[i]);
     }
 }
 
 nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
-                                int count, float *ends[2])
+                                int count)
 {
     void *list = clouds->pixels;
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
@@ -193,8 +190,7 @@ nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *pi
         return NEBEL_ERROR_MEMORY;
     clouds->pixels = list;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].count = clouds->parts[i].piece_count = 0;
-    job j = {
-        .clouds = clouds, .picture = picture, .row = trace_row, .worlds = worlds, .world_count = count, .ends = ends};
+    job j = {.clouds = clouds, .picture = picture, .row = trace_row, .worlds = worlds, .world_count = count};
     return do_parts(&j);
 }
 
@@ -236,18 +232,6 @@ void nb_gl_clouds_keep_fog(nb_gl_clouds *clouds, const nb_cloud_picture *picture
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
 
-static nebel_cloud_knots knots_of(const nb_cloud_part *part, const nb_cloud_pixel *pixel)
-{
-    nebel_cloud_knots knots = {.count = pixel->count};
-    for (uint32_t k = 0; k < pixel->count; k++) {
-        const nb_cloud_knot *const knot = &part->knots[pixel->first + k];
-        knots.t[k] = knot->t;
-        knots.transmittance[k] = knot->left;
-        memcpy(knots.in_scattering[k], knot->light, sizeof knot->light);
-    }
-    return knots;
-}
-
 /* Of one colour: light of air up to a place, which loses some in the shade of clouds. */
 static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, int c, float t, float clear)
 {
@@ -269,32 +253,137 @@ static float lost_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, int
     return lost + 0.5f * (dusks[k].fog[c] + fog) * (clear - shaded_at(part, pixel, c, t, clear) - dusks[k].gone[c]);
 }
 
+/* All that is known of a ray. */
+typedef struct nb_cloud_mix {
+    nebel_cloud_knots knots;
+    nb_cloud_haze air;
+    nb_cloud_marks marks;
+} nb_cloud_mix;
+
+/* Of light up to a mark shade takes its part. */
+static void set_mark(const nb_cloud_part *part, const nb_cloud_pixel *pixel, const nb_cloud_knot *knot, uint32_t k,
+                     nb_cloud_mix *mix)
+{
+    float light[3];
+    for (int c = 0; c < 3; c++) {
+        const float fog = mix->air.left[c][k] > 0 ? knot->haze_left[c] / mix->air.left[c][k] : 0;
+        light[c] = knot->haze_light[c] - lost_at(part, pixel, c, knot->t, mix->air.light[c][k], fog);
+    }
+    nb_cloud_mark(&mix->marks, k, knot->haze_left, light);
+}
+
+static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_cloud_knot *list,
+                             const nb_cloud_pixel *pixel, const double direction[3], nb_cloud_mix *mix)
+{
+    nb_cloud_rays rays;
+    mix->knots = (nebel_cloud_knots){.count = pixel->count};
+    memset(&mix->marks, 0, sizeof mix->marks);
+    for (uint32_t k = 0; k < pixel->count; k++) {
+        mix->knots.t[k] = list[k].t;
+        mix->knots.transmittance[k] = list[k].left;
+        memcpy(mix->knots.in_scattering[k], list[k].light, sizeof list[k].light);
+    }
+    nb_cloud_haze_ask(&mix->knots, direction, &mix->air, &rays);
+    const nebel_result result =
+        nb_worlds_trace(j->worlds, j->world_count, pixel->count, rays.direction, mix->knots.t, &rays.lights);
+    for (uint32_t k = 0; k < pixel->count && result == NEBEL_OK; k++) {
+        if (list[k].is_marked) set_mark(part, pixel, &list[k], k, mix);
+        for (int c = 0; c < 3; c++) mix->air.light[c][k] = shaded_at(part, pixel, c, list[k].t, mix->air.light[c][k]);
+    }
+    return result;
+}
+
+/* Knots move over from those before, and one may come between them. */
+static nebel_result choose_pixel(const job *j, nb_cloud_part *part, nb_cloud_pixel *pixel, const double direction[3])
+{
+    const nb_cloud_knot *const before = part->before + pixel->first;
+    nb_cloud_mix mix;
+    float doubt;
+    nebel_result result = find_mix(j, part, before, pixel, direction, &mix);
+    if (result != NEBEL_OK) return result;
+    const uint32_t count = pixel->count;
+    pixel->next = nb_cloud_haze_next(&mix.knots, &mix.marks, &mix.air, (float)NEBEL_DEFAULT_TOLERANCE, &doubt);
+    result = keep_knots(j, part, &mix.knots, pixel);
+    for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
+        const uint32_t at = pixel->count > count && (int)k >= pixel->next ? k + 1 : k;
+        nb_cloud_knot *const knot = &part->knots[pixel->first + at];
+        knot->is_marked = before[k].is_marked;
+        memcpy(knot->haze_left, before[k].haze_left, sizeof knot->haze_left);
+        memcpy(knot->haze_light, before[k].haze_light, sizeof knot->haze_light);
+    }
+    return result;
+}
+
+static void choose_row(const job *j, nb_cloud_part *part, uint32_t y)
+{
+    for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
+        const size_t i = (size_t)y * j->picture->view->width + x;
+        nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
+        double direction[3];
+        (void)direction_at(j->picture, x, y, direction);
+        pixel->next = -1;
+        if (pixel->count > 0) part->result = choose_pixel(j, part, pixel, direction);
+        j->marks[i] = pixel->next >= 0 ? part->knots[pixel->first + (uint32_t)pixel->next].t : 0;
+    }
+}
+
+nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
+                                 int count, float *places, int *any)
+{
+    const size_t pixels = (size_t)picture->view->width * picture->view->height;
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) {
+        nb_cloud_part *const part = &clouds->parts[i];
+        nb_cloud_knot *const knots = part->knots;
+        const size_t capacity = part->capacity;
+        part->knots = part->before;
+        part->capacity = part->capacity_before;
+        part->before = knots;
+        part->capacity_before = capacity;
+        part->count = 0;
+    }
+    job j = {.clouds = clouds,
+             .picture = picture,
+             .row = choose_row,
+             .worlds = worlds,
+             .world_count = count,
+             .marks = places};
+    const nebel_result result = do_parts(&j);
+    *any = 0;
+    for (size_t i = 0; i < pixels && result == NEBEL_OK; i++) *any |= clouds->pixels[i].next >= 0;
+    return result;
+}
+
+void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left, const float *light)
+{
+    for (uint32_t y = 0; y < picture->view->height; y++) {
+        nb_cloud_part *const part = part_of(clouds, picture, y);
+        for (uint32_t x = 0; x < picture->view->width; x++) {
+            const size_t i = (size_t)y * picture->view->width + x;
+            const nb_cloud_pixel *const pixel = &clouds->pixels[i];
+            if (pixel->count == 0 || pixel->next < 0) continue;
+            nb_cloud_knot *const knot = &part->knots[pixel->first + (uint32_t)pixel->next];
+            knot->is_marked = 1;
+            memcpy(knot->haze_left, left + 4 * i, sizeof knot->haze_left);
+            memcpy(knot->haze_light, light + 4 * i, sizeof knot->haze_light);
+        }
+    }
+}
+
 static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const double direction[3])
 {
     const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
-    const nebel_cloud_knots knots = knots_of(part, pixel);
-    const nb_cloud_fog *const fog = j->fog;
-    nb_cloud_haze haze;
-    nb_cloud_rays rays;
-    nb_cloud_haze_ask(&knots, direction, &haze, &rays);
-    const nebel_result result =
-        nb_worlds_trace(j->worlds, j->world_count, knots.count, rays.direction, knots.t, &rays.lights);
-    for (int c = 0; c < 3 && result == NEBEL_OK; c++) {
-        const size_t at = 4 * i + (size_t)c;
-        float over[NEBEL_MAX_CLOUD_KNOTS], left[2], light[2];
-        for (int end = 0; end < 2 && fog != NULL; end++) {
-            const uint32_t k = end == 0 ? 0 : knots.count - 1;
-            left[end] = fog->left[end][at];
-            light[end] = fog->light[end][at] - lost_at(part, pixel, c, knots.t[k], haze.light[c][k],
-                                                       haze.left[c][k] > 0 ? left[end] / haze.left[c][k] : 0);
-        }
-        for (uint32_t k = 0; k < knots.count; k++)
-            haze.light[c][k] = shaded_at(part, pixel, c, knots.t[k], haze.light[c][k]);
-        if (fog != NULL) nb_cloud_haze_add_fog(&knots, c, left, light, &haze);
-        nb_cloud_haze_sum(&knots, c, &haze, over);
-        for (uint32_t k = 0; k < knots.count; k++) part->knots[pixel->first + k].light[c] = over[k];
+    nb_cloud_knot *const list = part->knots + pixel->first;
+    nb_cloud_mix mix;
+    const nebel_result result = find_mix(j, part, list, pixel, direction, &mix);
+    if (result != NEBEL_OK) return result;
+    nb_cloud_haze haze = mix.air;
+    for (int c = 0; c < 3; c++) {
+        float over[NEBEL_MAX_CLOUD_KNOTS];
+        if (j->has_fog) nb_cloud_haze_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
+        nb_cloud_haze_sum(&mix.knots, c, &haze, over);
+        for (uint32_t k = 0; k < pixel->count; k++) list[k].light[c] = over[k];
     }
-    return result;
+    return NEBEL_OK;
 }
 
 static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
@@ -308,9 +397,14 @@ static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
 }
 
 nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
-                              const nb_cloud_fog *fog)
+                              int has_fog)
 {
-    job j = {.clouds = clouds, .picture = picture, .row = mix_row, .worlds = worlds, .world_count = count, .fog = fog};
+    job j = {.clouds = clouds,
+             .picture = picture,
+             .row = mix_row,
+             .worlds = worlds,
+             .world_count = count,
+             .has_fog = has_fog};
     return do_parts(&j);
 }
 

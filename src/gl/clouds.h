@@ -16,6 +16,8 @@ enum { NB_CLOUD_PARTS = 8 };
 typedef struct nb_cloud_knot {
     float t, left;  /* m; transmittance of clouds */
     float light[3]; /* of clouds alone; once they are mixed with air and fog: what is added to `left` of the haze's */
+    float haze_left[3], haze_light[3]; /* of air and fog, in no shade, where they are marked */
+    int is_marked;
 } nb_cloud_knot;
 
 /* Where a piece of shaded air begins: what fog leaves, air leaves, and what shade has taken of the air's light, without fog. */
@@ -25,8 +27,8 @@ typedef struct nb_cloud_dusk {
 
 typedef struct nb_cloud_part {
     nebel_cloud_workspace *workspace;
-    nb_cloud_knot *knots;
-    size_t count, capacity;
+    nb_cloud_knot *knots, *before; /* before: while more are put between them */
+    size_t count, capacity, capacity_before;
     nb_shaded_piece *pieces;
     nb_cloud_dusk *dusks; /* of each */
     size_t piece_count, piece_capacity, dusk_capacity;
@@ -36,6 +38,7 @@ typedef struct nb_cloud_part {
 /* The knots of a pixel, and its pieces of shaded air, in those of its part. */
 typedef struct nb_cloud_pixel {
     uint32_t first, count, first_piece, piece_count;
+    int next; /* the knot to mark; -1: none */
 } nb_cloud_pixel;
 
 typedef struct nb_gl_clouds {
@@ -61,24 +64,24 @@ typedef struct nb_cloud_picture {
 nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
                               const nebel_log *log);
 
-/* Finds all pixels' knots, in clear space, and their shade on the air, which is that of the eye. ends[0] and ends[1], if they are wanted: of each pixel where clouds begin, and
- * where they end; 0: there are none. MEMORY. */
+/* Finds all pixels' knots, in clear space, and their shade on the air, which is that of the eye. MEMORY. */
 nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
-                                int count, float *ends[2]);
+                                int count);
 
 /* Where piece k of the shaded air of each pixel begins; 0: there is none. */
 void nb_gl_clouds_write_places(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, float *places);
 /* What air and fog leave up to there: 4 numbers for each pixel. */
 void nb_gl_clouds_keep_fog(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, const float *left);
 
-/* What air and fog do before both ends of a pixel's clouds: 4 numbers for each pixel. */
-typedef struct nb_cloud_fog {
-    float *left[2], *light[2];
-} nb_cloud_fog;
+/* Where fog is to be known next among the clouds of each pixel; 0: nowhere. *any: whether it is anywhere. MEMORY. */
+nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
+                                 int count, float *places, int *any);
+/* What air and fog do up to there: 4 numbers for each pixel. */
+void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left, const float *light);
 
-/* Mixes them with the air, which is that of the eye, and fog; NULL: there is none. MEMORY. */
+/* Mixes them with the air, which is that of the eye, and with fog, if there is any, as far as it was chosen. MEMORY. */
 nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
-                              const nb_cloud_fog *fog);
+                              int has_fog);
 
 /* For rays that end at places[4 i], 0: nowhere, what is left of haze, which is in no shade, and added to it, 4 numbers for
  * each; and what clouds leave of the sunlight there. left[4 i]: what fog and air leave; NULL: there is no fog. MEMORY. */

@@ -79,57 +79,63 @@ static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *li
     return NEBEL_OK;
 }
 
-/* What fog leaves where shaded air begins, and where it changes; in planes of the fog at clouds' ends, which are found later. */
-static nebel_result find_dusk(nb_gl_frame *f, const nb_cloud_picture *picture, float *ends, nb_cloud_fog *fog)
+/* Planes of the frame: where fog is asked for, and what air and fog do up to there. */
+typedef struct fog_planes {
+    float *places, *left, *light;
+} fog_planes;
+
+/* What fog leaves where shaded air begins, and where it changes. */
+static nebel_result find_dusk(nb_gl_frame *f, const nb_cloud_picture *picture, const fog_planes *fog)
 {
     nb_gl_clouds *const clouds = &f->renderer->clouds;
     nebel_result result = NEBEL_OK;
     for (uint32_t k = 0; k < NB_SHADED_PIECES && result == NEBEL_OK; k++) {
-        nb_gl_clouds_write_places(clouds, picture, k, ends);
-        result = find_fog(f, ends, fog->left[0], fog->light[0]);
-        if (result == NEBEL_OK) nb_gl_clouds_keep_fog(clouds, picture, k, fog->left[0]);
+        nb_gl_clouds_write_places(clouds, picture, k, fog->places);
+        result = find_fog(f, fog->places, fog->left, fog->light);
+        if (result == NEBEL_OK) nb_gl_clouds_keep_fog(clouds, picture, k, fog->left);
     }
     return result;
 }
 
-static nebel_result trace_in_fog(nb_gl_frame *f, const nb_cloud_picture *picture)
+/* Fog among clouds, wherever it must be known. */
+static nebel_result find_marks(nb_gl_frame *f, const nb_cloud_picture *picture, const fog_planes *fog)
 {
     nebel_gl_renderer *const r = f->renderer;
-    float *ends[2] = {make_plane(f, 1), make_plane(f, 1)}, *const places = make_plane(f, 1);
-    nb_cloud_fog fog;
-    int all = ends[0] != NULL && ends[1] != NULL && places != NULL;
-    for (int i = 0; i < 2; i++) {
-        fog.left[i] = make_plane(f, 4);
-        fog.light[i] = make_plane(f, 4);
-        all = all && fog.left[i] != NULL && fog.light[i] != NULL;
+    for (;;) {
+        int any;
+        nebel_result result = nb_gl_clouds_choose(&r->clouds, picture, r->air.worlds, r->air.count, fog->places, &any);
+        if (result != NEBEL_OK || !any) return result;
+        result = find_fog(f, fog->places, fog->left, fog->light);
+        if (result != NEBEL_OK) return result;
+        nb_gl_clouds_mark(&r->clouds, picture, fog->left, fog->light);
     }
-    nebel_result result =
-        all ? nb_gl_clouds_trace(&r->clouds, picture, r->air.worlds, r->air.count, ends) : NEBEL_ERROR_MEMORY;
-    if (result == NEBEL_OK) result = find_dusk(f, picture, places, &fog);
-    for (int i = 0; i < 2 && result == NEBEL_OK; i++) result = find_fog(f, ends[i], fog.left[i], fog.light[i]);
-    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, picture, r->air.worlds, r->air.count, &fog);
-    nb_release(&r->allocator, places);
-    for (int i = 0; i < 2; i++) {
-        nb_release(&r->allocator, ends[i]);
-        nb_release(&r->allocator, fog.left[i]);
-        nb_release(&r->allocator, fog.light[i]);
-    }
+}
+
+static nebel_result find_all_fog(nb_gl_frame *f, const nb_cloud_picture *picture)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const fog_planes fog = {.places = make_plane(f, 1), .left = make_plane(f, 4), .light = make_plane(f, 4)};
+    nebel_result result = fog.places != NULL && fog.left != NULL && fog.light != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    if (result == NEBEL_OK) result = find_dusk(f, picture, &fog);
+    if (result == NEBEL_OK) result = find_marks(f, picture, &fog);
+    nb_release(&r->allocator, fog.places);
+    nb_release(&r->allocator, fog.left);
+    nb_release(&r->allocator, fog.light);
     return result;
 }
 
 nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    float *none[2] = {NULL, NULL};
     const nebel_sun sun = nb_gl_air_sun(r->scene);
     nebel_rays middles;
     if (f->panorama) nb_panorama_rays(&f->view, f->eye, nb_pixel_sample(0, 1), &middles);
     const nb_cloud_picture picture = picture_of(f, &f->view, &middles);
     nebel_result result = nb_gl_clouds_set(&r->clouds, f->clouds, &sun, f->desc->time, log_of(f));
     if (result != NEBEL_OK) return fail_memory(f, result);
-    if (has_fog(f)) return fail_memory(f, trace_in_fog(f, &picture));
-    result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count, none);
-    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, NULL);
+    result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count);
+    if (result == NEBEL_OK && has_fog(f)) result = find_all_fog(f, &picture);
+    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, has_fog(f));
     return fail_memory(f, result);
 }
 
