@@ -452,6 +452,50 @@ static void test_shadows(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* The sky's light: all of it above clouds and where there are none, and no steps along the ground, up through clouds and from layer
+ * to layer. Against the mean of columns that are asked one by one. */
+static void test_sky_in_the_shade(void **state)
+{
+    (void)state;
+    enum { PLACES = 3000, HEIGHTS = 1100 };
+    static const float none = 0;
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.coverage = .8}, {.kind = NEBEL_CLOUD_CIRRUS}});
+    nebel_clouds *clear = make(1, (const nebel_cloud_layer[]){{.weather = {1, 1, 1, &none}}});
+    nebel_cloud_workspace *workspace, *over_none;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace), *clear_view = view_of(clear, 0, &over_none);
+    double last = 0, along = 0, upward = 0, least = 1, most = 0;
+    float part;
+    for (int i = 0; i < PLACES; i++, last = (double)part) {
+        const double place[1][3] = {{10. * i, 0, 5. * i}};
+        assert_int_equal(nebel_shade_sky(over_none, 1, 1, place, 0, &part), NEBEL_OK);
+        assert_true(part == 1);
+        assert_int_equal(nebel_shade_sky(workspace, 1, 1, place, 0, &part), NEBEL_OK);
+        if (i > 0) along = fmax(along, fabs((double)part - last));
+        least = fmin(least, (double)part);
+        most = fmax(most, (double)part);
+    }
+    for (int i = 0; i < HEIGHTS; i++, last = (double)part) {
+        const double place[1][3] = {{300, 10. * i, 0}};
+        assert_int_equal(nebel_shade_sky(workspace, 1, 1, place, 0, &part), NEBEL_OK);
+        if (i > 0) upward = fmax(upward, fabs((double)part - last));
+    }
+    print_message("the ground has %.3f to %.3f of the sky; steps of 11 m: %.4f at most, upward: %.4f\n", least, most,
+                  along, upward);
+    assert_true(part == 1 && least < .6 && most > least + .1 && most <= 1);
+    assert_true(along < .01 && upward < .02);
+    assert_int_equal(nebel_shade_sky(NULL, 1, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_sky(workspace, 1, 1, NULL, 0, &part), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_sky(workspace, -1, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_sky(workspace, 1, 1, (const double[1][3]){{(double)NAN, 0, 0}}, 0, &part),
+                     NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_workspace(over_none);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_cloud_view(clear_view);
+    nebel_destroy_clouds(clouds);
+    nebel_destroy_clouds(clear);
+}
+
 /* Means along a ray over pieces in order; no step from ray to ray shows. Air above all clouds has all of its light. */
 static void test_air_in_the_shade(void **state)
 {
@@ -614,6 +658,7 @@ int main(void)
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
         cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_sky_in_the_shade),
         cmocka_unit_test(test_air_in_the_shade),
         cmocka_unit_test(test_bad_layers_are_refused),
         cmocka_unit_test(test_bad_calls_are_refused),

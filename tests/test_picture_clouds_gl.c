@@ -114,6 +114,31 @@ static void clouds_are_the_same_from_everywhere(void **state)
     free_world(&w);
 }
 
+/* Most of the light of a low sun does not reach them: the ground and models that the sky alone lights, through clouds. */
+static void the_sky_comes_through_them(void **state)
+{
+    (void)state;
+    static float pixels[4 * 2 * 3];
+    static const double low[3] = {.2, .12, -.97};
+    nb_gl context;
+    nebel_environment_map *map;
+    world w;
+    make_world(.7, 0, &w);
+    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
+    assert_int_equal(
+        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
+        NEBEL_OK);
+    w.scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
+    w.scene.mesh_count = 1;
+    memcpy(w.scene.sun_direction, low, sizeof low);
+    pass_open(&context, NB_GL_330);
+    const nebel_camera camera = planet_camera(150, .05);
+    check("in the sky's light", &w, NULL, &camera);
+    pass_close(&context);
+    nebel_release_environment_map(map);
+    free_world(&w);
+}
+
 static void clouds_lie_in_fog(void **state)
 {
     (void)state;
@@ -257,8 +282,11 @@ static void memory_that_runs_out_is_told(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(clouds_are_the_same_from_everywhere), cmocka_unit_test(clouds_lie_in_fog),
-        cmocka_unit_test(threads_and_frames_change_nothing),   cmocka_unit_test(the_processor_must_be_asked),
+        cmocka_unit_test(clouds_are_the_same_from_everywhere),
+        cmocka_unit_test(the_sky_comes_through_them),
+        cmocka_unit_test(clouds_lie_in_fog),
+        cmocka_unit_test(threads_and_frames_change_nothing),
+        cmocka_unit_test(the_processor_must_be_asked),
         cmocka_unit_test(memory_that_runs_out_is_told),
     };
     if (argc > 1) scale = (uint32_t)atoi(argv[1]);

@@ -488,6 +488,92 @@ static void air_under_clouds_is_dim(void **state)
     free_world(&w);
 }
 
+/* A sky that is everywhere as bright, of a planet's own kind. */
+static nebel_environment_map *make_sky(world *w)
+{
+    static float pixels[4 * 2 * 3];
+    nebel_environment_map *map;
+    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
+    assert_int_equal(
+        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
+        NEBEL_OK);
+    w->scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
+    return map;
+}
+
+/* What a surface sends out, without haze. */
+static double light_of(const test_picture *picture, size_t i, int c)
+{
+    const size_t k = 3 * i + (size_t)c;
+    return ((double)picture->planes.color[k] - (double)picture->planes.in_scattering[k]) /
+           (double)picture->planes.transmittance[k];
+}
+
+/* Of what is as far around a place as clouds are above it. */
+static double let_through_around(const nebel_clouds *clouds, double x, double z)
+{
+    enum { ACROSS = 8 };
+    double sum = 0;
+    for (int i = 0; i < ACROSS * ACROSS; i++)
+        sum += let_through(clouds, x + 1500 * ((i % ACROSS + .5) / ACROSS - .5),
+                           z + 1500 * ((int)(i / ACROSS) + .5 - .5 * ACROSS) / ACROSS);
+    return sum / (ACROSS * ACROSS);
+}
+
+/* A wall that faces away from a low sun, and the ground in its shadow, under closed clouds: they have that part of the sky's light
+ * which comes through from above. */
+static void surfaces_under_clouds_have_less_sky(void **state)
+{
+    (void)state;
+    static const float corners[4][3] = {{-3e4f, 0, 0}, {3e4f, 0, 0}, {3e4f, 500, 0}, {-3e4f, 500, 0}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const nebel_mesh wall = {.origin = {0, 0, -2000},
+                             .positions = corners[0],
+                             .indices = indices,
+                             .vertex_count = 4,
+                             .triangle_count = 2,
+                             .base_color = {.8f, .8f, .8f},
+                             .texture = -1};
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
+    memcpy(w.scene.sun_direction, (const double[3]){0, .17, -.985}, sizeof w.scene.sun_direction);
+    for (int c = 0; c < 3; c++) w.planet.air.ground_albedo[c] = .5;
+    nebel_environment_map *const map = make_sky(&w);
+    w.scene.mesh_count = 1;
+    w.scene.meshes = &wall;
+    const nebel_camera camera = planet_camera(100, 0);
+    test_picture under = render(&w, &camera, 2, 1, 0);
+    w.planet.clouds = NULL;
+    test_picture clear = render(&w, &camera, 2, 1, 0);
+    w.planet.clouds = w.clouds;
+    double worst[2] = {0, 0}, mean[2] = {0, 0}, darkest = 1;
+    int count[2] = {0, 0};
+    for (uint32_t i = 3; i < WIDTH * HEIGHT; i += 7) {
+        const nebel_ray ray = planet_ray(&camera, 0, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
+        const int is_wall = ray.direction[1] > -.04; /* z is -1: the wall stands on -.05 */
+        const double t = is_wall ? 2000 : -100 / ray.direction[1];
+        if (ray.direction[1] > .18 || fabs(ray.direction[1] + .05) < .01) continue;
+        const double through = let_through_around(w.clouds, t * ray.direction[0], -t);
+        for (int c = 0; c < 3; c++) {
+            const double is = light_of(&under, i, c) / light_of(&clear, i, c) / through;
+            worst[is_wall] = fmax(worst[is_wall], fabs(is - 1));
+            mean[is_wall] += is / 3;
+        }
+        darkest = fmin(darkest, through);
+        count[is_wall]++;
+    }
+    print_message(
+        "of the sky %.3f and more comes through; %d places of a wall have %.3f of that in the mean, but for %.3f; "
+        "%d of the ground %.3f, but for %.3f\n",
+        darkest, count[1], mean[1] / count[1], worst[1], count[0], mean[0] / count[0], worst[0]);
+    assert_true(count[0] > 30 && count[1] > 10 && darkest < .6);
+    for (int k = 0; k < 2; k++) assert_true(fabs(mean[k] / count[k] - 1) < .1 && worst[k] < .15);
+    test_picture_free(&under);
+    test_picture_free(&clear);
+    nebel_release_environment_map(map);
+    free_world(&w);
+}
+
 /* Where the weather has no clouds, all is as without them, to the last bit. */
 static void no_clouds_change_nothing(void **state)
 {
@@ -527,10 +613,15 @@ static void bad_times_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(clouds_and_air_are_one),   cmocka_unit_test(pictures_are_still),
-        cmocka_unit_test(clouds_end_at_surfaces),   cmocka_unit_test(fog_lies_among_clouds),
-        cmocka_unit_test(the_ground_has_shadows),   cmocka_unit_test(air_under_clouds_is_dim),
-        cmocka_unit_test(no_clouds_change_nothing), cmocka_unit_test(bad_times_are_refused),
+        cmocka_unit_test(clouds_and_air_are_one),
+        cmocka_unit_test(pictures_are_still),
+        cmocka_unit_test(clouds_end_at_surfaces),
+        cmocka_unit_test(fog_lies_among_clouds),
+        cmocka_unit_test(the_ground_has_shadows),
+        cmocka_unit_test(air_under_clouds_is_dim),
+        cmocka_unit_test(surfaces_under_clouds_have_less_sky),
+        cmocka_unit_test(no_clouds_change_nothing),
+        cmocka_unit_test(bad_times_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -130,6 +130,11 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
 nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
                                 size_t place_stride, float *parts);
 
+/* What part of the sky's light comes through clouds to n places, straight or scattered: that of straight above, as a mean
+ * over as wide a place as is far above, or width where that is more. Errors: ARGUMENT. */
+nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
+                             size_t place_stride, float *parts);
+
 /* What part of its light the air has along a ray, under clouds and between them. */
 typedef struct nebel_air_shade {
     uint32_t count;                    /* of pieces; 0: all of its light everywhere */

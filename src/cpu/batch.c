@@ -380,7 +380,8 @@ static nebel_result light_surfaces(const nb_frame *frame, nb_scratch *scratch)
     if (lighting->has_sun) {
         nb_hits_shadow(geometry->scene, scratch->points.start, lighting->sun, scratch->points.lit, &scratch->packets);
     }
-    const nebel_result result = set_sunlight(frame, scratch);
+    nebel_result result = frame->cloud_view != NULL ? nb_cloudscape_shade_sky(frame, scratch) : NEBEL_OK;
+    if (result == NEBEL_OK) result = set_sunlight(frame, scratch);
     return result == NEBEL_OK ? add_lamplight(frame, scratch) : result;
 }
 

@@ -252,21 +252,47 @@ nebel_result nb_cloudscape_add(const nb_frame *frame, nb_haze_fn haze, nb_scratc
 
 /* ---- shadows --------------------------------------------------------------------------------- */
 
+/* The place of a surface; returns the width of its shadows. */
+static double find_place(const nb_frame *frame, const nb_scratch *scratch, int lane, double place[1][3])
+{
+    double square = 0;
+    for (int c = 0; c < 3; c++) {
+        place[0][c] = frame->renderer->geometry.origin[c] + (double)scratch->points.start[c][lane];
+        square += pow(place[0][c] - frame->view.position[c], 2);
+    }
+    return 4 * frame->air.pixel * sqrt(square);
+}
+
 nebel_result nb_cloudscape_shade(const nb_frame *frame, nb_scratch *scratch, float (*color)[NB_BATCH])
 {
-    const nb_geometry *geometry = &frame->renderer->geometry;
     for (int i = 0; i < NB_BATCH; i++) {
-        double place[1][3], square = 0;
+        double place[1][3];
         float part;
         if (!scratch->points.lit[i]) continue;
-        for (int c = 0; c < 3; c++) {
-            place[0][c] = geometry->origin[c] + (double)scratch->points.start[c][i];
-            square += pow(place[0][c] - frame->view.position[c], 2);
-        }
-        const nebel_result result = nebel_shade_clouds(scratch->clouds.workspace, 4 * frame->air.pixel * sqrt(square),
-                                                       1, (const double(*)[3])place, 0, &part);
+        const double width = find_place(frame, scratch, i, place);
+        const nebel_result result =
+            nebel_shade_clouds(scratch->clouds.workspace, width, 1, (const double(*)[3])place, 0, &part);
         if (result != NEBEL_OK) return result;
         for (int c = 0; c < 3; c++) color[c][i] *= part;
+    }
+    return NEBEL_OK;
+}
+
+nebel_result nb_cloudscape_shade_sky(const nb_frame *frame, nb_scratch *scratch)
+{
+    for (int i = 0; i < NB_BATCH; i++) {
+        const uint32_t surface = scratch->hits.surface[i];
+        double place[1][3];
+        float part;
+        if (surface == NB_NONE || (surface != NB_GROUND && !frame->air.owns_ambient)) continue;
+        const double width = find_place(frame, scratch, i, place);
+        const nebel_result result =
+            nebel_shade_sky(scratch->clouds.workspace, width, 1, (const double(*)[3])place, 0, &part);
+        if (result != NEBEL_OK) return result;
+        for (int c = 0; c < 3; c++) {
+            scratch->air.ground.sky[c][i] *= part;
+            scratch->air.sky_there[c][i] *= part;
+        }
     }
     return NEBEL_OK;
 }

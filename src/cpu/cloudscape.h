@@ -22,4 +22,7 @@ nebel_result nb_cloudscape_add(const nb_frame *frame, nb_haze_fn haze, nb_scratc
 /* What clouds leave of the sun's light where it is lit at all, times `color`. */
 nebel_result nb_cloudscape_shade(const nb_frame *frame, nb_scratch *scratch, float (*color)[NB_BATCH]);
 
+/* The same of the sky's light on the ground, and on models where that is their ambient light, in scratch->air. */
+nebel_result nb_cloudscape_shade_sky(const nb_frame *frame, nb_scratch *scratch);
+
 #endif

@@ -228,11 +228,19 @@ const char nb_air_sun_text[] =
     "}\n";
 
 const char nb_air_light_text[] =
+    "float sky_left()\n"
+    "{\n"
+    "#ifdef SCENE_CLOUDS\n"
+    "    return texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).a;\n"
+    "#else\n"
+    "    return 1.0;\n"
+    "#endif\n"
+    "}\n"
     "void light_ground(vec3 direction, vec3 at, inout vec3 light, inout vec3 shining)\n"
     "{\n"
     "    int world;\n"
     "    nebel_ground ground = nearest_ground(direction, world);\n"
-    "    light = 0.31830988618379 * ground.sky;\n"
+    "    light = 0.31830988618379 * sky_left() * ground.sky;\n"
     "    shining = 0.31830988618379 * uneclipsed(world, at) * ground.sun;\n"
     "}\n"
     /* The square of the tangent from a place to the ball that ends `above` the ground of a planet. */
@@ -283,6 +291,7 @@ const char nb_air_light_text[] =
     "    for (int k = 1; k < SCENE_WORLDS; k++)\n"
     "        if (world_power(k, at, world_sizes[k].y) < world_power(world, at, world_sizes[world].y)) world = k;\n"
     "    int first = world_words[world].y;\n"
+    "    if (sky_is_ambient) light *= sky_left();\n"
     "    if (first < 0) return;\n"
     "    float radius = world_sizes[world].x, power = world_power(world, at, 0.0);\n"
     "    float rise = dot((radius + world_eyes[world].w) * world_eyes[world].xyz + at, scene_sun);\n"

@@ -424,12 +424,15 @@ static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, floa
     over[3] = (1 - part) * a->left + part * b->left;
 }
 
-static nebel_result shade(const job *j, nb_cloud_part *part, const double direction[3], double t, float *left)
+static nebel_result shade(const job *j, nb_cloud_part *part, const double direction[3], double t, float left[4])
 {
     double place[1][3];
-    const double length = nb_vector_length(direction);
+    const double length = nb_vector_length(direction), width = 4 * j->picture->pixel * t;
     for (int c = 0; c < 3; c++) place[0][c] = j->picture->eye[c] + t * direction[c] / length;
-    return nebel_shade_clouds(part->workspace, 4 * j->picture->pixel * t, 1, (const double(*)[3])place, 0, left);
+    const nebel_result result = nebel_shade_clouds(part->workspace, width, 1, (const double(*)[3])place, 0, &left[0]);
+    left[1] = left[2] = left[0];
+    return result == NEBEL_OK ? nebel_shade_sky(part->workspace, width, 1, (const double(*)[3])place, 0, &left[3])
+                              : result;
 }
 
 /* What shade takes from light of air up to the end of a ray, behind clouds that leave over[3] of it. */
@@ -461,8 +464,7 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
         (void)direction_at(j->picture, x, y, direction);
         lay_over(part->knots + pixel->first, pixel->count, end, j->over + 4 * i);
         part->result = shade_end(j, part, i, direction, end, j->over + 4 * i);
-        j->shade[i] = 1;
-        if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, &j->shade[i]);
+        if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, j->shade + 4 * i);
     }
 }
 

@@ -146,7 +146,7 @@ nebel_result nb_frame_end_clouds(const nb_gl_frame *f)
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, &f->rays);
     float *const places = make_plane(f, 4), *const left = make_plane(f, 4), *const over = make_plane(f, 4),
-                 *const shade = make_plane(f, 1);
+                 *const shade = make_plane(f, 4);
     nebel_result result =
         places != NULL && left != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK) {
@@ -157,7 +157,7 @@ nebel_result nb_frame_end_clouds(const nb_gl_frame *f)
     }
     result = fail_memory(f, result);
     if (result == NEBEL_OK) result = upload(f, &r->cloud_over, 4, over);
-    if (result == NEBEL_OK) result = upload(f, &r->cloud_shade, 1, shade);
+    if (result == NEBEL_OK) result = upload(f, &r->cloud_shade, 4, shade);
     nb_release(&r->allocator, places);
     nb_release(&r->allocator, left);
     nb_release(&r->allocator, over);

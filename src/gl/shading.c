@@ -362,6 +362,9 @@ static const char shadow_text[] =
 /* How much of the sun's light comes through the fog to a place, which is `at` in light coordinates. */
 static const char sun_text[] =
     "uniform vec3 scene_sun;\n"
+    "#ifdef SCENE_DIMMED\n"
+    "uniform highp sampler2D scene_dimming;\n" /* of the sun's light; alpha: of the sky's, under clouds */
+    "#endif\n"
     "#ifdef NEBEL_TILES\n"
     "uniform vec4 tile_place;\n" /* low corner in light coordinates, pixels per metre */
     "uniform ivec4 tile_grid;\n" /* pixels in all, in a tile, and tiles in a row */
@@ -405,9 +408,6 @@ static const char light_text[] =
     "uniform highp sampler2D scene_reflectance;\n"
     "uniform highp sampler2D scene_in_scattering;\n"
     "uniform highp sampler2D scene_transmittance;\n"
-    "#ifdef SCENE_DIMMED\n"
-    "uniform highp sampler2D scene_dimming;\n"
-    "#endif\n"
     "uniform vec3 scene_background;\n"
     "#ifdef NEBEL_ENVIRONMENT\n" /* the scene's, whatever lights the fog: that is asked for transmittance alone */
     "uniform bool scene_shows_ambient;\n"

@@ -48,7 +48,7 @@ static nb_cloud_roof roof_over(nebel_cloud_workspace *workspace, int k, const do
     const int next = layer_over(clouds, layer->high);
     const float part = (float)(layer->high - radius) * layer->per_thickness;
     nb_cloud_roof roof = nb_cloud_roof_at(workspace, k, place, width), above = {1, 1};
-    if (next >= 0) above = nb_cloud_roof_at(workspace, next, place, width);
+    if (next >= 0) above = roof_under(workspace, next, place, radius, width);
     roof.sun = above.sun + part * (roof.sun - above.sun);
     roof.up = above.up + part * (roof.up - above.up);
     return roof;
@@ -108,6 +108,25 @@ nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const n
         double unit[3];
         if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
         shade(workspace, ray, unit, (nebel_air_shade *)(void *)((char *)shades + i * shade_stride));
+    }
+    return NEBEL_OK;
+}
+
+nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
+                             size_t place_stride, float *parts)
+{
+    if (workspace == NULL || (n > 0 && (places == NULL || parts == NULL)) || !(width >= 0 && width <= NEBEL_MAX_LENGTH))
+        return NEBEL_ERROR_ARGUMENT;
+    const nebel_clouds *clouds = workspace->view->clouds;
+    for (size_t i = 0; i < n; i++) {
+        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
+        double from[3];
+        if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
+        for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+        const double radius = nb_vector_length(from);
+        const int k = layer_over(clouds, radius);
+        const double least = LEAST_WIDTH * (workspace->view->high - clouds->atmosphere->airs.radius);
+        parts[i] = k < 0 ? 1 : roof_over(workspace, k, from, radius, (float)fmax(least, width)).up;
     }
     return NEBEL_OK;
 }
