@@ -53,6 +53,15 @@ static float above(const nebel_clouds *clouds, double height, double x, double y
 
 /* ---- density --------------------------------------------------------------------------------- */
 
+/* In the middle of a layer. */
+static int is_cloud(const nebel_clouds *clouds, const nb_cloud_layer *layer, const nb_cloud_column *column,
+                    const double place[3])
+{
+    float missing[NB_CLOUD_BILLOWS + 1];
+    nb_cloud_drops drops;
+    return nb_cloud_in_column(&clouds->noise, layer, column, place, .5f, 0, missing, &drops) && drops.part > 0;
+}
+
 static void test_noise_is_what_its_constants_say(void **state)
 {
     (void)state;
@@ -75,7 +84,7 @@ static void test_noise_is_what_its_constants_say(void **state)
     }
     assert_near(square / COUNT, (double)NB_GRADIENT_VARIANCE, 5e-4);
     assert_true(steepest > 2);
-    /* A part of the planet is above the rank that a part of it is above of. */
+    /* A part of the planet is above the rank that a part of it is above of; under sheets with all their detail. */
     for (int k = 0; k < 3; k++) {
         const nb_cloud_layer *layer = &clouds->layers[k];
         int under = 0;
@@ -86,9 +95,33 @@ static void test_noise_is_what_its_constants_say(void **state)
                 square = unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2];
             } while (!(square > .1 && square < 1));
             for (int c = 0; c < 3; c++) unit[c] /= sqrt(square);
-            under += nb_cloud_column_at(&clouds->noise, layer, unit, 0).rank > 0;
+            const nb_cloud_column column = nb_cloud_column_at(&clouds->noise, layer, unit, 0);
+            for (int c = 0; c < 3; c++) unit[c] *= layer->low;
+            under += k == 0 ? column.rank > 0 : is_cloud(clouds, layer, &column, unit);
         }
         assert_near(under / (COUNT / 10.), (double)layer->coverage, .03);
+    }
+    nebel_destroy_clouds(clouds);
+}
+
+/* Where they cover all, sheets have no gaps, however thin they are there. */
+static void test_closed_sheets_have_no_gaps(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.kind = NEBEL_CLOUD_STRATUS, .coverage = 1},
+                                                               {.kind = NEBEL_CLOUD_CIRRUS, .coverage = 1}});
+    uint64_t numbers = 9;
+    for (int k = 0; k < 2; k++) {
+        const double height = k == 0 ? 550 : 8750, most = (double)clouds->layers[k].extinction;
+        double least = HUGE_VAL, largest = 0;
+        for (int i = 0; i < 20000; i++) {
+            const double x = dice(&numbers, -1, 1), y = dice(&numbers, -1, 1), z = dice(&numbers, -1, 1);
+            const double here = (double)above(clouds, height, x, y, z, 0) / most;
+            least = fmin(least, here);
+            largest = fmax(largest, here);
+        }
+        print_message("closed sheet %d: within %.2f and %.2f of its extinction\n", k, least, largest);
+        assert_true(least > .3 && largest > .95);
     }
     nebel_destroy_clouds(clouds);
 }
@@ -237,12 +270,12 @@ static void test_transmittance_is_that_of_the_density(void **state)
 
 /* Through pixels that hide heaps as much comes as through many thin rays within them: in the mean over 120 pixels from
  * 400 km above the ground, straight down and aslant. */
-static void test_wide_pixels_let_as_much_through(void **state)
+static void compare_wide_pixels(const nebel_cloud_layer *layer)
 {
-    (void)state;
-    enum { PIXELS = 120, RAYS = 24 };
+    enum { PIXELS = 300, RAYS = 24 };
     static const double spreads[] = {4e-4, 1.3e-3, 5e-3};
-    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .4}});
+    nebel_clouds *clouds = make(1, layer);
+    const nb_cloud_layer *made = &clouds->layers[0];
     nebel_cloud_workspace *workspace;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 23;
@@ -260,7 +293,7 @@ static void test_wide_pixels_let_as_much_through(void **state)
                 const double b = z + dice(&numbers, -half, half), down = sqrt(1 + a * a + b * b);
                 const nebel_ray thin = {{0, 4e5, 0}, {a / down, -1 / down, b / down}, HUGE_VAL};
                 double pieces[2][2];
-                assert_int_equal(nb_cloud_pieces(RADIUS + 900, RADIUS + 2700, (const double[3]){0, RADIUS + 4e5, 0},
+                assert_int_equal(nb_cloud_pieces(made->low, made->high, (const double[3]){0, RADIUS + 4e5, 0},
                                                  thin.direction, 1e6, pieces),
                                  1);
                 truth += brute_force(clouds, &thin, pieces[0][0], pieces[0][1], 20) / (PIXELS * RAYS);
@@ -273,6 +306,14 @@ static void test_wide_pixels_let_as_much_through(void **state)
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     nebel_destroy_clouds(clouds);
+}
+
+static void test_wide_pixels_let_as_much_through(void **state)
+{
+    (void)state;
+    compare_wide_pixels(&(nebel_cloud_layer){.coverage = .4});
+    compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = .6});
+    compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_CIRRUS});
 }
 
 /* What a workspace has seen before changes nothing. */
@@ -648,6 +689,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_noise_is_what_its_constants_say),
+        cmocka_unit_test(test_closed_sheets_have_no_gaps),
         cmocka_unit_test(test_there_is_no_seam_and_no_pole),
         cmocka_unit_test(test_details_stand_still_at_the_size_of_a_planet),
         cmocka_unit_test(test_wind_turns_the_shell),

@@ -398,6 +398,33 @@ static void fog_lies_among_clouds(void **state)
     }
 }
 
+/* From orbit closed clouds hide the ground up to its edge, whatever samples meet beside the middles of pixels: on the way to
+ * the ground seen aslant they lie within less than a pixel. */
+static void clouds_hide_the_ground_from_orbit(void **state)
+{
+    (void)state;
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
+    const double height = 4e5, dip = acos(w.planet.air.radius / (w.planet.air.radius + height));
+    nebel_camera camera = planet_camera(height, -dip - .05);
+    camera.vertical_fov = 9;
+    test_picture picture = render(&w, &camera, 2, 4, 0);
+    int ground = 0, sky = 0;
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++) {
+            const float left = picture.planes.transmittance[3 * ((size_t)y * WIDTH + x)];
+            if (test_depth(&picture, x, y) < HUGE_VALF) {
+                ground++;
+                assert_true(left < .1f);
+            } else {
+                sky += left > .5f;
+            }
+        }
+    assert_true(ground > WIDTH * HEIGHT / 3 && sky > WIDTH * HEIGHT / 20);
+    test_picture_free(&picture);
+    free_world(&w);
+}
+
 static void the_ground_has_shadows(void **state)
 {
     (void)state;
@@ -620,6 +647,7 @@ int main(void)
         cmocka_unit_test(the_ground_has_shadows),
         cmocka_unit_test(air_under_clouds_is_dim),
         cmocka_unit_test(surfaces_under_clouds_have_less_sky),
+        cmocka_unit_test(clouds_hide_the_ground_from_orbit),
         cmocka_unit_test(no_clouds_change_nothing),
         cmocka_unit_test(bad_times_are_refused),
     };

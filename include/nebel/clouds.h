@@ -42,7 +42,7 @@ typedef enum nebel_cloud_kind {
 typedef struct nebel_cloud_layer {
     nebel_cloud_kind kind;
     double base, top;  /* m above the ground, more than 0, base < top, within the air */
-    double coverage;   /* part of the planet under clouds, 0 to 1, before detail is cut out */
+    double coverage;   /* part of the planet under clouds, 0 to 1; of cumulus before detail is cut out */
     double extinction; /* 1/m in their middle, to NEBEL_MAX_AIR_EXTINCTION */
     double size;       /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9 */
     double detail;     /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */

@@ -176,6 +176,15 @@ static inline void nb_cloud_haze_sum(const nebel_cloud_knots *knots, int c, cons
     }
 }
 
+/* How far the ray through the middle of a pixel is followed for a sample that ends on the ground: not to where that does, for
+ * seen aslant from far above its ground may lie before the other's clouds, but to the ground, or as near as it comes to it. */
+static inline double nb_cloud_ground_end(const double center[3], const double eye[3], const double unit[3], double end)
+{
+    double nearest = 0;
+    for (int c = 0; c < 3; c++) nearest += (center[c] - eye[c]) * unit[c];
+    return fmax(end, nearest);
+}
+
 /* The knot before a surface, and the part of the way to the next one; behind the last one that. The surface is behind the
  * first. */
 static inline uint32_t nb_cloud_haze_find(uint32_t count, const float *t, float end, float *part)

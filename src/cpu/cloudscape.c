@@ -85,16 +85,29 @@ nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, n
     return result;
 }
 
+/* How far clouds matter to a sample. A ray that goes on from there to the ground is not followed beyond it. */
+static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t lane)
+{
+    const float distance = scratch->distance[lane];
+    if (!(scratch->air.ground.distance[lane] < HUGE_VALF)) return distance;
+    const nebel_ray ray = ray_of(frame, &scratch->clouds, lane);
+    const double length = (double)scratch->clouds.rays.length[lane];
+    double unit[3];
+    for (int c = 0; c < 3; c++) unit[c] = ray.direction[c] / length;
+    const nb_world *world = &frame->air.worlds[scratch->air.world[lane]];
+    return (float)nb_cloud_ground_end(world->center, ray.origin, unit, (double)distance);
+}
+
 #define NEAR_END 0.98f
 
 /* Whether what was found for another sample of a pixel does for one: it goes no farther, and ends before clouds, behind
  * them or near the end of what was found. Between two knots clouds are a straight line, which shows on surfaces. */
-static int is_found(const nb_cloud_scratch *clouds, int lane, float distance)
+static int is_found(const nb_cloud_scratch *clouds, int lane, float end)
 {
     const nebel_cloud_knots *knots = &clouds->knots[lane];
-    if (distance > clouds->reach[lane]) return 0;
-    if (knots->count == 0 || distance <= knots->t[0]) return 1;
-    return distance >= NEAR_END * fminf(clouds->reach[lane], knots->t[knots->count - 1]);
+    if (end > clouds->reach[lane]) return 0;
+    if (knots->count == 0 || end <= knots->t[0]) return 1;
+    return end >= NEAR_END * fminf(clouds->reach[lane], knots->t[knots->count - 1]);
 }
 
 /* As far as the sample goes. *any: whether there are clouds. */
@@ -105,9 +118,11 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
     *any = 0;
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         clouds->is_new[i] = 0;
-        if (!scratch->inside[i] || is_found(clouds, i, scratch->distance[i])) continue;
+        if (!scratch->inside[i]) continue;
+        clouds->end[i] = end_of(frame, scratch, (uint32_t)i);
+        if (is_found(clouds, i, clouds->end[i])) continue;
         nebel_ray ray = ray_of(frame, clouds, (uint32_t)i);
-        ray.t_max = (double)scratch->distance[i];
+        ray.t_max = (double)clouds->end[i];
         result = nebel_trace_clouds(clouds->workspace, 1, &ray, 0, frame->air.pixel / (double)clouds->rays.length[i],
                                     &clouds->knots[i], 0);
         clouds->reach[i] = (float)ray.t_max;
@@ -209,11 +224,11 @@ static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scra
         result = find_air(frame, clouds, i);
     }
     if (result == NEBEL_OK && frame->air.has_fog) {
-        memcpy(clouds->end, scratch->distance, sizeof clouds->end);
+        memcpy(clouds->distance, scratch->distance, sizeof clouds->distance);
         clouds->samples = scratch->samples;
         result = find_fog(frame, haze, scratch);
         scratch->samples = clouds->samples;
-        memcpy(scratch->distance, clouds->end, sizeof clouds->end);
+        memcpy(scratch->distance, clouds->distance, sizeof clouds->distance);
     }
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++)
         if (clouds->is_new[i]) mix_lane(frame->air.has_fog, clouds, i);
@@ -226,7 +241,7 @@ static void lay_over(nb_scratch *scratch, int lane)
     const nb_cloud_scratch *clouds = &scratch->clouds;
     const nebel_cloud_knots *knots = &clouds->knots[lane];
     nb_light_samples *samples = &scratch->samples;
-    const float end = scratch->distance[lane];
+    const float end = clouds->end[lane];
     float part;
     if (!(end > knots->t[0])) return;
     const uint32_t k = nb_cloud_haze_find(knots->count, knots->t, end, &part);

@@ -58,7 +58,8 @@ typedef struct nb_cloud_scratch {
     nb_cloud_marks marks[NB_BATCH];
     int next[NB_BATCH];    /* the knot to mark; -1: none */
     float doubt[NB_BATCH]; /* of light, as fog counts as spread evenly between marks */
-    float end[NB_BATCH];
+    float end[NB_BATCH];   /* m, how far clouds matter to a sample */
+    float distance[NB_BATCH];
     nb_light_samples samples;
 } nb_cloud_scratch;
 

@@ -410,6 +410,9 @@ nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *pict
 
 /* ---- ends ------------------------------------------------------------------------------------ */
 
+/* A surface is on the ground where it is no higher than that part of its distance and of the planet's radius. */
+#define NEAR_GROUND 1e-6
+
 /* Before a surface within the clouds they are as between the knots around it. */
 static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, float over[4])
 {
@@ -422,6 +425,22 @@ static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, floa
     const nb_cloud_knot *const a = &knots[k], *const b = &knots[part > 0 ? k + 1 : k];
     for (int c = 0; c < 3; c++) over[c] = (1 - part) * a->light[c] + part * b->light[c];
     over[3] = (1 - part) * a->left + part * b->left;
+}
+
+/* How far clouds matter to a ray that ends at t, which is known to some float digits. */
+static float cloud_end(const job *j, const double direction[3], float t)
+{
+    const double length = nb_vector_length(direction);
+    double unit[3];
+    for (int c = 0; c < 3; c++) unit[c] = direction[c] / length;
+    for (int k = 0; k < j->world_count; k++) {
+        const nb_world *const world = &j->worlds[k];
+        double from[3];
+        for (int c = 0; c < 3; c++) from[c] = j->picture->eye[c] + (double)t * unit[c] - world->center[c];
+        if (nb_vector_length(from) - world->radius < NEAR_GROUND * ((double)t + world->radius))
+            return (float)nb_cloud_ground_end(world->center, j->picture->eye, unit, (double)t);
+    }
+    return t;
 }
 
 static nebel_result shade(const job *j, nb_cloud_part *part, const double direction[3], double t, float left[4])
@@ -462,7 +481,7 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
         const float end = t > 0 ? t : HUGE_VALF;
         double direction[3];
         (void)direction_at(j->picture, x, y, direction);
-        lay_over(part->knots + pixel->first, pixel->count, end, j->over + 4 * i);
+        lay_over(part->knots + pixel->first, pixel->count, t > 0 ? cloud_end(j, direction, t) : end, j->over + 4 * i);
         part->result = shade_end(j, part, i, direction, end, j->over + 4 * i);
         if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, j->shade + 4 * i);
     }

@@ -28,6 +28,10 @@
 /* Where there may be cloud and is none, of a sixteenth of the smallest heaps. */
 #define LEAST_STEP 0.5
 
+/* Pixels may be wider than a layer is high: parts of the ray's stay in it that steps, and the least pieces, do not exceed. */
+#define STAY_STEP 0.16
+#define STAY_PIECE 0.0625
+
 /* Noise hardly ever rises by a fifth of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.2
 
@@ -220,8 +224,9 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     pass(walk, t + length);
 }
 
-/* Goes on until there is cloud, by as much as there can be none, or by the least step. */
-static double skip(const nb_walk *walk, int k, double t, double end, nb_cloud_seen *far, double *length)
+/* Goes on until there is cloud, by as much as there can be none, or by the least step, which pixels wider than that make
+ * longer, up to `longest`. */
+static double skip(const nb_walk *walk, int k, double t, double end, double longest, nb_cloud_seen *far, double *length)
 {
     double clear = 0, unknown[3] = {0, 0, 0};
     nb_spot spot = spot_at(walk, k, t);
@@ -235,7 +240,8 @@ static double skip(const nb_walk *walk, int k, double t, double end, nb_cloud_se
                 continue;
             }
         }
-        *length = nb_min(end - t, nb_max(clear / SLOPE_PART, nb_max(LEAST_STEP * walk->least, 0.7 * walk->spread * t)));
+        const double step = nb_max(LEAST_STEP * walk->least, nb_min(0.7 * walk->spread * t, longest));
+        *length = nb_min(end - t, nb_max(clear / SLOPE_PART, step));
         spot = spot_at(walk, k, t + *length);
         *far = extinction_of(walk, k, &spot, &clear);
         if (far->whole > 0) return t;
@@ -247,13 +253,13 @@ static double skip(const nb_walk *walk, int k, double t, double end, nb_cloud_se
 /* A piece of a ray in one layer; layers do not overlap. */
 static void walk_layer(nb_walk *walk, int k, double begin, double end)
 {
-    const double tolerance = PIECES * walk->view->tolerance;
+    const double tolerance = PIECES * walk->view->tolerance, whole = end - begin;
     double t = begin, length = walk->least;
     nb_cloud_seen here = look(walk, k, t), far = {0, 0};
     int has_far = 0;
     for (int i = 0; i < MOST_PIECES && t < end && nb_exp(-walk->apart) > UNSEEN; i++) {
         if (!has_far && here.whole == 0) {
-            t = skip(walk, k, t, end, &far, &length);
+            t = skip(walk, k, t, end, STAY_STEP * whole, &far, &length);
             has_far = 1;
             if (!(t < end)) return;
         }
@@ -262,7 +268,8 @@ static void walk_layer(nb_walk *walk, int k, double begin, double end)
         const nb_cloud_seen middle = look(walk, k, t + 0.5 * length);
         const double depth = length / 6 * (double)(here.whole + 4 * middle.whole + far.whole);
         const double depth_apart = length / 6 * (double)(here.apart + 4 * middle.apart + far.apart);
-        const double seen = nb_exp(-walk->depth), least = nb_max(0.25 * walk->spread * t, 1e-3 * walk->least);
+        const double seen = nb_exp(-walk->depth);
+        const double least = nb_max(nb_min(0.25 * walk->spread * t, STAY_PIECE * whole), 1e-3 * walk->least);
         const double missed = seen * length / 6 * fabs((double)(here.whole - 2 * middle.whole + far.whole));
         has_far = 1;
         if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + seen)) && length > 2 * least) {

@@ -17,9 +17,9 @@
 #define BILLOW_RATIO 6.1
 #define LOG2_BILLOW_RATIO 2.60880924f
 
-/* What is hidden of heaps is no longer along rays than this part of them, between what rays straight down and flat ones
- * find best (test_clouds). */
-#define HIDDEN_PART 0.22f
+/* What is hidden of heaps is no longer along rays than this part of them, and than the layer is high: between what rays straight
+ * down and flat ones find best (test_clouds). */
+#define HIDDEN_PART 0.3f
 
 static const float billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
 
@@ -39,6 +39,12 @@ nb_cloud_pose nb_cloud_pose_at(const nb_cloud_layer *layer, double time)
 static void turn(const double by[3][3], const double v[3], double out[3])
 {
     for (int i = 0; i < 3; i++) out[i] = nb_vector_dot(by[i], v);
+}
+
+static float step_up(float x)
+{
+    const float u = nb_smaller(1, nb_larger(0, x));
+    return u * u * (3 - 2 * u);
 }
 
 /* ---- columns --------------------------------------------------------------------------------- */
@@ -105,6 +111,14 @@ static float rank_of(const nb_cloud_layer *layer, float part)
     return layer->ranks[low] + (place - (float)low) * (layer->ranks[low + 1] - layer->ranks[low]);
 }
 
+/* Billows cut into heaps, but into sheets on one side and fill them on the other, so that as much of the planet is under
+ * them as is asked for. Where nearly all is, they close: gaps are filled, and what is left of noise makes thick and thin. */
+static float fill_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer, float coverage)
+{
+    if (layer->kind == NEBEL_CLOUD_CUMULUS) return 0;
+    return layer->detail * (1 - noise->billow_mean) + 0.5f * layer->softness * step_up(10 * (coverage - 0.9f));
+}
+
 /* The middle of a heap is where a twentieth of all cloud is more so. */
 nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const double unit[3],
                                    float width)
@@ -115,18 +129,12 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
     const float border = rank_of(layer, 1 - coverage), middle = rank_of(layer, 1 - 0.05f * coverage);
     const float sum = sum_octaves(noise, layer, unit, width, &column.variance);
     column.scale = 1 / (middle - border);
-    column.rank = (sum - border) * column.scale;
+    column.rank = (sum - border) * column.scale + fill_of(noise, layer, coverage);
     column.variance *= column.scale * column.scale;
     return column;
 }
 
 /* ---- shapes ---------------------------------------------------------------------------------- */
-
-static float step_up(float x)
-{
-    const float u = nb_smaller(1, nb_larger(0, x));
-    return u * u * (3 - 2 * u);
-}
 
 /* Heaps are domes: where their rank falls as a parabola from the middle, its root is a half ball. Sheets are thickest in
  * the middle of their height. */
@@ -427,7 +435,7 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->phase = nb_phase_resolve(&phase);
     layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
     layer->size = (float)desc->size;
-    layer->hidden = HIDDEN_PART * (float)desc->size;
+    layer->hidden = nb_smaller(HIDDEN_PART * (float)desc->size, 1 / layer->per_thickness);
     set_octaves(desc, radius, layer);
     set_ranks(&clouds->noise, layer);
     return desc->weather.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather, &layer->weather)
