@@ -119,9 +119,11 @@ nebel_gl_taps nebel_gl_default_taps(void);
 
 typedef struct nebel_gl_frame_desc {
     nebel_camera camera;
-    uint32_t width, height;                                 /* pixels, 1 to GL_MAX_TEXTURE_SIZE */
-    uint32_t samples;                                       /* per pixel, 1 to 4096; 0: 4 */
-    int (*progress)(size_t done, size_t total, void *user); /* after each sample; nonzero stops the frame. NULL: none */
+    uint32_t width, height; /* pixels, 1 to GL_MAX_TEXTURE_SIZE */
+    uint32_t samples;       /* per pixel, 1 to 4096; 0: 4 */
+    /* After each sample, and every tenth of a second or so while the processor walks through clouds: samples that are done.
+     * Nonzero stops the frame. NULL: none. */
+    int (*progress)(size_t done, size_t total, void *user);
     void *progress_user;
     nebel_gl_method method;
     const nebel_gl_taps *taps;       /* of FIVE_TAP; NULL: nebel_gl_default_taps */

@@ -19,7 +19,11 @@ typedef struct job {
     float *marks; /* where fog is to be known next */
     const float *places, *left;
     float *over, *shade;
+    uint32_t begin; /* the first row of each part in this round */
 } job;
+
+/* Rows of each part between two times of asking whether to go on: of a picture of 1280x720 a tenth of a second. */
+enum { ROUND = 2 };
 
 static uint32_t first_row(const job *j, size_t part)
 {
@@ -30,12 +34,14 @@ static void do_part(void *data, size_t i)
 {
     const job *const j = data;
     nb_cloud_part *const part = &j->clouds->parts[i];
+    const uint32_t first = first_row(j, i) + j->begin, next = first_row(j, i + 1);
+    const uint32_t end = first + ROUND < next ? first + ROUND : next;
     part->result = NEBEL_OK;
     if (part->workspace == NULL) part->result = nebel_create_cloud_workspace(j->clouds->view, &part->workspace);
-    for (uint32_t y = first_row(j, i); y < first_row(j, i + 1) && part->result == NEBEL_OK; y++) j->row(j, part, y);
+    for (uint32_t y = first; y < end && part->result == NEBEL_OK; y++) j->row(j, part, y);
 }
 
-static nebel_result do_parts(job *j)
+static nebel_result do_round(job *j)
 {
     nebel_result result = NEBEL_OK;
     if (j->clouds->run != NULL)
@@ -43,6 +49,17 @@ static nebel_result do_parts(job *j)
     else
         for (size_t i = 0; i < NB_CLOUD_PARTS; i++) do_part(j, i);
     for (size_t i = 0; i < NB_CLOUD_PARTS && result == NEBEL_OK; i++) result = j->clouds->parts[i].result;
+    return result;
+}
+
+static nebel_result do_parts(job *j)
+{
+    const uint32_t rows = (j->picture->view->height + NB_CLOUD_PARTS - 1) / NB_CLOUD_PARTS;
+    nebel_result result = NEBEL_OK;
+    for (j->begin = 0; j->begin < rows && result == NEBEL_OK; j->begin += ROUND) {
+        result = do_round(j);
+        if (result == NEBEL_OK) result = j->picture->ask(j->picture->ask_user);
+    }
     return result;
 }
 

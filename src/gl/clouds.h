@@ -58,6 +58,9 @@ typedef struct nb_cloud_picture {
     const nebel_rays *rays; /* of a panorama; NULL: it is none */
     double eye[3];
     double pixel; /* width of a pixel per metre of the camera's axis, or of the way in a panorama */
+    /* Asked after some rows, in the caller's thread, for walks take seconds: what is not OK ends them. */
+    nebel_result (*ask)(void *user);
+    void *ask_user;
 } nb_cloud_picture;
 
 /* Clouds at a moment under a sun. VALUE, MEMORY. */

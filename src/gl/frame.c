@@ -594,13 +594,19 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     return result == NEBEL_OK ? draw_light(f, sample) : result;
 }
 
-/* Waits for the sample first, so that progress is that of the work. */
-static nebel_result report(const frame *f, uint32_t done)
+nebel_result nb_frame_ask(const frame *f)
 {
-    if (f->desc->progress == NULL) return NEBEL_OK;
-    glFinish();
-    if (f->desc->progress(done, f->samples, f->desc->progress_user) == 0) return NEBEL_OK;
+    const nebel_gl_frame_desc *const desc = f->desc;
+    if (desc->progress == NULL || desc->progress(f->done, f->samples, desc->progress_user) == 0) return NEBEL_OK;
     return nb_fail(&f->renderer->log, NEBEL_ERROR_LIMIT, "frame: stopped");
+}
+
+/* Waits for the sample first, so that progress is that of the work. */
+static nebel_result report(frame *f)
+{
+    if (f->desc->progress != NULL) glFinish();
+    f->done++;
+    return nb_frame_ask(f);
 }
 
 static nebel_result prepare_particles(const frame *f)
@@ -651,7 +657,7 @@ static nebel_result draw_samples(frame *f)
     if (result == NEBEL_OK && f->panorama) result = prepare_panorama(f);
     for (uint32_t i = 0; i < f->samples && result == NEBEL_OK; i++) {
         result = draw_sample(f, i);
-        if (result == NEBEL_OK) result = report(f, i + 1);
+        if (result == NEBEL_OK) result = report(f);
     }
     return result;
 }

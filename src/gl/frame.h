@@ -10,7 +10,7 @@
 typedef struct nb_gl_frame {
     nebel_gl_renderer *renderer;
     const nebel_gl_frame_desc *desc;
-    uint32_t samples;
+    uint32_t samples, done;
     nb_lighting light;
     double eye[3];
     int panorama;
@@ -28,6 +28,9 @@ typedef struct nb_gl_frame {
     int shafts;              /* models shade fog */
     nebel_sunlit_fog sunlit; /* that fog */
 } nb_gl_frame;
+
+/* LIMIT where progress, which is told the samples that are done, stops the frame. */
+nebel_result nb_frame_ask(const nb_gl_frame *f);
 
 /* Whether the frame has some: fog, or air; particles. */
 int nb_frame_has_fog(const nb_gl_frame *f);
@@ -79,7 +82,7 @@ void nb_frame_set_shells(const nb_gl_frame *f, unsigned program);
 nebel_result nb_frame_trace_clouds(nb_gl_frame *f);
 
 /* Up to the surfaces of the present sample. */
-nebel_result nb_frame_end_clouds(const nb_gl_frame *f);
+nebel_result nb_frame_end_clouds(nb_gl_frame *f);
 
 /* For light_text. */
 void nb_frame_bind_clouds(const nb_gl_frame *f);

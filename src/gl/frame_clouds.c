@@ -31,10 +31,18 @@ static float *make_plane(const nb_gl_frame *f, size_t channels)
     return nb_allocate(&f->renderer->allocator, count_pixels(f) * channels, sizeof(float));
 }
 
-static nb_cloud_picture picture_of(const nb_gl_frame *f, const nebel_view *view, const nebel_rays *around)
+static nebel_result ask(void *user)
 {
-    nb_cloud_picture picture = {
-        .view = view, .rays = f->panorama ? around : NULL, .eye = {f->eye[0], f->eye[1], f->eye[2]}};
+    return nb_frame_ask(user);
+}
+
+static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, const nebel_rays *around)
+{
+    nb_cloud_picture picture = {.view = view,
+                                .rays = f->panorama ? around : NULL,
+                                .eye = {f->eye[0], f->eye[1], f->eye[2]},
+                                .ask = ask,
+                                .ask_user = f};
     picture.pixel = f->panorama ? pi / view->height : 2 / (view->clip_from_eye[5] * view->height);
     return picture;
 }
@@ -141,7 +149,7 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 
 /* ---- samples --------------------------------------------------------------------------------- */
 
-nebel_result nb_frame_end_clouds(const nb_gl_frame *f)
+nebel_result nb_frame_end_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, &f->rays);

@@ -356,6 +356,13 @@ static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     knots->error = (float)walk.missed;
 }
 
+/* Where a walk halves its pieces hangs on all digits, and two renderers have the last of them from other sums: without them both
+ * walk alike, but for one ray of ten thousand. Across 20,000 km they are a third of a millimetre. */
+static void round_direction(double unit[3])
+{
+    for (int c = 0; c < 3; c++) unit[c] = round(unit[c] * 0x1p36) * 0x1p-36;
+}
+
 /* ---- the face -------------------------------------------------------------------------------- */
 
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
@@ -367,7 +374,9 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
         const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
         double unit[3];
         if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
-        trace(workspace, ray, unit, spread, (nebel_cloud_knots *)(void *)((char *)knots + i * knot_stride));
+        round_direction(unit);
+        trace(workspace, ray, unit, (double)(float)spread,
+              (nebel_cloud_knots *)(void *)((char *)knots + i * knot_stride));
     }
     return NEBEL_OK;
 }
