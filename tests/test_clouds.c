@@ -578,6 +578,49 @@ static void test_air_in_the_shade(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* Fog along a ray: from where it begins, in pieces that meet, each with what places within it have, and no step from ray to ray. */
+static void test_fog_in_the_shade(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.coverage = .6}, {.kind = NEBEL_CLOUD_CIRRUS}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    nebel_fog_shade shade;
+    const nebel_ray over = {{0, 1.2e4, 0}, {1, .1, 0}, HUGE_VAL}, none = {{0, 1e4, 0}, {0, 0, 0}, HUGE_VAL};
+    double last = 0, step = 0, least = 1;
+    assert_int_equal(nebel_shade_fog(workspace, &over, 0, 0, &shade), NEBEL_OK);
+    assert_int_equal(shade.count, 0);
+    for (int i = 0; i < 4000; i++) {
+        const double angle = -.4 + 1e-4 * i, begin = 300;
+        const nebel_ray ray = {{0, 900, 0}, {cos(angle), sin(angle), 0}, 3e4};
+        double sum = 0, all = 0;
+        assert_int_equal(nebel_shade_fog(workspace, &ray, begin, 1e-3, &shade), NEBEL_OK);
+        assert_true(shade.count > 2 && fabs((double)shade.t[0] - begin) < 1e-3);
+        assert_true((double)shade.t[shade.count] <= 3e4 * (1 + 1e-6));
+        for (uint32_t k = 0; k < shade.count; k++) {
+            const double seen = exp(-(double)shade.t[k] / 3000) - exp(-(double)shade.t[k + 1] / 3000);
+            assert_true(shade.t[k] < shade.t[k + 1] && shade.sun[k] >= 0 && shade.sun[k] <= 1);
+            assert_true(shade.sky[k] >= 0 && shade.sky[k] <= 1 && shade.error[k] >= 0 && shade.error[k] <= 1);
+            sum += (double)shade.sun[k] * seen;
+            all += seen;
+            least = fmin(least, (double)shade.sun[k]);
+        }
+        if (i > 0) step = fmax(step, fabs(sum / all - last));
+        last = sum / all;
+    }
+    print_message("fog has %.3f of the sun or more; %.4f more or less in a ray's neighbour at most\n", least, step);
+    assert_true(least < .5 && step < .01);
+    assert_int_equal(nebel_shade_fog(NULL, &over, 0, 0, &shade), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_fog(workspace, NULL, 0, 0, &shade), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_fog(workspace, &over, 0, 0, NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_fog(workspace, &over, -1, 0, &shade), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_fog(workspace, &over, 0, (double)NAN, &shade), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_shade_fog(workspace, &none, 0, 0, &shade), NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* ---- bad input ------------------------------------------------------------------------------- */
 
 static void test_bad_layers_are_refused(void **state)
@@ -702,6 +745,7 @@ int main(void)
         cmocka_unit_test(test_shadows),
         cmocka_unit_test(test_sky_in_the_shade),
         cmocka_unit_test(test_air_in_the_shade),
+        cmocka_unit_test(test_fog_in_the_shade),
         cmocka_unit_test(test_bad_layers_are_refused),
         cmocka_unit_test(test_bad_calls_are_refused),
         cmocka_unit_test(test_without_memory),

@@ -2,6 +2,8 @@
 #include "near.h"
 #include "scene_help.h"
 
+#include <nebel/clouds.h>
+
 #include <math.h>
 
 #define PLANET(top, clouds)                                                                                            \
@@ -135,6 +137,45 @@ static void test_fog_has_their_shadow(void **state)
     nebel_destroy_scene(scene);
 }
 
+/* Fog under closed clouds has what they let through of the sky at the origin, but all of ambient light that is not the sky's. */
+static void test_fog_has_less_sky(void **state)
+{
+    (void)state;
+    static const char *const ambients[] = {"", "\"ambient\": 0.5, "};
+    static const double origin[1][3] = {{0, 0, 0}};
+    for (int k = 0; k < 2; k++) {
+        char text[512];
+        (void)snprintf(
+            text, sizeof text,
+            "{\"nebel\": 1, \"sun\": {\"direction\": [0, 1, 0.2], \"irradiance\": 3}, %s\"planet\": "
+            "{\"model\": \"physical\", \"clouds\": [{\"kind\": \"stratus\", \"coverage\": 1}]}, \"fog\": []}",
+            ambients[k]);
+        nebel_scene *scene = parse_good(text);
+        assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
+        const nebel_scene_data *const data = nebel_scene_contents(scene);
+        nebel_cloud_view *view;
+        nebel_cloud_workspace *workspace;
+        nebel_sun sun, same;
+        nebel_environment ambient;
+        float part;
+        const nebel_cloud_view_desc desc = {.clouds = data->planets->clouds, .sun = nebel_scene_sun(scene, 0)};
+        assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+        assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+        assert_int_equal(nebel_shade_sky(workspace, 200, 1, origin, 0, &part), NEBEL_OK);
+        assert_int_equal(nebel_find_scene_light(scene, 0, &sun, &ambient), NEBEL_OK);
+        assert_int_equal(nebel_find_scene_sunlight(scene, 0, &same), NEBEL_OK);
+        assert_memory_equal(&sun, &same, sizeof sun);
+        assert_true(part < .7f);
+        assert_near(ambient.intensity, data->environment.intensity * (k == 0 ? (double)part : 1), 1e-6);
+        assert_ptr_equal(ambient.map, data->environment.map);
+        assert_int_equal(nebel_find_scene_light(scene, 1e13, &sun, &ambient), NEBEL_ERROR_VALUE);
+        assert_int_equal(nebel_find_scene_light(scene, 0, &sun, NULL), NEBEL_ERROR_ARGUMENT);
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+        nebel_destroy_scene(scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -143,6 +184,7 @@ int main(void)
         cmocka_unit_test(test_what_is_wrong),
         cmocka_unit_test(test_without_memory),
         cmocka_unit_test(test_fog_has_their_shadow),
+        cmocka_unit_test(test_fog_has_less_sky),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

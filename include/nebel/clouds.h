@@ -26,6 +26,7 @@ extern "C" {
 #define NEBEL_MAX_CLOUD_LAYERS 4
 #define NEBEL_MAX_CLOUD_KNOTS 16
 #define NEBEL_MAX_AIR_SHADES 6
+#define NEBEL_MAX_FOG_SHADES 32
 #define NEBEL_MAX_CLOUD_RATIO 1e6 /* of the air's thickness to a layer's */
 #define NEBEL_CLOUD_NONE (-1.)    /* where 0 would mean the number of the kind */
 
@@ -146,6 +147,19 @@ typedef struct nebel_air_shade {
  * the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes. Errors: ARGUMENT. */
 nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
                              nebel_air_shade *shades, size_t shade_stride);
+
+/* What part of the sun's and of the sky's light fog has along a ray. */
+typedef struct nebel_fog_shade {
+    uint32_t count;                    /* of pieces; 0: all of it everywhere */
+    float t[NEBEL_MAX_FOG_SHADES + 1]; /* m, ascending, as of nebel_air_shade */
+    float sun[NEBEL_MAX_FOG_SHADES], sky[NEBEL_MAX_FOG_SHADES];
+    float error[NEBEL_MAX_FOG_SHADES]; /* of either: what a mean over twice the width differs by */
+} nebel_fog_shade;
+
+/* Along a ray from `begin` on, where fog begins, up to t_max or the ground, as means over pieces, which are longer the farther they
+ * are from there and from the end. What comes through is that of nebel_shade_air. spread as of nebel_trace_clouds. Errors: ARGUMENT. */
+nebel_result nebel_shade_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray, double begin, double spread,
+                             nebel_fog_shade *shade);
 
 #ifdef __cplusplus
 }

@@ -267,6 +267,11 @@ nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun);
  * untouched. */
 nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight);
 
+/* The same, and the ambient light that it has: that of the contents, of which clouds dim a planet's own sky by its intensity. On an
+ * error both are untouched. */
+nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebel_sun *sunlight,
+                                    nebel_environment *ambient);
+
 /* The particles of all nebulae, contents->particle_count of them, one nebula after the other. Free them before the
  * scene. Errors: ARGUMENT, MEMORY, VALUE (a nebula in whose shape no place is found). */
 nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle **particles);

@@ -8,6 +8,7 @@
 #include "base/lighting.h"
 #include "base/worlds.h"
 
+#include <nebel/clouds.h>
 #include <nebel/scene.h>
 
 /* Of hits: the ground of a planet, which belongs to no mesh. */
@@ -31,7 +32,24 @@ typedef struct nb_air {
     int is_fog_even;     /* daylight is the same all over it: that at the eye, below */
     float cloud_shade;   /* part of the sun that clouds leave to fog */
     double sun_at_eye[3], sky_at_eye[3];
+    int is_fog_shaded;             /* by clouds and by its place; cloud_shade is then 1 */
+    float per_origin_sky;          /* of what clouds leave of the sky at the origin, one over that */
+    double fog_min[3], fog_max[3]; /* of fog that is so shaded */
 } nb_air;
+
+/* What clouds leave along a ray, in parts: of the sun, and of the sky as of that which fog has at the origin. */
+typedef struct nb_fog_shade {
+    int is_found;
+    nebel_fog_shade pieces;
+    float end;       /* m, no fog is beyond */
+    float clear_sky; /* over clouds */
+} nb_fog_shade;
+
+/* Between two places of a ray, of fog that is spread evenly: what there is of the sun and of the sky; by how much either may be
+ * off wherever the fog is; and by how much within pieces, which no cut mends. */
+typedef struct nb_shade_between {
+    float sun, sky, sun_doubt, sky_doubt, sun_within, sky_within;
+} nb_shade_between;
 
 enum { NB_AIR_KNOTS = 34 };
 
@@ -43,6 +61,7 @@ typedef struct nb_air_knots {
     /* Of daylit fog, whose fog_light is its own: its light in the full light of the sun, in the origin's sky, and what there
      * is of both at the place. */
     float fog_sun[3][NB_BATCH], fog_sky[3][NB_BATCH], sun[3][NB_BATCH], sky[3][NB_BATCH];
+    nb_shade_between shade[NB_BATCH]; /* of clouds, from the place before, of fog that is shaded by its place */
 } nb_air_knots;
 
 /* Ground that rays meet, as nebel_find_ground says it. */
@@ -59,6 +78,7 @@ typedef struct nb_air_scratch {
     nb_air_knots knots[NB_AIR_KNOTS];                    /* the first where rays end */
     uint8_t order[NB_BATCH][NB_AIR_KNOTS];               /* of a ray's knots along it */
     int count[NB_BATCH];
+    nb_fog_shade fog_shade[NB_BATCH]; /* through the middles of pixels, of fog that is shaded by its place */
 } nb_air_scratch;
 
 /* Makes the tables for a place to look from, and those of the light on models. `to_sun`: of length 1. `ends`: whether rays

@@ -1,5 +1,7 @@
 #include "cloudscape.h"
 
+#include "fog_shade.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -76,6 +78,7 @@ nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, n
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
                  scratch->centers.y + place->first, &clouds->rays);
     memset(clouds->reach, 0, sizeof clouds->reach);
+    nb_fog_shade_start(scratch);
     for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
         const int in_row = nb_lane_x(place->first + i) < frame->width - place->left;
         const int in_column = nb_lane_y(place->first + i) < frame->height - place->top;

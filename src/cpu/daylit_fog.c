@@ -1,5 +1,7 @@
 #include "daylit_fog.h"
 
+#include "fog_shade.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -56,13 +58,13 @@ static int is_even(const nb_air *air, const double min[3], const double max[3])
     return 1;
 }
 
-/* Clouds shade all fog as they do the origin, as wide as nebel_find_scene_sunlight takes them. */
+/* Where it is even, clouds shade all fog as they do the origin, as wide as nebel_find_scene_sunlight takes them. */
 static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
 {
     enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     *part = 1;
-    if (frame->cloud_view == NULL) return NEBEL_OK;
+    if (frame->cloud_view == NULL || frame->air.is_fog_shaded) return NEBEL_OK;
     return nebel_shade_clouds(frame->renderer->scratch[0].clouds.workspace, WIDE, 1, origin, 0, part);
 }
 
@@ -76,12 +78,10 @@ static void light_at(const nb_air *air, const double place[3], double sun[3], do
 }
 
 /* Without tables, to `sun`, where it is the same everywhere. */
-static void set_even_light(nb_air *air, const double min[3], const double max[3], nebel_sun *sun)
+static void set_even_light(nb_air *air, const double place[3], nebel_sun *sun)
 {
     static const double origin[3] = {0, 0, 0};
-    double middle[3];
-    find_middle(min, max, middle);
-    const nebel_air_light there = nb_air_ask(air, middle), here = nb_air_ask(air, origin);
+    const nebel_air_light there = nb_air_ask(air, place), here = nb_air_ask(air, origin);
     for (int c = 0; c < 3; c++) {
         sun->irradiance[c] *= there.sun[c] * (double)air->cloud_shade;
         air->sun_at_eye[c] = 1;
@@ -95,16 +95,18 @@ nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     nebel_sun sun;
-    double min[3], max[3];
-    if (desc->even_daylight || !air->has_fog || !scene->has_sun ||
-        !nebel_snapshot_scattering_fog(renderer->fog, min, max) || is_near(&scene->planets[0], min, max))
-        return NEBEL_OK;
+    double min[3], max[3], middle[3] = {0, 0, 0};
+    if (desc->even_daylight || !air->has_fog || !scene->has_sun) return NEBEL_OK;
+    const int is_far = nebel_snapshot_scattering_fog(renderer->fog, min, max) && !is_near(&scene->planets[0], min, max);
+    nebel_result result = nb_fog_shade_set(frame);
+    if (result != NEBEL_OK || !(is_far || air->is_fog_shaded)) return result;
     memcpy(sun.direction, scene->sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, scene->sun_irradiance, sizeof sun.irradiance);
-    air->is_fog_even = is_even(air, min, max);
-    nebel_result result = find_cloud_shade(frame, &air->cloud_shade);
+    if (is_far) find_middle(min, max, middle);
+    air->is_fog_even = !is_far || is_even(air, min, max);
+    result = find_cloud_shade(frame, &air->cloud_shade);
     if (air->is_fog_even)
-        set_even_light(air, min, max, &sun);
+        set_even_light(air, middle, &sun);
     else if (result == NEBEL_OK)
         result = nb_air_set_daylights(air, &scene->planets[0], &renderer->log);
     if (result == NEBEL_OK && !air->is_fog_even) light_at(air, air->position, air->sun_at_eye, air->sky_at_eye);

@@ -1,6 +1,7 @@
 #include "haze.h"
 
 #include "daylit_fog.h"
+#include "fog_shade.h"
 
 #include <math.h>
 #include <string.h>
@@ -9,6 +10,7 @@
 typedef struct nb_knot {
     float at, fog_left[3], fog_light[3], air_left[3], air_light[3];
     float fog_sun[3], fog_sky[3], sun[3], sky[3]; /* of daylit fog, else 0 */
+    nb_shade_between shade;                       /* of clouds, from the knot before */
 } nb_knot;
 
 static nb_knot start_of(const nb_air *air)
@@ -25,7 +27,8 @@ static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lan
 {
     if (place < 0) return start_of(air);
     const nb_air_knots *knots = &scratch->knots[scratch->order[lane][place]];
-    nb_knot knot = {.at = knots->at[lane]};
+    nb_knot knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}};
+    if (air->is_fog_shaded) knot.shade = knots->shade[lane];
     for (int c = 0; c < 3; c++) {
         knot.fog_left[c] = knots->fog_left[c][lane];
         knot.fog_light[c] = knots->fog_light[c][lane];
@@ -41,18 +44,45 @@ static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lan
     return knot;
 }
 
-/* The light of fog between two knots, in the mean of the light of both. */
-static float fog_between(const nb_knot *a, const nb_knot *b, int c)
+/* Without clouds' shade, what fog between two knots has from the sun and from the sky, in the mean of the light of both. */
+static float sun_between(const nb_knot *a, const nb_knot *b, int c)
 {
-    return (b->fog_light[c] - a->fog_light[c]) + 0.5f * (a->sun[c] + b->sun[c]) * (b->fog_sun[c] - a->fog_sun[c]) +
-           0.5f * (a->sky[c] + b->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]);
+    return 0.5f * (a->sun[c] + b->sun[c]) * (b->fog_sun[c] - a->fog_sun[c]);
 }
 
-/* By how much that may be off: all fog may be at one of both. */
+static float sky_between(const nb_knot *a, const nb_knot *b, int c)
+{
+    return 0.5f * (a->sky[c] + b->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]);
+}
+
+/* The light of fog between two knots. */
+static float fog_between(const nb_knot *a, const nb_knot *b, int c)
+{
+    return (b->fog_light[c] - a->fog_light[c]) + b->shade.sun * sun_between(a, b, c) +
+           b->shade.sky * sky_between(a, b, c);
+}
+
+/* By how much that may be off: all fog may be at one place. */
+static float shade_doubt(const nb_knot *a, const nb_knot *b, int c)
+{
+    return fabsf(b->shade.sun_doubt * sun_between(a, b, c)) + fabsf(b->shade.sky_doubt * sky_between(a, b, c));
+}
+
+/* The same within pieces of shade. */
+static float within(const nb_knot *a, const nb_knot *b)
+{
+    float most = 0;
+    for (int c = 0; c < 3; c++)
+        most = fmaxf(most, 0.5f * (a->air_left[c] + b->air_left[c]) *
+                               (fabsf(b->shade.sun_within * sun_between(a, b, c)) +
+                                fabsf(b->shade.sky_within * sky_between(a, b, c))));
+    return most;
+}
+
 static float fog_doubt(const nb_knot *a, const nb_knot *b, int c)
 {
     return 0.5f * fabsf((b->sun[c] - a->sun[c]) * (b->fog_sun[c] - a->fog_sun[c])) +
-           0.5f * fabsf((b->sky[c] - a->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]));
+           0.5f * fabsf((b->sky[c] - a->sky[c]) * (b->fog_sky[c] - a->fog_sky[c])) + shade_doubt(a, b, c);
 }
 
 /* What is in doubt of the light between two knots. */
@@ -86,11 +116,21 @@ static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane
     return worst;
 }
 
+/* Whether most of the doubt is about where in the shade of clouds fog is. */
+static int is_by_shade(const nb_knot *a, const nb_knot *b)
+{
+    float most = 0;
+    for (int c = 0; c < 3; c++) most = fmaxf(most, 0.5f * (a->air_left[c] + b->air_left[c]) * shade_doubt(a, b, c));
+    return most > 0.5f * doubt(a, b);
+}
+
 /* Fog is mostly near and air far: what begins at the eye is cut where air begins to count, other long pieces nearer to
  * their start. */
-static float cut(const nb_frame *frame, const nb_rays *rays, int lane, const nb_knot *a, const nb_knot *b,
+static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, const nb_knot *a, const nb_knot *b,
                  float tolerance)
 {
+    const nb_rays *const rays = &scratch->rays;
+    if (is_by_shade(a, b)) return nb_fog_shade_cut(&scratch->air.fog_shade[lane], a->at, b->at);
     if (a->at == 0 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even) {
         const float enters = nb_daylit_fog_enters(&frame->air, rays, lane);
         if (enters > 0 && enters < b->at) return enters;
@@ -104,12 +144,24 @@ static float cut(const nb_frame *frame, const nb_rays *rays, int lane, const nb_
     return b->at * fminf(0.5f, fmaxf(1e-6f, tolerance / fmaxf(light, gone)));
 }
 
-static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
+/* Of the piece up to a knot. */
+static void shade_piece(nb_air_scratch *scratch, int lane, int place)
+{
+    static const nb_shade_between none = {.sun = 1, .sky = 1};
+    const uint8_t *const order = scratch->order[lane];
+    const nb_fog_shade *const shade = &scratch->fog_shade[lane];
+    nb_air_knots *const knots = &scratch->knots[order[place]];
+    const float before = place > 0 ? scratch->knots[order[place - 1]].at[lane] : 0;
+    knots->shade[lane] = shade->is_found ? nb_fog_shade_between(shade, before, knots->at[lane]) : none;
+}
+
+static void insert(const nb_air *air, nb_air_scratch *scratch, int lane, int place, int knot)
 {
     uint8_t *order = scratch->order[lane];
     memmove(order + place + 1, order + place, (size_t)(scratch->count[lane] - place));
     order[place] = (uint8_t)knot;
     scratch->count[lane]++;
+    for (int i = place; i < place + 2 && air->is_fog_shaded; i++) shade_piece(scratch, lane, i);
 }
 
 /* By clouds. */
@@ -171,7 +223,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int number)
         *at = 0;
         if (!scratch->inside[i]) continue;
         if (is_first && (*at = first_cut(frame, scratch, i)) > 0) {
-            insert(air, i, 0, number);
+            insert(&frame->air, air, i, 0, number);
             any = 1;
             continue;
         }
@@ -179,10 +231,10 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int number)
         const float tolerance = tolerance_of(frame, air, i);
         if (all <= tolerance) continue;
         const nb_knot a = knot_of(&frame->air, air, i, worst - 1), b = knot_of(&frame->air, air, i, worst);
-        const float place = cut(frame, &scratch->rays, i, &a, &b, tolerance);
+        const float place = cut(frame, scratch, i, &a, &b, tolerance);
         if (!(place > a.at && place < b.at)) continue;
         *at = place;
-        insert(air, i, worst, number);
+        insert(&frame->air, air, i, worst, number);
         any = 1;
     }
     return any;
@@ -211,6 +263,7 @@ static void sum_up(const nb_air *of, nb_scratch *scratch, int lane)
         for (int c = 0; c < 3; c++)
             light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
                         0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
+        all += within(&before, &here);
         before = here;
     }
     for (int c = 0; c < 3; c++) {
@@ -254,6 +307,8 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
         return result;
     }
     if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, first);
+    if (result == NEBEL_OK && frame->air.is_fog_shaded) result = nb_fog_shade_find(frame, scratch);
+    for (int i = 0; i < NB_BATCH && frame->air.is_fog_shaded; i++) shade_piece(&scratch->air, i, 0);
     for (int k = 1; k < NB_AIR_KNOTS && result == NEBEL_OK && choose(frame, scratch, k); k++)
         result = trace_knot(frame, fog, trace, scratch, &scratch->air.knots[k]);
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(&frame->air, scratch, i);

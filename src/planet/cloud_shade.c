@@ -1,4 +1,4 @@
-/* Air under clouds: what they leave of the light that it scatters. Sunlight and the sky's light are alike in that both come
+/* Air, surfaces and fog under clouds: what they leave of the light there. Sunlight and the sky's light are alike in that both come
  * through clouds above; sunlight aslant, the sky's from above. */
 #include "cloud_view.h"
 
@@ -71,25 +71,48 @@ static void find_parts(nebel_cloud_workspace *workspace, const double place[3], 
     }
 }
 
-static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], nebel_air_shade *shade)
+/* Where a ray is above the ground and no higher than clouds; places count from the planet's middle. */
+typedef struct nb_under {
+    double from[3], unit[3], begin, end;
+    double scale; /* m, how high the lowest layer's top is */
+} nb_under;
+
+static int find_under(const nebel_cloud_view *view, const nebel_ray *ray, const double unit[3], nb_under *under)
 {
-    const nebel_cloud_view *view = workspace->view;
     const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
     const double ground = atmosphere->airs.radius;
-    double from[3], piece[2][2];
+    const int lowest = layer_over(view->clouds, 0);
+    double pieces[2][2];
+    for (int c = 0; c < 3; c++) {
+        under->from[c] = ray->origin[c] - atmosphere->center[c];
+        under->unit[c] = unit[c];
+    }
+    const double end = fmin(ray->t_max, nb_cloud_to_ground(ground, under->from, unit));
+    if (lowest < 0 || !nb_cloud_pieces(0, view->high, under->from, unit, end, pieces)) return 0;
+    under->begin = pieces[0][0];
+    under->end = pieces[0][1];
+    under->scale = view->clouds->layers[lowest].high - ground;
+    return 1;
+}
+
+static void find_middle(const nb_under *under, double t, double next, double place[3])
+{
+    for (int c = 0; c < 3; c++) place[c] = under->from[c] + 0.5 * (t + next) * under->unit[c];
+}
+
+static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], nebel_air_shade *shade)
+{
+    nb_under under;
     int is_shaded = 0;
     shade->count = 0;
-    for (int c = 0; c < 3; c++) from[c] = ray->origin[c] - atmosphere->center[c];
-    const double end = fmin(ray->t_max, nb_cloud_to_ground(ground, from, unit));
-    const int lowest = layer_over(view->clouds, 0);
-    if (lowest < 0 || !nb_cloud_pieces(0, view->high, from, unit, end, piece)) return;
-    const double scale = view->clouds->layers[lowest].high - ground, begin = piece[0][0], far = piece[0][1];
+    if (!find_under(workspace->view, ray, unit, &under)) return;
+    const double begin = under.begin, far = under.end, scale = under.scale;
     double t = begin;
     shade->t[0] = (float)begin;
     for (int i = 0; i < NEBEL_MAX_AIR_SHADES && t < far; i++) {
         const double next = i < NEBEL_MAX_AIR_SHADES - 1 ? fmin(far, begin + ends[i] * scale) : far;
         double place[3];
-        for (int c = 0; c < 3; c++) place[c] = from[c] + 0.5 * (t + next) * unit[c];
+        find_middle(&under, t, next, place);
         find_parts(workspace, place, (float)fmax(LEAST_WIDTH * scale, WIDTH_PART * (next - t)), shade->part[i]);
         for (int c = 0; c < 3; c++) is_shaded |= shade->part[i][c] < 1;
         shade->t[i + 1] = (float)next;
@@ -128,5 +151,58 @@ nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, siz
         const double least = LEAST_WIDTH * (workspace->view->high - clouds->atmosphere->airs.radius);
         parts[i] = k < 0 ? 1 : roof_over(workspace, k, from, radius, (float)fmax(least, width)).up;
     }
+    return NEBEL_OK;
+}
+
+/* ---- fog ------------------------------------------------------------------------------------- */
+
+/* Pieces are so long where fog begins and where the ray ends, in heights of the lowest layer's top, and so much longer for the way
+ * from the nearer of both: most fog is seen around the eye, or lies on the ground. */
+#define FIRST_PIECE 0.06
+#define PIECE_GROWTH 0.25
+
+/* Over piece i. */
+static void shade_piece(nebel_cloud_workspace *workspace, const double place[3], float width, int i,
+                        nebel_fog_shade *shade)
+{
+    const double radius = nb_vector_length(place);
+    const int k = layer_over(workspace->view->clouds, radius);
+    nb_cloud_roof roof = {1, 1}, wide = roof;
+    if (k >= 0) {
+        roof = roof_over(workspace, k, place, radius, width);
+        wide = roof_over(workspace, k, place, radius, 2 * width);
+    }
+    shade->sun[i] = roof.sun;
+    shade->sky[i] = roof.up;
+    shade->error[i] = nb_larger(fabsf(wide.sun - roof.sun), fabsf(wide.up - roof.up));
+}
+
+nebel_result nebel_shade_fog(nebel_cloud_workspace *workspace, const nebel_ray *ray, double begin, double spread,
+                             nebel_fog_shade *shade)
+{
+    nb_under under;
+    double unit[3];
+    int is_shaded = 0;
+    if (workspace == NULL || ray == NULL || shade == NULL || !(begin >= 0) || !(spread >= 0 && spread <= 10) ||
+        !nb_air_is_ray(ray, unit))
+        return NEBEL_ERROR_ARGUMENT;
+    shade->count = 0;
+    if (!find_under(workspace->view, ray, unit, &under)) return NEBEL_OK;
+    const double first = fmax(begin, under.begin), scale = under.scale;
+    double t = first;
+    shade->t[0] = (float)first;
+    for (int i = 0; i < NEBEL_MAX_FOG_SHADES && t < under.end; i++) {
+        const double length = FIRST_PIECE * scale + PIECE_GROWTH * fmax(0, fmin(t - first, under.end - t));
+        const double next = i < NEBEL_MAX_FOG_SHADES - 1 ? fmin(under.end, t + length) : under.end;
+        const double width = fmax(LEAST_WIDTH * scale, fmax(WIDTH_PART * (next - t), spread * t));
+        double place[3];
+        find_middle(&under, t, next, place);
+        shade_piece(workspace, place, (float)width, i, shade);
+        is_shaded |= shade->sun[i] < 1 || shade->sky[i] < 1 || shade->error[i] > 0;
+        shade->t[i + 1] = (float)next;
+        shade->count++;
+        t = next;
+    }
+    if (!is_shaded) shade->count = 0;
     return NEBEL_OK;
 }

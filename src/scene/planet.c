@@ -165,7 +165,7 @@ static nebel_result set_clouds(nebel_scene *scene)
 }
 
 /* The shadow is as wide as scenes are in which fog stands. */
-static nebel_result shade_origin(const nebel_scene *scene, double frame, float *part)
+static nebel_result shade_origin(const nebel_scene *scene, double frame, float *sun, float *sky)
 {
     enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
@@ -178,22 +178,32 @@ static nebel_result shade_origin(const nebel_scene *scene, double frame, float *
     nebel_cloud_workspace *workspace = NULL;
     nebel_result result = nebel_create_cloud_view(&desc, &view);
     if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
-    if (result == NEBEL_OK) result = nebel_shade_clouds(workspace, WIDE, 1, origin, 0, part);
+    if (result == NEBEL_OK) result = nebel_shade_clouds(workspace, WIDE, 1, origin, 0, sun);
+    if (result == NEBEL_OK) result = nebel_shade_sky(workspace, WIDE, 1, origin, 0, sky);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     return result;
 }
 
-nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight)
+nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebel_sun *sunlight,
+                                    nebel_environment *ambient)
 {
-    float part = 1;
-    if (scene == NULL || sunlight == NULL) return NEBEL_ERROR_ARGUMENT;
-    const nebel_result result = scene->clouds != NULL ? shade_origin(scene, frame, &part) : NEBEL_OK;
+    float sun = 1, sky = 1;
+    if (scene == NULL || sunlight == NULL || ambient == NULL) return NEBEL_ERROR_ARGUMENT;
+    const nebel_result result = scene->clouds != NULL ? shade_origin(scene, frame, &sun, &sky) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     *sunlight = sun_of(&scene->data);
+    *ambient = scene->data.environment;
     for (int c = 0; c < 3 && scene->atmospheres[0] != NULL; c++)
-        sunlight->irradiance[c] *= (double)part * scene->planets->sun_left[c];
+        sunlight->irradiance[c] *= (double)sun * scene->planets->sun_left[c];
+    if (!scene->has_ambient) ambient->intensity *= (double)sky;
     return NEBEL_OK;
+}
+
+nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight)
+{
+    nebel_environment ambient;
+    return nebel_find_scene_light(scene, frame, sunlight, &ambient);
 }
 
 static nebel_result load_layers(nebel_scene *scene)

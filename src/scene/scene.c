@@ -371,11 +371,11 @@ static nebel_result commit(const nebel_scene *scene, double frame, int with_part
     *snapshot = NULL;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
     desc.max_opacity = scene->data.max_opacity;
-    nebel_result result = nebel_find_scene_sunlight(scene, frame, &desc.sun);
+    nebel_environment ambient;
+    nebel_result result = nebel_find_scene_light(scene, frame, &desc.sun, &ambient);
     if (result != NEBEL_OK) return result;
     result = nebel_create_fog(&desc, &fog);
-    if (result == NEBEL_OK && scene->data.environment.type != NEBEL_ENVIRONMENT_CONSTANT)
-        result = nebel_set_environment(fog, &scene->data.environment);
+    if (result == NEBEL_OK && ambient.type != NEBEL_ENVIRONMENT_CONSTANT) result = nebel_set_environment(fog, &ambient);
     if (result == NEBEL_OK) result = nebel_set_lamps(fog, scene->data.lamp_count, scene->data.lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(fog, scene->data.diffusion);
     if (result == NEBEL_OK) result = add_volumes(fog, scene, frame);

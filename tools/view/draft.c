@@ -91,14 +91,26 @@ void nb_draft_show(nb_draft *draft)
     memcpy(data->sun_irradiance, sun.irradiance, sizeof sun.irradiance);
 }
 
+/* What fog has of the sun, and of ambient light, which is the edition's. */
+static nebel_result find_fog_light(const nb_draft *draft, const nb_edition *edition, nebel_sun *sun,
+                                   nebel_environment *ambient)
+{
+    nebel_environment sky;
+    *ambient = nb_edition_environment(edition, find_light(draft)->environment.map);
+    const nebel_result result = nebel_find_scene_light(draft->scene, draft->frame, sun, &sky);
+    if (result == NEBEL_OK && ambient->type == NEBEL_ENVIRONMENT_MAP && find_light(draft)->environment_file == NULL)
+        ambient->intensity = sky.intensity;
+    return result;
+}
+
 /* Also where it fails the fog is the caller's. */
 static nebel_result create_fog(const nb_draft *draft, const nb_edition *edition, nebel_fog **fog)
 {
     nebel_fog_desc desc = {.log = draft->log, .max_opacity = edition->max_opacity};
     const nebel_scene_data *const file = nebel_scene_contents(draft->file);
-    nebel_result result = nebel_find_scene_sunlight(draft->scene, draft->frame, &desc.sun);
+    nebel_environment environment;
+    nebel_result result = find_fog_light(draft, edition, &desc.sun, &environment);
     if (result == NEBEL_OK) result = nebel_create_fog(&desc, fog);
-    const nebel_environment environment = nb_edition_environment(edition, find_light(draft)->environment.map);
     if (result == NEBEL_OK) result = nebel_set_environment(*fog, &environment);
     if (result == NEBEL_OK) result = nebel_set_lamps(*fog, edition->lamp_count, edition->lamps);
     if (result == NEBEL_OK) result = nebel_set_diffusion(*fog, file->diffusion);
@@ -205,10 +217,10 @@ static nebel_result change_fog(nb_draft *draft, const nb_edition *was, const nb_
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < now->count && result == NEBEL_OK; i++)
         if (has_changed(draft, &was->volumes[i], &now->volumes[i])) result = change_volume(draft, now, i);
-    const nebel_environment environment = nb_edition_environment(now, find_light(draft)->environment.map);
-    if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
+    nebel_environment environment;
     nebel_sun sun;
-    if (result == NEBEL_OK) result = nebel_find_scene_sunlight(draft->scene, draft->frame, &sun);
+    if (result == NEBEL_OK) result = find_fog_light(draft, now, &sun, &environment);
+    if (result == NEBEL_OK) result = nebel_set_environment(draft->fog, &environment);
     if (result == NEBEL_OK) result = nebel_set_sun(draft->fog, &sun);
     if (result == NEBEL_OK) result = nebel_set_lamps(draft->fog, now->lamp_count, now->lamps);
     if (result == NEBEL_OK) result = nebel_set_max_opacity(draft->fog, now->max_opacity > 0 ? now->max_opacity : 1);

@@ -1,0 +1,316 @@
+/* Fog in the shade of clouds by its own place, in pictures of the CPU: against many short pieces of each ray, each in the light
+ * that comes through clouds to it. */
+#include "planet_help.h"
+#include "test_render_scene.h"
+
+#include "base/vector.h"
+
+#include <nebel/clouds.h>
+
+enum { WIDTH = 32, HEIGHT = 20 };
+
+static const double irradiance[3] = {5, 4, 3};
+
+typedef struct world {
+    nebel_atmosphere *atmosphere;
+    nebel_clouds *clouds;
+    nebel_environment_map *map;
+    nebel_planet planet;
+    nebel_scene_data scene;
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+} world;
+
+/* Air so thin that it hardly counts, and a sky of its own. */
+static void make_world(const nebel_cloud_layer *layer, const double sun[3], world *w)
+{
+    static float pixels[4 * 2 * 3];
+    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_left = {1, 1, 1}, .cloud_layer_count = 1}};
+    for (uint32_t k = 0; k < w->planet.air.air_count; k++)
+        for (int c = 0; c < 3; c++) {
+            w->planet.air.airs[k].scattering[c] *= 1e-4;
+            w->planet.air.airs[k].absorption[c] *= 1e-4;
+        }
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {*layer}, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    w->planet.clouds = w->clouds;
+    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
+    assert_int_equal(
+        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &w->map),
+        NEBEL_OK);
+    w->scene = (nebel_scene_data){.has_sun = 1,
+                                  .sun_irradiance = {irradiance[0], irradiance[1], irradiance[2]},
+                                  .environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = w->map, .intensity = 1},
+                                  .planet_count = 1,
+                                  .planets = &w->planet};
+    memcpy(w->scene.sun_direction, sun, sizeof w->scene.sun_direction);
+    assert_true(nb_vector_make_unit(w->scene.sun_direction));
+    nebel_cloud_view_desc view = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
+    memcpy(view.sun.direction, w->scene.sun_direction, sizeof view.sun.direction);
+    assert_int_equal(nebel_create_cloud_view(&view, &w->view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(w->view, &w->workspace), NEBEL_OK);
+}
+
+static void free_world(world *w)
+{
+    nebel_destroy_cloud_workspace(w->workspace);
+    nebel_destroy_cloud_view(w->view);
+    nebel_destroy_clouds(w->clouds);
+    nebel_release_environment_map(w->map);
+    nebel_destroy_atmosphere(w->atmosphere);
+}
+
+static double sun_at(const world *w, const double place[3])
+{
+    float part;
+    assert_int_equal(nebel_shade_clouds(w->workspace, 0, 1, (const double(*)[3])(const void *)place, 0, &part),
+                     NEBEL_OK);
+    return (double)part;
+}
+
+static double sky_at(const world *w, const double place[3])
+{
+    float part;
+    assert_int_equal(nebel_shade_sky(w->workspace, 0, 1, (const double(*)[3])(const void *)place, 0, &part), NEBEL_OK);
+    return (double)part;
+}
+
+static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky)
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}};
+    nebel_environment environment = w->scene.environment;
+    memcpy(desc.sun.direction, w->scene.sun_direction, sizeof desc.sun.direction);
+    for (int c = 0; c < 3; c++) desc.sun.irradiance[c] = sun * irradiance[c];
+    environment.intensity = sky;
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    if (sky > 0) assert_int_equal(nebel_set_environment(fog, &environment), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, int threads, int is_even)
+{
+    nebel_renderer *renderer;
+    const test_picture picture = test_picture_make(WIDTH, HEIGHT);
+    const nebel_frame_desc desc = {
+        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .even_daylight = is_even};
+    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = threads}, &renderer),
+                     NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    return picture;
+}
+
+/* Of a ray of unit length from above it. */
+static double to_ground(const world *w, const nebel_ray *ray)
+{
+    const double radius = w->planet.air.radius, height = ray->origin[1];
+    const double along = (radius + height) * ray->direction[1];
+    return -along - sqrt(along * along - height * (2 * radius + height));
+}
+
+/* The light of fog along a ray of unit length that ends on the ground, in many short pieces. */
+static void step_along(const world *w, const nebel_snapshot *by_sun, const nebel_snapshot *by_sky, nebel_ray ray,
+                       double end, double light[3])
+{
+    enum { STEPS = 600 };
+    const nebel_ray whole = ray;
+    double left[3] = {1, 1, 1};
+    memset(light, 0, 3 * sizeof *light);
+    for (int i = 0; i < STEPS; i++) {
+        /* Shorter near the eye. */
+        const double from = end * i * i / (double)(STEPS * STEPS),
+                     to = end * (i + 1) * (i + 1) / (double)(STEPS * STEPS);
+        double middle[3];
+        nebel_light sun, sky;
+        for (int c = 0; c < 3; c++) {
+            ray.origin[c] = whole.origin[c] + from * whole.direction[c];
+            middle[c] = whole.origin[c] + .5 * (from + to) * whole.direction[c];
+        }
+        ray.t_max = to - from;
+        assert_int_equal(nebel_trace(by_sun, NULL, 1, &ray, 0, &sun, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace(by_sky, NULL, 1, &ray, 0, &sky, 0), NEBEL_OK);
+        if (!(sun.transmittance[0] < 1)) continue;
+        const double of_sun = sun_at(w, middle), of_sky = sky_at(w, middle);
+        for (int c = 0; c < 3; c++) {
+            light[c] += left[c] * (sun.in_scattering[c] * of_sun + sky.in_scattering[c] * of_sky);
+            left[c] *= sun.transmittance[c];
+        }
+    }
+}
+
+typedef struct off {
+    double most, mean, beyond, by_origin; /* beyond: what is told; by_origin: most, in the origin's light */
+    int count;
+} off;
+
+static off compare(const world *w, const nebel_volume_desc *mist, const nebel_camera *camera, double pitch)
+{
+    static const double origin[3] = {0, 0, 0};
+    nebel_snapshot *const fog = make_fog(w, mist, sun_at(w, origin), sky_at(w, origin));
+    nebel_snapshot *const by_sun = make_fog(w, mist, 1, 0), *const by_sky = make_fog(w, mist, 0, 1);
+    test_picture picture = render(w, fog, camera, 2, 0), even = render(w, fog, camera, 2, 1);
+    off is = {.beyond = -1};
+    for (uint32_t i = 5; i < WIDTH * HEIGHT; i += 7) {
+        nebel_ray ray = planet_ray(camera, pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
+        double light[3];
+        assert_true(nb_vector_make_unit(ray.direction));
+        if (ray.direction[1] > -.03) continue;
+        step_along(w, by_sun, by_sky, ray, to_ground(w, &ray), light);
+        for (int c = 0; c < 3; c++) {
+            const size_t k = 3 * i + (size_t)c;
+            const double far = fabs((double)picture.planes.in_scattering[k] - light[c]);
+            is.most = fmax(is.most, far);
+            is.mean += far;
+            is.beyond = fmax(is.beyond, far - (double)picture.planes.error[i]);
+            is.by_origin = fmax(is.by_origin, fabs((double)even.planes.in_scattering[k] - light[c]));
+            is.count++;
+        }
+    }
+    is.mean /= is.count;
+    test_picture_free(&picture);
+    test_picture_free(&even);
+    nebel_release_snapshot(fog);
+    nebel_release_snapshot(by_sun);
+    nebel_release_snapshot(by_sky);
+    return is;
+}
+
+static void mist_has_the_shadows_of_clouds(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double height, pitch, sun[3], extinction, size, top;
+    } views[] = {{"seen from above", 700, -.6, {.3, .8, -.2}, 2e-3, 6000, 60},
+                 {"seen from far", 500, -.15, {.3, .8, -.2}, 1e-3, 9000, 60},
+                 {"in a low sun", 200, -.1, {.2, .15, -1}, 1e-3, 9000, 100},
+                 {"without end", 300, -.3, {.3, .8, .2}, 2e-3, 0, 0}};
+    for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
+        world w;
+        make_world(&(nebel_cloud_layer){.coverage = .5}, views[v].sun, &w);
+        const double size = views[v].size, e = views[v].extinction;
+        nebel_volume_desc mist = {
+            .shape = {.type = NEBEL_SHAPE_BOX, .min = {-size, -5, -size}, .max = {size, views[v].top, size}},
+            .extinction = {e, e, e},
+            .albedo = {.97, .97, .97},
+            .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .3}};
+        if (!(size > 0)) {
+            mist.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
+            mist.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 30};
+        }
+        const nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
+        const off is = compare(&w, &mist, &camera, views[v].pitch);
+        print_message(
+            "mist %s: off by %.2g at most, %.2g in the mean, %.2g beyond what is told; in the origin's light it "
+            "would be off by %.2g\n",
+            views[v].name, is.most, is.mean, is.beyond, is.by_origin);
+        /* A step of a picture of 255 is .009 of light where it is bright; beyond what is told, half of one. */
+        assert_true(is.most < .015 && is.mean < 3e-3 && is.beyond < 4.5e-3 && is.by_origin > 5 * is.most);
+        free_world(&w);
+    }
+}
+
+/* Where on a line the sun comes through worst, 0, or best, 1. */
+static double find_place(const world *w, int best, double z)
+{
+    double found = 0, extreme = best ? 0 : 1;
+    for (int i = -20; i <= 20; i++) {
+        const double place[3] = {300. * i, 0, z}, part = sun_at(w, place);
+        if (best ? part > extreme : part < extreme) {
+            found = place[0];
+            extreme = part;
+        }
+    }
+    return found;
+}
+
+/* Banks of mist far smaller than clouds: each has the light of its place, whatever the origin has. */
+static void a_bank_has_the_light_of_its_place(void **state)
+{
+    (void)state;
+    static const double sun[3] = {.3, .8, -.2}, origin[3] = {0, 0, 0};
+    world w;
+    make_world(&(nebel_cloud_layer){.coverage = .7}, sun, &w);
+    for (int best = 0; best < 2; best++) {
+        nebel_camera camera = planet_camera(300, -.15);
+        const double x = find_place(&w, best, -1800), place[3] = {x, 0, -1800};
+        const nebel_volume_desc bank = {
+            .shape = {.type = NEBEL_SHAPE_BOX, .min = {x - 300, 0, -2100}, .max = {x + 300, 60, -1500}},
+            .extinction = {3e-3, 3e-3, 3e-3},
+            .albedo = {.97, .97, .97}};
+        camera.position[0] += x;
+        camera.look_at[0] += x;
+        const off is = compare(&w, &bank, &camera, -.15);
+        const double here = sun_at(&w, place), there = sun_at(&w, origin);
+        print_message(
+            "a bank with %.2f of the sun, the origin has %.2f: off by %.2g at most, %.2g beyond what is told; in "
+            "the origin's light by %.2g\n",
+            here, there, is.most, is.beyond, is.by_origin);
+        assert_true(best ? here > .95 : here < .5);
+        assert_true(is.most < .015 && is.beyond < 4.5e-3);
+        assert_true(fabs(here - there) < .3 || is.by_origin > 5 * is.most);
+    }
+    free_world(&w);
+}
+
+static void threads_change_nothing(void **state)
+{
+    (void)state;
+    static const double sun[3] = {.3, .8, -.2};
+    world w;
+    make_world(&(nebel_cloud_layer){.coverage = .5}, sun, &w);
+    const nebel_volume_desc mist = {
+        .shape = {.type = NEBEL_SHAPE_BOX, .min = {-6000, -5, -6000}, .max = {6000, 60, 6000}},
+        .extinction = {2e-3, 2e-3, 2e-3},
+        .albedo = {.97, .97, .97}};
+    nebel_snapshot *const fog = make_fog(&w, &mist, 1, 1);
+    const nebel_camera camera = planet_camera(500, -.3);
+    test_picture one = render(&w, fog, &camera, 1, 0), three = render(&w, fog, &camera, 3, 0);
+    assert_memory_equal(one.planes.color, three.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
+    assert_memory_equal(one.planes.error, three.planes.error, (size_t)WIDTH * HEIGHT * sizeof(float));
+    test_picture_free(&one);
+    test_picture_free(&three);
+    nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
+/* Where no cloud is, all is as without them, to the last bit. */
+static void clear_places_stay_as_they_are(void **state)
+{
+    (void)state;
+    static const double sun[3] = {.3, .8, -.2};
+    static const float none = 0;
+    world w;
+    make_world(&(nebel_cloud_layer){.weather = {1, 1, 1, &none}}, sun, &w);
+    const nebel_volume_desc bank = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-600, 0, -2100}, .max = {600, 60, -900}},
+                                    .extinction = {2e-3, 2e-3, 2e-3},
+                                    .albedo = {.97, .97, .97}};
+    nebel_snapshot *const fog = make_fog(&w, &bank, 1, 1);
+    const nebel_camera camera = planet_camera(500, -.3);
+    test_picture with = render(&w, fog, &camera, 2, 0);
+    w.planet.clouds = NULL;
+    test_picture without = render(&w, fog, &camera, 2, 0);
+    assert_memory_equal(with.planes.color, without.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
+    test_picture_free(&with);
+    test_picture_free(&without);
+    nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(mist_has_the_shadows_of_clouds),
+        cmocka_unit_test(a_bank_has_the_light_of_its_place),
+        cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(clear_places_stay_as_they_are),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
