@@ -185,6 +185,14 @@ static inline double nb_cloud_ground_end(const double center[3], const double ey
     return fmax(end, nearest);
 }
 
+/* Whether knots that were found up to `reach` do for a ray that ends elsewhere: it goes no farther, and ends before clouds, behind them
+ * or near the end of what was found. Between two knots clouds are a straight line, which shows on surfaces. */
+static inline int nb_cloud_is_found(uint32_t count, float first, float last, float reach, float end)
+{
+    if (end > reach) return 0;
+    return count == 0 || end <= first || end >= 0.98f * fminf(reach, last);
+}
+
 /* The knot before a surface, and the part of the way to the next one; behind the last one that. The surface is behind the
  * first. */
 static inline uint32_t nb_cloud_haze_find(uint32_t count, const float *t, float end, float *part)

@@ -101,16 +101,12 @@ static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t l
     return (float)nb_cloud_ground_end(world->center, ray.origin, unit, (double)distance);
 }
 
-#define NEAR_END 0.98f
-
-/* Whether what was found for another sample of a pixel does for one: it goes no farther, and ends before clouds, behind
- * them or near the end of what was found. Between two knots clouds are a straight line, which shows on surfaces. */
-static int is_found(const nb_cloud_scratch *clouds, int lane, float end)
+/* Whether what was found for another sample of a pixel does for one. */
+static int is_found(const nb_cloud_scratch *clouds, int lane)
 {
     const nebel_cloud_knots *knots = &clouds->knots[lane];
-    if (end > clouds->reach[lane]) return 0;
-    if (knots->count == 0 || end <= knots->t[0]) return 1;
-    return end >= NEAR_END * fminf(clouds->reach[lane], knots->t[knots->count - 1]);
+    const float last = knots->count > 0 ? knots->t[knots->count - 1] : 0;
+    return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
 }
 
 /* As far as the sample goes. *any: whether there are clouds. */
@@ -123,7 +119,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
         clouds->is_new[i] = 0;
         if (!scratch->inside[i]) continue;
         clouds->end[i] = end_of(frame, scratch, (uint32_t)i);
-        if (is_found(clouds, i, clouds->end[i])) continue;
+        if (is_found(clouds, i)) continue;
         nebel_ray ray = ray_of(frame, clouds, (uint32_t)i);
         ray.t_max = (double)clouds->end[i];
         result = nebel_trace_clouds(clouds->workspace, 1, &ray, 0, frame->air.pixel / (double)clouds->rays.length[i],

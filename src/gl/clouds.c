@@ -12,7 +12,7 @@
 
 typedef struct job {
     nb_gl_clouds *clouds;
-    const nb_cloud_picture *picture;
+    const nb_cloud_picture *picture, *middle; /* middle: of the middles of pixels, where picture is of a sample */
     void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);
     const nb_world *worlds;
     int world_count, has_fog;
@@ -123,6 +123,14 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
 
 /* ---- rays ------------------------------------------------------------------------------------ */
 
+static void set_knots(const nebel_cloud_knots *knots, nb_cloud_knot *list)
+{
+    for (uint32_t k = 0; k < knots->count; k++) {
+        list[k] = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
+        memcpy(list[k].light, knots->in_scattering[k], sizeof list[k].light);
+    }
+}
+
 static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cloud_knots *knots, nb_cloud_pixel *pixel)
 {
     void *list = part->knots;
@@ -132,11 +140,8 @@ static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cl
     part->knots = list;
     pixel->first = (uint32_t)part->count;
     pixel->count = knots->count;
-    for (uint32_t k = 0; k < knots->count; k++) {
-        nb_cloud_knot *const knot = &part->knots[part->count++];
-        *knot = (nb_cloud_knot){.t = knots->t[k], .left = knots->transmittance[k]};
-        memcpy(knot->light, knots->in_scattering[k], sizeof knot->light);
-    }
+    set_knots(knots, part->knots + part->count);
+    part->count += knots->count;
     return NEBEL_OK;
 }
 
@@ -183,16 +188,24 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
     return NEBEL_OK;
 }
 
+/* Through a pixel, up to t_max. */
+static nebel_result trace_pixel(nb_cloud_part *part, const nb_cloud_picture *picture, uint32_t x, uint32_t y,
+                                double t_max, nebel_ray *ray, nebel_cloud_knots *knots)
+{
+    const double length = direction_at(picture, x, y, ray->direction);
+    memcpy(ray->origin, picture->eye, sizeof ray->origin);
+    ray->t_max = t_max;
+    return nebel_trace_clouds(part->workspace, 1, ray, 0, picture->pixel / length, knots, 0);
+}
+
 static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)
 {
     const nb_cloud_picture *const picture = j->picture;
     for (uint32_t x = 0; x < picture->view->width && part->result == NEBEL_OK; x++) {
         const size_t i = (size_t)y * picture->view->width + x;
-        nebel_ray ray = {.t_max = HUGE_VAL};
+        nebel_ray ray;
         nebel_cloud_knots knots;
-        const double length = direction_at(picture, x, y, ray.direction);
-        memcpy(ray.origin, picture->eye, sizeof ray.origin);
-        part->result = nebel_trace_clouds(part->workspace, 1, &ray, 0, picture->pixel / length, &knots, 0);
+        part->result = trace_pixel(part, picture, x, y, HUGE_VAL, &ray, &knots);
         if (part->result == NEBEL_OK) part->result = shade_air(j, part, &ray, &j->clouds->pixels[i]);
         if (part->result == NEBEL_OK) part->result = keep_knots(j, part, &knots, &j->clouds->pixels[i]);
     }
@@ -386,10 +399,9 @@ void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, co
     }
 }
 
-static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const double direction[3])
+static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel,
+                              const double direction[3], nb_cloud_knot *list)
 {
-    const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
-    nb_cloud_knot *const list = part->knots + pixel->first;
     nb_cloud_mix mix;
     const nebel_result result = find_mix(j, part, list, pixel, direction, &mix);
     if (result != NEBEL_OK) return result;
@@ -406,10 +418,10 @@ static nebel_result mix_pixel(const job *j, nb_cloud_part *part, size_t i, const
 static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
 {
     for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
-        const size_t i = (size_t)y * j->picture->view->width + x;
+        const nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)y * j->picture->view->width + x];
         double direction[3];
         (void)direction_at(j->picture, x, y, direction);
-        if (j->clouds->pixels[i].count > 0) part->result = mix_pixel(j, part, i, direction);
+        if (pixel->count > 0) part->result = mix_pixel(j, part, pixel, direction, part->knots + pixel->first);
     }
 }
 
@@ -460,6 +472,34 @@ static float cloud_end(const job *j, const double direction[3], float t)
     return t;
 }
 
+/* Whether knots up to the ground do for a ray that ends there: among fog, which is not asked again, they must. */
+static int is_found(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel, float end)
+{
+    const nb_cloud_knot *const knots = part->knots + pixel->first;
+    if (pixel->count == 0 || j->left != NULL) return 1;
+    return nb_cloud_is_found(pixel->count, knots[0].t, knots[pixel->count - 1].t, HUGE_VALF, end);
+}
+
+static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uint32_t y, float end, float over[4])
+{
+    const nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)y * j->picture->view->width + x];
+    nb_cloud_knot list[NEBEL_MAX_CLOUD_KNOTS];
+    nebel_cloud_knots knots;
+    nebel_ray ray;
+    if (is_found(j, part, pixel, end)) {
+        lay_over(part->knots + pixel->first, pixel->count, end, over);
+        return NEBEL_OK;
+    }
+    nebel_result result = trace_pixel(part, j->middle, x, y, (double)end, &ray, &knots);
+    if (result != NEBEL_OK) return result;
+    nb_cloud_pixel anew = *pixel;
+    anew.count = knots.count;
+    set_knots(&knots, list);
+    if (knots.count > 0) result = mix_pixel(j, part, &anew, ray.direction, list);
+    lay_over(list, knots.count, end, over);
+    return result;
+}
+
 static nebel_result shade(const job *j, nb_cloud_part *part, const double direction[3], double t, float left[4])
 {
     double place[1][3];
@@ -493,22 +533,24 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
 {
     for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
         const size_t i = (size_t)y * j->picture->view->width + x;
-        const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
         const float t = j->places[4 * i];
         const float end = t > 0 ? t : HUGE_VALF;
         double direction[3];
         (void)direction_at(j->picture, x, y, direction);
-        lay_over(part->knots + pixel->first, pixel->count, t > 0 ? cloud_end(j, direction, t) : end, j->over + 4 * i);
-        part->result = shade_end(j, part, i, direction, end, j->over + 4 * i);
+        const float cloudy = t > 0 ? cloud_end(j, direction, t) : end;
+        part->result = lay_pixel(j, part, x, y, cloudy, j->over + 4 * i);
+        if (part->result == NEBEL_OK) part->result = shade_end(j, part, i, direction, end, j->over + 4 * i);
         if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, j->shade + 4 * i);
     }
 }
 
-nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
-                              const float *places, const float *left, float *over, float *shade_plane)
+nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
+                              const nb_world *worlds, int count, const float *places, const float *left, float *over,
+                              float *shade_plane)
 {
     job j = {.clouds = clouds,
              .picture = picture,
+             .middle = middle,
              .row = end_row,
              .worlds = worlds,
              .world_count = count,

@@ -87,9 +87,12 @@ nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *pict
                               int has_fog);
 
 /* For rays that end at places[4 i], 0: nowhere, what is left of haze, which is in no shade, and added to it, 4 numbers for
- * each; and what clouds leave of the sunlight there, three times, and of the sky's light: 4 numbers, where rays end. left[4 i]: what fog and air leave; NULL: there is no fog. MEMORY. */
-nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
-                              const float *places, const float *left, float *over, float *shade);
+ * each; and what clouds leave of the sunlight there, three times, and of the sky's light: 4 numbers, where rays end.
+ * left[4 i]: what fog and air leave; NULL: there is no fog, and where a ray ends amid
+ * clouds they are found anew up to there, through the middle of the pixel. MEMORY. */
+nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
+                              const nb_world *worlds, int count, const float *places, const float *left, float *over,
+                              float *shade);
 
 void nb_gl_clouds_release(nb_gl_clouds *clouds);
 

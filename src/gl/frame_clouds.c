@@ -47,6 +47,12 @@ static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, const
     return picture;
 }
 
+static nb_cloud_picture picture_of_middles(nb_gl_frame *f, nebel_rays *middles)
+{
+    if (f->panorama) nb_panorama_rays(&f->view, f->eye, nb_pixel_sample(0, 1), middles);
+    return picture_of(f, &f->view, middles);
+}
+
 /* The usual unpacking. A plane of 4 numbers, or of 1, which is that of all colours. */
 static nebel_result upload(const nb_gl_frame *f, unsigned *texture, int channels, const float *texels)
 {
@@ -137,8 +143,7 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
     nebel_gl_renderer *const r = f->renderer;
     const nebel_sun sun = nb_gl_air_sun(r->scene);
     nebel_rays middles;
-    if (f->panorama) nb_panorama_rays(&f->view, f->eye, nb_pixel_sample(0, 1), &middles);
-    const nb_cloud_picture picture = picture_of(f, &f->view, &middles);
+    const nb_cloud_picture picture = picture_of_middles(f, &middles);
     nebel_result result = nb_gl_clouds_set(&r->clouds, f->clouds, &sun, f->desc->time, log_of(f));
     if (result != NEBEL_OK) return fail_memory(f, result);
     result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count);
@@ -152,7 +157,9 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 nebel_result nb_frame_end_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
+    nebel_rays middles;
     const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, &f->rays);
+    const nb_cloud_picture middle = picture_of_middles(f, &middles);
     float *const places = make_plane(f, 4), *const left = make_plane(f, 4), *const over = make_plane(f, 4),
                  *const shade = make_plane(f, 4);
     nebel_result result =
@@ -160,8 +167,8 @@ nebel_result nb_frame_end_clouds(nb_gl_frame *f)
     if (result == NEBEL_OK) {
         read_back(f, r->targets.surface_buffer, 0, places);
         if (has_fog(f)) read_back(f, r->targets.fog_buffer, 1, left);
-        result = nb_gl_clouds_end(&r->clouds, &picture, r->air.worlds, r->air.count, places, has_fog(f) ? left : NULL,
-                                  over, shade);
+        result = nb_gl_clouds_end(&r->clouds, &picture, &middle, r->air.worlds, r->air.count, places,
+                                  has_fog(f) ? left : NULL, over, shade);
     }
     result = fail_memory(f, result);
     if (result == NEBEL_OK) result = upload(f, &r->cloud_over, 4, over);
