@@ -637,6 +637,48 @@ static void bad_times_are_refused(void **state)
     free_world(&w);
 }
 
+static double mean_change(const test_picture *a, const test_picture *b)
+{
+    double sum = 0;
+    for (size_t i = 0; i < (size_t)3 * WIDTH * HEIGHT; i++)
+        sum += fabs((double)(a->planes.color[i] - b->planes.color[i])) / (3 * WIDTH * HEIGHT);
+    return sum;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
+}
+
+/* Through the base and the top of a sheet, and to where pixels are wider than it is high, neighbouring pictures change by as much as
+ * others do: where something were switched one of them would stand out. */
+static void a_flight_through_clouds_has_no_jump(void **state)
+{
+    (void)state;
+    enum { FRAMES = 10 };
+    static const double begins[] = {290, 790, 2e5}, steps[] = {2, 2, 500};
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS}, &w);
+    for (int k = 0; k < 3; k++) {
+        double changes[FRAMES];
+        test_picture last = {0};
+        for (int i = 0; i <= FRAMES; i++) {
+            const double height = begins[k] + i * steps[k];
+            const nebel_camera camera = planet_camera(height, -acos(6.36e6 / (6.36e6 + height)) - .2);
+            test_picture next = render(&w, &camera, 2, 1, 0);
+            if (i > 0) changes[i - 1] = mean_change(&last, &next);
+            if (i > 0) test_picture_free(&last);
+            last = next;
+        }
+        test_picture_free(&last);
+        qsort(changes, FRAMES, sizeof *changes, ascending);
+        print_message("from %g m by %g m: changes of %.2g, %.2g at most\n", begins[k], steps[k], changes[FRAMES / 2],
+                      changes[FRAMES - 1]);
+        assert_true(changes[0] > 0 && changes[FRAMES - 1] < 2 * changes[FRAMES / 2]);
+    }
+    free_world(&w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -648,6 +690,7 @@ int main(void)
         cmocka_unit_test(air_under_clouds_is_dim),
         cmocka_unit_test(surfaces_under_clouds_have_less_sky),
         cmocka_unit_test(clouds_hide_the_ground_from_orbit),
+        cmocka_unit_test(a_flight_through_clouds_has_no_jump),
         cmocka_unit_test(no_clouds_change_nothing),
         cmocka_unit_test(bad_times_are_refused),
     };
