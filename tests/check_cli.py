@@ -944,9 +944,9 @@ class InfoTest(PictureCase):
                                      sun={"direction": sun, "irradiance": 3})
             warned = "warning: no sunlight reaches fog or models: fog[1] 'haze' has no end" in nebel("info", scene).out
             self.assertEqual(warned, is_dark, (shape, density, sun))
-            done = nebel("render", scene, "-o", self.folder / "dim.png", "-s", "8x8")
+            done = nebel("render", scene, "-o", self.folder / "dim.png", "-s", "8x8", "-q")
             for said in (done.err, nebel("trace", scene, text=RAY).err):
-                self.assertEqual("no sunlight reaches fog or models: fog[1]" in said, is_dark)
+                self.assertEqual(f"warning: {scene}: no sunlight reaches fog or models: fog[1]" in said, is_dark)
 
     def test_a_scene_or_a_model_that_is_wrong(self):
         self.assert_failed(nebel("info", self.folder / "none.json"), "none.json")

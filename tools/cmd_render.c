@@ -380,9 +380,9 @@ static void note_stillness(const nebel_scene *scene, const nb_render_call *wante
                       wanted->scene);
 }
 
-static void note_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
+static void warn_of_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
 {
-    if (!wanted->quiet && wanted->method == NEBEL_METHOD_EXACT) nb_note_endless(scene, wanted->scene);
+    if (wanted->method == NEBEL_METHOD_EXACT) nb_warn_of_endless(scene, wanted->scene);
 }
 
 /* What the scene has beside its cells is not drawn. */
@@ -556,7 +556,7 @@ static int set_up(studio *all)
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
-    note_darkness(nebel_scene_contents(all->loaded.scene), wanted);
+    warn_of_darkness(nebel_scene_contents(all->loaded.scene), wanted);
     status = check_classic(all);
     if (status == NB_DONE) status = make_cells(all);
     if (status == NB_DONE) status = tessellate(all);

@@ -52,9 +52,9 @@ size_t nb_find_endless(const nebel_scene_data *scene)
     return i;
 }
 
-void nb_note_endless(const nebel_scene_data *scene, const char *path)
+void nb_warn_of_endless(const nebel_scene_data *scene, const char *path)
 {
     const size_t endless = nb_find_endless(scene);
     if (endless == scene->volume_count) return;
-    nb_report_message("note: %s: no sunlight reaches fog or models: fog[%zu] %s", path, endless, nb_endless_advice);
+    nb_report_message("warning: %s: no sunlight reaches fog or models: fog[%zu] %s", path, endless, nb_endless_advice);
 }

@@ -11,7 +11,7 @@ size_t nb_find_endless(const nebel_scene_data *scene);
 /* What to say of it, behind its name. */
 extern const char nb_endless_advice[];
 
-/* Says so on standard error, where it is so. `path` is the scene's. */
-void nb_note_endless(const nebel_scene_data *scene, const char *path);
+/* Says so on standard error, where it is so; no quiet hides that. `path` is the scene's. */
+void nb_warn_of_endless(const nebel_scene_data *scene, const char *path);
 
 #endif
