@@ -99,7 +99,7 @@ static test_picture render(const world *w, nebel_snapshot *fog, const nebel_came
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
     const nebel_frame_desc desc = {
-        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .even_daylight = is_even};
+        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .even_shade = is_even};
     assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = threads}, &renderer),
                      NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);

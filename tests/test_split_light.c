@@ -91,6 +91,32 @@ static void parts_add_up(void **state)
     }
 }
 
+static void another_sun_takes_the_place_of_the_first(void **state)
+{
+    (void)state;
+    nebel_snapshot *snapshot = commit(3, volumes, 0, NULL), *lit = snapshot;
+    nebel_split_fog split;
+    nebel_light whole[RAYS], sun[RAYS], sky[RAYS], own[RAYS];
+    assert_int_equal(nebel_relight(NULL, &suns[1], &lit), NEBEL_ERROR_ARGUMENT);
+    assert_null(lit);
+    assert_int_equal(nebel_relight(snapshot, NULL, &lit), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_relight(snapshot, &suns[1], NULL), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_relight(snapshot, &suns[1], &lit), NEBEL_OK);
+    assert_int_equal(nebel_split_light(snapshot, &suns[1], &split), NEBEL_OK);
+    nebel_release_snapshot(snapshot); /* it lives on */
+    look(lit, whole);
+    look(split.sun, sun);
+    look(split.sky, sky);
+    look(split.own, own);
+    for (int i = 0; i < RAYS; i++)
+        for (int c = 0; c < 3; c++) {
+            const double sum = sun[i].in_scattering[c] + sky[i].in_scattering[c] + own[i].in_scattering[c];
+            assert_true(fabs(whole[i].in_scattering[c] - sum) <= 1e-6 * fmax(1, sum));
+        }
+    nebel_release_split_light(&split);
+    nebel_release_snapshot(lit);
+}
+
 static void boxes_are_of_fog_that_scatters(void **state)
 {
     (void)state;
@@ -165,6 +191,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_add_up),
+        cmocka_unit_test(another_sun_takes_the_place_of_the_first),
         cmocka_unit_test(boxes_are_of_fog_that_scatters),
         cmocka_unit_test(lost_memory_is_survived),
     };

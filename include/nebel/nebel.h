@@ -543,6 +543,9 @@ typedef struct nebel_split_fog {
 nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_split_fog *split);
 void nebel_release_split_light(nebel_split_fog *split);
 
+/* The same fog by all its lights, with another sun. As above. */
+nebel_result nebel_relight(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_snapshot **lit);
+
 /* How many lamps the snapshot has. */
 size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot);
 

@@ -26,6 +26,18 @@ typedef struct nb_daylight {
 /* Of a sun of irradiance 1: less counts as none. */
 #define NB_DAYLIGHT_LEAST_SKY 2e-30
 
+/* Fog that is all so near the origin along each axis, m and parts of the planet's radius, takes the origin's light. */
+#define NB_DAYLIGHT_NEAR 1e4
+#define NB_DAYLIGHT_NEAR_PART (1 / 600.)
+
+static inline int nb_daylight_is_near(const nebel_planet *home, const double min[3], const double max[3])
+{
+    const double most = fmin(NB_DAYLIGHT_NEAR, NB_DAYLIGHT_NEAR_PART * home->air.radius);
+    for (int c = 0; c < 3; c++)
+        if (min[c] < -most || max[c] > most) return 0;
+    return 1;
+}
+
 /* Skies lie evenly over this function of the cosine of the sun's angle to the zenith. */
 #define NB_DAYLIGHT_TWILIGHT 0.05
 

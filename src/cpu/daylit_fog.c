@@ -8,20 +8,7 @@
 /* As parts of the sun's light and of the sky's: a step of a picture of 255 is 0.9 % of light where it is bright. */
 #define LEAST_CHANGE (1 / 128.)
 
-/* Fog that is all so near the origin along each axis, m and parts of the planet's radius, takes the origin's light, as OpenGL
- * lights all fog. */
-#define MOST_NEAR 1e4
-#define NEAR_PART (1 / 600.)
-
 /* ---- the frame ------------------------------------------------------------------------------- */
-
-static int is_near(const nebel_planet *home, const double min[3], const double max[3])
-{
-    const double most = fmin(MOST_NEAR, NEAR_PART * home->air.radius);
-    for (int c = 0; c < 3; c++)
-        if (min[c] < -most || max[c] > most) return 0;
-    return 1;
-}
 
 /* Whether two places have another light. */
 static int differ(const nb_air *air, const nebel_air_light *a, const nebel_air_light *b)
@@ -96,9 +83,10 @@ nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_scene_data *scene = renderer->scene;
     nebel_sun sun;
     double min[3], max[3], middle[3] = {0, 0, 0};
-    if (desc->even_daylight || !air->has_fog || !scene->has_sun) return NEBEL_OK;
-    const int is_far = nebel_snapshot_scattering_fog(renderer->fog, min, max) && !is_near(&scene->planets[0], min, max);
-    nebel_result result = nb_fog_shade_set(frame);
+    if (!air->has_fog || !scene->has_sun) return NEBEL_OK;
+    const int is_far =
+        nebel_snapshot_scattering_fog(renderer->fog, min, max) && !nb_daylight_is_near(&scene->planets[0], min, max);
+    nebel_result result = desc->even_shade ? NEBEL_OK : nb_fog_shade_set(frame);
     if (result != NEBEL_OK || !(is_far || air->is_fog_shaded)) return result;
     memcpy(sun.direction, scene->sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, scene->sun_irradiance, sizeof sun.irradiance);

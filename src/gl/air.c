@@ -148,10 +148,11 @@ static nebel_result fill(nb_gl_air *air, const nebel_allocator *allocator, const
 }
 
 nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
-                           const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends)
+                           const nb_context *context, const nebel_scene_data *scene, const double eye[3], int ends,
+                           int is_lit)
 {
     nb_world worlds[NEBEL_MAX_PLANETS];
-    const int count = nb_worlds_set(worlds, scene, eye), is_lit = scene->has_sun && scene->mesh_count > 0;
+    const int count = nb_worlds_set(worlds, scene, eye);
     /* The ground of one planet ends the air of others. */
     const nebel_air_view_desc desc = {.sun = nb_gl_air_sun(scene),
                                       .position = {eye[0], eye[1], eye[2]},
@@ -225,4 +226,25 @@ void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_sce
     glUniform1f(glGetUniformLocation(program, "disc_radius"), (float)radius);
     glUniform3fv(glGetUniformLocation(program, "disc_light"), 1, light);
     glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), owns_ambient);
+}
+
+/* No air of any planet is farther from the eye. */
+static double find_reach(const nb_gl_air *air)
+{
+    double reach = 0;
+    for (int i = 0; i < air->count; i++) {
+        const nb_world *const world = &air->worlds[i];
+        reach = fmax(reach, sqrt(nb_world_power(world, air->of.position) + world->top * world->top) + world->top);
+    }
+    return reach;
+}
+
+void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float cloud_shade)
+{
+    double to_sun[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
+    (void)nb_vector_make_unit(to_sun);
+    nb_gl_air_set_light(air, program, scene);
+    glUniform3f(glGetUniformLocation(program, "scene_sun"), (float)to_sun[0], (float)to_sun[1], (float)to_sun[2]);
+    glUniform1f(glGetUniformLocation(program, "daylight_reach"), (float)find_reach(air));
+    glUniform1f(glGetUniformLocation(program, "cloud_shade"), cloud_shade);
 }

@@ -19,7 +19,14 @@ const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
 const char nb_air_words_text[] = "uniform highp sampler2D nebel_air_texture;\n"
                                  "highp int air_first = 0;\n" /* of the planet that is asked */
                                  "#define NEBEL_AIR_WORD(i) texelFetch(nebel_air_texture, ivec2((air_first + (i)) & "
-                                 "1023, (air_first + (i)) >> 10), 0)\n";
+                                 "1023, (air_first + (i)) >> 10), 0)\n"
+                                 /* What fog has of the sun, and of the sky of the origin. */
+                                 "#ifdef PASS_DAYLIGHT\n"
+                                 "highp vec3 fog_sun = vec3(1.0), fog_sky = vec3(1.0);\n"
+                                 "#define NEBEL_SUN_PART fog_sun\n"
+                                 "#define NEBEL_SKY_PART fog_sky\n"
+                                 "uniform highp vec3 scene_sun;\n"
+                                 "#endif\n";
 
 const char nb_air_worlds_text[] =
     "uniform ivec3 world_words[SCENE_WORLDS];\n" /* of its table; from there on of light at places, -1: none; has it air? */
@@ -73,118 +80,9 @@ const char nb_air_worlds_text[] =
     "    return all;\n"
     "}\n";
 
-/* Air and fog let through less the farther a ray goes and add light all the way, so that between two places the integral
- * of T_fog dS_air + T_air dS_fog is within what it is with the transmittances of the one place and of the other: the mean
- * is taken, and pieces are shorter where half of the products of differences is more than the tolerance
- * (src/cpu/haze.c). Here they follow each other from where air begins, the first one up to where it begins to count, and
- * the walk through fog goes on from piece to piece: what is in doubt goes with the square of a piece's length, what is
- * wrong with its cube, so that less than a tenth of that is. Before air and behind it is one piece each, without doubt. The
- * last piece is what is left where there are too many, or too many turns of loops. */
-const char nb_air_haze_text[] =
-    "#define PASS_KNOTS 64\n"
-    "struct pass_knot { float at; nebel_light fog; nebel_light air; };\n"
-    /* Goes on with the fog of a ray, up to t. */
-    "nebel_light pass_on(inout nb_progress progress, nebel_sight sight, int entry, float t)\n"
-    "{\n"
-    "    if (!nb_is_ray(sight.origin, sight.direction, t)) return nb_clear();\n"
-    "#ifdef NEBEL_TILES\n"
-    "    nb_media media = nb_media_of(NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1), true);\n"
-    "#else\n"
-    "    nb_media media = nb_media_of(0, int(NEBEL_WORD(0).x), false);\n"
-    "#endif\n"
-    "    progress.stage = NB_STAGE_WALK;\n"
-    "    return nb_trace_further(progress, nb_ray_up_to(sight.origin, sight.direction, t, true), media, true, true);\n"
-    "}\n"
-    "float pass_largest(vec3 v) { return max(v.x, max(v.y, v.z)); }\n"
-    "float pass_doubt(pass_knot a, pass_knot b)\n"
-    "{\n"
-    "    vec3 fog = (a.fog.transmittance - b.fog.transmittance) * (b.air.in_scattering - a.air.in_scattering);\n"
-    "    vec3 air = (a.air.transmittance - b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering);\n"
-    "    return pass_largest(0.5 * (abs(fog) + abs(air)));\n"
-    "}\n"
-    "vec3 pass_piece(pass_knot a, pass_knot b)\n"
-    "{\n"
-    "    return 0.5 * ((a.fog.transmittance + b.fog.transmittance) * (b.air.in_scattering - a.air.in_scattering) +\n"
-    "                  (a.air.transmittance + b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering));\n"
-    "}\n"
-    "nebel_light pass_haze(nebel_sight sight, int entry)\n"
-    "{\n"
-    "    nb_progress progress = nb_open_progress();\n"
-    "    pass_knot from, here;\n"
-    "    float begin, end;\n"
-    "    find_airs(sight.direction, begin, end);\n"
-    "    begin = min(begin, sight.t_max);\n"
-    "    end = min(end, sight.t_max);\n"
-    "    nebel_light air = airs_up_to(end);\n"
-    "    float brightest = pass_largest(air.in_scattering);\n"
-    "    float counts = max(brightest, pass_largest(1.0 - air.transmittance));\n"
-    "    float tolerance = 1e-3 * max(1.0, brightest);\n"
-    "    float way = (end - begin) * clamp(tolerance / max(counts, 1e-6), 1e-6, 0.5);\n"
-    "    from.at = 0.0;\n"
-    "    from.fog = from.air = nb_clear();\n"
-    "    vec3 light = vec3(0.0);\n"
-    "    bool is_last = false;\n"
-    "    for (int i = 0; i < PASS_KNOTS && from.at < sight.t_max && !is_last; i++) {\n"
-    "        nb_progress further = progress;\n"
-    "        is_last = i + 1 == PASS_KNOTS || nb_is_tired(progress.turns);\n"
-    "        here.at = from.at < begin ? begin : from.at < end ? min(from.at + way, end) : sight.t_max;\n"
-    "        if (is_last || !(here.at > from.at)) here.at = sight.t_max;\n"
-    "        here.fog = pass_on(further, sight, entry, here.at);\n"
-    "        here.air = airs_up_to(here.at);\n"
-    "        float doubt = pass_doubt(from, here);\n"
-    "        if (from.at >= begin) way = (here.at - from.at) * clamp(0.9 * sqrt(tolerance / max(doubt, 1e-9)), 0.1, "
-    "4.0);\n"
-    "        progress.turns = further.turns;\n"
-    "        if (doubt <= tolerance || is_last) {\n"
-    "            light += pass_piece(from, here);\n"
-    "            from = here;\n"
-    "            progress = further;\n"
-    "        }\n"
-    "    }\n"
-    "    nebel_light all;\n"
-    "    all.transmittance = from.fog.transmittance * from.air.transmittance;\n"
-    "    all.in_scattering = max(light, 0.0);\n"
-    "    return all;\n"
-    "}\n";
-
-/* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. From
- * on the ground or below it all surfaces are seen before it. */
-const char nb_air_ground_text[] =
-    "layout(location = 0) out highp vec4 out_place;\n"
-    "layout(location = 1) out highp vec4 out_normal;\n"
-    "layout(location = 2) out highp vec4 out_reflectance;\n"
-    "void main()\n"
-    "{\n"
-    "    int world;\n"
-    "    nebel_ground ground = nearest_ground(ray_direction(gl_FragCoord.xy), world);\n"
-    "    if (!(ground.distance < 1e17)) discard;\n"
-    "    out_place = vec4(max(ground.distance, 1e-30), ground.normal);\n"
-    "    out_normal = vec4(ground.normal, 0.0);\n"
-    "    out_reflectance = vec4(world_albedos[world], 1.0);\n"
-    "    gl_FragDepth = ground.distance > 0.0 ? 1.0 / (1.001 + 1.00001 * ground.distance) : 1e-30;\n"
-    "}\n";
-
-/* The disc is darker towards its edge, mu^a (src/cpu/air.c says by whom). Its edge is spread over a pixel, and one of less is
- * widened to that; rings say how much light it would have then. */
-const char nb_air_sun_text[] =
+const char nb_air_places_text[] =
     "uniform float disc_radius;\n" /* radians; 0: there is none */
-    "uniform vec3 disc_light;\n"   /* mean radiance above the air */
     "uniform bool sky_is_ambient;\n"
-    "float pixel_width(vec2 pixel)\n"
-    "{\n"
-    "#ifdef SCENE_PANORAMA\n"
-    "    return 1.5707963267949 * RAY_WORD(1).y;\n"
-    "#else\n"
-    "    return length(RAY_WORD(5)) / length(RAY_WORD(3) + pixel.x * RAY_WORD(4) + pixel.y * RAY_WORD(5));\n"
-    "#endif\n"
-    "}\n"
-    "vec3 disc_at(float radius, float width, float angle)\n"
-    "{\n"
-    "    vec3 powers = vec3(-0.023) + 0.292 / vec3(0.68, 0.55, 0.44);\n"
-    "    float cover = clamp((radius - angle) / width + 0.5, 0.0, 1.0), part = angle / (radius + 0.5 * width);\n"
-    "    float mu = sqrt(max(1.0 - part * part, 1e-12));\n"
-    "    return 0.5 * cover * (powers + 2.0) * pow(vec3(mu), powers);\n"
-    "}\n"
     /* What of the disc another leaves, as base/eclipse.h has it: both count as flat. */
     "float disc_left(float ball, float apart)\n"
     "{\n"
@@ -212,36 +110,6 @@ const char nb_air_sun_text[] =
     "                          atan(length(cross(to_ball, scene_sun)), dot(to_ball, scene_sun)));\n"
     "    }\n"
     "    return left;\n"
-    "}\n"
-    "vec3 sun_disc(vec3 direction, vec2 pixel)\n"
-    "{\n"
-    "    float width = pixel_width(pixel), radius = max(disc_radius, 0.5 * width);\n"
-    "    float angle = length(direction - scene_sun), far = radius + 0.5 * width, ring = far / 32.0;\n"
-    "    int rings = disc_radius > 0.0 && angle < far ? 32 : 0;\n"
-    "    vec3 sum = vec3(0.0);\n"
-    "    for (int i = 0; i < rings; i++) {\n"
-    "        float at = (float(i) + 0.5) * ring;\n"
-    "        sum += 2.0 * at * ring * disc_at(radius, width, at);\n"
-    "    }\n"
-    "    if (rings == 0) return vec3(0.0);\n"
-    "    return disc_light * disc_radius * disc_radius / sum * disc_at(radius, width, angle);\n"
-    "}\n";
-
-const char nb_air_light_text[] =
-    "float sky_left()\n"
-    "{\n"
-    "#ifdef SCENE_CLOUDS\n"
-    "    return texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).a;\n"
-    "#else\n"
-    "    return 1.0;\n"
-    "#endif\n"
-    "}\n"
-    "void light_ground(vec3 direction, vec3 at, inout vec3 light, inout vec3 shining)\n"
-    "{\n"
-    "    int world;\n"
-    "    nebel_ground ground = nearest_ground(direction, world);\n"
-    "    light = 0.31830988618379 * sky_left() * ground.sky;\n"
-    "    shining = 0.31830988618379 * uneclipsed(world, at) * ground.sun;\n"
     "}\n"
     /* The square of the tangent from a place to the ball that ends `above` the ground of a planet. */
     "float world_power(int world, vec3 at, float above)\n"
@@ -284,19 +152,225 @@ const char nb_air_light_text[] =
     "    int at = first + int(NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS) + int(s.x);\n"
     "    return exp(nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, s.y));\n"
     "}\n"
-    /* Models have the sun and the sky of the planet that is nearest by tangents to the balls of air. */
-    "void light_model(vec3 at, inout vec3 light, inout vec3 shining)\n"
+    /* What is left of the sun, and how much brighter the sky is than at the scene's origin: those of the planet that is
+       nearest by tangents to the balls of air. */
+    "void daylight_at(vec3 at, out vec3 sun, out vec3 sky)\n"
     "{\n"
     "    int world = 0;\n"
     "    for (int k = 1; k < SCENE_WORLDS; k++)\n"
     "        if (world_power(k, at, world_sizes[k].y) < world_power(world, at, world_sizes[world].y)) world = k;\n"
     "    int first = world_words[world].y;\n"
-    "    if (sky_is_ambient) light *= sky_left();\n"
+    "    sun = sky = vec3(1.0);\n"
     "    if (first < 0) return;\n"
     "    float radius = world_sizes[world].x, power = world_power(world, at, 0.0);\n"
     "    float rise = dot((radius + world_eyes[world].w) * world_eyes[world].xyz + at, scene_sun);\n"
     "    choose_world(world);\n"
-    "    shining *= uneclipsed(world, at) * daylight_sun(world, first, power, rise);\n"
+    "    sun = uneclipsed(world, at) * daylight_sun(world, first, power, rise);\n"
     "    float far = radius + height_of(radius, power);\n"
-    "    if (sky_is_ambient) light *= daylight_sky(first, far > 0.0 ? clamp(rise / far, -1.0, 1.0) : 1.0);\n"
+    "    if (sky_is_ambient) sky = daylight_sky(first, far > 0.0 ? clamp(rise / far, -1.0, 1.0) : 1.0);\n"
     "}\n";
+
+/* Air and fog let through less the farther a ray goes and add light all the way, so that between two places the integral
+ * of T_fog dS_air + T_air dS_fog is within what it is with the transmittances of the one place and of the other: the mean
+ * is taken, and pieces are shorter where half of the products of differences is more than the tolerance
+ * (src/cpu/haze.c). Here they follow each other from where air begins, the first one up to where it begins to count, and
+ * the walk through fog goes on from piece to piece: what is in doubt goes with the square of a piece's length, what is
+ * wrong with its cube, so that less than a tenth of that is. Before air and behind it is one piece each, without doubt. The
+ * last piece is what is left where there are too many, or too many turns of loops.
+ *
+ * In daylight that changes, fog within a piece has the mean of the sun and of the sky at both of its ends, half of whose difference is
+ * in doubt. From the lowest place of a ray on daylight changes one way, but in shadows of other planets. There may be fog in doubt
+ * outside the air, too; beyond all planets it has the light of both ends of its piece. */
+const char nb_air_pieces_text[] =
+    "#define PASS_KNOTS 64\n"
+    "struct pass_knot { float at; nebel_light fog; nebel_light air; vec3 sun; vec3 sky; };\n" /* the last two: of daylight */
+    /* Goes on with the fog of a ray, up to t. */
+    "nebel_light pass_on(inout nb_progress progress, nebel_sight sight, int entry, float t)\n"
+    "{\n"
+    "    if (!nb_is_ray(sight.origin, sight.direction, t)) return nb_clear();\n"
+    "#ifdef NEBEL_TILES\n"
+    "    nb_media media = nb_media_of(NEBEL_INDEX(entry), NEBEL_INDEX(entry + 1), true);\n"
+    "#else\n"
+    "    nb_media media = nb_media_of(0, int(NEBEL_WORD(0).x), false);\n"
+    "#endif\n"
+    "    progress.stage = NB_STAGE_WALK;\n"
+    "    return nb_trace_further(progress, nb_ray_up_to(sight.origin, sight.direction, t, true), media, true, true);\n"
+    "}\n"
+    "float pass_largest(vec3 v) { return max(v.x, max(v.y, v.z)); }\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "uniform float daylight_reach;\n" /* no planet is farther off */
+    "uniform float cloud_shade;\n"
+    "void pass_set_daylight(inout pass_knot knot, vec3 direction)\n"
+    "{\n"
+    "    daylight_at(knot.at * direction, knot.sun, knot.sky);\n"
+    "    knot.sun *= cloud_shade;\n"
+    "}\n"
+    "float pass_next_lowest(vec3 direction, float after)\n"
+    "{\n"
+    "    float next = 1e18;\n"
+    "    for (int k = 0; k < SCENE_WORLDS; k++) {\n"
+    "        float lowest = -(world_sizes[k].x + world_eyes[k].w) * dot(world_eyes[k].xyz, direction);\n"
+    "        if (lowest > after) next = min(next, lowest);\n"
+    "    }\n"
+    "    return next;\n"
+    "}\n"
+    /* Of light in the mean of what it is at both ends. Of what the sky adds the fog's own light is not told apart. */
+    "vec3 pass_daylight_doubt(pass_knot a, pass_knot b, nb_gathered before, nb_gathered behind)\n"
+    "{\n"
+    "    vec3 of_sun = max(behind.sunlight - before.sunlight, 0.0);\n"
+    "    vec3 of_sky = max(behind.radiance - before.radiance - of_sun, 0.0);\n"
+    "    return 0.5 * (a.air.transmittance + b.air.transmittance) *\n"
+    "           (abs(b.sun - a.sun) / max(a.sun + b.sun, 1e-30) * of_sun +\n"
+    "            abs(b.sky - a.sky) / max(a.sky + b.sky, 1e-30) * of_sky);\n"
+    "}\n"
+    "#endif\n"
+    /* `light`: what is in doubt of the fog's own. */
+    "float pass_doubt(pass_knot a, pass_knot b, vec3 light)\n"
+    "{\n"
+    "    vec3 fog = (a.fog.transmittance - b.fog.transmittance) * (b.air.in_scattering - a.air.in_scattering);\n"
+    "    vec3 air = (a.air.transmittance - b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering);\n"
+    "    return pass_largest(0.5 * (abs(fog) + abs(air)) + light);\n"
+    "}\n"
+    "vec3 pass_piece(pass_knot a, pass_knot b)\n"
+    "{\n"
+    "    return 0.5 * ((a.fog.transmittance + b.fog.transmittance) * (b.air.in_scattering - a.air.in_scattering) +\n"
+    "                  (a.air.transmittance + b.air.transmittance) * (b.fog.in_scattering - a.fog.in_scattering));\n"
+    "}\n";
+
+const char nb_air_haze_text[] =
+    "nebel_light pass_haze(nebel_sight sight, int entry)\n"
+    "{\n"
+    "    nb_progress progress = nb_open_progress();\n"
+    "    pass_knot from, here;\n"
+    "    float begin, end;\n"
+    "    find_airs(sight.direction, begin, end);\n"
+    "    begin = min(begin, sight.t_max);\n"
+    "    end = min(end, sight.t_max);\n"
+    "    nebel_light air = airs_up_to(end);\n"
+    "    float brightest = pass_largest(air.in_scattering);\n"
+    "    float counts = max(brightest, pass_largest(1.0 - air.transmittance));\n"
+    "    float tolerance = 1e-3 * max(1.0, brightest);\n"
+    "    float way = (end - begin) * clamp(tolerance / max(counts, 1e-6), 1e-6, 0.5);\n"
+    "    from.at = 0.0;\n"
+    "    from.fog = from.air = nb_clear();\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "    float reach = min(daylight_reach, sight.t_max);\n"
+    "    pass_set_daylight(from, sight.direction);\n"
+    "#endif\n"
+    "    vec3 light = vec3(0.0);\n"
+    "    bool is_last = false;\n"
+    "    for (int i = 0; i < PASS_KNOTS && from.at < sight.t_max && !is_last; i++) {\n"
+    "        nb_progress further = progress;\n"
+    "        is_last = i + 1 == PASS_KNOTS || nb_is_tired(progress.turns);\n"
+    "        here.at = from.at < begin ? begin : from.at < end ? min(from.at + way, end) : sight.t_max;\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "        here.at = min(here.at, pass_next_lowest(sight.direction, from.at));\n"
+    "#endif\n"
+    "        if (is_last || !(here.at > from.at)) here.at = sight.t_max;\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "        pass_set_daylight(here, sight.direction);\n"
+    "        fog_sun = 0.5 * (from.sun + here.sun);\n"
+    "        fog_sky = 0.5 * (from.sky + here.sky);\n"
+    "#endif\n"
+    "        here.fog = pass_on(further, sight, entry, here.at);\n"
+    "        here.air = airs_up_to(here.at);\n"
+    "        vec3 in_doubt = vec3(0.0);\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "        in_doubt = pass_daylight_doubt(from, here, progress.walked, further.walked);\n"
+    "#endif\n"
+    "        float doubt = pass_doubt(from, here, in_doubt);\n"
+    "        bool is_done = doubt <= tolerance || is_last;\n"
+    "        if (from.at >= begin) way = (here.at - from.at) * clamp(0.9 * sqrt(tolerance / max(doubt, 1e-9)), 0.1, "
+    "4.0);\n"
+    "        progress.turns = further.turns;\n"
+    "#ifdef PASS_DAYLIGHT\n"
+    "        if (!is_done && from.at < begin) begin = from.at;\n"
+    "        if (!is_done && from.at >= end) end = reach;\n"
+    "        is_done = is_done || from.at >= end;\n"
+    "#endif\n"
+    "        if (is_done) {\n"
+    "            light += pass_piece(from, here);\n"
+    "            from = here;\n"
+    "            progress = further;\n"
+    "        }\n"
+    "    }\n"
+    "    nebel_light all;\n"
+    "    all.transmittance = from.fog.transmittance * from.air.transmittance;\n"
+    "    all.in_scattering = max(light, 0.0);\n"
+    "    return all;\n"
+    "}\n";
+
+/* Surfaces on the ground touch it: they are seen where they lie this little behind it, which is more than rounding. From
+ * on the ground or below it all surfaces are seen before it. */
+const char nb_air_ground_text[] =
+    "layout(location = 0) out highp vec4 out_place;\n"
+    "layout(location = 1) out highp vec4 out_normal;\n"
+    "layout(location = 2) out highp vec4 out_reflectance;\n"
+    "void main()\n"
+    "{\n"
+    "    int world;\n"
+    "    nebel_ground ground = nearest_ground(ray_direction(gl_FragCoord.xy), world);\n"
+    "    if (!(ground.distance < 1e17)) discard;\n"
+    "    out_place = vec4(max(ground.distance, 1e-30), ground.normal);\n"
+    "    out_normal = vec4(ground.normal, 0.0);\n"
+    "    out_reflectance = vec4(world_albedos[world], 1.0);\n"
+    "    gl_FragDepth = ground.distance > 0.0 ? 1.0 / (1.001 + 1.00001 * ground.distance) : 1e-30;\n"
+    "}\n";
+
+/* The disc is darker towards its edge, mu^a (src/cpu/air.c says by whom). Its edge is spread over a pixel, and one of less is
+ * widened to that; rings say how much light it would have then. */
+const char nb_air_sun_text[] =
+    "uniform vec3 disc_light;\n" /* mean radiance above the air */
+    "float pixel_width(vec2 pixel)\n"
+    "{\n"
+    "#ifdef SCENE_PANORAMA\n"
+    "    return 1.5707963267949 * RAY_WORD(1).y;\n"
+    "#else\n"
+    "    return length(RAY_WORD(5)) / length(RAY_WORD(3) + pixel.x * RAY_WORD(4) + pixel.y * RAY_WORD(5));\n"
+    "#endif\n"
+    "}\n"
+    "vec3 disc_at(float radius, float width, float angle)\n"
+    "{\n"
+    "    vec3 powers = vec3(-0.023) + 0.292 / vec3(0.68, 0.55, 0.44);\n"
+    "    float cover = clamp((radius - angle) / width + 0.5, 0.0, 1.0), part = angle / (radius + 0.5 * width);\n"
+    "    float mu = sqrt(max(1.0 - part * part, 1e-12));\n"
+    "    return 0.5 * cover * (powers + 2.0) * pow(vec3(mu), powers);\n"
+    "}\n"
+    "vec3 sun_disc(vec3 direction, vec2 pixel)\n"
+    "{\n"
+    "    float width = pixel_width(pixel), radius = max(disc_radius, 0.5 * width);\n"
+    "    float angle = length(direction - scene_sun), far = radius + 0.5 * width, ring = far / 32.0;\n"
+    "    int rings = disc_radius > 0.0 && angle < far ? 32 : 0;\n"
+    "    vec3 sum = vec3(0.0);\n"
+    "    for (int i = 0; i < rings; i++) {\n"
+    "        float at = (float(i) + 0.5) * ring;\n"
+    "        sum += 2.0 * at * ring * disc_at(radius, width, at);\n"
+    "    }\n"
+    "    if (rings == 0) return vec3(0.0);\n"
+    "    return disc_light * disc_radius * disc_radius / sum * disc_at(radius, width, angle);\n"
+    "}\n";
+
+const char nb_air_light_text[] = "float sky_left()\n"
+                                 "{\n"
+                                 "#ifdef SCENE_CLOUDS\n"
+                                 "    return texelFetch(scene_dimming, ivec2(gl_FragCoord.xy), 0).a;\n"
+                                 "#else\n"
+                                 "    return 1.0;\n"
+                                 "#endif\n"
+                                 "}\n"
+                                 "void light_ground(vec3 direction, vec3 at, inout vec3 light, inout vec3 shining)\n"
+                                 "{\n"
+                                 "    int world;\n"
+                                 "    nebel_ground ground = nearest_ground(direction, world);\n"
+                                 "    light = 0.31830988618379 * sky_left() * ground.sky;\n"
+                                 "    shining = 0.31830988618379 * uneclipsed(world, at) * ground.sun;\n"
+                                 "}\n"
+                                 /* Of a white surface, without shadows. */
+                                 "void light_model(vec3 at, inout vec3 light, inout vec3 shining)\n"
+                                 "{\n"
+                                 "    vec3 sun, sky;\n"
+                                 "    daylight_at(at, sun, sky);\n"
+                                 "    shining *= sun;\n"
+                                 "    light *= sky;\n"
+                                 "    if (sky_is_ambient) light *= sky_left();\n"
+                                 "}\n";

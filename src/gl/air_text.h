@@ -12,13 +12,20 @@ extern const char nb_air_words_text[];
 /* Behind it and before the other ones: the air and the ground of all. */
 extern const char nb_air_worlds_text[];
 
+/* Declares daylight_at, the light of the sun and of the sky at a place, as models and fog have it. Behind the way to the sun,
+ * scene_sun. */
+extern const char nb_air_places_text[];
+
+/* Declares what pass_haze does piece by piece. */
+extern const char nb_air_pieces_text[];
+
 /* Declares pass_haze, what fog and air do along a ray. `entry`: of its tile's list, if there are tiles. */
 extern const char nb_air_haze_text[];
 
 /* The ground into the targets of surfaces. */
 extern const char nb_air_ground_text[];
 
-/* Declares sun_disc, and what planets leave of it. Behind the texts of rays and of the sun. */
+/* Declares sun_disc. Behind the texts of rays, of the sun and of places. */
 extern const char nb_air_sun_text[];
 
 /* Declares light_ground, which says what a white ground reflects of the sky and, where it faces it, of the sun; and light_model,

@@ -24,7 +24,16 @@ static nebel_result set_method(frame *f)
 static int find_shafts(frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    return f->casts && r->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(r->fog, &f->sunlit);
+    return f->casts && r->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(f->fog, &f->sunlit);
+}
+
+static nebel_result set_fog(frame *f)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const nebel_result result = nb_gl_daylit_fog_set(&r->daylit, &r->log, r->scene, r->fog);
+    f->fog = r->daylit.lit != NULL ? r->daylit.lit : r->fog;
+    f->cloud_shade = 1;
+    return result;
 }
 
 static nebel_result set_frame(frame *f)
@@ -36,6 +45,7 @@ static nebel_result set_frame(frame *f)
     if (result == NEBEL_OK) result = set_method(f);
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
+    if (result == NEBEL_OK) result = set_fog(f);
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
@@ -161,8 +171,8 @@ static void clear_fog(void)
 static nebel_result set_eye_fog(const frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
-    return f->panorama ? nb_gl_set_fog_around(r->eye_fog, r->fog, f->eye, f->view.width, f->view.height)
-                       : nebel_gl_set_fog(r->eye_fog, r->fog, &f->view);
+    return f->panorama ? nb_gl_set_fog_around(r->eye_fog, f->fog, f->eye, f->view.width, f->view.height)
+                       : nebel_gl_set_fog(r->eye_fog, f->fog, &f->view);
 }
 
 static void set_factor_numbers(const frame *f, unsigned program)
@@ -248,6 +258,8 @@ static nebel_result draw_exact_fog(const frame *f)
                              .height = f->view.height,
                              .panorama = f->panorama,
                              .air = f->planet != NULL ? &r->air : NULL,
+                             .daylight = r->daylit.lit != NULL ? r->scene : NULL,
+                             .cloud_shade = f->cloud_shade,
                              .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
@@ -473,11 +485,12 @@ static nebel_result draw_dimming(const frame *f)
 static nebel_result prepare_air(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
+    const int is_lit = r->scene->has_sun && (r->scene->mesh_count > 0 || r->daylit.lit != NULL);
     const int ends =
         r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0);
     if (f->planet == NULL) return NEBEL_OK;
     glActiveTexture(GL_TEXTURE0 + NB_UNIT_AIR);
-    nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends);
+    nebel_result result = nb_gl_air_set(&r->air, &r->allocator, &r->log, &r->context, r->scene, f->eye, ends, is_lit);
     glActiveTexture(GL_TEXTURE0);
     return result == NEBEL_OK ? nb_shading_make_ground(&r->shading, &r->context, &r->log, f->panorama, r->air.count)
                               : result;

@@ -17,6 +17,8 @@ typedef struct nb_gl_frame {
     const nebel_planet *planet; /* with air; NULL: none */
     const nebel_layers *layers; /* a planet of them; NULL: none */
     const nebel_clouds *clouds; /* with volume, in that air; NULL: none */
+    nebel_snapshot *fog;        /* the renderer's, or that in the sun above the air; NULL: none */
+    float cloud_shade;          /* part of that sun that clouds leave to it */
     unsigned place, depth;      /* where rays end now: as those of the targets */
     nb_method method;
     nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */

@@ -138,6 +138,17 @@ static nebel_result find_all_fog(nb_gl_frame *f, const nb_cloud_picture *picture
     return result;
 }
 
+/* All fog has that of the origin, as wide as nebel_find_scene_sunlight takes it. */
+static nebel_result find_shade(nb_gl_frame *f)
+{
+    enum { WIDE = 200 };
+    static const double origin[1][3] = {{0, 0, 0}};
+    const nebel_gl_renderer *const r = f->renderer;
+    return r->daylit.lit == NULL
+               ? NEBEL_OK
+               : nebel_shade_clouds(r->clouds.parts[0].workspace, WIDE, 1, origin, 0, &f->cloud_shade);
+}
+
 nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
@@ -147,6 +158,7 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
     nebel_result result = nb_gl_clouds_set(&r->clouds, f->clouds, &sun, f->desc->time, log_of(f));
     if (result != NEBEL_OK) return fail_memory(f, result);
     result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count);
+    if (result == NEBEL_OK) result = find_shade(f);
     if (result == NEBEL_OK && has_fog(f)) result = find_all_fog(f, &picture);
     if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, has_fog(f));
     return fail_memory(f, result);

@@ -257,6 +257,8 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     if (t->pass->samples > 1) set_samples(t, target_framebuffer);
     if (t->picture->shade.set != NULL) t->picture->shade.set(t->picture->shade.of, p->name);
     if (t->picture->air != NULL) nb_gl_air_set_worlds(t->picture->air, p->name);
+    if (t->picture->daylight != NULL)
+        nb_gl_air_set_daylight(t->picture->air, p->name, t->picture->daylight, t->picture->cloud_shade);
     if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
 }
 
@@ -379,6 +381,7 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .shafts = t->picture->shafts != NULL,
                                   .step = in_steps,
                                   .air = t->picture->air != NULL ? t->picture->air->count : 0,
+                                  .daylit = t->picture->daylight != NULL,
                                   .features = gl->fog.features,
                                   .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =

@@ -118,6 +118,7 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
     nebel_release_snapshot(r->cloud);
     nebel_release_snapshot(r->environment.of);
     nebel_release_snapshot(r->fog);
+    nb_gl_daylit_fog_release(&r->daylit);
     nb_release(&r->allocator, r->shading.lights);
     nb_release(&r->allocator, r->shadows.blocks);
     nb_lamps_release(&r->allocator, &r->lamps);

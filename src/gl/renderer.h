@@ -5,6 +5,7 @@
 #include "air.h"
 #include "camera.h"
 #include "clouds.h"
+#include "daylit_fog.h"
 #include "environment.h"
 #include "lamps.h"
 #include "meshes.h"
@@ -21,6 +22,7 @@ struct nebel_gl_renderer {
     nebel_log log;
     const nebel_scene_data *scene;
     nebel_snapshot *fog; /* NULL: none */
+    nb_gl_daylit_fog daylit;
     nb_context context;
     unsigned vertex_array; /* without attributes */
     nebel_gl *eye_fog;     /* as the eye sees it */

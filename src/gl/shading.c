@@ -735,9 +735,9 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const nb_texts light = {
         {head, kind->air ? nb_air_words_text : "", kind->has_fog || kind->environment || kind->air ? fog : "",
          nb_words_text, ray, shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-         kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "", kind->air ? nb_air_sun_text : "",
-         kind->air ? nb_air_light_text : "", nb_veil_text, light_text},
-        14};
+         kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "", kind->air ? nb_air_places_text : "",
+         kind->air ? nb_air_sun_text : "", kind->air ? nb_air_light_text : "", nb_veil_text, light_text},
+        15};
     const nb_texts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
     const nb_texts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,

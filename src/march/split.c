@@ -93,6 +93,13 @@ nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *
     return result;
 }
 
+nebel_result nebel_relight(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_snapshot **lit)
+{
+    if (lit != NULL) *lit = NULL;
+    if (snapshot == NULL || sun == NULL || lit == NULL) return NEBEL_ERROR_ARGUMENT;
+    return make_part(snapshot, (selection){.sun = sun, .sky = 1, .own = 1}, lit);
+}
+
 void nebel_release_split_light(nebel_split_fog *split)
 {
     nebel_release_snapshot(split->sun);

@@ -153,13 +153,18 @@ nb_vec3 nebel_environment_reflected(nb_vec3 normal)
 
 /* ---- media ----------------------------------------------------------------------------------- */
 
+/* As many times as bright is ambient light of a direction, all along the ray that is asked. */
+#ifndef NEBEL_SKY_PART
+#define NEBEL_SKY_PART nb_splat3(1.0)
+#endif
+
 /* Radiance of a medium's opaque fog along rays of a direction, without the light of sun and lamps. */
 nb_vec3 nb_opaque_radiance(int medium, nb_vec3 direction)
 {
     nb_vec3 radiance = NEBEL_WORD(medium + 2).xyz;
     if (NB_HAS(NB_HAS_ENVIRONMENT)) {
         int table = int(NEBEL_WORD(medium + NB_MEDIUM_FILTER).w);
-        if (table > 0) radiance *= nb_environment_scattered(table, direction);
+        if (table > 0) radiance *= NEBEL_SKY_PART * nb_environment_scattered(table, direction);
     }
     return radiance;
 }

@@ -10,6 +10,11 @@
 #define NEBEL_SUN_LIT(origin, direction, t, end) nb_vec2(1.0, end)
 #endif
 
+/* As many times as bright is the sun; it is the same all along the ray that is asked. environment.glsl has NEBEL_SKY_PART. */
+#ifndef NEBEL_SUN_PART
+#define NEBEL_SUN_PART nb_splat3(1.0)
+#endif
+
 nb_vec3 nb_to_sun() { return NEBEL_WORD(NB_HEADER_SUN).xyz; }
 
 /* Whether the sun lights any fog. */
@@ -25,7 +30,7 @@ nb_vec3 nb_sunlit_radiance(int medium, nb_vec3 direction)
     nb_vec3 radiance = nb_splat3(0.0);
     if (scattering > 0) {
         float phase = nb_scattered(scattering, direction, nb_to_sun());
-        radiance = NEBEL_WORD(scattering).xyz * NEBEL_WORD(NB_HEADER_SUN + 1).xyz * phase;
+        radiance = NEBEL_WORD(scattering).xyz * NEBEL_WORD(NB_HEADER_SUN + 1).xyz * NEBEL_SUN_PART * phase;
     }
     return radiance;
 }
