@@ -13,6 +13,10 @@
 
 #include "shader_help.h"
 
+/* All that NEBEL_FEATURES may name but what lights fog and voxels, which take drivers most of a minute to compile: the random
+ * fog here has none of them. The whole text is tried once in each language. */
+#define UNLIT "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 17301503\n"
+
 /* ---- random scenes --------------------------------------------------------------------------- */
 
 static nebel_snapshot *commit_random_fog(random_fog_kind kind, uint64_t seed)
@@ -35,7 +39,7 @@ static void test_soft_edges_in_haze(void **unused)
 {
     (void)unused;
     tracer t;
-    open_tracer(&t, NB_GL_300ES, BLOCK, "", trace_body);
+    open_tracer(&t, NB_GL_300ES, BLOCK, UNLIT, trace_body);
     for (uint64_t seed = 0; seed < 60; seed++) {
         random_fog_make(&fog, RANDOM_FOG_OVERLAP, seed);
         fog.count = 2;
@@ -63,8 +67,8 @@ static void test_priorities_among_many(void **unused)
 {
     (void)unused;
     for (int slots = 8; slots <= 32; slots *= 4) {
-        char defines[64];
-        snprintf(defines, sizeof defines, "#define NEBEL_SLOTS %d\n", slots);
+        char defines[128];
+        snprintf(defines, sizeof defines, UNLIT "#define NEBEL_SLOTS %d\n", slots);
         tracer t;
         open_tracer(&t, NB_GL_330, TEXTURE, defines, trace_body);
         for (uint64_t seed = 0; seed < 8; seed++) {
@@ -82,7 +86,7 @@ static void test_rays_to_a_light_know_no_distances(void **unused)
 {
     (void)unused;
     tracer t;
-    open_tracer(&t, NB_GL_300ES, TEXTURE, "",
+    open_tracer(&t, NB_GL_300ES, TEXTURE, UNLIT,
                 "out0 = vec4(nebel_transmit_light(in0.xyz, in1.xyz, in0.w), 0.0); out1 = vec4(0.0);\n");
     const nebel_trace_desc desc = {.tolerance = 1e-5, .ignore_distances = 1, .transmittance_only = 1};
     for (uint64_t seed = 1; seed < 12; seed += 2) {
@@ -109,10 +113,10 @@ static void try_hostile(tracer *t, random_fog_kind kind, uint64_t seed)
     nebel_release_snapshot(snapshot);
 }
 
-static void try_language(nb_gl_language language, word_store store, int seeds)
+static void try_language(nb_gl_language language, word_store store, const char *defines, int seeds)
 {
     tracer t;
-    open_tracer(&t, language, store, "", trace_body);
+    open_tracer(&t, language, store, defines, trace_body);
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++)
         for (int seed = 0; seed < seeds; seed++) {
             try_camera(&t, (random_fog_kind)kind, (uint64_t)seed);
@@ -124,25 +128,25 @@ static void try_language(nb_gl_language language, word_store store, int seeds)
 static void test_330_texture(void **state)
 {
     (void)state;
-    try_language(NB_GL_330, TEXTURE, 5);
+    try_language(NB_GL_330, TEXTURE, "", 5);
 }
 
 static void test_330_block(void **state)
 {
     (void)state;
-    try_language(NB_GL_330, BLOCK, 1);
+    try_language(NB_GL_330, BLOCK, UNLIT, 1);
 }
 
 static void test_300_es_texture(void **state)
 {
     (void)state;
-    try_language(NB_GL_300ES, TEXTURE, 1);
+    try_language(NB_GL_300ES, TEXTURE, UNLIT, 1);
 }
 
 static void test_300_es_block(void **state)
 {
     (void)state;
-    try_language(NB_GL_300ES, BLOCK, 1);
+    try_language(NB_GL_300ES, BLOCK, "", 1);
 }
 
 /* ---- sunlight -------------------------------------------------------------------------------- */
@@ -499,7 +503,7 @@ static void test_block_layout(void **state)
     (void)state;
     for (int language = NB_GL_330; language <= NB_GL_300ES; language++) {
         tracer t;
-        open_tracer(&t, (nb_gl_language)language, BLOCK, "", trace_body);
+        open_tracer(&t, (nb_gl_language)language, BLOCK, UNLIT, trace_body);
         const char *name = "nebel_words";
         GLuint index, block = glGetUniformBlockIndex(t.program, "nebel_fog_block");
         GLint offset, stride, type, length, size;
