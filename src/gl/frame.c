@@ -23,8 +23,7 @@ static nebel_result set_method(frame *f)
 /* Whether models shade fog: that of the pass, or before particles. */
 static int find_shafts(frame *f)
 {
-    const nebel_gl_renderer *const r = f->renderer;
-    return f->casts && r->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(f->fog, &f->sunlit);
+    return f->casts && f->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(f->fog, &f->sunlit);
 }
 
 static nebel_result set_fog(frame *f)
@@ -46,6 +45,7 @@ static nebel_result set_frame(frame *f)
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
     if (result == NEBEL_OK) result = set_fog(f);
+    if (result != NEBEL_OK) return result;
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
@@ -53,7 +53,7 @@ static nebel_result set_frame(frame *f)
     f->planet = nb_gl_air_planet(r->scene);
     f->layers = nb_gl_shells_planet(r->scene);
     f->clouds = f->planet != NULL ? f->planet->clouds : NULL;
-    return result;
+    return NEBEL_OK;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
