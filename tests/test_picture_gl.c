@@ -115,8 +115,9 @@ static void check_panorama(const nebel_scene *scene, const char *name)
     picture_free(&pair);
 }
 
-/* Models and voxels that are made or installed, not kept, may be missing. */
-static int try_demo(const char *path)
+/* Models and voxels that are made or installed, not kept, may be missing. Every other scene is seen all around, too, for
+ * which the driver compiles everything anew. */
+static int try_demo(const char *path, int number)
 {
     nebel_scene *scene = NULL;
     const char *const name = strrchr(path, '/') + 1;
@@ -134,7 +135,7 @@ static int try_demo(const char *path)
     }
     if (models == NEBEL_OK) {
         check_demo(scene, name);
-        check_panorama(scene, name);
+        if (number % 2 == 0) check_panorama(scene, name);
     } else {
         print_message("%s: left out: %s\n", name, nebel_result_text(models));
     }
@@ -148,7 +149,7 @@ static void test_demo_scenes(void **state)
     glob_t paths;
     int count = 0;
     assert_int_equal(glob(NEBEL_SOURCE "/examples/scenes/*.json", 0, NULL, &paths), 0);
-    for (size_t i = 0; i < paths.gl_pathc; i++) count += try_demo(paths.gl_pathv[i]);
+    for (size_t i = 0; i < paths.gl_pathc; i++) count += try_demo(paths.gl_pathv[i], count);
     globfree(&paths);
     assert_true(count >= 3);
 }
