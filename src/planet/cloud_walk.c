@@ -250,6 +250,15 @@ static double skip(const nb_walk *walk, int k, double t, double end, double long
     return end;
 }
 
+/* What Simpson's rule may miss of a piece's extinction, times six by its length. Where cloud begins or ends within the piece three
+ * values may lie on a line by chance, and a wisp would be drawn along all places where they do. */
+static double curve_of(const nb_cloud_seen *here, const nb_cloud_seen *middle, const nb_cloud_seen *far)
+{
+    const double a = (double)here->whole, b = (double)middle->whole, c = (double)far->whole;
+    const double curve = fabs(a - 2 * b + c);
+    return a > 0 && b > 0 && c > 0 ? curve : fmax(curve, fmax(a, fmax(b, c)));
+}
+
 /* A piece of a ray in one layer; layers do not overlap. */
 static void walk_layer(nb_walk *walk, int k, double begin, double end)
 {
@@ -270,7 +279,7 @@ static void walk_layer(nb_walk *walk, int k, double begin, double end)
         const double depth_apart = length / 6 * (double)(here.apart + 4 * middle.apart + far.apart);
         const double seen = nb_exp(-walk->depth);
         const double least = nb_max(nb_min(0.25 * walk->spread * t, STAY_PIECE * whole), 1e-3 * walk->least);
-        const double missed = seen * length / 6 * fabs((double)(here.whole - 2 * middle.whole + far.whole));
+        const double missed = seen * length / 6 * curve_of(&here, &middle, &far);
         has_far = 1;
         if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + seen)) && length > 2 * least) {
             length *= 0.5;
