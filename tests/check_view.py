@@ -365,6 +365,7 @@ class PlanetTest(FilmTest):
         first = self.assert_frame(viewer, 0, "cpu", BOTH_DRAW)
         viewer.type("frame", "9")
         self.assertFalse(self.same(self.assert_frame(viewer, 9, "cpu", BOTH_DRAW), first, 0.02), "another shadow")
+        self.assert_frame(viewer, 9, "gl", BOTH_DRAW)
         viewer.end()
 
     def test_a_planet_of_layers_turns(self):

@@ -57,7 +57,6 @@ static void render_cpu(const nebel_scene_data *scene, nebel_snapshot *fog, const
     nebel_renderer *renderer = NULL;
     const nebel_renderer_desc desc = {.log = {write_message, NULL}};
     const nebel_frame_desc frame = {.camera = *camera,
-                                    .even_shade = 1,
                                     .width = pair->width,
                                     .height = pair->height,
                                     .samples = samples,

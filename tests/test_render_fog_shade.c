@@ -94,17 +94,25 @@ static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume,
     return snapshot;
 }
 
-static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, int threads, int is_even)
+static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, int threads)
 {
     nebel_renderer *renderer;
     const test_picture picture = test_picture_make(WIDTH, HEIGHT);
-    const nebel_frame_desc desc = {
-        .camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .even_shade = is_even};
+    const nebel_frame_desc desc = {.camera = *camera, .width = WIDTH, .height = HEIGHT, .samples = 1};
     assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = threads}, &renderer),
                      NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture.planes), NEBEL_OK);
     nebel_destroy_renderer(renderer);
     return picture;
+}
+
+/* All fog in the light that it was made with, which is the origin's. */
+static test_picture render_evenly(const world *w, nebel_snapshot *fog, const nebel_camera *camera)
+{
+    world clear = *w;
+    clear.planet.clouds = NULL;
+    clear.scene.planets = &clear.planet;
+    return render(&clear, fog, camera, 2);
 }
 
 /* Of a ray of unit length from above it. */
@@ -155,7 +163,7 @@ static off compare(const world *w, const nebel_volume_desc *mist, const nebel_ca
     static const double origin[3] = {0, 0, 0};
     nebel_snapshot *const fog = make_fog(w, mist, sun_at(w, origin), sky_at(w, origin));
     nebel_snapshot *const by_sun = make_fog(w, mist, 1, 0), *const by_sky = make_fog(w, mist, 0, 1);
-    test_picture picture = render(w, fog, camera, 2, 0), even = render(w, fog, camera, 2, 1);
+    test_picture picture = render(w, fog, camera, 2), even = render_evenly(w, fog, camera);
     off is = {.beyond = -1};
     for (uint32_t i = 5; i < WIDTH * HEIGHT; i += 7) {
         nebel_ray ray = planet_ray(camera, pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
@@ -272,7 +280,7 @@ static void threads_change_nothing(void **state)
         .albedo = {.97, .97, .97}};
     nebel_snapshot *const fog = make_fog(&w, &mist, 1, 1);
     const nebel_camera camera = planet_camera(500, -.3);
-    test_picture one = render(&w, fog, &camera, 1, 0), three = render(&w, fog, &camera, 3, 0);
+    test_picture one = render(&w, fog, &camera, 1), three = render(&w, fog, &camera, 3);
     assert_memory_equal(one.planes.color, three.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
     assert_memory_equal(one.planes.error, three.planes.error, (size_t)WIDTH * HEIGHT * sizeof(float));
     test_picture_free(&one);
@@ -294,9 +302,9 @@ static void clear_places_stay_as_they_are(void **state)
                                     .albedo = {.97, .97, .97}};
     nebel_snapshot *const fog = make_fog(&w, &bank, 1, 1);
     const nebel_camera camera = planet_camera(500, -.3);
-    test_picture with = render(&w, fog, &camera, 2, 0);
+    test_picture with = render(&w, fog, &camera, 2);
     w.planet.clouds = NULL;
-    test_picture without = render(&w, fog, &camera, 2, 0);
+    test_picture without = render(&w, fog, &camera, 2);
     assert_memory_equal(with.planes.color, without.planes.color, (size_t)WIDTH * HEIGHT * 3 * sizeof(float));
     test_picture_free(&with);
     test_picture_free(&without);

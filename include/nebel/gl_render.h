@@ -22,7 +22,7 @@
  * surfaces of which a part is seen: each costs the fog and the particles of a frame once more.
  *
  * Contexts, threads and errors as in nebel/gl.h. Every function leaves the state of the context as it found it; beside
- * what nebel/gl.h lists it changes, while it runs, texture units 7 to 15, and TEXTURE_2D_ARRAY of units 10, 12 and 14; both
+ * what nebel/gl.h lists it changes, while it runs, texture units 7 to 15, and TEXTURE_2D_ARRAY of units 10, 11, 12 and 14; both
  * framebuffers; the bindings ARRAY_BUFFER and PIXEL_PACK_BUFFER; the parameters PACK_*; CLAMP_READ_COLOR; the depth
  * function, mask and range; POLYGON_OFFSET_FILL, PRIMITIVE_RESTART_FIXED_INDEX, DEPTH_CLAMP, the provoking vertex and
  * the clip control, where they exist. Conditional rendering must not be under way: pictures would be missing within a

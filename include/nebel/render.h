@@ -113,7 +113,6 @@ typedef struct nebel_frame_desc {
     uint32_t bounces, seed;
     double
         time; /* of a planet of layers, whose balls turn: within 1e12, in the unit of its days, which is frames in scenes */
-    int even_shade; /* nonzero: all fog on planets has the shade of clouds that the origin has, as in OpenGL */
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not

@@ -3,6 +3,7 @@
 #define NB_WORLDS_H
 
 #include "daylight.h"
+#include "eclipse.h"
 #include "vector.h"
 
 #include <nebel/scene.h>
@@ -57,6 +58,31 @@ static inline int nb_worlds_nearest(const nb_world *worlds, int count, const dou
     for (int k = 1; k < count; k++)
         if (nb_world_power(&worlds[k], place) < nb_world_power(&worlds[nearest], place)) nearest = k;
     return nearest;
+}
+
+/* What other planets than `world` leave of the sun's disc; `to_sun` and `sun` as of nb_eclipse_left. */
+static inline double nb_worlds_uneclipsed(const nb_world *worlds, int count, int world, const double place[3],
+                                          const double to_sun[3], double sun)
+{
+    double left = 1;
+    for (int k = 0; k < count; k++)
+        if (k != world) left *= nb_eclipse_left(place, worlds[k].center, worlds[k].radius, to_sun, sun);
+    return left;
+}
+
+/* The light at a place, of a sun of irradiance 1. */
+static inline nebel_air_light nb_worlds_light(const nb_world *worlds, int count, const double place[3],
+                                              const double to_sun[3], double disc)
+{
+    const int nearest = nb_worlds_nearest(worlds, count, place);
+    const nebel_sun sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
+    nebel_air_light light;
+    /* Places and suns are in order, so that it cannot fail. */
+    memset(&light, 0, sizeof light);
+    (void)nebel_light_air(worlds[nearest].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0, &light, 0);
+    const double left = nb_worlds_uneclipsed(worlds, count, nearest, place, to_sun, disc);
+    for (int c = 0; c < 3; c++) light.sun[c] *= left;
+    return light;
 }
 
 /* ---- their air ------------------------------------------------------------------------------- */

@@ -2,8 +2,6 @@
 
 #include "daylight.h"
 
-#include "base/eclipse.h"
-
 #include <nebel/render.h>
 
 #include <math.h>
@@ -83,14 +81,9 @@ nebel_result nb_air_trace(const nb_air *air, size_t n, const double *const direc
     return nb_worlds_trace(air->worlds, air->count, n, direction, t_max, lights);
 }
 
-/* What other planets leave of the sun's disc. */
 static double uneclipsed(const nb_air *air, int world, const double place[3])
 {
-    double left = 1;
-    for (int k = 0; k < air->count; k++)
-        if (k != world)
-            left *= nb_eclipse_left(place, air->worlds[k].center, air->worlds[k].radius, air->to_sun, air->sun_radius);
-    return left;
+    return nb_worlds_uneclipsed(air->worlds, air->count, world, place, air->to_sun, air->sun_radius);
 }
 
 /* ---- the ground ------------------------------------------------------------------------------ */
@@ -197,15 +190,7 @@ void nb_air_light_at(const nb_air *air, const double place[3], double sun[3], do
 
 nebel_air_light nb_air_ask(const nb_air *air, const double place[3])
 {
-    const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
-    const nebel_sun sun = {.direction = {air->to_sun[0], air->to_sun[1], air->to_sun[2]}, .irradiance = {1, 1, 1}};
-    nebel_air_light light;
-    /* Places and suns are in order, so that it cannot fail. */
-    memset(&light, 0, sizeof light);
-    (void)nebel_light_air(air->worlds[nearest].planet->atmosphere, &sun, 1, (const double(*)[3])place, 0, &light, 0);
-    const double left = uneclipsed(air, nearest, place);
-    for (int c = 0; c < 3; c++) light.sun[c] *= left;
-    return light;
+    return nb_worlds_light(air->worlds, air->count, place, air->to_sun, air->sun_radius);
 }
 
 void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hits *hits, const nb_points *points,

@@ -5,10 +5,10 @@
 #include "hits.h"
 #include "surface.h"
 
+#include "base/fog_shade.h"
 #include "base/lighting.h"
 #include "base/worlds.h"
 
-#include <nebel/clouds.h>
 #include <nebel/scene.h>
 
 /* Of hits: the ground of a planet, which belongs to no mesh. */
@@ -32,18 +32,8 @@ typedef struct nb_air {
     int is_fog_even;     /* daylight is the same all over it: that at the eye, below */
     float cloud_shade;   /* part of the sun that clouds leave to fog */
     double sun_at_eye[3], sky_at_eye[3];
-    int is_fog_shaded;             /* by clouds and by its place; cloud_shade is then 1 */
-    float per_origin_sky;          /* of what clouds leave of the sky at the origin, one over that */
-    double fog_min[3], fog_max[3]; /* of fog that is so shaded */
+    nb_fog_roof roof; /* of fog that clouds shade by its place; cloud_shade is then 1 */
 } nb_air;
-
-/* What clouds leave along a ray, in parts: of the sun, and of the sky as of that which fog has at the origin. */
-typedef struct nb_fog_shade {
-    int is_found;
-    nebel_fog_shade pieces;
-    float end;       /* m, no fog is beyond */
-    float clear_sky; /* over clouds */
-} nb_fog_shade;
 
 /* Between two places of a ray, of fog that is spread evenly: what there is of the sun and of the sky; by how much either may be
  * off wherever the fog is; and by how much within pieces, which no cut mends. */

@@ -51,7 +51,7 @@ static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
     enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     *part = 1;
-    if (frame->cloud_view == NULL || frame->air.is_fog_shaded) return NEBEL_OK;
+    if (frame->cloud_view == NULL || frame->air.roof.is_shaded) return NEBEL_OK;
     return nebel_shade_clouds(frame->renderer->scratch[0].clouds.workspace, WIDE, 1, origin, 0, part);
 }
 
@@ -76,7 +76,7 @@ static void set_even_light(nb_air *air, const double place[3], nebel_sun *sun)
     }
 }
 
-nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc)
+nebel_result nb_daylit_fog_set(nb_frame *frame)
 {
     nb_air *air = &frame->air;
     const nebel_renderer *renderer = frame->renderer;
@@ -86,8 +86,8 @@ nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc)
     if (!air->has_fog || !scene->has_sun) return NEBEL_OK;
     const int is_far =
         nebel_snapshot_scattering_fog(renderer->fog, min, max) && !nb_daylight_is_near(&scene->planets[0], min, max);
-    nebel_result result = desc->even_shade ? NEBEL_OK : nb_fog_shade_set(frame);
-    if (result != NEBEL_OK || !(is_far || air->is_fog_shaded)) return result;
+    nebel_result result = nb_fog_shade_set(frame);
+    if (result != NEBEL_OK || !(is_far || air->roof.is_shaded)) return result;
     memcpy(sun.direction, scene->sun_direction, sizeof sun.direction);
     memcpy(sun.irradiance, scene->sun_irradiance, sizeof sun.irradiance);
     if (is_far) find_middle(min, max, middle);

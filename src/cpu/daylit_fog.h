@@ -6,7 +6,7 @@
 
 /* Splits the light of the frame's fog where it needs that, once air and clouds are set. Errors: MEMORY, and those of
  * nebel_split_light. */
-nebel_result nb_daylit_fog_set(nb_frame *frame, const nebel_frame_desc *desc);
+nebel_result nb_daylit_fog_set(nb_frame *frame);
 
 static inline int nb_daylit_fog_is(const nb_air *air)
 {

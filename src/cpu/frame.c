@@ -118,7 +118,7 @@ static nebel_result set_frame(nb_frame *frame, const nebel_frame_desc *desc)
     result = nb_reference_set(frame, desc);
     if (result == NEBEL_OK) result = set_air(frame, desc);
     if (result == NEBEL_OK) result = nb_cloudscape_set(frame, desc);
-    if (result == NEBEL_OK) result = nb_daylit_fog_set(frame, desc);
+    if (result == NEBEL_OK) result = nb_daylit_fog_set(frame);
     if (result == NEBEL_OK) result = set_shafts(frame);
     return result == NEBEL_OK ? nb_shells_set(frame, desc) : result;
 }

@@ -28,7 +28,7 @@ static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lan
     if (place < 0) return start_of(air);
     const nb_air_knots *knots = &scratch->knots[scratch->order[lane][place]];
     nb_knot knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}};
-    if (air->is_fog_shaded) knot.shade = knots->shade[lane];
+    if (air->roof.is_shaded) knot.shade = knots->shade[lane];
     for (int c = 0; c < 3; c++) {
         knot.fog_left[c] = knots->fog_left[c][lane];
         knot.fog_light[c] = knots->fog_light[c][lane];
@@ -161,7 +161,7 @@ static void insert(const nb_air *air, nb_air_scratch *scratch, int lane, int pla
     memmove(order + place + 1, order + place, (size_t)(scratch->count[lane] - place));
     order[place] = (uint8_t)knot;
     scratch->count[lane]++;
-    for (int i = place; i < place + 2 && air->is_fog_shaded; i++) shade_piece(scratch, lane, i);
+    for (int i = place; i < place + 2 && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
 }
 
 /* By clouds. */
@@ -307,8 +307,8 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
         return result;
     }
     if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, first);
-    if (result == NEBEL_OK && frame->air.is_fog_shaded) result = nb_fog_shade_find(frame, scratch);
-    for (int i = 0; i < NB_BATCH && frame->air.is_fog_shaded; i++) shade_piece(&scratch->air, i, 0);
+    if (result == NEBEL_OK && frame->air.roof.is_shaded) result = nb_fog_shade_find(frame, scratch);
+    for (int i = 0; i < NB_BATCH && frame->air.roof.is_shaded; i++) shade_piece(&scratch->air, i, 0);
     for (int k = 1; k < NB_AIR_KNOTS && result == NEBEL_OK && choose(frame, scratch, k); k++)
         result = trace_knot(frame, fog, trace, scratch, &scratch->air.knots[k]);
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(&frame->air, scratch, i);

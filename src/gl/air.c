@@ -14,6 +14,11 @@ const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
     return scene->planet_count > 0 && scene->planets[0].atmosphere != NULL ? &scene->planets[0] : NULL;
 }
 
+int nb_gl_air_owns_ambient(const nebel_scene_data *scene)
+{
+    return scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
+}
+
 /* ---- the tables ------------------------------------------------------------------------------ */
 
 nebel_sun nb_gl_air_sun(const nebel_scene_data *scene)
@@ -219,13 +224,12 @@ void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program)
 void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene)
 {
     const double radius = scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (pi / 180) : 0;
-    const int owns_ambient = scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
     float light[3] = {0, 0, 0};
     for (int c = 0; c < 3 && radius > 0; c++) light[c] = (float)(scene->sun_irradiance[c] / (pi * pow(sin(radius), 2)));
     nb_gl_air_set_worlds(air, program);
     glUniform1f(glGetUniformLocation(program, "disc_radius"), (float)radius);
     glUniform3fv(glGetUniformLocation(program, "disc_light"), 1, light);
-    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), owns_ambient);
+    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), nb_gl_air_owns_ambient(scene));
 }
 
 /* No air of any planet is farther from the eye. */
@@ -239,12 +243,17 @@ static double find_reach(const nb_gl_air *air)
     return reach;
 }
 
-void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float cloud_shade)
+void nb_gl_air_set_reach(const nb_gl_air *air, unsigned program)
+{
+    glUniform1f(glGetUniformLocation(program, "daylight_reach"), (float)find_reach(air));
+}
+
+void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float even_shade)
 {
     double to_sun[3] = {scene->sun_direction[0], scene->sun_direction[1], scene->sun_direction[2]};
     (void)nb_vector_make_unit(to_sun);
     nb_gl_air_set_light(air, program, scene);
     glUniform3f(glGetUniformLocation(program, "scene_sun"), (float)to_sun[0], (float)to_sun[1], (float)to_sun[2]);
-    glUniform1f(glGetUniformLocation(program, "daylight_reach"), (float)find_reach(air));
-    glUniform1f(glGetUniformLocation(program, "cloud_shade"), cloud_shade);
+    nb_gl_air_set_reach(air, program);
+    glUniform1f(glGetUniformLocation(program, "even_shade"), even_shade);
 }

@@ -26,6 +26,9 @@ const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene);
 /* The sun of a scene; where there is none one of no light. */
 nebel_sun nb_gl_air_sun(const nebel_scene_data *scene);
 
+/* Whether ambient light is the planet's sky. */
+int nb_gl_air_owns_ambient(const nebel_scene_data *scene);
+
 /* Makes the texture where it is not there already, bound to the active unit; wants the usual unpacking. `ends`: rays may end
  * before the ground. `is_lit`: the light at places is asked for. VALUE (a place or a sun that is none), MEMORY, LIMIT. */
 nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,
@@ -37,7 +40,10 @@ void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program);
 void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene);
 
 /* Those of nb_air_places_text, and of nb_air_haze_text by daylight. */
-void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float cloud_shade);
+void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float even_shade);
+
+/* Of fog that clouds shade by its place. */
+void nb_gl_air_set_reach(const nb_gl_air *air, unsigned program);
 
 /* In OpenGL. */
 void nb_gl_air_delete(const nb_gl_air *air);

@@ -1,6 +1,7 @@
 /* What src/cpu/cloudscape.c does, for whole pictures. */
 #include "clouds.h"
 
+#include "cloud_shade.h"
 #include "panorama.h"
 
 #include "base/cloud_haze.h"
@@ -17,9 +18,11 @@ typedef struct job {
     const nb_world *worlds;
     int world_count, has_fog;
     float *marks; /* where fog is to be known next */
-    const float *places, *left;
+    const float *places;
     float *over, *shade;
-    uint32_t begin; /* the first row of each part in this round */
+    const nb_fog_roof *roof;
+    uint32_t *words; /* of shade */
+    uint32_t begin;  /* the first row of each part in this round */
 } job;
 
 /* Rows of each part between two times of asking whether to go on: of a picture of 1280x720 a tenth of a second. */
@@ -30,14 +33,18 @@ static uint32_t first_row(const job *j, size_t part)
     return (uint32_t)((uint64_t)j->picture->view->height * part / NB_CLOUD_PARTS);
 }
 
+static nebel_result open_workspace(const nb_gl_clouds *clouds, nb_cloud_part *part)
+{
+    return part->workspace != NULL ? NEBEL_OK : nebel_create_cloud_workspace(clouds->view, &part->workspace);
+}
+
 static void do_part(void *data, size_t i)
 {
     const job *const j = data;
     nb_cloud_part *const part = &j->clouds->parts[i];
     const uint32_t first = first_row(j, i) + j->begin, next = first_row(j, i + 1);
     const uint32_t end = first + ROUND < next ? first + ROUND : next;
-    part->result = NEBEL_OK;
-    if (part->workspace == NULL) part->result = nebel_create_cloud_workspace(j->clouds->view, &part->workspace);
+    part->result = open_workspace(j->clouds, part);
     for (uint32_t y = first; y < end && part->result == NEBEL_OK; y++) j->row(j, part, y);
 }
 
@@ -69,8 +76,8 @@ static double direction_at(const nb_cloud_picture *picture, uint32_t x, uint32_t
 {
     const nebel_view *const view = picture->view;
     const double *const clip = view->clip_from_eye, *const eye = view->eye_from_world;
-    if (picture->rays != NULL) {
-        nb_panorama_direction(picture->rays, x + .5, y + .5, direction);
+    if (picture->panorama) {
+        nb_panorama_look(view, x + picture->point.x, y + 1 - picture->point.y, direction);
         return 1;
     }
     const double right = ((2 * x + 1.) / view->width - 1 + clip[8]) / clip[0];
@@ -109,6 +116,13 @@ nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, cons
     return result;
 }
 
+nebel_result nb_gl_clouds_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace)
+{
+    const nebel_result result = open_workspace(clouds, &clouds->parts[0]);
+    *workspace = clouds->parts[0].workspace;
+    return result;
+}
+
 void nb_gl_clouds_release(nb_gl_clouds *clouds)
 {
     forget(clouds);
@@ -116,7 +130,6 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
         nb_release(&clouds->allocator, clouds->parts[i].knots);
         nb_release(&clouds->allocator, clouds->parts[i].before);
         nb_release(&clouds->allocator, clouds->parts[i].pieces);
-        nb_release(&clouds->allocator, clouds->parts[i].dusks);
     }
     nb_release(&clouds->allocator, clouds->pixels);
 }
@@ -147,13 +160,12 @@ static nebel_result keep_knots(const job *j, nb_cloud_part *part, const nebel_cl
 
 static int grow_pieces(const nebel_allocator *allocator, nb_cloud_part *part)
 {
-    void *pieces = part->pieces, *dusks = part->dusks;
-    const size_t count = part->piece_count, most = count + NB_SHADED_PIECES;
-    const int has_pieces = nb_grow(allocator, &pieces, sizeof *part->pieces, count, &part->piece_capacity, most);
+    void *pieces = part->pieces;
+    const size_t count = part->piece_count;
+    const int has =
+        nb_grow(allocator, &pieces, sizeof *part->pieces, count, &part->piece_capacity, count + NB_SHADED_PIECES);
     part->pieces = pieces;
-    const int has_dusks = nb_grow(allocator, &dusks, sizeof *part->dusks, count, &part->dusk_capacity, most);
-    part->dusks = dusks;
-    return has_pieces && has_dusks;
+    return has;
 }
 
 static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray *ray, nb_cloud_pixel *pixel)
@@ -175,15 +187,7 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
     }
     result = nb_worlds_trace(j->worlds, j->world_count, shade.count + 1, direction, shade.t, &lights);
     if (result != NEBEL_OK) return result;
-    nb_shaded_piece *const pieces = part->pieces + part->piece_count;
-    pixel->piece_count = nb_shaded_set(&shade, light, pieces);
-    for (uint32_t k = 0; k < pixel->piece_count; k++)
-        for (int c = 0; c < 3; c++) {
-            nb_cloud_dusk *const dusk = &part->dusks[part->piece_count + k];
-            dusk->fog[c] = 1;
-            dusk->air[c] = left[c][k];
-            dusk->gone[c] = light[c][k] - (pieces[k].rest[c] + pieces[k].part[c] * light[c][k]);
-        }
+    pixel->piece_count = nb_shaded_set(&shade, light, part->pieces + part->piece_count);
     part->piece_count += pixel->piece_count;
     return NEBEL_OK;
 }
@@ -224,40 +228,39 @@ nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *pi
     return do_parts(&j);
 }
 
-/* ---- fog before the shade -------------------------------------------------------------------- */
+/* ---- their shade ----------------------------------------------------------------------------- */
 
-static nb_cloud_part *part_of(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t y)
+static void write_shade_row(const job *j, nb_cloud_part *part, uint32_t y)
 {
-    const job j = {.picture = picture};
-    size_t i = 0;
-    while (y >= first_row(&j, i + 1)) i++;
-    return &clouds->parts[i];
-}
-
-void nb_gl_clouds_write_places(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, float *places)
-{
-    for (uint32_t y = 0; y < picture->view->height; y++) {
-        const nb_cloud_part *const part = part_of(clouds, picture, y);
-        for (uint32_t x = 0; x < picture->view->width; x++) {
-            const size_t i = (size_t)y * picture->view->width + x;
-            const nb_cloud_pixel *const pixel = &clouds->pixels[i];
-            places[i] = k < pixel->piece_count ? part->pieces[pixel->first_piece + k].t : 0;
-        }
+    const nb_cloud_picture *const picture = j->picture;
+    const size_t width = picture->view->width;
+    for (uint32_t x = 0; x < width && part->result == NEBEL_OK; x++) {
+        const size_t i = y * width + x;
+        const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
+        nebel_ray ray = {.t_max = HUGE_VAL};
+        nb_fog_shade fog;
+        const double length = direction_at(picture, x, y, ray.direction);
+        memcpy(ray.origin, picture->eye, sizeof ray.origin);
+        if (j->roof != NULL)
+            part->result = nb_fog_shade_along(part->workspace, j->roof, ray, picture->pixel / length, &fog);
+        if (part->result != NEBEL_OK) return;
+        const uint32_t layers = nb_gl_cloud_shade_write(
+            part->pieces + pixel->first_piece, pixel->piece_count, j->roof != NULL ? &fog : NULL,
+            j->words + NB_CLOUD_SHADE_WORDS * i, width * picture->view->height);
+        if (layers > part->layers) part->layers = layers;
     }
 }
 
-void nb_gl_clouds_keep_fog(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, const float *left)
+nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_fog_roof *roof,
+                                      uint32_t *words, uint32_t *layers)
 {
-    for (uint32_t y = 0; y < picture->view->height; y++) {
-        nb_cloud_part *const part = part_of(clouds, picture, y);
-        for (uint32_t x = 0; x < picture->view->width; x++) {
-            const size_t i = (size_t)y * picture->view->width + x;
-            const nb_cloud_pixel *const pixel = &clouds->pixels[i];
-            if (k >= pixel->piece_count) continue;
-            nb_cloud_dusk *const dusk = &part->dusks[pixel->first_piece + k];
-            for (size_t c = 0; c < 3; c++) dusk->fog[c] = dusk->air[c] > 0 ? left[4 * i + c] / dusk->air[c] : 0;
-        }
-    }
+    job j = {.clouds = clouds, .picture = picture, .row = write_shade_row, .roof = roof, .words = words};
+    for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].layers = 0;
+    const nebel_result result = do_parts(&j);
+    *layers = 0;
+    for (int i = 0; i < NB_CLOUD_PARTS; i++)
+        if (clouds->parts[i].layers > *layers) *layers = clouds->parts[i].layers;
+    return result;
 }
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
@@ -268,39 +271,12 @@ static float shaded_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, i
     return nb_shaded_light(part->pieces + pixel->first_piece, pixel->piece_count, c, t, clear);
 }
 
-/* Of one colour: what shade takes from light of air up to t, through fog that leaves `fog` up to there; between two pieces' places fog
- * counts as the mean of both. */
-static float lost_at(const nb_cloud_part *part, const nb_cloud_pixel *pixel, int c, float t, float clear, float fog)
-{
-    const nb_shaded_piece *const pieces = part->pieces + pixel->first_piece;
-    const nb_cloud_dusk *const dusks = part->dusks + pixel->first_piece;
-    float lost = 0;
-    if (pixel->piece_count == 0 || !(t > pieces[0].t)) return 0;
-    uint32_t k = 0;
-    for (; k + 1 < pixel->piece_count && t > pieces[k + 1].t; k++)
-        lost += 0.5f * (dusks[k].fog[c] + dusks[k + 1].fog[c]) * (dusks[k + 1].gone[c] - dusks[k].gone[c]);
-    if (k + 1 == pixel->piece_count) return lost;
-    return lost + 0.5f * (dusks[k].fog[c] + fog) * (clear - shaded_at(part, pixel, c, t, clear) - dusks[k].gone[c]);
-}
-
 /* All that is known of a ray. */
 typedef struct nb_cloud_mix {
     nebel_cloud_knots knots;
     nb_cloud_haze air;
     nb_cloud_marks marks;
 } nb_cloud_mix;
-
-/* Of light up to a mark shade takes its part. */
-static void set_mark(const nb_cloud_part *part, const nb_cloud_pixel *pixel, const nb_cloud_knot *knot, uint32_t k,
-                     nb_cloud_mix *mix)
-{
-    float light[3];
-    for (int c = 0; c < 3; c++) {
-        const float fog = mix->air.left[c][k] > 0 ? knot->haze_left[c] / mix->air.left[c][k] : 0;
-        light[c] = knot->haze_light[c] - lost_at(part, pixel, c, knot->t, mix->air.light[c][k], fog);
-    }
-    nb_cloud_mark(&mix->marks, k, knot->haze_left, light);
-}
 
 static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_cloud_knot *list,
                              const nb_cloud_pixel *pixel, const double direction[3], nb_cloud_mix *mix)
@@ -317,7 +293,7 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
     const nebel_result result =
         nb_worlds_trace(j->worlds, j->world_count, pixel->count, rays.direction, mix->knots.t, &rays.lights);
     for (uint32_t k = 0; k < pixel->count && result == NEBEL_OK; k++) {
-        if (list[k].is_marked) set_mark(part, pixel, &list[k], k, mix);
+        if (list[k].is_marked) nb_cloud_mark(&mix->marks, k, list[k].haze_left, list[k].haze_light);
         for (int c = 0; c < 3; c++) mix->air.light[c][k] = shaded_at(part, pixel, c, list[k].t, mix->air.light[c][k]);
     }
     return result;
@@ -353,6 +329,7 @@ static void choose_row(const job *j, nb_cloud_part *part, uint32_t y)
         (void)direction_at(j->picture, x, y, direction);
         pixel->next = -1;
         if (pixel->count > 0) part->result = choose_pixel(j, part, pixel, direction);
+        if (part->result != NEBEL_OK) return;
         j->marks[i] = pixel->next >= 0 ? part->knots[pixel->first + (uint32_t)pixel->next].t : 0;
     }
 }
@@ -381,6 +358,14 @@ nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *p
     *any = 0;
     for (size_t i = 0; i < pixels && result == NEBEL_OK; i++) *any |= clouds->pixels[i].next >= 0;
     return result;
+}
+
+static nb_cloud_part *part_of(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t y)
+{
+    const job j = {.picture = picture};
+    size_t i = 0;
+    while (y >= first_row(&j, i + 1)) i++;
+    return &clouds->parts[i];
 }
 
 void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const float *left, const float *light)
@@ -476,7 +461,7 @@ static float cloud_end(const job *j, const double direction[3], float t)
 static int is_found(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel, float end)
 {
     const nb_cloud_knot *const knots = part->knots + pixel->first;
-    if (pixel->count == 0 || j->left != NULL) return 1;
+    if (pixel->count == 0 || j->has_fog) return 1;
     return nb_cloud_is_found(pixel->count, knots[0].t, knots[pixel->count - 1].t, HUGE_VALF, end);
 }
 
@@ -511,24 +496,6 @@ static nebel_result shade(const job *j, nb_cloud_part *part, const double direct
                               : result;
 }
 
-/* What shade takes from light of air up to the end of a ray, behind clouds that leave over[3] of it. */
-static nebel_result shade_end(const job *j, const nb_cloud_part *part, size_t i, const double direction[3], float t,
-                              float over[4])
-{
-    const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
-    const double *const planes[3] = {direction, direction + 1, direction + 2};
-    float left[3], light[3];
-    const nebel_light_planes lights = {.transmittance = {left, left + 1, left + 2},
-                                       .in_scattering = {light, light + 1, light + 2}};
-    if (pixel->piece_count == 0) return NEBEL_OK;
-    const nebel_result result = nb_worlds_trace(j->worlds, j->world_count, 1, planes, &t, &lights);
-    for (int c = 0; c < 3 && result == NEBEL_OK; c++) {
-        const float fog = j->left == NULL ? 1 : left[c] > 0 ? j->left[4 * i + (size_t)c] / left[c] : 0;
-        over[c] -= over[3] * lost_at(part, pixel, c, t, light[c], fog);
-    }
-    return result;
-}
-
 static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
 {
     for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
@@ -539,13 +506,12 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
         (void)direction_at(j->picture, x, y, direction);
         const float cloudy = t > 0 ? cloud_end(j, direction, t) : end;
         part->result = lay_pixel(j, part, x, y, cloudy, j->over + 4 * i);
-        if (part->result == NEBEL_OK) part->result = shade_end(j, part, i, direction, end, j->over + 4 * i);
         if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, j->shade + 4 * i);
     }
 }
 
 nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
-                              const nb_world *worlds, int count, const float *places, const float *left, float *over,
+                              const nb_world *worlds, int count, int has_fog, const float *places, float *over,
                               float *shade_plane)
 {
     job j = {.clouds = clouds,
@@ -554,8 +520,8 @@ nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *pict
              .row = end_row,
              .worlds = worlds,
              .world_count = count,
+             .has_fog = has_fog,
              .places = places,
-             .left = left,
              .over = over,
              .shade = shade_plane};
     return do_parts(&j);

@@ -4,6 +4,8 @@
 
 #include "base/air_shade.h"
 #include "base/base.h"
+#include "base/fog_shade.h"
+#include "base/pixel.h"
 #include "base/worlds.h"
 
 #include <nebel/clouds.h>
@@ -16,22 +18,17 @@ enum { NB_CLOUD_PARTS = 8 };
 typedef struct nb_cloud_knot {
     float t, left;  /* m; transmittance of clouds */
     float light[3]; /* of clouds alone; once they are mixed with air and fog: what is added to `left` of the haze's */
-    float haze_left[3], haze_light[3]; /* of air and fog, in no shade, where they are marked */
+    float haze_left[3], haze_light[3]; /* of air and fog, where they are marked */
     int is_marked;
 } nb_cloud_knot;
-
-/* Where a piece of shaded air begins: what fog leaves, air leaves, and what shade has taken of the air's light, without fog. */
-typedef struct nb_cloud_dusk {
-    float fog[3], air[3], gone[3];
-} nb_cloud_dusk;
 
 typedef struct nb_cloud_part {
     nebel_cloud_workspace *workspace;
     nb_cloud_knot *knots, *before; /* before: while more are put between them */
     size_t count, capacity, capacity_before;
     nb_shaded_piece *pieces;
-    nb_cloud_dusk *dusks; /* of each */
-    size_t piece_count, piece_capacity, dusk_capacity;
+    size_t piece_count, piece_capacity;
+    uint32_t layers; /* of shade */
     nebel_result result;
 } nb_cloud_part;
 
@@ -54,8 +51,9 @@ typedef struct nb_gl_clouds {
 
 /* Rays through a picture, the lowest row first. */
 typedef struct nb_cloud_picture {
-    const nebel_view *view; /* perspective; of a panorama its size */
-    const nebel_rays *rays; /* of a panorama; NULL: it is none */
+    const nebel_view *view; /* perspective; of a panorama its size and axes */
+    int panorama;
+    nb_pixel_point point; /* of a panorama: where rays pass its pixels */
     double eye[3];
     double pixel; /* width of a pixel per metre of the camera's axis, or of the way in a panorama */
     /* Asked after some rows, in the caller's thread, for walks take seconds: what is not OK ends them. */
@@ -67,14 +65,17 @@ typedef struct nb_cloud_picture {
 nebel_result nb_gl_clouds_set(nb_gl_clouds *clouds, const nebel_clouds *of, const nebel_sun *sun, double time,
                               const nebel_log *log);
 
+/* A workspace of theirs, for the caller's thread. MEMORY. */
+nebel_result nb_gl_clouds_workspace(nb_gl_clouds *clouds, nebel_cloud_workspace **workspace);
+
 /* Finds all pixels' knots, in clear space, and their shade on the air, which is that of the eye. MEMORY. */
 nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
                                 int count);
 
-/* Where piece k of the shaded air of each pixel begins; 0: there is none. */
-void nb_gl_clouds_write_places(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, float *places);
-/* What air and fog leave up to there: 4 numbers for each pixel. */
-void nb_gl_clouds_keep_fog(nb_gl_clouds *clouds, const nb_cloud_picture *picture, uint32_t k, const float *left);
+/* Their shade on the air, and on fog, NULL: which is the same everywhere: texels as nb_gl_cloud_shade_write has them, of
+ * NB_CLOUD_SHADE_LAYERS layers of the picture, without fog NB_AIR_SHADE_LAYERS; *layers: how many of these are used. */
+nebel_result nb_gl_clouds_write_shade(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_fog_roof *roof,
+                                      uint32_t *words, uint32_t *layers);
 
 /* Where fog is to be known next among the clouds of each pixel; 0: nowhere. *any: whether it is anywhere. MEMORY. */
 nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
@@ -86,12 +87,11 @@ void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, co
 nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
                               int has_fog);
 
-/* For rays that end at places[4 i], 0: nowhere, what is left of haze, which is in no shade, and added to it, 4 numbers for
- * each; and what clouds leave of the sunlight there, three times, and of the sky's light: 4 numbers, where rays end.
- * left[4 i]: what fog and air leave; NULL: there is no fog, and where a ray ends amid
- * clouds they are found anew up to there, through the middle of the pixel. MEMORY. */
+/* For rays that end at places[4 i], 0: nowhere, what is left of haze, and added to it, 4 numbers for each; and what clouds leave of
+ * the sunlight there, three times, and of the sky's light: 4 numbers, where rays end. Where a ray ends amid clouds these are found
+ * anew up to there, through the middle of the pixel, but among fog. MEMORY. */
 nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
-                              const nb_world *worlds, int count, const float *places, const float *left, float *over,
+                              const nb_world *worlds, int count, int has_fog, const float *places, float *over,
                               float *shade);
 
 void nb_gl_clouds_release(nb_gl_clouds *clouds);

@@ -2,50 +2,92 @@
 
 #include "air.h"
 
-#include "base/daylight.h"
+#include "base/worlds.h"
 
 #include <nebel/shader.h>
 
-static int changes(const nebel_scene_data *scene, const nebel_snapshot *fog)
+static const double degree = 3.14159265358979323846 / 180;
+
+/* Of the light of fog by its place. */
+typedef struct changes {
+    int by_air;
+    nb_fog_roof roof;
+} changes;
+
+static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_workspace *clouds,
+                                 const nebel_snapshot *fog, changes *found)
 {
     double min[3], max[3];
-    return nb_gl_air_planet(scene) != NULL && scene->has_sun && nebel_snapshot_scattering_fog(fog, min, max) &&
-           !nb_daylight_is_near(&scene->planets[0], min, max);
+    *found = (changes){.by_air = 0};
+    if (fog == NULL || nb_gl_air_planet(scene) == NULL || !scene->has_sun) return NEBEL_OK;
+    found->by_air = nebel_snapshot_scattering_fog(fog, min, max) && !nb_daylight_is_near(&scene->planets[0], min, max);
+    if (clouds == NULL || nebel_snapshot_volume_count(fog) == 0) return NEBEL_OK;
+    return nb_fog_roof_set(clouds, fog, nb_gl_air_owns_ambient(scene), &found->roof);
 }
 
 /* Light that was scattered often comes from more places than one. */
 static int is_diffuse(const nebel_log *log, const nebel_snapshot *fog)
 {
     if ((nebel_pack_features(fog) & NEBEL_FEATURE_DIFFUSION) == 0) return 0;
-    (void)nb_fail(log, NEBEL_OK,
-                  "warning: frame: all fog has the sun and the sky of the scene's origin, however far it is: OpenGL "
-                  "lights fog by its place where light is scattered once. The CPU renderer (--device cpu) does it with "
-                  "\"diffusion\", too");
+    (void)nb_fail(
+        log, NEBEL_OK,
+        "warning: frame: all fog has the sun and the sky of the scene's origin, however far it is and whatever "
+        "clouds are over it: OpenGL lights fog by its place where light is scattered once. The CPU renderer "
+        "(--device cpu) does it with \"diffusion\", too");
     return 1;
 }
 
-static int is_same(const nb_gl_daylit_fog *daylit, const nebel_snapshot *fog, const nebel_sun *sun)
+/* What is left at the origin of it, but for clouds. */
+static nebel_sun dim(const nebel_scene_data *scene, nebel_sun sun)
 {
-    int same = daylit->of == fog;
+    static const double origin[3] = {0, 0, 0};
+    nb_world worlds[NEBEL_MAX_PLANETS] = {{.planet = &scene->planets[0]}};
+    double to_sun[3] = {sun.direction[0], sun.direction[1], sun.direction[2]};
+    (void)nb_vector_make_unit(to_sun);
+    const int count = nb_worlds_set(worlds, scene, origin);
+    const nebel_air_light light =
+        nb_worlds_light(worlds, count, origin, to_sun, 0.5 * degree * scene->planets[0].sun_diameter);
+    for (int c = 0; c < 3; c++) sun.irradiance[c] *= light.sun[c];
+    return sun;
+}
+
+static int is_same(const nb_gl_daylit_fog *daylit, const nebel_snapshot *fog, const nebel_sun *sun,
+                   const changes *found)
+{
+    int same = daylit->of == fog && daylit->by_air == found->by_air && daylit->roof.is_shaded == found->roof.is_shaded;
     for (int c = 0; c < 3; c++)
         same = same && daylit->sun.direction[c] == sun->direction[c] && daylit->sun.irradiance[c] == sun->irradiance[c];
     return same;
 }
 
-nebel_result nb_gl_daylit_fog_set(nb_gl_daylit_fog *daylit, const nebel_log *log, const nebel_scene_data *scene,
-                                  nebel_snapshot *fog)
+static nebel_result relight(nb_gl_daylit_fog *daylit, const nebel_log *log, const nebel_scene_data *scene,
+                            const changes *found, nebel_snapshot *fog)
 {
-    const nebel_sun sun = nb_gl_air_sun(scene);
     nebel_result result = NEBEL_OK;
-    if (is_same(daylit, fog, &sun)) return NEBEL_OK;
     nb_gl_daylit_fog_release(daylit);
     if (fog == NULL) return NEBEL_OK;
-    if (changes(scene, fog) && !is_diffuse(log, fog)) result = nebel_relight(fog, &sun, &daylit->lit);
+    const nebel_sun above = nb_gl_air_sun(scene);
+    if ((found->by_air || found->roof.is_shaded) && !is_diffuse(log, fog)) {
+        const nebel_sun sun = found->by_air ? above : dim(scene, above);
+        result = nebel_relight(fog, &sun, &daylit->lit);
+    }
     if (result != NEBEL_OK)
         return nb_fail(log, result, "frame: fog in the light of its place: %s", nebel_result_text(result));
     daylit->of = nebel_retain_snapshot(fog); /* so that no other can have its address */
-    daylit->sun = sun;
+    daylit->sun = above;
     return NEBEL_OK;
+}
+
+nebel_result nb_gl_daylit_fog_set(nb_gl_daylit_fog *daylit, const nebel_log *log, const nebel_scene_data *scene,
+                                  nebel_cloud_workspace *clouds, nebel_snapshot *fog)
+{
+    const nebel_sun sun = nb_gl_air_sun(scene);
+    changes found;
+    nebel_result result = find_changes(scene, clouds, fog, &found);
+    if (result == NEBEL_OK && !is_same(daylit, fog, &sun, &found)) result = relight(daylit, log, scene, &found, fog);
+    daylit->by_air = found.by_air;
+    daylit->roof = found.roof;
+    return result;
 }
 
 void nb_gl_daylit_fog_release(nb_gl_daylit_fog *daylit)

@@ -26,12 +26,20 @@ static int find_shafts(frame *f)
     return f->casts && f->fog != NULL && !f->method.replaces_fog && nebel_snapshot_sunlit_fog(f->fog, &f->sunlit);
 }
 
+static int is_fog_shaded(const nebel_gl_renderer *r)
+{
+    return r->daylit.lit != NULL && r->daylit.roof.is_shaded;
+}
+
 static nebel_result set_fog(frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const nebel_result result = nb_gl_daylit_fog_set(&r->daylit, &r->log, r->scene, r->fog);
+    nebel_cloud_workspace *clouds = NULL;
+    nebel_result result = f->clouds != NULL ? nb_frame_set_clouds(f, &clouds) : NEBEL_OK;
+    if (result == NEBEL_OK) result = nb_gl_daylit_fog_set(&r->daylit, &r->log, r->scene, clouds, r->fog);
     f->fog = r->daylit.lit != NULL ? r->daylit.lit : r->fog;
-    f->cloud_shade = 1;
+    f->even_shade = 1;
+    r->cloud_shade.clear_sky = is_fog_shaded(r) ? r->daylit.roof.clear_sky : 0;
     return result;
 }
 
@@ -44,16 +52,16 @@ static nebel_result set_frame(frame *f)
     if (result == NEBEL_OK) result = set_method(f);
     if (result == NEBEL_OK) result = nb_lighting_set(&f->light, r->scene, &r->log);
     if (result == NEBEL_OK) result = nb_camera_look(&desc->camera, desc->width, desc->height, &r->log, &f->view);
-    if (result == NEBEL_OK) result = set_fog(f);
     if (result != NEBEL_OK) return result;
     f->panorama = desc->camera.projection == NEBEL_PROJECTION_PANORAMA;
     for (int i = 0; i < 3; i++) f->eye[i] = desc->camera.position[i];
     f->casts = f->light.has_sun && r->meshes.count > 0 && r->meshes.low[0] <= r->meshes.high[0];
-    f->shafts = find_shafts(f);
     f->planet = nb_gl_air_planet(r->scene);
     f->layers = nb_gl_shells_planet(r->scene);
     f->clouds = f->planet != NULL ? f->planet->clouds : NULL;
-    return NEBEL_OK;
+    result = set_fog(f);
+    f->shafts = find_shafts(f);
+    return result;
 }
 
 /* ---- surfaces -------------------------------------------------------------------------------- */
@@ -258,8 +266,9 @@ static nebel_result draw_exact_fog(const frame *f)
                              .height = f->view.height,
                              .panorama = f->panorama,
                              .air = f->planet != NULL ? &r->air : NULL,
-                             .daylight = r->daylit.lit != NULL ? r->scene : NULL,
-                             .cloud_shade = f->cloud_shade,
+                             .daylight = r->daylit.lit != NULL && r->daylit.by_air ? r->scene : NULL,
+                             .even_shade = f->even_shade,
+                             .cloud_shade = f->clouds != NULL ? &r->cloud_shade : NULL,
                              .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))
@@ -485,7 +494,7 @@ static nebel_result draw_dimming(const frame *f)
 static nebel_result prepare_air(const frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const int is_lit = r->scene->has_sun && (r->scene->mesh_count > 0 || r->daylit.lit != NULL);
+    const int is_lit = r->scene->has_sun && (r->scene->mesh_count > 0 || r->daylit.by_air);
     const int ends =
         r->meshes.count > 0 || f->clouds != NULL || (r->fog != NULL && nebel_snapshot_volume_count(r->fog) > 0);
     if (f->planet == NULL) return NEBEL_OK;
@@ -580,6 +589,7 @@ static nebel_result draw_light(const frame *f, uint32_t sample)
 
 static nebel_result set_sample(frame *f, nb_pixel_point point)
 {
+    f->point = point;
     if (f->panorama) {
         nb_panorama_rays(&f->view, f->eye, point, &f->rays);
         return NEBEL_OK;

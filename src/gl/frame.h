@@ -6,6 +6,7 @@
 #include "renderer.h"
 
 #include "base/lighting.h"
+#include "base/pixel.h"
 
 typedef struct nb_gl_frame {
     nebel_gl_renderer *renderer;
@@ -17,12 +18,13 @@ typedef struct nb_gl_frame {
     const nebel_planet *planet; /* with air; NULL: none */
     const nebel_layers *layers; /* a planet of them; NULL: none */
     const nebel_clouds *clouds; /* with volume, in that air; NULL: none */
-    nebel_snapshot *fog;        /* the renderer's, or that in the sun above the air; NULL: none */
-    float cloud_shade;          /* part of that sun that clouds leave to it */
+    nebel_snapshot *fog;        /* the renderer's, or that of r->daylit; NULL: none */
+    float even_shade;           /* part of that sun that clouds leave to it, where that is the same everywhere */
     unsigned place, depth;      /* where rays end now: as those of the targets */
     nb_method method;
     nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
-    nebel_view sample_view;  /* through the places of the present sample */
+    nb_pixel_point point;    /* of the present sample */
+    nebel_view sample_view;  /* through that */
     nebel_rays rays;         /* of sample_view, or of the panorama */
     nebel_view sun_view;     /* of all that is seen, against the sun's light */
     int casts;               /* the sun shines, and there is something to cast shadows */
@@ -79,6 +81,9 @@ nebel_result nb_frame_draw_shells(nb_gl_frame *f);
 void nb_frame_set_shells(const nb_gl_frame *f, unsigned program);
 
 /* ---- clouds with volume ---------------------------------------------------------------------- */
+
+/* As they are in this frame, before anything is drawn; *workspace: of them. VALUE, MEMORY. */
+nebel_result nb_frame_set_clouds(nb_gl_frame *f, nebel_cloud_workspace **workspace);
 
 /* Of the whole frame; changes where rays end, and what is in the targets of fog. VALUE, MEMORY. */
 nebel_result nb_frame_trace_clouds(nb_gl_frame *f);

@@ -3,7 +3,6 @@
 #include "clouds.h"
 #include "frame.h"
 #include "gl.h"
-#include "panorama.h"
 #include "words.h"
 
 #include <math.h>
@@ -36,10 +35,11 @@ static nebel_result ask(void *user)
     return nb_frame_ask(user);
 }
 
-static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, const nebel_rays *around)
+static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pixel_point point)
 {
     nb_cloud_picture picture = {.view = view,
-                                .rays = f->panorama ? around : NULL,
+                                .panorama = f->panorama,
+                                .point = point,
                                 .eye = {f->eye[0], f->eye[1], f->eye[2]},
                                 .ask = ask,
                                 .ask_user = f};
@@ -47,10 +47,9 @@ static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, const
     return picture;
 }
 
-static nb_cloud_picture picture_of_middles(nb_gl_frame *f, nebel_rays *middles)
+static nb_cloud_picture picture_of_middles(nb_gl_frame *f)
 {
-    if (f->panorama) nb_panorama_rays(&f->view, f->eye, nb_pixel_sample(0, 1), middles);
-    return picture_of(f, &f->view, middles);
+    return picture_of(f, &f->view, nb_pixel_sample(0, 1));
 }
 
 /* The usual unpacking. A plane of 4 numbers, or of 1, which is that of all colours. */
@@ -98,19 +97,6 @@ typedef struct fog_planes {
     float *places, *left, *light;
 } fog_planes;
 
-/* What fog leaves where shaded air begins, and where it changes. */
-static nebel_result find_dusk(nb_gl_frame *f, const nb_cloud_picture *picture, const fog_planes *fog)
-{
-    nb_gl_clouds *const clouds = &f->renderer->clouds;
-    nebel_result result = NEBEL_OK;
-    for (uint32_t k = 0; k < NB_SHADED_PIECES && result == NEBEL_OK; k++) {
-        nb_gl_clouds_write_places(clouds, picture, k, fog->places);
-        result = find_fog(f, fog->places, fog->left, fog->light);
-        if (result == NEBEL_OK) nb_gl_clouds_keep_fog(clouds, picture, k, fog->left);
-    }
-    return result;
-}
-
 /* Fog among clouds, wherever it must be known. */
 static nebel_result find_marks(nb_gl_frame *f, const nb_cloud_picture *picture, const fog_planes *fog)
 {
@@ -130,7 +116,6 @@ static nebel_result find_all_fog(nb_gl_frame *f, const nb_cloud_picture *picture
     nebel_gl_renderer *const r = f->renderer;
     const fog_planes fog = {.places = make_plane(f, 1), .left = make_plane(f, 4), .light = make_plane(f, 4)};
     nebel_result result = fog.places != NULL && fog.left != NULL && fog.light != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
-    if (result == NEBEL_OK) result = find_dusk(f, picture, &fog);
     if (result == NEBEL_OK) result = find_marks(f, picture, &fog);
     nb_release(&r->allocator, fog.places);
     nb_release(&r->allocator, fog.left);
@@ -144,21 +129,44 @@ static nebel_result find_shade(nb_gl_frame *f)
     enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_gl_renderer *const r = f->renderer;
-    return r->daylit.lit == NULL
+    return r->daylit.lit == NULL || r->cloud_shade.clear_sky > 0
                ? NEBEL_OK
-               : nebel_shade_clouds(r->clouds.parts[0].workspace, WIDE, 1, origin, 0, &f->cloud_shade);
+               : nebel_shade_clouds(r->clouds.parts[0].workspace, WIDE, 1, origin, 0, &f->even_shade);
+}
+
+/* On air, and on fog by its place, for all samples. */
+static nebel_result draw_shade(nb_gl_frame *f, const nb_cloud_picture *picture)
+{
+    nebel_gl_renderer *const r = f->renderer;
+    const nb_fog_roof *const roof = r->cloud_shade.clear_sky > 0 ? &r->daylit.roof : NULL;
+    const size_t texels = count_pixels(f) * (roof != NULL ? NB_CLOUD_SHADE_LAYERS : NB_AIR_SHADE_LAYERS);
+    uint32_t layers, *const words = nb_allocate(&r->allocator, texels, NB_CLOUD_SHADE_WORDS * sizeof *words);
+    if (words == NULL) return NEBEL_ERROR_MEMORY;
+    nebel_result result = nb_gl_clouds_write_shade(&r->clouds, picture, roof, words, &layers);
+    glActiveTexture(GL_TEXTURE0 + NB_UNIT_SHADE);
+    if (result == NEBEL_OK)
+        result = nb_gl_cloud_shade_upload(&r->cloud_shade, log_of(f), f->view.width, f->view.height, layers, words);
+    glActiveTexture(GL_TEXTURE0);
+    nb_release(&r->allocator, words);
+    return result;
+}
+
+nebel_result nb_frame_set_clouds(nb_gl_frame *f, nebel_cloud_workspace **workspace)
+{
+    nb_gl_clouds *const clouds = &f->renderer->clouds;
+    const nebel_sun sun = nb_gl_air_sun(f->renderer->scene);
+    nebel_result result = nb_gl_clouds_set(clouds, f->clouds, &sun, f->desc->time, log_of(f));
+    if (result == NEBEL_OK) result = nb_gl_clouds_workspace(clouds, workspace);
+    return fail_memory(f, result);
 }
 
 nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const nebel_sun sun = nb_gl_air_sun(r->scene);
-    nebel_rays middles;
-    const nb_cloud_picture picture = picture_of_middles(f, &middles);
-    nebel_result result = nb_gl_clouds_set(&r->clouds, f->clouds, &sun, f->desc->time, log_of(f));
-    if (result != NEBEL_OK) return fail_memory(f, result);
-    result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count);
+    const nb_cloud_picture picture = picture_of_middles(f);
+    nebel_result result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count);
     if (result == NEBEL_OK) result = find_shade(f);
+    if (result == NEBEL_OK) result = draw_shade(f, &picture);
     if (result == NEBEL_OK && has_fog(f)) result = find_all_fog(f, &picture);
     if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, has_fog(f));
     return fail_memory(f, result);
@@ -169,24 +177,19 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 nebel_result nb_frame_end_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
-    nebel_rays middles;
-    const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, &f->rays);
-    const nb_cloud_picture middle = picture_of_middles(f, &middles);
-    float *const places = make_plane(f, 4), *const left = make_plane(f, 4), *const over = make_plane(f, 4),
-                 *const shade = make_plane(f, 4);
-    nebel_result result =
-        places != NULL && left != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
+    const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, f->point);
+    const nb_cloud_picture middle = picture_of_middles(f);
+    float *const places = make_plane(f, 4), *const over = make_plane(f, 4), *const shade = make_plane(f, 4);
+    nebel_result result = places != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK) {
         read_back(f, r->targets.surface_buffer, 0, places);
-        if (has_fog(f)) read_back(f, r->targets.fog_buffer, 1, left);
-        result = nb_gl_clouds_end(&r->clouds, &picture, &middle, r->air.worlds, r->air.count, places,
-                                  has_fog(f) ? left : NULL, over, shade);
+        result = nb_gl_clouds_end(&r->clouds, &picture, &middle, r->air.worlds, r->air.count, has_fog(f), places, over,
+                                  shade);
     }
     result = fail_memory(f, result);
     if (result == NEBEL_OK) result = upload(f, &r->cloud_over, 4, over);
-    if (result == NEBEL_OK) result = upload(f, &r->cloud_shade, 4, shade);
+    if (result == NEBEL_OK) result = upload(f, &r->cloud_dimming, 4, shade);
     nb_release(&r->allocator, places);
-    nb_release(&r->allocator, left);
     nb_release(&r->allocator, over);
     nb_release(&r->allocator, shade);
     return result;
@@ -195,5 +198,5 @@ nebel_result nb_frame_end_clouds(nb_gl_frame *f)
 void nb_frame_bind_clouds(const nb_gl_frame *f)
 {
     nb_frame_bind_texture(NB_UNIT_CLOUDS, GL_TEXTURE_2D, f->renderer->cloud_over);
-    nb_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, f->renderer->cloud_shade);
+    nb_frame_bind_texture(NB_UNIT_DIMMING, GL_TEXTURE_2D, f->renderer->cloud_dimming);
 }

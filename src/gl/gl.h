@@ -61,8 +61,9 @@ typedef struct nb_gl_picture {
     nb_gl_shade shade;
     const struct nb_gl_air *air;      /* on NB_UNIT_AIR, for the same eye; one sample a pixel. NULL: none */
     const nebel_scene_data *daylight; /* whose sun lights fog in that air, by its place; NULL: the fog's own sun does */
-    float cloud_shade;                /* part of that sun that clouds leave */
-    const struct nb_shafts *shafts;   /* where surfaces shade fog; NULL: nowhere. Changes their units */
+    float even_shade;                 /* part of that sun that clouds leave */
+    const struct nb_gl_cloud_shade *cloud_shade; /* of clouds; NULL: there are none */
+    const struct nb_shafts *shafts;              /* where surfaces shade fog; NULL: nowhere. Changes their units */
 } nb_gl_picture;
 
 /* nebel_gl_draw_fog along these. */

@@ -139,6 +139,15 @@ void nb_panorama_direction(const nebel_rays *rays, double x, double y, double di
     }
 }
 
+void nb_panorama_look(const nebel_view *view, double x, double y, double direction[3])
+{
+    const double *const axes = view->eye_from_world;
+    const double longitude = pi * (2 * x / view->width - 1), latitude = pi * (y / view->height - .5);
+    const double along = cos(latitude) * cos(longitude), across = cos(latitude) * sin(longitude);
+    for (int i = 0; i < 3; i++)
+        direction[i] = -along * axes[4 * i + 2] + across * axes[4 * i] + sin(latitude) * axes[4 * i + 1];
+}
+
 static nebel_view face_of(const double eye[3], int axis, double sign, uint32_t size)
 {
     nebel_view face = {.width = size, .height = size};

@@ -28,6 +28,9 @@ void nb_panorama_rays(const nebel_view *view, const double eye[3], nb_pixel_poin
 /* The direction through a place of the picture, as the text has it. */
 void nb_panorama_direction(const nebel_rays *rays, double x, double y, double direction[3]);
 
+/* The same in double, from the lower left corner of a picture with the size and the axes of a view. */
+void nb_panorama_look(const nebel_view *view, double x, double y, double direction[3]);
+
 /* Six views from an eye, along the axes of the world, which see all around: for lists of volumes. Two for each axis,
  * first along it; pixels are at most about as wide as those of a panorama of this size. */
 void nb_panorama_faces(const double eye[3], uint32_t width, uint32_t height, nebel_view faces[6]);

@@ -1,5 +1,6 @@
 /* Fog over the host's picture: checks, state, one triangle. */
 #include "air.h"
+#include "cloud_shade.h"
 #include "gl.h"
 #include "shafts.h"
 #include "state.h"
@@ -248,6 +249,12 @@ static void set_tiling(const task *t)
     }
 }
 
+/* Fog, by clouds and by its place. */
+static int is_shaded(const nb_gl_picture *picture)
+{
+    return picture->cloud_shade != NULL && picture->cloud_shade->clear_sky > 0;
+}
+
 static void set_uniforms(const task *t, GLuint target_framebuffer)
 {
     const nb_program *const p = t->program;
@@ -258,7 +265,9 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     if (t->picture->shade.set != NULL) t->picture->shade.set(t->picture->shade.of, p->name);
     if (t->picture->air != NULL) nb_gl_air_set_worlds(t->picture->air, p->name);
     if (t->picture->daylight != NULL)
-        nb_gl_air_set_daylight(t->picture->air, p->name, t->picture->daylight, t->picture->cloud_shade);
+        nb_gl_air_set_daylight(t->picture->air, p->name, t->picture->daylight, t->picture->even_shade);
+    if (is_shaded(t->picture)) nb_gl_air_set_reach(t->picture->air, p->name);
+    if (t->picture->cloud_shade != NULL) nb_gl_cloud_shade_set(t->picture->cloud_shade, p->name);
     if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
 }
 
@@ -382,6 +391,8 @@ static nebel_result draw_with_program(task *t, GLuint target_framebuffer)
                                   .step = in_steps,
                                   .air = t->picture->air != NULL ? t->picture->air->count : 0,
                                   .daylit = t->picture->daylight != NULL,
+                                  .clouds = t->picture->cloud_shade != NULL,
+                                  .shaded = is_shaded(t->picture),
                                   .features = gl->fog.features,
                                   .shade = {t->picture->shade.texts[0], t->picture->shade.texts[1]}};
     const nebel_result result =

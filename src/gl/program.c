@@ -1,6 +1,7 @@
 #include "program.h"
 
 #include "air_text.h"
+#include "cloud_shade.h"
 #include "panorama.h"
 #include "shafts.h"
 #include "steps.h"
@@ -173,7 +174,7 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
                                : kind->step && !is_counted ? "* 2"
                                                            : "";
     (void)snprintf(text, size,
-                   "%s%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define "
+                   "%s%s%s%s%s%s%s%s%s%s%s%s%s%s%s#define NEBEL_VIEW\n#define NEBEL_DEPTH_KIND %d\n#define "
                    "NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n"
                    "flat in highp vec4 pass_rays[10];\n#define NEBEL_RAY(i) pass_rays[i]\n"
                    "#define RAY_WORD(i) pass_rays[i].xyz\n%s",
@@ -184,6 +185,7 @@ static void write_head(const nb_context *context, const nb_program_kind *kind, c
                    (kind->features & NEBEL_FEATURE_DIFFUSION) != 0 ? "#define NEBEL_DIFFUSION\n" : "",
                    (kind->features & NEBEL_FEATURE_ENVIRONMENT) != 0 ? "#define NEBEL_ENVIRONMENT\n" : "",
                    nb_air_head(kind->air, air), kind->daylit ? "#define PASS_DAYLIGHT\n" : "",
+                   kind->clouds ? "#define PASS_CLOUDS\n" : "", kind->shaded ? "#define PASS_SHADE\n" : "",
                    kind->multisampled ? samples : "", kind->step ? step : nb_program_output(kind->output),
                    kind->from_eye ? "#define NEBEL_FROM_EYE\n" : "", (int)kind->depth, (unsigned)kind->features,
                    kind->panorama ? "#define PASS_PANORAMA\n" : "");
@@ -289,10 +291,11 @@ static nebel_result make(const nb_context *context, const nebel_log *log, const 
     const nb_texts fragment = {{head, is_shaded ? precision_text : "", is_shaded ? kind->shade[0] : "",
                                 is_shaded ? kind->shade[1] : "", kind->shafts ? nb_shaft_text : "",
                                 kind->air ? nb_air_words_text : "", fog, ray, tile, kind->air ? nb_air_worlds_text : "",
-                                kind->daylit ? nb_air_places_text : "", kind->air ? nb_air_pieces_text : "",
+                                kind->daylit ? nb_air_places_text : "", kind->clouds ? nb_cloud_shade_text : "",
+                                kind->shaded ? nb_fog_shade_text : "", kind->air ? nb_air_pieces_text : "",
                                 kind->air ? nb_air_haze_text : "", fragment_text,
                                 kind->step ? nb_step_text : whole_text},
-                               15};
+                               17};
     *program = (nb_program){.kind = *kind};
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &program->name);
     if (result == NEBEL_OK) set_uniforms(program);
@@ -303,8 +306,9 @@ static int is_same(const nb_program_kind *a, const nb_program_kind *b)
 {
     return a->in_texture == b->in_texture && a->tiled == b->tiled && a->multisampled == b->multisampled &&
            a->output == b->output && a->depth == b->depth && a->from_eye == b->from_eye && a->panorama == b->panorama &&
-           a->shafts == b->shafts && a->air == b->air && a->daylit == b->daylit && a->step == b->step &&
-           a->features == b->features && a->shade[0] == b->shade[0] && a->shade[1] == b->shade[1];
+           a->shafts == b->shafts && a->air == b->air && a->daylit == b->daylit && a->clouds == b->clouds &&
+           a->shaded == b->shaded && a->step == b->step && a->features == b->features && a->shade[0] == b->shade[0] &&
+           a->shade[1] == b->shade[1];
 }
 
 nebel_result nb_programs_find(nb_programs *programs, const nb_context *context, const nebel_allocator *allocator,

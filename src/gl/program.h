@@ -14,7 +14,7 @@ enum { NB_SAMPLES_MOST = 32 };
 
 /* The texts of a shader, one after the other. */
 typedef struct nb_texts {
-    const char *list[15];
+    const char *list[17];
     int count;
 } nb_texts;
 
@@ -42,6 +42,8 @@ typedef struct nb_program_kind {
     int step;             /* one of several passes; its output counts for the last program alone */
     int air;              /* the fog lies in that of so many planets, which is bound */
     int daylit;           /* and has the sun and the sky of its place there */
+    int clouds;           /* the air is in their shade */
+    int shaded;           /* and so is the fog, by its place */
     uint32_t features;    /* of the fog: what the text leaves out makes it faster */
     const char *shade[2]; /* texts before that of the fog; NULL: none */
 } nb_program_kind;

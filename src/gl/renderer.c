@@ -109,7 +109,8 @@ void nebel_destroy_gl_renderer(nebel_gl_renderer *r)
         nb_gl_shells_delete(&r->shells);
         glDeleteTextures(1, &r->cloud_ends);
         glDeleteTextures(1, &r->cloud_over);
-        glDeleteTextures(1, &r->cloud_shade);
+        glDeleteTextures(1, &r->cloud_dimming);
+        glDeleteTextures(1, &r->cloud_shade.texture);
         glDeleteVertexArrays(1, &r->vertex_array);
     }
     nebel_destroy_gl(r->eye_fog);

@@ -4,6 +4,7 @@
 
 #include "air.h"
 #include "camera.h"
+#include "cloud_shade.h"
 #include "clouds.h"
 #include "daylit_fog.h"
 #include "environment.h"
@@ -38,7 +39,8 @@ struct nebel_gl_renderer {
     nb_gl_air air;
     nb_gl_shells shells;
     nb_gl_clouds clouds;
-    unsigned cloud_ends, cloud_over, cloud_shade; /* textures of the size of the picture; 0: not made yet */
+    nb_gl_cloud_shade cloud_shade;
+    unsigned cloud_ends, cloud_over, cloud_dimming; /* textures of the size of the picture; 0: not made yet */
     nb_targets targets;
     nb_particles particles;
     int has_judged_particles; /* whether they should take light that they do not take, and said so */

@@ -17,10 +17,11 @@ enum {
     NB_UNIT_VEIL,
     NB_UNIT_LAMPS,
     NB_UNIT_LAMP_MAPS,
-    NB_SCENE_UNIT_END,             /* at most NB_UNIT_AIR */
-    NB_UNIT_SHELLS = NB_UNIT_AIR,  /* a planet has layers or air */
-    NB_UNIT_CLOUDS = NB_UNIT_VEIL, /* where there are clouds there are no particles */
-    NB_UNIT_MASK = NB_UNIT_NORMAL  /* while surfaces are drawn nothing reads normals */
+    NB_SCENE_UNIT_END,               /* at most NB_UNIT_AIR */
+    NB_UNIT_SHELLS = NB_UNIT_AIR,    /* a planet has layers or air */
+    NB_UNIT_SHADE = NB_UNIT_DIMMING, /* in passes, which are asked before what dims light is known */
+    NB_UNIT_CLOUDS = NB_UNIT_VEIL,   /* where there are clouds there are no particles */
+    NB_UNIT_MASK = NB_UNIT_NORMAL    /* while surfaces are drawn nothing reads normals */
 };
 
 enum { NB_CASCADES = 4, NB_MOST_MAPS = 8 };

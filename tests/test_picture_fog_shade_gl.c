@@ -1,0 +1,241 @@
+/* In OpenGL fog under clouds has their shade by its own place, as on the CPU: mist and banks of it under broken clouds, from near and
+ * far, with shafts, in the planet's own sky, far from the origin. With an argument in pictures so many times wider. */
+#include "pass_help.h"
+#include "picture_help.h"
+#include "planet_help.h"
+
+#include "base/vector.h"
+
+#include <nebel/clouds.h>
+#include <nebel/environment.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t scale = 1;
+
+static const float wall[4][3] = {{-40, -20, 0}, {40, -20, 0}, {40, 50, 0}, {-40, 50, 0}};
+static const uint32_t wall_indices[6] = {0, 1, 2, 0, 2, 3};
+
+typedef struct world {
+    nebel_atmosphere *atmosphere;
+    nebel_clouds *clouds;
+    nebel_environment_map *map;
+    nebel_planet planet;
+    nebel_mesh mesh;
+    nebel_scene_data scene;
+} world;
+
+/* With a sky of its own, which is the same all around. */
+static void make_world(double coverage, const double sun[3], world *w)
+{
+    static float pixels[4 * 2 * 3];
+    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_diameter = .53, .cloud_layer_count = 1},
+                 .mesh = {.origin = {0, 0, -150},
+                          .positions = wall[0],
+                          .indices = wall_indices,
+                          .vertex_count = 4,
+                          .triangle_count = 2,
+                          .base_color = {.8f, .8f, .8f},
+                          .texture = -1}};
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {{.coverage = coverage}}, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    w->planet.clouds = w->clouds;
+    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
+    assert_int_equal(
+        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &w->map),
+        NEBEL_OK);
+    w->scene = (nebel_scene_data){.has_sun = 1,
+                                  .sun_irradiance = {5, 4, 3},
+                                  .environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = w->map, .intensity = 1},
+                                  .planet_count = 1,
+                                  .planets = &w->planet,
+                                  .meshes = &w->mesh};
+    memcpy(w->scene.sun_direction, sun, sizeof w->scene.sun_direction);
+    assert_true(nb_vector_make_unit(w->scene.sun_direction));
+}
+
+static void free_world(world *w)
+{
+    nebel_destroy_clouds(w->clouds);
+    nebel_release_environment_map(w->map);
+    nebel_destroy_atmosphere(w->atmosphere);
+}
+
+/* In the light of the origin under these clouds, as programs make it. */
+static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume)
+{
+    static const double origin[1][3] = {{0, 0, 0}};
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view_desc above = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
+    nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}};
+    nebel_environment environment = w->scene.environment;
+    nebel_air_light light;
+    float sun, sky;
+    memcpy(above.sun.direction, w->scene.sun_direction, sizeof above.sun.direction);
+    assert_int_equal(nebel_create_cloud_view(&above, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+    assert_int_equal(nebel_shade_clouds(workspace, 200, 1, origin, 0, &sun), NEBEL_OK);
+    assert_int_equal(nebel_shade_sky(workspace, 200, 1, origin, 0, &sky), NEBEL_OK);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    desc.sun = above.sun;
+    assert_int_equal(nebel_light_air(w->atmosphere, &above.sun, 1, origin, 0, &light, 0), NEBEL_OK);
+    for (int c = 0; c < 3; c++) desc.sun.irradiance[c] = (double)sun * light.sun[c];
+    environment.intensity = (double)sky;
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_set_environment(fog, &environment), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, volume, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Of pixels the share whose in-scattering is apart by more than 1/255 of the brightest. */
+static double light_apart(const picture_pair *pair)
+{
+    const double most = picture_largest_light(pair) / 255;
+    const size_t pixels = (size_t)pair->width * pair->height;
+    size_t apart = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        int is = 0;
+        for (size_t c = 3 * i; c < 3 * i + 3; c++)
+            is |= !(fabs((double)pair->cpu.in_scattering[c] - (double)pair->gl.in_scattering[c]) <= most);
+        apart += (size_t)is;
+    }
+    return (double)apart / (double)pixels;
+}
+
+/* How much of the light of fog changes where clouds are not there: less than that of another picture cannot be told. */
+static double by_clouds(world *w, nebel_snapshot *fog, const nebel_camera *camera, const picture_pair *pair)
+{
+    nebel_renderer *renderer;
+    picture_pair clear = picture_make(pair->width, pair->height);
+    double most = 0;
+    const nebel_frame_desc frame = {.camera = *camera, .width = pair->width, .height = pair->height, .samples = 1};
+    w->planet.clouds = NULL;
+    assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){0}, &renderer), NEBEL_OK);
+    assert_int_equal(nebel_render_frame(renderer, &frame, &clear.cpu), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    w->planet.clouds = w->clouds;
+    for (size_t i = 0; i < 3 * (size_t)pair->width * pair->height; i++)
+        most = fmax(most, fabs((double)clear.cpu.in_scattering[i] - (double)pair->gl.in_scattering[i]));
+    picture_free(&clear);
+    return most / picture_largest_light(pair);
+}
+
+static void check(const char *name, world *w, const nebel_volume_desc *volume, const nebel_camera *camera)
+{
+    picture_pair pair = picture_make(64 * scale, 36 * scale);
+    nebel_snapshot *const fog = make_fog(w, volume);
+    const int objects = pass_count_objects();
+    pair.tolerance = NEBEL_DEFAULT_TOLERANCE;
+    picture_render(&w->scene, fog, camera, 1, &pair);
+    assert_int_equal(pass_count_objects(), objects);
+    const double shown = picture_shown_apart(&pair), light = light_apart(&pair),
+                 clouds = by_clouds(w, fog, camera, &pair);
+    print_message("%s: of 1000 pixels %.2f are shown 2/255 apart, %.2f have other light; clouds change it by %.2f\n",
+                  name, 1e3 * shown, 1e3 * light, clouds);
+    assert_true(shown <= 1e-3 && light <= 1e-3 && clouds > .05);
+    picture_free(&pair);
+    nebel_release_snapshot(fog);
+}
+
+static nebel_volume_desc make_mist(double extinction, double size, double top)
+{
+    return (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_BOX, .min = {-size, -5, -size}, .max = {size, top, size}},
+                               .extinction = {extinction, extinction, extinction},
+                               .albedo = {.97, .97, .97},
+                               .phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = .3}};
+}
+
+static const double high[3] = {.3, .8, -.2}, low[3] = {.2, .15, -1};
+
+static void mist_has_the_shadows_of_clouds(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.5, high, &w);
+    nebel_volume_desc mist = make_mist(2e-3, 6000, 60);
+    pass_open(&context, NB_GL_330);
+    nebel_camera camera = planet_camera(700, -.6);
+    check("mist seen from above", &w, &mist, &camera);
+    w.scene.mesh_count = 1;
+    camera = planet_camera(30, 0);
+    check("within it, before a wall that casts shadows", &w, &mist, &camera);
+    mist = make_mist(1e-3, 9000, 60);
+    w.scene.mesh_count = 0;
+    camera = planet_camera(500, -.15);
+    check("mist seen from far", &w, &mist, &camera);
+    camera = planet_camera(3e5, -1.2);
+    camera.vertical_fov = 3;
+    check("mist seen from orbit", &w, &mist, &camera);
+    mist.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
+    mist.density = (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .scale_height = 30};
+    camera = planet_camera(300, -.3);
+    check("mist without end", &w, &mist, &camera);
+    pass_close(&context);
+    pass_open(&context, NB_GL_300ES);
+    camera = planet_camera(300, 0);
+    camera.projection = NEBEL_PROJECTION_PANORAMA;
+    mist = make_mist(1e-3, 9000, 60);
+    check("all around", &w, &mist, &camera);
+    pass_close(&context);
+    free_world(&w);
+}
+
+static void shadows_are_long_in_a_low_sun(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.5, low, &w);
+    const nebel_volume_desc mist = make_mist(1e-3, 9000, 100);
+    const nebel_camera camera = planet_camera(200, -.1);
+    pass_open(&context, NB_GL_330);
+    check("mist in a low sun", &w, &mist, &camera);
+    pass_close(&context);
+    free_world(&w);
+}
+
+/* There the air leaves another part of the sun, too. */
+static void far_fog_has_both(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.6, low, &w);
+    const double radius = w.planet.air.radius, angle = .05, x = radius * sin(angle), y = radius * (cos(angle) - 1);
+    nebel_volume_desc mist = make_mist(1e-3, 6000, 0);
+    for (int c = 0; c < 3; c++) {
+        const double place[3] = {x, y, 0};
+        mist.shape.min[c] = place[c] + (c == 1 ? -400 : -6000);
+        mist.shape.max[c] = place[c] + (c == 1 ? 400 : 6000);
+    }
+    nebel_camera camera = planet_camera(0, 0);
+    const double eye[3] = {x - 3000, y + 900, 3000}, at[3] = {x, y, 0};
+    memcpy(camera.position, eye, sizeof eye);
+    memcpy(camera.look_at, at, sizeof at);
+    pass_open(&context, NB_GL_330);
+    check("mist far from the origin", &w, &mist, &camera);
+    pass_close(&context);
+    free_world(&w);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(mist_has_the_shadows_of_clouds),
+        cmocka_unit_test(shadows_are_long_in_a_low_sun),
+        cmocka_unit_test(far_fog_has_both),
+    };
+    if (argc > 1) scale = (uint32_t)atoi(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
