@@ -152,6 +152,41 @@ static void test_there_is_no_seam_and_no_pole(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* How often a line of 800 km in the middle of a layer enters or leaves clouds, over many lines; x or z is along it. */
+static int count_borders(const nebel_clouds *clouds, double height, int is_along_z)
+{
+    enum { LINES = 20, STEPS = 4000 };
+    int count = 0;
+    for (int line = 0; line < LINES; line++) {
+        int was_cloud = 0;
+        for (int i = 0; i < STEPS; i++) {
+            const double along = 200. * (i - STEPS / 2), aside = 4e4 * (line - LINES / 2);
+            const int is = above(clouds, height, is_along_z ? aside : along, RADIUS, is_along_z ? along : aside, 0) > 0;
+            count += i > 0 && is != was_cloud;
+            was_cloud = is;
+        }
+    }
+    return count;
+}
+
+/* Wisps are as many times longer as they are seldom met; without wind along z. Heaps know no wind. */
+static void test_wisps_lie_along_the_wind(void **state)
+{
+    (void)state;
+    const nebel_cloud_layer layers[] = {
+        {.kind = NEBEL_CLOUD_CIRRUS}, {.kind = NEBEL_CLOUD_CIRRUS, .wind = {-10, 0}}, {0}};
+    static const double heights[] = {8750, 8750, 1200};
+    double ratios[3];
+    for (int k = 0; k < 3; k++) {
+        nebel_clouds *const clouds = make(1, &layers[k]);
+        ratios[k] = (double)count_borders(clouds, heights[k], 0) / count_borders(clouds, heights[k], 1);
+        nebel_destroy_clouds(clouds);
+    }
+    print_message("borders across to along z: %.2f, in wind along x %.2f, of heaps %.2f\n", ratios[0], ratios[1],
+                  ratios[2]);
+    assert_true(ratios[0] > 3 && ratios[1] < 1. / 3 && fabs(log(ratios[2])) < .1);
+}
+
 /* A millimetre is far more than the last digit of a place on the Earth: density follows a line without steps. */
 static void test_details_stand_still_at_the_size_of_a_planet(void **state)
 {
@@ -734,6 +769,7 @@ int main(void)
         cmocka_unit_test(test_noise_is_what_its_constants_say),
         cmocka_unit_test(test_closed_sheets_have_no_gaps),
         cmocka_unit_test(test_there_is_no_seam_and_no_pole),
+        cmocka_unit_test(test_wisps_lie_along_the_wind),
         cmocka_unit_test(test_details_stand_still_at_the_size_of_a_planet),
         cmocka_unit_test(test_wind_turns_the_shell),
         cmocka_unit_test(test_wide_pixels_see_means),

@@ -34,7 +34,7 @@ extern "C" {
 typedef enum nebel_cloud_kind {
     NEBEL_CLOUD_CUMULUS = 0, /* flat bases, heaped tops: 900 to 2700 m */
     NEBEL_CLOUD_STRATUS,     /* a sheet with gaps: 300 to 800 m */
-    NEBEL_CLOUD_CIRRUS,      /* thin wisps of ice: 8000 to 9500 m */
+    NEBEL_CLOUD_CIRRUS,      /* thin wisps of ice, drawn out along the wind: 8000 to 9500 m */
     NEBEL_CLOUD_KIND_COUNT
 } nebel_cloud_kind;
 

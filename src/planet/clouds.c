@@ -21,6 +21,10 @@
  * down and flat ones find best (test_clouds). */
 #define HIDDEN_PART 0.3f
 
+/* Wisps are so many times longer along the wind than across; billows in them. */
+#define DRAWN_OUT 4
+#define BILLOWS_DRAWN_OUT 10
+
 static const float billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
 
 /* ---- places ---------------------------------------------------------------------------------- */
@@ -63,6 +67,15 @@ static float octave_at(const nb_cloud_noise *noise, const nb_cloud_octave *octav
     return nb_gradient_noise(noise, at);
 }
 
+/* Places of wisps are drawn together along the wind, so that noise of them is as many times longer that way, and no slope larger. A
+ * quarter of the planet on, where that way is up, wisps are as wide as long. */
+static void draw_out(const nb_cloud_layer *layer, double times, double place[3])
+{
+    if (layer->kind != NEBEL_CLOUD_CIRRUS) return;
+    const double wind[3] = {-layer->axis[2], 0, layer->axis[0]}, shift = (1 / times - 1) * nb_vector_dot(place, wind);
+    for (int i = 0; i < 3; i++) place[i] += shift * wind[i];
+}
+
 /* Wisps: places are shoved about by noise of their own. */
 static void bend(const nb_cloud_noise *noise, const nb_cloud_layer *layer, double place[3])
 {
@@ -83,6 +96,7 @@ static float sum_octaves(const nb_cloud_noise *noise, const nb_cloud_layer *laye
     float sum = 0;
     *variance = 0;
     for (int i = 0; i < 3; i++) place[i] = unit[i] * layer->low;
+    draw_out(layer, DRAWN_OUT, place);
     if (layer->kind == NEBEL_CLOUD_CIRRUS && width < layer->octaves[2].cell) bend(noise, layer, place);
     for (int k = 0; k < NB_CLOUD_OCTAVES; k++) {
         const nb_cloud_octave *octave = &layer->octaves[k];
@@ -185,8 +199,9 @@ static void set_levels(const nb_cloud_layer *layer, float width, float levels[NB
 static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int scale, const double place[3],
                         float level)
 {
-    double at[3];
-    for (int i = 0; i < 3; i++) at[i] = place[(i + scale) % 3] * layer->per_billow[scale] + layer->billow_shift[i];
+    double at[3], drawn[3] = {place[0], place[1], place[2]};
+    draw_out(layer, BILLOWS_DRAWN_OUT, drawn);
+    for (int i = 0; i < 3; i++) at[i] = drawn[(i + scale) % 3] * layer->per_billow[scale] + layer->billow_shift[i];
     return nb_billows(noise, at, level);
 }
 
@@ -281,7 +296,7 @@ static const struct {
 } kinds[NEBEL_CLOUD_KIND_COUNT] = {
     [NEBEL_CLOUD_CUMULUS] = {900, 2700, 0.4, 0.05, 2200, 0.8, 0.3, 20, 0.07f},
     [NEBEL_CLOUD_STRATUS] = {300, 800, 0.85, 0.03, 2600, 0.35, 0.2, 14, 0.5f},
-    [NEBEL_CLOUD_CIRRUS] = {8000, 9500, 0.5, 4e-4, 9000, 0.5, 0.4, 40, 1.2f},
+    [NEBEL_CLOUD_CIRRUS] = {8000, 9500, 0.5, 4e-4, 6000, 0.9, 0.4, 40, 1.2f},
 };
 
 static void set_default(double *number, double value)
