@@ -210,6 +210,10 @@ static void test_all_densities(void **state)
 }
 
 /* Above the ground at the origin, of the Earth unless the file says otherwise, in the file's own terms. */
+#define ALTITUDE(scale_height)                                                                                         \
+    "{\"nebel\": 1, \"fog\": [{\"extinction\": 1, \"shape\": {\"type\": \"world\"}, \"density\": {\"type\": "          \
+    "\"altitude\", \"scale_height\": " #scale_height "}}]"
+
 static void test_altitudes(void **state)
 {
     (void)state;
@@ -220,12 +224,22 @@ static void test_altitudes(void **state)
         "\"density\": {\"type\": \"altitude\", \"scale_height\": 0.04, \"radius\": 2, \"base\": 0.003, \"below\": "
         "\"constant\"}}]}",
         "{\"nebel\": 1, \"up\": \"z\", \"fog\": [{\"extinction\": 1, \"shape\": {\"type\": \"world\"}, \"density\": "
-        "{\"type\": \"altitude\", \"scale_height\": 40, \"center\": [1, 2, 3]}}]}"};
+        "{\"type\": \"altitude\", \"scale_height\": 40, \"center\": [1, 2, 3]}}]}",
+        ALTITUDE(40) ", \"planet\": {\"preset\": \"mars\", \"model\": \"physical\"}}",
+        ALTITUDE(
+            0.04) ", \"planet\": [{\"model\": \"physical\", \"radius\": 500, \"center\": [1, 2, -490]}, {\"model\": "
+                  "\"physical\", \"preset\": \"moon\", \"center\": [0, 0, 9000]}], \"unit\": 1000, \"up\": \"z\"}",
+        ALTITUDE(40) ", \"planet\": {\"model\": \"layers\", \"radius\": 3000}}"};
     const nebel_density wanted[] = {
         {.scale_height = 40, .center = {0, -6.36e6, 0}, .radius = 6.36e6},
         {.scale_height = 40, .center = {0, -2000, 0}, .radius = 2000, .base = 3, .below = NEBEL_BELOW_CONSTANT},
-        {.scale_height = 40, .center = {1, 3, -2}, .radius = 6.36e6}};
-    for (int i = 0; i < 3; i++) {
+        {.scale_height = 40, .center = {1, 3, -2}, .radius = 6.36e6},
+        {.scale_height = 40,
+         .center = {0, -nebel_find_atmosphere("mars")->radius, 0},
+         .radius = nebel_find_atmosphere("mars")->radius},
+        {.scale_height = 40, .center = {1e3, -4.9e5, -2e3}, .radius = 5e5},
+        {.scale_height = 40, .center = {0, -3000, 0}, .radius = 3000}};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         nebel_scene *s;
         const nebel_density *density = &one(texts[i], &s)->density, *w = &wanted[i];
         assert_int_equal(density->type, NEBEL_DENSITY_ALTITUDE);

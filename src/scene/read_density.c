@@ -1,6 +1,8 @@
 /* Density profiles and phase functions. */
 #include "scene/scene_internal.h"
 
+#include <string.h>
+
 /* ---- density --------------------------------------------------------------------------------- */
 
 enum { TYPE, BASE, SCALE_HEIGHT, BELOW, FROM, TO, POWER, CENTER, SIGMA, DISTANCE, RADIUS, DENSITY_KEY_COUNT };
@@ -85,12 +87,15 @@ static bool read_members(nb_json *json, const nb_json_node *const *found, nebel_
            nb_value_number(json, found[RADIUS], &nb_range_extent, &density->radius);
 }
 
-/* The ball of the planet `earth`, in terms of the file; its ground, or that of a radius which is given, is at the origin. */
+/* The ball is that of the first planet, in terms of the file. Where that has no center the ground is at the origin. */
 static bool read_altitude(nb_scene_reader *in, const nb_json_node *const *found, nebel_density *density)
 {
-    density->radius = 6.36e6 / in->space.unit;
+    const nb_ball *const ball = &in->ball;
+    density->radius = ball->radius > 0 ? ball->radius : ball->preset_radius / in->space.unit;
     if (!read_members(in->json, found, density)) return false;
-    if (found[CENTER] == NULL) {
+    if (found[CENTER] == NULL && ball->has_center) {
+        memcpy(density->center, ball->center, sizeof density->center);
+    } else if (found[CENTER] == NULL) {
         density->center[1] = -density->radius * in->space.unit;
         nb_space_restore_place(&in->space, density->center);
     }

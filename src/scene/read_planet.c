@@ -114,6 +114,35 @@ static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, ne
     return true;
 }
 
+static bool is_text(const nb_json_node *node, const char *text)
+{
+    return node->type == NB_JSON_STRING && node->string_size == strlen(text) &&
+           memcmp(node->string, text, node->string_size) == 0;
+}
+
+static void find_center(const nb_json *json, const nb_json_node *node, nb_ball *ball)
+{
+    int i = 0;
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL && i < 3; one = nb_json_next(json, one))
+        ball->center[i++] = one->type == NB_JSON_NUMBER ? one->number : 0;
+    ball->has_center = i == 3;
+}
+
+nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet)
+{
+    nb_ball ball = {.preset_radius = nebel_find_atmosphere(presets[0].name)->radius};
+    const nb_json_node *const first =
+        planet != NULL && planet->type == NB_JSON_ARRAY ? nb_json_first(json, planet) : planet;
+    if (first == NULL || first->type != NB_JSON_OBJECT) return ball;
+    for (const nb_json_node *one = nb_json_first(json, first); one != NULL; one = nb_json_next(json, one)) {
+        for (size_t i = 0; i < sizeof presets / sizeof *presets && nb_value_is_key(one, "", "preset"); i++)
+            if (is_text(one, presets[i].name)) ball.preset_radius = nebel_find_atmosphere(presets[i].name)->radius;
+        if (nb_value_is_key(one, "", "radius") && one->type == NB_JSON_NUMBER) ball.radius = one->number;
+        if (nb_value_is_key(one, "", "center")) find_center(json, one, &ball);
+    }
+    return ball;
+}
+
 /* The core knows what numbers do not go with each other. */
 static bool try_planet(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {

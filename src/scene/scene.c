@@ -150,32 +150,35 @@ void nb_read_keep_message(nebel_result result, const char *message, void *user)
     snprintf(in->core_message, sizeof in->core_message, "%s", message);
 }
 
-/* What a file's numbers mean may stand behind them, and those are gone once they are read: a first reading looks for
- * that alone. What is wrong is left for the second one to say. */
+/* What a file's numbers mean, and over which planet fog is, may stand behind them, and those are gone once they are read: a first
+ * reading looks for that alone. What is wrong is left for the second one to say. */
 static bool take_space(nb_json *json, const nb_json_node *value, void *user)
 {
-    nb_space *space = user, wanted = *space;
+    nb_scene_reader *in = user;
+    nb_space *space = &in->space, wanted = *space;
     const nb_json_node *parent = nb_json_parent(json, value);
     if (parent == NULL || nb_json_parent(json, parent) != NULL) return true;
     if (nb_json_has_key(value, "up") && nb_read_up(json, value, &wanted)) space->z_up = wanted.z_up;
     if (nb_json_has_key(value, "unit") && nb_read_unit(json, value, &wanted)) space->unit = wanted.unit;
+    if (nb_json_has_key(value, "planet")) in->ball = nb_find_ball(json, value);
     return json->result == NEBEL_OK;
 }
 
-static nebel_result find_space(const nb_json_desc *whole, nb_space *space)
+static nebel_result find_space(const nb_json_desc *whole, nb_scene_reader *in)
 {
     nb_json json;
     nb_json_desc desc = *whole;
     desc.log = (nebel_log){NULL, NULL};
     desc.take = take_space;
-    desc.user = space;
+    desc.user = in;
     return nb_json_read(&json, &desc) == NEBEL_ERROR_MEMORY ? NEBEL_ERROR_MEMORY : NEBEL_OK;
 }
 
 static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size, const char *name, nb_save *save)
 {
     nb_json json;
-    nb_scene_reader in = {.json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS};
+    nb_scene_reader in = {
+        .json = &json, .scene = scene, .save = save, .space = NB_SPACE_OURS, .ball = nb_find_ball(NULL, NULL)};
     const nebel_fog_desc fog = {.allocator = scene->allocator, .log = {nb_read_keep_message, &in}};
     nb_json_desc desc = {.text = text,
                          .size = size,
@@ -188,7 +191,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     scene->folder = nb_path_folder(&scene->arena, name);
     nebel_result result = scene->folder != NULL ? nebel_create_fog(&fog, &in.trial) : NEBEL_ERROR_MEMORY;
     if (result != NEBEL_OK) return nb_fail(&scene->log, result, "%s: %s", name, nebel_result_text(result));
-    result = find_space(&desc, &in.space);
+    result = find_space(&desc, &in);
     desc.unit = in.space.unit;
     if (result == NEBEL_OK)
         result = nb_json_read(&json, &desc);

@@ -99,11 +99,19 @@ enum { NB_SCENE_SECTIONS = 16 };
 typedef struct nb_save nb_save;
 
 /* What reading needs beside the scene itself. */
+/* The ground of the scene's first planet as the file has it, for fog over it. */
+typedef struct nb_ball {
+    double preset_radius;     /* m */
+    double radius, center[3]; /* in terms of the file; 0: the preset's */
+    bool has_center;
+} nb_ball;
+
 typedef struct nb_scene_reader {
     nb_json *json;
     nebel_scene *scene;
-    nb_save *save;                             /* what is to be written in the file; NULL: nothing */
-    nb_space space;                            /* of the file's numbers */
+    nb_save *save;  /* what is to be written in the file; NULL: nothing */
+    nb_space space; /* of the file's numbers */
+    nb_ball ball;
     const nb_fog_node *node;                   /* of a model, whose fog is being read; NULL: the scene's own */
     nebel_fog *trial;                          /* takes every volume once, for the core's own checks */
     char core_message[512];                    /* what the core said about the last one */
@@ -121,6 +129,9 @@ bool nb_read_background(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_ambient(nb_scene_reader *in, const nb_json_node *node);
 /* The light of the planet's air at the scene's origin, for the sun of the contents. Errors: MEMORY. */
 nebel_result nb_planet_light(nebel_scene *scene);
+
+/* Without a planet that of the preset `earth`. What is wrong is left for nb_read_planet to say. */
+nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet);
 
 bool nb_read_sun(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_light(nb_scene_reader *in, const nb_json_node *node);
