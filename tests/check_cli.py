@@ -921,6 +921,17 @@ class InfoTest(PictureCase):
         self.assertIn("visibility: 60 m", nebel("info", scene).out)
         self.assertIn("visibility: no end", nebel("info", self.write_scene("none.json", [])).out)
 
+    def test_visibility_in_air(self):
+        """Of air that is as good as even: -ln(0.05) mean free paths; fog takes its part; and air is no lack of fog."""
+        planet = {"model": "physical", "radius": 1e9, "thickness": 1e6,
+                  "airs": [{"type": "exponential", "scattering": 1e-4, "scale_height": 1e9}]}
+        camera = {"position": [0, 1000, 0], "look_at": [1, 1000, 0]}
+        for fog, wanted in (([], -math.log(0.05) / 1e-4),
+                            ([{"shape": {"type": "world"}, "extinction": 3e-4, "source": 1}], -math.log(0.05) / 4e-4)):
+            out = nebel("info", self.write_scene("air.json", fog, planet=planet, camera=camera)).out
+            self.assertAlmostEqual(float(re.search(r"visibility: (\S+) m", out)[1]), wanted, delta=1e-3 * wanted)
+            self.assertNotIn("warning", out)
+
     def test_what_looks_like_a_mistake(self):
         scene = self.write_scene("odd.json", [
             {"name": "ghost", "shape": BOX, "extinction": 0}, {"shape": BOX, "extinction": 5},

@@ -213,8 +213,36 @@ static void print_cells(const nebel_cells_desc *cells)
         (void)printf("portals wherever they touch\n");
 }
 
-/* Where 5 % of the light of the green channel is left, straight ahead: the meteorological range in uniform fog. NaN:
- * unknown. */
+/* The part of the light of the green channel that is left. */
+#define VISIBLE 0.05
+
+/* What fog and the air of all planets leave up to a distance. */
+static double left_at(const nebel_scene_data *scene, const nebel_snapshot *fog, nebel_ray ray, double distance)
+{
+    nebel_light light;
+    ray.t_max = distance;
+    double left = nebel_trace(fog, NULL, 1, &ray, 0, &light, 0) == NEBEL_OK ? light.transmittance[1] : 0;
+    for (size_t i = 0; i < scene->planet_count; i++)
+        if (scene->planets[i].atmosphere != NULL &&
+            nebel_trace_air(scene->planets[i].atmosphere, NULL, 1, &ray, 0, &light, 0) == NEBEL_OK)
+            left *= light.transmittance[1];
+    return left;
+}
+
+/* Nearer than where fog alone leaves as much. It falls all the way, so that halves of the way are told apart, by their logarithms. */
+static double visibility_in_air(const nebel_scene_data *scene, const nebel_snapshot *fog, const nebel_ray *ray,
+                                double by_fog)
+{
+    double near = fmin(1e-6, by_fog), far = fmin(1e12, by_fog);
+    if (left_at(scene, fog, *ray, far) > VISIBLE) return by_fog;
+    for (int i = 0; i < 60; i++) {
+        const double middle = sqrt(near * far);
+        *(left_at(scene, fog, *ray, middle) > VISIBLE ? &near : &far) = middle;
+    }
+    return far;
+}
+
+/* Where so much is left straight ahead: the meteorological range in uniform fog. NaN: unknown. */
 static double visibility_of(const nebel_scene_data *scene, const nebel_snapshot *fog)
 {
     const nebel_camera *const camera = &scene->camera;
@@ -224,8 +252,9 @@ static double visibility_of(const nebel_scene_data *scene, const nebel_snapshot 
         ray.direction[axis] = camera->look_at[axis] - camera->position[axis];
     }
     double distance;
-    const nebel_result result = nebel_find_transmittance(fog, 0.05, 1, 1, &ray, sizeof ray, &distance);
-    return result == NEBEL_OK ? distance : (double)NAN;
+    const nebel_result result = nebel_find_transmittance(fog, VISIBLE, 1, 1, &ray, sizeof ray, &distance);
+    if (result != NEBEL_OK) return (double)NAN;
+    return scene->planet_count > 0 ? visibility_in_air(scene, fog, &ray, distance) : distance;
 }
 
 static void print_visibility(double visibility)
@@ -294,7 +323,8 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
 {
     size_t volumes = 0;
     for (size_t i = 0; i < scene->volume_count; i++) volumes += scene->volumes[i].operation != NEBEL_OPERATION_EXCLUDE;
-    if (volumes == 0 && scene->nebula_count == 0 && scene->cells == NULL) (void)printf("warning: there is no fog\n");
+    if (volumes == 0 && scene->nebula_count == 0 && scene->cells == NULL && scene->planet_count == 0)
+        (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
     if (scene->mesh_count > 0 && !is_lit(scene))
         (void)printf("warning: no sun, no lamps and no ambient light: the models are black\n");
