@@ -235,7 +235,7 @@ static void light_is_that_of_T40(void **state)
     expect_near("Rayleigh", 4 * PI * gather(small, 0, 0, 0, 2), 0.05320320237142445, 1e-6);
     expect_near("from above", 4 * PI * gather(small, 5e5, 180, 0, 0), 0.05652699014088097, 1e-6);
     nebel_destroy_atmosphere(small);
-    desc.airs[0] = (nebel_air){.absorption = {1.2e-6}, .profile = NEBEL_AIR_LAYER, .center = 2.5e5, .width = 2.5e5};
+    desc.airs[0] = (nebel_air){.absorption = {1.2e-6}, .profile = NEBEL_AIR_LAYER, .middle = 2.5e5, .width = 2.5e5};
     desc.airs[1] = (nebel_air){.scattering = {0, 1e-6, 0}, .scale_height = 1e15};
     nebel_atmosphere *odd = make(&desc);
     nb_track_depth(&odd->airs, (nb_track){1e6, 1e6}, 5e5, depth);
@@ -256,7 +256,7 @@ static const nebel_atmosphere_desc measured = {.radius = 6.36e6,
                                                          .scale_height = 1200},
                                                         {.absorption = {0.6497166e-6, 1.8809e-6, 0.08501668e-6},
                                                          .profile = NEBEL_AIR_LAYER,
-                                                         .center = 25000,
+                                                         .middle = 25000,
                                                          .width = 15000}},
                                                .air_count = 3,
                                                .ground_albedo = {0.1, 0.1, 0.1}};

@@ -155,9 +155,15 @@ static void test_what_is_wrong(void **state)
         {FORMAT, PHYSICAL("\"radius\": `-6e6"), "planet.radius: is -6000000; must be"},
         {FORMAT, PHYSICAL("\"thickness\": `0"), "planet.thickness: is 0; must be"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 6}"),
-         "planet: thickness: must be within a millionth of the radius and 1e12"},
+         "planet: thickness: is 6; must be within 6.36 (a millionth of the radius) and 1e+12"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 1e8}"),
-         "planet: airs[0] scale_height: must be within a thousandth of the thickness"},
+         "planet: airs[0] scale_height: is 8000; must be within 100000 (a thousandth of the thickness) and 1e+15; "
+         "these "
+         "airs are the preset's"},
+        {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 9000}"),
+         "planet: airs[2] middle: is 25000; must be within 0 (the ground) and 9000; these airs are the preset's"},
+        {FORMAT, SCENE("", "`{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": 1}]}"),
+         "planet: airs[0] scale_height: is 1; must be within 100 (a thousandth of the thickness) and 1e+15"},
         {FORMAT, PHYSICAL("\"center\": [0, `2e15, 0]"), "planet.center[1]: is 2e+15"},
         {FORMAT, PHYSICAL("\"center\": `[0, 0]"), "planet.center: has 2 elements"},
         {FORMAT, PHYSICAL("\"ground_albedo\": `1.5"), "planet.ground_albedo: is 1.5"},

@@ -278,7 +278,7 @@ static void change_air(nebel_air *air)
     }
     air->phase = (nebel_phase){.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = air->phase.g / 2 + .25};
     if (air->profile == NEBEL_AIR_EXPONENTIAL) air->scale_height *= 1.5;
-    if (air->profile == NEBEL_AIR_LAYER) air->center *= .75, air->width *= .75;
+    if (air->profile == NEBEL_AIR_LAYER) air->middle *= .75, air->width *= .75;
 }
 
 /* Of layers that are one above the other, all of them, so that they stay apart. */

@@ -33,7 +33,7 @@ extern "C" {
 
 typedef enum nebel_air_profile {
     NEBEL_AIR_EXPONENTIAL = 0, /* e^(-height / scale_height) */
-    NEBEL_AIR_LAYER,           /* 1 at `center`, falling to 0 at center - width and center + width in straight lines */
+    NEBEL_AIR_LAYER,           /* 1 at `middle`, falling to 0 at middle - width and middle + width in straight lines */
     NEBEL_AIR_PROFILE_COUNT
 } nebel_air_profile;
 
@@ -44,7 +44,7 @@ typedef struct nebel_air {
     nebel_phase phase;
     nebel_air_profile profile;
     double scale_height;  /* EXPONENTIAL: m, at least thickness / NEBEL_MAX_AIR_RATIO */
-    double center, width; /* LAYER: m above the ground, and m, at least as much */
+    double middle, width; /* LAYER: m above the ground, and m, at least as much */
 } nebel_air;
 
 /* How much work goes into the table of light that was scattered more than once. */

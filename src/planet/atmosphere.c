@@ -20,7 +20,7 @@ static void resolve_air(const nebel_air *desc, nb_air *air)
 {
     air->phase = nb_phase_resolve(&desc->phase);
     air->scale = desc->profile == NEBEL_AIR_EXPONENTIAL ? desc->scale_height : 0;
-    air->center = desc->center;
+    air->center = desc->middle;
     air->width = desc->width;
     for (int c = 0; c < 3; c++) {
         air->scattering[c] = desc->scattering[c];

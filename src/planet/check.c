@@ -2,7 +2,7 @@
 
 #include "media/phase.h"
 
-#include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
@@ -18,52 +18,73 @@ nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
     return whole;
 }
 
-static int all_within(const double numbers[3], double least, double most)
+/* What is said of: "airs[2] " or "" where it is no kind of air. */
+typedef struct subject {
+    const nebel_log *log;
+    char name[16];
+} subject;
+
+static nebel_result refuse(const subject *of, const char *what, const char *fault)
 {
-    for (int c = 0; c < 3; c++)
-        if (!(numbers[c] >= least && numbers[c] <= most)) return 0;
-    return 1;
+    return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: %s", of->name, what, fault);
 }
 
-static const char *find_air_fault(const nebel_air *air, double thickness)
+/* `bound` says what the least is, or the most: "". */
+static nebel_result check(const subject *of, const char *what, double number, double least, double most,
+                          const char *bound)
 {
-    if (!all_within(air->scattering, 0, NEBEL_MAX_AIR_EXTINCTION)) return "scattering: must be within 0 and 1e3";
-    if (!all_within(air->absorption, 0, NEBEL_MAX_AIR_EXTINCTION)) return "absorption: must be within 0 and 1e3";
+    if (number >= least && number <= most) return NEBEL_OK;
+    return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: is %g; must be within %g%s and %g", of->name, what,
+                   number, least, bound, most);
+}
+
+static nebel_result check_all(const subject *of, const char *what, const double numbers[3], double least, double most)
+{
+    nebel_result result = NEBEL_OK;
+    for (int c = 0; c < 3 && result == NEBEL_OK; c++) result = check(of, what, numbers[c], least, most, "");
+    return result;
+}
+
+static nebel_result check_profile(const subject *of, const nebel_air *air, double thickness)
+{
+    static const char thousandth[] = " (a thousandth of the thickness)";
+    const double least = thickness / NEBEL_MAX_AIR_RATIO;
+    nebel_result result;
     switch (air->profile) {
     case NEBEL_AIR_EXPONENTIAL:
-        if (!(air->scale_height >= thickness / NEBEL_MAX_AIR_RATIO && air->scale_height <= NEBEL_MAX_LENGTH))
-            return "scale_height: must be within a thousandth of the thickness and 1e15";
-        break;
+        return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, thousandth);
     case NEBEL_AIR_LAYER:
-        if (!(air->center >= 0 && air->center <= thickness)) return "center: must be within 0 and the thickness";
-        if (!(air->width >= thickness / NEBEL_MAX_AIR_RATIO && air->width <= NEBEL_MAX_LENGTH))
-            return "width: must be within a thousandth of the thickness and 1e15";
-        break;
+        result = check(of, "middle", air->middle, 0, thickness, " (the ground)");
+        return result == NEBEL_OK ? check(of, "width", air->width, least, NEBEL_MAX_LENGTH, thousandth) : result;
     default:
-        return "profile: is unknown";
+        return refuse(of, "profile", "is unknown");
     }
-    return nb_phase_fault(&air->phase);
 }
 
-static const char *find_fault(const nebel_atmosphere_desc *desc)
+static nebel_result check_air(const subject *of, const nebel_air *air, double thickness)
 {
-    if (!all_within(desc->ground, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH)) return "ground: must be within -1e15 and 1e15";
-    if (!(desc->radius >= 1 && desc->radius <= 1e12)) return "radius: must be within 1 and 1e12";
-    if (!(desc->thickness >= desc->radius / 1e6 && desc->thickness <= 1e12))
-        return "thickness: must be within a millionth of the radius and 1e12";
-    if (desc->air_count > NEBEL_MAX_AIRS) return "air_count: must be at most 4";
-    if (!all_within(desc->ground_albedo, 0, 1)) return "ground_albedo: must be within 0 and 1";
-    if (!((int)desc->quality >= 0 && desc->quality < NEBEL_AIR_QUALITY_COUNT)) return "quality: is unknown";
-    return NULL;
+    nebel_result result = check_all(of, "scattering", air->scattering, 0, NEBEL_MAX_AIR_EXTINCTION);
+    if (result == NEBEL_OK) result = check_all(of, "absorption", air->absorption, 0, NEBEL_MAX_AIR_EXTINCTION);
+    if (result == NEBEL_OK) result = check_profile(of, air, thickness);
+    if (result != NEBEL_OK) return result;
+    const char *fault = nb_phase_fault(&air->phase);
+    return fault == NULL ? NEBEL_OK : nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s", of->name, fault);
 }
 
 nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
-    const char *fault = find_fault(desc);
-    if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "atmosphere: %s", fault);
-    for (uint32_t i = 0; i < desc->air_count; i++) {
-        fault = find_air_fault(&desc->airs[i], desc->thickness);
-        if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "atmosphere: airs[%u] %s", (unsigned)i, fault);
+    subject of = {&desc->log, ""};
+    nebel_result result = check_all(&of, "ground", desc->ground, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
+    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, "");
+    if (result == NEBEL_OK)
+        result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, " (a millionth of the radius)");
+    if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1);
+    if (result != NEBEL_OK) return result;
+    if (desc->air_count > NEBEL_MAX_AIRS) return refuse(&of, "air_count", "must be at most 4");
+    if ((int)desc->quality < 0 || desc->quality >= NEBEL_AIR_QUALITY_COUNT) return refuse(&of, "quality", "is unknown");
+    for (uint32_t i = 0; i < desc->air_count && result == NEBEL_OK; i++) {
+        (void)snprintf(of.name, sizeof of.name, "airs[%u] ", (unsigned)i);
+        result = check_air(&of, &desc->airs[i], desc->thickness);
     }
-    return NEBEL_OK;
+    return result;
 }

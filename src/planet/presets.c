@@ -34,7 +34,7 @@ static const struct {
             .absorption = OF_MILLION(0.444, 0.444, 0.444),
             .phase = {.type = NEBEL_PHASE_CORNETTE_SHANKS, .g = 0.8},
             .scale_height = 1200},
-           {.absorption = OF_MILLION(0.65, 1.881, 0.085), .profile = NEBEL_AIR_LAYER, .center = 25000, .width = 15000}},
+           {.absorption = OF_MILLION(0.65, 1.881, 0.085), .profile = NEBEL_AIR_LAYER, .middle = 25000, .width = 15000}},
       .air_count = 3,
       .ground_albedo = ALIKE(0.3)}},
     /* Carbon dioxide of 610 Pa at 210 K, with the cross section of Sneep and Ubachs 2005 at 532 nm and the fourth power

@@ -37,7 +37,7 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air *a
         !nb_value_amount(json, found[ABSORPTION], &amount_range, air->absorption) ||
         !nb_read_phase(in, found[PHASE], &air->phase) ||
         !nb_value_number(json, found[SCALE_HEIGHT], &length_range, &air->scale_height) ||
-        !nb_value_number(json, found[MIDDLE], &middle_range, &air->center) ||
+        !nb_value_number(json, found[MIDDLE], &middle_range, &air->middle) ||
         !nb_value_number(json, found[WIDTH], &length_range, &air->width))
         return false;
     air->profile = (nebel_air_profile)type;
@@ -46,7 +46,7 @@ static bool read_air(nb_scene_reader *in, const nb_json_node *node, nebel_air *a
         air->absorption[c] /= in->space.unit;
     }
     air->scale_height *= in->space.unit;
-    air->center *= in->space.unit;
+    air->middle *= in->space.unit;
     air->width *= in->space.unit;
     return true;
 }
@@ -144,7 +144,7 @@ nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet)
 }
 
 /* The core knows what numbers do not go with each other. */
-static bool try_planet(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
+static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_airs, nebel_planet *planet)
 {
     static const char subject[] = "atmosphere: ";
     planet->air.log = (nebel_log){nb_read_keep_message, in};
@@ -153,7 +153,9 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
-    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s", message);
+    const bool is_of_preset = !has_airs && strncmp(message, "airs[", 5) == 0;
+    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s%s", message,
+                        is_of_preset ? "; these airs are the preset's: give \"airs\" that go with the other keys" : "");
 }
 
 static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
@@ -168,7 +170,7 @@ static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_p
     const int quality = found[QUALITY] != NULL ? nb_value_choice(json, found[QUALITY], quality_names, 2) : 0;
     if (quality < 0) return false;
     planet->air.quality = (nebel_air_quality)quality;
-    return try_planet(in, node, planet) && nb_read_clouds(in, found[CLOUDS], planet);
+    return try_planet(in, node, found[AIRS] != NULL, planet) && nb_read_clouds(in, found[CLOUDS], planet);
 }
 
 /* The model says which keys there may be. */

@@ -23,7 +23,7 @@ static const nb_place air_places[] = {
     PLACE(nebel_air, "scattering", scattering, 3, NB_EDIT_AMOUNT),
     PLACE(nebel_air, "absorption", absorption, 3, NB_EDIT_AMOUNT),
     NUMBER(nebel_air, scale_height),
-    PLACE(nebel_air, "middle", center, 1, NB_EDIT_EACH),
+    PLACE(nebel_air, "middle", middle, 1, NB_EDIT_EACH),
     NUMBER(nebel_air, width),
     END,
 };
@@ -77,7 +77,7 @@ static void restore_air(const nb_space *space, nebel_air *air)
         air->absorption[c] *= space->unit;
     }
     air->scale_height /= space->unit;
-    air->center /= space->unit;
+    air->middle /= space->unit;
     air->width /= space->unit;
 }
 

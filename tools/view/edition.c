@@ -507,7 +507,7 @@ static int are_same_airs(const nebel_atmosphere_desc *a, const nebel_atmosphere_
     for (uint32_t i = 0; i < a->air_count; i++) {
         const nebel_air *const from = &a->airs[i], *const to = &b->airs[i];
         if (!HAS_SAME(from, to, nebel_air, scattering, phase) || !is_same_phase(&from->phase, &to->phase) ||
-            from->scale_height != to->scale_height || from->center != to->center || from->width != to->width)
+            from->scale_height != to->scale_height || from->middle != to->middle || from->width != to->width)
             return 0;
     }
     return 1;

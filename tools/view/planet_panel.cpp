@@ -64,7 +64,7 @@ bool draw_air(nebel_air *air)
         changed |=
             drag_length("scale height", &air->scale_height, "Where it is 1 / e = 0.37 as dense as at the ground.");
     if (air->profile == NEBEL_AIR_LAYER) {
-        changed |= drag("middle", &air->center, 1, 1, 0, "%.4g m", "Above the ground: where it is densest.");
+        changed |= drag("middle", &air->middle, 1, 1, 0, "%.4g m", "Above the ground: where it is densest.");
         changed |= drag_length("width", &air->width, "From its middle to either end.");
     }
     if (phase == NEBEL_PHASE_HENYEY_GREENSTEIN || phase == NEBEL_PHASE_CORNETTE_SHANKS || phase == NEBEL_PHASE_DRAINE)
