@@ -59,7 +59,7 @@ static void test_everything_it_may_say(void **state)
     assert_number(air[0].scale_height, 500);
     assert_int_equal(air[1].profile, NEBEL_AIR_LAYER);
     assert_number(air[1].absorption[0], 4e-3);
-    assert_number(air[1].center, 3000);
+    assert_number(air[1].middle, 3000);
     assert_number(air[1].width, 1000);
     nebel_destroy_scene(scene);
 }
@@ -161,7 +161,7 @@ static void test_what_is_wrong(void **state)
          "these "
          "airs are the preset's"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 9000}"),
-         "planet: airs[2] middle: is 25000; must be within 0 (the ground) and 9000; these airs are the preset's"},
+         "planet: airs[2] middle: is 25000; must be within 0 and 9000 (the thickness); these airs are the preset's"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": 1}]}"),
          "planet: airs[0] scale_height: is 1; must be within 100 (a thousandth of the thickness) and 1e+15"},
         {FORMAT, PHYSICAL("\"center\": [0, `2e15, 0]"), "planet.center[1]: is 2e+15"},

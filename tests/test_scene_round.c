@@ -565,7 +565,7 @@ static void same_air(const nebel_air *a, const nebel_air *b)
     WHOLE(a->phase.type, b->phase.type);
     SAME(&a->phase.g, &b->phase.g);
     SAME(&a->scale_height, &b->scale_height);
-    SAME(&a->center, &b->center);
+    SAME(&a->middle, &b->middle);
     SAME(&a->width, &b->width);
 }
 

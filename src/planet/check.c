@@ -29,19 +29,19 @@ static nebel_result refuse(const subject *of, const char *what, const char *faul
     return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: %s", of->name, what, fault);
 }
 
-/* `bound` says what the least is, or the most: "". */
+/* `least_is` and `most_is` say what these are: "". */
 static nebel_result check(const subject *of, const char *what, double number, double least, double most,
-                          const char *bound)
+                          const char *least_is, const char *most_is)
 {
     if (number >= least && number <= most) return NEBEL_OK;
-    return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: is %g; must be within %g%s and %g", of->name, what,
-                   number, least, bound, most);
+    return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: is %g; must be within %g%s and %g%s", of->name, what,
+                   number, least, least_is, most, most_is);
 }
 
 static nebel_result check_all(const subject *of, const char *what, const double numbers[3], double least, double most)
 {
     nebel_result result = NEBEL_OK;
-    for (int c = 0; c < 3 && result == NEBEL_OK; c++) result = check(of, what, numbers[c], least, most, "");
+    for (int c = 0; c < 3 && result == NEBEL_OK; c++) result = check(of, what, numbers[c], least, most, "", "");
     return result;
 }
 
@@ -52,10 +52,10 @@ static nebel_result check_profile(const subject *of, const nebel_air *air, doubl
     nebel_result result;
     switch (air->profile) {
     case NEBEL_AIR_EXPONENTIAL:
-        return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, thousandth);
+        return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, thousandth, "");
     case NEBEL_AIR_LAYER:
-        result = check(of, "middle", air->middle, 0, thickness, " (the ground)");
-        return result == NEBEL_OK ? check(of, "width", air->width, least, NEBEL_MAX_LENGTH, thousandth) : result;
+        result = check(of, "middle", air->middle, 0, thickness, "", " (the thickness)");
+        return result == NEBEL_OK ? check(of, "width", air->width, least, NEBEL_MAX_LENGTH, thousandth, "") : result;
     default:
         return refuse(of, "profile", "is unknown");
     }
@@ -75,9 +75,9 @@ nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
     subject of = {&desc->log, ""};
     nebel_result result = check_all(&of, "ground", desc->ground, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
-    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, "");
+    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, "", "");
     if (result == NEBEL_OK)
-        result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, " (a millionth of the radius)");
+        result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, " (a millionth of the radius)", "");
     if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1);
     if (result != NEBEL_OK) return result;
     if (desc->air_count > NEBEL_MAX_AIRS) return refuse(&of, "air_count", "must be at most 4");
