@@ -303,6 +303,41 @@ static void test_transmittance_is_that_of_the_density(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* Thin cloud around the eye: what a ray's transmittance is off by its neighbour's is off by, too. It is not where a long step is
+ * taken for exact whose three values lie on a line by chance, or goes over a wisp: then lines and terraces are seen. */
+static void test_no_lines_in_thin_clouds(void **state)
+{
+    (void)state;
+    enum { WIDE = 160, HIGH = 40 };
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1, .coverage = .7}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    double worst = 0, sum = 0, last = 0;
+    int between = 0;
+    for (int i = 0; i < WIDE * HIGH; i++) {
+        const double x = -.25 + .7 * (i % WIDE) / WIDE, y = .2 + .35 * (double)(i / WIDE) / HIGH;
+        const double length = sqrt(x * x + y * y + 1);
+        const nebel_ray ray = {{0, 1359.375, 0}, {x / length, y / length, -1 / length}, 300};
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_OK);
+        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        const double truth = brute_force(clouds, &ray, 0, 300, 1), step = fabs(left - truth - last);
+        last = left - truth;
+        between += truth > .02 && truth < .98;
+        if (i % WIDE == 0) continue;
+        worst = fmax(worst, step);
+        sum += step / (WIDE * HIGH);
+    }
+    print_message("thin clouds around the eye, %d of %d rays within: neighbours off by %.2g more or less at most, %.2g "
+                  "in the mean\n",
+                  between, WIDE * HIGH, worst, sum);
+    /* Ten times what all of a ray may be off by: the pieces of one place are a few, each within that. */
+    assert_true(between > WIDE * HIGH / 2 && worst < 10 * NEBEL_DEFAULT_TOLERANCE);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* Through pixels that hide heaps as much comes as through many thin rays within them: in the mean over 120 pixels from
  * 400 km above the ground, straight down and aslant. */
 static void compare_wide_pixels(const nebel_cloud_layer *layer)
@@ -774,6 +809,7 @@ int main(void)
         cmocka_unit_test(test_wind_turns_the_shell),
         cmocka_unit_test(test_wide_pixels_see_means),
         cmocka_unit_test(test_transmittance_is_that_of_the_density),
+        cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_wide_pixels_let_as_much_through),
         cmocka_unit_test(test_order_of_rays_makes_no_difference),
         cmocka_unit_test(test_light_of_slabs),

@@ -25,8 +25,14 @@
 /* The first step from a piece towards the sun: optical depth in the middle of clouds; half of the least piece at most. */
 #define FIRST_DEPTH 0.3
 
-/* Where there may be cloud and is none, of a sixteenth of the smallest heaps. */
-#define LEAST_STEP 0.5
+/* Where there may be cloud and is none, of a sixteenth of the smallest heaps: near, where wisps are many pixels wide, and where a
+ * pixel is half a step. */
+#define LEAST_STEP 0.2
+#define FAR_STEP 0.5
+
+/* The first piece of who stands within cloud, of the same: small billows are shorter, and three values of a longer piece may lie on
+ * a line by chance. Later ones have grown from pieces that were smooth. */
+#define FIRST_STEP 0.1
 
 /* Pixels may be wider than a layer is high: parts of the ray's stay in it that steps, and the least pieces, do not exceed. */
 #define STAY_STEP 0.16
@@ -240,7 +246,9 @@ static double skip(const nb_walk *walk, int k, double t, double end, double long
                 continue;
             }
         }
-        const double step = nb_max(LEAST_STEP * walk->least, nb_min(0.7 * walk->spread * t, longest));
+        const double width = walk->spread * t,
+                     near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
+        const double step = nb_max(near, nb_min(0.7 * width, longest));
         *length = nb_min(end - t, nb_max(clear / SLOPE_PART, step));
         spot = spot_at(walk, k, t + *length);
         *far = extinction_of(walk, k, &spot, &clear);
@@ -263,7 +271,7 @@ static double curve_of(const nb_cloud_seen *here, const nb_cloud_seen *middle, c
 static void walk_layer(nb_walk *walk, int k, double begin, double end)
 {
     const double tolerance = PIECES * walk->view->tolerance, whole = end - begin;
-    double t = begin, length = walk->least;
+    double t = begin, length = FIRST_STEP * walk->least;
     nb_cloud_seen here = look(walk, k, t), far = {0, 0};
     int has_far = 0;
     for (int i = 0; i < MOST_PIECES && t < end && nb_exp(-walk->apart) > UNSEEN; i++) {
