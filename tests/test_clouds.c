@@ -712,6 +712,7 @@ static void test_bad_layers_are_refused(void **state)
                                      {.extinction = HUGE_VAL},
                                      {.size = none},
                                      {.size = 1e10},
+                                     {.size = 4.001 * RADIUS},
                                      {.detail = 1.1},
                                      {.detail = -.5},
                                      {.variation = 2},

@@ -28,6 +28,7 @@ extern "C" {
 #define NEBEL_MAX_AIR_SHADES 6
 #define NEBEL_MAX_FOG_SHADES 32
 #define NEBEL_MAX_CLOUD_RATIO 1e6 /* of the air's thickness to a layer's */
+#define NEBEL_MAX_CLOUD_RADII 4.  /* of the planet to a layer's size */
 #define NEBEL_CLOUD_NONE (-1.)    /* where 0 would mean the number of the kind */
 
 /* What a layer looks like, and its numbers where none are given. */
@@ -45,7 +46,8 @@ typedef struct nebel_cloud_layer {
     double base, top;  /* m above the ground, more than 0, base < top, within the air */
     double coverage;   /* part of the planet under clouds, 0 to 1; of cumulus before detail is cut out */
     double extinction; /* 1/m in their middle, to NEBEL_MAX_AIR_EXTINCTION */
-    double size;       /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9 */
+    double
+        size; /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9, at most NEBEL_MAX_CLOUD_RADII */
     double detail;     /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */
     double variation;  /* how much more clouds are here than there, over ten sizes and more, to 1, or NONE */
     double diameter;   /* um, of drops: 5 to 50 */

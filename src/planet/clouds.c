@@ -473,6 +473,11 @@ static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *laye
         const nebel_result result =
             nebel_resolve_cloud_layer(airs->top - airs->radius, &desc->layers[i], &desc->log, &layers[i]);
         if (result != NEBEL_OK) return result;
+        /* Larger ones do not change over the planet but by what is left of rounding. */
+        if (layers[i].size > NEBEL_MAX_CLOUD_RADII * airs->radius)
+            return nb_fail(&desc->log, NEBEL_ERROR_VALUE,
+                           "clouds: layers[%u] size: is %g; must be at most %g (4 radii)", (unsigned)i, layers[i].size,
+                           NEBEL_MAX_CLOUD_RADII * airs->radius);
         for (uint32_t k = 0; k < i; k++)
             if (overlap(&layers[k], &layers[i]))
                 return nb_fail(

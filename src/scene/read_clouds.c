@@ -20,7 +20,7 @@ static bool read_part(nb_json *json, const nb_json_node *node, double *value)
 static bool read_numbers(nb_scene_reader *in, const nb_json_node *const *found, nebel_cloud_layer *layer)
 {
     static const nb_range height_range = {
-        .low = 0, .high = 1e12, .open = true, .dimension = NB_LENGTH, .text = "a height above the ground"};
+        .low = 1e-15, .high = 1e12, .dimension = NB_LENGTH, .text = "a height above the ground"};
     static const nb_range size_range = {.low = 1e-3, .high = 1e9, .dimension = NB_LENGTH, .text = "a length"};
     static const nb_range amount_range = {
         .low = 1e-12, .high = NEBEL_MAX_AIR_EXTINCTION, .dimension = NB_PER_LENGTH, .text = "an amount"};
@@ -74,6 +74,14 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
     return true;
 }
 
+static bool check_size(nb_json *json, const nb_json_node *node, const nebel_planet *planet, double size)
+{
+    const double most = NEBEL_MAX_CLOUD_RADII * planet->air.radius;
+    return size <= most || nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
+                                        "size: is %g m; must be at most %g m, which is %g of the radius", size, most,
+                                        NEBEL_MAX_CLOUD_RADII);
+}
+
 /* Of no coverage: no layer. */
 static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
@@ -92,7 +100,7 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     nebel_cloud_layer resolved;
     if (!try_layer(in, node, planet->air.thickness, layer, &resolved)) return false;
     if (found[COVERAGE] != NULL && layer->coverage == 0) return true;
-    if (!check_apart(in, node, planet, &resolved)) return false;
+    if (!check_size(json, node, planet, resolved.size) || !check_apart(in, node, planet, &resolved)) return false;
     planet->cloud_layer_count++;
     in->scene->data.moves_on |= layer->wind[0] != 0 || layer->wind[1] != 0;
     return true;
