@@ -171,6 +171,42 @@ static void rays_may_end_within_the_air(void **state)
     nebel_destroy_atmosphere(air);
 }
 
+/* Under air that is thinner than float's digits of the way to it, rays that end at the ground pass all of it. */
+static void thin_air_is_passed_up_to_the_ground(void **state)
+{
+    (void)state;
+    enum { COUNT = 100 };
+    const nebel_atmosphere_desc desc = {
+        .thickness = 6.4, .airs = {{.scattering = {.2, .3, .5}, .scale_height = .8}}, .air_count = 1};
+    const nebel_air_view_desc from = {
+        .position = {0, 2e7, 0}, .sun = {.direction = {0, 1, 0}, .irradiance = {1, 1, 1}}, .has_distances = 1};
+    nebel_air_view_desc whole = from;
+    nebel_atmosphere *atmosphere;
+    nebel_air_view *view;
+    double direction[3][COUNT];
+    float distance[COUNT], left[2][3][COUNT], light[2][3][COUNT];
+    const double *const along[3] = {direction[0], direction[1], direction[2]};
+    assert_int_equal(nebel_create_atmosphere(&desc, &atmosphere), NEBEL_OK);
+    whole.atmosphere = atmosphere;
+    assert_int_equal(nebel_create_air_view(&whole, &view), NEBEL_OK);
+    for (int i = 0; i < COUNT; i++) {
+        direction[0][i] = .0023 * i;
+        direction[1][i] = -1;
+        direction[2][i] = .0001 * i;
+    }
+    assert_int_equal(nebel_find_ground(view, COUNT, along, &(nebel_ground_planes){.distance = distance}), NEBEL_OK);
+    for (int k = 0; k < 2; k++) {
+        const nebel_light_planes lights = {.transmittance = {left[k][0], left[k][1], left[k][2]},
+                                           .in_scattering = {light[k][0], light[k][1], light[k][2]}};
+        assert_int_equal(nebel_trace_air_view(view, COUNT, along, k == 0 ? distance : NULL, &lights), NEBEL_OK);
+    }
+    assert_true(left[1][2][0] < .9f && left[1][2][0] > .1f);
+    assert_memory_equal(left[0], left[1], sizeof left[0]);
+    assert_memory_equal(light[0], light[1], sizeof light[0]);
+    nebel_destroy_air_view(view);
+    nebel_destroy_atmosphere(atmosphere);
+}
+
 /* The ground is a ball, lit by what nebel_light_air says. */
 static void ground_is_lit_as_places_are(void **state)
 {
@@ -339,9 +375,13 @@ static void bad_calls_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tables_are_as_far_off_as_they_say), cmocka_unit_test(rays_may_end_within_the_air),
-        cmocka_unit_test(ground_is_lit_as_places_are),       cmocka_unit_test(order_of_work_changes_nothing),
-        cmocka_unit_test(odd_places_have_answers),           cmocka_unit_test(bad_calls_are_refused),
+        cmocka_unit_test(tables_are_as_far_off_as_they_say),
+        cmocka_unit_test(rays_may_end_within_the_air),
+        cmocka_unit_test(thin_air_is_passed_up_to_the_ground),
+        cmocka_unit_test(ground_is_lit_as_places_are),
+        cmocka_unit_test(order_of_work_changes_nothing),
+        cmocka_unit_test(odd_places_have_answers),
+        cmocka_unit_test(bad_calls_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

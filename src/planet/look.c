@@ -51,7 +51,8 @@ static nb_look look_along(const nebel_air_view *view, double x, double y, double
     nb_bearing bearing;
     if (!find_bearing(view, x, y, z, &bearing)) return look;
     const nb_reach reach = nb_outlook_reach(&view->outlook, (nb_slope){bearing.up, bearing.level});
-    look.along = nb_smaller(reach.span, t_max - reach.begin);
+    /* Distances have float's digits: what they do not tell from the end, such as the ground under thin air, is there. */
+    look.along = t_max - reach.begin > reach.span - 0x1p-22 * t_max ? reach.span : t_max - reach.begin;
     if (!(look.along > 0)) return (nb_look){.along = 0};
     look.sun = sun_along(view, &bearing);
     const double half = bearing.level > 0 ? sqrt(nb_larger(0, 0.5 * (1 - bearing.ahead / bearing.level))) : 0;

@@ -103,7 +103,8 @@ nebel_light nb_air_light(nb_air_ray ray, float t_max)
     nebel_light light;
     light.transmittance = nb_splat3(1.0);
     light.in_scattering = nb_splat3(0.0);
-    float along = min(ray.span, t_max - ray.begin);
+    float along = t_max - ray.begin;
+    if (along > ray.span - 2.4e-7 * t_max) along = ray.span; /* float does not tell it from the end */
     if (along > 0.0) {
         nb_vec4 sizes = NEBEL_AIR_WORD(NB_AIR_SIZES);
         int scatterers = int(sizes.z);
