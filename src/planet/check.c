@@ -21,7 +21,7 @@ nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
 /* What is said of: "airs[2] " or "" where it is no kind of air. */
 typedef struct subject {
     const nebel_log *log;
-    char name[16];
+    char name[24];
 } subject;
 
 static nebel_result refuse(const subject *of, const char *what, const char *fault)
