@@ -335,6 +335,33 @@ static void test_wide_pixels_let_as_much_through(void **state)
     compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_CIRRUS});
 }
 
+/* As of air: however deep the eye is below the ground, clouds are where they are seen from the ground over it. */
+static void test_below_the_ground_is_on_it(void **state)
+{
+    (void)state;
+    static const double depths[] = {1, 5e3, 3e6, RADIUS};
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.coverage = .6});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    for (int i = 0; i < 20; i++) {
+        nebel_ray ray = {{0, 0, 0}, {.3 - .02 * i, .1 + .04 * i, 1}, HUGE_VAL};
+        nebel_cloud_knots on, below;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &on, 0), NEBEL_OK);
+        for (size_t k = 0; k < sizeof depths / sizeof *depths; k++) {
+            ray.origin[1] = -depths[k];
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &below, 0), NEBEL_OK);
+            assert_int_equal(below.count, on.count);
+            if (on.count == 0) continue;
+            const uint32_t last = on.count - 1;
+            assert_true(below.t[last] == on.t[last]);
+            assert_true(fabsf(below.transmittance[last] - on.transmittance[last]) < 1e-5f);
+        }
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* What a workspace has seen before changes nothing. */
 static void test_order_of_rays_makes_no_difference(void **state)
 {
@@ -609,6 +636,7 @@ int main(void)
         cmocka_unit_test(test_transmittance_is_that_of_the_density),
         cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_wide_pixels_let_as_much_through),
+        cmocka_unit_test(test_below_the_ground_is_on_it),
         cmocka_unit_test(test_order_of_rays_makes_no_difference),
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
