@@ -335,6 +335,104 @@ static void test_wide_pixels_let_as_much_through(void **state)
     compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_CIRRUS});
 }
 
+/* The light of pixels that do not hide heaps is that of thin rays within them: in the mean over some from 200 km, straight down, and
+ * aslant towards the sun and away from it. */
+static void compare_light_of_pixels(const nebel_cloud_layer *layer)
+{
+    enum { PIXELS = 400, RAYS = 16 };
+    static const double widths[] = {10, 40, 100}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
+    const double far = 2e5;
+    nebel_clouds *clouds = make(1, layer);
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 5;
+    for (int i = 0; i < 9; i++) {
+        const double *unit = directions[i / 3], width = widths[i % 3];
+        double seen = 0, truth = 0, middle[2] = {0, 0};
+        for (int k = 0; k < PIXELS * RAYS; k++) {
+            const int is_first = k % RAYS == 0;
+            for (int c = 0; c < 2 && is_first; c++) middle[c] = dice(&numbers, -2e4, 2e4);
+            const double x = middle[0] + dice(&numbers, -.5, .5) * width,
+                         z = middle[1] + dice(&numbers, -.5, .5) * width;
+            const nebel_ray pixel = {{middle[0] - far * unit[0], 1500 - far * unit[1], middle[1] - far * unit[2]},
+                                     {unit[0], unit[1], unit[2]},
+                                     HUGE_VAL};
+            const nebel_ray thin = {
+                {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
+            nebel_cloud_knots knots;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, 1 / far, &knots, 0), NEBEL_OK);
+            if (knots.count > 0) truth += (double)knots.in_scattering[knots.count - 1][1] / (PIXELS * RAYS);
+            if (!is_first) continue;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, width / far, &knots, 0), NEBEL_OK);
+            if (knots.count > 0) seen += (double)knots.in_scattering[knots.count - 1][1] / PIXELS;
+        }
+        print_message("pixels of %.0f m: light of %.4f, of thin rays %.4f\n", width, seen, truth);
+        assert_near(seen, truth, .1 * truth);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_light_of_pixels(void **state)
+{
+    (void)state;
+    compare_light_of_pixels(&(nebel_cloud_layer){.coverage = .5});
+    compare_light_of_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS});
+}
+
+/* Steps are no longer than a layer is high, however large its heaps. */
+static void test_thin_layers(void **state)
+{
+    (void)state;
+    enum { RAYS = 200 };
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.base = 900, .top = 910, .extinction = .2, .coverage = .6});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    int missed = 0, met = 0;
+    for (int i = 0; i < RAYS; i++) {
+        const double length = sqrt(1.04);
+        const nebel_ray ray = {{200. * (i - .5 * RAYS), 0, 0}, {0, 1 / length, .2 / length}, HUGE_VAL};
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &knots, 0), NEBEL_OK);
+        const double truth = brute_force(clouds, &ray, 860 * length, 911 * length, .05);
+        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        met += truth < .9;
+        missed += fabs(left - truth) > .05;
+    }
+    print_message("a layer of 10 m: of %d rays %d meet it, %d are off\n", RAYS, met, missed);
+    assert_true(met > 15 && missed < 3);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* Where nothing behind is seen any more the last knot is there, not where the ray leaves the layer, which is hundreds of kilometres
+ * on for a ray that just passes over its base: a walk ends at an optical depth, which is that up to the knot. */
+static void test_thick_cloud_ends_where_it_is_seen(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1});
+    const double g = clouds->layers[0].mean_cosine;
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    for (int i = 0; i < 40; i++) {
+        const double rise = -.03 + .0015 * i;
+        const nebel_ray ray = {{0, 600, 0}, {cos(rise), sin(rise), 0}, HUGE_VAL};
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &knots, 0), NEBEL_OK);
+        const double end = (double)knots.t[knots.count - 1];
+        double depth = 0;
+        assert_true(end < 1e4);
+        for (double t = 0; t < end; t += 100) depth -= log(brute_force(clouds, &ray, t, fmin(t + 100, end), 1));
+        /* A piece of no more than 1 / 0.15 begins before a hundredth is left of what leads away. */
+        assert_true(depth > 4.6 / (1 - g * g) - .2 && depth < 4.6 / (1 - g * g) + 7);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* As of air: however deep the eye is below the ground, clouds are where they are seen from the ground over it. */
 static void test_below_the_ground_is_on_it(void **state)
 {
@@ -636,6 +734,9 @@ int main(void)
         cmocka_unit_test(test_transmittance_is_that_of_the_density),
         cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_wide_pixels_let_as_much_through),
+        cmocka_unit_test(test_light_of_pixels),
+        cmocka_unit_test(test_thin_layers),
+        cmocka_unit_test(test_thick_cloud_ends_where_it_is_seen),
         cmocka_unit_test(test_below_the_ground_is_on_it),
         cmocka_unit_test(test_order_of_rays_makes_no_difference),
         cmocka_unit_test(test_light_of_slabs),

@@ -186,11 +186,11 @@ static inline double nb_cloud_ground_end(const double center[3], const double ey
 }
 
 /* Whether knots that were found up to `reach` do for a ray that ends elsewhere: it goes no farther, and ends before clouds, behind them
- * or near the end of what was found. Between two knots clouds are a straight line, which shows on surfaces. */
+ * or near where that did. Between two knots clouds are a straight line, which shows on surfaces. */
 static inline int nb_cloud_is_found(uint32_t count, float first, float last, float reach, float end)
 {
     if (end > reach) return 0;
-    return count == 0 || end <= first || end >= 0.98f * fminf(reach, last);
+    return count == 0 || end <= first || end >= fminf(0.98f * reach, last);
 }
 
 /* The knot before a surface, and the part of the way to the next one; behind the last one that. The surface is behind the

@@ -38,6 +38,10 @@
 #define STAY_STEP 0.16
 #define STAY_PIECE 0.0625
 
+/* Nodes of depths up, down and away from the sun, in parts of the layer's height: heaps between wider ones share the
+ * depths of their middle, and are half as bright (test_clouds). */
+#define NODES_PART 0.08
+
 /* Noise hardly ever rises by a fifth of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.2
 
@@ -67,7 +71,7 @@ typedef struct nb_walk {
     nb_turned turned[NEBEL_MAX_CLOUD_LAYERS];
     int layer;           /* the only one here */
     double depth, apart; /* so far: optical depths, of all scattering and of what leads away */
-    double light[3], missed;
+    double light[3], missed, cloud_end;
     nb_stretch stretch;
     nebel_cloud_knots *knots;
 } nb_walk;
@@ -181,6 +185,16 @@ static void pass(nb_walk *walk, double t)
     if (fallen > 0.12 || (fallen > 0.02 && t > 1.5 * (double)knots->t[last])) add_knot(walk, t);
 }
 
+/* Where the last cloud ends, not the stay in its layer, which may be beyond the horizon: the last light would come through all air before
+ * that. A knot that is there already does not have that light yet. */
+static void end_knots(nb_walk *walk)
+{
+    nebel_cloud_knots *knots = walk->knots;
+    if (knots->count == 0) return;
+    if (knots->count > 1 && knots->t[knots->count - 1] >= (float)walk->cloud_end) knots->count--;
+    write_knot(walk, knots->count++, walk->cloud_end);
+}
+
 /* ---- pieces ---------------------------------------------------------------------------------- */
 
 /* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
@@ -199,7 +213,8 @@ static void add_light(nb_walk *walk, int k)
         .first = (float)fmin(0.1 * thickness,
                              fmax(2 * width, fmin(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
         /* Wider lattices than the layer is high would show through it. */
-        .wide = (float)fmax(fmin(20 * width, 0.8 * thickness), 0.08 * walk->least),
+        .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
+                              0.08 * walk->least),
     };
     const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, &grain);
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
@@ -224,6 +239,7 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     stretch->seen_apart += seen_apart;
     stretch->weight += seen + seen_apart;
     stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
+    walk->cloud_end = t + length;
     walk->depth += depth;
     walk->apart += depth_apart;
     if (stretch->depth > STRETCH_DEPTH / (0.15 + nb_exp(-walk->depth))) add_light(walk, k);
@@ -231,7 +247,7 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
 }
 
 /* Goes on until there is cloud, by as much as there can be none, or by the least step, which pixels wider than that make
- * longer, up to `longest`. */
+ * longer, and no more than `longest`. */
 static double skip(const nb_walk *walk, int k, double t, double end, double longest, nb_cloud_seen *far, double *length)
 {
     double clear = 0, unknown[3] = {0, 0, 0};
@@ -248,7 +264,7 @@ static double skip(const nb_walk *walk, int k, double t, double end, double long
         }
         const double width = walk->spread * t,
                      near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
-        const double step = nb_max(near, nb_min(0.7 * width, longest));
+        const double step = nb_min(longest, nb_max(near, 0.7 * width));
         *length = nb_min(end - t, nb_max(clear / SLOPE_PART, step));
         spot = spot_at(walk, k, t + *length);
         *far = extinction_of(walk, k, &spot, &clear);
@@ -366,18 +382,13 @@ static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     knots->error = 0;
     const double end = fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk.from, unit));
     const int count = find_stays(&walk, end, stays);
-    double last = 0;
     for (int i = 0; i < count && nb_exp(-walk.apart) > UNSEEN; i++) {
         const nb_cloud_layer *layer = &workspace->view->clouds->layers[stays[i].layer];
         walk.least = (double)layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 16;
         walk_layer(&walk, stays[i].layer, stays[i].begin, stays[i].end);
         add_light(&walk, stays[i].layer);
-        last = stays[i].end;
     }
-    if (knots->count > 0) {
-        write_knot(&walk, knots->count, fmax(last, (double)knots->t[knots->count - 1]));
-        knots->count++;
-    }
+    end_knots(&walk);
     knots->error = (float)walk.missed;
 }
 
