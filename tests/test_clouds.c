@@ -613,6 +613,41 @@ static void test_ways_to_the_sun(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* A sun just below level is seen over the planet's bulge: through the layer, under it, and through it again. */
+static void test_ways_to_a_sun_below_level(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds =
+        make(1, (const nebel_cloud_layer[]){
+                    {.kind = NEBEL_CLOUD_STRATUS, .base = 400, .top = 1000, .extinction = 4e-5, .coverage = 1}});
+    const nebel_cloud_view_desc desc = {
+        .clouds = clouds, .sun = {.direction = {1, -.015, 0}, .irradiance = {5, 4, 3}}, .tolerance = 1e-3};
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+    const double *sun = view->sun.direction;
+    for (int i = 0; i < 8; i++) {
+        const double z = 3e3 * i, from[3] = {0, 900 + RADIUS, z};
+        const nebel_ray ray = {{0, 900, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
+        const double first = -log(brute_force(clouds, &ray, 0, 95e3, 20)),
+                     truth = first - log(brute_force(clouds, &ray, 95e3, 260e3, 20));
+        const double near = (double)nb_cloud_depths_at(workspace, from, &(nb_cloud_grain){6, 16, 100}).sun,
+                     far = (double)nb_cloud_sun_depth_at(workspace, from, 100);
+        if (i == 0)
+            print_message(
+                "to a sun below level: depth %.3g, of it %.3g before the bulge; as of pieces %.3g, by lattices "
+                "%.3g\n",
+                truth, first, near, far);
+        assert_true(truth > 1.5 * first);
+        assert_near(near, truth, .15 * truth);
+        assert_near(far, truth, .2 * truth);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* ---- bad input ------------------------------------------------------------------------------- */
 
 static void test_bad_layers_are_refused(void **state)
@@ -741,6 +776,7 @@ int main(void)
         cmocka_unit_test(test_order_of_rays_makes_no_difference),
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
+        cmocka_unit_test(test_ways_to_a_sun_below_level),
         cmocka_unit_test(test_bad_layers_are_refused),
         cmocka_unit_test(test_bad_calls_are_refused),
         cmocka_unit_test(test_without_memory),

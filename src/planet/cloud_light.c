@@ -119,26 +119,40 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
 /* At most so many steps, of which the last one goes to the layer's end; and what nodes near by take of their own. */
 enum { STEPS = 40, OWN_STEPS = 4, COARSER = 4 };
 
+/* The pieces of a way in a layer. Just below the horizon it may leave the layer over the planet's bulge and enter it again
+ * behind; but not through the ground. */
+static int stays_of(const nebel_cloud_view *view, int k, const double from[3], const double unit[3],
+                    double pieces[2][2])
+{
+    const nb_cloud_layer *layer = &view->clouds->layers[k];
+    const int count = nb_cloud_pieces(layer->low, layer->high, from, unit, HUGE_VAL, pieces);
+    const double ground = nb_cloud_to_ground(view->clouds->atmosphere->airs.radius, from, unit);
+    return count == 2 && ground < pieces[1][0] ? 1 : count;
+}
+
 /* Optical depth of a layer from a place on. Steps grow: what is far away throws soft shadows. Each takes the mean over its
  * length. *t: how far it came; returns whether there is more. */
 static int march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float first,
                  float width, int steps, double *sum, double *t)
 {
-    const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
-    double pieces[2][2];
-    if (nb_cloud_pieces(layer->low, layer->high, from, unit, HUGE_VAL, pieces) == 0) return 0;
-    const double end = pieces[0][1];
-    *t = pieces[0][0];
-    double step = nb_max((double)first, 0.02 * *t);
-    for (int i = 0; i < steps && *t < end; i++) {
-        const double length = i == STEPS - 1 ? end - *t : nb_min(step, end - *t);
-        double place[3];
-        for (int c = 0; c < 3; c++) place[c] = from[c] + (*t + 0.5 * length) * unit[c];
-        *sum += length * (double)nb_cloud_seen_at(workspace, k, place, nb_larger(width, 0.7f * (float)length));
-        *t += length;
-        step *= 1.5;
+    double pieces[2][2], step = (double)first;
+    const int count = stays_of(workspace->view, k, from, unit, pieces);
+    int taken = 0;
+    for (int i = 0; i < count; i++) {
+        const double end = pieces[i][1];
+        *t = pieces[i][0];
+        step = nb_max(step, 0.02 * *t);
+        for (; taken < steps && *t < end; taken++) {
+            const double length = taken >= STEPS - 1 ? end - *t : nb_min(step, end - *t);
+            double place[3];
+            for (int c = 0; c < 3; c++) place[c] = from[c] + (*t + 0.5 * length) * unit[c];
+            *sum += length * (double)nb_cloud_seen_at(workspace, k, place, nb_larger(width, 0.7f * (float)length));
+            *t += length;
+            step *= 1.5;
+        }
+        if (*t < end) return 1;
     }
-    return *t < end;
+    return 0;
 }
 
 static float depth_along(nebel_cloud_workspace *workspace, int but, const double from[3], const double unit[3],
