@@ -61,4 +61,18 @@ static inline nebel_cloud_view *view_of(const nebel_clouds *clouds, double toler
     return view;
 }
 
+/* Even steps, in m, through the density as it is stated. */
+static inline double brute_force(const nebel_clouds *clouds, const nebel_ray *ray, double begin, double end,
+                                 double step)
+{
+    double depth = 0, place[1][3];
+    float extinction;
+    for (double t = begin + .5 * step; t < end && depth < 12; t += step) {
+        for (int c = 0; c < 3; c++) place[0][c] = ray->origin[c] + t * ray->direction[c];
+        assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, (const double(*)[3])place, 0, &extinction), NEBEL_OK);
+        depth += step * (double)extinction;
+    }
+    return exp(-depth);
+}
+
 #endif

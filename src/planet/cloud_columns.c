@@ -217,5 +217,6 @@ float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double
     nb_cloud_drops drops;
     if (!nb_cloud_in_column(&workspace->view->clouds->noise, of, &column, own, height, width, missing, &drops))
         return 0;
-    return nb_cloud_through(of, &drops, width - HEAP_PART * of->size, 1).whole;
+    const float hidden = nb_smaller(nb_smaller(of->hidden_height, of->hidden_width), width - HEAP_PART * of->size);
+    return nb_cloud_through(&drops, hidden, 1).whole;
 }

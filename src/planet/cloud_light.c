@@ -164,6 +164,12 @@ static float depth_along(nebel_cloud_workspace *workspace, int but, const double
     return (float)fmin(sum, 1e6);
 }
 
+float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
+                           float width)
+{
+    return depth_along(workspace, -1, from, unit, first, width);
+}
+
 static void read_nodes(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], float width,
                        float depth[3]);
 
@@ -378,34 +384,39 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
     return ray;
 }
 
-/* Scattered light of the slab towards the eye, in parts of the sun's irradiance: J and F's first moment, without what
- * was scattered once. */
-static float often_of(const nb_cloud_depths *depths, float apart, float wide, float sun, float up)
+nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depths)
 {
+    const float g = mean_cosine, wide = g / (1 + g), apart = 1 - g * g;
     const float m = nb_smaller(1, (depths->up + 0.3f) / (depths->sun + 0.3f));
     const float x = apart * m * depths->sun, all = x + apart * nb_smaller(m * depths->away, depths->down);
     const float here = falling(x / m), there = falling(all / m);
     const float flux = m * (0.25f * (2 + 3 * m) + 0.25f * (2 - 3 * m) * there) / (1 + 0.75f * (1 - wide) * all);
-    const float mean = (0.5f * m + 0.75f * m * m - 0.5f * flux - 0.75f * ((1 - wide) * flux * x + m * m * here)) / PI_F;
-    const float toward = m * sun + (1 - m) * up;
-    return nb_larger(0, mean + 0.75f / PI_F * wide * (flux - m * here) * toward);
-}
-
-nb_cloud_source nb_cloud_source_of(const nebel_cloud_view *view, const nb_cloud_ray *ray, int layer,
-                                   const nb_cloud_depths *depths, const nb_cloud_light *light, const double up[3])
-{
-    const float g = (float)view->clouds->layers[layer].mean_cosine, wide = g / (1 + g), apart = ray->apart[layer];
-    const float left = falling(depths->sun), left_wide = falling(apart * depths->sun);
-    const float often = often_of(depths, apart, wide, (float)ray->sun, (float)nb_vector_dot(ray->direction, up));
+    const float side = 0.75f / PI_F * wide * (flux - m * here);
     const float over = (1 - g) * depths->up, whole = over + (1 - g) * depths->down;
     const float from_above = (0.5f + 0.75f * (whole - over)) / (1 + 0.75f * whole);
     /* Half of the ground that is seen lies in this cloud's shadow. */
     const float ground = 0.5f + 0.5f * nb_cloud_part_through(depths->up + depths->down, g);
+    return (nb_cloud_parts){
+        .left = falling(depths->sun),
+        .left_wide = falling(apart * depths->sun),
+        .mean = (0.5f * m + 0.75f * m * m - 0.5f * flux - 0.75f * ((1 - wide) * flux * x + m * m * here)) / PI_F,
+        .to_sun = m * side,
+        .to_up = (1 - m) * side,
+        .above = from_above,
+        .below = (1 - from_above) * ground,
+    };
+}
+
+nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
+                                   const nb_cloud_light *light, const double up[3])
+{
+    const float apart = ray->apart[layer], rise = (float)nb_vector_dot(ray->direction, up);
+    const float often = nb_larger(0, parts->mean + parts->to_sun * (float)ray->sun + parts->to_up * rise);
     nb_cloud_source source;
     for (int c = 0; c < 3; c++) {
-        source.once[c] = light->sun[c] * left * (ray->phase[layer] - apart * ray->wide_phase[layer]);
-        source.often[c] = light->sun[c] * apart * (often + left_wide * ray->wide_phase[layer]);
-        source.ambient[c] = from_above * light->above[c] + (1 - from_above) * ground * light->below[c];
+        source.once[c] = light->sun[c] * parts->left * (ray->phase[layer] - apart * ray->wide_phase[layer]);
+        source.often[c] = light->sun[c] * apart * (often + parts->left_wide * ray->wide_phase[layer]);
+        source.ambient[c] = parts->above * light->above[c] + parts->below * light->below[c];
     }
     return source;
 }

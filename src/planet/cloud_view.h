@@ -79,12 +79,53 @@ typedef struct nb_cloud_block {
     float most;
 } nb_cloud_block;
 
+/* What a place has of light, whoever looks at it: of the sun's, what was not scattered, or hardly turned; mean radiance of what
+ * was scattered more often, and by how much there is more of it towards the sun and up; of the sky's two halves. */
+typedef struct nb_cloud_parts {
+    float left, left_wide, mean, to_sun, to_up, above, below;
+} nb_cloud_parts;
+
+/* A place in clouds; with a direction along the ground, and optical depths. */
+typedef struct nb_crowd_place {
+    double from[3], turn;
+    float extinction, up, down;
+} nb_crowd_place;
+
+/* How much of a place is seen: of all scattering, and of what leads away. */
+typedef struct nb_crowd_seen {
+    float whole, apart;
+} nb_crowd_seen;
+
+enum {
+    NB_CROWD_HEIGHTS = 6,
+    NB_CROWD_VIEWS = 8,
+    NB_CROWD_TURNS = 3,
+    NB_CROWD_SUNS = 10,
+    NB_CROWD_PLACES = 128,
+};
+
+/* Places at a height in a layer, and what they are in the mean; what was not asked for is not there. */
+typedef struct nb_crowd_height {
+    int is_set, count;
+    nb_crowd_place places[NB_CROWD_PLACES];
+    nb_cloud_parts parts[NB_CROWD_SUNS][NB_CROWD_PLACES];
+    nb_crowd_seen seen[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_PLACES];
+    nb_cloud_parts means[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
+    uint8_t has_parts[NB_CROWD_SUNS], has_seen[NB_CROWD_VIEWS][NB_CROWD_TURNS],
+        has_mean[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
+} nb_crowd_height;
+
+typedef struct nb_cloud_crowd {
+    nb_crowd_height heights[NB_CROWD_HEIGHTS];
+} nb_cloud_crowd;
+
 struct nebel_cloud_workspace {
     const nebel_cloud_view *view;
     nb_cloud_lattice lattices[NB_CLOUD_WAYS]; /* nb_cloud_ways; those of layers that are */
     nb_cloud_point *points;
     nb_cloud_patch *patches;
     nb_cloud_block *blocks;
+    nb_cloud_crowd *crowds; /* of each layer */
 };
 
 /* Where a ray is within a shell: at most two pieces, before and behind what lies below it. Returns how many. */
@@ -121,6 +162,10 @@ typedef struct nb_cloud_depths {
     float sun, away, up, down;
 } nb_cloud_depths;
 
+/* All along a way; the first step is so long, and what is narrower than a width is seen as a mean. */
+float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
+                           float width);
+
 /* How finely they are found: what is narrower than a width is seen as a mean. */
 typedef struct nb_cloud_grain {
     float width, first; /* first: length of the first step towards the sun */
@@ -149,6 +194,8 @@ double nb_cloud_to_ground(double radius, const double from[3], const double unit
 /* What comes through a slab of such depth, straight or scattered, for a mean cosine. */
 float nb_cloud_part_through(float depth, float mean_cosine);
 
+nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depths);
+
 /* What a layer's drops send towards the eye, per unit of extinction. */
 typedef struct nb_cloud_source {
     float once[3];    /* of sunlight, seen through all cloud between */
@@ -166,7 +213,15 @@ typedef struct nb_cloud_ray {
 
 nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3]);
 
-nb_cloud_source nb_cloud_source_of(const nebel_cloud_view *view, const nb_cloud_ray *ray, int layer,
-                                   const nb_cloud_depths *depths, const nb_cloud_light *light, const double up[3]);
+nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
+                                   const nb_cloud_light *light, const double up[3]);
+
+/* How much of light is of clouds that a pixel so wide hides: 0 to 1. */
+float nb_cloud_crowd_part(const nb_cloud_layer *layer, float width);
+
+/* Mean of places in a layer at a part of its height, by how much of each a ray sees. */
+nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, float height, const double up[3],
+                                 const double ray[3]);
+nb_cloud_parts nb_cloud_mix_parts(const nb_cloud_parts *a, const nb_cloud_parts *b, float part);
 
 #endif

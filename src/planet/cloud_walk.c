@@ -45,10 +45,6 @@
 /* Noise hardly ever rises by a fifth of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.2
 
-/* What a pixel hides is so long along the ray, in pixels: then as much comes through as through the pixel's parts
- * (test_clouds). */
-#define HIDDEN_LENGTH 0.55f
-
 enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
 
 /* Pieces one behind the other that have the same light. */
@@ -111,12 +107,12 @@ static nb_cloud_seen extinction_of(const nb_walk *walk, int k, const nb_spot *sp
     if (clear != NULL) *clear = 0;
     if (!(spot->height > 0 && spot->height < 1)) return (nb_cloud_seen){0, 0};
     const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->unit, spot->width);
+    const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k].direction));
     if (nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing,
                            &drops))
-        return nb_cloud_through(layer, &drops, HIDDEN_LENGTH * spot->width, walk->ray.apart[k]);
+        return nb_cloud_through(&drops, nb_cloud_hidden_length(layer, spot->width, climb), walk->ray.apart[k]);
     if (clear == NULL) return (nb_cloud_seen){0, 0};
-    const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k].direction)) * layer->per_thickness;
-    float slope = layer->slope * column.scale + NB_CLOUD_RANK_SLOPE * climb;
+    float slope = layer->slope * column.scale + NB_CLOUD_RANK_SLOPE * climb * layer->per_thickness;
     for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
         *clear = nb_max(*clear, (double)(missing[n] / slope));
         slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
@@ -216,9 +212,19 @@ static void add_light(nb_walk *walk, int k)
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
                               0.08 * walk->least),
     };
-    const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, &grain);
+    const float crowd = nb_cloud_crowd_part(layer, (float)width);
+    nb_cloud_parts parts = {0, 0, 0, 0, 0, 0, 0};
+    if (crowd < 1) {
+        const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, &grain);
+        parts = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
+    }
+    if (crowd > 0) {
+        const float height = (float)(radius - layer->low) * layer->per_thickness;
+        const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, height, up, walk->unit);
+        parts = nb_cloud_mix_parts(&parts, &mean, crowd);
+    }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
-    const nb_cloud_source source = nb_cloud_source_of(walk->view, &walk->ray, k, &depths, &light, up);
+    const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light, up);
     for (int c = 0; c < 3; c++)
         walk->light[c] += stretch->seen * (double)(source.once[c] + source.ambient[c]) +
                           stretch->seen_apart * (double)source.often[c];
@@ -498,7 +504,10 @@ nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cl
     made->blocks = nb_allocate_zero(&view->allocator, NB_CLOUD_BLOCKS, sizeof *made->blocks);
     made->points = nb_allocate_zero(&view->allocator, NB_CLOUD_POINTS, sizeof *made->points);
     made->patches = nb_allocate_zero(&view->allocator, NB_CLOUD_PATCHES, sizeof *made->patches);
-    int is_whole = made->blocks != NULL && made->points != NULL && made->patches != NULL;
+    if (view->clouds->layer_count > 0)
+        made->crowds = nb_allocate_zero(&view->allocator, (size_t)view->clouds->layer_count, sizeof *made->crowds);
+    int is_whole = made->blocks != NULL && made->points != NULL && made->patches != NULL &&
+                   (made->crowds != NULL || view->clouds->layer_count == 0);
     for (int i = 0; i < NB_CLOUD_ROOFS + view->clouds->layer_count; i++) {
         nb_cloud_lattice *lattice = &made->lattices[i];
         lattice->nodes = nb_allocate_zero(&view->allocator, NB_CLOUD_NODES, sizeof *lattice->nodes);
@@ -524,5 +533,6 @@ void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace)
     nb_release(&allocator, workspace->points);
     nb_release(&allocator, workspace->patches);
     nb_release(&allocator, workspace->blocks);
+    nb_release(&allocator, workspace->crowds);
     nb_release(&allocator, workspace);
 }

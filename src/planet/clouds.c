@@ -17,9 +17,14 @@
 #define BILLOW_RATIO 6.1
 #define LOG2_BILLOW_RATIO 2.60880924f
 
-/* What is hidden of heaps is no longer along rays than this part of them, and than the layer is high: between what rays straight
- * down and flat ones find best (test_clouds). */
-#define HIDDEN_PART 0.3f
+/* A pixel hides so much along a ray, in pixels; of sheets, which it meets aslant, as much more as it is long there, down to so
+ * flat rays. Then as much comes through as through thin rays within the pixel (test_clouds). */
+#define HIDDEN_PIXELS 0.55f
+#define FLATTEST 0.3f
+
+/* Nor more than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in sizes of heaps: of heaps, of
+ * sheets. Beyond it the ray meets other cloud. As thin rays find, straight down to 9 degrees flat (test_clouds). */
+static const float hidden_heights[] = {0.37f, 0.75f}, hidden_widths[] = {0.42f, 0.55f};
 
 /* Wisps are so many times longer along the wind than across; billows in them. */
 #define DRAWN_OUT 4
@@ -263,14 +268,23 @@ static float through(const nb_cloud_drops *drops, float depth, float length, flo
     return nb_smaller(mean, (float)-nb_log(mean_left(drops, (double)depth)) / length);
 }
 
-nb_cloud_seen nb_cloud_through(const nb_cloud_layer *layer, const nb_cloud_drops *drops, float length, float apart)
+float nb_cloud_hidden_length(const nb_cloud_layer *layer, float width, float climb)
 {
-    const float bounded = nb_smaller(length, layer->hidden), depth = drops->most * bounded, mean = nb_cloud_mean(drops);
+    const float up = climb / layer->hidden_height,
+                aside = (1 - climb * climb) / (layer->hidden_width * layer->hidden_width);
+    const float whole = 1 / sqrtf(up * up + nb_larger(0, aside));
+    const float along = layer->kind == NEBEL_CLOUD_CUMULUS ? width : width / nb_larger(climb, FLATTEST);
+    return nb_smaller(HIDDEN_PIXELS * along, whole);
+}
+
+nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float apart)
+{
+    const float depth = drops->most * length, mean = nb_cloud_mean(drops);
     const int is_full = drops->part - drops->spread >= 1;
     /* Then the mean is right to a thousandth of what a full place has. */
     const int is_even = drops->spread < 1e-3f || !(depth * drops->spread * drops->spread > 6e-3f);
     if (is_full || is_even) return (nb_cloud_seen){mean, apart * mean};
-    return (nb_cloud_seen){through(drops, depth, bounded, mean), through(drops, apart * depth, bounded, apart * mean)};
+    return (nb_cloud_seen){through(drops, depth, length, mean), through(drops, apart * depth, length, apart * mean)};
 }
 
 float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
@@ -450,7 +464,8 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->phase = nb_phase_resolve(&phase);
     layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
     layer->size = (float)desc->size;
-    layer->hidden = nb_smaller(HIDDEN_PART * (float)desc->size, 1 / layer->per_thickness);
+    layer->hidden_height = hidden_heights[desc->kind != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
+    layer->hidden_width = hidden_widths[desc->kind != NEBEL_CLOUD_CUMULUS] * (float)desc->size;
     set_octaves(desc, radius, layer);
     set_ranks(&clouds->noise, layer);
     return desc->weather.texels != NULL ? nb_layer_map_make(&clouds->allocator, &desc->weather, &layer->weather)

@@ -25,8 +25,9 @@ typedef struct nb_cloud_layer {
     double low, high;    /* m from the planet's centre */
     float per_thickness; /* 1/m */
     float extinction, detail, softness;
-    float size, hidden;       /* m, of heaps; of what a width hides along a ray, at most */
-    double axis[3], per_time; /* the shell turns by that angle in a unit of time */
+    float size;                        /* m, of heaps */
+    float hidden_height, hidden_width; /* m, of what is hidden at most */
+    double axis[3], per_time;          /* the shell turns by that angle in a unit of time */
     nb_cloud_octave octaves[NB_CLOUD_OCTAVES];
     double billow_shift[3], per_billow[NB_CLOUD_BILLOWS]; /* 1/m, of the largest first */
     float billow_slopes[NB_CLOUD_BILLOWS];                /* of ranks, at most, per m */
@@ -90,7 +91,10 @@ typedef struct nb_cloud_seen {
     float whole, apart;
 } nb_cloud_seen;
 
-nb_cloud_seen nb_cloud_through(const nb_cloud_layer *layer, const nb_cloud_drops *drops, float length, float apart);
+nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float apart);
+
+/* What a width hides along a ray that climbs so much a metre, as a length of it. */
+float nb_cloud_hidden_length(const nb_cloud_layer *layer, float width, float climb);
 
 /* Mean extinction over a width, 0 outside the layer. */
 float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,

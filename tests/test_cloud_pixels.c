@@ -1,0 +1,189 @@
+/* What pixels of a width see of clouds, against thin rays within them: how much comes through, and what light. */
+#include "planet/cloud_view.h"
+
+#include "cloud_help.h"
+#include "dice.h"
+#include "near.h"
+#include "unit.h"
+
+#include <math.h>
+
+/* From afar a cloud is the mean of what is seen near. */
+static void test_wide_pixels_see_means(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .5}});
+    double near = 0, far = 0;
+    enum { COUNT = 40000 };
+    uint64_t numbers = 3;
+    for (int i = 0; i < COUNT; i++) {
+        const double x = dice(&numbers, -3e5, 3e5), z = dice(&numbers, -3e5, 3e5);
+        near += (double)above(clouds, 1300, x, RADIUS, z, 0) / COUNT;
+        far += (double)above(clouds, 1300, x, RADIUS, z, 3000) / COUNT;
+    }
+    print_message("mean extinction %.4g, of wide pixels %.4g\n", near, far);
+    assert_near(far, near, .25 * near);
+    nebel_destroy_clouds(clouds);
+}
+
+/* Through pixels that hide heaps as much comes as through many thin rays within them: in the mean over 300 pixels from
+ * 400 km above the ground, whose rays lead so far aside for each metre down, or 0.6 more or less. */
+static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside)
+{
+    enum { PIXELS = 300, RAYS = 24 };
+    static const double spreads[] = {4e-4, 1.3e-3, 5e-3};
+    nebel_clouds *clouds = make(1, layer);
+    const nb_cloud_layer *made = &clouds->layers[0];
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 23;
+    for (size_t s = 0; s < sizeof spreads / sizeof *spreads; s++) {
+        double seen = 0, truth = 0;
+        for (int i = 0; i < PIXELS; i++) {
+            const double x = aside + dice(&numbers, -.6, .6), z = dice(&numbers, -.6, .6);
+            const nebel_ray ray = {{0, 4e5, 0}, {x, -1, z}, HUGE_VAL};
+            const double length = sqrt(1 + x * x + z * z);
+            nebel_cloud_knots knots;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spreads[s], &knots, 0), NEBEL_OK);
+            seen += (knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1) / PIXELS;
+            for (int k = 0; k < RAYS; k++) {
+                const double half = .5 * spreads[s] * length, a = x + dice(&numbers, -half, half);
+                const double b = z + dice(&numbers, -half, half), down = sqrt(1 + a * a + b * b);
+                const nebel_ray thin = {{0, 4e5, 0}, {a / down, -1 / down, b / down}, HUGE_VAL};
+                double pieces[2][2];
+                assert_int_equal(nb_cloud_pieces(made->low, made->high, (const double[3]){0, RADIUS + 4e5, 0},
+                                                 thin.direction, 3e6, pieces),
+                                 1);
+                truth += brute_force(clouds, &thin, pieces[0][0], pieces[0][1], 20) / (PIXELS * RAYS);
+            }
+        }
+        print_message("pixels of %.0f m, %.1f aside: %.3f of the light comes through, %.3f through thin rays\n",
+                      4e5 * spreads[s] * sqrt(1 + aside * aside), aside, seen, truth);
+        assert_near(seen, truth, .05);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_wide_pixels_let_as_much_through(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        compare_wide_pixels(&(nebel_cloud_layer){.coverage = .4}, 1.6 * i);
+        compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = .6}, 1.6 * i);
+        compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_CIRRUS}, 1.6 * i);
+    }
+}
+
+/* The light of pixels that do not hide heaps is that of thin rays within them: in the mean over some from 200 km, straight down, and
+ * aslant towards the sun and away from it. */
+static void compare_light_of_pixels(const nebel_cloud_layer *layer)
+{
+    enum { PIXELS = 400, RAYS = 16 };
+    static const double widths[] = {10, 40, 100}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
+    const double far = 2e5;
+    nebel_clouds *clouds = make(1, layer);
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 5;
+    for (int i = 0; i < 9; i++) {
+        const double *unit = directions[i / 3], width = widths[i % 3];
+        double seen = 0, truth = 0, middle[2] = {0, 0};
+        for (int k = 0; k < PIXELS * RAYS; k++) {
+            const int is_first = k % RAYS == 0;
+            for (int c = 0; c < 2 && is_first; c++) middle[c] = dice(&numbers, -2e4, 2e4);
+            const double x = middle[0] + dice(&numbers, -.5, .5) * width,
+                         z = middle[1] + dice(&numbers, -.5, .5) * width;
+            const nebel_ray pixel = {{middle[0] - far * unit[0], 1500 - far * unit[1], middle[1] - far * unit[2]},
+                                     {unit[0], unit[1], unit[2]},
+                                     HUGE_VAL};
+            const nebel_ray thin = {
+                {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
+            nebel_cloud_knots knots;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, 1 / far, &knots, 0), NEBEL_OK);
+            if (knots.count > 0) truth += (double)knots.in_scattering[knots.count - 1][1] / (PIXELS * RAYS);
+            if (!is_first) continue;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, width / far, &knots, 0), NEBEL_OK);
+            if (knots.count > 0) seen += (double)knots.in_scattering[knots.count - 1][1] / PIXELS;
+        }
+        print_message("pixels of %.0f m: light of %.4f, of thin rays %.4f\n", width, seen, truth);
+        assert_near(seen, truth, .1 * truth);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_light_of_pixels(void **state)
+{
+    (void)state;
+    compare_light_of_pixels(&(nebel_cloud_layer){.coverage = .5});
+    compare_light_of_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS});
+}
+
+typedef struct nb_shown {
+    double mean, deviation; /* of light */
+} nb_shown;
+
+/* Light of pixels of a width anywhere in 200 x 200 km. */
+static nb_shown show_pixels(nebel_cloud_workspace *workspace, const double unit[3], double width, int count,
+                            uint64_t *numbers)
+{
+    const double far = 2e5;
+    double sum = 0, squares = 0;
+    for (int i = 0; i < count; i++) {
+        const double x = dice(numbers, -1e5, 1e5), z = dice(numbers, -1e5, 1e5);
+        const nebel_ray ray = {
+            {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, width / far, &knots, 0), NEBEL_OK);
+        const double light = knots.count > 0 ? (double)knots.in_scattering[knots.count - 1][1] : 0;
+        sum += light / count;
+        squares += light * light / count;
+    }
+    return (nb_shown){sum, sqrt(fmax(0, squares - sum * sum))};
+}
+
+/* So is that of pixels that hide heaps, which is that of a table, but for places that the table has by chance; and pixels wider
+ * than all heaps have no grain. */
+static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even)
+{
+    static const double widths[] = {440, 2000, 20000}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
+    nebel_clouds *clouds = make(1, layer);
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 29;
+    for (int i = 0; i < 3; i++) {
+        const double truth = show_pixels(workspace, directions[i], 10, 1200, &numbers).mean;
+        for (int k = 0; k < 3; k++) {
+            const nb_shown seen = show_pixels(workspace, directions[i], widths[k], 3000, &numbers);
+            print_message("pixels of %.0f m: light of %.4f, grain of %.4f; of thin rays %.4f\n", widths[k], seen.mean,
+                          seen.deviation, truth);
+            assert_near(seen.mean, truth, .2 * truth);
+            assert_true(widths[k] < 1e4 || seen.deviation < even * truth);
+        }
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_light_of_pixels_that_hide_heaps(void **state)
+{
+    (void)state;
+    compare_light_of_crowds(&(nebel_cloud_layer){.coverage = .5}, .15);
+    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS}, .05);
+    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, .02);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_wide_pixels_see_means),
+        cmocka_unit_test(test_wide_pixels_let_as_much_through),
+        cmocka_unit_test(test_light_of_pixels),
+        cmocka_unit_test(test_light_of_pixels_that_hide_heaps),
+    };
+    return cmocka_run_group_tests(tests, make_air, free_air);
+}
