@@ -930,7 +930,7 @@ class InfoTest(PictureCase):
                             ([{"shape": {"type": "world"}, "extinction": 3e-4, "source": 1}], -math.log(0.05) / 4e-4)):
             out = nebel("info", self.write_scene("air.json", fog, planet=planet, camera=camera)).out
             self.assertAlmostEqual(float(re.search(r"visibility: (\S+) m", out)[1]), wanted, delta=1e-3 * wanted)
-            self.assertNotIn("warning", out)
+            self.assertNotIn("there is no fog", out)
 
     def test_what_looks_like_a_mistake(self):
         scene = self.write_scene("odd.json", [
@@ -958,6 +958,15 @@ class InfoTest(PictureCase):
             done = nebel("render", scene, "-o", self.folder / "dim.png", "-s", "8x8", "-q")
             for said in (done.err, nebel("trace", scene, text=RAY).err):
                 self.assertEqual(f"warning: {scene}: no sunlight reaches fog or models: fog[1]" in said, is_dark)
+
+    def test_a_planet_without_a_sun(self):
+        air, up = {"model": "physical"}, [0, 1, 0]
+        for planet, sun, is_dark in ((air, None, True), (air, {"direction": up, "irradiance": 0}, True),
+                                     (air, {"direction": up}, False), ({"model": "layers"}, None, False)):
+            scene = self.write_scene("night.json", [], planet=planet, **({} if sun is None else {"sun": sun}))
+            self.assertEqual("warning: the planet's air is black" in nebel("info", scene).out, is_dark, (planet, sun))
+            done = nebel("render", scene, "-o", self.folder / "night.png", "-s", "8x8", "-q")
+            self.assertEqual(f"warning: {scene}: the planet's air is black" in done.err, is_dark, (planet, sun))
 
     def test_a_scene_or_a_model_that_is_wrong(self):
         self.assert_failed(nebel("info", self.folder / "none.json"), "none.json")

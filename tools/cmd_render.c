@@ -382,7 +382,7 @@ static void note_stillness(const nebel_scene *scene, const nb_render_call *wante
 
 static void warn_of_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
 {
-    if (wanted->method == NEBEL_METHOD_EXACT) nb_warn_of_endless(scene, wanted->scene);
+    if (wanted->method == NEBEL_METHOD_EXACT) nb_warn_of_darkness(scene, wanted->scene);
 }
 
 /* What the scene has beside its cells is not drawn. */

@@ -52,9 +52,20 @@ size_t nb_find_endless(const nebel_scene_data *scene)
     return i;
 }
 
-void nb_warn_of_endless(const nebel_scene_data *scene, const char *path)
+const char nb_dark_air_advice[] = "the planet's air is black, as no sun shines on it: give the scene a \"sun\"";
+
+int nb_is_air_dark(const nebel_scene_data *scene)
+{
+    if (scene->has_sun && !is_black(scene->sun_irradiance)) return 0;
+    for (size_t i = 0; i < scene->planet_count; i++)
+        if (scene->planets[i].model == NEBEL_PLANET_PHYSICAL) return 1;
+    return 0;
+}
+
+void nb_warn_of_darkness(const nebel_scene_data *scene, const char *path)
 {
     const size_t endless = nb_find_endless(scene);
+    if (nb_is_air_dark(scene)) nb_report_message("warning: %s: %s", path, nb_dark_air_advice);
     if (endless == scene->volume_count) return;
     nb_report_message("warning: %s: no sunlight reaches fog or models: fog[%zu] %s", path, endless, nb_endless_advice);
 }

@@ -1,4 +1,4 @@
-/* Fog without an end on the way to the sun. */
+/* Scenes whose sunlight reaches nothing: fog without an end on the way to the sun, air without a sun. */
 #ifndef NB_ENDLESS_H
 #define NB_ENDLESS_H
 
@@ -11,7 +11,11 @@ size_t nb_find_endless(const nebel_scene_data *scene);
 /* What to say of it, behind its name. */
 extern const char nb_endless_advice[];
 
-/* Says so on standard error, where it is so; no quiet hides that. `path` is the scene's. */
-void nb_warn_of_endless(const nebel_scene_data *scene, const char *path);
+/* Whether there is a planet of air that no sun shines on, which is black whatever ambient light there is. */
+int nb_is_air_dark(const nebel_scene_data *scene);
+extern const char nb_dark_air_advice[];
+
+/* Says both on standard error, where it is so; no quiet hides that. `path` is the scene's. */
+void nb_warn_of_darkness(const nebel_scene_data *scene, const char *path);
 
 #endif

@@ -326,6 +326,7 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
     if (volumes == 0 && scene->nebula_count == 0 && scene->cells == NULL && scene->planet_count == 0)
         (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
+    if (nb_is_air_dark(scene)) (void)printf("warning: %s\n", nb_dark_air_advice);
     if (scene->mesh_count > 0 && !is_lit(scene))
         (void)printf("warning: no sun, no lamps and no ambient light: the models are black\n");
 }
