@@ -13,6 +13,9 @@ static const double ends[NEBEL_MAX_AIR_SHADES - 1] = {0.75, 2.2, 6, 15, 40};
 #define WIDTH_PART 0.7
 #define LEAST_WIDTH 0.06
 
+/* Of the way to the eye: from space the air under clouds is a veil, which a few pixels share. */
+#define FAR_PART 0.01
+
 #define PI_F 3.14159265f
 
 /* The lowest layer whose top is above a radius; -1: none. */
@@ -112,9 +115,10 @@ static void shade(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     shade->t[0] = (float)begin;
     for (int i = 0; i < NEBEL_MAX_AIR_SHADES && t < far; i++) {
         const double next = i < NEBEL_MAX_AIR_SHADES - 1 ? fmin(far, begin + ends[i] * scale) : far;
+        const double width = fmax(LEAST_WIDTH * scale, fmax(WIDTH_PART * (next - t), FAR_PART * t));
         double place[3];
         find_middle(&under, t, next, place);
-        find_parts(workspace, place, (float)fmax(LEAST_WIDTH * scale, WIDTH_PART * (next - t)), shade->part[i]);
+        find_parts(workspace, place, (float)width, shade->part[i]);
         for (int c = 0; c < 3; c++) is_shaded |= shade->part[i][c] < 1;
         shade->t[i + 1] = (float)next;
         shade->count++;
