@@ -80,7 +80,7 @@ static void test_wide_pixels_let_as_much_through(void **state)
  * aslant towards the sun and away from it. */
 static void compare_light_of_pixels(const nebel_cloud_layer *layer)
 {
-    enum { PIXELS = 400, RAYS = 16 };
+    enum { PIXELS = 600, RAYS = 6 };
     static const double widths[] = {10, 40, 100}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
     const double far = 2e5;
     nebel_clouds *clouds = make(1, layer);
