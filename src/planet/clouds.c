@@ -58,10 +58,11 @@ static float step_up(float x)
 
 /* ---- columns --------------------------------------------------------------------------------- */
 
-/* The part of an octave that is seen where pixels are `width` wide. */
+/* The part of an octave that is seen where pixels are `width` wide: none where four pixels go into three waves, each two
+ * cells long. It fades over three octaves of widths: heaps would end at a line across pictures from orbit. */
 static float share_of(float width, float cell)
 {
-    return nb_smaller(1, nb_larger(0, 2 - 2 * width / cell));
+    return 1 - step_up((width / cell - 0.2f) / 1.4f);
 }
 
 static float octave_at(const nb_cloud_noise *noise, const nb_cloud_octave *octave, const double place[3])
@@ -102,7 +103,7 @@ static float sum_octaves(const nb_cloud_noise *noise, const nb_cloud_layer *laye
     *variance = 0;
     for (int i = 0; i < 3; i++) place[i] = unit[i] * layer->low;
     draw_out(layer, DRAWN_OUT, place);
-    if (layer->kind == NEBEL_CLOUD_CIRRUS && width < layer->octaves[2].cell) bend(noise, layer, place);
+    if (layer->kind == NEBEL_CLOUD_CIRRUS && share_of(width, layer->octaves[2].cell) > 0) bend(noise, layer, place);
     for (int k = 0; k < NB_CLOUD_OCTAVES; k++) {
         const nb_cloud_octave *octave = &layer->octaves[k];
         const float share = share_of(width, octave->cell), weight = octave->weight;
