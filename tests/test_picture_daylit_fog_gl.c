@@ -238,6 +238,63 @@ static void moons_shade_balls(void **state)
     assert_true(lit[1] - lit[0] > .005 && lit[2] - lit[1] > .005);
 }
 
+/* ---- many shadows on a ray ------------------------------------------------------------------- */
+
+/* A fence beside the view, whose posts are half as wide as apart. */
+enum { POSTS = 220 };
+
+static nebel_mesh make_fence(float (*corners)[3], uint32_t *indices)
+{
+    static const uint32_t order[6] = {0, 1, 2, 0, 2, 3};
+    for (uint32_t i = 0; i < POSTS; i++) {
+        for (uint32_t k = 0; k < 4; k++) {
+            corners[4 * i + k][0] = 60;
+            corners[4 * i + k][1] = k < 2 ? -1 : 60;
+            corners[4 * i + k][2] = -40 - (float)i - (k == 0 || k == 3 ? 0 : .5f);
+        }
+        for (uint32_t k = 0; k < 6; k++) indices[6 * i + k] = 4 * i + order[k];
+    }
+    return (nebel_mesh){.positions = corners[0],
+                        .indices = indices,
+                        .vertex_count = 4 * POSTS,
+                        .triangle_count = 2 * POSTS,
+                        .base_color = {.5f, .5f, .5f},
+                        .texture = -1};
+}
+
+/* Before the sky. Llvmpipe ends loops after so many turns, those of the search for shadows, too: then fog was missing. */
+static void fences_shade_mist(void **state)
+{
+    (void)state;
+    static float corners[4 * POSTS][3];
+    static uint32_t indices[6 * POSTS];
+    static const double to_sun[3] = {1, .3, 0};
+    const nebel_volume_desc mist = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-100, -5, -700}, .max = {50, 30, 0}},
+                                    .extinction = {.002, .002, .002},
+                                    .albedo = {.9, .8, .7},
+                                    .density = {.type = NEBEL_DENSITY_HEIGHT, .base = 2, .scale_height = 22}};
+    const nebel_mesh fence = make_fence(corners, indices);
+    nebel_camera camera = planet_camera(4, .054);
+    nebel_snapshot *snapshot;
+    nebel_fog *fog;
+    nb_gl context;
+    worlds s;
+    pass_open(&context, NB_GL_330);
+    worlds_make(1, worlds_near, to_sun, .53, &s);
+    s.scene.mesh_count = 1;
+    s.scene.meshes = &fence;
+    camera.vertical_fov = 6;
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.sun = s.sun}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    picture_pair pair = check("beside a fence", &s.scene, snapshot, &camera);
+    picture_free(&pair);
+    nebel_release_snapshot(snapshot);
+    worlds_free(&s);
+    pass_close(&context);
+}
+
 /* ---- what is not lit so ---------------------------------------------------------------------- */
 
 static void count_warnings(nebel_result result, const char *message, void *user)
@@ -274,9 +331,8 @@ static void diffusion_is_warned_of_once(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mist_seas_are_the_same),
-        cmocka_unit_test(balls_have_the_light_of_their_place),
-        cmocka_unit_test(moons_shade_balls),
+        cmocka_unit_test(mist_seas_are_the_same),      cmocka_unit_test(balls_have_the_light_of_their_place),
+        cmocka_unit_test(moons_shade_balls),           cmocka_unit_test(fences_shade_mist),
         cmocka_unit_test(diffusion_is_warned_of_once),
     };
     if (argc > 1) scale = (uint32_t)atoi(argv[1]);

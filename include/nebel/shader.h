@@ -142,7 +142,8 @@
  *     vec2 my_sun_lit(vec3 origin, vec3 direction, float t, float end)
  *
  * which returns the share of sunlight, 0 to 1, that reaches the ray from t on, and up to where along the ray that holds
- * (more than t, at most end) [m]. Without it all fog is lit. See docs/shaders.md.
+ * (more than t, at most end) [m]. Without it all fog is lit. A function with loops of its own counts them in an int for
+ * NEBEL_MOST_TURNS, named by `#define NEBEL_SUN_LIT_TURNS my_turns`. See docs/shaders.md.
  *
  * docs/shaders.md shows a complete shader, the same for Vulkan and HLSL, and says how exact and how fast all this is.
  *

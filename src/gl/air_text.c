@@ -306,7 +306,8 @@ const char nb_air_haze_text[] =
     "        in_doubt = pass_daylight_doubt(from, here, shade, progress.walked, further.walked);\n"
     "#endif\n"
     "        float doubt = pass_doubt(from, here, in_doubt);\n"
-    "        bool is_done = doubt <= tolerance || is_last;\n"
+    /* What cannot be walked once more is kept: the rest of a ray that never was walked has no sunlight. */
+    "        bool is_done = doubt <= tolerance || is_last || nb_is_tired(2 * further.turns - progress.turns);\n"
     "        if (from.at >= begin) way = (here.at - from.at) * clamp(0.9 * sqrt(tolerance / max(doubt, 1e-9)), 0.1, "
     "4.0);\n"
     "        progress.turns = further.turns;\n"

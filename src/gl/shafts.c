@@ -7,7 +7,8 @@ enum { LEVELS = 2, LEVEL_SHIFT = 3 };
 
 /* Light coordinates are those of the shadow maps. The ray goes from block to block: where the nearest surface of a block
  * is behind all of the ray above it, the piece is lit; where the farthest is before, it is dark; otherwise the block's
- * own blocks decide, and at last a texel, in which the ray meets its depth. Where nothing is, depth is endless. */
+ * own blocks decide, and at last a texel, in which the ray meets its depth. Where nothing is, depth is endless. A larger
+ * block is asked again when the ray has left the one that did not know. */
 const char nb_shaft_text[] =
     "precision highp float;\n"
     "precision highp int;\n"
@@ -18,6 +19,7 @@ const char nb_shaft_text[] =
     "uniform int shaft_layers[8];\n"
     "uniform vec4 shaft_places[8];\n" /* low corner in light coordinates, texels per metre */
     "uniform vec2 shaft_heights;\n"   /* of depth 0; depth of a metre */
+    "int shaft_turns = 0;\n"
     "vec2 shaft_range(int map, ivec2 cell, int level)\n"
     "{\n"
     "    if (level > 0) return texelFetch(shaft_blocks, ivec3(cell, map + (level - 1) * 8), 0).xy;\n"
@@ -42,23 +44,29 @@ const char nb_shaft_text[] =
     "high.y)));\n"
     "    float step = 0.004 / max(max(abs(rate.x), abs(rate.y)), 1e-9);\n"
     "    int level = 2;\n"
+    "    ivec2 last = ivec2(0);\n"
     "    while (piece.end < end) {\n"
+    "        shaft_turns++;\n"
     "        float t = piece.end;\n"
     "        float next = min(t + max(step, t * 5e-7), 0.5 * (t + end));\n"
     "        if (!(next > t)) next = end;\n"
+    "        ivec2 texel = clamp(ivec2(at + rate * next), ivec2(0), ivec2(shaft_size) - 1);\n"
+    "        int moved = max(texel.x ^ last.x, texel.y ^ last.y);\n"
+    "        level = max(level, moved > 63 ? 2 : moved > 7 ? 1 : 0);\n"
+    "        last = texel;\n"
     "        int shift = 3 * level;\n"
-    "        ivec2 cell = clamp(ivec2(at + rate * next), ivec2(0), ivec2(shaft_size) - 1) >> shift;\n"
+    "        ivec2 cell = texel >> shift;\n"
     "        vec2 side = vec2((cell + ivec2(rate.x > 0.0 ? 1 : 0, rate.y > 0.0 ? 1 : 0)) << shift);\n"
     "        vec2 leave = (side - at) * inverse;\n"
     "        float stop = min(max(min(leave.x, leave.y), next), end);\n"
-    "        float first = z.x + z.y * next, last = z.x + z.y * stop;\n"
+    "        float first = z.x + z.y * next, far = z.x + z.y * stop;\n"
     "        vec2 range = shaft_range(map, cell, level);\n"
-    "        bool dark = min(first, last) > range.y;\n"
-    "        bool sure = dark || max(first, last) <= range.x;\n"
+    "        bool dark = min(first, far) > range.y;\n"
+    "        bool sure = dark || max(first, far) <= range.x;\n"
     "        if (!sure && level == 0) {\n"
     "            float turn = (range.x - z.x) * shaft_inverse(z.y);\n"
     "            sure = true;\n"
-    "            dark = turn > next ? first > range.x : last > range.x;\n"
+    "            dark = turn > next ? first > range.x : far > range.x;\n"
     "            if (turn > next && turn < stop) stop = turn;\n"
     "        }\n"
     "        if (!sure) {\n"
@@ -69,7 +77,6 @@ const char nb_shaft_text[] =
     "            piece.known = true;\n"
     "            piece.dark = dark;\n"
     "            piece.end = stop;\n"
-    "            level = min(level + 1, 2);\n"
     "        }\n"
     "    }\n"
     "}\n"
@@ -84,6 +91,7 @@ const char nb_shaft_text[] =
     "        float next = piece.end + max(piece.end * 5e-7, 1e-6), stop = end;\n"
     "        int map = 0;\n"
     "        for (; map < shaft_count; map++) {\n"
+    "            shaft_turns++;\n"
     "            vec4 place = shaft_places[map];\n"
     "            vec2 inverse = vec2(shaft_inverse(d.x), shaft_inverse(d.y));\n"
     "            vec2 low = (place.xy - p.xy) * inverse, high = low + shaft_size / place.zw * inverse;\n"
@@ -104,7 +112,8 @@ const char nb_shaft_text[] =
     "    }\n"
     "    return vec2(piece.dark ? 0.0 : 1.0, piece.end);\n"
     "}\n"
-    "#define NEBEL_SUN_LIT(origin, direction, t, end) shaft_lit(origin, direction, t, end)\n";
+    "#define NEBEL_SUN_LIT(origin, direction, t, end) shaft_lit(origin, direction, t, end)\n"
+    "#define NEBEL_SUN_LIT_TURNS shaft_turns\n";
 
 /* ---- blocks ---------------------------------------------------------------------------------- */
 

@@ -533,13 +533,15 @@ nb_leg nb_next_leg(nb_leg leg, nb_piece piece, float rest, float strain, bool fi
 }
 
 /* How far the next leg goes at most, and whether the sun lights it. `lit` is the host's last answer. */
-void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit)
+void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit, inout int turns)
 {
     float t = piece.start + leg.from;
     float near = max(t * (8.0 * NB_EPSILON), 1e-6);
     if (leg.number > 0 && leg.from < leg.stop - near) return;
     if (lit.y <= t + near) {
+        turns -= NEBEL_SUN_LIT_TURNS;
         lit = NEBEL_SUN_LIT(ray.origin, ray.direction, t + near, ray.t_max);
+        turns += NEBEL_SUN_LIT_TURNS;
         lit.y = max(lit.y, t + 2.0 * near);
     }
     leg.sunlight = lit.x;

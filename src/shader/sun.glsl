@@ -10,6 +10,11 @@
 #define NEBEL_SUN_LIT(origin, direction, t, end) nb_vec2(1.0, end)
 #endif
 
+/* Where that has loops: how many turns of them it has taken in this shader so far, for NEBEL_MOST_TURNS. */
+#ifndef NEBEL_SUN_LIT_TURNS
+#define NEBEL_SUN_LIT_TURNS 0
+#endif
+
 /* As many times as bright is the sun; it is the same all along the ray that is asked. environment.glsl has NEBEL_SKY_PART. */
 #ifndef NEBEL_SUN_PART
 #define NEBEL_SUN_PART nb_splat3(1.0)

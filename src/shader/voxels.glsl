@@ -79,18 +79,20 @@ void nb_add_others_at_points(inout nb_two_points sum, nb_piece piece, nb_ray ray
     }
 }
 
-/* Sunlight from t on, t from the start of the piece: its share, and up to where it comes through the same shadows; `turns`: those of
+/* Sunlight from t on, t from the start of the piece: its share, and up to where it comes through the same shadows; `of_fog`: those of
  * fog, too. */
-nb_vec2 nb_sunlight_from(nb_piece piece, nb_ray ray, float t, bool turns, inout nb_vec2 lit)
+nb_vec2 nb_sunlight_from(nb_piece piece, nb_ray ray, float t, bool of_fog, inout nb_vec2 lit, inout int turns)
 {
     float from = piece.start + t;
     float near = max(from * (8.0 * NB_EPSILON), 1e-6);
     if (lit.y <= from + near) {
+        turns -= NEBEL_SUN_LIT_TURNS;
         lit = NEBEL_SUN_LIT(ray.origin, ray.direction, from + near, ray.t_max);
+        turns += NEBEL_SUN_LIT_TURNS;
         lit.y = max(lit.y, from + 2.0 * near);
     }
     float stop = min(piece.end, lit.y);
-    if (turns && lit.x > 0.0) stop = nb_find_turn(ray, from, stop).next;
+    if (of_fog && lit.x > 0.0) stop = nb_find_turn(ray, from, stop).next;
     return nb_vec2(lit.x, stop - piece.start);
 }
 
@@ -118,7 +120,7 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
     nb_cell_walk w = nb_enter_brick(profile.first, size, nb_grid_brick_at(path.from, last), path.from);
     while (t < length && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
         turns += 1 + (alone ? 0 : 2 * used) + (NB_HAS(NB_HAS_SEVERAL) && piece.sunlit ? nb_turns_to_sun() / 2 : 0);
-        if (t >= sunlight.y) sunlight = nb_sunlight_from(piece, ray, t, NB_HAS(NB_HAS_SEVERAL) || to_sun.ends, lit);
+        if (t >= sunlight.y) sunlight = nb_sunlight_from(piece, ray, t, NB_HAS(NB_HAS_SEVERAL) || to_sun.ends, lit, turns);
         nb_vec3 from = path.from - w.brick * NB_BRICK;
         nb_vec3 bricks = nb_grid_crossings(w.brick, last, path.from, path.inverse, NB_BRICK);
         nb_vec3 cells = nb_grid_crossings(w.cell, nb_splat3(NB_BRICK - 1.0), from, path.inverse, 1.0);

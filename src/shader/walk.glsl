@@ -101,7 +101,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
     while (t < ray.t_max && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
         bool on_leg = NB_HAS(NB_HAS_PROFILE | NB_HAS_SUN) && stepping;
         if (NB_HAS(NB_HAS_SUN) && on_leg && lit && piece.sunlit) {
-            nb_plan_leg(leg, piece, ray, sunlit);
+            nb_plan_leg(leg, piece, ray, sunlit, turns);
             leg.h = min(leg.h, min(leg.stop - leg.from, leg.most));
         }
         bool stale = crowd || t >= window.end;
