@@ -201,7 +201,7 @@ float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outloo
 /* Who looks from within a heap sees no gaps of it. */
 #define HEAP_PART 0.45f
 
-float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width)
+float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width, int is_alone)
 {
     const nb_cloud_layer *of = &workspace->view->clouds->layers[layer];
     const double radius = nb_vector_length(place), per = 1 / radius;
@@ -211,12 +211,13 @@ float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double
         own[i] = nb_vector_dot(workspace->view->poses[layer].turn[i], place);
         unit[i] = own[i] * per;
     }
-    const nb_cloud_column column = nb_cloud_column_near(workspace, layer, unit, width);
+    const nb_cloud_noise *noise = &workspace->view->clouds->noise;
+    const nb_cloud_column column =
+        is_alone ? nb_cloud_column_at(noise, of, unit, width) : nb_cloud_column_near(workspace, layer, unit, width);
     const float height = (float)(radius - of->low) * of->per_thickness;
     float missing[NB_CLOUD_BILLOWS + 1];
     nb_cloud_drops drops;
-    if (!nb_cloud_in_column(&workspace->view->clouds->noise, of, &column, own, height, width, missing, &drops))
-        return 0;
+    if (!nb_cloud_in_column(noise, of, &column, own, height, width, missing, &drops)) return 0;
     const float hidden = nb_smaller(nb_smaller(of->hidden_height, of->hidden_width), width - HEAP_PART * of->size);
     return nb_cloud_through(&drops, hidden, 1).whole;
 }

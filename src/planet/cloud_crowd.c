@@ -1,7 +1,8 @@
 /* Light of clouds that pixels hide: of a pixel as wide as heaps are, one place knows nothing of lit and shaded sides, nor
- * of which of them are seen. What it shows at a height in a layer is the mean over places in clouds all around the
- * planet, by how much of each is seen that way, which hangs on the height, on the sun's, on how steep the ray is and on how
- * far aside of the sun it leads: a table of four, whose entries are found when they are asked for.
+ * of which of them are seen. What it shows of a layer is the mean over places in its clouds all around the planet, by how
+ * much of each is seen that way, which hangs on the height of the sun, on how steep the ray is and on how far aside of the
+ * sun it leads: a table of three, whose entries are found when they are asked for. Of heights it knows nothing: the mean of
+ * clouds lets a pixel see deeper into a layer than thin rays do, which end on the first cloud.
  *
  * The places stay with the clouds, so that the table is the same at all times, and it is the same for all rays, so that
  * such pixels have no grain. */
@@ -24,10 +25,10 @@
 #define NEAR_PART 0.03f
 #define FAR_PART 0.15f
 
-/* Of the layer's height, wide: ways up, down and away from the sun, as of nodes. */
-#define AROUND_PART 0.05
+/* Of the layer's height, wide: ways up, down and away from the sun, as smooth as between nodes. */
+#define AROUND_PART 0.13
 
-enum { TRIES = 4096, LEAST_PLACES = NB_CROWD_PLACES / 4 };
+enum { TRIES = 24576 };
 
 static const float views[NB_CROWD_VIEWS] = {-1,   -.55f, -.25f, -.08f,
                                             .08f, .25f,  .55f,  1}; /* rays' cosines to straight up */
@@ -36,57 +37,51 @@ static const float turns[NB_CROWD_TURNS] = {-1, 0, 1}; /* cosines between ray an
 
 /* ---- places ---------------------------------------------------------------------------------- */
 
-/* Evenly over the planet, and each with a direction along the ground. Roberts, The Unreasonable Effectiveness of
- * Quasirandom Sequences, 2018. */
-static void spread(int i, double unit[3], double *turn)
+/* Evenly over the planet and the layer's height, and each with a direction along the ground. Roberts, The Unreasonable
+ * Effectiveness of Quasirandom Sequences, 2018. */
+static void spread(int i, double unit[3], double *height, double *turn)
 {
-    double parts[3];
-    static const double steps[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
-    for (int k = 0; k < 3; k++) parts[k] = 0.5 + i * steps[k] - floor(0.5 + i * steps[k]);
+    double parts[4];
+    static const double steps[4] = {0.8566748838545029, 0.7338918566271260, 0.6287067210378087, 0.5385972572236101};
+    for (int k = 0; k < 4; k++) parts[k] = 0.5 + i * steps[k] - floor(0.5 + i * steps[k]);
     const double y = 1 - 2 * parts[0], level = sqrt(1 - y * y);
     unit[0] = level * cos(2 * PI * parts[1]);
     unit[1] = y;
     unit[2] = level * sin(2 * PI * parts[1]);
-    *turn = 2 * PI * parts[2];
+    *height = parts[2];
+    *turn = 2 * PI * parts[3];
 }
 
-static int find_at_height(const nebel_cloud_view *view, int k, double height, nb_crowd_place places[NB_CROWD_PLACES])
+static void find_places(const nebel_cloud_view *view, int k, nb_cloud_crowd *crowd)
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const double(*turned)[3] = view->poses[k].turn;
-    int count = 0;
-    for (int i = 0; i < TRIES && count < NB_CROWD_PLACES; i++) {
-        nb_crowd_place *place = &places[count];
-        double own[3];
-        spread(i, own, &place->turn);
+    for (int i = 0; i < TRIES && crowd->count < NB_CROWD_PLACES; i++) {
+        nb_crowd_place *place = &crowd->places[crowd->count];
+        double own[3], height;
+        spread(i, own, &height, &place->turn);
         for (int c = 0; c < 3; c++)
-            place->from[c] = (layer->low + height / (double)layer->per_thickness) *
+            place->from[c] = (layer->low + height * (layer->high - layer->low)) *
                              (turned[0][c] * own[0] + turned[1][c] * own[1] + turned[2][c] * own[2]);
         place->extinction =
             nb_cloud_at(&view->clouds->noise, layer, &view->poses[k], place->from, FINE_PART * layer->size);
-        count += place->extinction > 0;
+        crowd->count += place->extinction > 0;
     }
-    return count;
 }
 
-/* Where hardly any cloud is as high those less high stand for it. */
-static void find_places(nebel_cloud_workspace *workspace, int k, nb_crowd_height *at, double height)
+static void set_places(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd)
 {
-    const double thickness = 1 / (double)workspace->view->clouds->layers[k].per_thickness;
-    const float wide = (float)(AROUND_PART * thickness);
-    do {
-        at->count = find_at_height(workspace->view, k, height, at->places);
-        height = 0.5 + 0.8 * (height - 0.5);
-    } while (at->count < LEAST_PLACES && fabs(height - 0.5) > 0.05);
-    for (int i = 0; i < at->count; i++) {
-        nb_crowd_place *place = &at->places[i];
+    const float wide = (float)(AROUND_PART / (double)workspace->view->clouds->layers[k].per_thickness);
+    find_places(workspace->view, k, crowd);
+    for (int i = 0; i < crowd->count; i++) {
+        nb_crowd_place *place = &crowd->places[i];
         double up[3], down[3];
         const double radius = nb_vector_length(place->from);
         for (int c = 0; c < 3; c++) up[c] = place->from[c] / radius, down[c] = -up[c];
-        place->up = nb_cloud_depth_along(workspace, place->from, up, wide, wide);
-        place->down = nb_cloud_depth_along(workspace, place->from, down, wide, wide);
+        place->up = nb_cloud_depth_along(workspace, place->from, up, wide, wide, 1);
+        place->down = nb_cloud_depth_along(workspace, place->from, down, wide, wide, 1);
     }
-    at->is_set = 1;
+    crowd->is_set = 1;
 }
 
 /* ---- entries --------------------------------------------------------------------------------- */
@@ -114,52 +109,52 @@ static nb_fine fine_of(const nb_cloud_layer *layer)
     return (nb_fine){width, first};
 }
 
-static const nb_cloud_parts *parts_under(nebel_cloud_workspace *workspace, int k, nb_crowd_height *at, int sun)
+static const nb_cloud_parts *parts_under(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int sun)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float wide = (float)(AROUND_PART / (double)layer->per_thickness);
-    if (at->has_parts[sun]) return at->parts[sun];
-    for (int i = 0; i < at->count; i++) {
-        const nb_crowd_place *place = &at->places[i];
+    if (crowd->has_parts[sun]) return crowd->parts[sun];
+    for (int i = 0; i < crowd->count; i++) {
+        const nb_crowd_place *place = &crowd->places[i];
         double to[3], away[3];
         direct(place, (double)suns[sun], place->turn, to);
         for (int c = 0; c < 3; c++) away[c] = -to[c];
         const nb_cloud_depths depths = {
-            .sun = nb_cloud_depth_along(workspace, place->from, to, fine.first, fine.width),
-            .away = nb_cloud_depth_along(workspace, place->from, away, wide, wide),
+            .sun = nb_cloud_depth_along(workspace, place->from, to, fine.first, fine.width, 1),
+            .away = nb_cloud_depth_along(workspace, place->from, away, wide, wide, 1),
             .up = place->up,
             .down = place->down,
         };
-        at->parts[sun][i] = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
+        crowd->parts[sun][i] = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
     }
-    at->has_parts[sun] = 1;
-    return at->parts[sun];
+    crowd->has_parts[sun] = 1;
+    return crowd->parts[sun];
 }
 
 /* What counts is how places differ: where none is seen, too, some are seen more than others. */
-static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_crowd_height *at, int view, int turn)
+static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int view, int turn)
 {
     const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
     const nb_fine fine = fine_of(layer);
     const float g = (float)layer->mean_cosine, apart = 1 - g * g;
-    nb_crowd_seen *seen = at->seen[view][turn];
+    nb_crowd_seen *seen = crowd->seen[view][turn];
     float least = HUGE_VALF;
-    if (at->has_seen[view][turn]) return seen;
-    for (int i = 0; i < at->count; i++) {
-        const nb_crowd_place *place = &at->places[i];
+    if (crowd->has_seen[view][turn]) return seen;
+    for (int i = 0; i < crowd->count; i++) {
+        const nb_crowd_place *place = &crowd->places[i];
         double ray[3];
         direct(place, (double)views[view], place->turn + acos((double)turns[turn]), ray);
         for (int c = 0; c < 3; c++) ray[c] = -ray[c];
-        seen[i].whole = nb_cloud_depth_along(workspace, place->from, ray, fine.first, fine.width);
+        seen[i].whole = nb_cloud_depth_along(workspace, place->from, ray, fine.first, fine.width, 1);
         least = nb_smaller(least, seen[i].whole);
     }
-    for (int i = 0; i < at->count; i++) {
+    for (int i = 0; i < crowd->count; i++) {
         const double depth = (double)(seen[i].whole - least);
-        seen[i].whole = at->places[i].extinction * (float)nb_exp(-depth);
-        seen[i].apart = at->places[i].extinction * (float)nb_exp(-(double)apart * depth);
+        seen[i].whole = crowd->places[i].extinction * (float)nb_exp(-depth);
+        seen[i].apart = crowd->places[i].extinction * (float)nb_exp(-(double)apart * depth);
     }
-    at->has_seen[view][turn] = 1;
+    crowd->has_seen[view][turn] = 1;
     return seen;
 }
 
@@ -174,19 +169,18 @@ static void add_parts(nb_cloud_parts *sum, const nb_cloud_parts *parts, float wh
     sum->to_up += apart * parts->to_up;
 }
 
-static const nb_cloud_parts *entry_of(nebel_cloud_workspace *workspace, int k, const int at[4])
+static const nb_cloud_parts *entry_of(nebel_cloud_workspace *workspace, int k, const int at[3])
 {
-    nb_crowd_height *height = &workspace->crowds[k].heights[at[0]];
-    nb_cloud_parts *mean = &height->means[at[1]][at[2]][at[3]];
-    if (height->has_mean[at[1]][at[2]][at[3]]) return mean;
-    if (!height->is_set) find_places(workspace, k, height, (at[0] + 0.5) / NB_CROWD_HEIGHTS);
-    const nb_cloud_parts *parts = parts_under(workspace, k, height, at[3]);
-    const nb_crowd_seen *seen = seen_by(workspace, k, height, at[1], at[2]);
+    nb_cloud_crowd *crowd = &workspace->crowds[k];
+    nb_cloud_parts *mean = &crowd->means[at[0]][at[1]][at[2]];
+    if (crowd->has_mean[at[0]][at[1]][at[2]]) return mean;
+    const nb_cloud_parts *parts = parts_under(workspace, k, crowd, at[2]);
+    const nb_crowd_seen *seen = seen_by(workspace, k, crowd, at[0], at[1]);
     nb_crowd_seen sum = {0, 0};
-    for (int i = 0; i < height->count; i++) sum = (nb_crowd_seen){sum.whole + seen[i].whole, sum.apart + seen[i].apart};
-    for (int i = 0; i < height->count; i++)
+    for (int i = 0; i < crowd->count; i++) sum = (nb_crowd_seen){sum.whole + seen[i].whole, sum.apart + seen[i].apart};
+    for (int i = 0; i < crowd->count; i++)
         add_parts(mean, &parts[i], seen[i].whole / sum.whole, seen[i].apart / sum.apart);
-    height->has_mean[at[1]][at[2]][at[3]] = 1;
+    crowd->has_mean[at[0]][at[1]][at[2]] = 1;
     return mean;
 }
 
@@ -201,30 +195,30 @@ static float place_among(const float *nodes, int count, float x, int *low)
     return nb_larger(0, nb_smaller(1, (x - nodes[i]) / (nodes[i + 1] - nodes[i])));
 }
 
-float nb_cloud_crowd_part(const nb_cloud_layer *layer, float width)
+float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int k, float width)
 {
-    const float x = (width / layer->size - NEAR_PART) / (FAR_PART - NEAR_PART);
-    return nb_larger(0, nb_smaller(1, x));
+    const float size = workspace->view->clouds->layers[k].size;
+    const float part = nb_larger(0, nb_smaller(1, (width / size - NEAR_PART) / (FAR_PART - NEAR_PART)));
+    nb_cloud_crowd *crowd = &workspace->crowds[k];
+    if (part > 0 && !crowd->is_set) set_places(workspace, k, crowd);
+    return crowd->count > 0 ? part : 0;
 }
 
-nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, float height, const double up[3],
-                                 const double ray[3])
+nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const double up[3], const double ray[3])
 {
     const double *to_sun = workspace->view->sun.direction;
     const double sun = nb_vector_dot(up, to_sun), view = nb_vector_dot(up, ray);
     const double across = sqrt(fmax(0, (1 - sun * sun) * (1 - view * view)));
     const double turn = across > 1e-6 ? (nb_vector_dot(ray, to_sun) - sun * view) / across : 0;
-    const float place = nb_larger(0, nb_smaller(NB_CROWD_HEIGHTS - 1, height * NB_CROWD_HEIGHTS - 0.5f));
-    int low[4];
-    low[0] = place < NB_CROWD_HEIGHTS - 2 ? (int)place : NB_CROWD_HEIGHTS - 2;
-    const float part[4] = {place - (float)low[0], place_among(views, NB_CROWD_VIEWS, (float)view, &low[1]),
-                           place_among(turns, NB_CROWD_TURNS, (float)turn, &low[2]),
-                           place_among(suns, NB_CROWD_SUNS, (float)sun, &low[3])};
+    int low[3];
+    const float part[3] = {place_among(views, NB_CROWD_VIEWS, (float)view, &low[0]),
+                           place_among(turns, NB_CROWD_TURNS, (float)turn, &low[1]),
+                           place_among(suns, NB_CROWD_SUNS, (float)sun, &low[2])};
     nb_cloud_parts sum = {0, 0, 0, 0, 0, 0, 0};
-    for (int corner = 0; corner < 16; corner++) {
+    for (int corner = 0; corner < 8; corner++) {
         float weight = 1;
-        int at[4];
-        for (int i = 0; i < 4; i++) {
+        int at[3];
+        for (int i = 0; i < 3; i++) {
             at[i] = low[i] + (corner >> i & 1);
             weight *= corner >> i & 1 ? part[i] : 1 - part[i];
         }

@@ -1,6 +1,6 @@
 /* Light in clouds.
  *
- * Scattered once: the sun's light through the air and the optical depth that a lattice has for the way to the sun.
+ * Scattered once: the sun's light through the air and the optical depth of the way to the sun.
  *
  * Scattered often: what goes on nearly straight, a part g^2 of all, counts as not scattered (Joseph, Wiscombe and
  * Weinman, The Delta-Eddington Approximation for Radiative Flux Transfer, 1976). The place is taken for one in a slab of
@@ -116,8 +116,8 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
     return count;
 }
 
-/* At most so many steps, of which the last one goes to the layer's end; and what nodes near by take of their own. */
-enum { STEPS = 40, OWN_STEPS = 4, COARSER = 4 };
+/* At most so many steps, of which the last one goes to the layer's end. */
+enum { STEPS = 40 };
 
 /* The pieces of a way in a layer. Just below the horizon it may leave the layer over the planet's bulge and enter it again
  * behind; but not through the ground. */
@@ -131,75 +131,37 @@ static int stays_of(const nebel_cloud_view *view, int k, const double from[3], c
 }
 
 /* Optical depth of a layer from a place on. Steps grow: what is far away throws soft shadows. Each takes the mean over its
- * length. *t: how far it came; returns whether there is more. */
-static int march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float first,
-                 float width, int steps, double *sum, double *t)
+ * length. */
+static double march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float first,
+                    float width, int is_alone)
 {
-    double pieces[2][2], step = (double)first;
+    double pieces[2][2], step = (double)first, sum = 0;
     const int count = stays_of(workspace->view, k, from, unit, pieces);
     int taken = 0;
     for (int i = 0; i < count; i++) {
         const double end = pieces[i][1];
-        *t = pieces[i][0];
-        step = nb_max(step, 0.02 * *t);
-        for (; taken < steps && *t < end; taken++) {
-            const double length = taken >= STEPS - 1 ? end - *t : nb_min(step, end - *t);
+        double t = pieces[i][0];
+        step = nb_max(step, 0.02 * t);
+        for (; t < end; taken++) {
+            const double length = taken >= STEPS - 1 ? end - t : nb_min(step, end - t);
             double place[3];
-            for (int c = 0; c < 3; c++) place[c] = from[c] + (*t + 0.5 * length) * unit[c];
-            *sum += length * (double)nb_cloud_seen_at(workspace, k, place, nb_larger(width, 0.7f * (float)length));
-            *t += length;
+            for (int c = 0; c < 3; c++) place[c] = from[c] + (t + 0.5 * length) * unit[c];
+            sum += length *
+                   (double)nb_cloud_seen_at(workspace, k, place, nb_larger(width, 0.7f * (float)length), is_alone);
+            t += length;
             step *= 1.5;
         }
-        if (*t < end) return 1;
     }
-    return 0;
-}
-
-static float depth_along(nebel_cloud_workspace *workspace, int but, const double from[3], const double unit[3],
-                         float first, float width)
-{
-    double sum = 0, t;
-    for (int k = 0; k < workspace->view->clouds->layer_count; k++)
-        if (k != but) march(workspace, k, from, unit, first, width, STEPS, &sum, &t);
-    return (float)fmin(sum, 1e6);
+    return sum;
 }
 
 float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
-                           float width)
+                           float width, int is_alone)
 {
-    return depth_along(workspace, -1, from, unit, first, width);
-}
-
-static void read_nodes(nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3], float width,
-                       float depth[3]);
-
-/* The layer that a place is in, whose lattices so coarse do not show through it; -1: none. */
-static int layer_for(const nebel_cloud_view *view, const double place[3], double coarse)
-{
-    const double radius = nb_vector_length(place);
-    for (int k = 0; k < view->clouds->layer_count; k++) {
-        const nb_cloud_layer *layer = &view->clouds->layers[k];
-        if (radius > layer->low && radius < layer->high) return 5 * coarse <= layer->high - layer->low ? k : -1;
-    }
-    return -1;
-}
-
-/* After some steps of its own, from `first` on, a way to the sun goes on as a lattice says whose nodes are as far apart
- * as the next step is long. */
-static float depth_to_sun(nebel_cloud_workspace *workspace, const double from[3], float first, float width)
-{
-    const double *sun = workspace->view->sun.direction;
-    const float coarse = first * COARSER;
-    const int own = layer_for(workspace->view, from, (double)coarse);
-    double sum = 0, t;
-    if (own >= 0 && march(workspace, own, from, sun, first, width, OWN_STEPS, &sum, &t)) {
-        double place[3];
-        float rest[3];
-        for (int c = 0; c < 3; c++) place[c] = from[c] + t * sun[c];
-        read_nodes(workspace, NB_CLOUD_TO_SUN, place, coarse, rest);
-        return (float)sum + rest[0];
-    }
-    return (float)sum + depth_along(workspace, own, from, sun, first, width);
+    double sum = 0;
+    for (int k = 0; k < workspace->view->clouds->layer_count; k++)
+        sum += march(workspace, k, from, unit, first, width, is_alone);
+    return (float)fmin(sum, 1e6);
 }
 
 /* Columns next to each other in a layer are as good as one so wide, in sizes of heaps. Wider ones would count what comes through
@@ -228,10 +190,10 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
         for (int c = 0; c < 3; c++) up[c] = place[c] + u * across[0][c] + v * across[1][c];
         nb_vector_make_unit(up);
         for (int c = 0; c < 3; c++) base[c] = layer->low * up[c];
-        const float sun = depth_along(workspace, -1, base, workspace->view->sun.direction, first, fine);
+        const float sun = nb_cloud_depth_along(workspace, base, workspace->view->sun.direction, first, fine, 0);
         parts[0] += nb_cloud_part_through(sun, cosine) / (float)(count * count);
-        parts[1] +=
-            nb_cloud_part_through(depth_along(workspace, -1, base, up, first, fine), cosine) / (float)(count * count);
+        parts[1] += nb_cloud_part_through(nb_cloud_depth_along(workspace, base, up, first, fine, 0), cosine) /
+                    (float)(count * count);
     }
 }
 
@@ -242,7 +204,7 @@ static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, co
     double place[3], up[3], turned[3];
     for (int i = 0; i < 3; i++) place[i] = ldexp((double)at[i], level);
     if (ways == NB_CLOUD_TO_SUN) {
-        depth[0] = depth_to_sun(workspace, place, width, width);
+        depth[0] = nb_cloud_depth_along(workspace, place, workspace->view->sun.direction, width, width, 0);
         return;
     }
     if (ways >= NB_CLOUD_ROOFS) {
@@ -251,11 +213,11 @@ static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, co
     }
     const double radius = fmax(1, nb_vector_length(place));
     for (int i = 0; i < 3; i++) turned[i] = -workspace->view->sun.direction[i];
-    depth[0] = depth_along(workspace, -1, place, turned, width, width);
+    depth[0] = nb_cloud_depth_along(workspace, place, turned, width, width, 0);
     for (int i = 0; i < 3; i++) up[i] = place[i] / radius;
-    depth[1] = depth_along(workspace, -1, place, up, width, width);
+    depth[1] = nb_cloud_depth_along(workspace, place, up, width, width, 0);
     for (int i = 0; i < 3; i++) up[i] = -up[i];
-    depth[2] = depth_along(workspace, -1, place, up, width, width);
+    depth[2] = nb_cloud_depth_along(workspace, place, up, width, width, 0);
 }
 
 /* Tables hold 2 x 2 x 2 neighbours one behind the other, which share lines of the processor's cache. */
@@ -351,7 +313,8 @@ nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, cons
 
 nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)
 {
-    nb_cloud_depths depths = {.sun = depth_to_sun(workspace, place, grain->first, grain->width)};
+    nb_cloud_depths depths = {
+        .sun = nb_cloud_depth_along(workspace, place, workspace->view->sun.direction, grain->first, grain->width, 0)};
     float others[3];
     read_nodes(workspace, NB_CLOUD_AROUND, place, grain->wide, others);
     depths.away = others[0];

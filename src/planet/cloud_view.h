@@ -97,15 +97,14 @@ typedef struct nb_crowd_seen {
 } nb_crowd_seen;
 
 enum {
-    NB_CROWD_HEIGHTS = 6,
     NB_CROWD_VIEWS = 8,
     NB_CROWD_TURNS = 3,
     NB_CROWD_SUNS = 10,
-    NB_CROWD_PLACES = 128,
+    NB_CROWD_PLACES = 768,
 };
 
-/* Places at a height in a layer, and what they are in the mean; what was not asked for is not there. */
-typedef struct nb_crowd_height {
+/* Places in a layer, and what they are in the mean; what was not asked for is not there. */
+typedef struct nb_cloud_crowd {
     int is_set, count;
     nb_crowd_place places[NB_CROWD_PLACES];
     nb_cloud_parts parts[NB_CROWD_SUNS][NB_CROWD_PLACES];
@@ -113,10 +112,6 @@ typedef struct nb_crowd_height {
     nb_cloud_parts means[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
     uint8_t has_parts[NB_CROWD_SUNS], has_seen[NB_CROWD_VIEWS][NB_CROWD_TURNS],
         has_mean[NB_CROWD_VIEWS][NB_CROWD_TURNS][NB_CROWD_SUNS];
-} nb_crowd_height;
-
-typedef struct nb_cloud_crowd {
-    nb_crowd_height heights[NB_CROWD_HEIGHTS];
 } nb_cloud_crowd;
 
 struct nebel_cloud_workspace {
@@ -150,7 +145,8 @@ nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int l
 /* No column that the ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts
  * variance in. */
 float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way);
-float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
+/* is_alone: no column next to it is asked, so that none is kept. */
+float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width, int is_alone);
 
 nebel_result nb_cloud_light_make(nebel_cloud_view *view);
 
@@ -162,9 +158,10 @@ typedef struct nb_cloud_depths {
     float sun, away, up, down;
 } nb_cloud_depths;
 
-/* All along a way; the first step is so long, and what is narrower than a width is seen as a mean. */
+/* All along a way; the first step is so long, and what is narrower than a width is seen as a mean. is_alone: of a place that has
+ * no neighbours. */
 float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
-                           float width);
+                           float width, int is_alone);
 
 /* How finely they are found: what is narrower than a width is seen as a mean. */
 typedef struct nb_cloud_grain {
@@ -216,12 +213,11 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
 nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
                                    const nb_cloud_light *light, const double up[3]);
 
-/* How much of light is of clouds that a pixel so wide hides: 0 to 1. */
-float nb_cloud_crowd_part(const nb_cloud_layer *layer, float width);
+/* How much of light is of clouds that a pixel so wide hides: 0 to 1. Always 0 where hardly any cloud is in the layer. */
+float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int layer, float width);
 
-/* Mean of places in a layer at a part of its height, by how much of each a ray sees. */
-nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, float height, const double up[3],
-                                 const double ray[3]);
+/* Mean of places in a layer, by how much of each a ray sees. */
+nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, const double up[3], const double ray[3]);
 nb_cloud_parts nb_cloud_mix_parts(const nb_cloud_parts *a, const nb_cloud_parts *b, float part);
 
 #endif

@@ -212,15 +212,14 @@ static void add_light(nb_walk *walk, int k)
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
                               0.08 * walk->least),
     };
-    const float crowd = nb_cloud_crowd_part(layer, (float)width);
+    const float crowd = nb_cloud_crowd_part(walk->workspace, k, (float)width);
     nb_cloud_parts parts = {0, 0, 0, 0, 0, 0, 0};
     if (crowd < 1) {
         const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, &grain);
         parts = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
     }
     if (crowd > 0) {
-        const float height = (float)(radius - layer->low) * layer->per_thickness;
-        const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, height, up, walk->unit);
+        const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit);
         parts = nb_cloud_mix_parts(&parts, &mean, crowd);
     }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
