@@ -81,35 +81,59 @@ float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3])
 
 /* ---- billows --------------------------------------------------------------------------------- */
 
-/* One point per cell. */
-static float distance_to_point(int cells, const float place[3])
+enum { MOST_CELLS = 4 * NB_BILLOW_CELLS };
+
+/* One per cell, as parts of it. */
+static void set_points(int cells, float (*points)[3])
+{
+    for (int k = 0; k < cells * cells * cells; k++) {
+        const int at[3] = {k % cells, k / cells % cells, k / cells / cells};
+        uint32_t hash = (uint32_t)cells;
+        for (int i = 0; i < 3; i++) hash = nb_mix_bits(hash + (uint32_t)at[i]);
+        for (int i = 0; i < 3; i++) points[k][i] = (float)(hash >> (10 * i) & 1023) / 1024;
+    }
+}
+
+static float distance_to_point(int cells, const float (*points)[3], const float place[3])
 {
     const int low[3] = {(int)place[0], (int)place[1], (int)place[2]};
     float nearest = 4;
     for (int k = 0; k < 27; k++) {
-        const int step[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
-        uint32_t hash = (uint32_t)cells;
-        for (int i = 0; i < 3; i++) hash = nb_mix_bits(hash + (uint32_t)((low[i] + step[i] + cells) & (cells - 1)));
+        const int at[3] = {low[0] + k % 3 - 1, low[1] + k / 3 % 3 - 1, low[2] + k / 9 - 1};
+        const int last = cells - 1;
+        const float *point =
+            points[(((at[2] + cells) & last) * cells + ((at[1] + cells) & last)) * cells + ((at[0] + cells) & last)];
         float square = 0;
         for (int i = 0; i < 3; i++) {
-            const float point = (float)(low[i] + step[i]) + (float)(hash >> (10 * i) & 1023) / 1024;
-            square += (point - place[i]) * (point - place[i]);
+            const float aside = (float)at[i] + point[i] - place[i];
+            square += aside * aside;
         }
         nearest = square < nearest ? square : nearest;
     }
     return sqrtf(nearest);
 }
 
-static float billow_at(const int at[3])
+static void add_billows(int cells, float weight, float *table)
 {
-    float sum = 0, weight = 1;
-    for (int cells = NB_BILLOW_CELLS; cells <= 4 * NB_BILLOW_CELLS; cells *= 2) {
+    float points[MOST_CELLS * MOST_CELLS * MOST_CELLS][3];
+    set_points(cells, points);
+    for (int i = 0; i < NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE; i++) {
+        const int at[3] = {i % NB_BILLOW_SIZE, i / NB_BILLOW_SIZE % NB_BILLOW_SIZE,
+                           i / NB_BILLOW_SIZE / NB_BILLOW_SIZE};
         float place[3];
-        for (int i = 0; i < 3; i++) place[i] = ((float)at[i] + 0.5f) * (float)cells / NB_BILLOW_SIZE;
-        sum += weight * (1 - distance_to_point(cells, place));
-        weight *= 0.5f;
+        for (int c = 0; c < 3; c++) place[c] = ((float)at[c] + 0.5f) * (float)cells / NB_BILLOW_SIZE;
+        table[i] += weight * (1 - distance_to_point(cells, (const float(*)[3])points, place));
     }
-    return nb_smaller(1, nb_larger(0, sum / 1.75f));
+}
+
+static void set_billows(float *table)
+{
+    enum { COUNT = NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE };
+    memset(table, 0, COUNT * sizeof *table);
+    add_billows(NB_BILLOW_CELLS, 1, table);
+    add_billows(2 * NB_BILLOW_CELLS, 0.5f, table);
+    add_billows(4 * NB_BILLOW_CELLS, 0.25f, table);
+    for (int i = 0; i < COUNT; i++) table[i] = nb_smaller(1, nb_larger(0, table[i] / 1.75f));
 }
 
 static void halve(const float *fine, int size, float *coarse)
@@ -138,10 +162,8 @@ static float variance_of(const float *values, int count, double *mean)
 
 static void fill_billows(nb_cloud_noise *noise)
 {
-    float *table = noise->billows[0], all = 0;
-    for (int i = 0; i < NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE; i++)
-        table[i] = billow_at((const int[3]){i % NB_BILLOW_SIZE, i / NB_BILLOW_SIZE % NB_BILLOW_SIZE,
-                                            i / NB_BILLOW_SIZE / NB_BILLOW_SIZE});
+    float all = 0;
+    set_billows(noise->billows[0]);
     for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
         const int size = NB_BILLOW_SIZE >> level;
         double mean;

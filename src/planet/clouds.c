@@ -206,6 +206,7 @@ static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer
                         float level)
 {
     double at[3], drawn[3] = {place[0], place[1], place[2]};
+    if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_mean;
     draw_out(layer, BILLOWS_DRAWN_OUT, drawn);
     for (int i = 0; i < 3; i++) at[i] = drawn[(i + scale) % 3] * layer->per_billow[scale] + layer->billow_shift[i];
     return nb_billows(noise, at, level);
