@@ -300,8 +300,8 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
         double depth = 0;
         assert_true(end < 1e4);
         for (double t = 0; t < end; t += 100) depth -= log(brute_force(clouds, &ray, t, fmin(t + 100, end), 1));
-        /* A piece of no more than 1 / 0.15 begins before a hundredth is left of what leads away. */
-        assert_true(depth > 4.6 / (1 - g * g) - .2 && depth < 4.6 / (1 - g * g) + 7);
+        /* A piece of no more than 1 / 0.15 begins before three hundredths are left of what leads away. */
+        assert_true(depth > 3.5 / (1 - g * g) - .2 && depth < 3.5 / (1 - g * g) + 7);
     }
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);

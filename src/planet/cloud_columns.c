@@ -30,31 +30,22 @@ static void unit_of(nb_cube_place place, double unit[3])
     nb_vector_make_unit(unit);
 }
 
-static void fill(const nebel_clouds *clouds, int layer, double spacing, float width, nb_cloud_point *point)
-{
-    double unit[3];
-    const nb_cube_place place = {(int)(point->key & 7), {point->at[0] * spacing, point->at[1] * spacing}};
-    unit_of(place, unit);
-    point->column = nb_cloud_column_at(&clouds->noise, &clouds->layers[layer], unit, width);
-}
-
-/* A grid: level 0 is as it is; each next one twice as wide. */
+/* A grid on a face: level 0 is as it is; each next one twice as wide. */
 typedef struct nb_grid {
-    int layer, level;
+    const nb_cloud_layer *layer;
+    const nb_cloud_grid *of;
+    int level;
     uint32_t key;
-    double wide, spacing, per_spacing; /* m, and on the face */
 } nb_grid;
 
-static nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, int face)
+static inline nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, int face)
 {
-    const nb_cloud_layer *of = &clouds->layers[layer];
-    nb_grid grid = {.layer = layer, .level = level};
-    grid.key = UINT32_C(0x80000000) | (uint32_t)(level * NEBEL_MAX_CLOUD_LAYERS + layer) << 3 | (uint32_t)face;
-    const double times = (double)(INT64_C(1) << level);
-    grid.wide = (double)of->grid * times;
-    grid.spacing = of->spacing * times;
-    grid.per_spacing = of->per_spacing * (0x1p-40 * (double)(INT64_C(1) << (40 - level)));
-    return grid;
+    return (nb_grid){
+        .layer = &clouds->layers[layer],
+        .of = &clouds->layers[layer].grids[level],
+        .level = level,
+        .key = UINT32_C(0x80000000) | (uint32_t)(level * NEBEL_MAX_CLOUD_LAYERS + layer) << 3 | (uint32_t)face,
+    };
 }
 
 /* Tables hold 4 x 4 neighbours one behind the other, which share lines of the processor's cache. */
@@ -75,8 +66,13 @@ static const nb_cloud_column *point_at(nebel_cloud_workspace *workspace, const n
 {
     nb_cloud_point *point = &workspace->points[hash_of(grid->key, x, y) & (NB_CLOUD_POINTS - 1)];
     if (!(point->key == grid->key && point->at[0] == x && point->at[1] == y)) {
-        *point = (nb_cloud_point){.key = grid->key, .at = {x, y}};
-        fill(workspace->view->clouds, grid->layer, grid->spacing, grid->level == 0 ? 0 : (float)grid->wide, point);
+        const nb_cube_place place = {(int)(grid->key & 7), {x * grid->of->spacing, y * grid->of->spacing}};
+        double unit[3];
+        unit_of(place, unit);
+        *point = (nb_cloud_point){
+            .key = grid->key,
+            .at = {x, y},
+            .column = nb_cloud_column_at(&workspace->view->clouds->noise, grid->layer, unit, grid->of->width)};
     }
     return &point->column;
 }
@@ -86,47 +82,51 @@ static const nb_cloud_patch *patch_at(nebel_cloud_workspace *workspace, const nb
     nb_cloud_patch *patch = &workspace->patches[hash_of(grid->key, x, y) & (NB_CLOUD_PATCHES - 1)];
     if (patch->key == grid->key && patch->at[0] == x && patch->at[1] == y) return patch;
     *patch = (nb_cloud_patch){.key = grid->key, .at = {x, y}};
-    for (int k = 0; k < 4; k++) patch->columns[k] = *point_at(workspace, grid, x + (k & 1), y + (k >> 1));
+    for (int k = 0; k < 4; k++) {
+        const nb_cloud_column *column = point_at(workspace, grid, x + (k & 1), y + (k >> 1));
+        patch->ranks[k] = column->rank;
+        patch->scales[k] = column->scale;
+        patch->variances[k] = column->variance;
+    }
     return patch;
 }
 
-static void read_grid(nebel_cloud_workspace *workspace, int layer, const nb_cube_place *place, int level, float weight,
-                      nb_cloud_column *sum)
+static inline float mix(const float weights[4], const float of[4])
+{
+    return weights[0] * of[0] + weights[1] * of[1] + weights[2] * of[2] + weights[3] * of[3];
+}
+
+static nb_cloud_column read_grid(nebel_cloud_workspace *workspace, int layer, const nb_cube_place *place, int level)
 {
     const nb_grid grid = grid_of(workspace->view->clouds, layer, level, place->face);
-    const double per = grid.per_spacing, x = place->at[0] * per, y = place->at[1] * per;
+    const double x = place->at[0] * grid.of->per_spacing, y = place->at[1] * grid.of->per_spacing;
     const double left = whole_below(x), low = whole_below(y);
     const float u = (float)(x - left), v = (float)(y - low);
+    const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
     const nb_cloud_patch *patch = patch_at(workspace, &grid, (int)left, (int)low);
-    for (int k = 0; k < 4; k++) {
-        const nb_cloud_column *column = &patch->columns[k];
-        const float share = weight * (k & 1 ? u : 1 - u) * (k >> 1 ? v : 1 - v);
-        sum->rank += share * column->rank;
-        sum->scale += share * column->scale;
-        sum->variance += share * column->variance;
-    }
+    return (nb_cloud_column){mix(weights, patch->ranks), mix(weights, patch->scales), mix(weights, patch->variances)};
 }
 
 /* The first grid of two, and the part of the second, for a width: the finer one up to three quarters of the way. */
 static int levels_of(const nb_cloud_layer *layer, float width, float *part)
 {
-    const float wide = width / layer->grid;
-    int exponent = 0;
-    *part = 0;
-    if (!(wide > 0.75f)) return 0;
-    const float mantissa = frexpf(nb_smaller(wide, 1e9f), &exponent); /* 0.5 to 1 */
-    *part = nb_larger(0, 4 * (mantissa - 0.75f));
-    return exponent;
+    const float level = nb_level_of(nb_smaller(2 * width / layer->grid, 0x1p30f));
+    const int low = (int)level;
+    *part = nb_larger(0, 2 * (level - (float)low) - 1);
+    return low;
 }
 
-nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double unit[3], float width)
+nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double place[3], float width)
 {
-    const nb_cube_place place = cube_of(unit);
-    nb_cloud_column column = {0, 0, 0};
+    const nb_cube_place at = cube_of(place);
     float part;
     const int level = levels_of(&workspace->view->clouds->layers[layer], width, &part);
-    if (part < 1) read_grid(workspace, layer, &place, level, 1 - part, &column);
-    if (part > 0) read_grid(workspace, layer, &place, level + 1, part, &column);
+    nb_cloud_column column = read_grid(workspace, layer, &at, level);
+    if (!(part > 0)) return column;
+    const nb_cloud_column next = read_grid(workspace, layer, &at, level + 1);
+    column.rank += part * (next.rank - column.rank);
+    column.scale += part * (next.scale - column.scale);
+    column.variance += part * (next.variance - column.variance);
     return column;
 }
 
@@ -184,7 +184,7 @@ float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outloo
     for (int k = 0; k < 2; k++) {
         if (k == 0 ? out->part >= 1 : out->part <= 0) continue;
         const nb_grid grid = grid_of(workspace->view->clouds, out->layer, out->level + k, out->face);
-        const double side = grid.spacing * sides[size], per_side = grid.per_spacing * (1 / sides[size]);
+        const double side = grid.of->spacing * sides[size], per_side = grid.of->per_spacing * (1 / sides[size]);
         int block[2];
         for (int i = 0; i < 2; i++) {
             const double low = whole_below(out->at[i] * per_side), edge = (low + out->grows[i]) * side;
@@ -204,20 +204,16 @@ float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outloo
 float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width, int is_alone)
 {
     const nb_cloud_layer *of = &workspace->view->clouds->layers[layer];
-    const double radius = nb_vector_length(place), per = 1 / radius;
+    const double radius = nb_vector_length(place);
     if (!(radius > of->low && radius < of->high)) return 0;
-    double own[3], unit[3];
-    for (int i = 0; i < 3; i++) {
-        own[i] = nb_vector_dot(workspace->view->poses[layer].turn[i], place);
-        unit[i] = own[i] * per;
-    }
+    const double unit[3] = {place[0] / radius, place[1] / radius, place[2] / radius};
     const nb_cloud_noise *noise = &workspace->view->clouds->noise;
     const nb_cloud_column column =
-        is_alone ? nb_cloud_column_at(noise, of, unit, width) : nb_cloud_column_near(workspace, layer, unit, width);
+        is_alone ? nb_cloud_column_at(noise, of, unit, width) : nb_cloud_column_near(workspace, layer, place, width);
     const float height = (float)(radius - of->low) * of->per_thickness;
     float missing[NB_CLOUD_BILLOWS + 1];
     nb_cloud_drops drops;
-    if (!nb_cloud_in_column(noise, of, &column, own, height, width, missing, &drops)) return 0;
+    if (!nb_cloud_in_column(noise, of, &column, place, height, width, missing, &drops)) return 0;
     const float hidden = nb_smaller(nb_smaller(of->hidden_height, of->hidden_width), width - HEAP_PART * of->size);
     return nb_cloud_through(&drops, hidden, 1).whole;
 }

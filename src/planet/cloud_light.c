@@ -135,9 +135,13 @@ static int stays_of(const nebel_cloud_view *view, int k, const double from[3], c
 static double march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float first,
                     float width, int is_alone)
 {
-    double pieces[2][2], step = (double)first, sum = 0;
+    double pieces[2][2], own[3], way[3], step = (double)first, sum = 0;
     const int count = stays_of(workspace->view, k, from, unit, pieces);
     int taken = 0;
+    for (int c = 0; c < 3; c++) {
+        own[c] = nb_vector_dot(workspace->view->poses[k].turn[c], from);
+        way[c] = nb_vector_dot(workspace->view->poses[k].turn[c], unit);
+    }
     for (int i = 0; i < count; i++) {
         const double end = pieces[i][1];
         double t = pieces[i][0];
@@ -145,7 +149,7 @@ static double march(nebel_cloud_workspace *workspace, int k, const double from[3
         for (; t < end; taken++) {
             const double length = taken >= STEPS - 1 ? end - t : nb_min(step, end - t);
             double place[3];
-            for (int c = 0; c < 3; c++) place[c] = from[c] + (t + 0.5 * length) * unit[c];
+            for (int c = 0; c < 3; c++) place[c] = own[c] + (t + 0.5 * length) * way[c];
             sum += length *
                    (double)nb_cloud_seen_at(workspace, k, place, nb_larger(width, 0.7f * (float)length), is_alone);
             t += length;
@@ -182,6 +186,7 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
     nb_vector_make_unit(across[0]);
     nb_vector_cross(place, across[0], across[1]);
     nb_vector_make_unit(across[1]);
+    const int is_alone = width > MOST_COLUMNS * layer->size;
     parts[0] = parts[1] = parts[2] = 0;
     for (int i = 0; i < count * count; i++) {
         const double u = ((i % count + 0.5) / count - 0.5) * (double)width,
@@ -190,9 +195,9 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
         for (int c = 0; c < 3; c++) up[c] = place[c] + u * across[0][c] + v * across[1][c];
         nb_vector_make_unit(up);
         for (int c = 0; c < 3; c++) base[c] = layer->low * up[c];
-        const float sun = nb_cloud_depth_along(workspace, base, workspace->view->sun.direction, first, fine, 0);
+        const float sun = nb_cloud_depth_along(workspace, base, workspace->view->sun.direction, first, fine, is_alone);
         parts[0] += nb_cloud_part_through(sun, cosine) / (float)(count * count);
-        parts[1] += nb_cloud_part_through(nb_cloud_depth_along(workspace, base, up, first, fine, 0), cosine) /
+        parts[1] += nb_cloud_part_through(nb_cloud_depth_along(workspace, base, up, first, fine, is_alone), cosine) /
                     (float)(count * count);
     }
 }

@@ -136,7 +136,8 @@ static void set_billows(float *table)
     for (int i = 0; i < COUNT; i++) table[i] = nb_smaller(1, nb_larger(0, table[i] / 1.75f));
 }
 
-static void halve(const float *fine, int size, float *coarse)
+/* In place. */
+static void halve(float *table, int size)
 {
     const int half = size / 2;
     for (int z = 0; z < half; z++)
@@ -144,8 +145,8 @@ static void halve(const float *fine, int size, float *coarse)
             for (int x = 0; x < half; x++) {
                 float sum = 0;
                 for (int k = 0; k < 8; k++)
-                    sum += fine[((2 * z + (k >> 2)) * size + 2 * y + (k >> 1 & 1)) * size + 2 * x + (k & 1)];
-                coarse[(z * half + y) * half + x] = sum / 8;
+                    sum += table[((2 * z + (k >> 2)) * size + 2 * y + (k >> 1 & 1)) * size + 2 * x + (k & 1)];
+                table[(z * half + y) * half + x] = sum / 8;
             }
 }
 
@@ -160,58 +161,69 @@ static float variance_of(const float *values, int count, double *mean)
     return (float)(square / count - *mean * *mean);
 }
 
-static void fill_billows(nb_cloud_noise *noise)
+/* Numbers on the far side follow on each side. */
+static void surround(const float *table, int size, float *wider)
+{
+    const int row = size + 2;
+    for (int z = 0; z < row; z++)
+        for (int y = 0; y < row; y++)
+            for (int x = 0; x < row; x++) {
+                const int at[3] = {(x + size - 1) % size, (y + size - 1) % size, (z + size - 1) % size};
+                wider[(z * row + y) * row + x] = table[(at[2] * size + at[1]) * size + at[0]];
+            }
+}
+
+static void fill_billows(nb_cloud_noise *noise, float *table)
 {
     float all = 0;
-    set_billows(noise->billows[0]);
+    set_billows(table);
     for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
         const int size = NB_BILLOW_SIZE >> level;
         double mean;
-        if (level > 0) halve(noise->billows[level - 1], 2 * size, noise->billows[level]);
-        const float left = variance_of(noise->billows[level], size * size * size, &mean);
+        if (level > 0) halve(table, 2 * size);
+        surround(table, size, noise->billows[level]);
+        const float left = variance_of(table, size * size * size, &mean);
         if (level == 0) all = left;
         noise->billow_mean = (float)mean;
         noise->billow_variance[level] = all - left;
     }
 }
 
-static float read_level(const nb_cloud_noise *noise, const double place[3], int level)
+/* `part` is of a period. */
+static float read_level(const nb_cloud_noise *noise, const float part[3], int level)
 {
-    const int size = NB_BILLOW_SIZE >> level;
-    double scaled[3];
-    for (int i = 0; i < 3; i++) scaled[i] = place[i] * size - 0.5;
-    const nb_spot spot = spot_of(scaled, size);
-    const float *table = noise->billows[level];
-    const int x0 = spot.at[0], x1 = (x0 + 1) & (size - 1);
-    const int y0 = spot.at[1] * size, y1 = ((spot.at[1] + 1) & (size - 1)) * size;
-    const int z0 = spot.at[2] * size * size, z1 = ((spot.at[2] + 1) & (size - 1)) * size * size;
-    const float u = spot.part[0], v = spot.part[1];
-    const float a = mix(table[z0 + y0 + x0], table[z0 + y0 + x1], u),
-                b = mix(table[z0 + y1 + x0], table[z0 + y1 + x1], u);
-    const float c = mix(table[z1 + y0 + x0], table[z1 + y0 + x1], u),
-                d = mix(table[z1 + y1 + x0], table[z1 + y1 + x1], u);
-    return mix(mix(a, b, v), mix(c, d, v), spot.part[2]);
-}
-
-/* Levels blend over the last quarter before the next. */
-static inline float next_part(float level, int low)
-{
-    return nb_larger(0, 4 * (level - (float)low) - 3);
+    const int size = NB_BILLOW_SIZE >> level, row = size + 2, plane = row * row;
+    float at[3];
+    int low[3];
+    for (int i = 0; i < 3; i++) {
+        at[i] = part[i] * (float)size + 0.5f; /* numbers stand for the middles of their cells */
+        low[i] = (int)at[i];
+        at[i] -= (float)low[i];
+    }
+    const float *t = noise->billows[level] + low[2] * plane + low[1] * row + low[0], *s = t + plane;
+    const float a = mix(t[0], t[1], at[0]), b = mix(t[row], t[row + 1], at[0]);
+    const float c = mix(s[0], s[1], at[0]), d = mix(s[row], s[row + 1], at[0]);
+    return mix(mix(a, b, at[1]), mix(c, d, at[1]), at[2]);
 }
 
 float nb_billows_lost(const nb_cloud_noise *noise, float level)
 {
     if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_variance[NB_BILLOW_LEVELS - 1];
     const int low = (int)level;
-    return mix(noise->billow_variance[low], noise->billow_variance[low + 1], next_part(level, low));
+    return mix(noise->billow_variance[low], noise->billow_variance[low + 1], nb_next_part(level, low));
 }
 
 float nb_billows(const nb_cloud_noise *noise, const double place[3], float level)
 {
     if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_mean;
+    float part[3];
+    for (int i = 0; i < 3; i++) {
+        const float left = (float)(place[i] - (double)(int64_t)place[i]);
+        part[i] = left < 0 ? left + 1 : left;
+    }
     const int low = (int)level;
-    const float part = next_part(level, low), fine = read_level(noise, place, low);
-    return part > 0 ? mix(fine, read_level(noise, place, low + 1), part) : fine;
+    const float next = nb_next_part(level, low), fine = read_level(noise, part, low);
+    return next > 0 ? mix(fine, read_level(noise, part, low + 1), next) : fine;
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */
@@ -219,25 +231,26 @@ float nb_billows(const nb_cloud_noise *noise, const double place[3], float level
 nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_noise *noise)
 {
     enum { POINTS = NB_CLOUD_LATTICE * NB_CLOUD_LATTICE * NB_CLOUD_LATTICE };
-    size_t all = 0, used = 0;
+    size_t all = 0, starts[NB_BILLOW_LEVELS];
     for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
-        const size_t size = (size_t)NB_BILLOW_SIZE >> level;
-        all += size * size * size;
+        const size_t row = ((size_t)NB_BILLOW_SIZE >> level) + 2;
+        starts[level] = all;
+        all += row * row * row;
     }
     noise->turns = nb_allocate(allocator, POINTS, 1);
     noise->directions = nb_allocate(allocator, NB_CLOUD_DIRECTIONS, sizeof *noise->directions);
     float *tables = nb_allocate(allocator, all, sizeof *tables);
+    float *table = nb_allocate(allocator, NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE, sizeof *table);
+    const int is_whole = noise->turns != NULL && noise->directions != NULL && tables != NULL && table != NULL;
     noise->billows[0] = tables;
-    if (noise->turns == NULL || noise->directions == NULL || tables == NULL) return NEBEL_ERROR_MEMORY;
-    for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
-        const size_t size = (size_t)NB_BILLOW_SIZE >> level;
-        noise->billows[level] = tables + used;
-        used += size * size * size;
+    if (is_whole) {
+        for (int level = 1; level < NB_BILLOW_LEVELS; level++) noise->billows[level] = tables + starts[level];
+        for (uint32_t i = 0; i < POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
+        fill_directions(noise->directions);
+        fill_billows(noise, table);
     }
-    for (uint32_t i = 0; i < POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
-    fill_directions(noise->directions);
-    fill_billows(noise);
-    return NEBEL_OK;
+    nb_release(allocator, table);
+    return is_whole ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 
 void nb_cloud_noise_free(const nebel_allocator *allocator, nb_cloud_noise *noise)

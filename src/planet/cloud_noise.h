@@ -4,6 +4,8 @@
 
 #include "base/base.h"
 
+#include <string.h>
+
 enum {
     NB_CLOUD_LATTICE = 64, /* points of gradient noise before it repeats, on each axis */
     NB_CLOUD_DIRECTIONS = 256,
@@ -23,10 +25,25 @@ static inline float nb_larger(float a, float b)
     return a > b ? a : b;
 }
 
+/* About how often `times` can be halved until it is 1: 0 below 1, the logarithm at powers of two, linear between. */
+static inline float nb_level_of(float times)
+{
+    int32_t bits; /* exponent and mantissa as one number */
+    if (!(times > 1)) return 0;
+    memcpy(&bits, &times, sizeof bits);
+    return (float)(bits - 0x3f800000) * 0x1p-23f;
+}
+
+/* Levels blend over the last quarter before the next. */
+static inline float nb_next_part(float level, int low)
+{
+    return nb_larger(0, 4 * (level - (float)low) - 3);
+}
+
 typedef struct nb_cloud_noise {
     uint8_t *turns; /* [z][y][x]: which direction */
     float (*directions)[4];
-    float *billows[NB_BILLOW_LEVELS];
+    float *billows[NB_BILLOW_LEVELS];                     /* with a number more on each side, as if it went on there */
     float billow_mean, billow_variance[NB_BILLOW_LEVELS]; /* what a level has lost of the first one's */
 } nb_cloud_noise;
 

@@ -69,7 +69,7 @@ typedef struct nb_cloud_point {
 typedef struct nb_cloud_patch {
     uint32_t key;
     int32_t at[2];
-    nb_cloud_column columns[4];
+    float ranks[4], scales[4], variances[4];
 } nb_cloud_patch;
 
 /* The largest rank, with all that a width hides, of a block of that grid. */
@@ -127,8 +127,8 @@ struct nebel_cloud_workspace {
 int nb_cloud_pieces(double low, double high, const double from[3], const double unit[3], double t_max,
                     double pieces[2][2]);
 
-/* nb_cloud_column_at and nb_cloud_at, linear between columns that are found once. */
-nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double unit[3], float width);
+/* nb_cloud_column_at over or under a place in the layer's axes, linear between columns that are found once. */
+nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
 
 /* A place of a ray on a face of the cube, on which blocks of columns are. */
 typedef struct nb_cloud_outlook {
@@ -145,7 +145,7 @@ nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int l
 /* No column that the ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts
  * variance in. */
 float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way);
-/* is_alone: no column next to it is asked, so that none is kept. */
+/* Extinction at a place in the layer's axes. is_alone: no column next to it is asked, so that none is kept. */
 float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width, int is_alone);
 
 nebel_result nb_cloud_light_make(nebel_cloud_view *view);

@@ -13,7 +13,7 @@
 #include "formulas/elementary.inc"
 
 /* Behind so little nothing is seen any more. */
-#define UNSEEN 0.01
+#define UNSEEN 0.03
 
 /* Of what a piece may miss: that of many pieces together is less than their number of it, since signs differ. */
 #define PIECES 1.5
@@ -106,7 +106,7 @@ static nb_cloud_seen extinction_of(const nb_walk *walk, int k, const nb_spot *sp
     nb_cloud_drops drops;
     if (clear != NULL) *clear = 0;
     if (!(spot->height > 0 && spot->height < 1)) return (nb_cloud_seen){0, 0};
-    const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->unit, spot->width);
+    const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->place, spot->width);
     const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k].direction));
     if (nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing,
                            &drops))
@@ -247,6 +247,8 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     walk->cloud_end = t + length;
     walk->depth += depth;
     walk->apart += depth_apart;
+    /* What is behind has the light of the last that is seen. */
+    if (nb_exp(-walk->apart) <= UNSEEN) stretch->seen_apart += nb_exp(-walk->apart) / apart;
     if (stretch->depth > STRETCH_DEPTH / (0.15 + nb_exp(-walk->depth))) add_light(walk, k);
     pass(walk, t + length);
 }

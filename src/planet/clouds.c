@@ -14,8 +14,7 @@
 #define PI 3.14159265358979323846
 
 /* Each scale of billows is so much smaller than the one before. */
-#define BILLOW_RATIO 6.1
-#define LOG2_BILLOW_RATIO 2.60880924f
+#define BILLOW_RATIO 6.1f
 
 /* A pixel hides so much along a ray, in pixels; of sheets, which it meets aslant, as much more as it is long there, down to so
  * flat rays. Then as much comes through as through thin rays within the pixel (test_clouds). */
@@ -193,22 +192,27 @@ static float mean_ramp(float x, float wide)
     return (ramp_integral(x + wide) - ramp_integral(x - wide)) / (2 * wide);
 }
 
-/* How often the tables of billows are halved for a width. */
-static void set_levels(const nb_cloud_layer *layer, float width, float levels[NB_CLOUD_BILLOWS])
+/* How often the tables of billows are halved for a width. Returns the variance that they lose by that. */
+static float set_levels(const nb_cloud_noise *noise, const nb_cloud_layer *layer, float width,
+                        float levels[NB_CLOUD_BILLOWS])
 {
-    const float finest = width * NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
-    const float last = finest > 1 ? log2f(finest) : 0;
-    for (int k = 0; k < NB_CLOUD_BILLOWS; k++)
-        levels[k] = nb_larger(0, last - (float)(NB_CLOUD_BILLOWS - 1 - k) * LOG2_BILLOW_RATIO);
+    float lost = 0, numbers = width * layer->last_billow; /* of a table within the width */
+    for (int k = NB_CLOUD_BILLOWS - 1; k >= 0; k--, numbers *= 1 / BILLOW_RATIO) {
+        levels[k] = nb_level_of(numbers);
+        if (levels[k] > 0) lost += billow_weights[k] * billow_weights[k] * nb_billows_lost(noise, levels[k]);
+    }
+    return lost;
 }
 
 static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int scale, const double place[3],
                         float level)
 {
-    double at[3], drawn[3] = {place[0], place[1], place[2]};
+    double at[3], drawn[5] = {place[0], place[1], place[2]};
     if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_mean;
     draw_out(layer, BILLOWS_DRAWN_OUT, drawn);
-    for (int i = 0; i < 3; i++) at[i] = drawn[(i + scale) % 3] * layer->per_billow[scale] + layer->billow_shift[i];
+    drawn[3] = drawn[0];
+    drawn[4] = drawn[1];
+    for (int i = 0; i < 3; i++) at[i] = drawn[i + scale] * layer->per_billow[scale] + layer->billow_shift[i];
     return nb_billows(noise, at, level);
 }
 
@@ -232,9 +236,7 @@ int nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
     /* What is far within is whole. */
     if (deep > 0 && whole - deep < softness + sqrtf(3 * variance)) {
         float most = deep; /* with all that is not read */
-        set_levels(layer, width, levels);
-        for (int k = 0; k < NB_CLOUD_BILLOWS; k++)
-            variance += deep * deep * billow_weights[k] * billow_weights[k] * nb_billows_lost(noise, levels[k]);
+        variance += deep * deep * set_levels(noise, layer, width, levels);
         const float spread = sqrtf(3 * variance);
         for (int k = 0; k < NB_CLOUD_BILLOWS && whole - most < softness + spread; k++) {
             const float billows = billows_at(noise, layer, k, place, levels[k]);
@@ -286,7 +288,8 @@ nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float 
     /* Then the mean is right to a thousandth of what a full place has. */
     const int is_even = drops->spread < 1e-3f || !(depth * drops->spread * drops->spread > 6e-3f);
     if (is_full || is_even) return (nb_cloud_seen){mean, apart * mean};
-    return (nb_cloud_seen){through(drops, depth, length, mean), through(drops, apart * depth, length, apart * mean)};
+    const float whole = through(drops, depth, length, mean);
+    return (nb_cloud_seen){whole, apart < 1 ? through(drops, apart * depth, length, apart * mean) : whole};
 }
 
 float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
@@ -411,13 +414,16 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
     }
     for (int i = 0; i < 3; i++) layer->billow_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
     double period = 0.9 * desc->size;
-    for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= BILLOW_RATIO) {
+    for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= (double)BILLOW_RATIO) {
         layer->per_billow[i] = 1 / period;
         layer->billow_slopes[i] = billow_weights[i] * (float)fmax(0, desc->detail) * NB_BILLOW_SLOPE / (float)period;
     }
+    layer->last_billow = NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
     layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
-    layer->spacing = (double)layer->grid / layer->low;
-    layer->per_spacing = layer->low / (double)layer->grid;
+    for (int i = 0; i < NB_CLOUD_GRIDS; i++) {
+        const double wide = ldexp((double)layer->grid, i);
+        layer->grids[i] = (nb_cloud_grid){wide / layer->low, layer->low / wide, i == 0 ? 0 : (float)wide};
+    }
     /* Wisps are bent, and that noise has a slope, too. */
     if (desc->kind == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
 }

@@ -12,6 +12,7 @@ enum {
     NB_CLOUD_OCTAVES = 5, /* of where heaps are */
     NB_CLOUD_BILLOWS = 3, /* scales of billows */
     NB_CLOUD_RANKS = 257, /* of the octaves' sum */
+    NB_CLOUD_GRIDS = 32,
 };
 
 /* Octaves of noise have their lattices turned against each other, so that no axis shows. */
@@ -19,6 +20,12 @@ typedef struct nb_cloud_octave {
     double turn[3][3], shift[3]; /* from m to the lattice */
     float cell, weight;          /* m */
 } nb_cloud_octave;
+
+/* Columns are kept on grids, each twice as wide as the one before. */
+typedef struct nb_cloud_grid {
+    double spacing, per_spacing; /* between columns, on faces of a cube */
+    float width;                 /* m, of what a column hides */
+} nb_cloud_grid;
 
 typedef struct nb_cloud_layer {
     nebel_cloud_kind kind;
@@ -30,11 +37,12 @@ typedef struct nb_cloud_layer {
     double axis[3], per_time;          /* the shell turns by that angle in a unit of time */
     nb_cloud_octave octaves[NB_CLOUD_OCTAVES];
     double billow_shift[3], per_billow[NB_CLOUD_BILLOWS]; /* 1/m, of the largest first */
+    float last_billow;                                    /* 1/m, numbers in the table of the smallest */
     float billow_slopes[NB_CLOUD_BILLOWS];                /* of ranks, at most, per m */
     float ranks[NB_CLOUD_RANKS]; /* of the octaves' sum over the planet: what a part of it is below of */
     float slope;                 /* of that sum, at most, per m */
     float grid;                  /* m, between columns that are kept */
-    double spacing, per_spacing; /* the same on faces of a cube */
+    nb_cloud_grid grids[NB_CLOUD_GRIDS];
     float coverage;
     nb_layer_map weather; /* level_count 0: none */
     nb_phase phase;
