@@ -689,6 +689,7 @@ class RenderTest(PictureCase):
             self.assert_misused(self.render(name, "--frames", "0-1"), "--output")
         for frames in ("1", "2-1", "-1-2", "a-b", "0-1000001", "1-2-3", "0-99999999999", ""):
             self.assert_misused(self.render("a%d.png", "--frames", frames), "--frames")
+        self.assert_misused(self.render("a%d.png", "--frames", "7"), "one alone is --frame\n")
         self.assert_misused(self.render("a%d.png", "--frames", "0-1", "--frame", "0"), "--frame")
         self.assert_misused(self.render("a.png", "--frame", "1.5"), "--frame")
         self.assertEqual(self.files(), self.given)

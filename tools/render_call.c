@@ -132,7 +132,7 @@ static void read_frames(nb_arguments *arguments, nb_render_call *wanted)
     if (arguments->values[FRAME] != NULL) nb_options_reject(arguments, FRAMES, "contradicts --frame; leave one out");
     const int good = read_pair(text, '-', LAST_FRAME, &wanted->first_frame, &wanted->last_frame);
     if (good && wanted->first_frame <= wanted->last_frame) return;
-    nb_options_reject(arguments, FRAMES, "is no range such as 0-95, of frames up to 1000000");
+    nb_options_reject(arguments, FRAMES, "is no range such as 0-95, of frames up to 1000000; one alone is --frame");
 }
 
 /* A side of a WebP. */
