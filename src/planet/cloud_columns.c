@@ -34,7 +34,6 @@ static void unit_of(nb_cube_place place, double unit[3])
 typedef struct nb_grid {
     const nb_cloud_layer *layer;
     const nb_cloud_grid *of;
-    int level;
     uint32_t key;
 } nb_grid;
 
@@ -43,7 +42,6 @@ static inline nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, 
     return (nb_grid){
         .layer = &clouds->layers[layer],
         .of = &clouds->layers[layer].grids[level],
-        .level = level,
         .key = UINT32_C(0x80000000) | (uint32_t)(level * NEBEL_MAX_CLOUD_LAYERS + layer) << 3 | (uint32_t)face,
     };
 }
@@ -107,10 +105,13 @@ static nb_cloud_column read_grid(nebel_cloud_workspace *workspace, int layer, co
     return (nb_cloud_column){mix(weights, patch->ranks), mix(weights, patch->scales), mix(weights, patch->variances)};
 }
 
+/* Numbers are held to the last grid but one. */
+#define WIDEST ((float)(1U << (NB_CLOUD_GRIDS - 2)))
+
 /* The first grid of two, and the part of the second, for a width: the finer one up to three quarters of the way. */
 static int levels_of(const nb_cloud_layer *layer, float width, float *part)
 {
-    const float level = nb_level_of(nb_smaller(2 * width / layer->grid, 0x1p30f));
+    const float level = nb_level_of(nb_smaller(2 * width / layer->grid, WIDEST));
     const int low = (int)level;
     *part = nb_larger(0, 2 * (level - (float)low) - 1);
     return low;
@@ -206,10 +207,14 @@ float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double
     const nb_cloud_layer *of = &workspace->view->clouds->layers[layer];
     const double radius = nb_vector_length(place);
     if (!(radius > of->low && radius < of->high)) return 0;
-    const double unit[3] = {place[0] / radius, place[1] / radius, place[2] / radius};
     const nb_cloud_noise *noise = &workspace->view->clouds->noise;
-    const nb_cloud_column column =
-        is_alone ? nb_cloud_column_at(noise, of, unit, width) : nb_cloud_column_near(workspace, layer, place, width);
+    nb_cloud_column column;
+    if (is_alone) {
+        const double unit[3] = {place[0] / radius, place[1] / radius, place[2] / radius};
+        column = nb_cloud_column_at(noise, of, unit, width);
+    } else {
+        column = nb_cloud_column_near(workspace, layer, place, width);
+    }
     const float height = (float)(radius - of->low) * of->per_thickness;
     float missing[NB_CLOUD_BILLOWS + 1];
     nb_cloud_drops drops;

@@ -206,23 +206,28 @@ static float read_level(const nb_cloud_noise *noise, const float part[3], int le
     return mix(mix(a, b, at[1]), mix(c, d, at[1]), at[2]);
 }
 
+/* Levels blend over the last quarter before the next. */
+static float next_part(float level, int low)
+{
+    return nb_larger(0, 4 * (level - (float)low) - 3);
+}
+
 float nb_billows_lost(const nb_cloud_noise *noise, float level)
 {
     if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_variance[NB_BILLOW_LEVELS - 1];
     const int low = (int)level;
-    return mix(noise->billow_variance[low], noise->billow_variance[low + 1], nb_next_part(level, low));
+    return mix(noise->billow_variance[low], noise->billow_variance[low + 1], next_part(level, low));
 }
 
 float nb_billows(const nb_cloud_noise *noise, const double place[3], float level)
 {
-    if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_mean;
     float part[3];
     for (int i = 0; i < 3; i++) {
         const float left = (float)(place[i] - (double)(int64_t)place[i]);
         part[i] = left < 0 ? left + 1 : left;
     }
     const int low = (int)level;
-    const float next = nb_next_part(level, low), fine = read_level(noise, part, low);
+    const float next = next_part(level, low), fine = read_level(noise, part, low);
     return next > 0 ? mix(fine, read_level(noise, part, low + 1), next) : fine;
 }
 

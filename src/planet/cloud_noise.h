@@ -34,12 +34,6 @@ static inline float nb_level_of(float times)
     return (float)(bits - 0x3f800000) * 0x1p-23f;
 }
 
-/* Levels blend over the last quarter before the next. */
-static inline float nb_next_part(float level, int low)
-{
-    return nb_larger(0, 4 * (level - (float)low) - 3);
-}
-
 typedef struct nb_cloud_noise {
     uint8_t *turns; /* [z][y][x]: which direction */
     float (*directions)[4];
@@ -59,7 +53,8 @@ float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3]);
 #define NB_GRADIENT_SLOPE 2.3f
 #define NB_BILLOW_SLOPE 7.f /* of billows, per period: each octave's is that of a distance */
 
-/* 0 to 1, 1 in the middle of a billow; `place` in periods; level: how often halved, 0 or more. */
+/* 0 to 1, 1 in the middle of a billow; `place` in periods; level: how often halved, 0 to less than NB_BILLOW_LEVELS - 1. Beyond
+ * it all is billow_mean. */
 float nb_billows(const nb_cloud_noise *noise, const double place[3], float level);
 
 /* The variance that a level has lost. */

@@ -12,7 +12,7 @@
 
 #include "formulas/elementary.inc"
 
-/* Behind so little nothing is seen any more. */
+/* Where so little is left rays end: what is behind has the light of the last that is seen. */
 #define UNSEEN 0.03
 
 /* Of what a piece may miss: that of many pieces together is less than their number of it, since signs differ. */
@@ -247,7 +247,6 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     walk->cloud_end = t + length;
     walk->depth += depth;
     walk->apart += depth_apart;
-    /* What is behind has the light of the last that is seen. */
     if (nb_exp(-walk->apart) <= UNSEEN) stretch->seen_apart += nb_exp(-walk->apart) / apart;
     if (stretch->depth > STRETCH_DEPTH / (0.15 + nb_exp(-walk->depth))) add_light(walk, k);
     pass(walk, t + length);

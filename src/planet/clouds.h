@@ -12,7 +12,7 @@ enum {
     NB_CLOUD_OCTAVES = 5, /* of where heaps are */
     NB_CLOUD_BILLOWS = 3, /* scales of billows */
     NB_CLOUD_RANKS = 257, /* of the octaves' sum */
-    NB_CLOUD_GRIDS = 32,
+    NB_CLOUD_GRIDS = 32,  /* on which columns are kept */
 };
 
 /* Octaves of noise have their lattices turned against each other, so that no axis shows. */
@@ -21,7 +21,7 @@ typedef struct nb_cloud_octave {
     float cell, weight;          /* m */
 } nb_cloud_octave;
 
-/* Columns are kept on grids, each twice as wide as the one before. */
+/* Each is twice as wide as the one before. */
 typedef struct nb_cloud_grid {
     double spacing, per_spacing; /* between columns, on faces of a cube */
     float width;                 /* m, of what a column hides */
