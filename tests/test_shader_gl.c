@@ -371,7 +371,7 @@ static void test_lists(void **state)
     const double eye[3] = {8, 3, -11};
     size_t kept = 0;
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, "", trace_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     nebel_snapshot *snapshot = commit_random_fog(RANDOM_FOG_PROFILES, 3);
     for (size_t i = 0; i < fog.count; i++)
         fog.volumes[i].extinction[0] = .01 * (double)(i + 1); /* their canonical order */
@@ -387,14 +387,14 @@ static void test_lists(void **state)
     memcpy(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
-    open_tracer(&t, NB_GL_330, TEXTURE, "#define NEBEL_INDEX(i) (i)\n", list_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT "#define NEBEL_INDEX(i) (i)\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)fog.count;
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
     assert_memory_equal(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
-    open_tracer(&t, NB_GL_300ES, TEXTURE, "#define NEBEL_INDEX(i) (2 * (i))\n", list_body);
+    open_tracer(&t, NB_GL_300ES, TEXTURE, UNLIT "#define NEBEL_INDEX(i) (2 * (i))\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)kept;
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
@@ -434,7 +434,7 @@ static void test_transmittance_alone(void **state)
 {
     (void)state;
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, "", transmit_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, transmit_body);
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
         nebel_snapshot *snapshot = commit_random_fog((random_fog_kind)kind, 2);
         camera_rays(fog.shift, fog.shift, 3);

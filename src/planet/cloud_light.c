@@ -116,8 +116,25 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
     return count;
 }
 
-/* At most so many steps, of which the last one goes to the layer's end. */
-enum { STEPS = 40 };
+/* Steps along a way: how long the first is, how much longer each is than the one before, and what is narrower than a width is
+ * seen as a mean. is_alone: of a place that has no neighbours. */
+typedef struct nb_steps {
+    float first, growth, width;
+    int is_alone;
+} nb_steps;
+
+/* At most so many, of which the last one goes to the layer's end. */
+enum { MOST_STEPS = 64 };
+
+/* Of ways that others do not share, and of those to the sun that a lattice keeps for all around. What is far away throws softer
+ * shadows the more steps grow. */
+#define GROWTH 1.5f
+#define SHARED_GROWTH 1.2f
+
+/* A ray's ways to the sun are its own for five steps: then the next is so much longer than the first. What is behind them comes
+ * from the lattice, whose nodes are half of that step apart. */
+#define OWN_GROWTH (GROWTH * GROWTH * GROWTH * GROWTH * GROWTH)
+#define NODES_STEP 0.5f
 
 /* The pieces of a way in a layer. Just below the horizon it may leave the layer over the planet's bulge and enter it again
  * behind; but not through the ground. */
@@ -130,12 +147,11 @@ static int stays_of(const nebel_cloud_view *view, int k, const double from[3], c
     return count == 2 && ground < pieces[1][0] ? 1 : count;
 }
 
-/* Optical depth of a layer from a place on. Steps grow: what is far away throws soft shadows. Each takes the mean over its
- * length. */
-static double march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], float first,
-                    float width, int is_alone)
+/* Optical depth of a layer from a place on, as far as `reach`. Each step takes the mean over its length. */
+static double march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], double reach,
+                    const nb_steps *steps)
 {
-    double pieces[2][2], own[3], way[3], step = (double)first, sum = 0;
+    double pieces[2][2], own[3], way[3], step = (double)steps->first, sum = 0;
     const int count = stays_of(workspace->view, k, from, unit, pieces);
     int taken = 0;
     for (int c = 0; c < 3; c++) {
@@ -143,29 +159,35 @@ static double march(nebel_cloud_workspace *workspace, int k, const double from[3
         way[c] = nb_vector_dot(workspace->view->poses[k].turn[c], unit);
     }
     for (int i = 0; i < count; i++) {
-        const double end = pieces[i][1];
+        const double end = nb_min(reach, pieces[i][1]);
         double t = pieces[i][0];
         step = nb_max(step, 0.02 * t);
         for (; t < end; taken++) {
-            const double length = taken >= STEPS - 1 ? end - t : nb_min(step, end - t);
+            const double length = taken >= MOST_STEPS - 1 ? end - t : nb_min(step, end - t);
+            const float width = nb_larger(steps->width, 0.7f * (float)length);
             double place[3];
             for (int c = 0; c < 3; c++) place[c] = own[c] + (t + 0.5 * length) * way[c];
-            sum += length *
-                   (double)nb_cloud_seen_at(workspace, k, place, nb_larger(width, 0.7f * (float)length), is_alone);
+            sum += length * (double)nb_cloud_seen_at(workspace, k, place, width, steps->is_alone);
             t += length;
-            step *= 1.5;
+            step *= (double)steps->growth;
         }
     }
     return sum;
 }
 
+static double depth_until(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], double reach,
+                          const nb_steps *steps)
+{
+    double sum = 0;
+    for (int k = 0; k < workspace->view->clouds->layer_count; k++) sum += march(workspace, k, from, unit, reach, steps);
+    return nb_min(sum, 1e6);
+}
+
 float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
                            float width, int is_alone)
 {
-    double sum = 0;
-    for (int k = 0; k < workspace->view->clouds->layer_count; k++)
-        sum += march(workspace, k, from, unit, first, width, is_alone);
-    return (float)fmin(sum, 1e6);
+    const nb_steps steps = {first, GROWTH, width, is_alone};
+    return (float)depth_until(workspace, from, unit, HUGE_VAL, &steps);
 }
 
 /* Columns next to each other in a layer are as good as one so wide, in sizes of heaps. Wider ones would count what comes through
@@ -187,6 +209,7 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
     nb_vector_cross(place, across[0], across[1]);
     nb_vector_make_unit(across[1]);
     const int is_alone = width > MOST_COLUMNS * layer->size;
+    const nb_steps to_sun = {first, is_alone ? GROWTH : SHARED_GROWTH, fine, is_alone};
     parts[0] = parts[1] = parts[2] = 0;
     for (int i = 0; i < count * count; i++) {
         const double u = ((i % count + 0.5) / count - 0.5) * (double)width,
@@ -195,7 +218,7 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
         for (int c = 0; c < 3; c++) up[c] = place[c] + u * across[0][c] + v * across[1][c];
         nb_vector_make_unit(up);
         for (int c = 0; c < 3; c++) base[c] = layer->low * up[c];
-        const float sun = nb_cloud_depth_along(workspace, base, workspace->view->sun.direction, first, fine, is_alone);
+        const float sun = (float)depth_until(workspace, base, workspace->view->sun.direction, HUGE_VAL, &to_sun);
         parts[0] += nb_cloud_part_through(sun, cosine) / (float)(count * count);
         parts[1] += nb_cloud_part_through(nb_cloud_depth_along(workspace, base, up, first, fine, is_alone), cosine) /
                     (float)(count * count);
@@ -209,7 +232,8 @@ static void find_depths(nebel_cloud_workspace *workspace, nb_cloud_ways ways, co
     double place[3], up[3], turned[3];
     for (int i = 0; i < 3; i++) place[i] = ldexp((double)at[i], level);
     if (ways == NB_CLOUD_TO_SUN) {
-        depth[0] = nb_cloud_depth_along(workspace, place, workspace->view->sun.direction, width, width, 0);
+        const nb_steps steps = {width, SHARED_GROWTH, width, 0};
+        depth[0] = (float)depth_until(workspace, place, workspace->view->sun.direction, HUGE_VAL, &steps);
         return;
     }
     if (ways >= NB_CLOUD_ROOFS) {
@@ -316,10 +340,23 @@ nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, cons
     return (nb_cloud_roof){parts[0], parts[1]};
 }
 
+static float find_sun_depth(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)
+{
+    const nb_steps steps = {grain->first, GROWTH, grain->width, 0};
+    const float next = OWN_GROWTH * grain->first, width = NODES_STEP * next;
+    const double *sun = workspace->view->sun.direction, reach = (double)((next - grain->first) / (GROWTH - 1));
+    const double near = depth_until(workspace, place, sun, reach, &steps);
+    double far[3];
+    for (int c = 0; c < 3; c++) far[c] = place[c] + reach * sun[c];
+    /* Nodes just above all layers share cells with others below. */
+    if (nb_vector_length(far) > workspace->view->high + (double)width && nb_vector_dot(far, sun) > 0)
+        return (float)near;
+    return (float)near + nb_cloud_sun_depth_at(workspace, far, width);
+}
+
 nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)
 {
-    nb_cloud_depths depths = {
-        .sun = nb_cloud_depth_along(workspace, place, workspace->view->sun.direction, grain->first, grain->width, 0)};
+    nb_cloud_depths depths = {.sun = find_sun_depth(workspace, place, grain)};
     float others[3];
     read_nodes(workspace, NB_CLOUD_AROUND, place, grain->wide, others);
     depths.away = others[0];
