@@ -44,7 +44,7 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside)
             const nebel_ray ray = {{0, 4e5, 0}, {x, -1, z}, HUGE_VAL};
             const double length = sqrt(1 + x * x + z * z);
             nebel_cloud_knots knots;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spreads[s], &knots, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spreads[s]}, 0, &knots, 0), NEBEL_OK);
             seen += (knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1) / PIXELS;
             for (int k = 0; k < RAYS; k++) {
                 const double half = .5 * spreads[s] * length, a = x + dice(&numbers, -half, half);
@@ -101,10 +101,11 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
             const nebel_ray thin = {
                 {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
             nebel_cloud_knots knots;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, 1 / far, &knots, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, &(double){1 / far}, 0, &knots, 0), NEBEL_OK);
             if (knots.count > 0) truth += (double)knots.in_scattering[knots.count - 1][1] / (PIXELS * RAYS);
             if (!is_first) continue;
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, width / far, &knots, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, &(double){width / far}, 0, &knots, 0),
+                             NEBEL_OK);
             if (knots.count > 0) seen += (double)knots.in_scattering[knots.count - 1][1] / PIXELS;
         }
         print_message("pixels of %.0f m: light of %.4f, of thin rays %.4f\n", width, seen, truth);
@@ -137,7 +138,7 @@ static nb_shown show_pixels(nebel_cloud_workspace *workspace, const double unit[
         const nebel_ray ray = {
             {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
         nebel_cloud_knots knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, width / far, &knots, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){width / far}, 0, &knots, 0), NEBEL_OK);
         const double light = knots.count > 0 ? (double)knots.in_scattering[knots.count - 1][1] : 0;
         sum += light / count;
         squares += light * light / count;

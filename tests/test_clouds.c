@@ -1,4 +1,5 @@
 /* Clouds with volume: their density, what quadrature makes of it, the model of their light, and bad input. */
+#include "planet/cloud_looks.h"
 #include "planet/cloud_view.h"
 
 #include "cloud_help.h"
@@ -12,13 +13,13 @@
 
 /* ---- density --------------------------------------------------------------------------------- */
 
-/* In the middle of a layer. */
-static int is_cloud(const nebel_clouds *clouds, const nb_cloud_layer *layer, const nb_cloud_column *column,
-                    const double place[3])
+/* In the middle of a layer's height. */
+static int is_cloud(const nebel_clouds *clouds, const nb_cloud_layer *layer, const double unit[3])
 {
-    float missing[NB_CLOUD_BILLOWS + 1];
-    nb_cloud_drops drops;
-    return nb_cloud_in_column(&clouds->noise, layer, column, place, .5f, 0, missing, &drops) && drops.part > 0;
+    nb_cloud_looks looks = {.count = 1};
+    for (int c = 0; c < 3; c++) looks.place[c][0] = (layer->low + layer->high) / 2 * unit[c];
+    nb_cloud_look_alone(clouds->kernel, &clouds->noise, layer, &looks);
+    return nb_cloud_has_drops(&looks, 0) && looks.part[0] > 0;
 }
 
 static void test_noise_is_what_its_constants_say(void **state)
@@ -55,8 +56,7 @@ static void test_noise_is_what_its_constants_say(void **state)
             } while (!(square > .1 && square < 1));
             for (int c = 0; c < 3; c++) unit[c] /= sqrt(square);
             const nb_cloud_column column = nb_cloud_column_at(&clouds->noise, layer, unit, 0);
-            for (int c = 0; c < 3; c++) unit[c] *= layer->low;
-            under += k == 0 ? column.rank > 0 : is_cloud(clouds, layer, &column, unit);
+            under += k == 0 ? column.rank > 0 : is_cloud(clouds, layer, unit);
         }
         assert_near(under / (COUNT / 10.), (double)layer->coverage, .03);
     }
@@ -205,7 +205,7 @@ static void test_transmittance_is_that_of_the_density(void **state)
         const double turn = dice(&numbers, 0, 2 * PI), up = dice(&numbers, .15, 1), level = sqrt(1 - up * up);
         const nebel_ray ray = {{0, 2, 0}, {level * cos(turn), up, level * sin(turn)}, HUGE_VAL};
         nebel_cloud_knots knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, 890 / up * .98, 2720 / up, 1), off = fabs(left - truth);
         worst = fmax(worst, off);
@@ -237,7 +237,7 @@ static void test_no_lines_in_thin_clouds(void **state)
         const double length = sqrt(x * x + y * y + 1);
         const nebel_ray ray = {{0, 1359.375, 0}, {x / length, y / length, -1 / length}, 300};
         nebel_cloud_knots knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const double truth = brute_force(clouds, &ray, 0, 300, 1), step = fabs(left - truth - last);
         last = left - truth;
@@ -269,7 +269,7 @@ static void test_thin_layers(void **state)
         const double length = sqrt(1.04);
         const nebel_ray ray = {{200. * (i - .5 * RAYS), 0, 0}, {0, 1 / length, .2 / length}, HUGE_VAL};
         nebel_cloud_knots knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &knots, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &knots, 0), NEBEL_OK);
         const double truth = brute_force(clouds, &ray, 860 * length, 911 * length, .05);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         met += truth < .9;
@@ -295,7 +295,7 @@ static void test_thick_cloud_ends_where_it_is_seen(void **state)
         const double rise = -.03 + .0015 * i;
         const nebel_ray ray = {{0, 600, 0}, {cos(rise), sin(rise), 0}, HUGE_VAL};
         nebel_cloud_knots knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &knots, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &knots, 0), NEBEL_OK);
         const double end = (double)knots.t[knots.count - 1];
         double depth = 0;
         assert_true(end < 1e4);
@@ -319,10 +319,10 @@ static void test_below_the_ground_is_on_it(void **state)
     for (int i = 0; i < 20; i++) {
         nebel_ray ray = {{0, 0, 0}, {.3 - .02 * i, .1 + .04 * i, 1}, HUGE_VAL};
         nebel_cloud_knots on, below;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &on, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &on, 0), NEBEL_OK);
         for (size_t k = 0; k < sizeof depths / sizeof *depths; k++) {
             ray.origin[1] = -depths[k];
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 1e-3, &below, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){1e-3}, 0, &below, 0), NEBEL_OK);
             assert_int_equal(below.count, on.count);
             if (on.count == 0) continue;
             const uint32_t last = on.count - 1;
@@ -335,9 +335,17 @@ static void test_below_the_ground_is_on_it(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+enum { RAYS = 40 };
+
+/* From within a layer and from above all. */
+static void lay_rays(nebel_ray rays[RAYS])
+{
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (nebel_ray){{0, i % 2 ? 1500 : 3e4, 0}, {.02 * i, i % 2 ? .1 : -.3, 1}, HUGE_VAL};
+}
+
 static void compare_orders(double spread)
 {
-    enum { RAYS = 40 };
     nebel_clouds *clouds = make(2, (const nebel_cloud_layer[]){{.seed = 2}, {.kind = NEBEL_CLOUD_CIRRUS}});
     nebel_cloud_workspace *workspace, *other;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
@@ -345,12 +353,12 @@ static void compare_orders(double spread)
     nebel_ray rays[RAYS];
     memset(knots, 0, sizeof knots);
     assert_int_equal(nebel_create_cloud_workspace(view, &other), NEBEL_OK);
-    for (int i = 0; i < RAYS; i++)
-        rays[i] = (nebel_ray){{0, i % 2 ? 1500 : 3e4, 0}, {.02 * i, i % 2 ? .1 : -.3, 1}, HUGE_VAL};
-    assert_int_equal(nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, spread, knots[0], sizeof **knots),
-                     NEBEL_OK);
+    lay_rays(rays);
+    assert_int_equal(
+        nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){spread}, 0, knots[0], sizeof **knots),
+        NEBEL_OK);
     for (int i = RAYS - 1; i >= 0; i--)
-        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, spread, &knots[1][i], 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(other, 1, &rays[i], 0, &(double){spread}, 0, &knots[1][i], 0), NEBEL_OK);
     assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
     int some = 0;
     for (int i = 0; i < RAYS; i++) {
@@ -374,6 +382,42 @@ static void test_order_of_rays_makes_no_difference(void **state)
     (void)state;
     compare_orders(1e-3);
     compare_orders(.05);
+}
+
+/* Each kind, many rays at once. */
+static void test_instruction_sets_agree(void **state)
+{
+    (void)state;
+    static nebel_cloud_knots knots[2][RAYS];
+    nebel_ray rays[RAYS];
+    int some = 0;
+    lay_rays(rays);
+    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++) {
+        nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.kind = (nebel_cloud_kind)kind, .seed = 3});
+        memset(knots, 0, sizeof knots);
+        for (int isa = NEBEL_ISA_SCALAR; isa < NEBEL_ISA_COUNT; isa++) {
+            const nebel_cloud_view_desc desc = {
+                .clouds = clouds, .sun = {.direction = {.6, .7, .1}, .irradiance = {5, 4, 3}}, .isa = (nebel_isa)isa};
+            nebel_cloud_view *view;
+            nebel_cloud_workspace *workspace;
+            if (!nebel_isa_available((nebel_isa)isa)) {
+                assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_ERROR_UNSUPPORTED);
+                continue;
+            }
+            nebel_cloud_knots *seen = knots[isa != NEBEL_ISA_SCALAR];
+            assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+            assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+            assert_int_equal(
+                nebel_trace_clouds(workspace, RAYS, rays, sizeof *rays, &(double){1e-3}, 0, seen, sizeof *seen),
+                NEBEL_OK);
+            if (isa != NEBEL_ISA_SCALAR) assert_memory_equal(knots[0], knots[1], sizeof knots[0]);
+            nebel_destroy_cloud_workspace(workspace);
+            nebel_destroy_cloud_view(view);
+        }
+        for (int i = 0; i < RAYS; i++) some += knots[0][i].count > 0;
+        nebel_destroy_clouds(clouds);
+    }
+    assert_true(some > RAYS);
 }
 
 /* ---- light ----------------------------------------------------------------------------------- */
@@ -603,12 +647,12 @@ static void test_bad_calls_are_refused(void **state)
     assert_int_equal(nebel_cloud_extinction(clouds, 0, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_cloud_extinction(clouds, none, 0, 0, NULL, 0, NULL), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_shade_clouds(workspace, 0, 1, place, 0, &number), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, -1, &knots, 0), NEBEL_ERROR_ARGUMENT);
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){-1}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, NULL, 0), NEBEL_ERROR_ARGUMENT);
     ray.t_max = none;
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
     ray = (nebel_ray){{0, 0, 0}, {0, 0, 0}, 1};
-    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_ERROR_ARGUMENT);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_workspace(NULL);
     nebel_destroy_cloud_view(view);
@@ -654,6 +698,7 @@ int main(void)
         cmocka_unit_test(test_thick_cloud_ends_where_it_is_seen),
         cmocka_unit_test(test_below_the_ground_is_on_it),
         cmocka_unit_test(test_order_of_rays_makes_no_difference),
+        cmocka_unit_test(test_instruction_sets_agree),
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
         cmocka_unit_test(test_ways_to_a_sun_below_level),

@@ -138,7 +138,8 @@ static void clouds_and_air_are_one(void **state)
             nebel_air_shade shade;
             double light[3];
             assert_int_equal(nebel_shade_air(workspace, 1, &ray, 0, &shade, 0), NEBEL_OK);
-            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, spread / length, &knots, 0), NEBEL_OK);
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spread / length}, 0, &knots, 0),
+                             NEBEL_OK);
             compose(&w, &sun, &ray, &knots, &shade, light);
             cloudy += knots.count > 0;
             for (int c = 0; c < 3; c++)
@@ -207,9 +208,9 @@ static void clouds_end_at_surfaces(void **state)
         nebel_cloud_knots knots;
         if (i % WIDTH >= WIDTH / 2) continue;
         ray.t_max = way * length / fabs(ray.direction[2]);
-        assert_int_equal(
-            nebel_trace_clouds(workspace, 1, &ray, 0, 2 * tan(30 * test_pi / 180) / HEIGHT / length, &knots, 0),
-            NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0,
+                                            &(double){2 * tan(30 * test_pi / 180) / HEIGHT / length}, 0, &knots, 0),
+                         NEBEL_OK);
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const nebel_light air = air_to(&w, &sun, ray, ray.t_max);
         cloudy += left > .05 && left < .95;
@@ -309,12 +310,12 @@ static int have_same_knots(nebel_cloud_workspace *workspace, const nebel_ray *ra
                            double tolerance, nebel_cloud_knots *knots)
 {
     enum { OTHERS = 6 };
-    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, spread, knots, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){spread}, 0, knots, 0), NEBEL_OK);
     for (int i = 0; i < OTHERS; i++) {
         nebel_ray other = *ray;
         nebel_cloud_knots its;
         other.direction[i % 3] *= 1 + (i < 3 ? 1e-13 : -1e-13);
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &other, 0, spread, &its, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &other, 0, &(double){spread}, 0, &its, 0), NEBEL_OK);
         if (its.count != knots->count) return 0;
         for (uint32_t k = 0; k < its.count; k++)
             if (fabs((double)its.t[k] / (double)knots->t[k] - 1) > 1e-6 ||

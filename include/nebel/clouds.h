@@ -4,7 +4,7 @@
  *     nebel_create_clouds(&(nebel_clouds_desc){.atmosphere = air, .layer_count = 1}, &clouds); // cumulus
  *     nebel_create_cloud_view(&(nebel_cloud_view_desc){.clouds = clouds, .sun = sun}, &view);
  *     nebel_create_cloud_workspace(view, &workspace);                                          // one per thread
- *     nebel_trace_clouds(workspace, 1, &ray, 0, 0.001, &knots, 0);
+ *     nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0.001}, 0, &knots, 0);
  *
  * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/planet.md): noise in
  * three dimensions in the planet's axes, so that there is no seam and no pole; who looks from afar gets its mean over
@@ -93,11 +93,12 @@ typedef struct nebel_cloud_view_desc {
     nebel_sun sun;              /* irradiance {0}: dark */
     double time;                /* within -1e12 and 1e12 */
     double tolerance;           /* of transmittance, per ray; 0: NEBEL_DEFAULT_TOLERANCE */
+    nebel_isa isa;              /* the same bits for every one; DEFAULT: the best of this processor */
     nebel_allocator allocator;
     nebel_log log;
 } nebel_cloud_view_desc;
 
-/* Errors: ARGUMENT, VALUE (time, tolerance), MEMORY. Any thread. */
+/* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY. Any thread. */
 nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view);
 
 /* NULL is fine. */
@@ -123,10 +124,12 @@ typedef struct nebel_cloud_knots {
     float error;                                   /* of transmittance: what quadrature tells */
 } nebel_cloud_knots;
 
-/* Along n rays up to t_max or the ground. spread: width of a pixel per metre of the way, 0 or more: what is narrower is
- * seen as a mean. Strides in bytes. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order). */
+/* Along n rays up to t_max or the ground. spreads: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is seen as
+ * a mean. Strides in bytes; of spreads 0 is one for all rays. Sixteen rays and more at once take half as long as one by one, and
+ * have the same bits. One thread per workspace. Errors: ARGUMENT (NULL, a ray or spread not in order); then no knots are written. */
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                double spread, nebel_cloud_knots *knots, size_t knot_stride);
+                                const double *spreads, size_t spread_stride, nebel_cloud_knots *knots,
+                                size_t knot_stride);
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
  * nebel_cloud_extinction. Errors: ARGUMENT. */

@@ -16,6 +16,7 @@ nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
                                   .sun = {.direction = {0, 1, 0}},
                                   .time = desc->time,
                                   .tolerance = fmin(1, desc->tolerance),
+                                  .isa = renderer->fog_isa,
                                   .allocator = renderer->allocator,
                                   .log = renderer->log};
     if (scene->has_sun) {
@@ -109,22 +110,29 @@ static int is_found(const nb_cloud_scratch *clouds, int lane)
     return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
 }
 
-/* As far as the sample goes. *any: whether there are clouds. */
+/* As far as samples go, all of a batch at once. *any: whether there are clouds. */
 static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
-    nebel_result result = NEBEL_OK;
+    uint32_t count = 0, lanes[NB_BATCH];
     *any = 0;
-    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
         clouds->is_new[i] = 0;
         if (!scratch->inside[i]) continue;
-        clouds->end[i] = end_of(frame, scratch, (uint32_t)i);
-        if (is_found(clouds, i)) continue;
-        nebel_ray ray = ray_of(frame, clouds, (uint32_t)i);
-        ray.t_max = (double)clouds->end[i];
-        result = nebel_trace_clouds(clouds->workspace, 1, &ray, 0, frame->air.pixel / (double)clouds->rays.length[i],
-                                    &clouds->knots[i], 0);
-        clouds->reach[i] = (float)ray.t_max;
+        clouds->end[i] = end_of(frame, scratch, i);
+        if (is_found(clouds, (int)i)) continue;
+        clouds->asked[count] = ray_of(frame, clouds, i);
+        clouds->asked[count].t_max = (double)clouds->end[i];
+        clouds->spreads[count] = frame->air.pixel / (double)clouds->rays.length[i];
+        lanes[count++] = i;
+    }
+    const nebel_result result =
+        nebel_trace_clouds(clouds->workspace, count, clouds->asked, sizeof *clouds->asked, clouds->spreads,
+                           sizeof *clouds->spreads, clouds->found, sizeof *clouds->found);
+    for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
+        const uint32_t i = lanes[k];
+        clouds->knots[i] = clouds->found[k];
+        clouds->reach[i] = clouds->end[i];
         clouds->is_new[i] = clouds->knots[i].count > 0;
         *any |= clouds->is_new[i];
     }

@@ -51,6 +51,9 @@ typedef struct nb_cloud_scratch {
     float reach[NB_BATCH]; /* m, how far they are known */
     int is_new[NB_BATCH];
     nebel_cloud_knots knots[NB_BATCH];
+    nebel_ray asked[NB_BATCH]; /* one behind the other: rays that clouds are looked for along, and what is found */
+    double spreads[NB_BATCH];
+    nebel_cloud_knots found[NB_BATCH];
     nb_shaded_piece shaded[NB_BATCH][NB_SHADED_PIECES]; /* the air */
     uint32_t shaded_count[NB_BATCH];
     float over[NEBEL_MAX_CLOUD_KNOTS][3][NB_BATCH]; /* what a knot adds to light that came from behind */

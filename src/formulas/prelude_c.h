@@ -74,8 +74,11 @@ static inline nb_real nb_narrow(nb_wide x) { return (nb_real)x; }
 static inline nb_wmask nb_widen_mask(nb_mask m) { return m; }
 static inline nb_mask nb_narrow_mask(nb_wmask m) { return m; }
 
-#if !defined(NB_DOUBLE) && !defined(NB_FAST)
+#if !defined(NB_DOUBLE)
 static inline nb_real nb_gather(const float *from, nb_wide index) { return from[(size_t)index]; }
+#endif
+#if !defined(NB_DOUBLE) && !defined(NB_FAST)
+static inline nb_bits nb_wto_bits32(nb_wide x) { return (nb_bits)(int32_t)x; }
 static inline nb_real nb_gather_bytes(const uint8_t *from, nb_wide index) { return (nb_real)from[(size_t)index]; }
 static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index) { return (nb_real)from[(size_t)index]; }
 

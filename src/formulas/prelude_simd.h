@@ -226,6 +226,20 @@ static inline void nb_wstore_lanes(double *to, nb_wide x)
 #define NB_WIDE_SIGN_BIT NB_SIGN_BIT
 typedef nb_bits nb_wbits;
 
+/* Numbers of an array, one for each lane: what lies at whole numbers below 2^24. */
+static inline nb_real nb_gather(const float *from, nb_wide index)
+{
+#if defined(NB_ISA_AVX512)
+    return _mm512_i32gather_ps(_mm512_cvttps_epi32(index), from, 4);
+#elif defined(NB_ISA_AVX2)
+    return _mm256_i32gather_ps(from, _mm256_cvttps_epi32(index), 4);
+#else
+    float lane[NB_WIDTH];
+    for (int i = 0; i < NB_WIDTH; ++i) lane[i] = from[(int)index[i]];
+    return nb_load_lanes(lane);
+#endif
+}
+
 #else
 
 typedef double nb_wide __attribute__((vector_size(8 * NB_WIDTH)));
@@ -258,6 +272,12 @@ static inline nb_wide nb_wload_lanes(const double *from)
 static inline void nb_wstore_lanes(double *to, nb_wide x) { memcpy(to, &x, sizeof x); }
 
 #define NB_WIDE_SIGN_BIT 0x8000000000000000u
+
+/* Whole numbers within -2^31 and 2^31 as integers: the addition leaves them in the lowest bits. */
+static inline nb_bits nb_wto_bits32(nb_wide x)
+{
+    return (nb_bits)nb_narrow_mask((nb_wmask)(x + NB_W(6755399441055744.0)));
+}
 
 /* Numbers of an array, one for each lane: what lies at whole numbers below 2^31. Of bytes and shorts the bytes behind
  * are read, too, three and two of them. */

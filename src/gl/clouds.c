@@ -196,10 +196,10 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
 static nebel_result trace_pixel(nb_cloud_part *part, const nb_cloud_picture *picture, uint32_t x, uint32_t y,
                                 double t_max, nebel_ray *ray, nebel_cloud_knots *knots)
 {
-    const double length = direction_at(picture, x, y, ray->direction);
+    const double length = direction_at(picture, x, y, ray->direction), spread = picture->pixel / length;
     memcpy(ray->origin, picture->eye, sizeof ray->origin);
     ray->t_max = t_max;
-    return nebel_trace_clouds(part->workspace, 1, ray, 0, picture->pixel / length, knots, 0);
+    return nebel_trace_clouds(part->workspace, 1, ray, 0, &spread, 0, knots, 0);
 }
 
 static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)

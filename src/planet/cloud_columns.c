@@ -1,8 +1,8 @@
 /* Columns of clouds as they were found before: on the faces of a cube around the planet, linear between grid points. Of
  * the smallest octave of noise a grid point is an eighth of a cell, of far clouds no more than a pixel. */
+#include "cloud_looks.h"
 #include "cloud_view.h"
 
-#include "base/hash.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -30,7 +30,6 @@ static void unit_of(nb_cube_place place, double unit[3])
     nb_vector_make_unit(unit);
 }
 
-/* A grid on a face: level 0 is as it is; each next one twice as wide. */
 typedef struct nb_grid {
     const nb_cloud_layer *layer;
     const nb_cloud_grid *of;
@@ -42,16 +41,8 @@ static inline nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, 
     return (nb_grid){
         .layer = &clouds->layers[layer],
         .of = &clouds->layers[layer].grids[level],
-        .key = UINT32_C(0x80000000) | (uint32_t)(level * NEBEL_MAX_CLOUD_LAYERS + layer) << 3 | (uint32_t)face,
+        .key = nb_cloud_grid_key(layer, level, face),
     };
-}
-
-/* Tables hold 4 x 4 neighbours one behind the other, which share lines of the processor's cache. */
-static uint32_t hash_of(uint32_t key, int x, int y)
-{
-    const uint32_t tile_x = (uint32_t)x >> 2, tile_y = (uint32_t)y >> 2;
-    const uint32_t tile = nb_mix_bits(key + tile_x * UINT32_C(0x9e3779b1) + tile_y * UINT32_C(0x85ebca77));
-    return tile << 4 | ((uint32_t)y & 3) << 2 | ((uint32_t)x & 3);
 }
 
 static double whole_below(double x)
@@ -62,7 +53,7 @@ static double whole_below(double x)
 
 static const nb_cloud_column *point_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int x, int y)
 {
-    nb_cloud_point *point = &workspace->points[hash_of(grid->key, x, y) & (NB_CLOUD_POINTS - 1)];
+    nb_cloud_point *point = &workspace->points[nb_cloud_grid_hash(grid->key, x, y) & (NB_CLOUD_POINTS - 1)];
     if (!(point->key == grid->key && point->at[0] == x && point->at[1] == y)) {
         const nb_cube_place place = {(int)(grid->key & 7), {x * grid->of->spacing, y * grid->of->spacing}};
         double unit[3];
@@ -75,18 +66,19 @@ static const nb_cloud_column *point_at(nebel_cloud_workspace *workspace, const n
     return &point->column;
 }
 
-static const nb_cloud_patch *patch_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int x, int y)
+/* The four columns around a cell, which may have taken another's place. */
+static void fill_patch(nebel_cloud_workspace *workspace, int layer, uint32_t key, int32_t x, int32_t y,
+                       nb_cloud_patch *patch)
 {
-    nb_cloud_patch *patch = &workspace->patches[hash_of(grid->key, x, y) & (NB_CLOUD_PATCHES - 1)];
-    if (patch->key == grid->key && patch->at[0] == x && patch->at[1] == y) return patch;
-    *patch = (nb_cloud_patch){.key = grid->key, .at = {x, y}};
+    const int level = (int)(key >> 3 & 0xffffff) / NEBEL_MAX_CLOUD_LAYERS;
+    const nb_grid grid = grid_of(workspace->view->clouds, layer, level, (int)(key & 7));
+    *patch = (nb_cloud_patch){.key = key, .at = {x, y}};
     for (int k = 0; k < 4; k++) {
-        const nb_cloud_column *column = point_at(workspace, grid, x + (k & 1), y + (k >> 1));
+        const nb_cloud_column *column = point_at(workspace, &grid, x + (k & 1), y + (k >> 1));
         patch->ranks[k] = column->rank;
         patch->scales[k] = column->scale;
         patch->variances[k] = column->variance;
     }
-    return patch;
 }
 
 static inline float mix(const float weights[4], const float of[4])
@@ -94,41 +86,43 @@ static inline float mix(const float weights[4], const float of[4])
     return weights[0] * of[0] + weights[1] * of[1] + weights[2] * of[2] + weights[3] * of[3];
 }
 
-static nb_cloud_column read_grid(nebel_cloud_workspace *workspace, int layer, const nb_cube_place *place, int level)
+/* Linear between columns that are found once. */
+static nb_cloud_column read_cell(nebel_cloud_workspace *workspace, int layer, const nb_cloud_cells *cells, int lane)
 {
-    const nb_grid grid = grid_of(workspace->view->clouds, layer, level, place->face);
-    const double x = place->at[0] * grid.of->per_spacing, y = place->at[1] * grid.of->per_spacing;
-    const double left = whole_below(x), low = whole_below(y);
-    const float u = (float)(x - left), v = (float)(y - low);
+    const uint32_t key = cells->key[lane];
+    const int32_t x = cells->x[lane], y = cells->y[lane];
+    const float u = cells->u[lane], v = cells->v[lane];
     const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
-    const nb_cloud_patch *patch = patch_at(workspace, &grid, (int)left, (int)low);
+    nb_cloud_patch *patch = &workspace->patches[cells->hash[lane] & (NB_CLOUD_PATCHES - 1)];
+    if (!(patch->key == key && patch->at[0] == x && patch->at[1] == y)) fill_patch(workspace, layer, key, x, y, patch);
     return (nb_cloud_column){mix(weights, patch->ranks), mix(weights, patch->scales), mix(weights, patch->variances)};
 }
 
-/* Numbers are held to the last grid but one. */
-#define WIDEST ((float)(1U << (NB_CLOUD_GRIDS - 2)))
-
-/* The first grid of two, and the part of the second, for a width: the finer one up to three quarters of the way. */
-static int levels_of(const nb_cloud_layer *layer, float width, float *part)
+static nb_cloud_column column_at(nebel_cloud_workspace *workspace, int layer, const nb_cloud_looks *looks, int lane)
 {
-    const float level = nb_level_of(nb_smaller(2 * width / layer->grid, WIDEST));
-    const int low = (int)level;
-    *part = nb_larger(0, 2 * (level - (float)low) - 1);
-    return low;
-}
-
-nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double place[3], float width)
-{
-    const nb_cube_place at = cube_of(place);
-    float part;
-    const int level = levels_of(&workspace->view->clouds->layers[layer], width, &part);
-    nb_cloud_column column = read_grid(workspace, layer, &at, level);
+    nb_cloud_column column = read_cell(workspace, layer, &looks->cells[0], lane);
+    const float part = looks->next[lane];
     if (!(part > 0)) return column;
-    const nb_cloud_column next = read_grid(workspace, layer, &at, level + 1);
+    const nb_cloud_column next = read_cell(workspace, layer, &looks->cells[1], lane);
     column.rank += part * (next.rank - column.rank);
     column.scale += part * (next.scale - column.scale);
     column.variance += part * (next.variance - column.variance);
     return column;
+}
+
+void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
+{
+    const nb_cloud_kernel *kernel = workspace->view->kernel;
+    const nebel_clouds *clouds = workspace->view->clouds;
+    const nb_cloud_layer *of = &clouds->layers[layer];
+    nb_cloud_fill_lanes(looks);
+    kernel->find_places(of, layer, looks);
+    for (int i = 0; i < NB_CLOUD_LANES; i++) {
+        nb_cloud_column column = {.rank = -1, .scale = 0, .variance = 0};
+        if (i < looks->count && nb_cloud_is_in_layer(looks, i)) column = column_at(workspace, layer, looks, i);
+        nb_cloud_set_column(looks, i, &column);
+    }
+    kernel->find_drops(&clouds->noise, of, looks);
 }
 
 /* ---- where no cloud can be ------------------------------------------------------------------- */
@@ -139,7 +133,7 @@ enum { POINTS = 4, BLOCKS = 4 };
 static float block_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y)
 {
     const uint32_t key = grid->key ^ (uint32_t)size << 29;
-    nb_cloud_block *block = &workspace->blocks[hash_of(key, x, y) & (NB_CLOUD_BLOCKS - 1)];
+    nb_cloud_block *block = &workspace->blocks[nb_cloud_grid_hash(key, x, y) & (NB_CLOUD_BLOCKS - 1)];
     if (block->key == key && block->at[0] == x && block->at[1] == y) return block->most;
     float most = -HUGE_VALF;
     if (size > 0) {
@@ -166,7 +160,9 @@ nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int l
     const double sign = at.face & 1 ? -1 : 1;
     nb_cloud_outlook out = {
         .layer = layer, .face = at.face, .over = sign * place[axis], .rise = sign * direction[axis]};
-    out.level = levels_of(&workspace->view->clouds->layers[layer], width, &out.part);
+    const float level = nb_cloud_grid_level(workspace->view->clouds->layers[layer].grid, width);
+    out.level = (int)level;
+    out.part = nb_cloud_next_part(level, out.level);
     for (int i = 0; i < 2; i++) {
         out.at[i] = at.at[i];
         out.place[i] = place[across[i]];
@@ -185,7 +181,7 @@ float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outloo
     for (int k = 0; k < 2; k++) {
         if (k == 0 ? out->part >= 1 : out->part <= 0) continue;
         const nb_grid grid = grid_of(workspace->view->clouds, out->layer, out->level + k, out->face);
-        const double side = grid.of->spacing * sides[size], per_side = grid.of->per_spacing * (1 / sides[size]);
+        const double side = grid.of->spacing * sides[size], per_side = 1 / side;
         int block[2];
         for (int i = 0; i < 2; i++) {
             const double low = whole_below(out->at[i] * per_side), edge = (low + out->grows[i]) * side;
@@ -197,28 +193,4 @@ float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outloo
         if (here > most) most = here;
     }
     return most;
-}
-
-/* Who looks from within a heap sees no gaps of it. */
-#define HEAP_PART 0.45f
-
-float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width, int is_alone)
-{
-    const nb_cloud_layer *of = &workspace->view->clouds->layers[layer];
-    const double radius = nb_vector_length(place);
-    if (!(radius > of->low && radius < of->high)) return 0;
-    const nb_cloud_noise *noise = &workspace->view->clouds->noise;
-    nb_cloud_column column;
-    if (is_alone) {
-        const double unit[3] = {place[0] / radius, place[1] / radius, place[2] / radius};
-        column = nb_cloud_column_at(noise, of, unit, width);
-    } else {
-        column = nb_cloud_column_near(workspace, layer, place, width);
-    }
-    const float height = (float)(radius - of->low) * of->per_thickness;
-    float missing[NB_CLOUD_BILLOWS + 1];
-    nb_cloud_drops drops;
-    if (!nb_cloud_in_column(noise, of, &column, place, height, width, missing, &drops)) return 0;
-    const float hidden = nb_smaller(nb_smaller(of->hidden_height, of->hidden_width), width - HEAP_PART * of->size);
-    return nb_cloud_through(&drops, hidden, 1).whole;
 }

@@ -6,6 +6,7 @@
  *
  * The places stay with the clouds, so that the table is the same at all times, and it is the same for all rays, so that
  * such pixels have no grain. */
+#include "cloud_looks.h"
 #include "cloud_view.h"
 
 #include "base/vector.h"
@@ -55,17 +56,24 @@ static void spread(int i, double unit[3], double *height, double *turn)
 static void find_places(const nebel_cloud_view *view, int k, nb_cloud_crowd *crowd)
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
-    const double(*turned)[3] = view->poses[k].turn;
-    for (int i = 0; i < TRIES && crowd->count < NB_CROWD_PLACES; i++) {
-        nb_crowd_place *place = &crowd->places[crowd->count];
-        double own[3], height;
-        spread(i, own, &height, &place->turn);
-        for (int c = 0; c < 3; c++)
-            place->from[c] = (layer->low + height * (layer->high - layer->low)) *
-                             (turned[0][c] * own[0] + turned[1][c] * own[1] + turned[2][c] * own[2]);
-        place->extinction =
-            nb_cloud_at(&view->clouds->noise, layer, &view->poses[k], place->from, FINE_PART * layer->size);
-        crowd->count += place->extinction > 0;
+    const nb_cloud_pose *pose = &view->poses[k];
+    nb_cloud_looks looks = {.count = 0};
+    for (int first = 0; first < TRIES && crowd->count < NB_CROWD_PLACES; first += NB_CLOUD_LANES) {
+        nb_crowd_place places[NB_CLOUD_LANES];
+        float extinction[NB_CLOUD_LANES];
+        for (int i = 0; i < NB_CLOUD_LANES; i++) {
+            double own[3], height;
+            spread(first + i, own, &height, &places[i].turn);
+            for (int c = 0; c < 3; c++)
+                places[i].from[c] = (layer->low + height * (layer->high - layer->low)) *
+                                    (pose->turn[0][c] * own[0] + pose->turn[1][c] * own[1] + pose->turn[2][c] * own[2]);
+            nb_cloud_ask(&looks, pose, places[i].from, FINE_PART * layer->size);
+        }
+        nb_cloud_find_means(view->clouds, k, &looks, extinction);
+        for (int i = 0; i < NB_CLOUD_LANES && crowd->count < NB_CROWD_PLACES; i++) {
+            places[i].extinction = extinction[i];
+            if (extinction[i] > 0) crowd->places[crowd->count++] = places[i];
+        }
     }
 }
 

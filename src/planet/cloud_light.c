@@ -10,6 +10,7 @@
  *
  * with g' = g / (1 + g) and m the cosine at which sunlight enters; nothing else enters on either side. The slab lies
  * across the sunlight where the way up is no shorter, and level where it is. */
+#include "cloud_looks.h"
 #include "cloud_view.h"
 
 #include "base/hash.h"
@@ -147,6 +148,38 @@ static int stays_of(const nebel_cloud_view *view, int k, const double from[3], c
     return count == 2 && ground < pieces[1][0] ? 1 : count;
 }
 
+/* Who looks from within a heap sees no gaps of it. */
+#define HEAP_PART 0.45f
+
+/* Steps whose places are asked at once. */
+typedef struct nb_stride {
+    nb_cloud_looks looks;
+    double lengths[NB_CLOUD_LANES];
+} nb_stride;
+
+/* Optical depth of all that were asked; begins anew. */
+static double stride(nebel_cloud_workspace *workspace, int k, int is_alone, nb_stride *steps)
+{
+    const nebel_cloud_view *view = workspace->view;
+    const nb_cloud_layer *layer = &view->clouds->layers[k];
+    nb_cloud_looks *looks = &steps->looks;
+    double sum = 0;
+    if (looks->count == 0) return 0;
+    if (is_alone)
+        nb_cloud_look_alone(view->kernel, &view->clouds->noise, layer, looks);
+    else
+        nb_cloud_look(workspace, k, looks);
+    for (int i = 0; i < looks->count; i++) {
+        if (!nb_cloud_has_drops(looks, i) || !nb_cloud_is_in_layer(looks, i)) continue;
+        const nb_cloud_drops drops = nb_cloud_drops_of(looks, i);
+        const float hidden = nb_smaller(nb_smaller(layer->hidden_height, layer->hidden_width),
+                                        looks->width[i] - HEAP_PART * layer->size);
+        sum += steps->lengths[i] * (double)nb_cloud_through(&drops, hidden, 1).whole;
+    }
+    looks->count = 0;
+    return sum;
+}
+
 /* Optical depth of a layer from a place on, as far as `reach`. Each step takes the mean over its length. */
 static double march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], double reach,
                     const nb_steps *steps)
@@ -154,6 +187,9 @@ static double march(nebel_cloud_workspace *workspace, int k, const double from[3
     double pieces[2][2], own[3], way[3], step = (double)steps->first, sum = 0;
     const int count = stays_of(workspace->view, k, from, unit, pieces);
     int taken = 0;
+    nb_stride some;
+    nb_cloud_looks *looks = &some.looks;
+    looks->count = 0;
     for (int c = 0; c < 3; c++) {
         own[c] = nb_vector_dot(workspace->view->poses[k].turn[c], from);
         way[c] = nb_vector_dot(workspace->view->poses[k].turn[c], unit);
@@ -164,15 +200,16 @@ static double march(nebel_cloud_workspace *workspace, int k, const double from[3
         step = nb_max(step, 0.02 * t);
         for (; t < end; taken++) {
             const double length = taken >= MOST_STEPS - 1 ? end - t : nb_min(step, end - t);
-            const float width = nb_larger(steps->width, 0.7f * (float)length);
-            double place[3];
-            for (int c = 0; c < 3; c++) place[c] = own[c] + (t + 0.5 * length) * way[c];
-            sum += length * (double)nb_cloud_seen_at(workspace, k, place, width, steps->is_alone);
+            const int at = looks->count++;
+            for (int c = 0; c < 3; c++) looks->place[c][at] = own[c] + (t + 0.5 * length) * way[c];
+            looks->width[at] = nb_larger(steps->width, 0.7f * (float)length);
+            some.lengths[at] = length;
+            if (looks->count == NB_CLOUD_LANES) sum += stride(workspace, k, steps->is_alone, &some);
             t += length;
             step *= (double)steps->growth;
         }
     }
-    return sum;
+    return sum + stride(workspace, k, steps->is_alone, &some);
 }
 
 static double depth_until(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], double reach,

@@ -181,7 +181,7 @@ static void fill_billows(nb_cloud_noise *noise, float *table)
         const int size = NB_BILLOW_SIZE >> level;
         double mean;
         if (level > 0) halve(table, 2 * size);
-        surround(table, size, noise->billows[level]);
+        surround(table, size, noise->billows + (size_t)noise->billow_starts[level]);
         const float left = variance_of(table, size * size * size, &mean);
         if (level == 0) all = left;
         noise->billow_mean = (float)mean;
@@ -189,57 +189,15 @@ static void fill_billows(nb_cloud_noise *noise, float *table)
     }
 }
 
-/* `part` is of a period. */
-static float read_level(const nb_cloud_noise *noise, const float part[3], int level)
-{
-    const int size = NB_BILLOW_SIZE >> level, row = size + 2, plane = row * row;
-    float at[3];
-    int low[3];
-    for (int i = 0; i < 3; i++) {
-        at[i] = part[i] * (float)size + 0.5f; /* numbers stand for the middles of their cells */
-        low[i] = (int)at[i];
-        at[i] -= (float)low[i];
-    }
-    const float *t = noise->billows[level] + low[2] * plane + low[1] * row + low[0], *s = t + plane;
-    const float a = mix(t[0], t[1], at[0]), b = mix(t[row], t[row + 1], at[0]);
-    const float c = mix(s[0], s[1], at[0]), d = mix(s[row], s[row + 1], at[0]);
-    return mix(mix(a, b, at[1]), mix(c, d, at[1]), at[2]);
-}
-
-/* Levels blend over the last quarter before the next. */
-static float next_part(float level, int low)
-{
-    return nb_larger(0, 4 * (level - (float)low) - 3);
-}
-
-float nb_billows_lost(const nb_cloud_noise *noise, float level)
-{
-    if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_variance[NB_BILLOW_LEVELS - 1];
-    const int low = (int)level;
-    return mix(noise->billow_variance[low], noise->billow_variance[low + 1], next_part(level, low));
-}
-
-float nb_billows(const nb_cloud_noise *noise, const double place[3], float level)
-{
-    float part[3];
-    for (int i = 0; i < 3; i++) {
-        const float left = (float)(place[i] - (double)(int64_t)place[i]);
-        part[i] = left < 0 ? left + 1 : left;
-    }
-    const int low = (int)level;
-    const float next = next_part(level, low), fine = read_level(noise, part, low);
-    return next > 0 ? mix(fine, read_level(noise, part, low + 1), next) : fine;
-}
-
 /* ---- making ---------------------------------------------------------------------------------- */
 
 nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_noise *noise)
 {
     enum { POINTS = NB_CLOUD_LATTICE * NB_CLOUD_LATTICE * NB_CLOUD_LATTICE };
-    size_t all = 0, starts[NB_BILLOW_LEVELS];
+    size_t all = 0;
     for (int level = 0; level < NB_BILLOW_LEVELS; level++) {
         const size_t row = ((size_t)NB_BILLOW_SIZE >> level) + 2;
-        starts[level] = all;
+        noise->billow_starts[level] = (float)all;
         all += row * row * row;
     }
     noise->turns = nb_allocate(allocator, POINTS, 1);
@@ -247,9 +205,8 @@ nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_nois
     float *tables = nb_allocate(allocator, all, sizeof *tables);
     float *table = nb_allocate(allocator, NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE, sizeof *table);
     const int is_whole = noise->turns != NULL && noise->directions != NULL && tables != NULL && table != NULL;
-    noise->billows[0] = tables;
+    noise->billows = tables;
     if (is_whole) {
-        for (int level = 1; level < NB_BILLOW_LEVELS; level++) noise->billows[level] = tables + starts[level];
         for (uint32_t i = 0; i < POINTS; i++) noise->turns[i] = (uint8_t)(nb_mix_bits(i + 77) >> 13);
         fill_directions(noise->directions);
         fill_billows(noise, table);
@@ -262,5 +219,5 @@ void nb_cloud_noise_free(const nebel_allocator *allocator, nb_cloud_noise *noise
 {
     nb_release(allocator, noise->turns);
     nb_release(allocator, noise->directions);
-    nb_release(allocator, noise->billows[0]);
+    nb_release(allocator, noise->billows);
 }

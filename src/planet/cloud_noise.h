@@ -29,16 +29,18 @@ static inline float nb_larger(float a, float b)
 static inline float nb_level_of(float times)
 {
     int32_t bits; /* exponent and mantissa as one number */
-    if (!(times > 1)) return 0;
     memcpy(&bits, &times, sizeof bits);
-    return (float)(bits - 0x3f800000) * 0x1p-23f;
+    return times > 1 ? (float)(bits - 0x3f800000) * 0x1p-23f : 0;
 }
 
 typedef struct nb_cloud_noise {
     uint8_t *turns; /* [z][y][x]: which direction */
     float (*directions)[4];
-    float *billows[NB_BILLOW_LEVELS];                     /* with a number more on each side, as if it went on there */
-    float billow_mean, billow_variance[NB_BILLOW_LEVELS]; /* what a level has lost of the first one's */
+    float
+        *billows; /* tables of them, 0 to 1, 1 in the middle; with a number more on each side, as if it went on there */
+    float billow_starts[NB_BILLOW_LEVELS];   /* of each level, whole numbers */
+    float billow_mean;                       /* where they are halved more often */
+    float billow_variance[NB_BILLOW_LEVELS]; /* what a level has lost of the first one's */
 } nb_cloud_noise;
 
 /* Errors: MEMORY. */
@@ -52,12 +54,5 @@ float nb_gradient_noise(const nb_cloud_noise *noise, const double place[3]);
 #define NB_GRADIENT_VARIANCE 0.0364f
 #define NB_GRADIENT_SLOPE 2.3f
 #define NB_BILLOW_SLOPE 7.f /* of billows, per period: each octave's is that of a distance */
-
-/* 0 to 1, 1 in the middle of a billow; `place` in periods; level: how often halved, 0 to less than NB_BILLOW_LEVELS - 1. Beyond
- * it all is billow_mean. */
-float nb_billows(const nb_cloud_noise *noise, const double place[3], float level);
-
-/* The variance that a level has lost. */
-float nb_billows_lost(const nb_cloud_noise *noise, float level);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef NB_PLANET_CLOUD_VIEW_H
 #define NB_PLANET_CLOUD_VIEW_H
 
+#include "atmosphere.h"
 #include "clouds.h"
 
 enum {
@@ -22,6 +23,7 @@ typedef struct nb_cloud_light {
 struct nebel_cloud_view {
     nebel_allocator allocator;
     const nebel_clouds *clouds;
+    const nb_cloud_kernel *kernel;
     nebel_sun sun;
     double tolerance;
     nb_cloud_pose poses[NEBEL_MAX_CLOUD_LAYERS];
@@ -127,8 +129,8 @@ struct nebel_cloud_workspace {
 int nb_cloud_pieces(double low, double high, const double from[3], const double unit[3], double t_max,
                     double pieces[2][2]);
 
-/* nb_cloud_column_at over or under a place in the layer's axes, linear between columns that are found once. */
-nb_cloud_column nb_cloud_column_near(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
+/* Finds drops at places in a layer, from columns that are found once and linear between. */
+void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks);
 
 /* A place of a ray on a face of the cube, on which blocks of columns are. */
 typedef struct nb_cloud_outlook {
@@ -145,8 +147,6 @@ nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int l
 /* No column that the ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts
  * variance in. */
 float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way);
-/* Extinction at a place in the layer's axes. is_alone: no column next to it is asked, so that none is kept. */
-float nb_cloud_seen_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width, int is_alone);
 
 nebel_result nb_cloud_light_make(nebel_cloud_view *view);
 

@@ -1,5 +1,9 @@
 /* Clouds along a ray: Simpson's rule on pieces that are halved or doubled by what it may miss, as far as the clouds
- * before let it be seen. Where no cloud can be nothing is read: the sum that says where clouds are has a largest slope. */
+ * before let it be seen. Where no cloud can be nothing is read: the sum that says where clouds are has a largest slope.
+ *
+ * Where a walk looks next hangs on what it saw last. So that places can be looked at many at once, many walks go on together:
+ * each says what it asks, and waits for it. */
+#include "cloud_looks.h"
 #include "cloud_view.h"
 
 #include "base/vector.h"
@@ -58,15 +62,47 @@ typedef struct nb_turned {
     double from[3], direction[3];
 } nb_turned;
 
+/* A place of the ray in a layer's axes, and a part of its height. */
+typedef struct nb_spot {
+    double place[3], radius;
+    float height, width;
+} nb_spot;
+
+/* Where a ray is in a layer. */
+typedef struct nb_stay {
+    int layer;
+    double begin, end;
+} nb_stay;
+
+/* What a walk waits for. */
+typedef enum nb_wait { NB_WAIT_NOTHING, NB_WAIT_ENTRY, NB_WAIT_STEP, NB_WAIT_PIECE } nb_wait;
+
 typedef struct nb_walk {
     const nebel_cloud_view *view;
     nebel_cloud_workspace *workspace;
     double from[3], unit[3], spread; /* from the planet's centre */
-    double least;                    /* m, of pieces that are not yet known to be smooth */
     nb_cloud_ray ray;
     nb_turned turned[NEBEL_MAX_CLOUD_LAYERS];
-    int layer;           /* the only one here */
-    double depth, apart; /* so far: optical depths, of all scattering and of what leads away */
+    nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS];
+    int stay, stay_count;
+
+    /* In a stay. A piece lies from t to t + length. */
+    double least; /* m, of pieces that are not yet known to be smooth */
+    double t, length;
+    int pieces, has_far;
+    nb_cloud_seen here, middle, far; /* at its beginning; far: has_far */
+
+    /* In search of cloud. clear: there is none ahead, as far as slopes of noise say. unknown: up to where blocks of columns do not
+     * say whether there is, by size; they are not asked again before that. */
+    int is_searching;
+    double clear, unknown[3];
+    nb_spot spot;
+
+    nb_wait wait;
+    int unanswered;
+
+    double depth, apart;     /* so far: optical depths, of all scattering and of what leads away */
+    double left, left_apart; /* e to the minus them */
     double light[3], missed, cloud_end;
     nb_stretch stretch;
     nebel_cloud_knots *knots;
@@ -78,12 +114,6 @@ static double radius_at(const nb_walk *walk, double t, double place[3])
     return nb_vector_length(place);
 }
 
-/* A place of the ray in a layer's axes, and a part of its height. */
-typedef struct nb_spot {
-    double place[3], unit[3], radius;
-    float height, width;
-} nb_spot;
-
 static nb_spot spot_at(const nb_walk *walk, int k, double t)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
@@ -91,66 +121,120 @@ static nb_spot spot_at(const nb_walk *walk, int k, double t)
     nb_spot spot = {.width = (float)(walk->spread * t)};
     for (int i = 0; i < 3; i++) spot.place[i] = turned->from[i] + t * turned->direction[i];
     spot.radius = nb_vector_length(spot.place);
-    const double per = 1 / spot.radius;
-    for (int i = 0; i < 3; i++) spot.unit[i] = spot.place[i] * per;
     spot.height = (float)(spot.radius - layer->low) * layer->per_thickness;
     return spot;
 }
 
-/* *clear, if asked: where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first
- * scales, whatever the others do. */
-static nb_cloud_seen extinction_of(const nb_walk *walk, int k, const nb_spot *spot, double *clear)
+/* How fast a ray rises. */
+static double climb_at(const nb_walk *walk, int k, const double place[3], double radius)
 {
-    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    float missing[NB_CLOUD_BILLOWS + 1];
-    nb_cloud_drops drops;
-    if (clear != NULL) *clear = 0;
-    if (!(spot->height > 0 && spot->height < 1)) return (nb_cloud_seen){0, 0};
-    const nb_cloud_column column = nb_cloud_column_near(walk->workspace, k, spot->place, spot->width);
-    const float climb = (float)fabs(nb_vector_dot(spot->unit, walk->turned[k].direction));
-    if (nb_cloud_in_column(&walk->view->clouds->noise, layer, &column, spot->place, spot->height, spot->width, missing,
-                           &drops))
-        return nb_cloud_through(&drops, nb_cloud_hidden_length(layer, spot->width, climb), walk->ray.apart[k]);
-    if (clear == NULL) return (nb_cloud_seen){0, 0};
-    float slope = layer->slope * column.scale + NB_CLOUD_RANK_SLOPE * climb * layer->per_thickness;
-    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
-        *clear = nb_max(*clear, (double)(missing[n] / slope));
-        slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
-    }
-    return (nb_cloud_seen){0, 0};
+    return nb_vector_dot(place, walk->turned[k].direction) / radius;
 }
 
-static nb_cloud_seen look(const nb_walk *walk, int k, double t)
+/* ---- looking --------------------------------------------------------------------------------- */
+
+/* Places of many walks that are looked at together. What is seen goes to where *seen is. */
+typedef struct nb_queue {
+    nb_cloud_looks looks;
+    nb_walk *walks[NB_CLOUD_LANES];
+    nb_cloud_seen *seen[NB_CLOUD_LANES];
+} nb_queue;
+
+static void ask(nb_queue *queue, nb_walk *walk, int k, double t, nb_cloud_seen *seen)
 {
-    const nb_spot spot = spot_at(walk, k, t);
-    return extinction_of(walk, k, &spot, NULL);
+    const int i = queue->looks.count++;
+    for (int c = 0; c < 3; c++) queue->looks.place[c][i] = walk->turned[k].from[c] + t * walk->turned[k].direction[c];
+    queue->looks.width[i] = (float)(walk->spread * t);
+    queue->walks[i] = walk;
+    queue->seen[i] = seen;
+    walk->unanswered++;
 }
+
+/* Where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first scales, whatever
+ * the others do. */
+static double clear_from(const nb_cloud_layer *layer, const nb_cloud_looks *looks, int i, float climb)
+{
+    float slope = layer->slope * looks->scale[i] + NB_CLOUD_RANK_SLOPE * climb * layer->per_thickness;
+    double clear = 0;
+    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
+        clear = nb_max(clear, (double)(looks->missing[n][i] / slope));
+        slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
+    }
+    return clear;
+}
+
+static void see(const nb_queue *queue, int k, int i)
+{
+    const nb_cloud_looks *looks = &queue->looks;
+    nb_walk *walk = queue->walks[i];
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
+    nb_spot spot = {.radius = looks->radius[i], .height = looks->height[i], .width = looks->width[i]};
+    *queue->seen[i] = (nb_cloud_seen){0, 0};
+    walk->unanswered--;
+    for (int c = 0; c < 3; c++) spot.place[c] = looks->place[c][i];
+    const float climb = (float)fabs(climb_at(walk, k, spot.place, spot.radius));
+    const int is_in = nb_cloud_is_in_layer(looks, i);
+    if (is_in && nb_cloud_has_drops(looks, i)) {
+        const nb_cloud_drops drops = nb_cloud_drops_of(looks, i);
+        *queue->seen[i] =
+            nb_cloud_through(&drops, nb_cloud_hidden_length(layer, spot.width, climb), walk->ray.apart[k]);
+    } else if (walk->wait == NB_WAIT_STEP) {
+        walk->spot = spot;
+        walk->clear = is_in ? clear_from(layer, looks, i, climb) : 0;
+    }
+}
+
+/* ---- where no cloud is ----------------------------------------------------------------------- */
 
 /* The least rank on the way between two places: curves of rays sag below the line between their heights. */
 static float least_between(const nb_walk *walk, int k, const nb_spot *a, double way)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    const double climb = nb_vector_dot(a->unit, walk->turned[k].direction), sag = way * way / a->radius;
+    const double climb = climb_at(walk, k, a->place, a->radius), sag = way * way / a->radius;
     const float end = a->height + (float)(climb * way) * layer->per_thickness;
     const float low = nb_smaller(a->height, end) - (float)sag * layer->per_thickness;
     const float high = nb_larger(a->height, end) + (float)sag * layer->per_thickness;
-    if (layer->kind == NEBEL_CLOUD_CUMULUS) return nb_cloud_least_rank(layer, nb_larger(0, low));
-    return low < 0.5f && high > 0.5f ? 0 : nb_cloud_least_rank(layer, high <= 0.5f ? high : low);
+    if (layer->kind == NEBEL_CLOUD_CUMULUS) return nb_cloud_least_rank(layer->kind, nb_larger(0, low));
+    return low < 0.5f && high > 0.5f ? 0 : nb_cloud_least_rank(layer->kind, high <= 0.5f ? high : low);
 }
 
-/* How far ahead there is no cloud for sure; 0 where that is not known. unknown: up to where it is not, of blocks by size; they
- * are not asked again before that. */
-static double clear_way(const nb_walk *walk, int k, const nb_spot *spot, double t, double unknown[3])
+/* How far ahead there is no cloud for sure; 0 where that is not known. */
+static double clear_way(nb_walk *walk, int k)
 {
+    const nb_spot *spot = &walk->spot;
     const nb_cloud_outlook out =
         nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
     for (int size = 2; size >= 0; size--) {
         double way;
-        if (t < unknown[size]) continue;
+        if (walk->t < walk->unknown[size]) continue;
         const float most = nb_cloud_most_rank(walk->workspace, &out, size, &way);
         way += 1e-3 * walk->least;
         if (least_between(walk, k, spot, way) >= most) return way;
-        unknown[size] = t + way;
+        walk->unknown[size] = walk->t + way;
+    }
+    return 0;
+}
+
+/* Goes on until there may be cloud, by as much as there can be none, or by the least step, which pixels wider than that make longer, but
+ * no more than a part of the stay. Returns 0 at its end, else 1 and the step is from t as long as length. */
+static int find_step(nb_walk *walk, const nb_stay *stay)
+{
+    const int k = stay->layer;
+    while (walk->t < stay->end) {
+        if (walk->t >= walk->unknown[0]) {
+            const double way = clear_way(walk, k);
+            if (way > 0) {
+                walk->t += way;
+                walk->spot = spot_at(walk, k, walk->t);
+                walk->clear = 0;
+                continue;
+            }
+        }
+        const double width = walk->spread * walk->t,
+                     near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
+        const double step = nb_min(STAY_STEP * (stay->end - stay->begin), nb_max(near, 0.7 * width));
+        walk->length = nb_min(stay->end - walk->t, nb_max(walk->clear / SLOPE_PART, step));
+        return 1;
     }
     return 0;
 }
@@ -161,7 +245,7 @@ static void write_knot(nb_walk *walk, uint32_t i, double t)
 {
     nebel_cloud_knots *knots = walk->knots;
     knots->t[i] = (float)t;
-    knots->transmittance[i] = (float)nb_exp(-walk->depth);
+    knots->transmittance[i] = (float)walk->left;
     for (int c = 0; c < 3; c++) knots->in_scattering[i][c] = (float)walk->light[c];
 }
 
@@ -177,7 +261,7 @@ static void pass(nb_walk *walk, double t)
 {
     const nebel_cloud_knots *knots = walk->knots;
     const uint32_t last = knots->count - 1;
-    const double fallen = (double)knots->transmittance[last] - nb_exp(-walk->depth);
+    const double fallen = (double)knots->transmittance[last] - walk->left;
     if (fallen > 0.12 || (fallen > 0.02 && t > 1.5 * (double)knots->t[last])) add_knot(walk, t);
 }
 
@@ -236,8 +320,8 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     if (!(depth > 0)) return;
     if (walk->knots->count == 0) add_knot(walk, t);
     if (t - stretch->end > walk->least) add_light(walk, k);
-    const double apart = (double)walk->ray.apart[k], seen = nb_exp(-walk->depth) * (1 - nb_exp(-depth));
-    const double seen_apart = nb_exp(-walk->apart) * (1 - nb_exp(-depth_apart)) / apart;
+    const double apart = (double)walk->ray.apart[k], seen = walk->left * (1 - nb_exp(-depth));
+    const double seen_apart = walk->left_apart * (1 - nb_exp(-depth_apart)) / apart;
     stretch->depth += depth;
     stretch->end = t + length;
     stretch->seen += seen;
@@ -247,37 +331,11 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     walk->cloud_end = t + length;
     walk->depth += depth;
     walk->apart += depth_apart;
-    if (nb_exp(-walk->apart) <= UNSEEN) stretch->seen_apart += nb_exp(-walk->apart) / apart;
-    if (stretch->depth > STRETCH_DEPTH / (0.15 + nb_exp(-walk->depth))) add_light(walk, k);
+    walk->left = nb_exp(-walk->depth);
+    walk->left_apart = nb_exp(-walk->apart);
+    if (walk->left_apart <= UNSEEN) stretch->seen_apart += walk->left_apart / apart;
+    if (stretch->depth > STRETCH_DEPTH / (0.15 + walk->left)) add_light(walk, k);
     pass(walk, t + length);
-}
-
-/* Goes on until there is cloud, by as much as there can be none, or by the least step, which pixels wider than that make
- * longer, and no more than `longest`. */
-static double skip(const nb_walk *walk, int k, double t, double end, double longest, nb_cloud_seen *far, double *length)
-{
-    double clear = 0, unknown[3] = {0, 0, 0};
-    nb_spot spot = spot_at(walk, k, t);
-    while (t < end) {
-        if (t >= unknown[0]) {
-            const double way = clear_way(walk, k, &spot, t, unknown);
-            if (way > 0) {
-                t += way;
-                spot = spot_at(walk, k, t);
-                clear = 0;
-                continue;
-            }
-        }
-        const double width = walk->spread * t,
-                     near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
-        const double step = nb_min(longest, nb_max(near, 0.7 * width));
-        *length = nb_min(end - t, nb_max(clear / SLOPE_PART, step));
-        spot = spot_at(walk, k, t + *length);
-        *far = extinction_of(walk, k, &spot, &clear);
-        if (far->whole > 0) return t;
-        t += *length;
-    }
-    return end;
 }
 
 /* What Simpson's rule may miss of a piece's extinction, times six by its length. Where cloud begins or ends within the piece three
@@ -289,66 +347,106 @@ static double curve_of(const nb_cloud_seen *here, const nb_cloud_seen *middle, c
     return a > 0 && b > 0 && c > 0 ? curve : fmax(curve, fmax(a, fmax(b, c)));
 }
 
-/* A piece of a ray in one layer; layers do not overlap. */
-static void walk_layer(nb_walk *walk, int k, double begin, double end)
+/* Takes a piece whose three values are known, or halves it. */
+static void judge_piece(nb_walk *walk, const nb_stay *stay)
 {
-    const double tolerance = PIECES * walk->view->tolerance, whole = end - begin;
-    double t = begin, length = FIRST_STEP * walk->least;
-    nb_cloud_seen here = look(walk, k, t), far = {0, 0};
-    int has_far = 0;
-    for (int i = 0; i < MOST_PIECES && t < end && nb_exp(-walk->apart) > UNSEEN; i++) {
-        if (!has_far && here.whole == 0) {
-            t = skip(walk, k, t, end, STAY_STEP * whole, &far, &length);
-            has_far = 1;
-            if (!(t < end)) return;
-        }
-        length = nb_min(length, end - t);
-        if (!has_far) far = look(walk, k, t + length);
-        const nb_cloud_seen middle = look(walk, k, t + 0.5 * length);
-        const double depth = length / 6 * (double)(here.whole + 4 * middle.whole + far.whole);
-        const double depth_apart = length / 6 * (double)(here.apart + 4 * middle.apart + far.apart);
-        const double seen = nb_exp(-walk->depth);
-        const double least = nb_max(nb_min(0.25 * walk->spread * t, STAY_PIECE * whole), 1e-3 * walk->least);
-        const double missed = seen * length / 6 * curve_of(&here, &middle, &far);
-        has_far = 1;
-        if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + seen)) && length > 2 * least) {
-            length *= 0.5;
-            far = middle;
-            continue;
-        }
-        has_far = 0;
-        walk->missed += missed / PIECES;
-        take_piece(walk, k, t, length, depth, depth_apart);
-        t += length;
-        here = far;
-        if (missed < 0.2 * tolerance) length *= 1.7;
-        length = nb_min(length, 8 * walk->least + 0.01 * t);
+    const double tolerance = PIECES * walk->view->tolerance, length = walk->length;
+    const nb_cloud_seen *here = &walk->here, *middle = &walk->middle, *far = &walk->far;
+    const double depth = length / 6 * (double)(here->whole + 4 * middle->whole + far->whole);
+    const double depth_apart = length / 6 * (double)(here->apart + 4 * middle->apart + far->apart);
+    const double least =
+        nb_max(nb_min(0.25 * walk->spread * walk->t, STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
+    const double missed = walk->left * length / 6 * curve_of(here, middle, far);
+    if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->left)) && length > 2 * least) {
+        walk->length *= 0.5;
+        walk->far = walk->middle;
+        walk->has_far = 1;
+        return;
     }
+    walk->missed += missed / PIECES;
+    take_piece(walk, stay->layer, walk->t, length, depth, depth_apart);
+    walk->t += length;
+    walk->here = walk->far;
+    walk->has_far = 0;
+    if (missed < 0.2 * tolerance) walk->length *= 1.7;
+    walk->length = nb_min(walk->length, 8 * walk->least + 0.01 * walk->t);
 }
 
-/* ---- rays ------------------------------------------------------------------------------------ */
+/* ---- walks ----------------------------------------------------------------------------------- */
 
-typedef struct nb_stay {
-    int layer;
-    double begin, end;
-} nb_stay;
+/* What a walk waits for next in a stay; nothing at its end. */
+static nb_wait find_next(nb_walk *walk, const nb_stay *stay)
+{
+    if (walk->is_searching) return find_step(walk, stay) ? NB_WAIT_STEP : NB_WAIT_NOTHING;
+    if (walk->pieces++ >= MOST_PIECES || !(walk->t < stay->end) || walk->left_apart <= UNSEEN) return NB_WAIT_NOTHING;
+    if (!walk->has_far && walk->here.whole == 0) {
+        walk->is_searching = 1;
+        walk->clear = walk->unknown[0] = walk->unknown[1] = walk->unknown[2] = 0;
+        walk->spot = spot_at(walk, stay->layer, walk->t);
+        return find_next(walk, stay);
+    }
+    walk->length = nb_min(walk->length, stay->end - walk->t);
+    return NB_WAIT_PIECE;
+}
 
-static int find_stays(const nb_walk *walk, double t_max, nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS])
+static void enter(nb_walk *walk, const nb_stay *stay)
+{
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[stay->layer];
+    walk->least = (double)layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 16;
+    walk->t = stay->begin;
+    walk->length = FIRST_STEP * walk->least;
+    walk->pieces = walk->has_far = walk->is_searching = 0;
+    walk->wait = NB_WAIT_ENTRY;
+}
+
+/* From stay to stay, as far as something is seen; layers do not overlap. At the end it waits for nothing. */
+static void go_on(nb_walk *walk)
+{
+    walk->wait = find_next(walk, &walk->stays[walk->stay]);
+    if (walk->wait != NB_WAIT_NOTHING) return;
+    add_light(walk, walk->stays[walk->stay].layer);
+    if (++walk->stay < walk->stay_count && walk->left_apart > UNSEEN) enter(walk, &walk->stays[walk->stay]);
+}
+
+/* What it waited for has come. */
+static void take_answer(nb_walk *walk)
+{
+    if (walk->wait == NB_WAIT_PIECE) judge_piece(walk, &walk->stays[walk->stay]);
+    if (walk->wait == NB_WAIT_STEP) {
+        walk->has_far = walk->far.whole > 0;
+        walk->is_searching = !walk->has_far;
+        if (walk->is_searching) walk->t += walk->length;
+    }
+    go_on(walk);
+}
+
+static void put_questions(nb_walk *walk, nb_queue *queue)
+{
+    const int k = walk->stays[walk->stay].layer;
+    if (walk->wait == NB_WAIT_ENTRY) {
+        ask(queue, walk, k, walk->t, &walk->here);
+        return;
+    }
+    if (walk->wait == NB_WAIT_PIECE) ask(queue, walk, k, walk->t + 0.5 * walk->length, &walk->middle);
+    if (!walk->has_far) ask(queue, walk, k, walk->t + walk->length, &walk->far);
+}
+
+static void find_stays(nb_walk *walk, double t_max)
 {
     const nebel_clouds *clouds = walk->view->clouds;
-    int count = 0;
+    nb_stay *stays = walk->stays;
+    walk->stay_count = 0;
     for (int k = 0; k < clouds->layer_count; k++) {
         double pieces[2][2];
         const int found =
             nb_cloud_pieces(clouds->layers[k].low, clouds->layers[k].high, walk->from, walk->unit, t_max, pieces);
         for (int i = 0; i < found; i++) {
             const nb_stay stay = {k, pieces[i][0], pieces[i][1]};
-            int at = count++;
+            int at = walk->stay_count++;
             for (; at > 0 && stays[at - 1].begin > stay.begin; at--) stays[at] = stays[at - 1];
             stays[at] = stay;
         }
     }
-    return count;
 }
 
 void nb_cloud_raise(double ground, double from[3])
@@ -368,34 +466,31 @@ double nb_cloud_to_ground(double radius, const double from[3], const double unit
     return fmax(0, -along - sqrt((radius - near) * (radius + near)));
 }
 
-static void trace(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], double spread,
-                  nebel_cloud_knots *knots)
+static void begin(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], double spread,
+                  nebel_cloud_knots *knots, nb_walk *walk)
 {
     const nebel_atmosphere *atmosphere = workspace->view->clouds->atmosphere;
-    nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS];
-    nb_walk walk = {.view = workspace->view, .workspace = workspace, .spread = spread, .knots = knots};
-    for (int c = 0; c < 3; c++) walk.from[c] = ray->origin[c] - atmosphere->center[c];
-    nb_cloud_raise(atmosphere->airs.radius, walk.from);
-    memcpy(walk.unit, unit, sizeof walk.unit);
-    walk.ray = nb_cloud_ray_make(workspace->view, unit);
+    *walk = (nb_walk){
+        .view = workspace->view, .workspace = workspace, .spread = spread, .knots = knots, .left = 1, .left_apart = 1};
+    for (int c = 0; c < 3; c++) walk->from[c] = ray->origin[c] - atmosphere->center[c];
+    nb_cloud_raise(atmosphere->airs.radius, walk->from);
+    memcpy(walk->unit, unit, sizeof walk->unit);
+    walk->ray = nb_cloud_ray_make(workspace->view, unit);
     for (int k = 0; k < workspace->view->clouds->layer_count; k++)
         for (int i = 0; i < 3; i++) {
             const double *turn = workspace->view->poses[k].turn[i];
-            walk.turned[k].from[i] = nb_vector_dot(turn, walk.from);
-            walk.turned[k].direction[i] = nb_vector_dot(turn, unit);
+            walk->turned[k].from[i] = nb_vector_dot(turn, walk->from);
+            walk->turned[k].direction[i] = nb_vector_dot(turn, unit);
         }
     knots->count = 0;
-    knots->error = 0;
-    const double end = fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk.from, unit));
-    const int count = find_stays(&walk, end, stays);
-    for (int i = 0; i < count && nb_exp(-walk.apart) > UNSEEN; i++) {
-        const nb_cloud_layer *layer = &workspace->view->clouds->layers[stays[i].layer];
-        walk.least = (double)layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 16;
-        walk_layer(&walk, stays[i].layer, stays[i].begin, stays[i].end);
-        add_light(&walk, stays[i].layer);
-    }
-    end_knots(&walk);
-    knots->error = (float)walk.missed;
+    find_stays(walk, fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk->from, unit)));
+    if (walk->stay_count > 0) enter(walk, &walk->stays[0]);
+}
+
+static void end(nb_walk *walk)
+{
+    end_knots(walk);
+    walk->knots->error = (float)walk->missed;
 }
 
 /* Where a walk halves its pieces hangs on all digits, and two renderers have the last of them from other sums: without them both
@@ -405,21 +500,122 @@ static void round_direction(double unit[3])
     for (int c = 0; c < 3; c++) unit[c] = round(unit[c] * 0x1p36) * 0x1p-36;
 }
 
+/* ---- many walks ------------------------------------------------------------------------------ */
+
+/* So many go on together. */
+enum { WALKS = 32 };
+
+typedef struct nb_rays {
+    nebel_cloud_workspace *workspace;
+    size_t n, next;
+    const char *rays, *spreads;
+    char *knots;
+    size_t ray_stride, spread_stride, knot_stride;
+} nb_rays;
+
+static const nebel_ray *ray_at(const nb_rays *rays, size_t i)
+{
+    return (const nebel_ray *)(const void *)(rays->rays + i * rays->ray_stride);
+}
+
+static double spread_at(const nb_rays *rays, size_t i)
+{
+    return *(const double *)(const void *)(rays->spreads + i * rays->spread_stride);
+}
+
+/* Walks, those of them that have something to ask or are at their end, and what they ask of each layer. */
+typedef struct nb_party {
+    nb_walk walks[WALKS], *ready[WALKS];
+    int ready_count;
+    nb_queue queues[NEBEL_MAX_CLOUD_LAYERS];
+} nb_party;
+
+static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
+{
+    const size_t i = rays->next++;
+    double unit[3];
+    (void)nb_air_is_ray(ray_at(rays, i), unit);
+    round_direction(unit);
+    begin(rays->workspace, ray_at(rays, i), unit, (double)(float)spread_at(rays, i),
+          (nebel_cloud_knots *)(void *)(rays->knots + i * rays->knot_stride), walk);
+    party->ready[party->ready_count++] = walk;
+}
+
+static void look(const nb_rays *rays, int k, nb_party *party)
+{
+    nb_queue *queue = &party->queues[k];
+    nb_cloud_look(rays->workspace, k, &queue->looks);
+    for (int i = 0; i < queue->looks.count; i++) see(queue, k, i);
+    for (int i = 0; i < queue->looks.count; i++) {
+        nb_walk *walk = queue->walks[i];
+        if (walk->unanswered != 0 || walk->wait == NB_WAIT_NOTHING) continue;
+        take_answer(walk);
+        walk->unanswered = -1;
+        party->ready[party->ready_count++] = walk;
+    }
+    queue->looks.count = 0;
+}
+
+/* The layer of which most is asked; -1: of none. */
+static int find_asked(const nb_rays *rays, const nb_party *party)
+{
+    int most = -1, count = 0;
+    for (int k = 0; k < rays->workspace->view->clouds->layer_count; k++)
+        if (party->queues[k].looks.count > count) {
+            count = party->queues[k].looks.count;
+            most = k;
+        }
+    return most;
+}
+
+/* Looks as soon as there is no room for two more questions about a layer, or nobody has any. */
+static void trace(nb_rays *rays)
+{
+    nb_party party;
+    party.ready_count = 0;
+    for (int k = 0; k < NEBEL_MAX_CLOUD_LAYERS; k++) party.queues[k].looks.count = 0;
+    for (int i = 0; i < WALKS && rays->next < rays->n; i++) begin_next(rays, &party.walks[i], &party);
+    for (;;) {
+        if (party.ready_count == 0) {
+            const int k = find_asked(rays, &party);
+            if (k < 0) return;
+            look(rays, k, &party);
+            continue;
+        }
+        nb_walk *walk = party.ready[--party.ready_count];
+        if (walk->wait == NB_WAIT_NOTHING) {
+            end(walk);
+            if (rays->next < rays->n) begin_next(rays, walk, &party);
+            continue;
+        }
+        const int k = walk->stays[walk->stay].layer;
+        walk->unanswered = 0;
+        if (party.queues[k].looks.count > NB_CLOUD_LANES - 2) look(rays, k, &party);
+        put_questions(walk, &party.queues[k]);
+    }
+}
+
 /* ---- the face -------------------------------------------------------------------------------- */
 
 nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
-                                double spread, nebel_cloud_knots *knots, size_t knot_stride)
+                                const double *spreads, size_t spread_stride, nebel_cloud_knots *knots,
+                                size_t knot_stride)
 {
-    if (workspace == NULL || (n > 0 && (rays == NULL || knots == NULL)) || !(spread >= 0 && spread <= 10))
-        return NEBEL_ERROR_ARGUMENT;
+    nb_rays all = {.workspace = workspace,
+                   .n = n,
+                   .rays = (const char *)rays,
+                   .spreads = (const char *)spreads,
+                   .knots = (char *)knots,
+                   .ray_stride = ray_stride,
+                   .spread_stride = spread_stride,
+                   .knot_stride = knot_stride};
+    if (workspace == NULL || (n > 0 && (rays == NULL || spreads == NULL || knots == NULL))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
         double unit[3];
-        if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
-        round_direction(unit);
-        trace(workspace, ray, unit, (double)(float)spread,
-              (nebel_cloud_knots *)(void *)((char *)knots + i * knot_stride));
+        if (!nb_air_is_ray(ray_at(&all, i), unit) || !(spread_at(&all, i) >= 0 && spread_at(&all, i) <= 10))
+            return NEBEL_ERROR_ARGUMENT;
     }
+    trace(&all);
     return NEBEL_OK;
 }
 
@@ -459,11 +655,16 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
     if (!(desc->tolerance >= 0 && desc->tolerance <= 1))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: tolerance is %g; must be within 0 and 1",
                        desc->tolerance);
+    const nb_cloud_kernel *kernel = nb_cloud_kernel_choose(desc->isa);
+    if (kernel == NULL)
+        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %s: not available here",
+                       nebel_isa_name(desc->isa));
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_cloud_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
     made->allocator = allocator;
     made->clouds = desc->clouds;
+    made->kernel = kernel;
     made->sun = sun;
     made->tolerance = fmax(1e-6, desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE);
     made->low = HUGE_VAL;

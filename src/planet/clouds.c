@@ -1,6 +1,9 @@
-#include "clouds.h"
+#include "atmosphere.h"
+#include "cloud_looks.h"
 
+#include "base/cpu.h"
 #include "base/hash.h"
+#include "base/levels.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -13,9 +16,6 @@
 
 #define PI 3.14159265358979323846
 
-/* Each scale of billows is so much smaller than the one before. */
-#define BILLOW_RATIO 6.1f
-
 /* A pixel hides so much along a ray, in pixels; of sheets, which it meets aslant, as much more as it is long there, down to so
  * flat rays. Then as much comes through as through thin rays within the pixel (test_clouds). */
 #define HIDDEN_PIXELS 0.55f
@@ -24,12 +24,6 @@
 /* Nor more than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in sizes of heaps: of heaps, of
  * sheets. Beyond it the ray meets other cloud. As thin rays find, straight down to 9 degrees flat (test_clouds). */
 static const float hidden_heights[] = {0.37f, 0.75f}, hidden_widths[] = {0.42f, 0.55f};
-
-/* Wisps are so many times longer along the wind than across; billows in them. */
-#define DRAWN_OUT 4
-#define BILLOWS_DRAWN_OUT 10
-
-static const float billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
 
 /* ---- places ---------------------------------------------------------------------------------- */
 
@@ -74,10 +68,11 @@ static float octave_at(const nb_cloud_noise *noise, const nb_cloud_octave *octav
 
 /* Places of wisps are drawn together along the wind, so that noise of them is as many times longer that way, and no slope larger. A
  * quarter of the planet on, where that way is up, wisps are as wide as long. */
-static void draw_out(const nb_cloud_layer *layer, double times, double place[3])
+static void draw_out(const nb_cloud_layer *layer, double place[3])
 {
     if (layer->kind != NEBEL_CLOUD_CIRRUS) return;
-    const double wind[3] = {-layer->axis[2], 0, layer->axis[0]}, shift = (1 / times - 1) * nb_vector_dot(place, wind);
+    const double wind[3] = {-layer->axis[2], 0, layer->axis[0]};
+    const double shift = (1.0 / NB_WISPS_DRAWN_OUT - 1) * nb_vector_dot(place, wind);
     for (int i = 0; i < 3; i++) place[i] += shift * wind[i];
 }
 
@@ -101,7 +96,7 @@ static float sum_octaves(const nb_cloud_noise *noise, const nb_cloud_layer *laye
     float sum = 0;
     *variance = 0;
     for (int i = 0; i < 3; i++) place[i] = unit[i] * layer->low;
-    draw_out(layer, DRAWN_OUT, place);
+    draw_out(layer, place);
     if (layer->kind == NEBEL_CLOUD_CIRRUS && share_of(width, layer->octaves[2].cell) > 0) bend(noise, layer, place);
     for (int k = 0; k < NB_CLOUD_OCTAVES; k++) {
         const nb_cloud_octave *octave = &layer->octaves[k];
@@ -153,30 +148,7 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
     return column;
 }
 
-/* ---- shapes ---------------------------------------------------------------------------------- */
-
-/* Heaps are domes: where their rank falls as a parabola from the middle, its root is a half ball. Sheets are thickest in
- * the middle of their height. */
-float nb_cloud_least_rank(const nb_cloud_layer *layer, float height)
-{
-    const float from_middle = 2 * height - 1;
-    switch (layer->kind) {
-    case NEBEL_CLOUD_STRATUS:
-        return 0.5f * from_middle * from_middle;
-    case NEBEL_CLOUD_CIRRUS:
-        return 0.7f * from_middle * from_middle;
-    default:
-        return height * height;
-    }
-}
-
-/* Bases are flat, where vapour begins to condense, and thin there: drops grow on their way up. */
-static float thin_out(const nb_cloud_layer *layer, float height)
-{
-    const float end = step_up(10 * (1 - height));
-    if (layer->kind != NEBEL_CLOUD_CUMULUS) return end * step_up(6 * height);
-    return end * step_up(16 * height) * (0.45f + 0.55f * nb_smaller(1, 2 * height));
-}
+/* ---- drops ----------------------------------------------------------------------------------- */
 
 /* Integral of x held within 0 and 1. */
 static float ramp_integral(float x)
@@ -190,66 +162,6 @@ static float mean_ramp(float x, float wide)
 {
     if (wide < 1e-3f) return nb_smaller(1, nb_larger(0, x));
     return (ramp_integral(x + wide) - ramp_integral(x - wide)) / (2 * wide);
-}
-
-/* How often the tables of billows are halved for a width. Returns the variance that they lose by that. */
-static float set_levels(const nb_cloud_noise *noise, const nb_cloud_layer *layer, float width,
-                        float levels[NB_CLOUD_BILLOWS])
-{
-    float lost = 0, numbers = width * layer->last_billow; /* of a table within the width */
-    for (int k = NB_CLOUD_BILLOWS - 1; k >= 0; k--, numbers *= 1 / BILLOW_RATIO) {
-        levels[k] = nb_level_of(numbers);
-        if (levels[k] > 0) lost += billow_weights[k] * billow_weights[k] * nb_billows_lost(noise, levels[k]);
-    }
-    return lost;
-}
-
-static float billows_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int scale, const double place[3],
-                        float level)
-{
-    double at[3], drawn[5] = {place[0], place[1], place[2]};
-    if (!(level < NB_BILLOW_LEVELS - 1)) return noise->billow_mean;
-    draw_out(layer, BILLOWS_DRAWN_OUT, drawn);
-    drawn[3] = drawn[0];
-    drawn[4] = drawn[1];
-    for (int i = 0; i < 3; i++) at[i] = drawn[i + scale] * layer->per_billow[scale] + layer->billow_shift[i];
-    return nb_billows(noise, at, level);
-}
-
-static void set_missing(float missing[NB_CLOUD_BILLOWS + 1], int first, float value)
-{
-    for (int n = first; n <= NB_CLOUD_BILLOWS; n++) missing[n] = value;
-}
-
-/* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
- * left of them can neither make cloud nor thin it. */
-int nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
-                       const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1],
-                       nb_cloud_drops *drops)
-{
-    const float whole = column->rank - nb_cloud_least_rank(layer, height), softness = layer->softness;
-    set_missing(missing, 0, -whole - sqrtf(3 * column->variance));
-    if (missing[0] >= 0) return 0;
-    const float deep =
-        layer->kind == NEBEL_CLOUD_CUMULUS ? layer->detail * (0.5f + 0.5f * nb_smaller(1, 3 * height)) : layer->detail;
-    float variance = column->variance, levels[NB_CLOUD_BILLOWS], cut = 0;
-    /* What is far within is whole. */
-    if (deep > 0 && whole - deep < softness + sqrtf(3 * variance)) {
-        float most = deep; /* with all that is not read */
-        variance += deep * deep * set_levels(noise, layer, width, levels);
-        const float spread = sqrtf(3 * variance);
-        for (int k = 0; k < NB_CLOUD_BILLOWS && whole - most < softness + spread; k++) {
-            const float billows = billows_at(noise, layer, k, place, levels[k]);
-            cut += deep * billow_weights[k] * (1 - billows);
-            most -= deep * billow_weights[k] * billows;
-            set_missing(missing, k + 1, cut - whole - spread);
-            if (missing[k + 1] >= 0) return 0;
-        }
-    }
-    *drops = (nb_cloud_drops){.most = layer->extinction * thin_out(layer, height),
-                              .part = (whole - cut) / softness,
-                              .spread = sqrtf(3 * variance) / softness};
-    return 1;
 }
 
 float nb_cloud_mean(const nb_cloud_drops *drops)
@@ -292,19 +204,49 @@ nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float 
     return (nb_cloud_seen){whole, apart < 1 ? through(drops, apart * depth, length, apart * mean) : whole};
 }
 
-float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
-                  const double place[3], float width)
+/* ---- places that are asked at once ----------------------------------------------------------- */
+
+#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = {nb_cloud_find_places_##suffix, nb_cloud_find_drops_##suffix},
+static const nb_cloud_kernel kernels[NEBEL_ISA_COUNT] = {NB_LEVELS(KERNEL)};
+
+const nb_cloud_kernel *nb_cloud_kernel_choose(nebel_isa isa)
 {
-    const double radius = nb_vector_length(place);
-    if (!(radius > layer->low && radius < layer->high)) return 0;
-    double own[3], unit[3];
-    turn(pose->turn, place, own);
-    for (int i = 0; i < 3; i++) unit[i] = own[i] / radius;
-    float missing[NB_CLOUD_BILLOWS + 1];
-    nb_cloud_drops drops;
-    const nb_cloud_column column = nb_cloud_column_at(noise, layer, unit, width);
-    const float height = (float)(radius - layer->low) * layer->per_thickness;
-    return nb_cloud_in_column(noise, layer, &column, own, height, width, missing, &drops) ? nb_cloud_mean(&drops) : 0;
+    const nebel_isa chosen = nb_cpu_choose(isa);
+    return chosen != NEBEL_ISA_COUNT ? &kernels[chosen] : NULL;
+}
+
+void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double place[3], float width)
+{
+    const int i = looks->count++;
+    for (int c = 0; c < 3; c++) looks->place[c][i] = nb_vector_dot(pose->turn[c], place);
+    looks->width[i] = width;
+}
+
+void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                         nb_cloud_looks *looks)
+{
+    nb_cloud_fill_lanes(looks);
+    kernel->find_places(layer, 0, looks);
+    for (int i = 0; i < NB_CLOUD_LANES; i++) {
+        nb_cloud_column column = {.rank = -1};
+        if (i < looks->count && nb_cloud_is_in_layer(looks, i)) {
+            double unit[3];
+            for (int c = 0; c < 3; c++) unit[c] = looks->place[c][i] / looks->radius[i];
+            column = nb_cloud_column_at(noise, layer, unit, looks->width[i]);
+        }
+        nb_cloud_set_column(looks, i, &column);
+    }
+    kernel->find_drops(noise, layer, looks);
+}
+
+void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_looks *looks, float extinction[])
+{
+    nb_cloud_look_alone(clouds->kernel, &clouds->noise, &clouds->layers[layer], looks);
+    for (int i = 0; i < looks->count; i++) {
+        const nb_cloud_drops drops = nb_cloud_drops_of(looks, i);
+        extinction[i] = nb_cloud_has_drops(looks, i) && nb_cloud_is_in_layer(looks, i) ? nb_cloud_mean(&drops) : 0;
+    }
+    looks->count = 0;
 }
 
 /* ---- descriptions ---------------------------------------------------------------------------- */
@@ -414,16 +356,17 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
     }
     for (int i = 0; i < 3; i++) layer->billow_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
     double period = 0.9 * desc->size;
-    for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= (double)BILLOW_RATIO) {
+    for (int i = 0; i < NB_CLOUD_BILLOWS; i++, period /= (double)NB_BILLOW_RATIO) {
         layer->per_billow[i] = 1 / period;
-        layer->billow_slopes[i] = billow_weights[i] * (float)fmax(0, desc->detail) * NB_BILLOW_SLOPE / (float)period;
+        layer->billow_slopes[i] = nb_billow_weights[i] * (float)fmax(0, desc->detail) * NB_BILLOW_SLOPE / (float)period;
     }
     layer->last_billow = NB_BILLOW_SIZE * (float)layer->per_billow[NB_CLOUD_BILLOWS - 1];
     layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
     for (int i = 0; i < NB_CLOUD_GRIDS; i++) {
         const double wide = ldexp((double)layer->grid, i);
-        layer->grids[i] = (nb_cloud_grid){wide / layer->low, layer->low / wide, i == 0 ? 0 : (float)wide};
+        layer->grids[i] = (nb_cloud_grid){wide / layer->low, i == 0 ? 0 : (float)wide};
     }
+    layer->per_spacing = layer->low / (double)layer->grid;
     /* Wisps are bent, and that noise has a slope, too. */
     if (desc->kind == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
 }
@@ -525,6 +468,7 @@ nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **c
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
     made->allocator = allocator;
     made->atmosphere = desc->atmosphere;
+    made->kernel = nb_cloud_kernel_choose(NEBEL_ISA_DEFAULT);
     result = nb_cloud_noise_make(&allocator, &made->noise);
     for (uint32_t i = 0; i < desc->layer_count && result == NEBEL_OK; i++) {
         made->layer_count++;
@@ -547,6 +491,30 @@ void nebel_destroy_clouds(nebel_clouds *clouds)
     nb_release(&allocator, clouds);
 }
 
+static const double *place_of(const double (*places)[3], size_t stride, size_t i)
+{
+    return (const double *)(const void *)((const char *)places + i * stride);
+}
+
+static void add_layer(const nebel_clouds *clouds, int k, double time, float width, size_t n, const double (*places)[3],
+                      size_t stride, float *extinction)
+{
+    const nb_cloud_pose pose = nb_cloud_pose_at(&clouds->layers[k], time);
+    nb_cloud_looks looks = {.count = 0};
+    for (size_t first = 0; first < n; first += NB_CLOUD_LANES) {
+        const size_t count = n - first < NB_CLOUD_LANES ? n - first : NB_CLOUD_LANES;
+        float means[NB_CLOUD_LANES];
+        for (size_t i = 0; i < count; i++) {
+            const double *place = place_of(places, stride, first + i);
+            double from[3];
+            for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+            nb_cloud_ask(&looks, &pose, from, width);
+        }
+        nb_cloud_find_means(clouds, k, &looks, means);
+        for (size_t i = 0; i < count; i++) extinction[first + i] += means[i];
+    }
+}
+
 nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, double width, size_t n,
                                     const double (*places)[3], size_t place_stride, float *extinction)
 {
@@ -554,15 +522,10 @@ nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, dou
         !(width >= 0 && width <= NEBEL_MAX_LENGTH))
         return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
-        double from[3];
-        if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
-        for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+        if (!nb_air_is_place(place_of(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
         extinction[i] = 0;
-        for (int k = 0; k < clouds->layer_count; k++) {
-            const nb_cloud_pose pose = nb_cloud_pose_at(&clouds->layers[k], time);
-            extinction[i] += nb_cloud_at(&clouds->noise, &clouds->layers[k], &pose, from, (float)width);
-        }
     }
+    for (int k = 0; k < clouds->layer_count; k++)
+        add_layer(clouds, k, time, (float)width, n, places, place_stride, extinction);
     return NEBEL_OK;
 }

@@ -2,9 +2,10 @@
 #ifndef NB_PLANET_CLOUDS_H
 #define NB_PLANET_CLOUDS_H
 
-#include "atmosphere.h"
 #include "cloud_noise.h"
 #include "layer_map.h"
+
+#include "media/phase.h"
 
 #include <nebel/clouds.h>
 
@@ -15,6 +16,14 @@ enum {
     NB_CLOUD_GRIDS = 32,  /* on which columns are kept */
 };
 
+/* Each scale of billows is so much smaller than the one before. */
+#define NB_BILLOW_RATIO 6.1f
+static const float nb_billow_weights[NB_CLOUD_BILLOWS] = {0.68f, 0.24f, 0.08f};
+
+/* Wisps are so many times longer along the wind than across; billows in them. */
+#define NB_WISPS_DRAWN_OUT 4
+#define NB_BILLOWS_DRAWN_OUT 10
+
 /* Octaves of noise have their lattices turned against each other, so that no axis shows. */
 typedef struct nb_cloud_octave {
     double turn[3][3], shift[3]; /* from m to the lattice */
@@ -23,8 +32,8 @@ typedef struct nb_cloud_octave {
 
 /* Each is twice as wide as the one before. */
 typedef struct nb_cloud_grid {
-    double spacing, per_spacing; /* between columns, on faces of a cube */
-    float width;                 /* m, of what a column hides */
+    double spacing; /* between columns, on faces of a cube */
+    float width;    /* m, of what a column hides */
 } nb_cloud_grid;
 
 typedef struct nb_cloud_layer {
@@ -43,14 +52,19 @@ typedef struct nb_cloud_layer {
     float slope;                 /* of that sum, at most, per m */
     float grid;                  /* m, between columns that are kept */
     nb_cloud_grid grids[NB_CLOUD_GRIDS];
+    double per_spacing; /* of the first */
     float coverage;
     nb_layer_map weather; /* level_count 0: none */
     nb_phase phase;
     double mean_cosine;
 } nb_cloud_layer;
 
+/* How densities are found: see cloud_looks.h. */
+typedef struct nb_cloud_kernel nb_cloud_kernel;
+
 struct nebel_clouds {
     nebel_allocator allocator;
+    const nb_cloud_kernel *kernel; /* for those who ask for density alone */
     const nebel_atmosphere *atmosphere;
     nb_cloud_noise noise;
     nb_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
@@ -73,22 +87,31 @@ typedef struct nb_cloud_column {
 nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const double unit[3],
                                    float width);
 
-/* Where rank is less there is no cloud at a part of the layer's height; `width` is counted by the column's variance. */
+/* ---- shapes ---------------------------------------------------------------------------------- */
+
+/* Sheets are thickest in the middle of their height. */
+static inline float nb_cloud_sheet_bulge(nebel_cloud_kind kind)
+{
+    return kind == NEBEL_CLOUD_STRATUS ? 0.5f : 0.7f;
+}
+
+/* Where rank is less there is no cloud at a part of the layer's height; a width is counted by the column's variance. Heaps are domes:
+ * where their rank falls as a parabola from the middle, its root is a half ball. */
 #define NB_CLOUD_RANK_SLOPE 2.8f /* of it over height, at most */
-float nb_cloud_least_rank(const nb_cloud_layer *layer, float height);
+static inline float nb_cloud_least_rank(nebel_cloud_kind kind, float height)
+{
+    const float from_middle = 2 * height - 1;
+    if (kind == NEBEL_CLOUD_CUMULUS) return height * height;
+    return nb_cloud_sheet_bulge(kind) * from_middle * from_middle;
+}
+
+/* ---- drops ----------------------------------------------------------------------------------- */
 
 /* Drops at a place: extinction is `most` times `part` held within 0 and 1; where a width hides some of it, all within
  * `spread` of `part` is as likely. */
 typedef struct nb_cloud_drops {
     float most, part, spread;
 } nb_cloud_drops;
-
-/* Drops at `place` (from the centre, in the layer's axes) in its column, at a part of the layer's height. Returns whether
- * there are any: if not, missing[n] is by how much the rank is at least too low, whatever billows behind the first n
- * scales do. */
-int nb_cloud_in_column(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_column *column,
-                       const double place[3], float height, float width, float missing[NB_CLOUD_BILLOWS + 1],
-                       nb_cloud_drops *drops);
 
 /* Their mean extinction. */
 float nb_cloud_mean(const nb_cloud_drops *drops);
@@ -104,8 +127,16 @@ nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float 
 /* What a width hides along a ray that climbs so much a metre, as a length of it. */
 float nb_cloud_hidden_length(const nb_cloud_layer *layer, float width, float climb);
 
-/* Mean extinction over a width, 0 outside the layer. */
-float nb_cloud_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_pose *pose,
-                  const double place[3], float width);
+/* Places that are asked at once (cloud_looks.h). */
+typedef struct nb_cloud_looks nb_cloud_looks;
+
+/* Puts a place from the planet's centre behind those that are asked. */
+void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double place[3], float width);
+/* Finds drops; no column next to the places is asked, so that none is kept. */
+void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                         nb_cloud_looks *looks);
+/* Mean extinction at all places that were asked; begins anew. */
+void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_looks *looks,
+                         float extinction[/* NB_CLOUD_LANES */]);
 
 #endif

@@ -1,0 +1,155 @@
+/* Drops in clouds at many places whose columns are known, compiled once per instruction set: NB_WIDTH at a time. No place's numbers
+ * hang on another's, so that all instruction sets agree. */
+#define NB_FAST
+
+#include "cloud_looks.h"
+
+#include "formulas/prelude.h"
+
+#include "formulas/elementary.inc"
+
+#include "cloud_kernel.h"
+
+/* ---- billows --------------------------------------------------------------------------------- */
+
+static inline nb_real load(const float from[], int p)
+{
+    return nb_load_lanes(from + p);
+}
+
+static inline nb_real mix(nb_real a, nb_real b, nb_real part)
+{
+    return a + part * (b - a);
+}
+
+/* How often tables are halved, and the part of the next: levels blend over the last quarter before it. */
+typedef struct nb_table {
+    nb_real level, low, next;
+} nb_table;
+
+static inline nb_table choose_table(nb_real numbers)
+{
+    const nb_halvings halvings = nb_halve(numbers);
+    nb_table table;
+    table.level = halvings.whole + halvings.part;
+    table.low = nb_min(halvings.whole, nb_splat(NB_BILLOW_LEVELS - 2));
+    table.next = nb_clamp(NB_F(4.0) * (table.level - table.low) - NB_F(3.0), NB_F(0.0), NB_F(1.0));
+    return table;
+}
+
+/* Linear between the eight numbers around a place. */
+static inline nb_real read_level(const nb_cloud_noise *noise, const nb_real parts[3], nb_real level)
+{
+    const nb_real size = nb_scale_pow2(nb_splat(NB_BILLOW_SIZE), -level), row = size + NB_F(2.0);
+    nb_real at[3], low[3];
+    for (int c = 0; c < 3; c++) {
+        const nb_real place = parts[c] * size + NB_F(0.5); /* numbers stand for the middles of their cells */
+        low[c] = nb_floor(place);
+        at[c] = place - low[c];
+    }
+    /* Tables have less than 2^24 numbers all together, so that floats count them. */
+    const nb_real near = (low[2] * row + low[1]) * row + low[0] + nb_gather(noise->billow_starts, level);
+    const nb_real far = near + row * row;
+    const float *t = noise->billows;
+    const nb_real a = mix(nb_gather(t, near), nb_gather(t + 1, near), at[0]);
+    const nb_real b = mix(nb_gather(t, near + row), nb_gather(t + 1, near + row), at[0]);
+    const nb_real c = mix(nb_gather(t, far), nb_gather(t + 1, far), at[0]);
+    const nb_real d = mix(nb_gather(t, far + row), nb_gather(t + 1, far + row), at[0]);
+    return mix(mix(a, b, at[1]), mix(c, d, at[1]), at[2]);
+}
+
+/* 0 to 1, 1 in the middle of a billow. Where they are halved too often all is their mean. */
+static inline nb_real read_billows(const nb_cloud_noise *noise, const nb_real parts[3], const nb_table *table)
+{
+    nb_real billows = read_level(noise, parts, table->low);
+    if (nb_any(table->next > NB_F(0.0)))
+        billows = mix(billows, read_level(noise, parts, table->low + NB_F(1.0)), table->next);
+    return nb_select(table->level < nb_splat(NB_BILLOW_LEVELS - 1), billows, nb_splat(noise->billow_mean));
+}
+
+/* Each scale's table for widths. Returns the variance that they lose by that. */
+static inline nb_real choose_tables(const nb_cloud_noise *noise, const nb_cloud_layer *layer, nb_real width,
+                                    nb_table tables[NB_CLOUD_BILLOWS])
+{
+    nb_real numbers = width * nb_splat(layer->last_billow), lost = NB_F(0.0);
+    for (int k = NB_CLOUD_BILLOWS - 1; k >= 0; k--) {
+        const float weight = nb_billow_weights[k] * nb_billow_weights[k];
+        tables[k] = choose_table(numbers);
+        lost += nb_splat(weight) * mix(nb_gather(noise->billow_variance, tables[k].low),
+                                       nb_gather(noise->billow_variance + 1, tables[k].low), tables[k].next);
+        numbers *= NB_F(1.0) / nb_splat(NB_BILLOW_RATIO);
+    }
+    return lost;
+}
+
+/* ---- drops ----------------------------------------------------------------------------------- */
+
+static inline nb_real step_up(nb_real x)
+{
+    const nb_real u = nb_clamp(x, NB_F(0.0), NB_F(1.0));
+    return u * u * (NB_F(3.0) - NB_F(2.0) * u);
+}
+
+/* Bases are flat, where vapour begins to condense, and thin there: drops grow on their way up. */
+static inline nb_real thin_out(nebel_cloud_kind kind, nb_real height)
+{
+    const nb_real end = step_up(NB_F(10.0) * (NB_F(1.0) - height));
+    if (kind != NEBEL_CLOUD_CUMULUS) return end * step_up(NB_F(6.0) * height);
+    return end * step_up(NB_F(16.0) * height) * (NB_F(0.45) + NB_F(0.55) * nb_min(NB_F(1.0), NB_F(2.0) * height));
+}
+
+/* nb_cloud_least_rank. */
+static inline nb_real least_rank(nebel_cloud_kind kind, nb_real height)
+{
+    const nb_real from_middle = NB_F(2.0) * height - NB_F(1.0);
+    if (kind == NEBEL_CLOUD_CUMULUS) return height * height;
+    return nb_splat(nb_cloud_sheet_bulge(kind)) * from_middle * from_middle;
+}
+
+/* How deep billows may cut. */
+static inline nb_real deepest(const nb_cloud_layer *layer, nb_real height)
+{
+    const nb_real detail = nb_splat(layer->detail);
+    if (layer->kind != NEBEL_CLOUD_CUMULUS) return detail;
+    return detail * (NB_F(0.5) + NB_F(0.5) * nb_min(NB_F(1.0), NB_F(3.0) * height));
+}
+
+/* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
+ * left of them can neither make cloud nor thin it. */
+static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int p,
+                                  nb_cloud_looks *looks)
+{
+    const nb_real height = load(looks->height, p), variance = load(looks->variance, p),
+                  softness = nb_splat(layer->softness);
+    const nb_real whole = load(looks->rank, p) - least_rank(layer->kind, height), deep = deepest(layer, height);
+    nb_real spread = nb_sqrt(NB_F(3.0) * variance), missing = -whole - spread, most = deep, cut = NB_F(0.0);
+    /* What is far within is whole. */
+    nb_mask is_open = nb_and(nb_and(missing<NB_F(0.0), deep> NB_F(0.0)), whole - deep < softness + spread);
+    nb_table tables[NB_CLOUD_BILLOWS];
+    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) nb_store_lanes(looks->missing[n] + p, missing);
+    if (nb_any(is_open)) {
+        const nb_real lost = choose_tables(noise, layer, load(looks->width, p), tables);
+        spread = nb_select(is_open, nb_sqrt(NB_F(3.0) * (variance + deep * deep * lost)), spread);
+    }
+    for (int k = 0; k < NB_CLOUD_BILLOWS; k++) {
+        is_open = nb_and(is_open, whole - most < softness + spread);
+        if (!nb_any(is_open)) break;
+        const nb_real parts[3] = {load(looks->parts[k][0], p), load(looks->parts[k][1], p),
+                                  load(looks->parts[k][2], p)};
+        const nb_real billows = read_billows(noise, parts, &tables[k]), part = deep * nb_splat(nb_billow_weights[k]);
+        cut = nb_select(is_open, cut + part * (NB_F(1.0) - billows), cut);
+        most = most - part * billows;
+        missing = nb_select(is_open, cut - whole - spread, missing);
+        for (int n = k + 1; n <= NB_CLOUD_BILLOWS; n++) nb_store_lanes(looks->missing[n] + p, missing);
+        is_open = nb_and(is_open, missing < NB_F(0.0));
+    }
+    nb_store_lanes(looks->most + p, nb_splat(layer->extinction) * thin_out(layer->kind, height));
+    nb_store_lanes(looks->part + p, (whole - cut) / softness);
+    nb_store_lanes(looks->spread + p, spread / softness);
+}
+
+void SUFFIXED(nb_cloud_find_drops_, NB_SUFFIX)(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
+                                               nb_cloud_looks *looks)
+{
+    for (int p = 0; p < looks->count; p += NB_WIDTH) find_in_packet(noise, layer, p, looks);
+}
