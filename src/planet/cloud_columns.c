@@ -75,39 +75,39 @@ static void fill_patch(nebel_cloud_workspace *workspace, int layer, uint32_t key
     *patch = (nb_cloud_patch){.key = key, .at = {x, y}};
     for (int k = 0; k < 4; k++) {
         const nb_cloud_column *column = point_at(workspace, &grid, x + (k & 1), y + (k >> 1));
-        patch->ranks[k] = column->rank;
-        patch->scales[k] = column->scale;
-        patch->variances[k] = column->variance;
+        patch->columns[k][0] = column->rank;
+        patch->columns[k][1] = column->scale;
+        patch->columns[k][2] = column->variance;
     }
 }
 
-static inline float mix(const float weights[4], const float of[4])
-{
-    return weights[0] * of[0] + weights[1] * of[1] + weights[2] * of[2] + weights[3] * of[3];
-}
-
-/* Linear between columns that are found once. */
-static nb_cloud_column read_cell(nebel_cloud_workspace *workspace, int layer, const nb_cloud_cells *cells, int lane)
+/* Adds a part of the column that lies linear between those around a cell, which are found once. */
+static inline void add_cell(nebel_cloud_workspace *workspace, int layer, const nb_cloud_cells *cells, int lane,
+                            float part, float column[4])
 {
     const uint32_t key = cells->key[lane];
     const int32_t x = cells->x[lane], y = cells->y[lane];
-    const float u = cells->u[lane], v = cells->v[lane];
-    const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+    const float u = cells->u[lane], v = cells->v[lane], far = part * v, near = part - far;
+    const float weights[4] = {near - u * near, u * near, far - u * far, u * far};
     nb_cloud_patch *patch = &workspace->patches[cells->hash[lane] & (NB_CLOUD_PATCHES - 1)];
     if (!(patch->key == key && patch->at[0] == x && patch->at[1] == y)) fill_patch(workspace, layer, key, x, y, patch);
-    return (nb_cloud_column){mix(weights, patch->ranks), mix(weights, patch->scales), mix(weights, patch->variances)};
+    for (int c = 0; c < 4; c++)
+        column[c] += weights[0] * patch->columns[0][c] + weights[1] * patch->columns[1][c] +
+                     weights[2] * patch->columns[2][c] + weights[3] * patch->columns[3][c];
 }
 
-static nb_cloud_column column_at(nebel_cloud_workspace *workspace, int layer, const nb_cloud_looks *looks, int lane)
+static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
 {
-    nb_cloud_column column = read_cell(workspace, layer, &looks->cells[0], lane);
-    const float part = looks->next[lane];
-    if (!(part > 0)) return column;
-    const nb_cloud_column next = read_cell(workspace, layer, &looks->cells[1], lane);
-    column.rank += part * (next.rank - column.rank);
-    column.scale += part * (next.scale - column.scale);
-    column.variance += part * (next.variance - column.variance);
-    return column;
+    for (int i = 0; i < looks->count; i++) {
+        const float next = looks->next[i];
+        float column[4] = {0, 0, 0, 0};
+        if (!nb_cloud_is_in_layer(looks, i)) continue;
+        add_cell(workspace, layer, &looks->cells[0], i, 1 - next, column);
+        if (next > 0) add_cell(workspace, layer, &looks->cells[1], i, next, column);
+        looks->rank[i] = column[0];
+        looks->scale[i] = column[1];
+        looks->variance[i] = column[2];
+    }
 }
 
 void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
@@ -117,11 +117,8 @@ void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *
     const nb_cloud_layer *of = &clouds->layers[layer];
     nb_cloud_fill_lanes(looks);
     kernel->find_places(of, layer, looks);
-    for (int i = 0; i < NB_CLOUD_LANES; i++) {
-        nb_cloud_column column = {.rank = -1, .scale = 0, .variance = 0};
-        if (i < looks->count && nb_cloud_is_in_layer(looks, i)) column = column_at(workspace, layer, looks, i);
-        nb_cloud_set_column(looks, i, &column);
-    }
+    nb_cloud_set_no_columns(looks);
+    find_columns(workspace, layer, looks);
     kernel->find_drops(&clouds->noise, of, looks);
 }
 

@@ -97,11 +97,13 @@ static inline int nb_cloud_is_in_layer(const nb_cloud_looks *looks, int lane)
     return looks->height[lane] > 0 && looks->height[lane] < 1;
 }
 
-static inline void nb_cloud_set_column(nb_cloud_looks *looks, int lane, const nb_cloud_column *column)
+/* What counts where no column is asked: no cloud. */
+static inline void nb_cloud_set_no_columns(nb_cloud_looks *looks)
 {
-    looks->rank[lane] = column->rank;
-    looks->scale[lane] = column->scale;
-    looks->variance[lane] = column->variance;
+    for (int i = 0; i < NB_CLOUD_LANES; i++) {
+        looks->rank[i] = -1;
+        looks->scale[i] = looks->variance[i] = 0;
+    }
 }
 
 /* Whether there are drops, in the layer. */

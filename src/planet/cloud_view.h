@@ -67,11 +67,11 @@ typedef struct nb_cloud_point {
     nb_cloud_column column;
 } nb_cloud_point;
 
-/* The four columns around a cell of that grid, x first. */
+/* The four columns around a cell of that grid, x first; of each rank, scale, variance and nothing: four numbers fill a register. */
 typedef struct nb_cloud_patch {
     uint32_t key;
     int32_t at[2];
-    float ranks[4], scales[4], variances[4];
+    float columns[4][4];
 } nb_cloud_patch;
 
 /* The largest rank, with all that a width hides, of a block of that grid. */

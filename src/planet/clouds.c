@@ -227,14 +227,15 @@ void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *no
 {
     nb_cloud_fill_lanes(looks);
     kernel->find_places(layer, 0, looks);
-    for (int i = 0; i < NB_CLOUD_LANES; i++) {
-        nb_cloud_column column = {.rank = -1};
-        if (i < looks->count && nb_cloud_is_in_layer(looks, i)) {
-            double unit[3];
-            for (int c = 0; c < 3; c++) unit[c] = looks->place[c][i] / looks->radius[i];
-            column = nb_cloud_column_at(noise, layer, unit, looks->width[i]);
-        }
-        nb_cloud_set_column(looks, i, &column);
+    nb_cloud_set_no_columns(looks);
+    for (int i = 0; i < looks->count; i++) {
+        double unit[3];
+        if (!nb_cloud_is_in_layer(looks, i)) continue;
+        for (int c = 0; c < 3; c++) unit[c] = looks->place[c][i] / looks->radius[i];
+        const nb_cloud_column column = nb_cloud_column_at(noise, layer, unit, looks->width[i]);
+        looks->rank[i] = column.rank;
+        looks->scale[i] = column.scale;
+        looks->variance[i] = column.variance;
     }
     kernel->find_drops(noise, layer, looks);
 }
