@@ -76,6 +76,12 @@ static inline nb_mask nb_narrow_mask(nb_wmask m) { return m; }
 
 #if !defined(NB_DOUBLE)
 static inline nb_real nb_gather(const float *from, nb_wide index) { return from[(size_t)index]; }
+
+static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
+{
+    *behind = (nb_real)from[(size_t)index + 1];
+    return (nb_real)from[(size_t)index];
+}
 #endif
 #if !defined(NB_DOUBLE) && !defined(NB_FAST)
 static inline nb_bits nb_wto_bits32(nb_wide x) { return (nb_bits)(int32_t)x; }
@@ -83,12 +89,6 @@ static inline nb_real nb_gather_bytes(const uint8_t *from, nb_wide index) { retu
 static inline nb_real nb_gather_shorts(const uint16_t *from, nb_wide index) { return (nb_real)from[(size_t)index]; }
 
 static inline nb_real nb_gather_byte_pairs(const uint8_t *from, nb_wide index, nb_real *behind)
-{
-    *behind = (nb_real)from[(size_t)index + 1];
-    return (nb_real)from[(size_t)index];
-}
-
-static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
 {
     *behind = (nb_real)from[(size_t)index + 1];
     return (nb_real)from[(size_t)index];

@@ -226,19 +226,46 @@ static inline void nb_wstore_lanes(double *to, nb_wide x)
 #define NB_WIDE_SIGN_BIT NB_SIGN_BIT
 typedef nb_bits nb_wbits;
 
-/* Numbers of an array, one for each lane: what lies at whole numbers below 2^24. */
+/* Numbers of an array, one for each lane: what lies at whole numbers below 2^24; of shorts, with the one behind. */
+#if defined(NB_ISA_AVX512) || defined(NB_ISA_AVX2)
+#if defined(NB_ISA_AVX512)
+#define NB_INDEX(index) _mm512_cvttps_epi32(index)
+#define NB_GATHER_REAL(from, at) _mm512_i32gather_ps(at, from, 4)
+#define NB_GATHER_BITS(from, at) (nb_bits)_mm512_i32gather_epi32(at, (const int *)(const void *)(from), 2)
+#define NB_TO_NUMBERS(bits) _mm512_cvtepi32_ps((__m512i)(bits))
+#else
+#define NB_INDEX(index) _mm256_cvttps_epi32(index)
+#define NB_GATHER_REAL(from, at) _mm256_i32gather_ps(from, at, 4)
+#define NB_GATHER_BITS(from, at) (nb_bits)_mm256_i32gather_epi32((const int *)(const void *)(from), at, 2)
+#define NB_TO_NUMBERS(bits) _mm256_cvtepi32_ps((__m256i)(bits))
+#endif
+static inline nb_real nb_gather(const float *from, nb_wide index) { return NB_GATHER_REAL(from, NB_INDEX(index)); }
+
+static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
+{
+    const nb_bits both = NB_GATHER_BITS(from, NB_INDEX(index));
+    *behind = NB_TO_NUMBERS(both >> 16);
+    return NB_TO_NUMBERS(both & 0xffffu);
+}
+#else
 static inline nb_real nb_gather(const float *from, nb_wide index)
 {
-#if defined(NB_ISA_AVX512)
-    return _mm512_i32gather_ps(_mm512_cvttps_epi32(index), from, 4);
-#elif defined(NB_ISA_AVX2)
-    return _mm256_i32gather_ps(from, _mm256_cvttps_epi32(index), 4);
-#else
     float lane[NB_WIDTH];
     for (int i = 0; i < NB_WIDTH; ++i) lane[i] = from[(int)index[i]];
     return nb_load_lanes(lane);
-#endif
 }
+
+static inline nb_real nb_gather_pairs(const uint16_t *from, nb_wide index, nb_real *behind)
+{
+    float lane[NB_WIDTH], next[NB_WIDTH];
+    for (int i = 0; i < NB_WIDTH; ++i) {
+        lane[i] = (float)from[(int)index[i]];
+        next[i] = (float)from[(int)index[i] + 1];
+    }
+    *behind = nb_load_lanes(next);
+    return nb_load_lanes(lane);
+}
+#endif
 
 #else
 

@@ -75,35 +75,30 @@ static void fill_patch(nebel_cloud_workspace *workspace, int layer, uint32_t key
     *patch = (nb_cloud_patch){.key = key, .at = {x, y}};
     for (int k = 0; k < 4; k++) {
         const nb_cloud_column *column = point_at(workspace, &grid, x + (k & 1), y + (k >> 1));
-        patch->columns[k][0] = column->rank;
-        patch->columns[k][1] = column->scale;
-        patch->columns[k][2] = column->variance;
+        patch->columns[k] = (nb_four){column->rank, column->scale, column->variance, 0};
     }
 }
 
-/* Adds a part of the column that lies linear between those around a cell, which are found once. */
-static inline void add_cell(nebel_cloud_workspace *workspace, int layer, const nb_cloud_cells *cells, int lane,
-                            float part, float column[4])
+/* Linear between the columns around a cell, which are found once. */
+static inline nb_four read_cell(nebel_cloud_workspace *workspace, int layer, const nb_cloud_cells *cells, int lane)
 {
     const uint32_t key = cells->key[lane];
     const int32_t x = cells->x[lane], y = cells->y[lane];
-    const float u = cells->u[lane], v = cells->v[lane], far = part * v, near = part - far;
-    const float weights[4] = {near - u * near, u * near, far - u * far, u * far};
     nb_cloud_patch *patch = &workspace->patches[cells->hash[lane] & (NB_CLOUD_PATCHES - 1)];
     if (!(patch->key == key && patch->at[0] == x && patch->at[1] == y)) fill_patch(workspace, layer, key, x, y, patch);
-    for (int c = 0; c < 4; c++)
-        column[c] += weights[0] * patch->columns[0][c] + weights[1] * patch->columns[1][c] +
-                     weights[2] * patch->columns[2][c] + weights[3] * patch->columns[3][c];
+    const nb_four *columns = patch->columns;
+    const nb_four near = columns[0] + cells->u[lane] * (columns[1] - columns[0]);
+    const nb_four far = columns[2] + cells->u[lane] * (columns[3] - columns[2]);
+    return near + cells->v[lane] * (far - near);
 }
 
 static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
 {
     for (int i = 0; i < looks->count; i++) {
         const float next = looks->next[i];
-        float column[4] = {0, 0, 0, 0};
         if (!nb_cloud_is_in_layer(looks, i)) continue;
-        add_cell(workspace, layer, &looks->cells[0], i, 1 - next, column);
-        if (next > 0) add_cell(workspace, layer, &looks->cells[1], i, next, column);
+        nb_four column = read_cell(workspace, layer, &looks->cells[0], i);
+        if (next > 0) column += next * (read_cell(workspace, layer, &looks->cells[1], i) - column);
         looks->rank[i] = column[0];
         looks->scale[i] = column[1];
         looks->variance[i] = column[2];

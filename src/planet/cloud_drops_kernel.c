@@ -43,6 +43,13 @@ static inline nb_table choose_table(nb_real numbers)
     return table;
 }
 
+static inline nb_real read_pair(const nb_cloud_noise *noise, nb_real index, nb_real part)
+{
+    nb_real behind;
+    const nb_real number = nb_gather_pairs(noise->billows, index, &behind);
+    return mix(number, behind, part);
+}
+
 /* Linear between the eight numbers around a place. */
 static inline nb_real read_level(const nb_cloud_noise *noise, const nb_real parts[3], nb_real level)
 {
@@ -56,11 +63,8 @@ static inline nb_real read_level(const nb_cloud_noise *noise, const nb_real part
     /* Tables have less than 2^24 numbers all together, so that floats count them. */
     const nb_real near = (low[2] * row + low[1]) * row + low[0] + nb_gather(noise->billow_starts, level);
     const nb_real far = near + row * row;
-    const float *t = noise->billows;
-    const nb_real a = mix(nb_gather(t, near), nb_gather(t + 1, near), at[0]);
-    const nb_real b = mix(nb_gather(t, near + row), nb_gather(t + 1, near + row), at[0]);
-    const nb_real c = mix(nb_gather(t, far), nb_gather(t + 1, far), at[0]);
-    const nb_real d = mix(nb_gather(t, far + row), nb_gather(t + 1, far + row), at[0]);
+    const nb_real a = read_pair(noise, near, at[0]), b = read_pair(noise, near + row, at[0]);
+    const nb_real c = read_pair(noise, far, at[0]), d = read_pair(noise, far + row, at[0]);
     return mix(mix(a, b, at[1]), mix(c, d, at[1]), at[2]);
 }
 
@@ -70,7 +74,8 @@ static inline nb_real read_billows(const nb_cloud_noise *noise, const nb_real pa
     nb_real billows = read_level(noise, parts, table->low);
     if (nb_any(table->next > NB_F(0.0)))
         billows = mix(billows, read_level(noise, parts, table->low + NB_F(1.0)), table->next);
-    return nb_select(table->level < nb_splat(NB_BILLOW_LEVELS - 1), billows, nb_splat(noise->billow_mean));
+    return nb_select(table->level < nb_splat(NB_BILLOW_LEVELS - 1), billows * nb_splat(1.0f / NB_BILLOW_MOST),
+                     nb_splat(noise->billow_mean));
 }
 
 /* Each scale's table for widths. Returns the variance that they lose by that. */

@@ -162,14 +162,15 @@ static float variance_of(const float *values, int count, double *mean)
 }
 
 /* Numbers on the far side follow on each side. */
-static void surround(const float *table, int size, float *wider)
+static void surround(const float *table, int size, uint16_t *wider)
 {
     const int row = size + 2;
     for (int z = 0; z < row; z++)
         for (int y = 0; y < row; y++)
             for (int x = 0; x < row; x++) {
                 const int at[3] = {(x + size - 1) % size, (y + size - 1) % size, (z + size - 1) % size};
-                wider[(z * row + y) * row + x] = table[(at[2] * size + at[1]) * size + at[0]];
+                const float value = table[(at[2] * size + at[1]) * size + at[0]];
+                wider[(z * row + y) * row + x] = (uint16_t)(NB_BILLOW_MOST * value + 0.5f);
             }
 }
 
@@ -202,7 +203,7 @@ nebel_result nb_cloud_noise_make(const nebel_allocator *allocator, nb_cloud_nois
     }
     noise->turns = nb_allocate(allocator, POINTS, 1);
     noise->directions = nb_allocate(allocator, NB_CLOUD_DIRECTIONS, sizeof *noise->directions);
-    float *tables = nb_allocate(allocator, all, sizeof *tables);
+    uint16_t *tables = nb_allocate(allocator, all, sizeof *tables);
     float *table = nb_allocate(allocator, NB_BILLOW_SIZE * NB_BILLOW_SIZE * NB_BILLOW_SIZE, sizeof *table);
     const int is_whole = noise->turns != NULL && noise->directions != NULL && tables != NULL && table != NULL;
     noise->billows = tables;
