@@ -16,8 +16,10 @@
 
 #include "formulas/elementary.inc"
 
-/* Where so little is left rays end: what is behind has the light of the last that is seen. */
+/* Where so little is left rays end; from FADING on what is seen fades to nothing there, so that no ray that just ends differs from one
+ * that just goes on to bright cloud far behind. */
 #define UNSEEN 0.03
+#define FADING 0.12
 
 /* Of what a piece may miss: that of many pieces together is less than their number of it, since signs differ. */
 #define PIECES 1.5
@@ -49,6 +51,12 @@
 /* Noise hardly ever rises by a fifth of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.2
 
+/* Between two knots transmittance falls by no more than about that. */
+#define MOST_FALL 0.12
+
+/* Gaps between clouds are long from this part of the way to their end on. */
+#define LONG_GAP 0.1
+
 enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
 
 /* Pieces one behind the other that have the same light. */
@@ -56,6 +64,11 @@ typedef struct nb_stretch {
     double end, depth, seen, seen_apart; /* seen: of all scattering, and of what leads away */
     double weight, moment;               /* of places by what is seen */
 } nb_stretch;
+
+/* What clouds have left and sent up to a place of a ray. */
+typedef struct nb_cloud_knot {
+    double t, left, left_apart, light[3];
+} nb_cloud_knot;
 
 /* A ray in a layer's axes. */
 typedef struct nb_turned {
@@ -105,6 +118,7 @@ typedef struct nb_walk {
     double left, left_apart; /* e to the minus them */
     double light[3], missed, cloud_end;
     nb_stretch stretch;
+    nb_cloud_knot last, gap_end; /* the last that was written; the end of the last long gap between clouds */
     nebel_cloud_knots *knots;
 } nb_walk;
 
@@ -241,28 +255,54 @@ static int find_step(nb_walk *walk, const nb_stay *stay)
 
 /* ---- knots ----------------------------------------------------------------------------------- */
 
-static void write_knot(nb_walk *walk, uint32_t i, double t)
+static nb_cloud_knot knot_here(const nb_walk *walk, double t)
 {
-    nebel_cloud_knots *knots = walk->knots;
-    knots->t[i] = (float)t;
-    knots->transmittance[i] = (float)walk->left;
-    for (int c = 0; c < 3; c++) knots->in_scattering[i][c] = (float)walk->light[c];
+    nb_cloud_knot knot = {.t = t, .left = walk->left, .left_apart = walk->left_apart};
+    memcpy(knot.light, walk->light, sizeof knot.light);
+    return knot;
 }
 
-/* The last place may stay free until the end. */
-static void add_knot(nb_walk *walk, double t)
+static void write_knot(nb_walk *walk, const nb_cloud_knot *knot)
 {
     nebel_cloud_knots *knots = walk->knots;
-    if (knots->count + 1 < MOST) write_knot(walk, knots->count++, t);
+    const uint32_t i = knots->count++;
+    knots->t[i] = (float)knot->t;
+    knots->transmittance[i] = (float)knot->left;
+    for (int c = 0; c < 3; c++) knots->in_scattering[i][c] = (float)knot->light[c];
+    walk->last = *knot;
+}
+
+/* What light must have fallen for a knot to be worth its place: the more there are the more. */
+static double least_fall(const nb_walk *walk)
+{
+    return MOST_FALL * walk->knots->count / MOST;
+}
+
+/* Before it the end of the gap that clouds lie behind, if they have taken something. The last place may stay free until the end. */
+static void add_knot(nb_walk *walk, double t)
+{
+    const nebel_cloud_knots *knots = walk->knots;
+    const nb_cloud_knot here = knot_here(walk, t);
+    if (walk->gap_end.t > walk->last.t && walk->gap_end.left_apart - here.left_apart > least_fall(walk) &&
+        knots->count + 2 < MOST)
+        write_knot(walk, &walk->gap_end);
+    if (knots->count + 1 < MOST) write_knot(walk, &here);
+}
+
+/* A long gap before a cloud at t is full of air, and clouds leave as much of its light at both ends: a knot between two clouds would
+ * have the mean of both. */
+static void bridge_gap(nb_walk *walk, double t)
+{
+    if (!(t - walk->cloud_end > LONG_GAP * t)) return;
+    if (walk->last.left_apart - walk->left_apart > least_fall(walk)) add_knot(walk, walk->cloud_end);
+    walk->gap_end = knot_here(walk, t);
 }
 
 /* Where the clouds' transmittance has fallen, or the ray is far from the last knot. */
 static void pass(nb_walk *walk, double t)
 {
-    const nebel_cloud_knots *knots = walk->knots;
-    const uint32_t last = knots->count - 1;
-    const double fallen = (double)knots->transmittance[last] - walk->left;
-    if (fallen > 0.12 || (fallen > 0.02 && t > 1.5 * (double)knots->t[last])) add_knot(walk, t);
+    const double fallen = walk->last.left - walk->left;
+    if (fallen > MOST_FALL || (fallen > 0.02 && t > 1.5 * walk->last.t)) add_knot(walk, t);
 }
 
 /* Where the last cloud ends, not the stay in its layer, which may be beyond the horizon: the last light would come through all air before
@@ -270,9 +310,11 @@ static void pass(nb_walk *walk, double t)
 static void end_knots(nb_walk *walk)
 {
     nebel_cloud_knots *knots = walk->knots;
+    const nb_cloud_knot end = knot_here(walk, walk->cloud_end);
     if (knots->count == 0) return;
-    if (knots->count > 1 && knots->t[knots->count - 1] >= (float)walk->cloud_end) knots->count--;
-    write_knot(walk, knots->count++, walk->cloud_end);
+    if (knots->count > 1 && walk->last.t >= walk->cloud_end) knots->count--;
+    if (walk->gap_end.t > walk->last.t && knots->count + 1 < MOST) write_knot(walk, &walk->gap_end);
+    write_knot(walk, &end);
 }
 
 /* ---- pieces ---------------------------------------------------------------------------------- */
@@ -314,26 +356,36 @@ static void add_light(nb_walk *walk, int k)
     walk->stretch = (nb_stretch){.weight = 0};
 }
 
+/* What counts of light that leads away and is left: all of it, but in the end nothing. */
+static double visible(double left)
+{
+    const double faded = nb_min(1, nb_max(0, (FADING - left) / (FADING - UNSEEN)));
+    return nb_max(0, left - UNSEEN * faded * faded);
+}
+
 static void take_piece(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
 {
     nb_stretch *stretch = &walk->stretch;
     if (!(depth > 0)) return;
-    if (walk->knots->count == 0) add_knot(walk, t);
     if (t - stretch->end > walk->least) add_light(walk, k);
+    if (walk->knots->count == 0)
+        add_knot(walk, t);
+    else
+        bridge_gap(walk, t);
     const double apart = (double)walk->ray.apart[k], seen = walk->left * (1 - nb_exp(-depth));
-    const double seen_apart = walk->left_apart * (1 - nb_exp(-depth_apart)) / apart;
+    const double before = visible(walk->left_apart);
     stretch->depth += depth;
     stretch->end = t + length;
     stretch->seen += seen;
-    stretch->seen_apart += seen_apart;
-    stretch->weight += seen + seen_apart;
-    stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
     walk->cloud_end = t + length;
     walk->depth += depth;
     walk->apart += depth_apart;
     walk->left = nb_exp(-walk->depth);
     walk->left_apart = nb_exp(-walk->apart);
-    if (walk->left_apart <= UNSEEN) stretch->seen_apart += walk->left_apart / apart;
+    const double seen_apart = (before - visible(walk->left_apart)) / apart;
+    stretch->seen_apart += seen_apart;
+    stretch->weight += seen + seen_apart;
+    stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
     if (stretch->depth > STRETCH_DEPTH / (0.15 + walk->left)) add_light(walk, k);
     pass(walk, t + length);
 }
