@@ -2,7 +2,8 @@
 
 set(nebel_kernel_files ${PROJECT_SOURCE_DIR}/src/march/trace_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/transmit_kernel.c
     ${PROJECT_SOURCE_DIR}/src/kernels/pixels_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/vertices_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/planet/cloud_places_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/cloud_drops_kernel.c)
+    ${PROJECT_SOURCE_DIR}/src/planet/cloud_places_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/cloud_drops_kernel.c
+    ${PROJECT_SOURCE_DIR}/src/planet/gather_kernel.c)
 
 set(nebel_flags_scalar "")
 set(nebel_flags_neon "")
@@ -53,8 +54,8 @@ function(nebel_add_kernel file level)
     target_compile_definitions(${target} PRIVATE NB_ISA_${upper}=1 NB_SUFFIX=${level})
     # gcc's note that vectors wider than the base level change the calling convention: the kernels pass none between objects.
     target_compile_options(${target} PRIVATE -Wno-psabi ${nebel_flags_${level}})
-    # The march is full of loops over three colours, which -O2 leaves in memory.
-    if(stem STREQUAL trace_kernel AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
+    # The march and air are full of loops over three colours, which -O2 leaves in memory.
+    if(stem MATCHES "^(trace|gather)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
         target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
     endif()
 endfunction()

@@ -72,11 +72,15 @@ for compiler in gcc clang; do
     try_c $compiler double -DNB_DOUBLE=1
     if [ "$(uname -m)" = x86_64 ]; then
         try_c $compiler sse2 -DNB_ISA_SSE2=1 -msse2
+        try_c $compiler 'sse2, double' -DNB_DOUBLE=1 -DNB_ISA_SSE2=1 -msse2
         try_c $compiler avx2 -DNB_ISA_AVX2=1 -mavx2 -mfma
+        try_c $compiler 'avx2, double' -DNB_DOUBLE=1 -DNB_ISA_AVX2=1 -mavx2 -mfma
         try_c $compiler avx512 -DNB_ISA_AVX512=1 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mavx2
+        try_c $compiler 'avx512, double' -DNB_DOUBLE=1 -DNB_ISA_AVX512=1 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mavx2
     fi
 done
 try_c aarch64-linux-gnu-gcc neon -DNB_ISA_NEON=1
+try_c aarch64-linux-gnu-gcc 'neon, double' -DNB_DOUBLE=1 -DNB_ISA_NEON=1
 try_glsl "330 core"
 try_glsl "300 es" prelude_300es.glsl
 

@@ -187,10 +187,9 @@ static void gain_is_that_of_T31(void **state)
                         0, NULL, &path);
             for (int n = 0; n < path.count; n++)
                 for (int c = 0; c < 3; c++) {
-                    const nb_path_node *node = &path.nodes[n];
-                    const double scattering =
-                        airs->airs[0].scattering[c] * node->density[0] + airs->airs[1].scattering[c] * node->density[1];
-                    sum[c] += 0.5 * weight * node->weight * node->transmittance[c] * scattering;
+                    const double scattering = airs->airs[0].scattering[c] * path.density[0][n] +
+                                              airs->airs[1].scattering[c] * path.density[1][n];
+                    sum[c] += 0.5 * weight * path.weight[n] * path.transmittance[c][n] * scattering;
                 }
         }
         for (int c = 0; c < 3; c++) expect_near("gain", sum[c], rows[i][1 + c], 1e-4);
@@ -567,6 +566,55 @@ static void parts_may_come_in_any_order(void **state)
     nebel_destroy_atmosphere(backwards);
 }
 
+static void expect_same_light(int count, const nb_node_light *a, const nb_node_light *b)
+{
+    const size_t size = (size_t)count * sizeof(double);
+    for (int c = 0; c < 3; c++) {
+        assert_memory_equal(a->sun[c], b->sun[c], size);
+        assert_memory_equal(a->often[c], b->often[c], size);
+        assert_memory_equal(a->missing[c], b->missing[c], size);
+    }
+}
+
+/* At nodes of rays up, down and level, by day and in twilight. */
+static void try_kernel(const nebel_atmosphere *atmosphere, nb_gather_fn *kernel)
+{
+    const nb_airs *airs = &atmosphere->airs;
+    for (int i = 0; i < 60; i++) {
+        const nb_track track = track_from(airs->radius + 1e4 * (i % 4), 80 + i % 5 * 4);
+        const double end = fmin(nb_track_enter(track, airs->radius), nb_track_leave(track, airs->top));
+        nb_path path;
+        nb_node_light light, same;
+        nb_path_lay(airs, &atmosphere->rule, track, end, 0, NULL, &path);
+        const nb_gather_job job = {
+            .airs = airs,
+            .scatter = &atmosphere->scatter,
+            .wants_sun = 1,
+            .track = track,
+            .aspect = {track.rise / track.radius, cos(0.2 * i), i % 7 == 0 ? 1 : cos((70 + i % 11 * 3) * DEGREES)},
+            .path = &path,
+            .count = path.count < NB_GATHER_NODES ? path.count + 1 : NB_GATHER_NODES};
+        nb_gather_choose(NEBEL_ISA_SCALAR)(&job, &light);
+        kernel(&job, &same);
+        expect_same_light(job.count, &light, &same);
+    }
+}
+
+static void all_instruction_sets_agree(void **state)
+{
+    (void)state;
+    for (int quality = 0; quality < NEBEL_AIR_QUALITY_COUNT; quality++) {
+        nebel_atmosphere_desc desc = *nebel_find_atmosphere("earth");
+        desc.quality = (nebel_air_quality)quality;
+        nebel_atmosphere *earth = make(&desc);
+        for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
+            nb_gather_fn *const kernel = nb_gather_choose((nebel_isa)isa);
+            if (kernel != NULL) try_kernel(earth, kernel);
+        }
+        nebel_destroy_atmosphere(earth);
+    }
+}
+
 static void memory_may_run_out(void **state)
 {
     (void)state;
@@ -593,7 +641,7 @@ int main(void)
         cmocka_unit_test(twilights_agree),         cmocka_unit_test(a_furnace_stays_white),
         cmocka_unit_test(odd_rays_have_answers),   cmocka_unit_test(distance_changes_nothing),
         cmocka_unit_test(bad_numbers_are_refused), cmocka_unit_test(parts_may_come_in_any_order),
-        cmocka_unit_test(memory_may_run_out),
+        cmocka_unit_test(memory_may_run_out),      cmocka_unit_test(all_instruction_sets_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

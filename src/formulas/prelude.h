@@ -12,6 +12,7 @@
  *     NB_ISA_SSE2 | NB_ISA_NEON    2 floats, 2 doubles as wide
  *     NB_ISA_AVX2                  4 floats, 4 doubles as wide
  *     NB_ISA_AVX512                8 floats, 8 doubles as wide (needs -mavx512f -mavx512vl -mavx512dq)
+ *     NB_ISA_... and NB_DOUBLE     2, 4, 8 doubles, wide is real
  *     NB_FAST with any of these    wide is real, and twice as many lanes (4, 8, 16; still one without NB_ISA_...)
  *
  * Always with -ffp-contract=off -fno-math-errno: then a lane has the same bits in every target of the same precision
@@ -20,7 +21,9 @@
 #ifndef NB_PRELUDE_H
 #define NB_PRELUDE_H
 
-#if defined(NB_ISA_SSE2) || defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512) || defined(NB_ISA_NEON)
+#if defined(NB_DOUBLE) && (defined(NB_ISA_SSE2) || defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512) || defined(NB_ISA_NEON))
+#include "prelude_double.h"
+#elif defined(NB_ISA_SSE2) || defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512) || defined(NB_ISA_NEON)
 #include "prelude_simd.h"
 #else
 #include "prelude_c.h"

@@ -95,6 +95,10 @@ static inline nb_real nb_gather_byte_pairs(const uint8_t *from, nb_wide index, n
 }
 #endif
 
+#ifdef NB_DOUBLE
+static inline nb_real nb_pick(const double *from, nb_real index) { return from[(size_t)index]; }
+#endif
+
 /* ---- masks ----------------------------------------------------------------------------------- */
 
 #define nb_mask_true 1

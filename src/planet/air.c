@@ -8,10 +8,11 @@
 #include "formulas/elementary.inc"
 #include "formulas/planet.inc"
 
+#include "depth.h"
+
 double nb_air_density(const nb_air *air, double height)
 {
-    if (air->scale > 0) return nb_exp(-height / air->scale);
-    return fmax(0, 1 - fabs(height - air->center) / air->width);
+    return nb_density_of(air, height);
 }
 
 /* ---- shells ---------------------------------------------------------------------------------- */
@@ -49,74 +50,27 @@ void nb_airs_cut(nb_airs *airs)
 
 nb_track nb_track_ahead(nb_track track, double length)
 {
-    return (nb_track){sqrt(fmax(0, track.radius * track.radius + length * (2 * track.rise + length))),
-                      track.rise + length};
-}
-
-/* The square of half the chord that a sphere cuts off the ray's line; below 0 where they do not meet. */
-static double half_chord_square(nb_track track, double sphere)
-{
-    return (sphere - track.radius) * (sphere + track.radius) + track.rise * track.rise;
+    const nb_tracks ahead = nb_tracks_ahead((nb_tracks){track.radius, track.rise}, length);
+    return (nb_track){ahead.radius, ahead.rise};
 }
 
 double nb_track_leave(nb_track track, double sphere)
 {
-    return fmax(0, sqrt(fmax(0, half_chord_square(track, sphere))) - track.rise);
+    return nb_tracks_leave((nb_tracks){track.radius, track.rise}, sphere);
 }
 
 double nb_track_enter(nb_track track, double sphere)
 {
-    const double square = half_chord_square(track, sphere);
+    const double square = nb_half_chord_square((nb_tracks){track.radius, track.rise}, sphere);
     if (!(track.rise < 0 && square > 0)) return HUGE_VAL;
     return fmax(0, (track.radius - sphere) * (track.radius + sphere) / (sqrt(square) - track.rise));
 }
 
 /* ---- optical depth --------------------------------------------------------------------------- */
 
-/* How far a ray that goes up has come when it is `height` above its start. */
-static double reach_height(nb_track track, double height)
-{
-    const double climb = fmax(0, height) * (2 * track.radius + height);
-    return climb > 0 ? climb / (track.rise + sqrt(track.rise * track.rise + climb)) : 0;
-}
-
-/* The density of a layer integrated from a to b, between which it has no edge: it is nearly a parabola of the way. */
-static double layer_piece(const nb_air *air, nb_track track, double height, double a, double b)
-{
-    static const double nodes[] = {0.2386191860831969, 0.6612093864662645, 0.9324695142031521};
-    static const double weights[] = {0.4679139345726910, 0.3607615730481386, 0.1713244923791704};
-    const double half = 0.5 * (b - a);
-    double sum = 0;
-    for (int i = 0; i < 6; i++) {
-        const double s = a + half * (1 + (i % 2 ? nodes[i / 2] : -nodes[i / 2]));
-        sum += weights[i / 2] * nb_air_density(air, height + nb_air_height(track.radius, track.rise, s));
-    }
-    return half * sum;
-}
-
-static double layer_length(const nb_air *air, nb_track track, double height, double length)
-{
-    const double edges[] = {air->center - air->width, air->center, air->center + air->width};
-    double from = fmin(reach_height(track, edges[0] - height), length), sum = 0;
-    for (int i = 1; i < 3; i++) {
-        const double to = fmin(reach_height(track, edges[i] - height), length);
-        if (to > from) sum += layer_piece(air, track, height, from, to);
-        from = fmax(from, to);
-    }
-    return sum;
-}
-
-/* Adds the depth of `length` m of a ray that goes up. */
 static void add_rising(const nb_airs *airs, nb_track track, double length, double depth[3])
 {
-    const double height = track.radius - airs->radius;
-    for (int i = 0; i < airs->count; i++) {
-        const nb_air *air = &airs->airs[i];
-        const double dense =
-            air->scale > 0 ? nb_air_density(air, height) * nb_air_length(track.radius, track.rise, air->scale, length)
-                           : layer_length(air, track, height, length);
-        for (int c = 0; c < 3; c++) depth[c] += air->extinction[c] * dense;
-    }
+    nb_add_rising(airs, (nb_tracks){track.radius, track.rise}, length, depth);
 }
 
 /* From the lowest place on, up on both sides. */
@@ -137,11 +91,5 @@ void nb_track_depth(const nb_airs *airs, nb_track track, double length, double d
 
 void nb_track_sunlight(const nb_airs *airs, nb_track track, double light[3])
 {
-    if (nb_track_enter(track, airs->radius) < HUGE_VAL) {
-        light[0] = light[1] = light[2] = 0;
-        return;
-    }
-    double depth[3];
-    nb_track_depth(airs, track, nb_track_leave(track, airs->top), depth);
-    for (int c = 0; c < 3; c++) light[c] = nb_exp(-depth[c]);
+    nb_tracks_sunlight(airs, (nb_tracks){track.radius, track.rise}, light);
 }

@@ -7,7 +7,8 @@
 
 #include <nebel/planet.h>
 
-enum { NB_MOMENTS = 5 }; /* orders of phase functions that light scattered often is kept by */
+/* Orders of phase functions that light scattered often is kept by: NB_MOMENTS, or so few. */
+enum { NB_MOMENTS = 5, NB_FEW_MOMENTS = 3 };
 
 /* One kind of air, ready for evaluation. */
 typedef struct nb_air {

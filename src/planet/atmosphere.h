@@ -2,9 +2,8 @@
 #ifndef NB_PLANET_ATMOSPHERE_H
 #define NB_PLANET_ATMOSPHERE_H
 
+#include "gather.h"
 #include "rule.h"
-#include "path.h"
-#include "scatter.h"
 
 struct nebel_atmosphere {
     nebel_allocator allocator;
@@ -12,6 +11,7 @@ struct nebel_atmosphere {
     nb_airs airs;
     nb_rule rule;
     nb_scatter scatter;
+    nb_gather_fn *gather;
     double share_off; /* how much of light that was scattered often may be wrong for want of entries and directions */
 };
 
@@ -24,14 +24,17 @@ typedef struct nb_gathered {
     double once[NEBEL_MAX_AIRS][3], often[3], missing[3];
 } nb_gathered;
 
-/* Adds what comes to the ray at a node. */
-void nb_gather_node(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path_node *node,
-                    nb_gathered *gathered);
+/* Where the ray enters and leaves the shadow of the planet, in any order; below 0 where it does not. */
+void nb_find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, double cuts[2]);
 
-/* Up to each of `count` ends, ascending, at most NB_PATH_CUTS - 2. `aspect` is that of the ray's direction where it
- * starts; the ray must stay within the air up to the last end. */
-void nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect, int count,
-               const double ends[], nb_gathered gathered[]);
+/* Over the nodes of a path, up to each of `count` ends, ascending; the last one is the path's. Returns what is scattered
+ * just where the ray begins, per metre. `aspect` is that of the ray's direction there. */
+nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
+                           int count, const double ends[], nb_gathered gathered[]);
+
+/* Along a ray that stays within the air up to the last end; at most NB_PATH_CUTS - 2 of them. */
+nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
+                      int count, const double ends[], nb_gathered gathered[]);
 
 /* What was scattered once by phase functions as they are; `sun` is the cosine between ray and sun. */
 void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_gathered *gathered, double sun, double once[3]);

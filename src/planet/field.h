@@ -22,12 +22,4 @@ typedef struct nb_aspect {
 /* Adds light (radiance times solid angle) that comes from a direction. */
 void nb_field_add(nb_field *field, int orders, nb_aspect from, const double light[3]);
 
-/* What a field gives towards a direction by kinds of air of such density: radiance to the metre. */
-void nb_field_scatter(const nb_field *field, int orders, const nb_airs *airs, const double density[], nb_aspect toward,
-                      double radiance[3]);
-
-/* About what it would give more or less if the next order were kept, too. */
-void nb_field_missing(const nb_field *field, int orders, const nb_airs *airs, const double density[],
-                      double radiance[3]);
-
 #endif

@@ -37,35 +37,51 @@ static void find_ends(const nb_airs *airs, nb_track track, double length, int cu
     ends->at[ends->count++] = length;
 }
 
+static void set_node(const nb_airs *airs, nb_track track, double s, double weight, nb_path *path, int i)
+{
+    path->s[i] = s;
+    path->radius[i] = nb_track_ahead(track, s).radius;
+    path->weight[i] = weight;
+    for (int k = 0; k < airs->count; k++)
+        path->density[k][i] = nb_air_density(&airs->airs[k], path->radius[i] - airs->radius);
+}
+
+static double extinction_at(const nb_airs *airs, const nb_path *path, int i, int c)
+{
+    double sum = 0;
+    for (int k = 0; k < airs->count; k++) sum += path->density[k][i] * airs->airs[k].extinction[c];
+    return sum;
+}
+
 /* Adds the nodes from a to b; `depth` is that of the ray up to a, and becomes that up to b. */
 static void lay_piece(const nb_airs *airs, const nb_rule *rule, nb_track track, double a, double b, double depth[3],
                       nb_path *path)
 {
     const double half = 0.5 * (b - a);
-    nb_path_node *nodes = path->nodes + path->count;
-    double extinction[NB_RULE_MOST][3];
-    for (int i = 0; i < rule->count; i++) {
-        nb_path_node *node = &nodes[i];
-        node->s = a + half * (1 + rule->nodes[i]);
-        node->radius = nb_track_ahead(track, node->s).radius;
-        node->weight = half * rule->weights[i];
-        for (int c = 0; c < 3; c++) extinction[i][c] = 0;
-        for (int k = 0; k < airs->count; k++) {
-            node->density[k] = nb_air_density(&airs->airs[k], node->radius - airs->radius);
-            for (int c = 0; c < 3; c++) extinction[i][c] += node->density[k] * airs->airs[k].extinction[c];
-        }
-    }
+    const int first = path->count;
+    for (int i = 0; i < rule->count; i++)
+        set_node(airs, track, a + half * (1 + rule->nodes[i]), half * rule->weights[i], path, first + i);
     for (int c = 0; c < 3; c++) {
-        double whole = 0;
+        double extinction[NB_RULE_MOST], whole = 0;
+        for (int i = 0; i < rule->count; i++) extinction[i] = extinction_at(airs, path, first + i, c);
         for (int i = 0; i < rule->count; i++) {
             double before = 0;
-            for (int j = 0; j < rule->count; j++) before += rule->before[i][j] * extinction[j][c];
-            nodes[i].transmittance[c] = nb_exp(-(depth[c] + half * before));
-            whole += rule->weights[i] * extinction[i][c];
+            for (int j = 0; j < rule->count; j++) before += rule->before[i][j] * extinction[j];
+            path->transmittance[c][first + i] = nb_exp(-(depth[c] + half * before));
+            whole += rule->weights[i] * extinction[i];
         }
         depth[c] += half * whole;
     }
     path->count += rule->count;
+}
+
+static void add_start(const nb_airs *airs, nb_track track, nb_path *path)
+{
+    int i = path->count;
+    do {
+        set_node(airs, track, 0, 1, path, i);
+        for (int c = 0; c < 3; c++) path->transmittance[c][i] = 1;
+    } while (++i % NB_PATH_LANES > 0);
 }
 
 void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, double length, int cut_count,
@@ -77,5 +93,6 @@ void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, doubl
     find_ends(airs, track, length, cut_count, cuts, &ends);
     for (int i = 1; i < ends.count; i++)
         if (ends.at[i] > ends.at[i - 1]) lay_piece(airs, rule, track, ends.at[i - 1], ends.at[i], depth, path);
-    for (int c = 0; c < 3; c++) path->transmittance[c] = nb_exp(-depth[c]);
+    add_start(airs, track, path);
+    for (int c = 0; c < 3; c++) path->left[c] = nb_exp(-depth[c]);
 }

@@ -7,21 +7,20 @@
 
 enum {
     NB_PATH_CUTS = 20,
-    NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS) * NB_RULE_MOST,
+    NB_PATH_LANES = 8,
+    NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS) * NB_RULE_MOST + NB_PATH_LANES,
 };
 
-typedef struct nb_path_node {
-    double s;                /* m from the start */
-    double radius;           /* m from the planet's centre */
-    double weight;           /* m */
-    double transmittance[3]; /* from the start to here */
-    double density[NEBEL_MAX_AIRS];
-} nb_path_node;
-
+/* Nodes in arrays, for kernels that take several at once. Behind the last one is another at the start of the ray, of weight
+ * 1, and copies of that up to a multiple of NB_PATH_LANES. */
 typedef struct nb_path {
     int count;
-    nb_path_node nodes[NB_PATH_MOST];
-    double transmittance[3]; /* of the whole ray */
+    double s[NB_PATH_MOST];                /* m from the start */
+    double radius[NB_PATH_MOST];           /* m from the planet's centre */
+    double weight[NB_PATH_MOST];           /* m */
+    double transmittance[3][NB_PATH_MOST]; /* from the start to here */
+    double density[NEBEL_MAX_AIRS][NB_PATH_MOST];
+    double left[3]; /* transmittance of the whole ray */
 } nb_path;
 
 /* The ray must stay within the air for `length`. It is cut where it is lowest, where it passes shells of air, and at

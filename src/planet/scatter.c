@@ -1,6 +1,6 @@
 #include "scatter.h"
 
-#include "path.h"
+#include "gather.h"
 
 #include <float.h>
 #include <math.h>
@@ -10,6 +10,8 @@
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
+
+#include "moments.h"
 
 #define PI 3.14159265358979323846
 
@@ -42,48 +44,22 @@ static double sun_at(const nb_scatter *scatter, int i)
     return copysign(fmin(1, scatter->sun_scale * (exp(fabs(place)) - 1)), place);
 }
 
-/* A place among entries 0 to count - 1. */
-typedef struct nb_between {
-    int first;
-    double part;
-} nb_between;
-
-static nb_between between(double place, int count)
-{
-    const double bounded = fmax(0, fmin(place, count - 1));
-    const int first = bounded < count - 2 ? (int)bounded : count - 2;
-    return (nb_between){first, bounded - first};
-}
-
-static nb_between between_suns(const nb_scatter *scatter, double sun)
-{
-    const double place = copysign(nb_log(1 + fabs(sun) / scatter->sun_scale), sun) - scatter->first_sun;
-    return between(place / (scatter->last_sun - scatter->first_sun) * (scatter->suns - 1), scatter->suns);
-}
-
 nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun)
 {
-    const double part = sqrt(fmax(0, (radius - airs->radius) / (airs->top - airs->radius)));
-    const nb_between h = between(part * (scatter->heights - 1), scatter->heights), s = between_suns(scatter, sun);
-    const nb_field *low = &scatter->fields[h.first * scatter->suns + s.first], *high = low + scatter->suns;
+    const nb_spots spots = nb_spots_of(scatter, airs, radius, sun);
     nb_field field;
     for (int c = 0; c < 3; c++) {
-        double all = 1;
-        for (int m = 0; m < scatter->orders * (scatter->orders + 1) / 2; m++) {
-            const double below = low[0].moments[m][c] + s.part * (low[1].moments[m][c] - low[0].moments[m][c]);
-            const double above = high[0].moments[m][c] + s.part * (high[1].moments[m][c] - high[0].moments[m][c]);
-            const double here = below + h.part * (above - below);
-            if (m == 0) all = nb_exp(here);
-            field.moments[m][c] = m == 0 ? all : all * here;
-        }
+        const double all = nb_exp(nb_moment_at(&spots, 0, c));
+        for (int m = 0; m < scatter->orders * (scatter->orders + 1) / 2; m++)
+            field.moments[m][c] = m == 0 ? all : all * nb_moment_at(&spots, m, c);
     }
     return field;
 }
 
 void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3])
 {
-    const nb_between s = between_suns(scatter, sun);
-    const double *a = scatter->ground[s.first], *b = scatter->ground[s.first + 1];
+    const nb_between s = nb_between_suns(scatter, sun);
+    const double *a = scatter->ground[(int)s.first], *b = a + 3;
     for (int c = 0; c < 3; c++) irradiance[c] = nb_exp(a[c] + s.part * (b[c] - a[c]));
 }
 
@@ -119,7 +95,7 @@ typedef struct nb_effort {
 } nb_effort;
 
 static const nb_effort efforts[NEBEL_AIR_QUALITY_COUNT] = {
-    [NEBEL_AIR_FAST] = {12, 32, 8, 3, 3, 4, 3},
+    [NEBEL_AIR_FAST] = {12, 32, 8, 3, 3, 4, NB_FEW_MOMENTS},
     [NEBEL_AIR_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS},
 };
 
@@ -131,6 +107,7 @@ typedef struct nb_maker {
     nb_rule slopes, nodes;
     double turn_cosines[MOST_TURNS];
     int first; /* the light to be scattered is the sun's */
+    nb_gather_fn *gather;
 } nb_maker;
 
 /* What is shared by all that comes to one height from directions of one slope. */
@@ -158,37 +135,46 @@ static void phases_of(const nb_airs *airs, int orders, double sun, double phases
     }
 }
 
-static void gather_sunlight(const nb_fan *fan, nb_aspect aspect, double light[3])
+/* Adds sunlight from `count` nodes, the first of which is `first` of the path. */
+static void add_sunlight(const nb_fan *fan, const double phases[], const nb_node_light *nodes, int first, int count,
+                         double light[3])
 {
     const nb_airs *airs = fan->maker->airs;
-    double phases[NEBEL_MAX_AIRS];
-    phases_of(airs, fan->maker->effort->moments, aspect.sun, phases);
-    for (int i = 0; i < fan->path.count; i++) {
-        const nb_path_node *node = &fan->path.nodes[i];
-        const double sun = (fan->track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
-        double sunlight[3];
-        nb_track_sunlight(airs, (nb_track){node->radius, node->radius * sun}, sunlight);
-        for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < count; i++) {
             double scattered = 0;
             for (int k = 0; k < airs->count; k++)
-                scattered += airs->airs[k].scattering[c] * node->density[k] * phases[k];
-            light[c] += node->weight * node->transmittance[c] * sunlight[c] * fmax(0, scattered);
+                scattered += airs->airs[k].scattering[c] * fan->path.density[k][first + i] * phases[k];
+            light[c] += nodes->sun[c][i] * fmax(0, scattered);
         }
-    }
 }
 
-static void gather_last(const nb_fan *fan, nb_aspect aspect, double light[3])
+static void add_last(const nb_node_light *nodes, int count, double light[3])
+{
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++) light[c] += nodes->often[c][i];
+}
+
+static void gather_air(const nb_fan *fan, nb_aspect aspect, double light[3])
 {
     const nb_maker *maker = fan->maker;
-    for (int i = 0; i < fan->path.count; i++) {
-        const nb_path_node *node = &fan->path.nodes[i];
-        const double along = (fan->track.rise + node->s) / node->radius;
-        const double sun = (fan->track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
-        const nb_field field = nb_scatter_look_up(maker->scatter, maker->airs, node->radius, sun);
-        double radiance[3];
-        nb_field_scatter(&field, maker->effort->moments, maker->airs, node->density,
-                         (nb_aspect){along, aspect.sun, sun}, radiance);
-        for (int c = 0; c < 3; c++) light[c] += node->weight * node->transmittance[c] * radiance[c];
+    nb_gather_job job = {.airs = maker->airs,
+                         .scatter = maker->first ? NULL : maker->scatter,
+                         .wants_sun = maker->first,
+                         .track = fan->track,
+                         .aspect = aspect,
+                         .path = &fan->path};
+    double phases[NEBEL_MAX_AIRS];
+    if (maker->first) phases_of(maker->airs, maker->effort->moments, aspect.sun, phases);
+    for (; job.first < fan->path.count; job.first += NB_GATHER_NODES) {
+        nb_node_light nodes;
+        const int left = fan->path.count - job.first;
+        job.count = left < NB_GATHER_NODES ? left : NB_GATHER_NODES;
+        maker->gather(&job, &nodes);
+        if (maker->first)
+            add_sunlight(fan, phases, &nodes, job.first, job.count, light);
+        else
+            add_last(&nodes, job.count, light);
     }
 }
 
@@ -204,17 +190,14 @@ static void gather_ground(const nb_fan *fan, nb_aspect aspect, double light[3])
     } else {
         nb_scatter_look_up_ground(maker->scatter, sun, irradiance);
     }
-    for (int c = 0; c < 3; c++) light[c] += fan->path.transmittance[c] * maker->albedo[c] / PI * irradiance[c];
+    for (int c = 0; c < 3; c++) light[c] += fan->path.left[c] * maker->albedo[c] / PI * irradiance[c];
 }
 
 /* What arrives at a place from one direction, of light scattered once more. */
 static void gather(const nb_fan *fan, nb_aspect aspect, double light[3])
 {
     for (int c = 0; c < 3; c++) light[c] = 0;
-    if (fan->maker->first)
-        gather_sunlight(fan, aspect, light);
-    else
-        gather_last(fan, aspect, light);
+    gather_air(fan, aspect, light);
     if (fan->hits_ground) gather_ground(fan, aspect, light);
 }
 
@@ -342,7 +325,8 @@ nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *p
                       .albedo = albedo,
                       .effort = effort,
                       .slopes = nb_rule_make(effort->slopes),
-                      .nodes = nb_rule_make(effort->nodes)};
+                      .nodes = nb_rule_make(effort->nodes),
+                      .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
     for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
     nebel_result result = allocate(allocator, airs, effort, scatter);
     const nebel_result has_last = allocate(allocator, airs, effort, &last),

@@ -9,7 +9,7 @@
 typedef struct nb_scatter {
     int heights, suns;
     double first_sun, last_sun, sun_scale; /* what entries over the sun's height are spread over */
-    int orders;                            /* of moments that are kept, at most NB_MOMENTS */
+    int orders;                            /* of moments that are kept: NB_MOMENTS or NB_FEW_MOMENTS */
     nb_field *fields;    /* [height][sun]: of sunlight that was scattered at least once, for a sun of irradiance 1: the
                          logarithm of the first moment, and the others as parts of it */
     double (*ground)[3]; /* [sun]: the logarithm of the same light's irradiance on the ground */

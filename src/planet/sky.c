@@ -1,16 +1,10 @@
 /* Light along rays through air, and at places. */
 #include "atmosphere.h"
-#include "path.h"
 
 #include "base/vector.h"
 
 #include <math.h>
 #include <string.h>
-
-/* Behind the terminator light comes from near the horizon, and changes fast with the sun's height: where the sun is 5, 7 and
- * 10 degrees below the horizon a far finer table has up to 5, 8 and 21 % more or less of all light (`precise`: 3, 7 and 8).
- * Measured on the Earth; others may be worse. */
-#define TWILIGHT_OFF 3
 
 #define NB_DOUBLE
 #include "formulas/prelude.h"
@@ -19,9 +13,8 @@
 
 /* ---- along a ray ----------------------------------------------------------------------------- */
 
-/* Where the ray enters and leaves the shadow of the planet, a cylinder behind it: |p + s d|^2 - ((p + s d) sun)^2 is the
- * square of the radius. */
-static void find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, double cuts[2])
+/* The shadow is a cylinder behind the planet: |p + s d|^2 - ((p + s d) sun)^2 is the square of the radius. */
+void nb_find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, double cuts[2])
 {
     const double up = track.radius * aspect.height_of_sun;
     const double a = 1 - aspect.sun * aspect.sun, b = track.rise - up * aspect.sun;
@@ -33,48 +26,92 @@ static void find_shadow(const nb_airs *airs, nb_track track, nb_aspect aspect, d
     cuts[1] = c / q;
 }
 
-/* Adds what one kind of light gives at a node. */
-static void add(double sum[3], const nb_path_node *node, const double radiance[3])
+/* Nodes of a path whose light is at hand. */
+typedef struct nb_gathering {
+    const nebel_atmosphere *atmosphere;
+    nb_gather_job job;
+    nb_node_light light;
+} nb_gathering;
+
+static int smaller(int a, int b)
 {
-    for (int c = 0; c < 3; c++) sum[c] += node->weight * node->transmittance[c] * radiance[c];
+    return a < b ? a : b;
 }
 
-void nb_gather_node(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path_node *node,
-                    nb_gathered *gathered)
+/* Adds the light of nodes `from` to `to` - 1, which are at hand. */
+static void add_nodes(const nb_gathering *gathering, int from, int to, nb_gathered *sum)
 {
-    const nb_airs *airs = &atmosphere->airs;
-    const nb_scatter *scatter = &atmosphere->scatter;
-    const double sun = (track.radius * aspect.height_of_sun + node->s * aspect.sun) / node->radius;
-    const double zenith = (track.rise + node->s) / node->radius;
-    const nb_field field = nb_scatter_look_up(scatter, airs, node->radius, sun);
-    double sunlight[3], once[3], often[3], missing[3];
-    nb_track_sunlight(airs, (nb_track){node->radius, node->radius * sun}, sunlight);
-    for (int k = 0; k < airs->count; k++) {
-        for (int c = 0; c < 3; c++) once[c] = sunlight[c] * airs->airs[k].scattering[c] * node->density[k];
-        add(gathered->once[k], node, once);
+    const nb_gather_job *job = &gathering->job;
+    const nb_node_light *light = &gathering->light;
+    for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < job->airs->count; k++) {
+            const double scattering = job->airs->airs[k].scattering[c];
+            for (int i = from; i < to && scattering > 0; i++)
+                sum->once[k][c] += light->sun[c][i - job->first] * (scattering * job->path->density[k][i]);
+        }
+        for (int i = from; i < to; i++) {
+            sum->often[c] += light->often[c][i - job->first];
+            sum->missing[c] += light->missing[c][i - job->first];
+        }
     }
-    nb_field_scatter(&field, scatter->orders, airs, node->density, (nb_aspect){zenith, aspect.sun, sun}, often);
-    nb_field_missing(&field, scatter->orders, airs, node->density, missing);
-    for (int c = 0; c < 3; c++) missing[c] += TWILIGHT_OFF * fmax(0, -sun) * often[c];
-    add(gathered->often, node, often);
-    add(gathered->missing, node, missing);
 }
 
-void nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect, int count,
-               const double ends[], nb_gathered gathered[])
+/* The same of any nodes that are not before those at hand. */
+static void gather_nodes(nb_gathering *gathering, int from, int to, nb_gathered *sum)
+{
+    nb_gather_job *job = &gathering->job;
+    while (from < to) {
+        if (from == job->first + job->count) {
+            job->first = from;
+            job->count = smaller(NB_GATHER_NODES, job->path->count + 1 - from);
+            gathering->atmosphere->gather(job, &gathering->light);
+        }
+        const int next = smaller(to, job->first + job->count);
+        add_nodes(gathering, from, next, sum);
+        from = next;
+    }
+}
+
+/* The first node from `from` on that is not before `end`. */
+static int node_at(const nb_path *path, int from, double end)
+{
+    while (from < path->count && path->s[from] < end) from++;
+    return from;
+}
+
+nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, const nb_path *path,
+                           int count, const double ends[], nb_gathered gathered[])
+{
+    nb_gathering gathering;
+    nb_gathered sum, start;
+    memset(&sum, 0, sizeof sum);
+    memset(&start, 0, sizeof start);
+    gathering.atmosphere = atmosphere;
+    gathering.job = (nb_gather_job){.airs = &atmosphere->airs,
+                                    .scatter = &atmosphere->scatter,
+                                    .wants_sun = 1,
+                                    .track = track,
+                                    .aspect = aspect,
+                                    .path = path};
+    for (int k = 0, i = 0; k < count; k++) {
+        const int to = k + 1 == count ? path->count : node_at(path, i, ends[k]);
+        gather_nodes(&gathering, i, to, &sum);
+        gathered[k] = sum;
+        i = to;
+    }
+    gather_nodes(&gathering, path->count, path->count + 1, &start);
+    return start;
+}
+
+nb_gathered nb_gather(const nebel_atmosphere *atmosphere, const nb_rule *rule, nb_track track, nb_aspect aspect,
+                      int count, const double ends[], nb_gathered gathered[])
 {
     double cuts[NB_PATH_CUTS];
     nb_path path;
-    find_shadow(&atmosphere->airs, track, aspect, cuts);
+    nb_find_shadow(&atmosphere->airs, track, aspect, cuts);
     memcpy(cuts + 2, ends, (size_t)count * sizeof *ends);
     nb_path_lay(&atmosphere->airs, rule, track, ends[count - 1], 2 + count, cuts, &path);
-    nb_gathered sum;
-    memset(&sum, 0, sizeof sum);
-    for (int k = 0, i = 0; k < count; k++) {
-        for (; i < path.count && (k + 1 == count || path.nodes[i].s < ends[k]); i++)
-            nb_gather_node(atmosphere, track, aspect, &path.nodes[i], &sum);
-        gathered[k] = sum;
-    }
+    return nb_gather_path(atmosphere, track, aspect, &path, count, ends, gathered);
 }
 
 void nb_gathered_once(const nebel_atmosphere *atmosphere, const nb_gathered *gathered, double sun, double once[3])

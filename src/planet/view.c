@@ -45,37 +45,45 @@ static void write_entry(const nebel_air_view *view, const nb_gathered *gathered,
     entry[often + 3] = (float)(per * off);
 }
 
-/* What is scattered just where the ray begins, per metre. */
-static void gather_start(const nebel_atmosphere *atmosphere, nb_track track, nb_aspect aspect, nb_gathered *gathered)
+/* What the columns of a row share: the ray, the ends of its levels, and nodes along it where no shadow cuts it. */
+typedef struct nb_row {
+    nb_slope slope;
+    nb_reach reach;
+    nb_track track;
+    double ends[NB_VIEW_LEVELS];
+    nb_path path;
+} nb_row;
+
+static nb_aspect column_aspect(const nebel_air_view *view, const nb_row *row, int column)
 {
-    nb_path_node node = {.radius = track.radius, .weight = 1, .transmittance = {1, 1, 1}};
-    for (int k = 0; k < atmosphere->airs.count; k++)
-        node.density[k] = nb_air_density(&atmosphere->airs.airs[k], track.radius - atmosphere->airs.radius);
-    memset(gathered, 0, sizeof *gathered);
-    nb_gather_node(atmosphere, track, aspect, &node, gathered);
+    const nb_slope slope = row->slope, to_sun = view->sun_slope;
+    const double sun = slope.cosine * to_sun.cosine + slope.sine * to_sun.sine * column_cosine(view, column);
+    const double height_of_sun = (view->outlook.radius * to_sun.cosine + row->reach.begin * sun) / row->track.radius;
+    return (nb_aspect){fmax(-1, fmin(1, row->track.rise / row->track.radius)), fmax(-1, fmin(1, sun)),
+                       fmax(-1, fmin(1, height_of_sun))};
 }
 
-static void fill_column(nebel_air_view *view, int row, int column, nb_slope slope, nb_reach reach, nb_track track)
+/* Returns what is scattered just where the ray begins. */
+static nb_gathered gather_column(const nebel_air_view *view, const nb_row *row, nb_aspect aspect,
+                                 nb_gathered gathered[])
 {
     const nebel_atmosphere *atmosphere = view->atmosphere;
+    double cuts[2];
+    int is_cut = 0;
+    nb_find_shadow(&atmosphere->airs, row->track, aspect, cuts);
+    for (int i = 0; i < 2; i++) is_cut |= cuts[i] > 0 && cuts[i] < row->reach.span;
+    if (is_cut) return nb_gather(atmosphere, &view->rule, row->track, aspect, view->levels, row->ends, gathered);
+    return nb_gather_path(atmosphere, row->track, aspect, &row->path, view->levels, row->ends, gathered);
+}
+
+static void fill_column(nebel_air_view *view, int number, const nb_row *row, int column)
+{
     nb_gathered gathered[NB_VIEW_LEVELS];
-    double ends[NB_VIEW_LEVELS];
-    const double sun =
-        slope.cosine * view->sun_slope.cosine + slope.sine * view->sun_slope.sine * column_cosine(view, column);
-    const double height_of_sun = (view->outlook.radius * view->sun_slope.cosine + reach.begin * sun) / track.radius;
-    const nb_aspect aspect = {fmax(-1, fmin(1, track.rise / track.radius)), fmax(-1, fmin(1, sun)),
-                              fmax(-1, fmin(1, height_of_sun))};
-    for (int level = 0; level < view->levels; level++) {
-        const double share = (level + 1.0) / view->levels;
-        ends[level] = reach.span * share * share;
-    }
-    nb_gathered start;
-    gather_start(atmosphere, track, aspect, &start);
-    write_entry(view, &start, 1, nb_view_entry(view, row, column, 0));
-    if (reach.span > 0) nb_gather(atmosphere, &view->rule, track, aspect, view->levels, ends, gathered);
+    const nb_gathered start = gather_column(view, row, column_aspect(view, row, column), gathered);
+    write_entry(view, &start, 1, nb_view_entry(view, number, column, 0));
     for (int level = 0; level < view->levels; level++)
-        write_entry(view, reach.span > 0 ? &gathered[level] : &start, reach.span > 0 ? 1 / ends[level] : 1,
-                    nb_view_entry(view, row, column, level + 1));
+        write_entry(view, row->reach.span > 0 ? &gathered[level] : &start,
+                    row->reach.span > 0 ? 1 / row->ends[level] : 1, nb_view_entry(view, number, column, level + 1));
 }
 
 static void fill_extinction(nebel_air_view *view, int row, nb_track track, double length)
@@ -96,15 +104,26 @@ static void fill_extinction(nebel_air_view *view, int row, nb_track track, doubl
     }
 }
 
-static void fill_row(void *data, size_t row)
+static void set_row(const nebel_air_view *view, int number, nb_row *row)
+{
+    const nb_airs *airs = &view->atmosphere->airs;
+    row->slope = row_slope(view, number, &row->reach);
+    row->track = (nb_track){row->reach.begin > 0 ? airs->top : view->outlook.radius,
+                            view->outlook.radius * row->slope.cosine + row->reach.begin};
+    for (int level = 0; level < view->levels; level++) {
+        const double share = (level + 1.0) / view->levels;
+        row->ends[level] = row->reach.span * share * share;
+    }
+    nb_path_lay(airs, &view->rule, row->track, row->reach.span, view->levels, row->ends, &row->path);
+}
+
+static void fill_row(void *data, size_t number)
 {
     nebel_air_view *view = data;
-    nb_reach reach;
-    const nb_slope slope = row_slope(view, (int)row, &reach);
-    const double rise = view->outlook.radius * slope.cosine + reach.begin;
-    const nb_track track = {reach.begin > 0 ? view->atmosphere->airs.top : view->outlook.radius, rise};
-    fill_extinction(view, (int)row, track, reach.span);
-    for (int column = 0; column < view->columns; column++) fill_column(view, (int)row, column, slope, reach, track);
+    nb_row row;
+    set_row(view, (int)number, &row);
+    fill_extinction(view, (int)number, row.track, row.reach.span);
+    for (int column = 0; column < view->columns; column++) fill_column(view, (int)number, &row, column);
 }
 
 /* Of one colour, as if all scattered evenly. */

@@ -1,0 +1,117 @@
+/* Optical depth along rays through air, in lanes. Included after formulas/planet.inc, of doubles. */
+#ifndef NB_PLANET_DEPTH_H
+#define NB_PLANET_DEPTH_H
+
+#include "air.h"
+
+/* Rays in lanes, each as an nb_track. */
+typedef struct nb_tracks {
+    nb_real radius, rise;
+} nb_tracks;
+
+/* How far a ray from the ground or above lies behind the place where it is lowest, off the centre. */
+static inline nb_real nb_lowest_radius(nb_tracks track)
+{
+    return nb_sqrt(nb_max(NB_F(0.0), track.radius * track.radius - track.rise * track.rise));
+}
+
+static inline nb_tracks nb_tracks_ahead(nb_tracks track, nb_real length)
+{
+    const nb_real square = track.radius * track.radius + length * (NB_F(2.0) * track.rise + length);
+    return (nb_tracks){nb_sqrt(nb_max(NB_F(0.0), square)), track.rise + length};
+}
+
+/* The square of half the chord that a sphere cuts off the ray's line; below 0 where they do not meet. */
+static inline nb_real nb_half_chord_square(nb_tracks track, nb_real sphere)
+{
+    return (sphere - track.radius) * (sphere + track.radius) + track.rise * track.rise;
+}
+
+static inline nb_real nb_tracks_leave(nb_tracks track, nb_real sphere)
+{
+    const nb_real half = nb_sqrt(nb_max(NB_F(0.0), nb_half_chord_square(track, sphere)));
+    return nb_max(NB_F(0.0), half - track.rise);
+}
+
+/* ---- rays that go up ------------------------------------------------------------------------- */
+
+static inline nb_real nb_density_of(const nb_air *air, nb_real height)
+{
+    if (air->scale > 0) return nb_exp(-height / nb_splat(air->scale));
+    return nb_max(NB_F(0.0), NB_F(1.0) - nb_abs(height - nb_splat(air->center)) / nb_splat(air->width));
+}
+
+/* How far a ray has come when it is `height` above its start. */
+static inline nb_real nb_reach_height(nb_tracks track, nb_real height)
+{
+    const nb_real climb = nb_max(NB_F(0.0), height) * (NB_F(2.0) * track.radius + height);
+    const nb_real way = climb / (track.rise + nb_sqrt(track.rise * track.rise + climb));
+    return nb_select(climb > NB_F(0.0), way, NB_F(0.0));
+}
+
+/* The density of a layer integrated from a to b, between which it has no edge: it is nearly a parabola of the way. */
+static inline nb_real nb_layer_piece(const nb_air *air, nb_tracks track, nb_real height, nb_real a, nb_real b)
+{
+    static const double nodes[] = {0.2386191860831969, 0.6612093864662645, 0.9324695142031521};
+    static const double weights[] = {0.4679139345726910, 0.3607615730481386, 0.1713244923791704};
+    const nb_real half = NB_F(0.5) * (b - a);
+    nb_real sum = NB_F(0.0);
+    for (int i = 0; i < 6; i++) {
+        const nb_real s = a + half * nb_splat(1 + (i % 2 ? nodes[i / 2] : -nodes[i / 2]));
+        const nb_real here = height + nb_air_height(track.radius, track.rise, s);
+        sum = sum + nb_splat(weights[i / 2]) * nb_density_of(air, here);
+    }
+    return half * sum;
+}
+
+static inline nb_real nb_layer_length(const nb_air *air, nb_tracks track, nb_real height, nb_real length)
+{
+    nb_real from = nb_min(nb_reach_height(track, nb_splat(air->center - air->width) - height), length);
+    nb_real sum = NB_F(0.0);
+    for (int i = 0; i < 2; i++) {
+        const nb_real edge = nb_splat(air->center + i * air->width);
+        const nb_real to = nb_max(from, nb_min(nb_reach_height(track, edge - height), length));
+        if (nb_any(to > from)) sum = sum + nb_layer_piece(air, track, height, from, to);
+        from = to;
+    }
+    return sum;
+}
+
+/* Adds the depth of `length` m. */
+static inline void nb_add_rising(const nb_airs *airs, nb_tracks track, nb_real length, nb_real depth[3])
+{
+    const nb_real height = track.radius - nb_splat(airs->radius);
+    for (int i = 0; i < airs->count; i++) {
+        const nb_air *air = &airs->airs[i];
+        const nb_real dense = air->scale > 0 ? nb_density_of(air, height) *
+                                                   nb_air_length(track.radius, track.rise, nb_splat(air->scale), length)
+                                             : nb_layer_length(air, track, height, length);
+        for (int c = 0; c < 3; c++) depth[c] = depth[c] + nb_splat(air->extinction[c]) * dense;
+    }
+}
+
+/* ---- towards a sun --------------------------------------------------------------------------- */
+
+/* Where the planet hides the sun in whose direction the rays go. */
+static inline nb_mask nb_tracks_are_dark(const nb_airs *airs, nb_tracks track)
+{
+    return nb_and(track.rise<NB_F(0.0), nb_half_chord_square(track, nb_splat(airs->radius))> NB_F(0.0));
+}
+
+/* What air leaves of the sun's light: 0 in the shadow of the planet. A ray that goes down first goes up from its lowest
+ * place on both sides. */
+static inline void nb_tracks_sunlight(const nb_airs *airs, nb_tracks track, nb_real light[3])
+{
+    const nb_mask dark = nb_tracks_are_dark(airs, track), falls = track.rise < NB_F(0.0);
+    nb_real depth[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    for (int c = 0; c < 3; c++) light[c] = NB_F(0.0);
+    if (nb_all(dark)) return;
+    const nb_real length = nb_tracks_leave(track, nb_splat(airs->top)), back = nb_select(falls, -track.rise, NB_F(0.0));
+    const nb_tracks up = {nb_select(falls, nb_lowest_radius(track), track.radius),
+                          nb_select(falls, NB_F(0.0), track.rise)};
+    if (nb_any(nb_and(falls, nb_not(dark)))) nb_add_rising(airs, up, back, depth);
+    nb_add_rising(airs, up, length - back, depth);
+    for (int c = 0; c < 3; c++) light[c] = nb_select(dark, NB_F(0.0), nb_exp(-depth[c]));
+}
+
+#endif

@@ -1,0 +1,34 @@
+/* What comes to a ray at its nodes, one kernel per instruction set. */
+#ifndef NB_PLANET_GATHER_H
+#define NB_PLANET_GATHER_H
+
+#include "path.h"
+#include "scatter.h"
+
+enum { NB_GATHER_NODES = 64 }; /* at a time */
+
+/* For a sun of irradiance 1, what reaches the start of the ray from each node, whose weight is counted: sunlight, for a
+ * scattering of 1/m and a phase function of 1; light scattered by all air after that of the table; and about what of this
+ * is missing for want of moments, and in twilight for want of entries. */
+typedef struct nb_node_light {
+    double sun[3][NB_GATHER_NODES], often[3][NB_GATHER_NODES], missing[3][NB_GATHER_NODES];
+} nb_node_light;
+
+typedef struct nb_gather_job {
+    const nb_airs *airs;
+    const nb_scatter *scatter; /* NULL: sunlight alone */
+    int wants_sun;
+    nb_track track;
+    nb_aspect aspect; /* of the ray's direction, where it starts */
+    const nb_path *path;
+    int first, count; /* nodes; first: a multiple of NB_PATH_LANES */
+} nb_gather_job;
+
+typedef void nb_gather_fn(const nb_gather_job *job, nb_node_light *light);
+
+nb_gather_fn nb_gather_scalar, nb_gather_sse2, nb_gather_avx2, nb_gather_avx512, nb_gather_neon;
+
+/* The kernel of an instruction set, or for DEFAULT of the best one; NULL where this build or processor has not got it. */
+nb_gather_fn *nb_gather_choose(nebel_isa isa);
+
+#endif
