@@ -3,7 +3,7 @@
 set(nebel_kernel_files ${PROJECT_SOURCE_DIR}/src/march/trace_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/transmit_kernel.c
     ${PROJECT_SOURCE_DIR}/src/kernels/pixels_kernel.c ${PROJECT_SOURCE_DIR}/src/kernels/vertices_kernel.c
     ${PROJECT_SOURCE_DIR}/src/planet/cloud_places_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/cloud_drops_kernel.c
-    ${PROJECT_SOURCE_DIR}/src/planet/gather_kernel.c)
+    ${PROJECT_SOURCE_DIR}/src/planet/gather_kernel.c ${PROJECT_SOURCE_DIR}/src/planet/look_kernel.c)
 
 set(nebel_flags_scalar "")
 set(nebel_flags_neon "")
@@ -55,7 +55,7 @@ function(nebel_add_kernel file level)
     # gcc's note that vectors wider than the base level change the calling convention: the kernels pass none between objects.
     target_compile_options(${target} PRIVATE -Wno-psabi ${nebel_flags_${level}})
     # The march and air are full of loops over three colours, which -O2 leaves in memory.
-    if(stem MATCHES "^(trace|gather)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
+    if(stem MATCHES "^(trace|gather|look)_kernel$" AND CMAKE_C_COMPILER_ID STREQUAL GNU AND NOT NEBEL_SANITIZE)
         target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
     endif()
 endfunction()

@@ -1,6 +1,8 @@
 /* Tables of air from one place: how far they are from nebel_trace_air, and whether they say so. */
 #include <nebel/planet.h>
 
+#include "planet/view.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -372,6 +374,66 @@ static void bad_calls_are_refused(void **state)
     assert_int_equal(nebel_resolve_atmosphere(NULL, &whole), NEBEL_ERROR_ARGUMENT);
 }
 
+/* What the kernels of an instruction set say of rays and of the ground. */
+typedef struct answers {
+    float transmittance[3][RAYS], in_scattering[3][RAYS], error[RAYS];
+    float distance[RAYS], normal[3][RAYS], sun[3][RAYS], sky[3][RAYS];
+} answers;
+
+static void ask(nebel_air_view *view, nebel_isa isa, const bundle *rays, int ends, answers *a)
+{
+    const double *const direction[3] = {rays->direction[0], rays->direction[1], rays->direction[2]};
+    nebel_light_planes lights = {.error = a->error};
+    nebel_ground_planes ground = {.distance = a->distance};
+    memset(a, 0, sizeof *a);
+    for (int c = 0; c < 3; c++) {
+        lights.transmittance[c] = a->transmittance[c];
+        lights.in_scattering[c] = a->in_scattering[c];
+        ground.normal[c] = a->normal[c];
+        ground.sun[c] = a->sun[c];
+        ground.sky[c] = a->sky[c];
+    }
+    view->look = nb_look_choose(isa);
+    view->look_down = nb_look_down_choose(isa);
+    assert_int_equal(nebel_trace_air_view(view, RAYS, direction, ends ? rays->t_max : NULL, &lights), NEBEL_OK);
+    assert_int_equal(nebel_find_ground(view, RAYS, direction, &ground), NEBEL_OK);
+}
+
+/* Also of directions that are none, and of rays that do not fill the last lanes. */
+static void all_instruction_sets_agree(void **state)
+{
+    (void)state;
+    static const double heights[] = {0, 1.7, 3e4, 4e5};
+    static bundle rays;
+    static answers scalar, other;
+    nebel_atmosphere *earth = make("earth");
+    uint32_t chance = 5;
+    for (int i = 0; i < 8; i++) {
+        const nebel_air_view_desc desc = {.atmosphere = earth,
+                                          .sun = {.direction = {0.5, 0.8 - 0.15 * i, -0.4}, .irradiance = {1, 2, 3}},
+                                          .position = {0, heights[i % 4], 0},
+                                          .has_distances = i / 4};
+        nebel_air_view *view;
+        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+        aim(&rays, nebel_find_atmosphere("earth"), heights[i % 4], &chance);
+        for (int c = 0; c < 3; c++) {
+            rays.direction[c][3] = c == 1;
+            rays.direction[c][4] = 0;
+            rays.direction[c][5] = c == 1 ? -1 : 0;
+            rays.direction[c][6] = HUGE_VAL;
+            rays.direction[c][7] = (double)NAN;
+        }
+        ask(view, NEBEL_ISA_SCALAR, &rays, desc.has_distances, &scalar);
+        for (int isa = 0; isa < NEBEL_ISA_COUNT; isa++) {
+            if (nb_look_choose((nebel_isa)isa) == NULL) continue;
+            ask(view, (nebel_isa)isa, &rays, desc.has_distances, &other);
+            assert_memory_equal(&scalar, &other, sizeof scalar);
+        }
+        nebel_destroy_air_view(view);
+    }
+    nebel_destroy_atmosphere(earth);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -382,6 +444,7 @@ int main(void)
         cmocka_unit_test(order_of_work_changes_nothing),
         cmocka_unit_test(odd_places_have_answers),
         cmocka_unit_test(bad_calls_are_refused),
+        cmocka_unit_test(all_instruction_sets_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

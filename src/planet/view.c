@@ -232,7 +232,7 @@ static void set_axes(nebel_air_view *view, const double place[3])
 static nebel_result allocate(nebel_air_view *view)
 {
     const size_t count = (size_t)NB_VIEW_ROWS * (size_t)view->columns * ((size_t)view->levels + 1);
-    view->size = 3 * view->scatterer_count + 5;
+    view->size = (3 * view->scatterer_count + 5 + 3) / 4 * 4;
     view->entries = nb_allocate_zero(&view->allocator, count, (size_t)view->size * sizeof *view->entries);
     view->extinction =
         nb_allocate_zero(&view->allocator, (size_t)NB_VIEW_ROWS * ((size_t)view->levels + 1), sizeof *view->extinction);
@@ -270,6 +270,8 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
     made->allocator = allocator;
     made->atmosphere = desc->atmosphere;
     made->sun = sun;
+    made->look = nb_look_choose(NEBEL_ISA_DEFAULT);
+    made->look_down = nb_look_down_choose(NEBEL_ISA_DEFAULT);
     set_up(made, desc);
     if (allocate(made) != NEBEL_OK) {
         nebel_destroy_air_view(made);

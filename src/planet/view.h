@@ -3,6 +3,7 @@
 #define NB_PLANET_VIEW_H
 
 #include "atmosphere.h"
+#include "look.h"
 #include "slope.h"
 
 enum {
@@ -25,13 +26,14 @@ struct nebel_air_view {
     int columns;
     int levels; /* NB_VIEW_LEVELS, or 1: the ends alone */
     int scatterers[NEBEL_MAX_AIRS], scatterer_count;
-    int size;                /* of an entry: see below */
+    int size;                /* of an entry, a multiple of four: see below */
     float *entries;          /* [row][column][level 0..levels] */
     double (*extinction)[4]; /* [row][level 0..levels], 1/m, and what interpolation may miss of it */
     double brightest;        /* light of a whole ray, as if all scattered evenly */
     nb_rule rule;
     double sunlight[NB_VIEW_SUNS][3]; /* what air leaves of the sun on the ground, evenly over the root of the cosine of
                                          its angle to the zenith */
+    nb_look_fn *look, *look_down;
 };
 
 /* In an entry, all per metre and for a sun of irradiance 1 but for the last two: what was scattered once by each kind of

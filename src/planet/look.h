@@ -1,0 +1,42 @@
+/* Rays through a table of air, one kernel per instruction set. */
+#ifndef NB_PLANET_LOOK_H
+#define NB_PLANET_LOOK_H
+
+#include "scatter.h"
+
+/* Numbers of an entry, three of each kind of air that scatters, and five; a multiple of four. */
+enum { NB_VIEW_SIZE = 3 * NEBEL_MAX_AIRS + 8 };
+
+/* A view in plain numbers: kernels have the structures of formulas in lanes. */
+typedef struct nb_look_table {
+    double radius, ground, thickness, height, dip, ratio, horizon, half_arc; /* an nb_outlook */
+    double up[3], ahead[3], aside[3], sun_cosine, sun_sine;
+    int falling, rising, columns, levels, size, suns;
+    const float *entries;
+    const double (*extinction)[4], (*sunlight)[3];
+    int scatterer_count;
+    const nb_phase *phases[NEBEL_MAX_AIRS]; /* of those that scatter */
+    double irradiance[3], least_off;
+    const nb_scatter *scatter;
+} nb_look_table;
+
+typedef struct nb_look_job {
+    const nb_look_table *table;
+    size_t count;
+    const double *direction[3];
+    const float *t_max; /* NULL: as far as they go */
+    nebel_light_planes lights;
+    nebel_ground_planes ground;
+} nb_look_job;
+
+typedef void nb_look_fn(const nb_look_job *job);
+
+nb_look_fn nb_look_scalar, nb_look_sse2, nb_look_avx2, nb_look_avx512, nb_look_neon;
+nb_look_fn nb_look_down_scalar, nb_look_down_sse2, nb_look_down_avx2, nb_look_down_avx512, nb_look_down_neon;
+
+/* The kernels of an instruction set, or for DEFAULT of the best one; NULL where this build or processor has not got it:
+ * for light along rays, and for the ground that they meet. */
+nb_look_fn *nb_look_choose(nebel_isa isa);
+nb_look_fn *nb_look_down_choose(nebel_isa isa);
+
+#endif
