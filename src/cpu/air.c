@@ -248,8 +248,9 @@ static double disc_scale(double sun, double radius, double width, int c)
 
 static void add_sun(const nb_air *air, double cosine, double width, double light[3])
 {
-    const double sun = air->sun_radius, radius = fmax(sun, 0.5 * width);
-    if (!(cosine > cos(fmin(PI, radius + width)))) return;
+    const double sun = air->sun_radius, radius = fmax(sun, 0.5 * width), reach = radius + width;
+    /* Most rays are that far off that cos x >= 1 - x^2 / 2 says so. */
+    if (!(cosine > 1 - 0.5 * reach * reach && cosine > cos(fmin(PI, reach)))) return;
     const double angle = sqrt(2 * fmax(0, 1 - cosine));
     for (int c = 0; c < 3; c++)
         light[c] += air->sun_light[c] * disc_scale(sun, radius, width, c) * disc(radius, width, angle, c);

@@ -1,6 +1,7 @@
 #include "even.h"
 
 #include <math.h>
+#include <string.h>
 
 /* What the centre of a pixel may be off the mean over it: a part of its light, and of 1 of transmittance. */
 #define MOST_OFF 1e-3f
@@ -37,10 +38,35 @@ static int sees_borders(const nb_frame *frame, const nb_scratch *scratch)
 
 /* ---- how light bends ------------------------------------------------------------------------- */
 
-/* Lane of a pixel of the batch. */
-static uint32_t lane_of(uint32_t x, uint32_t y)
+/* Numbers of a batch's pixels, row by row. */
+typedef float nb_rows[NB_BLOCK][NB_REGION];
+
+static void set_rows(const float *lanes, nb_rows rows)
 {
-    return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
+    for (int block = 0; block < NB_PACKETS; block++)
+        for (int y = 0; y < NB_BLOCK; y++)
+            memcpy(rows[y] + block * NB_BLOCK, lanes + block * NB_PACKET + y * NB_BLOCK, NB_BLOCK * sizeof **rows);
+}
+
+/* Second differences along a row. Pixels at the batch's border take that of their neighbours. */
+NB_CLONES static void bend_across(const float *restrict row, uint32_t columns, float *restrict bend)
+{
+    NB_SIMD
+    for (uint32_t x = 1; x < NB_REGION - 1; x++) bend[x] = fabsf(row[x - 1] - 2 * row[x] + row[x + 1]);
+    bend[0] = bend[1];
+    bend[columns - 1] = bend[columns - 2];
+}
+
+/* The mean over a pixel of a parabola is off its centre by a 24th of each second difference; `most` becomes that where it
+ * is less. */
+NB_CLONES static void widen_by_bends(const float *restrict above, const float *restrict row,
+                                     const float *restrict below, const float *restrict across, float *restrict most)
+{
+    NB_SIMD
+    for (int x = 0; x < NB_REGION; x++) {
+        const float off = (across[x] + fabsf(above[x] - 2 * row[x] + below[x])) / 24;
+        most[x] = most[x] > off ? most[x] : off;
+    }
 }
 
 static uint32_t clamp(uint32_t i, uint32_t count)
@@ -48,31 +74,44 @@ static uint32_t clamp(uint32_t i, uint32_t count)
     return i < 1 ? 1 : i > count - 2 ? count - 2 : i;
 }
 
-/* The mean over a pixel of a parabola is off its centre by a 24th of each second difference. Pixels at the batch's border
- * take that of their neighbours. */
-static float bend(const float *values, uint32_t x, uint32_t y, uint32_t columns, uint32_t rows)
+static void widen(const float *lanes, uint32_t columns, uint32_t rows, nb_rows most)
 {
-    const uint32_t u = clamp(x, columns), v = clamp(y, rows);
-    const float across = values[lane_of(u - 1, y)] - 2 * values[lane_of(u, y)] + values[lane_of(u + 1, y)];
-    const float down = values[lane_of(x, v - 1)] - 2 * values[lane_of(x, v)] + values[lane_of(x, v + 1)];
-    return (fabsf(across) + fabsf(down)) / 24;
+    nb_rows values;
+    set_rows(lanes, values);
+    for (uint32_t y = 0; y < rows; y++) {
+        const uint32_t v = clamp(y, rows);
+        float across[NB_REGION] = {0};
+        bend_across(values[y], columns, across);
+        widen_by_bends(values[v - 1], values[v], values[v + 1], across, most[y]);
+    }
+}
+
+static uint32_t lane_of(uint32_t x, uint32_t y)
+{
+    return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
+}
+
+static float brightest(const nb_light_samples *samples, uint32_t lane)
+{
+    float most = 0;
+    for (int c = 0; c < 3; c++) most = most > samples->color[c][lane] ? most : samples->color[c][lane];
+    return most;
 }
 
 /* What light may be off is added to the error. */
 static int is_smooth(uint32_t columns, uint32_t rows, nb_light_samples *samples)
 {
+    nb_rows off = {{0}}, left = {{0}};
+    for (int c = 0; c < 3; c++) {
+        widen(samples->color[c], columns, rows, off);
+        widen(samples->in_scattering[c], columns, rows, off);
+        widen(samples->transmittance[c], columns, rows, left);
+    }
     for (uint32_t y = 0; y < rows; y++)
         for (uint32_t x = 0; x < columns; x++) {
             const uint32_t i = lane_of(x, y);
-            float off = 0, most = 0, left = 0;
-            for (int c = 0; c < 3; c++) {
-                most = fmaxf(most, samples->color[c][i]);
-                off = fmaxf(off, bend(samples->color[c], x, y, columns, rows));
-                off = fmaxf(off, bend(samples->in_scattering[c], x, y, columns, rows));
-                left = fmaxf(left, bend(samples->transmittance[c], x, y, columns, rows));
-            }
-            if (!(off <= MOST_OFF * most && left <= MOST_OFF)) return 0;
-            samples->error[i] += off;
+            if (!(off[y][x] <= MOST_OFF * brightest(samples, i) && left[y][x] <= MOST_OFF)) return 0;
+            samples->error[i] += off[y][x];
         }
     return 1;
 }

@@ -46,8 +46,12 @@ static void add_vectors(float *plane, uint32_t width, const nb_area *area, int i
     }
     for (uint32_t y = 0; y < area->rows; y++) {
         float *row = plane + 3 * ((size_t)(area->top + y) * width + area->left);
+        const uint32_t first = lane_of(0, y);
         for (uint32_t x = 0; x < area->columns; x++) {
-            for (uint32_t c = 0; c < 3; c++) row[3 * x + c] += v[c][lane_of(x, y)];
+            const uint32_t i = first + x / NB_BLOCK * NB_PACKET + x % NB_BLOCK;
+            row[3 * x] += v[0][i];
+            row[3 * x + 1] += v[1][i];
+            row[3 * x + 2] += v[2][i];
         }
     }
 }
