@@ -96,6 +96,8 @@ static inline nb_real nb_gather_byte_pairs(const uint8_t *from, nb_wide index, n
 #endif
 
 #ifdef NB_DOUBLE
+static inline nb_real nb_load_floats(const float *from) { return (nb_real)*from; }
+static inline void nb_store_floats(float *to, nb_real x) { *to = (float)x; }
 static inline nb_real nb_pick(const double *from, nb_real index) { return from[(size_t)index]; }
 #endif
 

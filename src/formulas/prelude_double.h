@@ -95,6 +95,22 @@ static inline nb_real nb_load_lanes(const double *from)
 
 static inline void nb_store_lanes(double *to, nb_real x) { memcpy(to, &x, sizeof x); }
 
+/* Neighbours of an array of floats. */
+typedef float nb_floats __attribute__((vector_size(4 * NB_WIDTH)));
+
+static inline nb_real nb_load_floats(const float *from)
+{
+    nb_floats x;
+    memcpy(&x, from, sizeof x);
+    return __builtin_convertvector(x, nb_real);
+}
+
+static inline void nb_store_floats(float *to, nb_real x)
+{
+    const nb_floats narrow = __builtin_convertvector(x, nb_floats);
+    memcpy(to, &narrow, sizeof narrow);
+}
+
 /* Numbers of an array, one for each lane: what lies at whole numbers below 2^31. */
 #ifdef NB_REAL_PICK
 static inline nb_real nb_pick(const double *from, nb_real index) { return NB_REAL_PICK(from, index); }

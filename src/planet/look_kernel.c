@@ -42,18 +42,23 @@ static inline nb_real load_doubles(nb_part part, const double *from)
 
 static inline nb_real load_floats(nb_part part, const float *from)
 {
-    double lanes[NB_WIDTH];
-    for (size_t i = 0; i < NB_WIDTH; i++) lanes[i] = (double)from[part.first + (i < part.count ? i : part.count - 1)];
-    return nb_load_lanes(lanes);
+    if (part.count == NB_WIDTH) return nb_load_floats(from + part.first);
+    float lanes[NB_WIDTH];
+    for (size_t i = 0; i < NB_WIDTH; i++) lanes[i] = from[part.first + (i < part.count ? i : part.count - 1)];
+    return nb_load_floats(lanes);
 }
 
 /* NULL: not wanted. */
 static inline void store_floats(nb_part part, nb_real x, float *to)
 {
-    double lanes[NB_WIDTH];
     if (to == NULL) return;
-    nb_store_lanes(lanes, x);
-    for (size_t i = 0; i < part.count; i++) to[part.first + i] = (float)lanes[i];
+    if (part.count == NB_WIDTH) {
+        nb_store_floats(to + part.first, x);
+        return;
+    }
+    float lanes[NB_WIDTH];
+    nb_store_floats(lanes, x);
+    for (size_t i = 0; i < part.count; i++) to[part.first + i] = lanes[i];
 }
 
 /* ---- directions ------------------------------------------------------------------------------ */
@@ -191,7 +196,8 @@ static inline four load_four(const float *from)
 
 /* What lanes read of the table, number by number. */
 typedef struct nb_read {
-    double mean[NB_VIEW_SIZE][NB_WIDTH], extinction[4][NB_WIDTH];
+    float mean[NB_VIEW_SIZE][NB_WIDTH];
+    double extinction[4][NB_WIDTH];
 } nb_read;
 
 /* One ray's place in the table. */
@@ -200,27 +206,43 @@ typedef struct nb_spot {
     double row_part, column_part, level_part;
 } nb_spot;
 
-/* Adds four neighbours of one level, weighed. */
-static inline void add_level(const nb_look_table *table, const nb_spot *spot, size_t level, double weight, four *sum)
+/* Four neighbours of one level, and their weights. */
+typedef struct nb_corners {
+    const float *entries[4];
+    float weights[4];
+} nb_corners;
+
+static inline nb_corners corners_of(const nb_look_table *table, const nb_spot *spot, size_t level, double weight)
 {
-    const size_t size = (size_t)table->size, next = size * ((size_t)table->levels + 1),
-                 below = next * (size_t)table->columns;
-    const float *entry = table->entries + spot->row * below + spot->column * next + level * size;
+    const size_t next = (size_t)table->size * ((size_t)table->levels + 1), below = next * (size_t)table->columns;
+    const float *entry = table->entries + spot->row * below + spot->column * next + level * (size_t)table->size;
     const double upper = weight * (1 - spot->row_part), lower = weight * spot->row_part;
-    const float a = (float)(upper * (1 - spot->column_part)), b = (float)(upper * spot->column_part),
-                d = (float)(lower * (1 - spot->column_part)), e = (float)(lower * spot->column_part);
-    for (size_t i = 0; i < size; i += 4)
-        sum[i / 4] += a * load_four(entry + i) + b * load_four(entry + next + i) + d * load_four(entry + below + i) +
-                      e * load_four(entry + below + next + i);
+    return (nb_corners){{entry, entry + next, entry + below, entry + below + next},
+                        {(float)(upper * (1 - spot->column_part)), (float)(upper * spot->column_part),
+                         (float)(lower * (1 - spot->column_part)), (float)(lower * spot->column_part)}};
+}
+
+static inline four mix(const nb_corners *corners, int i)
+{
+    four sum = corners->weights[0] * load_four(corners->entries[0] + i);
+    for (int k = 1; k < 4; k++) sum += corners->weights[k] * load_four(corners->entries[k] + i);
+    return sum;
+}
+
+static inline void store_mean(four mean, int i, int lane, nb_read *read)
+{
+    for (int j = 0; j < 4; j++) read->mean[i + j][lane] = mean[j];
 }
 
 static inline void read_light(const nb_look_table *table, const nb_spot *spot, int lane, nb_read *read)
 {
-    four sum[NB_VIEW_SIZE / 4];
-    for (int i = 0; i < table->size / 4; i++) sum[i] = (four){0};
-    if (spot->level_part < 1) add_level(table, spot, spot->level, 1 - spot->level_part, sum);
-    if (spot->level_part > 0) add_level(table, spot, spot->level + 1, spot->level_part, sum);
-    for (int i = 0; i < table->size; i++) read->mean[i][lane] = (double)sum[i / 4][i % 4];
+    const nb_corners far = corners_of(table, spot, spot->level + 1, spot->level_part);
+    if (spot->level_part == 1) {
+        for (int i = 0; i < table->size; i += 4) store_mean(mix(&far, i), i, lane, read);
+        return;
+    }
+    const nb_corners near = corners_of(table, spot, spot->level, 1 - spot->level_part);
+    for (int i = 0; i < table->size; i += 4) store_mean(mix(&near, i) + mix(&far, i), i, lane, read);
 }
 
 static inline void read_extinction(const nb_look_table *table, const nb_spot *spot, int lane, nb_read *read)
@@ -273,15 +295,15 @@ static inline nb_real light_of(const nb_look_table *table, const nb_looks *looks
     for (int c = 0; c < 3; c++) once[c] = NB_F(0.0);
     for (int k = 0; k < table->scatterer_count; k++) {
         const nb_real phase = phase_at(table->phases[k], looks->sun);
-        for (int c = 0; c < 3; c++) once[c] = once[c] + phase * nb_load_lanes(read->mean[3 * k + c]);
+        for (int c = 0; c < 3; c++) once[c] = once[c] + phase * nb_load_floats(read->mean[3 * k + c]);
     }
     for (int c = 0; c < 3; c++) {
         const nb_real sunlight = looks->along * nb_splat(table->irradiance[c]);
-        light[c] = sunlight * (once[c] + nb_load_lanes(read->mean[often + c]));
+        light[c] = sunlight * (once[c] + nb_load_floats(read->mean[often + c]));
         error = nb_max(error, sunlight * NB_F(NB_ONCE_OFF) * once[c]);
         most = nb_max(most, light[c]);
     }
-    return error + looks->along * nb_load_lanes(read->mean[often + 3]) + nb_load_lanes(read->mean[often + 4]) * most +
+    return error + looks->along * nb_load_floats(read->mean[often + 3]) + nb_load_floats(read->mean[often + 4]) * most +
            nb_splat(table->least_off);
 }
 

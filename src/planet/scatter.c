@@ -207,7 +207,9 @@ static void add_slope(const nb_maker *maker, int height, double zenith, double w
     const nb_airs *airs = maker->airs;
     const nb_effort *effort = maker->effort;
     const double radius = airs->radius + height_at(maker->scatter, airs, height);
-    nb_fan fan = {.maker = maker, .track = {radius, radius * zenith}};
+    nb_fan fan;
+    fan.maker = maker;
+    fan.track = (nb_track){radius, radius * zenith};
     const double ground = nb_track_enter(fan.track, airs->radius), level = sqrt(fmax(0, 1 - zenith * zenith));
     fan.hits_ground = ground < HUGE_VAL;
     fan.end = fan.hits_ground ? ground : nb_track_leave(fan.track, airs->top);
