@@ -21,10 +21,12 @@
 #ifndef NB_PRELUDE_H
 #define NB_PRELUDE_H
 
-#if defined(NB_DOUBLE) && (defined(NB_ISA_SSE2) || defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512) || defined(NB_ISA_NEON))
+#if defined(NB_ISA_SSE2) || defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512) || defined(NB_ISA_NEON)
+#ifdef NB_DOUBLE
 #include "prelude_double.h"
-#elif defined(NB_ISA_SSE2) || defined(NB_ISA_AVX2) || defined(NB_ISA_AVX512) || defined(NB_ISA_NEON)
+#else
 #include "prelude_simd.h"
+#endif
 #else
 #include "prelude_c.h"
 #endif
