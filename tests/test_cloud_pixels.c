@@ -206,12 +206,46 @@ static void test_light_under_a_low_sun(void **state)
     }
 }
 
+/* From afar pixels are mixed of columns with cloud and without: beyond a sharp edge of the weather there is none, before it there is. */
+static void test_weather_ends_where_it_ends(void **state)
+{
+    (void)state;
+    enum { WIDE = 512, HIGH = 256, BELT = 40, ROWS = 180 };
+    static float texels[HIGH][WIDE];
+    for (int y = 0; y < HIGH; y++)
+        for (int x = 0; x < WIDE; x++) texels[y][x] = y > HIGH / 2 - BELT && y < HIGH / 2 + BELT;
+    nebel_clouds *clouds = make(1, &(const nebel_cloud_layer){.weather = {WIDE, HIGH, 1, texels[0]}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    const double *center = clouds->atmosphere->center, radius = clouds->atmosphere->airs.radius;
+    const double step = 2 * tan(25 * PI / 180) / ROWS, edge = PI / HIGH * BELT;
+    int within = 0, beyond = 0;
+    for (int i = 0; i < ROWS * ROWS; i++) {
+        const double x = step * (i % ROWS - ROWS / 2), y = step * (i / ROWS - ROWS / 2);
+        const nebel_ray ray = {{center[0], center[1], center[2] + 16e6}, {x, y, -1}, HUGE_VAL};
+        const double square = 1 + x * x + y * y, under = 16e6 * 16e6 - square * (16e6 * 16e6 - radius * radius);
+        nebel_cloud_knots knots;
+        if (under < 0) continue;
+        const double t = (16e6 - sqrt(under)) / square, latitude = fabs(asin(y * t / radius));
+        /* A texel, and what a pixel hides. */
+        if (fabs(latitude - edge) < PI / HIGH + step * t / radius) continue;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){step}, 0, &knots, 0), NEBEL_OK);
+        if (latitude < edge) within += knots.count > 0;
+        if (latitude > edge) beyond += knots.count > 0;
+    }
+    assert_int_equal(beyond, 0);
+    assert_true(within > 10000);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_wide_pixels_see_means), cmocka_unit_test(test_wide_pixels_let_as_much_through),
-        cmocka_unit_test(test_light_of_pixels),       cmocka_unit_test(test_light_of_pixels_that_hide_heaps),
-        cmocka_unit_test(test_light_under_a_low_sun),
+        cmocka_unit_test(test_weather_ends_where_it_ends),      cmocka_unit_test(test_wide_pixels_see_means),
+        cmocka_unit_test(test_wide_pixels_let_as_much_through), cmocka_unit_test(test_light_of_pixels),
+        cmocka_unit_test(test_light_of_pixels_that_hide_heaps), cmocka_unit_test(test_light_under_a_low_sun),
     };
     return cmocka_run_group_tests(tests, make_air, free_air);
 }

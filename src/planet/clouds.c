@@ -133,17 +133,21 @@ static float fill_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer, f
     return layer->detail * (1 - noise->billow_mean) + 0.5f * layer->softness * step_up(10 * (coverage - 0.9f));
 }
 
+/* Where less is under clouds, their ranks are not drawn apart further, but lowered: columns are mixed with those next to them, which must
+ * not be thousands of times as far above or below all cloud. */
+#define LEAST_COVERAGE 0.015625f
+
 /* The middle of a heap is where a twentieth of all cloud is more so. */
 nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const double unit[3],
                                    float width)
 {
-    const float coverage = weather_at(layer, unit, width);
-    nb_cloud_column column = {.rank = -1};
-    if (!(coverage > 0)) return column;
-    const float border = rank_of(layer, 1 - coverage), middle = rank_of(layer, 1 - 0.05f * coverage);
+    const float coverage = weather_at(layer, unit, width), bounded = nb_larger(coverage, LEAST_COVERAGE);
+    const float border = rank_of(layer, 1 - bounded), middle = rank_of(layer, 1 - 0.05f * bounded);
+    const float fill = fill_of(noise, layer, bounded);
+    nb_cloud_column column = {.scale = 1 / (middle - border)};
     const float sum = sum_octaves(noise, layer, unit, width, &column.variance);
-    column.scale = 1 / (middle - border);
-    column.rank = (sum - border) * column.scale + fill_of(noise, layer, coverage);
+    const float highest = (layer->most - border + sqrtf(3 * column.variance)) * column.scale + fill;
+    column.rank = (sum - border) * column.scale + fill - highest * (bounded - coverage) / LEAST_COVERAGE;
     column.variance *= column.scale * column.scale;
     return column;
 }
@@ -340,7 +344,7 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
                                             desc->size / 2.1, desc->size / 4.3};
     double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     uint32_t hash = nb_mix_bits(desc->seed + 1);
-    layer->slope = 0;
+    layer->slope = layer->most = 0;
     for (int k = 0; k < NB_CLOUD_OCTAVES; k++) {
         nb_cloud_octave *octave = &layer->octaves[k];
         double next[3][3];
@@ -354,6 +358,7 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
             octave->shift[i] = (double)hash * 0x1p-32 * NB_CLOUD_LATTICE;
         }
         layer->slope += octave->weight * NB_GRADIENT_SLOPE / octave->cell;
+        layer->most += octave->weight; /* noise is within -1 and 1 */
     }
     for (int i = 0; i < 3; i++) layer->billow_shift[i] = (double)nb_mix_bits(hash + (uint32_t)i) * 0x1p-32;
     double period = 0.9 * desc->size;

@@ -49,7 +49,7 @@ typedef struct nb_cloud_layer {
     float last_billow;                                    /* 1/m, numbers in the table of the smallest */
     float billow_slopes[NB_CLOUD_BILLOWS];                /* of ranks, at most, per m */
     float ranks[NB_CLOUD_RANKS]; /* of the octaves' sum over the planet: what a part of it is below of */
-    float slope;                 /* of that sum, at most, per m */
+    float slope, most;           /* of that sum, at most, per m; the sum itself */
     float grid;                  /* m, between columns that are kept */
     nb_cloud_grid grids[NB_CLOUD_GRIDS];
     double per_spacing; /* of the first */
