@@ -394,7 +394,6 @@ static void ask(nebel_air_view *view, nebel_isa isa, const bundle *rays, int end
         ground.sky[c] = a->sky[c];
     }
     view->look = nb_look_choose(isa);
-    view->look_down = nb_look_down_choose(isa);
     assert_int_equal(nebel_trace_air_view(view, RAYS, direction, ends ? rays->t_max : NULL, &lights), NEBEL_OK);
     assert_int_equal(nebel_find_ground(view, RAYS, direction, &ground), NEBEL_OK);
 }

@@ -8,20 +8,12 @@
 /* What is told at least, as a part of the brightest light in the table: rays that are short and steep share few rows. */
 #define LEAST_OFF 2e-4
 
-#define ALONG(NAME, suffix) [NEBEL_ISA_##NAME] = nb_look_##suffix,
-static nb_look_fn *const along[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(ALONG)};
+#define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = &nb_look_kernel_##suffix,
+static const nb_look_kernel *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
 
-#define DOWN(NAME, suffix) [NEBEL_ISA_##NAME] = nb_look_down_##suffix,
-static nb_look_fn *const down[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(DOWN)};
-
-nb_look_fn *nb_look_choose(nebel_isa isa)
+const nb_look_kernel *nb_look_choose(nebel_isa isa)
 {
-    return along[nb_cpu_choose(isa)];
-}
-
-nb_look_fn *nb_look_down_choose(nebel_isa isa)
-{
-    return down[nb_cpu_choose(isa)];
+    return kernels[nb_cpu_choose(isa)];
 }
 
 static nb_look_table table_of(const nebel_air_view *view)
@@ -70,7 +62,7 @@ nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const do
                              .direction = {direction[0], direction[1], direction[2]},
                              .t_max = t_max,
                              .lights = *lights};
-    view->look(&job);
+    view->look->along(&job);
     return NEBEL_OK;
 }
 
@@ -81,6 +73,6 @@ nebel_result nebel_find_ground(const nebel_air_view *view, size_t n, const doubl
     const nb_look_table table = table_of(view);
     const nb_look_job job = {
         .table = &table, .count = n, .direction = {direction[0], direction[1], direction[2]}, .ground = *planes};
-    view->look_down(&job);
+    view->look->down(&job);
     return NEBEL_OK;
 }

@@ -29,14 +29,16 @@ typedef struct nb_look_job {
     nebel_ground_planes ground;
 } nb_look_job;
 
-typedef void nb_look_fn(const nb_look_job *job);
+/* Of an instruction set: light along rays, and the ground that they meet. */
+typedef struct nb_look_kernel {
+    void (*along)(const nb_look_job *job);
+    void (*down)(const nb_look_job *job);
+} nb_look_kernel;
 
-nb_look_fn nb_look_scalar, nb_look_sse2, nb_look_avx2, nb_look_avx512, nb_look_neon;
-nb_look_fn nb_look_down_scalar, nb_look_down_sse2, nb_look_down_avx2, nb_look_down_avx512, nb_look_down_neon;
+extern const nb_look_kernel nb_look_kernel_scalar, nb_look_kernel_sse2, nb_look_kernel_avx2, nb_look_kernel_avx512,
+    nb_look_kernel_neon;
 
-/* The kernels of an instruction set, or for DEFAULT of the best one; NULL where this build or processor has not got it:
- * for light along rays, and for the ground that they meet. */
-nb_look_fn *nb_look_choose(nebel_isa isa);
-nb_look_fn *nb_look_down_choose(nebel_isa isa);
+/* For DEFAULT that of the best one; NULL where this build or processor has not got it. */
+const nb_look_kernel *nb_look_choose(nebel_isa isa);
 
 #endif

@@ -307,7 +307,7 @@ static inline nb_real light_of(const nb_look_table *table, const nb_looks *looks
            nb_splat(table->least_off);
 }
 
-void SUFFIXED(nb_look_, NB_SUFFIX)(const nb_look_job *job)
+static void look_along(const nb_look_job *job)
 {
     const nebel_light_planes *lights = &job->lights;
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
@@ -393,7 +393,7 @@ static void store_ground(const nb_look_job *job, nb_part part, const nb_bearings
     }
 }
 
-void SUFFIXED(nb_look_down_, NB_SUFFIX)(const nb_look_job *job)
+static void look_down(const nb_look_job *job)
 {
     const nb_outlook outlook = outlook_of(job->table);
     for (size_t first = 0; first < job->count; first += NB_WIDTH) {
@@ -405,3 +405,5 @@ void SUFFIXED(nb_look_down_, NB_SUFFIX)(const nb_look_job *job)
         if (nb_any(down)) store_ground(job, part, &b, down, nb_select(down, way, NB_F(0.0)));
     }
 }
+
+const nb_look_kernel SUFFIXED(nb_look_kernel_, NB_SUFFIX) = {look_along, look_down};

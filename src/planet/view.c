@@ -271,7 +271,6 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
     made->atmosphere = desc->atmosphere;
     made->sun = sun;
     made->look = nb_look_choose(NEBEL_ISA_DEFAULT);
-    made->look_down = nb_look_down_choose(NEBEL_ISA_DEFAULT);
     set_up(made, desc);
     if (allocate(made) != NEBEL_OK) {
         nebel_destroy_air_view(made);

@@ -33,7 +33,7 @@ struct nebel_air_view {
     nb_rule rule;
     double sunlight[NB_VIEW_SUNS][3]; /* what air leaves of the sun on the ground, evenly over the root of the cosine of
                                          its angle to the zenith */
-    nb_look_fn *look, *look_down;
+    const nb_look_kernel *look;
 };
 
 /* In an entry, all per metre and for a sun of irradiance 1 but for the last two: what was scattered once by each kind of
