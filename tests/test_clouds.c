@@ -9,6 +9,7 @@
 #include "unit.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* ---- density --------------------------------------------------------------------------------- */
@@ -577,6 +578,53 @@ static void test_ways_to_a_sun_below_level(void **state)
 
 /* ---- bad input ------------------------------------------------------------------------------- */
 
+static void keep_text(nebel_result result, const char *message, void *user)
+{
+    (void)result;
+    (void)snprintf(user, 200, "%s", message);
+}
+
+static void assert_layer_fault(const nebel_cloud_layer *layer, const char *wanted)
+{
+    char said[200] = "";
+    nebel_cloud_layer resolved;
+    assert_int_equal(nebel_resolve_cloud_layer(1e5, layer, &(nebel_log){keep_text, said}, &resolved),
+                     NEBEL_ERROR_VALUE);
+    assert_string_equal(said, wanted);
+}
+
+static void test_what_is_said_of_bad_layers(void **state)
+{
+    (void)state;
+    assert_layer_fault(&(nebel_cloud_layer){.base = (double)NAN},
+                       "cloud layer: base: is nan; must be above the ground");
+    assert_layer_fault(&(nebel_cloud_layer){.base = -5}, "cloud layer: base: is -5; must be above the ground");
+    assert_layer_fault(&(nebel_cloud_layer){.base = 5000},
+                       "cloud layer: top: is 2700, as none is given; must be above the base, 5000 m");
+    assert_layer_fault(&(nebel_cloud_layer){.coverage = 1.5},
+                       "cloud layer: coverage: is 1.5; must be more than 0, at most 1");
+    assert_layer_fault(&(nebel_cloud_layer){.detail = -.5},
+                       "cloud layer: detail: is -0.5; must be within 0 and 1, or none (-1)");
+    assert_layer_fault(&(nebel_cloud_layer){.wind = {0, 1e13}},
+                       "cloud layer: wind: is 1e+13; must be within -1e12 and 1e12");
+}
+
+static void test_clouds_need_air(void **state)
+{
+    (void)state;
+    nebel_atmosphere *moon;
+    nebel_clouds *clouds;
+    char said[200] = "";
+    assert_int_equal(nebel_create_atmosphere(nebel_find_atmosphere("moon"), &moon), NEBEL_OK);
+    nebel_clouds_desc desc = {.atmosphere = moon, .layer_count = 1, .log = {keep_text, said}};
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_ERROR_VALUE);
+    assert_string_equal(said, "clouds: need air, and the planet has none");
+    desc.layer_count = 0;
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
+    nebel_destroy_clouds(clouds);
+    nebel_destroy_atmosphere(moon);
+}
+
 static void test_bad_layers_are_refused(void **state)
 {
     (void)state;
@@ -702,6 +750,8 @@ int main(void)
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
         cmocka_unit_test(test_ways_to_a_sun_below_level),
+        cmocka_unit_test(test_what_is_said_of_bad_layers),
+        cmocka_unit_test(test_clouds_need_air),
         cmocka_unit_test(test_bad_layers_are_refused),
         cmocka_unit_test(test_bad_calls_are_refused),
         cmocka_unit_test(test_without_memory),

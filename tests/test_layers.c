@@ -6,6 +6,7 @@
 #include "unit.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -329,6 +330,26 @@ static void coverage_is_about_what_is_asked(void **state)
 
 /* ---- bad input ------------------------------------------------------------------------------- */
 
+static void keep_text(nebel_result result, const char *message, void *user)
+{
+    (void)result;
+    (void)snprintf(user, 200, "%s", message);
+}
+
+static void faults_say_the_number(void **state)
+{
+    (void)state;
+    char said[200] = "";
+    nebel_layers *layers;
+    const nebel_log log = {keep_text, said};
+    assert_int_equal(nebel_create_layers(&(nebel_layers_desc){.radius = .5, .log = log}, &layers), NEBEL_ERROR_VALUE);
+    assert_string_equal(said, "planet: radius: is 0.5; must be within 1 and 1e+12");
+    nebel_layers_desc desc = {.cloud_count = 2, .clouds = {{.gain = 1}, {.height = -1}}, .log = log};
+    assert_int_equal(nebel_create_layers(&desc, &layers), NEBEL_ERROR_VALUE);
+    assert_string_equal(said, "planet: clouds[1]: height: is -1; must be more than 0, at most 1e12");
+    assert_null(layers);
+}
+
 static void bad_descriptions_are_refused(void **state)
 {
     (void)state;
@@ -406,10 +427,15 @@ static void memory_that_runs_out_is_told(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layers_are_those_of_the_formulas), cmocka_unit_test(rays_end_and_begin_within),
-        cmocka_unit_test(balls_turn_to_the_east),           cmocka_unit_test(maps_are_averaged),
-        cmocka_unit_test(maps_have_no_seam_and_no_star),    cmocka_unit_test(coverage_is_about_what_is_asked),
-        cmocka_unit_test(bad_descriptions_are_refused),     cmocka_unit_test(bad_rays_are_refused),
+        cmocka_unit_test(layers_are_those_of_the_formulas),
+        cmocka_unit_test(rays_end_and_begin_within),
+        cmocka_unit_test(balls_turn_to_the_east),
+        cmocka_unit_test(maps_are_averaged),
+        cmocka_unit_test(maps_have_no_seam_and_no_star),
+        cmocka_unit_test(coverage_is_about_what_is_asked),
+        cmocka_unit_test(faults_say_the_number),
+        cmocka_unit_test(bad_descriptions_are_refused),
+        cmocka_unit_test(bad_rays_are_refused),
         cmocka_unit_test(memory_that_runs_out_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -116,8 +116,12 @@ static void test_what_is_wrong(void **state)
     assert_int_equal(nebel_change_scene_planets(NULL, own), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
     assert_int_equal(nebel_change_scene_planets(scene, NULL), NEBEL_ERROR_ARGUMENT);
-    wrong faults[] = {{*own, "planet: sun_diameter"}, {*own, "ground_albedo"}, {*own, "scale_height"},
-                      {*own, "top: must be above"},   {*own, "overlap"},       {*own, "coverage"}};
+    wrong faults[] = {{*own, "planet: sun_diameter"},
+                      {*own, "ground_albedo"},
+                      {*own, "scale_height"},
+                      {*own, "top: is 50; must be above the base, 60 m"},
+                      {*own, "overlap"},
+                      {*own, "coverage"}};
     faults[0].planet.sun_diameter = (double)NAN;
     faults[1].planet.air.ground_albedo[1] = 1.5;
     faults[2].planet.air.airs[0].scale_height = -1;

@@ -61,6 +61,7 @@ static void test_everything_they_may_say(void **state)
     nebel_destroy_scene(scene);
 }
 
+#define AIRLESS(key) "{\"nebel\": 1, \"fog\": [], \"planet\": {\"model\": \"physical\", " key ", \"clouds\": `[{}]}}"
 #define ONE(members) PLANET("", "[{" members "}]")
 
 static void test_what_is_wrong(void **state)
@@ -72,17 +73,28 @@ static void test_what_is_wrong(void **state)
         {FORMAT, PLANET("", "[{}, `{}]"), "planet.clouds[1]: lies from 900 to 2700 m and overlaps another"},
         {LIMIT, PLANET("", "[{\"coverage\": 0}, {\"coverage\": 0}, {\"coverage\": 0}, {\"coverage\": 0}, `{}]"),
          "planet.clouds[4]: is one too many"},
+        {LIMIT, PLANET("", "[{}, {}, {}, {}, `{}]"), "planet.clouds[4]: is one too many"},
+        {FORMAT, AIRLESS("\"preset\": \"moon\""), "planet.clouds: need air, and the planet has none"},
+        {FORMAT, AIRLESS("\"airs\": []"), "planet.clouds: need air, and the planet has none"},
         {FORMAT, ONE("\"kind\": `\"fluffy\""),
          "planet.clouds[0].kind: unknown; must be one of: cumulus, stratus, cirrus"},
         {FORMAT, ONE("\"base\": `0"), "planet.clouds[0].base: is 0"},
         {FORMAT, ONE("\"base\": `-100"), "planet.clouds[0].base: is -100"},
-        {FORMAT, PLANET("", "[`{\"base\": 3000}]"), "planet.clouds[0]: top: must be above the base"},
-        {FORMAT, PLANET("", "[`{\"base\": 1000, \"top\": 1000}]"), "planet.clouds[0]: top: must be above the base"},
+        {FORMAT, PLANET("", "[`{\"base\": 3000}]"),
+         "planet.clouds[0]: top: is 2700, as none is given; must be above the base, 3000 m"},
+        {FORMAT, PLANET("", "[`{\"top\": 500}]"),
+         "planet.clouds[0]: top: is 500; must be above the base, 900 m, as none is given"},
+        {FORMAT, PLANET("", "[`{\"base\": 1000, \"top\": 1000}]"),
+         "planet.clouds[0]: top: is 1000; must be above the base, 1000 m"},
         {FORMAT, PLANET("", "[{\"base\": `1e-300}]"), "planet.clouds[0].base: is 1e-300; must be a height"},
         {FORMAT, PLANET("", "[`{\"size\": 3e7}]"),
          "planet.clouds[0]: size: is 3e+07 m; must be at most 2.544e+07 m, which is 4 of the radius"},
-        {FORMAT, PLANET("", "[`{\"top\": 2e5}]"), "planet.clouds[0]: top: must be within the air"},
-        {FORMAT, PLANET("", "[`{\"base\": 1000, \"top\": 1000.01}]"), "planet.clouds[0]: top: must be a millionth"},
+        {FORMAT, PLANET("", "[`{\"top\": 2e5}]"), "planet.clouds[0]: top: is 200000; must be within the air, 100000 m"},
+        {FORMAT, PLANET("", "[`{\"base\": 2e5, \"top\": 3e5}]"),
+         "planet.clouds[0]: base: is 200000; must be within the air, 100000 m"},
+        {FORMAT, PLANET("", "[`{\"base\": 1000, \"top\": 1000.01}]"),
+         "planet.clouds[0]: top: is 1000.01; must be at least 0.1 m (a millionth of the air's thickness) above the "
+         "base, 1000 m"},
         {FORMAT, ONE("\"coverage\": `1.5"), "planet.clouds[0].coverage: is 1.5"},
         {FORMAT, ONE("\"coverage\": `-0.1"), "planet.clouds[0].coverage: is -0.1"},
         {FORMAT, ONE("\"extinction\": `0"), "planet.clouds[0].extinction: is 0"},

@@ -194,7 +194,10 @@ static void test_what_is_wrong(void **state)
         {LIMIT,
          SCENE("", "[" EARTH "," MOON_AT("1e8") "," MOON_AT("2e8") "," MOON_AT("3e8") "," MOON_AT("4e8") "," MOON_AT(
                        "5e8") "," MOON_AT("6e8") "," MOON_AT("7e8") ", `" MOON_AT("8e8") "]"),
-         "planet[8]: is one too many; a scene has at most 8 planets"}};
+         "planet[8]: is one too many; a scene has at most 8 planets"},
+        {LIMIT,
+         SCENE("", "[" EARTH "," EARTH "," EARTH "," EARTH "," EARTH "," EARTH "," EARTH "," EARTH ", `" EARTH "]"),
+         "planet[8]: is one too many"}};
     CHECK(rules);
 }
 

@@ -82,7 +82,8 @@ static void test_what_is_refused(void **state)
             PLANET("[{\"model\": \"physical\", \"clouds\": [{}]}, {\"model\": \"physical\", \"preset\": \"moon\", "
                    "\"center\": [0, 1e8, 0]}]"),
             CLOUDS(""), PLANET("{\"model\": \"layers\"}"), SCENE("\"fog\": []"),
-            PLANET("{\"model\": \"physical\", \"airs\": [], \"clouds\": [{}]}")};
+            PLANET("{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000, "
+                   "\"scattering\": 1e-6}], \"clouds\": [{}]}")};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
         draft d = open_planets(one);
         check_refused(others[i], &d, NEBEL_ERROR_ARGUMENT, "the file has changed, load it again");

@@ -12,6 +12,8 @@
  * lattice, and higher orders by a model, delta-Eddington's on a slab: docs/planet.md says how far off.
  *
  * Units are metres; places are those of the scene, y up. Nothing here calls a graphics interface.
+ *
+ * Strides are in bytes. 0 with n > 1: the same ray or place for all, and of results the same one is written each time.
  */
 #ifndef NEBEL_CLOUDS_H
 #define NEBEL_CLOUDS_H
@@ -72,7 +74,8 @@ nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer
                                        nebel_cloud_layer *resolved);
 
 /* Makes clouds that do not change any more. Free them with nebel_destroy_clouds. Errors: ARGUMENT (NULL), VALUE (a number
- * out of range; the log says which), LIMIT (layers), MEMORY. Any thread. */
+ * out of range, layers around a planet without air; the log says which), LIMIT (layers), MEMORY; *clouds is then NULL. Any
+ * thread. */
 nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **clouds);
 
 /* NULL is fine. */
@@ -98,7 +101,8 @@ typedef struct nebel_cloud_view_desc {
     nebel_log log;
 } nebel_cloud_view_desc;
 
-/* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY. Any thread. */
+/* Errors: ARGUMENT, VALUE (time, tolerance), UNSUPPORTED (isa not available), MEMORY; *view is then NULL. Any
+ * thread. */
 nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view);
 
 /* NULL is fine. */
@@ -109,7 +113,7 @@ void nebel_destroy_cloud_view(nebel_cloud_view *view);
  * a time. */
 typedef struct nebel_cloud_workspace nebel_cloud_workspace;
 
-/* With the view's allocator. Errors: ARGUMENT, MEMORY. */
+/* With the view's allocator. Errors: ARGUMENT, MEMORY; *workspace is then NULL. */
 nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cloud_workspace **workspace);
 
 /* NULL is fine. */

@@ -290,23 +290,57 @@ static int is_part(double number)
     return number == NEBEL_CLOUD_NONE || (number >= 0 && number <= 1);
 }
 
-static const char *find_fault(double thickness, const nebel_cloud_layer *layer)
+static nebel_result refuse(const nebel_log *log, const char *what, double number, const char *wanted)
 {
-    if (!(layer->base > 0)) return "base: must be above the ground";
-    if (!(layer->top > layer->base)) return "top: must be above the base";
-    if (!(layer->top <= thickness)) return "top: must be within the air";
-    if (!(layer->top - layer->base >= thickness / NEBEL_MAX_CLOUD_RATIO))
-        return "top: must be a millionth of the air's thickness above the base";
-    if (!(layer->coverage > 0 && layer->coverage <= 1)) return "coverage: must be more than 0, at most 1";
+    return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: %s: is %g; must be %s", what, number, wanted);
+}
+
+static const char *origin_of(double given)
+{
+    return given == 0 ? ", as none is given" : "";
+}
+
+/* `given` may have zeros, whose numbers the layer has. */
+static nebel_result check_heights(double thickness, const nebel_cloud_layer *given, const nebel_cloud_layer *layer,
+                                  const nebel_log *log)
+{
+    const double base = layer->base, top = layer->top;
+    const char *const of_base = origin_of(given->base), *const of_top = origin_of(given->top);
+    if (!(base > 0)) return refuse(log, "base", base, "above the ground");
+    if (!(base < thickness))
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: base: is %.8g%s; must be within the air, %.8g m", base,
+                       of_base, thickness);
+    if (!(top > base))
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g%s; must be above the base, %.8g m%s", top,
+                       of_top, base, of_base);
+    if (!(top <= thickness))
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g%s; must be within the air, %.8g m", top,
+                       of_top, thickness);
+    if (!(top - base >= thickness / NEBEL_MAX_CLOUD_RATIO))
+        return nb_fail(
+            log, NEBEL_ERROR_VALUE,
+            "cloud layer: top: is %.8g%s; must be at least %g m (a millionth of the air's thickness) above the base, "
+            "%.8g m%s",
+            top, of_top, thickness / NEBEL_MAX_CLOUD_RATIO, base, of_base);
+    return NEBEL_OK;
+}
+
+static nebel_result check_looks(const nebel_cloud_layer *layer, const nebel_log *log)
+{
+    static const char part[] = "within 0 and 1, or none (-1)";
+    if (!(layer->coverage > 0 && layer->coverage <= 1))
+        return refuse(log, "coverage", layer->coverage, "more than 0, at most 1");
     if (!(layer->extinction > 0 && layer->extinction <= NEBEL_MAX_AIR_EXTINCTION))
-        return "extinction: must be more than 0, at most 1e3";
-    if (!(layer->size >= 1e-3 && layer->size <= 1e9)) return "size: must be within 1e-3 and 1e9";
-    if (!is_part(layer->detail)) return "detail: must be within 0 and 1, or none";
-    if (!is_part(layer->variation)) return "variation: must be within 0 and 1, or none";
-    if (!(layer->diameter >= 5 && layer->diameter <= NEBEL_MAX_DROPLET)) return "diameter: must be within 5 and 50";
+        return refuse(log, "extinction", layer->extinction, "more than 0, at most 1e3");
+    if (!(layer->size >= 1e-3 && layer->size <= 1e9)) return refuse(log, "size", layer->size, "within 1e-3 and 1e9");
+    if (!is_part(layer->detail)) return refuse(log, "detail", layer->detail, part);
+    if (!is_part(layer->variation)) return refuse(log, "variation", layer->variation, part);
+    if (!(layer->diameter >= 5 && layer->diameter <= NEBEL_MAX_DROPLET))
+        return refuse(log, "diameter", layer->diameter, "within 5 and 50");
     for (int i = 0; i < 2; i++)
-        if (!(fabs(layer->wind[i]) <= 1e12)) return "wind: must be within -1e12 and 1e12";
-    return nb_map_fault(&layer->weather, 1);
+        if (!(fabs(layer->wind[i]) <= 1e12)) return refuse(log, "wind", layer->wind[i], "within -1e12 and 1e12");
+    const char *fault = nb_map_fault(&layer->weather, 1);
+    return fault == NULL ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: weather: %s", fault);
 }
 
 nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer *desc, const nebel_log *log,
@@ -316,10 +350,10 @@ nebel_result nebel_resolve_cloud_layer(double thickness, const nebel_cloud_layer
     if ((int)desc->kind < 0 || desc->kind >= NEBEL_CLOUD_KIND_COUNT)
         return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: kind: is unknown");
     const nebel_cloud_layer whole = resolve(thickness, desc);
-    const char *fault = find_fault(thickness, &whole);
-    if (fault != NULL) return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: %s", fault);
-    *resolved = whole;
-    return NEBEL_OK;
+    nebel_result result = check_heights(thickness, desc, &whole, log);
+    if (result == NEBEL_OK) result = check_looks(&whole, log);
+    if (result == NEBEL_OK) *resolved = whole;
+    return result;
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */
@@ -441,6 +475,8 @@ static nebel_result check(const nebel_clouds_desc *desc, nebel_cloud_layer *laye
     if (desc->layer_count > NEBEL_MAX_CLOUD_LAYERS)
         return nb_fail(&desc->log, NEBEL_ERROR_LIMIT, "clouds: %u layers; at most %d are possible",
                        (unsigned)desc->layer_count, NEBEL_MAX_CLOUD_LAYERS);
+    if (desc->layer_count > 0 && nb_airs_are_empty(airs))
+        return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: need air, and the planet has none");
     for (uint32_t i = 0; i < desc->layer_count; i++) {
         const nebel_result result =
             nebel_resolve_cloud_layer(airs->top - airs->radius, &desc->layers[i], &desc->log, &layers[i]);

@@ -3,6 +3,7 @@
 #include "layer_map.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #define NB_DOUBLE
@@ -67,52 +68,90 @@ static nebel_layers_desc resolve(const nebel_layers_desc *desc)
     return whole;
 }
 
-static const char *find_shell_fault(const nebel_cloud_shell *shell)
+/* What is said of: "clouds[2]: ", or "" where it is the planet. */
+typedef struct subject {
+    const nebel_log *log;
+    char name[24];
+} subject;
+
+static nebel_result refuse(const subject *of, const char *what, const char *fault)
 {
-    const char *fault = nb_map_fault(&shell->map, 1);
-    if (fault == NULL) fault = nb_map_fault(&shell->detail, 1);
-    if (fault != NULL) return fault;
-    if (!(shell->height > 0 && shell->height <= 1e12)) return "height: must be more than 0, at most 1e12";
-    if (!(fabs(shell->day) <= 1e12)) return "day: must be within -1e12 and 1e12";
-    if (!all_within(shell->color, 3, 0, 1)) return "color: must be within 0 and 1";
-    if (!all_within(shell->wrap, 3, -1e3, 1e3)) return "wrap: must be within -1000 and 1000";
-    if (!(shell->gain >= 0 && shell->gain <= 1e3)) return "gain: must be within 0 and 1000";
-    if (!(shell->coverage >= 0 && shell->coverage <= 1)) return "coverage: must be within 0 and 1";
-    return NULL;
+    return nb_fail(of->log, NEBEL_ERROR_VALUE, "planet: %s%s: %s", of->name, what, fault);
 }
 
-static const char *find_air_fault(const nebel_air_shell *air)
+static nebel_result check_all(const subject *of, const char *what, const double *numbers, int count, double least,
+                              double most)
 {
-    if (!(air->height > 0 && air->height <= 1e12)) return "air.height: must be more than 0, at most 1e12";
-    if (!(air->brightness >= 0 && air->brightness <= 1e6)) return "air.brightness: must be within 0 and 1e6";
-    if (air->ramp_count > NEBEL_MAX_RAMP) return "air.ramp_count: must be at most 16";
-    for (uint32_t i = 0; i < air->ramp_count; i++)
-        if (!all_within(air->ramp[i], 3, 0, 1e6)) return "air.ramp: must be within 0 and 1e6";
-    return NULL;
+    for (int i = 0; i < count; i++)
+        if (!all_within(&numbers[i], 1, least, most))
+            return nb_fail(of->log, NEBEL_ERROR_VALUE, "planet: %s%s: is %g; must be within %g and %g", of->name, what,
+                           numbers[i], least, most);
+    return NEBEL_OK;
 }
 
-static const char *find_fault(const nebel_layers_desc *desc)
+static nebel_result check_one(const subject *of, const char *what, double number, double least, double most)
 {
-    if (!all_within(desc->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH))
-        return "center: must be within -1e15 and 1e15";
-    if (!(desc->radius >= 1 && desc->radius <= 1e12)) return "radius: must be within 1 and 1e12";
-    if (!all_within(desc->rotation, 4, -1e6, 1e6)) return "rotation: must be within -1e6 and 1e6";
-    if (!(fabs(desc->day) <= 1e12)) return "day: must be within -1e12 and 1e12";
-    if (!(desc->coverage >= 0 && desc->coverage <= 1)) return "coverage: must be within 0 and 1";
-    if (desc->cloud_count > NEBEL_MAX_CLOUD_SHELLS) return "cloud_count: must be at most 8";
-    return nb_map_fault(&desc->ground, 3);
+    return check_all(of, what, &number, 1, least, most);
+}
+
+static nebel_result check_height(const subject *of, const char *what, double height)
+{
+    if (height > 0 && height <= 1e12) return NEBEL_OK;
+    return nb_fail(of->log, NEBEL_ERROR_VALUE, "planet: %s%s: is %g; must be more than 0, at most 1e12", of->name, what,
+                   height);
+}
+
+static nebel_result check_map(const subject *of, const char *what, const nebel_map *map, int channels)
+{
+    const char *fault = nb_map_fault(map, channels);
+    return fault == NULL ? NEBEL_OK : refuse(of, what, fault);
+}
+
+static nebel_result check_shell(const subject *of, const nebel_cloud_shell *shell)
+{
+    nebel_result result = check_map(of, "map", &shell->map, 1);
+    if (result == NEBEL_OK) result = check_map(of, "detail", &shell->detail, 1);
+    if (result == NEBEL_OK) result = check_height(of, "height", shell->height);
+    if (result == NEBEL_OK) result = check_one(of, "day", shell->day, -1e12, 1e12);
+    if (result == NEBEL_OK) result = check_all(of, "color", shell->color, 3, 0, 1);
+    if (result == NEBEL_OK) result = check_all(of, "wrap", shell->wrap, 3, -1e3, 1e3);
+    if (result == NEBEL_OK) result = check_one(of, "gain", shell->gain, 0, 1e3);
+    return result == NEBEL_OK ? check_one(of, "coverage", shell->coverage, 0, 1) : result;
+}
+
+static nebel_result check_air(const subject *of, const nebel_air_shell *air)
+{
+    nebel_result result = check_height(of, "air.height", air->height);
+    if (result == NEBEL_OK) result = check_one(of, "air.brightness", air->brightness, 0, 1e6);
+    if (result == NEBEL_OK && air->ramp_count > NEBEL_MAX_RAMP)
+        result = refuse(of, "air.ramp_count", "must be at most 16");
+    for (uint32_t i = 0; result == NEBEL_OK && i < air->ramp_count; i++)
+        result = check_all(of, "air.ramp", air->ramp[i], 3, 0, 1e6);
+    return result;
+}
+
+static nebel_result check_ball(const subject *of, const nebel_layers_desc *desc)
+{
+    nebel_result result = check_all(of, "center", desc->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
+    if (result == NEBEL_OK) result = check_one(of, "radius", desc->radius, 1, 1e12);
+    if (result == NEBEL_OK) result = check_all(of, "rotation", desc->rotation, 4, -1e6, 1e6);
+    if (result == NEBEL_OK) result = check_one(of, "day", desc->day, -1e12, 1e12);
+    if (result == NEBEL_OK) result = check_one(of, "coverage", desc->coverage, 0, 1);
+    if (result == NEBEL_OK && desc->cloud_count > NEBEL_MAX_CLOUD_SHELLS)
+        result = refuse(of, "cloud_count", "must be at most 8");
+    return result == NEBEL_OK ? check_map(of, "ground", &desc->ground, 3) : result;
 }
 
 static nebel_result check(const nebel_layers_desc *desc)
 {
-    const char *fault = find_fault(desc);
-    if (fault == NULL && !desc->air.is_absent) fault = find_air_fault(&desc->air);
-    if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "planet: %s", fault);
-    for (uint32_t i = 0; i < desc->cloud_count; i++) {
-        fault = find_shell_fault(&desc->clouds[i]);
-        if (fault != NULL) return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "planet: clouds[%u]: %s", (unsigned)i, fault);
+    subject of = {&desc->log, ""};
+    nebel_result result = check_ball(&of, desc);
+    if (result == NEBEL_OK && !desc->air.is_absent) result = check_air(&of, &desc->air);
+    for (uint32_t i = 0; result == NEBEL_OK && i < desc->cloud_count; i++) {
+        (void)snprintf(of.name, sizeof of.name, "clouds[%u]: ", (unsigned)i);
+        result = check_shell(&of, &desc->clouds[i]);
     }
-    return NEBEL_OK;
+    return result;
 }
 
 /* ---- making ---------------------------------------------------------------------------------- */

@@ -106,16 +106,32 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     return true;
 }
 
+/* Before any is read: two of five alike would be told of each other. */
+static bool check_count(nb_json *json, const nb_json_node *node)
+{
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
+        if (one->index == NEBEL_MAX_CLOUD_LAYERS)
+            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one,
+                                "is one too many; a planet has at most %d layers of clouds", NEBEL_MAX_CLOUD_LAYERS);
+    return true;
+}
+
+static bool has_air(const nebel_atmosphere_desc *desc)
+{
+    for (uint32_t i = 0; i < desc->air_count; i++)
+        for (int c = 0; c < 3; c++)
+            if (desc->airs[i].scattering[c] > 0 || desc->airs[i].absorption[c] > 0) return true;
+    return false;
+}
+
 bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
-    int count = 0;
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds")) return false;
-    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
-        if (count++ == NEBEL_MAX_CLOUD_LAYERS)
-            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one,
-                                "is one too many; a planet has at most %d layers of clouds", NEBEL_MAX_CLOUD_LAYERS);
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds") || !check_count(in->json, node))
+        return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_layer(in, one, planet)) return false;
-    }
-    return true;
+    return planet->cloud_layer_count == 0 || has_air(&planet->air) ||
+           nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
+                        "need air, and the planet has none; leave them out, or give it another \"preset\" or \"airs\"");
 }

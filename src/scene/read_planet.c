@@ -220,18 +220,25 @@ static bool read_one_of_many(nb_scene_reader *in, const nb_json_node *node, nebe
     return check_apart(in, node, planets, number);
 }
 
+/* Before any is read: two of nine alike would be told of each other. */
+static bool check_count(nb_json *json, const nb_json_node *node)
+{
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
+        if (one->index == NEBEL_MAX_PLANETS)
+            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one, "is one too many; a scene has at most %d planets",
+                                NEBEL_MAX_PLANETS);
+    return true;
+}
+
 static bool read_planets(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planets, size_t *count)
 {
     if (node->type != NB_JSON_ARRAY) {
         *count = 1;
         return read_planet(in, node, planets);
     }
-    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
-        if (*count == NEBEL_MAX_PLANETS)
-            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one, "is one too many; a scene has at most %d planets",
-                                NEBEL_MAX_PLANETS);
+    if (!check_count(in->json, node)) return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_one_of_many(in, one, planets, (*count)++)) return false;
-    }
     return *count > 0 || nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for no planet");
 }
 
