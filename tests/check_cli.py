@@ -668,7 +668,8 @@ class RenderTest(PictureCase):
         done = self.render("f%%_%04d.png", "--frames", "8-10")
         self.assert_done(done)
         self.assertRegex(done.err, "3 pictures")
-        self.assertIn("nothing moves", done.err)
+        self.assertRegex(done.err, 'nothing moves.*camera and sun move with "keys"')
+        self.assertNotIn("wind", done.err)
         self.assertEqual(self.files(), sorted(self.given + [f"f%_{n:04d}.png" for n in (8, 9, 10)]))
         self.assertEqual(self.render("f%d.png", "--frames", "1-2", "--quiet").err, "")
         for n in (1, 2):

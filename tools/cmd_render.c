@@ -369,6 +369,14 @@ static int make_picture(studio *all)
     return status;
 }
 
+/* What of a planet moves. */
+static const char *name_movers(const nebel_scene_data *scene)
+{
+    if (scene->planet_count == 0) return "";
+    return scene->planets->model == NEBEL_PLANET_LAYERS ? ", a planet of layers turns with \"day\""
+                                                        : ", clouds drift with \"wind\"";
+}
+
 static void note_stillness(const nebel_scene *scene, const nb_render_call *wanted)
 {
     const nebel_scene_data *const data = nebel_scene_contents(scene);
@@ -376,8 +384,8 @@ static void note_stillness(const nebel_scene *scene, const nb_render_call *wante
         data->sun_key_count > 1)
         return;
     nb_report_message("note: %s: nothing moves, all frames are the same picture; "
-                      "the camera turns with \"turntable\", or moves with \"keys\"",
-                      wanted->scene);
+                      "the camera turns with \"turntable\", camera and sun move with \"keys\"%s",
+                      wanted->scene, name_movers(data));
 }
 
 static void warn_of_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
