@@ -101,7 +101,7 @@ typedef struct nebel_layers_desc {
 typedef struct nebel_layers nebel_layers;
 
 /* Makes a planet that does not change any more; maps are copied. Free it with nebel_destroy_layers. Errors: ARGUMENT
- * (NULL), VALUE (a number out of range; the log says which), MEMORY. Any thread. */
+ * (NULL), VALUE (a number out of range; the log says which), MEMORY; *layers is then NULL. Any thread. */
 nebel_result nebel_create_layers(const nebel_layers_desc *desc, nebel_layers **layers);
 
 /* NULL is fine. */

@@ -15,6 +15,8 @@
  * it as Rayleigh's phase function sees; that is exact for air, and smoothes what dust sends ahead.
  *
  * Places are those of the scene, y up. Units are metres. Nothing here calls a graphics interface.
+ *
+ * Strides are in bytes. 0 with n > 1: the same ray or place for all, and of results the same one is written each time.
  */
 #ifndef NEBEL_PLANET_H
 #define NEBEL_PLANET_H
@@ -81,8 +83,8 @@ nebel_result nebel_resolve_atmosphere(const nebel_atmosphere_desc *desc, nebel_a
 typedef struct nebel_atmosphere nebel_atmosphere;
 
 /* Makes an atmosphere that does not change any more, with its table: the same bits however `run` splits the work. Free
- * it with nebel_destroy_atmosphere. Errors: ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY.
- * Any thread. */
+ * it with nebel_destroy_atmosphere. Errors: ARGUMENT (NULL), VALUE (a number out of range; the log says which), MEMORY;
+ * *atmosphere is then NULL. Any thread. */
 nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_atmosphere **atmosphere);
 
 /* NULL is fine. */
@@ -124,8 +126,8 @@ typedef struct nebel_air_view_desc {
     nebel_log log;
 } nebel_air_view_desc;
 
-/* Makes the table. Errors: ARGUMENT (NULL, a sun or a place that is not in order), MEMORY. The same bits however `run`
- * splits the work. */
+/* Makes the table. Errors: ARGUMENT (NULL, a sun or a place that is not in order), MEMORY; *view is then NULL. The same
+ * bits however `run` splits the work. */
 nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_view **view);
 
 /* NULL is fine. */
