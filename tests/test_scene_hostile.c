@@ -245,6 +245,20 @@ static void test_relative_paths_start_at_the_scene(void **state)
     nebel_destroy_scene(scene);
 }
 
+static void test_maps_start_there_too(void **state)
+{
+    journal kept = {0};
+    char path[200], expected[300];
+    in_folder(path, *state, "models.json");
+    FILE *file = fopen(path, "w");
+    fputs("{\"nebel\": 1, \"fog\": [],\n\"planet\": {\"model\": \"layers\", \"map\": \"is/none.png\"}}", file);
+    fclose(file);
+    snprintf(expected, sizeof expected, "planet.map: cannot read the picture \"%s/is/none.png\": No such file",
+             (char *)*state);
+    assert_int_equal(load(path, &kept), NEBEL_ERROR_FILE);
+    assert_non_null(strstr(kept.last, expected));
+}
+
 static int make_folder(void **state)
 {
     static char folder[] = "/tmp/nebel_test_XXXXXX";
@@ -276,6 +290,7 @@ int main(void)
         cmocka_unit_test(test_a_file_without_permission_is_an_error),
         cmocka_unit_test(test_a_scene_may_come_through_a_pipe),
         cmocka_unit_test(test_relative_paths_start_at_the_scene),
+        cmocka_unit_test(test_maps_start_there_too),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
