@@ -92,8 +92,14 @@ static inline nb_four read_cell(nebel_cloud_workspace *workspace, int layer, con
     return near + cells->v[lane] * (far - near);
 }
 
+/* First all cells are sent for, which caches seldom have, so that one does not wait for the other. */
 static void find_columns(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *looks)
 {
+    for (int i = 0; i < looks->count; i++) {
+        __builtin_prefetch(&workspace->patches[looks->cells[0].hash[i] & (NB_CLOUD_PATCHES - 1)]);
+        if (looks->next[i] > 0)
+            __builtin_prefetch(&workspace->patches[looks->cells[1].hash[i] & (NB_CLOUD_PATCHES - 1)]);
+    }
     for (int i = 0; i < looks->count; i++) {
         const float next = looks->next[i];
         if (!nb_cloud_is_in_layer(looks, i)) continue;
