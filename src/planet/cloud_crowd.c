@@ -57,7 +57,7 @@ static void find_places(const nebel_cloud_view *view, int k, nb_cloud_crowd *cro
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const nb_cloud_pose *pose = &view->poses[k];
-    nb_cloud_looks looks = {.count = 0};
+    nb_cloud_looks looks = {.count = 0, .are_of_rays = 0};
     for (int first = 0; first < TRIES && crowd->count < NB_CROWD_PLACES; first += NB_CLOUD_LANES) {
         nb_crowd_place places[NB_CLOUD_LANES];
         float extinction[NB_CLOUD_LANES];

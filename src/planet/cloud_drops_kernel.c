@@ -125,10 +125,17 @@ static inline nb_real deepest(const nb_cloud_layer *layer, nb_real height)
     return detail * (NB_F(0.5) + NB_F(0.5) * nb_min(NB_F(1.0), NB_F(3.0) * height));
 }
 
+/* Extinction at a place is `most` times `part` held within 0 and 1; where a width hides some of it, all within `spread` of
+ * `part` is as likely. missing[n]: by how much the rank is at least too low, whatever billows behind the first n scales do; below
+ * 0 where it may not be. */
+typedef struct nb_drops {
+    nb_real most, part, spread, missing[NB_CLOUD_BILLOWS + 1];
+} nb_drops;
+
 /* Billows cut one minus the weighted sum of their scales. From the largest scale on they are read only until what is
  * left of them can neither make cloud nor thin it. */
-static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int p,
-                                  nb_cloud_looks *looks)
+static inline nb_drops drops_of(const nb_cloud_noise *noise, const nb_cloud_layer *layer, const nb_cloud_looks *looks,
+                                int p)
 {
     const nb_real height = load(looks->height, p), variance = load(looks->variance, p),
                   softness = nb_splat(layer->softness);
@@ -137,7 +144,8 @@ static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_la
     /* What is far within is whole. */
     nb_mask is_open = nb_and(nb_and(missing<NB_F(0.0), deep> NB_F(0.0)), whole - deep < softness + spread);
     nb_table tables[NB_CLOUD_BILLOWS];
-    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) nb_store_lanes(looks->missing[n] + p, missing);
+    nb_drops drops;
+    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) drops.missing[n] = missing;
     if (nb_any(is_open)) {
         const nb_real lost = choose_tables(noise, layer, load(looks->width, p), tables);
         spread = nb_select(is_open, nb_sqrt(NB_F(3.0) * (variance + deep * deep * lost)), spread);
@@ -151,12 +159,93 @@ static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_la
         cut = nb_select(is_open, cut + part * (NB_F(1.0) - billows), cut);
         most = most - part * billows;
         missing = nb_select(is_open, cut - whole - spread, missing);
-        for (int n = k + 1; n <= NB_CLOUD_BILLOWS; n++) nb_store_lanes(looks->missing[n] + p, missing);
+        for (int n = k + 1; n <= NB_CLOUD_BILLOWS; n++) drops.missing[n] = missing;
         is_open = nb_and(is_open, missing < NB_F(0.0));
     }
-    nb_store_lanes(looks->most + p, nb_splat(layer->extinction) * thin_out(layer->kind, height));
-    nb_store_lanes(looks->part + p, (whole - cut) / softness);
-    nb_store_lanes(looks->spread + p, spread / softness);
+    drops.most = nb_splat(layer->extinction) * thin_out(layer->kind, height);
+    drops.part = (whole - cut) / softness;
+    drops.spread = spread / softness;
+    return drops;
+}
+
+/* ---- what comes through ---------------------------------------------------------------------- */
+
+/* Where less is hidden, all is as likely as the middle. */
+#define LEAST_SPREAD NB_F(1e-3)
+
+/* Integral of x held within 0 and 1. */
+static inline nb_real ramp_integral(nb_real x)
+{
+    const nb_real held = nb_clamp(x, NB_F(0.0), NB_F(1.0));
+    return NB_F(0.5) * held * held + nb_max(NB_F(0.0), x - NB_F(1.0));
+}
+
+/* The mean of x held within 0 and 1 where all within `wide` of x is as likely. */
+static inline nb_real mean_ramp(nb_real x, nb_real wide)
+{
+    const nb_real mean = (ramp_integral(x + wide) - ramp_integral(x - wide)) / (NB_F(2.0) * nb_max(LEAST_SPREAD, wide));
+    return nb_select(wide < LEAST_SPREAD, nb_clamp(x, NB_F(0.0), NB_F(1.0)), mean);
+}
+
+/* Where a part is full and another clear, between them evenly all that lies between: mean of 1 - exp(-depth x). */
+static inline nb_real mean_lost(const nb_drops *drops, nb_real depth)
+{
+    const nb_real low = drops->part - drops->spread, high = drops->part + drops->spread;
+    const nb_real from = nb_clamp(low, NB_F(0.0), NB_F(1.0)), to = nb_clamp(high, NB_F(0.0), NB_F(1.0));
+    const nb_real full = nb_max(NB_F(0.0), high - NB_F(1.0)) - nb_max(NB_F(0.0), low - NB_F(1.0));
+    const nb_real lost = nb_one_minus_exp(depth * from);
+    const nb_real between = lost + (NB_F(1.0) - lost) * (NB_F(1.0) - nb_exp_ratio(depth * (to - from)));
+    return ((to - from) * between + full * nb_one_minus_exp(depth)) / (high - low);
+}
+
+/* Never more than the mean, whatever is too little for a number. */
+static inline nb_real through(const nb_drops *drops, nb_real depth, nb_real length, nb_real mean)
+{
+    return nb_clamp(-nb_log1p(-mean_lost(drops, depth)) / length, NB_F(0.0), mean);
+}
+
+/* Stores what lets as much through as drops do. */
+static inline void see_through(const nb_cloud_layer *layer, const nb_drops *drops, nb_mask is_cloud, int p,
+                               nb_cloud_looks *looks)
+{
+    const nb_real length = load(looks->hidden, p), depth = drops->most * length, spread = drops->spread;
+    const nb_real mean = nb_select(is_cloud, drops->most * mean_ramp(drops->part, drops->spread), NB_F(0.0));
+    const nb_real part = nb_splat(layer->apart);
+    nb_real whole = mean, apart = part * mean;
+    /* Else the mean is right to a thousandth of what a full place has. */
+    const nb_mask is_uneven = nb_and(nb_and(is_cloud, drops->part - spread < NB_F(1.0)),
+                                     nb_and(spread >= LEAST_SPREAD, depth * spread * spread > NB_F(6e-3)));
+    if (nb_any(is_uneven)) {
+        whole = nb_select(is_uneven, through(drops, depth, length, whole), whole);
+        if (looks->are_of_rays) apart = nb_select(is_uneven, through(drops, part * depth, length, apart), apart);
+    }
+    nb_store_lanes(looks->whole + p, whole);
+    if (looks->are_of_rays) nb_store_lanes(looks->apart + p, apart);
+}
+
+/* Of billows, the slope of the first scales counts, whatever the others do. */
+static inline nb_real clear_of(const nb_cloud_layer *layer, const nb_cloud_looks *looks, const nb_real missing[], int p)
+{
+    nb_real slope = nb_splat(layer->slope) * load(looks->scale, p) +
+                    nb_splat(NB_CLOUD_RANK_SLOPE * layer->per_thickness) * nb_abs(load(looks->climb, p));
+    nb_real clear = NB_F(0.0);
+    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
+        clear = nb_max(clear, missing[n] / slope);
+        if (n < NB_CLOUD_BILLOWS) slope += nb_splat(layer->billow_slopes[n]);
+    }
+    return clear;
+}
+
+static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_layer *layer, int p,
+                                  nb_cloud_looks *looks)
+{
+    const nb_real height = load(looks->height, p);
+    const nb_mask is_in = nb_and(height > NB_F(0.0), height < NB_F(1.0));
+    const nb_drops drops = drops_of(noise, layer, looks, p);
+    const nb_mask is_cloud = nb_and(is_in, drops.missing[NB_CLOUD_BILLOWS] < NB_F(0.0));
+    see_through(layer, &drops, is_cloud, p, looks);
+    if (looks->are_of_rays)
+        nb_store_lanes(looks->clear + p, nb_select(is_in, clear_of(layer, looks, drops.missing, p), NB_F(0.0)));
 }
 
 void SUFFIXED(nb_cloud_find_drops_, NB_SUFFIX)(const nb_cloud_noise *noise, const nb_cloud_layer *layer,

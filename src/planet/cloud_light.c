@@ -169,13 +169,7 @@ static double stride(nebel_cloud_workspace *workspace, int k, int is_alone, nb_s
         nb_cloud_look_alone(view->kernel, &view->clouds->noise, layer, looks);
     else
         nb_cloud_look(workspace, k, looks);
-    for (int i = 0; i < looks->count; i++) {
-        if (!nb_cloud_has_drops(looks, i) || !nb_cloud_is_in_layer(looks, i)) continue;
-        const nb_cloud_drops drops = nb_cloud_drops_of(looks, i);
-        const float hidden = nb_smaller(nb_smaller(layer->hidden_height, layer->hidden_width),
-                                        looks->width[i] - HEAP_PART * layer->size);
-        sum += steps->lengths[i] * (double)nb_cloud_through(&drops, hidden, 1).whole;
-    }
+    for (int i = 0; i < looks->count; i++) sum += steps->lengths[i] * (double)looks->whole[i];
     looks->count = 0;
     return sum;
 }
@@ -184,12 +178,14 @@ static double stride(nebel_cloud_workspace *workspace, int k, int is_alone, nb_s
 static double march(nebel_cloud_workspace *workspace, int k, const double from[3], const double unit[3], double reach,
                     const nb_steps *steps)
 {
+    const nb_cloud_layer *layer = &workspace->view->clouds->layers[k];
+    const float most_hidden = nb_smaller(layer->hidden_height, layer->hidden_width);
     double pieces[2][2], own[3], way[3], step = (double)steps->first, sum = 0;
     const int count = stays_of(workspace->view, k, from, unit, pieces);
     int taken = 0;
     nb_stride some;
     nb_cloud_looks *looks = &some.looks;
-    looks->count = 0;
+    looks->count = looks->are_of_rays = 0;
     for (int c = 0; c < 3; c++) {
         own[c] = nb_vector_dot(workspace->view->poses[k].turn[c], from);
         way[c] = nb_vector_dot(workspace->view->poses[k].turn[c], unit);
@@ -203,6 +199,7 @@ static double march(nebel_cloud_workspace *workspace, int k, const double from[3
             const int at = looks->count++;
             for (int c = 0; c < 3; c++) looks->place[c][at] = own[c] + (t + 0.5 * length) * way[c];
             looks->width[at] = nb_larger(steps->width, 0.7f * (float)length);
+            looks->hidden[at] = nb_smaller(most_hidden, looks->width[at] - HEAP_PART * layer->size);
             some.lengths[at] = length;
             if (looks->count == NB_CLOUD_LANES) sum += stride(workspace, k, steps->is_alone, &some);
             t += length;
@@ -421,7 +418,7 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
         const nb_phase lobe = nb_phase_resolve(&phase);
         ray.phase[k] = (float)nb_phase_at(&layer->phase, ray.sun);
         ray.wide_phase[k] = (float)nb_phase_at(&lobe, ray.sun);
-        ray.apart[k] = (float)(1 - g * g);
+        ray.apart[k] = layer->apart;
     }
     return ray;
 }

@@ -45,12 +45,16 @@ typedef struct nb_cloud_cells {
 /* Places, and what is there; behind `count` are places that do not matter. */
 struct nb_cloud_looks {
     int count;
+    int are_of_rays;                 /* then `way` is asked, too, and `hidden` is found */
     double place[3][NB_CLOUD_LANES]; /* from the planet's centre, in the layer's axes */
+    double way[3][NB_CLOUD_LANES];   /* a ray's direction there */
     float width[NB_CLOUD_LANES];     /* m: what is narrower is seen as a mean */
+    float hidden[NB_CLOUD_LANES];    /* m: how long that is along a ray; up to 0: not at all */
 
     /* By find_places. */
     double radius[NB_CLOUD_LANES];
     float height[NB_CLOUD_LANES];                     /* part of the layer's: cloud may be where it is within 0 and 1 */
+    float climb[NB_CLOUD_LANES];                      /* of rays: cosine to straight up */
     nb_cloud_cells cells[2];                          /* in the grid below a width, and in the next where that counts */
     float next[NB_CLOUD_LANES];                       /* the part of that */
     float parts[NB_CLOUD_BILLOWS][3][NB_CLOUD_LANES]; /* of a period of each scale of billows */
@@ -58,10 +62,11 @@ struct nb_cloud_looks {
     /* The places' columns: asked of whoever keeps them. */
     float rank[NB_CLOUD_LANES], scale[NB_CLOUD_LANES], variance[NB_CLOUD_LANES];
 
-    /* By find_drops. missing[n]: by how much the rank is at least too low, whatever billows behind the first n scales do;
-     * below 0 where it may not be. */
-    float most[NB_CLOUD_LANES], part[NB_CLOUD_LANES], spread[NB_CLOUD_LANES]; /* as of nb_cloud_drops */
-    float missing[NB_CLOUD_BILLOWS + 1][NB_CLOUD_LANES];
+    /* By find_drops, 1/m: what extinction lets as much through as the mean of all that is hidden; 0 where no cloud is. Where half
+     * of it is cloud half of the light comes through, however thick that is. */
+    float whole[NB_CLOUD_LANES];
+    /* Of rays: the same of what leads away; where no cloud is, how far there is none ahead as far as slopes of noise say, m. */
+    float apart[NB_CLOUD_LANES], clear[NB_CLOUD_LANES];
 };
 
 /* In this order, with the columns between; number: of the layer. The same bits for every instruction set, and for every place
@@ -87,7 +92,9 @@ static inline void nb_cloud_fill_lanes(nb_cloud_looks *looks)
 {
     for (int i = looks->count; i < NB_CLOUD_LANES; i++) {
         for (int c = 0; c < 3; c++) looks->place[c][i] = looks->place[c][0];
+        for (int c = 0; c < 3 && looks->are_of_rays; c++) looks->way[c][i] = looks->way[c][0];
         looks->width[i] = looks->width[0];
+        if (!looks->are_of_rays) looks->hidden[i] = looks->hidden[0];
     }
 }
 
@@ -104,17 +111,6 @@ static inline void nb_cloud_set_no_columns(nb_cloud_looks *looks)
         looks->rank[i] = -1;
         looks->scale[i] = looks->variance[i] = 0;
     }
-}
-
-/* Whether there are drops, in the layer. */
-static inline int nb_cloud_has_drops(const nb_cloud_looks *looks, int lane)
-{
-    return looks->missing[NB_CLOUD_BILLOWS][lane] < 0;
-}
-
-static inline nb_cloud_drops nb_cloud_drops_of(const nb_cloud_looks *looks, int lane)
-{
-    return (nb_cloud_drops){looks->most[lane], looks->part[lane], looks->spread[lane]};
 }
 
 #endif

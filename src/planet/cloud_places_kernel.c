@@ -99,13 +99,39 @@ static inline void find_parts(const nb_cloud_layer *layer, const nb_wide place[3
         }
 }
 
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+/* A pixel hides so much along a ray, in pixels; of sheets, which it meets aslant, as much more as it is long there, down to so
+ * flat rays. Then as much comes through as through thin rays within the pixel (test_clouds). */
+#define HIDDEN_PIXELS 0.55f
+#define FLATTEST 0.3f
+
+/* How fast a ray climbs, and what a width hides along it: no more than a ball of cloud is wide. */
+static inline void find_climb(const nb_cloud_layer *layer, const nb_wide place[3], nb_wide radius, int p,
+                              nb_cloud_looks *looks)
+{
+    nb_wide along = NB_W(0.0);
+    for (int c = 0; c < 3; c++) along += place[c] * nb_wload_lanes(looks->way[c] + p);
+    const nb_real climb = nb_narrow(along / radius), width = nb_load_lanes(looks->width + p);
+    const nb_real up = climb / nb_splat(layer->hidden_height),
+                  aside = (NB_F(1.0) - climb * climb) / nb_splat(layer->hidden_width * layer->hidden_width);
+    const nb_real whole = NB_F(1.0) / nb_sqrt(up * up + nb_max(NB_F(0.0), aside));
+    nb_real part = nb_splat(HIDDEN_PIXELS);
+    if (layer->kind != NEBEL_CLOUD_CUMULUS) part = part / nb_max(nb_abs(climb), nb_splat(FLATTEST));
+    nb_store_lanes(looks->climb + p, climb);
+    nb_store_lanes(looks->hidden + p, nb_min(part * width, whole));
+}
+
 /* ---- the face -------------------------------------------------------------------------------- */
+
+/* Drops are found eight at a time at most, or twice as many as places. */
+enum { TOGETHER = NB_WIDTH < 4 ? 2 * NB_WIDTH : 8 };
 
 void SUFFIXED(nb_cloud_find_places_, NB_SUFFIX)(const nb_cloud_layer *layer, int number, nb_cloud_looks *looks)
 {
     const nb_wide low = nb_wsplat(layer->low);
     const nb_real per = nb_splat(layer->per_thickness);
-    const int end = (looks->count + 2 * NB_WIDTH - 1) & -(2 * NB_WIDTH); /* drops are found twice as many at a time */
+    const int end = (looks->count + TOGETHER - 1) & -TOGETHER;
     for (int p = 0; p < end; p += NB_WIDTH) {
         nb_wide place[3];
         for (int c = 0; c < 3; c++) place[c] = nb_wload_lanes(looks->place[c] + p);
@@ -113,6 +139,7 @@ void SUFFIXED(nb_cloud_find_places_, NB_SUFFIX)(const nb_cloud_layer *layer, int
         const nb_faces faces = find_faces(place[0], place[1], place[2]);
         nb_wstore_lanes(looks->radius + p, radius);
         nb_store_lanes(looks->height + p, nb_narrow(radius - low) * per);
+        if (looks->are_of_rays) find_climb(layer, place, radius, p, looks);
         find_cells(layer, number, &faces, p, looks);
         find_parts(layer, place, p, looks);
     }

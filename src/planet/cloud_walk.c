@@ -78,7 +78,7 @@ typedef struct nb_turned {
 /* A place of the ray in a layer's axes, and a part of its height. */
 typedef struct nb_spot {
     double place[3], radius;
-    float height, width;
+    float height, width, climb; /* climb: cosine to straight up */
 } nb_spot;
 
 /* Where a ray is in a layer. */
@@ -136,13 +136,8 @@ static nb_spot spot_at(const nb_walk *walk, int k, double t)
     for (int i = 0; i < 3; i++) spot.place[i] = turned->from[i] + t * turned->direction[i];
     spot.radius = nb_vector_length(spot.place);
     spot.height = (float)(spot.radius - layer->low) * layer->per_thickness;
+    spot.climb = (float)(nb_vector_dot(spot.place, turned->direction) / spot.radius);
     return spot;
-}
-
-/* How fast a ray rises. */
-static double climb_at(const nb_walk *walk, int k, const double place[3], double radius)
-{
-    return nb_vector_dot(place, walk->turned[k].direction) / radius;
 }
 
 /* ---- looking --------------------------------------------------------------------------------- */
@@ -157,45 +152,28 @@ typedef struct nb_queue {
 static void ask(nb_queue *queue, nb_walk *walk, int k, double t, nb_cloud_seen *seen)
 {
     const int i = queue->looks.count++;
-    for (int c = 0; c < 3; c++) queue->looks.place[c][i] = walk->turned[k].from[c] + t * walk->turned[k].direction[c];
+    const nb_turned *turned = &walk->turned[k];
+    for (int c = 0; c < 3; c++) {
+        queue->looks.place[c][i] = turned->from[c] + t * turned->direction[c];
+        queue->looks.way[c][i] = turned->direction[c];
+    }
     queue->looks.width[i] = (float)(walk->spread * t);
     queue->walks[i] = walk;
     queue->seen[i] = seen;
     walk->unanswered++;
 }
 
-/* Where there is no cloud, how far there is none ahead as far as slopes of noise say: of billows, that of the first scales, whatever
- * the others do. */
-static double clear_from(const nb_cloud_layer *layer, const nb_cloud_looks *looks, int i, float climb)
-{
-    float slope = layer->slope * looks->scale[i] + NB_CLOUD_RANK_SLOPE * climb * layer->per_thickness;
-    double clear = 0;
-    for (int n = 0; n <= NB_CLOUD_BILLOWS; n++) {
-        clear = nb_max(clear, (double)(looks->missing[n][i] / slope));
-        slope += n < NB_CLOUD_BILLOWS ? layer->billow_slopes[n] : 0;
-    }
-    return clear;
-}
-
-static void see(const nb_queue *queue, int k, int i)
+static void see(const nb_queue *queue, int i)
 {
     const nb_cloud_looks *looks = &queue->looks;
     nb_walk *walk = queue->walks[i];
-    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    nb_spot spot = {.radius = looks->radius[i], .height = looks->height[i], .width = looks->width[i]};
-    *queue->seen[i] = (nb_cloud_seen){0, 0};
+    *queue->seen[i] = (nb_cloud_seen){looks->whole[i], looks->apart[i]};
     walk->unanswered--;
-    for (int c = 0; c < 3; c++) spot.place[c] = looks->place[c][i];
-    const float climb = (float)fabs(climb_at(walk, k, spot.place, spot.radius));
-    const int is_in = nb_cloud_is_in_layer(looks, i);
-    if (is_in && nb_cloud_has_drops(looks, i)) {
-        const nb_cloud_drops drops = nb_cloud_drops_of(looks, i);
-        *queue->seen[i] =
-            nb_cloud_through(&drops, nb_cloud_hidden_length(layer, spot.width, climb), walk->ray.apart[k]);
-    } else if (walk->wait == NB_WAIT_STEP) {
-        walk->spot = spot;
-        walk->clear = is_in ? clear_from(layer, looks, i, climb) : 0;
-    }
+    if (walk->wait != NB_WAIT_STEP || looks->whole[i] > 0) return;
+    walk->spot = (nb_spot){
+        .radius = looks->radius[i], .height = looks->height[i], .width = looks->width[i], .climb = looks->climb[i]};
+    for (int c = 0; c < 3; c++) walk->spot.place[c] = looks->place[c][i];
+    walk->clear = (double)looks->clear[i];
 }
 
 /* ---- where no cloud is ----------------------------------------------------------------------- */
@@ -204,8 +182,8 @@ static void see(const nb_queue *queue, int k, int i)
 static float least_between(const nb_walk *walk, int k, const nb_spot *a, double way)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    const double climb = climb_at(walk, k, a->place, a->radius), sag = way * way / a->radius;
-    const float end = a->height + (float)(climb * way) * layer->per_thickness;
+    const double sag = way * way / a->radius;
+    const float end = a->height + a->climb * (float)way * layer->per_thickness;
     const float low = nb_smaller(a->height, end) - (float)sag * layer->per_thickness;
     const float high = nb_larger(a->height, end) + (float)sag * layer->per_thickness;
     if (layer->kind == NEBEL_CLOUD_CUMULUS) return nb_cloud_least_rank(layer->kind, nb_larger(0, low));
@@ -597,7 +575,7 @@ static void look(const nb_rays *rays, int k, nb_party *party)
 {
     nb_queue *queue = &party->queues[k];
     nb_cloud_look(rays->workspace, k, &queue->looks);
-    for (int i = 0; i < queue->looks.count; i++) see(queue, k, i);
+    for (int i = 0; i < queue->looks.count; i++) see(queue, i);
     for (int i = 0; i < queue->looks.count; i++) {
         nb_walk *walk = queue->walks[i];
         if (walk->unanswered != 0 || walk->wait == NB_WAIT_NOTHING) continue;
@@ -625,7 +603,10 @@ static void trace(nb_rays *rays)
 {
     nb_party party;
     party.ready_count = 0;
-    for (int k = 0; k < NEBEL_MAX_CLOUD_LAYERS; k++) party.queues[k].looks.count = 0;
+    for (int k = 0; k < NEBEL_MAX_CLOUD_LAYERS; k++) {
+        party.queues[k].looks.count = 0;
+        party.queues[k].looks.are_of_rays = 1;
+    }
     for (int i = 0; i < WALKS && rays->next < rays->n; i++) begin_next(rays, &party.walks[i], &party);
     for (;;) {
         if (party.ready_count == 0) {

@@ -16,12 +16,7 @@
 
 #define PI 3.14159265358979323846
 
-/* A pixel hides so much along a ray, in pixels; of sheets, which it meets aslant, as much more as it is long there, down to so
- * flat rays. Then as much comes through as through thin rays within the pixel (test_clouds). */
-#define HIDDEN_PIXELS 0.55f
-#define FLATTEST 0.3f
-
-/* Nor more than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in sizes of heaps: of heaps, of
+/* A pixel hides no more along a ray than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in sizes of heaps: of heaps, of
  * sheets. Beyond it the ray meets other cloud. As thin rays find, straight down to 9 degrees flat (test_clouds). */
 static const float hidden_heights[] = {0.37f, 0.75f}, hidden_widths[] = {0.42f, 0.55f};
 
@@ -152,62 +147,6 @@ nb_cloud_column nb_cloud_column_at(const nb_cloud_noise *noise, const nb_cloud_l
     return column;
 }
 
-/* ---- drops ----------------------------------------------------------------------------------- */
-
-/* Integral of x held within 0 and 1. */
-static float ramp_integral(float x)
-{
-    if (x <= 0) return 0;
-    return x < 1 ? 0.5f * x * x : x - 0.5f;
-}
-
-/* The mean of x held within 0 and 1 where all within `wide` of x is as likely. */
-static float mean_ramp(float x, float wide)
-{
-    if (wide < 1e-3f) return nb_smaller(1, nb_larger(0, x));
-    return (ramp_integral(x + wide) - ramp_integral(x - wide)) / (2 * wide);
-}
-
-float nb_cloud_mean(const nb_cloud_drops *drops)
-{
-    return drops->most * mean_ramp(drops->part, drops->spread);
-}
-
-/* Where a part is full and another clear, between them evenly all that lies between: mean of exp(-depth x). */
-static double mean_left(const nb_cloud_drops *drops, double depth)
-{
-    const double low = (double)(drops->part - drops->spread), high = (double)(drops->part + drops->spread);
-    const double clear = nb_max(0, -low) - nb_max(0, -high), full = nb_max(0, high - 1) - nb_max(0, low - 1);
-    const double from = nb_exp(-depth * nb_max(0, nb_min(1, low))), to = nb_exp(-depth * nb_max(0, nb_min(1, high)));
-    return (clear + (from - to) / depth + full * nb_exp(-depth)) / (high - low);
-}
-
-/* Never more than the mean, whatever is too little for a number. */
-static float through(const nb_cloud_drops *drops, float depth, float length, float mean)
-{
-    return nb_smaller(mean, (float)-nb_log(mean_left(drops, (double)depth)) / length);
-}
-
-float nb_cloud_hidden_length(const nb_cloud_layer *layer, float width, float climb)
-{
-    const float up = climb / layer->hidden_height,
-                aside = (1 - climb * climb) / (layer->hidden_width * layer->hidden_width);
-    const float whole = 1 / sqrtf(up * up + nb_larger(0, aside));
-    const float along = layer->kind == NEBEL_CLOUD_CUMULUS ? width : width / nb_larger(climb, FLATTEST);
-    return nb_smaller(HIDDEN_PIXELS * along, whole);
-}
-
-nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float apart)
-{
-    const float depth = drops->most * length, mean = nb_cloud_mean(drops);
-    const int is_full = drops->part - drops->spread >= 1;
-    /* Then the mean is right to a thousandth of what a full place has. */
-    const int is_even = drops->spread < 1e-3f || !(depth * drops->spread * drops->spread > 6e-3f);
-    if (is_full || is_even) return (nb_cloud_seen){mean, apart * mean};
-    const float whole = through(drops, depth, length, mean);
-    return (nb_cloud_seen){whole, apart < 1 ? through(drops, apart * depth, length, apart * mean) : whole};
-}
-
 /* ---- places that are asked at once ----------------------------------------------------------- */
 
 #define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = {nb_cloud_find_places_##suffix, nb_cloud_find_drops_##suffix},
@@ -224,6 +163,7 @@ void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double
     const int i = looks->count++;
     for (int c = 0; c < 3; c++) looks->place[c][i] = nb_vector_dot(pose->turn[c], place);
     looks->width[i] = width;
+    looks->hidden[i] = 0;
 }
 
 void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
@@ -247,10 +187,7 @@ void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *no
 void nb_cloud_find_means(const nebel_clouds *clouds, int layer, nb_cloud_looks *looks, float extinction[])
 {
     nb_cloud_look_alone(clouds->kernel, &clouds->noise, &clouds->layers[layer], looks);
-    for (int i = 0; i < looks->count; i++) {
-        const nb_cloud_drops drops = nb_cloud_drops_of(looks, i);
-        extinction[i] = nb_cloud_has_drops(looks, i) && nb_cloud_is_in_layer(looks, i) ? nb_cloud_mean(&drops) : 0;
-    }
+    memcpy(extinction, looks->whole, (size_t)looks->count * sizeof *extinction);
     looks->count = 0;
 }
 
@@ -454,6 +391,7 @@ static nebel_result set_layer(nebel_clouds *clouds, const nebel_cloud_layer *des
     layer->per_time = speed / layer->low;
     layer->phase = nb_phase_resolve(&phase);
     layer->mean_cosine = nb_phase_mean_cosine(&layer->phase);
+    layer->apart = (float)(1 - layer->mean_cosine * layer->mean_cosine);
     layer->size = (float)desc->size;
     layer->hidden_height = hidden_heights[desc->kind != NEBEL_CLOUD_CUMULUS] / layer->per_thickness;
     layer->hidden_width = hidden_widths[desc->kind != NEBEL_CLOUD_CUMULUS] * (float)desc->size;
@@ -542,7 +480,7 @@ static void add_layer(const nebel_clouds *clouds, int k, double time, float widt
                       size_t stride, float *extinction)
 {
     const nb_cloud_pose pose = nb_cloud_pose_at(&clouds->layers[k], time);
-    nb_cloud_looks looks = {.count = 0};
+    nb_cloud_looks looks = {.count = 0, .are_of_rays = 0};
     for (size_t first = 0; first < n; first += NB_CLOUD_LANES) {
         const size_t count = n - first < NB_CLOUD_LANES ? n - first : NB_CLOUD_LANES;
         float means[NB_CLOUD_LANES];

@@ -57,6 +57,7 @@ typedef struct nb_cloud_layer {
     nb_layer_map weather; /* level_count 0: none */
     nb_phase phase;
     double mean_cosine;
+    float apart; /* 1 - g^2 of that: what part of scattering leads away */
 } nb_cloud_layer;
 
 /* How densities are found: see cloud_looks.h. */
@@ -107,30 +108,15 @@ static inline float nb_cloud_least_rank(nebel_cloud_kind kind, float height)
 
 /* ---- drops ----------------------------------------------------------------------------------- */
 
-/* Drops at a place: extinction is `most` times `part` held within 0 and 1; where a width hides some of it, all within
- * `spread` of `part` is as likely. */
-typedef struct nb_cloud_drops {
-    float most, part, spread;
-} nb_cloud_drops;
-
-/* Their mean extinction. */
-float nb_cloud_mean(const nb_cloud_drops *drops);
-
-/* What extinction lets as much through as the mean of all that is hidden, which is as long along a ray as `length`; apart:
- * of that part of extinction. Where half of it is cloud half of the light comes through, however thick that is. */
+/* How much of extinction is seen: of all; of that part of scattering which leads away. */
 typedef struct nb_cloud_seen {
     float whole, apart;
 } nb_cloud_seen;
 
-nb_cloud_seen nb_cloud_through(const nb_cloud_drops *drops, float length, float apart);
-
-/* What a width hides along a ray that climbs so much a metre, as a length of it. */
-float nb_cloud_hidden_length(const nb_cloud_layer *layer, float width, float climb);
-
 /* Places that are asked at once (cloud_looks.h). */
 typedef struct nb_cloud_looks nb_cloud_looks;
 
-/* Puts a place from the planet's centre behind those that are asked. */
+/* Puts a place from the planet's centre behind those whose mean is asked. */
 void nb_cloud_ask(nb_cloud_looks *looks, const nb_cloud_pose *pose, const double place[3], float width);
 /* Finds drops; no column next to the places is asked, so that none is kept. */
 void nb_cloud_look_alone(const nb_cloud_kernel *kernel, const nb_cloud_noise *noise, const nb_cloud_layer *layer,
