@@ -51,42 +51,89 @@ static nebel_ray ray_of(const nb_frame *frame, const nb_cloud_scratch *clouds, u
     return ray;
 }
 
-static nebel_result shade_air(const nb_frame *frame, nb_cloud_scratch *clouds, uint32_t lane)
+/* What is asked of the air at once: ends along the rays of some lanes. */
+typedef struct nb_air_asked {
+    uint32_t lane_count, lanes[NB_BATCH], first[NB_BATCH]; /* of a lane's ends */
+    uint32_t count;
+    double direction[3][NB_WORLDS_RAYS];
+    float t[NB_WORLDS_RAYS], left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS];
+} nb_air_asked;
+
+static int has_room(const nb_air_asked *asked, uint32_t count)
 {
-    const nebel_ray ray = ray_of(frame, clouds, lane);
-    nebel_air_shade shade;
-    float left[3][NB_SHADED_PIECES], light[3][NB_SHADED_PIECES];
-    double along[3][NB_SHADED_PIECES];
-    const double *const direction[3] = {along[0], along[1], along[2]};
-    nebel_light_planes lights = {.error = NULL};
-    nebel_result result = nebel_shade_air(clouds->workspace, 1, &ray, 0, &shade, 0);
-    clouds->shaded_count[lane] = 0;
-    if (result != NEBEL_OK || shade.count == 0) return result;
-    for (int c = 0; c < 3; c++) {
-        for (int k = 0; k < NB_SHADED_PIECES; k++) along[c][k] = ray.direction[c];
-        lights.transmittance[c] = left[c];
-        lights.in_scattering[c] = light[c];
+    return asked->count + count <= NB_WORLDS_RAYS;
+}
+
+static void ask_air(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, const float *t, nb_air_asked *asked)
+{
+    asked->lanes[asked->lane_count] = lane;
+    asked->first[asked->lane_count++] = asked->count;
+    for (uint32_t k = 0; k < count; k++) {
+        for (int c = 0; c < 3; c++) asked->direction[c][asked->count] = clouds->rays.direction[c][lane];
+        asked->t[asked->count++] = t[k];
     }
-    result = nb_air_trace(&frame->air, shade.count + 1, direction, shade.t, &lights);
-    if (result == NEBEL_OK) clouds->shaded_count[lane] = nb_shaded_set(&shade, light, clouds->shaded[lane]);
+}
+
+static nebel_result answer(const nb_frame *frame, nb_air_asked *asked)
+{
+    const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
+    nebel_light_planes lights = {.error = NULL};
+    for (int c = 0; c < 3; c++) {
+        lights.transmittance[c] = asked->left[c];
+        lights.in_scattering[c] = asked->light[c];
+    }
+    return nb_air_trace(&frame->air, asked->count, direction, asked->t, &lights);
+}
+
+/* The shade of those that were asked; begins anew. */
+static nebel_result set_shade(const nb_frame *frame, const nebel_air_shade *shades, nb_cloud_scratch *clouds,
+                              nb_air_asked *asked)
+{
+    if (asked->count == 0) return NEBEL_OK;
+    const nebel_result result = answer(frame, asked);
+    for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
+        const uint32_t lane = asked->lanes[i];
+        float light[3][NB_SHADED_PIECES];
+        for (int c = 0; c < 3; c++)
+            memcpy(light[c], asked->light[c] + asked->first[i], (shades[lane].count + 1) * sizeof light[c][0]);
+        clouds->shaded_count[lane] = nb_shaded_set(&shades[lane], light, clouds->shaded[lane]);
+    }
+    asked->lane_count = asked->count = 0;
     return result;
+}
+
+static int is_in_picture(const nb_frame *frame, const nb_place *place, uint32_t lane)
+{
+    return nb_lane_x(place->first + lane) < frame->width - place->left &&
+           nb_lane_y(place->first + lane) < frame->height - place->top;
+}
+
+static nebel_result shade_air(const nb_frame *frame, const nb_place *place, nb_cloud_scratch *clouds)
+{
+    nebel_result result = NEBEL_OK;
+    nebel_air_shade shades[NB_BATCH];
+    nb_air_asked asked;
+    asked.lane_count = asked.count = 0;
+    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        if (!is_in_picture(frame, place, i)) continue;
+        const nebel_ray ray = ray_of(frame, clouds, i);
+        result = nebel_shade_air(clouds->workspace, 1, &ray, 0, &shades[i], 0);
+        if (result != NEBEL_OK || shades[i].count == 0) continue;
+        if (!has_room(&asked, shades[i].count + 1)) result = set_shade(frame, shades, clouds, &asked);
+        ask_air(clouds, i, shades[i].count + 1, shades[i].t, &asked);
+    }
+    return result == NEBEL_OK ? set_shade(frame, shades, clouds, &asked) : result;
 }
 
 nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
 {
-    nebel_result result = NEBEL_OK;
     nb_cloud_scratch *clouds = &scratch->clouds;
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
                  scratch->centers.y + place->first, &clouds->rays);
     memset(clouds->reach, 0, sizeof clouds->reach);
     nb_fog_shade_start(scratch);
-    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        const int in_row = nb_lane_x(place->first + i) < frame->width - place->left;
-        const int in_column = nb_lane_y(place->first + i) < frame->height - place->top;
-        clouds->knots[i].count = clouds->shaded_count[i] = 0;
-        if (in_row && in_column) result = shade_air(frame, clouds, i);
-    }
-    return result;
+    for (uint32_t i = 0; i < NB_BATCH; i++) clouds->knots[i].count = clouds->shaded_count[i] = 0;
+    return shade_air(frame, place, clouds);
 }
 
 /* How far clouds matter to a sample. A ray that goes on from there to the ground is not followed beyond it. */
@@ -141,21 +188,39 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
 
-/* What the air does up to the knots of a ray. */
-static nebel_result find_air(const nb_frame *frame, nb_cloud_scratch *clouds, int lane)
+/* What the air does up to the knots of those that were asked; begins anew. */
+static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_air_asked *asked)
 {
-    const nebel_cloud_knots *knots = &clouds->knots[lane];
-    const double direction[3] = {clouds->rays.direction[0][lane], clouds->rays.direction[1][lane],
-                                 clouds->rays.direction[2][lane]};
-    nb_cloud_haze *air = &clouds->air[lane];
-    nb_cloud_rays rays;
-    nb_cloud_haze_ask(knots, direction, air, &rays);
-    const nebel_result result = nb_air_trace(&frame->air, knots->count, rays.direction, knots->t, &rays.lights);
-    for (int c = 0; c < 3; c++)
-        for (uint32_t k = 0; k < knots->count; k++)
-            air->light[c][k] =
-                nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k], air->light[c][k]);
+    if (asked->count == 0) return NEBEL_OK;
+    const nebel_result result = answer(frame, asked);
+    for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
+        const uint32_t lane = asked->lanes[i], first = asked->first[i];
+        const nebel_cloud_knots *knots = &clouds->knots[lane];
+        nb_cloud_haze *air = &clouds->air[lane];
+        for (int c = 0; c < 3; c++)
+            for (uint32_t k = 0; k < knots->count; k++) {
+                air->left[c][k] = asked->left[c][first + k];
+                air->light[c][k] = nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k],
+                                                   asked->light[c][first + k]);
+            }
+    }
+    asked->lane_count = asked->count = 0;
     return result;
+}
+
+/* Of all lanes that are marked. */
+static nebel_result find_air(const nb_frame *frame, const int is_asked[NB_BATCH], nb_cloud_scratch *clouds)
+{
+    nebel_result result = NEBEL_OK;
+    nb_air_asked asked;
+    asked.lane_count = asked.count = 0;
+    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        const nebel_cloud_knots *knots = &clouds->knots[i];
+        if (!is_asked[i]) continue;
+        if (!has_room(&asked, knots->count)) result = set_air(frame, clouds, &asked);
+        ask_air(clouds, i, knots->count, knots->t, &asked);
+    }
+    return result == NEBEL_OK ? set_air(frame, clouds, &asked) : result;
 }
 
 /* Marks the knots that are next. */
@@ -180,9 +245,9 @@ static nebel_result mark(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scr
 /* What is next. *any: whether anything is. */
 static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int *any)
 {
-    nebel_result result = NEBEL_OK;
+    int is_longer[NB_BATCH] = {0};
     *any = 0;
-    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+    for (int i = 0; i < NB_BATCH; i++) {
         nebel_cloud_knots *knots = &clouds->knots[i];
         const uint32_t count = knots->count;
         clouds->next[i] = -1;
@@ -190,9 +255,9 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
         clouds->next[i] =
             nb_cloud_haze_next(knots, &clouds->marks[i], &clouds->air[i], frame->air.tolerance, &clouds->doubt[i]);
         *any |= clouds->next[i] >= 0;
-        if (knots->count > count) result = find_air(frame, clouds, i);
+        is_longer[i] = knots->count > count;
     }
-    return result;
+    return find_air(frame, is_longer, clouds);
 }
 
 static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
@@ -224,12 +289,9 @@ static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
 static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
-    nebel_result result = NEBEL_OK;
-    for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        if (!clouds->is_new[i]) continue;
-        clouds->doubt[i] = 0;
-        result = find_air(frame, clouds, i);
-    }
+    for (int i = 0; i < NB_BATCH; i++)
+        if (clouds->is_new[i]) clouds->doubt[i] = 0;
+    nebel_result result = find_air(frame, clouds->is_new, clouds);
     if (result == NEBEL_OK && frame->air.has_fog) {
         memcpy(clouds->distance, scratch->distance, sizeof clouds->distance);
         clouds->samples = scratch->samples;
