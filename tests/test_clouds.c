@@ -257,6 +257,45 @@ static void test_no_lines_in_thin_clouds(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* A closed sheet against a low sun: how much its light differs from the mean of neighbours, as a part of it. Where places of light
+ * hung on where pieces of a ray ended, which are halves and doubles of each other, it was 1.9e-3 and looked like grain. */
+static void test_neighbours_have_light_of_neighbouring_places(void **state)
+{
+    (void)state;
+    enum { SIDE = 48, COUNT = SIDE * SIDE };
+    const double pixel = 2 / sqrt(3) / 360;
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 0.9});
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    const nebel_cloud_view_desc desc = {.clouds = clouds, .sun = {.direction = {.3, .12, -1}, .irradiance = {5, 5, 5}}};
+    static nebel_cloud_knots knots[COUNT];
+    double square = 0, most = 0;
+    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+    for (int i = 0; i < COUNT; i++) {
+        const nebel_ray ray = {.origin = {0, 2, 0},
+                               .direction = {(i % SIDE - 180) * pixel, (110 - i / SIDE) * pixel, -1},
+                               .t_max = HUGE_VAL};
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &pixel, 0, &knots[i], 0), NEBEL_OK);
+        assert_true(knots[i].count > 0);
+    }
+    for (int i = SIDE; i < COUNT - SIDE; i++) {
+        double light[5];
+        const int at[5] = {i, i - 1, i + 1, i - SIDE, i + SIDE};
+        if (i % SIDE == 0 || i % SIDE == SIDE - 1) continue;
+        for (int k = 0; k < 5; k++) light[k] = (double)knots[at[k]].in_scattering[knots[at[k]].count - 1][0];
+        const double off = 4 * light[0] / (light[1] + light[2] + light[3] + light[4]) - 1;
+        square += off * off;
+        most = fmax(most, fabs(off));
+    }
+    print_message("sheet against a low sun: pixels off the mean of neighbours by %.2g, %.2g at most\n",
+                  sqrt(square / COUNT), most);
+    assert_true(sqrt(square / COUNT) < 1.2e-3 && most < 7e-3);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* Steps are no longer than a layer is high, however large its heaps. */
 static void test_thin_layers(void **state)
 {
@@ -742,6 +781,7 @@ int main(void)
         cmocka_unit_test(test_wind_turns_the_shell),
         cmocka_unit_test(test_transmittance_is_that_of_the_density),
         cmocka_unit_test(test_no_lines_in_thin_clouds),
+        cmocka_unit_test(test_neighbours_have_light_of_neighbouring_places),
         cmocka_unit_test(test_thin_layers),
         cmocka_unit_test(test_thick_cloud_ends_where_it_is_seen),
         cmocka_unit_test(test_below_the_ground_is_on_it),

@@ -26,7 +26,7 @@
 
 /* Optical depth of a piece; and of a stretch of them, whose light is that of its middle. Both grow as less is seen. */
 #define MOST_DEPTH 1
-#define STRETCH_DEPTH 0.35
+#define STRETCH_DEPTH 0.85
 
 /* The first step from a piece towards the sun: optical depth in the middle of clouds; half of the least piece at most. */
 #define FIRST_DEPTH 0.3
@@ -34,7 +34,11 @@
 /* Where there may be cloud and is none, of a sixteenth of the smallest heaps: near, where wisps are many pixels wide, and where a
  * pixel is half a step. */
 #define LEAST_STEP 0.2
-#define FAR_STEP 0.5
+#define FAR_STEP 0.7
+
+/* Where less than that is left steps in search of cloud are as much longer, up to so many times. */
+#define DIM 0.3
+#define MOST_TIMES 3
 
 /* The first piece of who stands within cloud, of the same: small billows are shorter, and three values of a longer piece may lie on
  * a line by chance. Later ones have grown from pieces that were smooth. */
@@ -48,8 +52,8 @@
  * depths of their middle, and are half as bright (test_clouds). */
 #define NODES_PART 0.08
 
-/* Noise hardly ever rises by a fifth of its largest slope all the way to the next cloud. */
-#define SLOPE_PART 0.2
+/* Noise hardly ever rises by a seventh of its largest slope all the way to the next cloud. */
+#define SLOPE_PART 0.15
 
 /* Between two knots transmittance falls by no more than about that. */
 #define MOST_FALL 0.12
@@ -61,8 +65,9 @@ enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
 
 /* Pieces one behind the other that have the same light. */
 typedef struct nb_stretch {
-    double end, depth, seen, seen_apart; /* seen: of all scattering, and of what leads away */
-    double weight, moment;               /* of places by what is seen */
+    double end, depth, most; /* most: how deep it gets */
+    double seen, seen_apart; /* of all scattering, and of what leads away */
+    double weight, moment;   /* of places by what is seen */
 } nb_stretch;
 
 /* What clouds have left and sent up to a place of a ray. */
@@ -207,8 +212,17 @@ static double clear_way(nb_walk *walk, int k)
     return 0;
 }
 
-/* Goes on until there may be cloud, by as much as there can be none, or by the least step, which pixels wider than that make longer, but
- * no more than a part of the stay. Returns 0 at its end, else 1 and the step is from t as long as length. */
+/* Pixels wider than the least step make it longer, but no more than a part of the stay. */
+static double least_step(const nb_walk *walk, const nb_stay *stay)
+{
+    const double width = walk->spread * walk->t,
+                 near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
+    const double times = nb_min(MOST_TIMES, nb_max(1, DIM / walk->left));
+    return times * nb_min(STAY_STEP * (stay->end - stay->begin), nb_max(near, width));
+}
+
+/* Goes on until there may be cloud, by as much as there can be none, or by the least step. Returns 0 at the stay's end, else 1 and
+ * the step is from t as long as length. */
 static int find_step(nb_walk *walk, const nb_stay *stay)
 {
     const int k = stay->layer;
@@ -222,10 +236,7 @@ static int find_step(nb_walk *walk, const nb_stay *stay)
                 continue;
             }
         }
-        const double width = walk->spread * walk->t,
-                     near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
-        const double step = nb_min(STAY_STEP * (stay->end - stay->begin), nb_max(near, 0.7 * width));
-        walk->length = nb_min(stay->end - walk->t, nb_max(walk->clear / SLOPE_PART, step));
+        walk->length = nb_min(stay->end - walk->t, nb_max(walk->clear / SLOPE_PART, least_step(walk, stay)));
         return 1;
     }
     return 0;
@@ -276,7 +287,7 @@ static void bridge_gap(nb_walk *walk, double t)
     walk->gap_end = knot_here(walk, t);
 }
 
-/* Where the clouds' transmittance has fallen, or the ray is far from the last knot. */
+/* Behind a stretch, whose light a knot has: where the clouds' transmittance has fallen, or the ray is far from the last knot. */
 static void pass(nb_walk *walk, double t)
 {
     const double fallen = walk->last.left - walk->left;
@@ -284,7 +295,7 @@ static void pass(nb_walk *walk, double t)
 }
 
 /* Where the last cloud ends, not the stay in its layer, which may be beyond the horizon: the last light would come through all air before
- * that. A knot that is there already does not have that light yet. */
+ * that. It takes the place of a knot that is there already. */
 static void end_knots(nb_walk *walk)
 {
     nebel_cloud_knots *knots = walk->knots;
@@ -300,10 +311,11 @@ static void end_knots(nb_walk *walk)
 /* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
 static void add_light(nb_walk *walk, int k)
 {
-    const nb_stretch *stretch = &walk->stretch;
+    const nb_stretch stretch = walk->stretch;
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    if (!(stretch->weight > 0)) return;
-    const double t = stretch->moment / stretch->weight, width = walk->spread * t;
+    walk->stretch = (nb_stretch){.weight = 0};
+    if (!(stretch.weight > 0)) return;
+    const double t = stretch.moment / stretch.weight, width = walk->spread * t;
     const double thickness = 1 / (double)layer->per_thickness;
     double place[3], up[3];
     const double radius = radius_at(walk, t, place);
@@ -329,9 +341,8 @@ static void add_light(nb_walk *walk, int k)
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
     const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light, up);
     for (int c = 0; c < 3; c++)
-        walk->light[c] += stretch->seen * (double)(source.once[c] + source.ambient[c]) +
-                          stretch->seen_apart * (double)source.often[c];
-    walk->stretch = (nb_stretch){.weight = 0};
+        walk->light[c] +=
+            stretch.seen * (double)(source.once[c] + source.ambient[c]) + stretch.seen_apart * (double)source.often[c];
 }
 
 /* What counts of light that leads away and is left: all of it, but in the end nothing. */
@@ -341,17 +352,19 @@ static double visible(double left)
     return nb_max(0, left - UNSEEN * faded * faded);
 }
 
-static void take_piece(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
+/* How deep the next stretch gets: where nothing more is seen it has no end. */
+static double deepest_stretch(const nb_walk *walk)
+{
+    return walk->left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->left) : HUGE_VAL;
+}
+
+/* Part of a piece that lies in one stretch. */
+static void take_part(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
 {
     nb_stretch *stretch = &walk->stretch;
-    if (!(depth > 0)) return;
-    if (t - stretch->end > walk->least) add_light(walk, k);
-    if (walk->knots->count == 0)
-        add_knot(walk, t);
-    else
-        bridge_gap(walk, t);
     const double apart = (double)walk->ray.apart[k], seen = walk->left * (1 - nb_exp(-depth));
     const double before = visible(walk->left_apart);
+    if (!(stretch->depth > 0)) stretch->most = deepest_stretch(walk);
     stretch->depth += depth;
     stretch->end = t + length;
     stretch->seen += seen;
@@ -364,8 +377,33 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
     stretch->seen_apart += seen_apart;
     stretch->weight += seen + seen_apart;
     stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
-    if (stretch->depth > STRETCH_DEPTH / (0.15 + walk->left)) add_light(walk, k);
-    pass(walk, t + length);
+}
+
+/* What part of a piece of such depth is left until the stretch ends; more than 1 where it goes on. */
+static double rest_of_stretch(const nb_walk *walk, double depth)
+{
+    const nb_stretch *stretch = &walk->stretch;
+    return ((stretch->depth > 0 ? stretch->most : deepest_stretch(walk)) - stretch->depth) / depth;
+}
+
+/* Stretches end where cloud is so deep, wherever pieces end: neighbouring rays, whose pieces may be others, have their light from
+ * neighbouring places. */
+static void take_piece(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
+{
+    if (!(depth > 0)) return;
+    if (t - walk->stretch.end > walk->least) add_light(walk, k);
+    if (walk->knots->count == 0)
+        add_knot(walk, t);
+    else
+        bridge_gap(walk, t);
+    for (double begin = 0; begin < 1;) {
+        const double end = begin + rest_of_stretch(walk, depth), part = nb_min(end, 1) - begin;
+        take_part(walk, k, t + begin * length, part * length, part * depth, part * depth_apart);
+        if (end > 1) return;
+        begin = end;
+        add_light(walk, k);
+        pass(walk, t + end * length);
+    }
 }
 
 /* What Simpson's rule may miss of a piece's extinction, times six by its length. Where cloud begins or ends within the piece three
@@ -385,7 +423,7 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
     const double depth = length / 6 * (double)(here->whole + 4 * middle->whole + far->whole);
     const double depth_apart = length / 6 * (double)(here->apart + 4 * middle->apart + far->apart);
     const double least =
-        nb_max(nb_min(0.25 * walk->spread * walk->t, STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
+        nb_max(nb_min(0.5 * walk->spread * walk->t, STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
     const double missed = walk->left * length / 6 * curve_of(here, middle, far);
     if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->left)) && length > 2 * least) {
         walk->length *= 0.5;
