@@ -1,6 +1,8 @@
 /* The planet of tutorials: its formulas against a rendition of their own, its maps, and bad input. */
 #include <nebel/layers.h>
 
+#include "base/vector.h"
+
 #include "dice.h"
 #include "scarce_memory.h"
 #include "unit.h"
@@ -234,6 +236,31 @@ static void rays_end_and_begin_within(void **state)
     nebel_destroy_layers(layers);
 }
 
+/* From on the ground, to rounding, there is the ground below and no ground above. */
+static void the_ground_is_below_who_stands_on_it(void **state)
+{
+    (void)state;
+    uint64_t numbers = 11;
+    nebel_layers *layers = create_known();
+    const nebel_layer_view view = {.sun = {{0, 1, 0}, {1, 1, 1}}};
+    for (int i = 0; i < 1000; i++) {
+        double up[3] = {dice(&numbers, -1, 1), dice(&numbers, -1, 1), dice(&numbers, -1, 1)};
+        nebel_ray ray = {.t_max = HUGE_VAL};
+        if (!nb_vector_make_unit(up)) continue;
+        for (int c = 0; c < 3; c++) {
+            ray.origin[c] = 2 * (1 + dice(&numbers, -5e-16, 5e-16)) * up[c];
+            ray.direction[c] = dice(&numbers, -1, 1);
+        }
+        const double rise = nb_vector_dot(up, ray.direction);
+        if (fabs(rise) < 1e-6) continue;
+        const nebel_layer_hits hits = look(layers, &view, &ray);
+        assert_int_equal(hits.count, rise > 0 ? 2 : 1);
+        assert_int_equal(hits.hits[0].is_ground, rise < 0);
+        assert_true(rise > 0 || hits.hits[0].t < 1e-12);
+    }
+    nebel_destroy_layers(layers);
+}
+
 /* After a quarter of a day what was to the west is here: an eastward turn. The clouds turn with the ground and on. */
 static void balls_turn_to_the_east(void **state)
 {
@@ -429,6 +456,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(layers_are_those_of_the_formulas),
         cmocka_unit_test(rays_end_and_begin_within),
+        cmocka_unit_test(the_ground_is_below_who_stands_on_it),
         cmocka_unit_test(balls_turn_to_the_east),
         cmocka_unit_test(maps_are_averaged),
         cmocka_unit_test(maps_have_no_seam_and_no_star),

@@ -482,6 +482,33 @@ static void odd_rays_have_answers(void **state)
     }
 }
 
+/* The centre is below the place at y. */
+static void below_the_ground_is_on_it(void **state)
+{
+    (void)state;
+    static const double depths[] = {1, 5e3, 3e6, 6.36e6};
+    nebel_atmosphere *air;
+    const nebel_sun sun = {.direction = {.3, .5, .1}, .irradiance = {1, 1, 1}};
+    assert_int_equal(nebel_create_atmosphere(&(nebel_atmosphere_desc){0}, &air), NEBEL_OK);
+    for (size_t k = 0; k < sizeof depths / sizeof *depths; k++) {
+        const nebel_ray on = {{0, 0, 0}, {.2, 1, -.4}, HUGE_VAL};
+        const nebel_ray below = {{0, -depths[k], 0}, {.2, 1, -.4}, HUGE_VAL};
+        const double places[2][3] = {{0, 0, 0}, {0, -depths[k], 0}};
+        nebel_light wanted, got;
+        nebel_air_light light[2];
+        assert_int_equal(nebel_trace_air(air, &sun, 1, &on, 0, &wanted, 0), NEBEL_OK);
+        assert_int_equal(nebel_trace_air(air, &sun, 1, &below, 0, &got, 0), NEBEL_OK);
+        assert_int_equal(nebel_light_air(air, &sun, 2, places, sizeof *places, light, sizeof *light), NEBEL_OK);
+        for (int c = 0; c < 3; c++) {
+            expect_near("transmittance", got.transmittance[c], wanted.transmittance[c], 1e-9);
+            expect_near("light", got.in_scattering[c], wanted.in_scattering[c], 1e-9);
+            expect_near("sun", light[1].sun[c], light[0].sun[c], 1e-9);
+            expect_near("sky", light[1].sky[c], light[0].sky[c], 1e-9);
+        }
+    }
+    nebel_destroy_atmosphere(air);
+}
+
 /* The planet seen from 1e15 m away is the same as from close by. */
 static void distance_changes_nothing(void **state)
 {
@@ -634,14 +661,23 @@ static void memory_may_run_out(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(chapman_is_that_of_T12),  cmocka_unit_test(lengths_are_those_of_T13),
-        cmocka_unit_test(pieces_add_up),           cmocka_unit_test(transmittance_is_that_of_T30),
-        cmocka_unit_test(gain_is_that_of_T31),     cmocka_unit_test(light_is_that_of_T40),
-        cmocka_unit_test(skies_are_those_of_T41),  cmocka_unit_test(qualities_agree),
-        cmocka_unit_test(twilights_agree),         cmocka_unit_test(a_furnace_stays_white),
-        cmocka_unit_test(odd_rays_have_answers),   cmocka_unit_test(distance_changes_nothing),
-        cmocka_unit_test(bad_numbers_are_refused), cmocka_unit_test(parts_may_come_in_any_order),
-        cmocka_unit_test(memory_may_run_out),      cmocka_unit_test(all_instruction_sets_agree),
+        cmocka_unit_test(chapman_is_that_of_T12),
+        cmocka_unit_test(lengths_are_those_of_T13),
+        cmocka_unit_test(pieces_add_up),
+        cmocka_unit_test(transmittance_is_that_of_T30),
+        cmocka_unit_test(gain_is_that_of_T31),
+        cmocka_unit_test(light_is_that_of_T40),
+        cmocka_unit_test(skies_are_those_of_T41),
+        cmocka_unit_test(qualities_agree),
+        cmocka_unit_test(twilights_agree),
+        cmocka_unit_test(a_furnace_stays_white),
+        cmocka_unit_test(odd_rays_have_answers),
+        cmocka_unit_test(distance_changes_nothing),
+        cmocka_unit_test(bad_numbers_are_refused),
+        cmocka_unit_test(parts_may_come_in_any_order),
+        cmocka_unit_test(memory_may_run_out),
+        cmocka_unit_test(all_instruction_sets_agree),
+        cmocka_unit_test(below_the_ground_is_on_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -34,6 +34,14 @@ static inline int nb_vector_make_unit(double v[3])
     return 1;
 }
 
+/* How far a place is above a ball, of which it is so far from the middle. Within 1e-12 of the radius, where rounding does not say on
+ * which side of it, it is just above. */
+static inline double nb_vector_above_ball(double far, double radius)
+{
+    const double on = 1e-12 * radius;
+    return fabs(far - radius) <= on ? on : far - radius;
+}
+
 /* What a quaternion x y z w of any length, 0: none, makes of the axes x, y and z. */
 static inline void nb_vector_axes(const double q[4], double axes[3][3])
 {

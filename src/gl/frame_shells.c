@@ -53,7 +53,7 @@ static void set_ball(const nb_gl_frame *f, unsigned program, double radius, doub
     const nebel_layers_desc *const desc = nebel_describe_layers(f->layers);
     double from[3], axes[3][3];
     float frame[9];
-    const double away = eye_from_middle(f, from);
+    const double away = eye_from_middle(f, from), above = nb_vector_above_ball(away, radius);
     const float middle[3] = {(float)from[0], (float)from[1], (float)from[2]};
     nb_vector_axes(desc->rotation, axes);
     for (int i = 0; i < 9; i++) frame[i] = (float)axes[i / 3][i % 3];
@@ -65,7 +65,7 @@ static void set_ball(const nb_gl_frame *f, unsigned program, double radius, doub
     set_ambient(f, program, "ball_ambient");
     glUniformMatrix3fv(glGetUniformLocation(program, "ball_frame"), 1, GL_FALSE, frame);
     glUniform1f(glGetUniformLocation(program, "ball_radius"), (float)radius);
-    glUniform1f(glGetUniformLocation(program, "ball_square"), (float)((away - radius) * (away + radius)));
+    glUniform1f(glGetUniformLocation(program, "ball_square"), (float)(above * (away + radius)));
     glUniform1f(glGetUniformLocation(program, "ball_turned"), (float)turned);
     glUniform1f(glGetUniformLocation(program, "ball_spread"), (float)pixel_spread(f));
 }

@@ -48,6 +48,9 @@ int nb_air_resolve_sun(const nebel_sun *sun, nebel_sun *resolved);
 
 int nb_air_is_place(const double place[3]);
 
+/* A place from the centre, of which one below the ground becomes that straight above it; the centre itself that at y. */
+void nb_air_raise(double ground, double from[3]);
+
 /* Whether a ray is in order; `unit` is its direction, made a unit one. */
 int nb_air_is_ray(const nebel_ray *ray, double unit[3]);
 

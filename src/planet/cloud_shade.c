@@ -90,7 +90,7 @@ static int find_under(const nebel_cloud_view *view, const nebel_ray *ray, const 
         under->from[c] = ray->origin[c] - atmosphere->center[c];
         under->unit[c] = unit[c];
     }
-    nb_cloud_raise(ground, under->from);
+    nb_air_raise(ground, under->from);
     const double end = fmin(ray->t_max, nb_cloud_to_ground(ground, under->from, unit));
     if (lowest < 0 || !nb_cloud_pieces(0, view->high, under->from, unit, end, pieces)) return 0;
     under->begin = pieces[0][0];

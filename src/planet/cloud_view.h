@@ -184,9 +184,6 @@ typedef struct nb_cloud_roof {
 
 nb_cloud_roof nb_cloud_roof_at(nebel_cloud_workspace *workspace, int layer, const double place[3], float width);
 
-/* From below the ground a place from the centre is that on it, as for air; from the centre itself that at y. */
-void nb_cloud_raise(double ground, double from[3]);
-
 /* Where a ray meets the ground; HUGE_VAL: nowhere. */
 double nb_cloud_to_ground(double radius, const double from[3], const double unit[3]);
 

@@ -517,13 +517,6 @@ static void find_stays(nb_walk *walk, double t_max)
     }
 }
 
-void nb_cloud_raise(double ground, double from[3])
-{
-    const double far = nb_vector_length(from);
-    if (far >= ground) return;
-    for (int c = 0; c < 3; c++) from[c] = far > 0 ? from[c] / far * ground : c == 1 ? ground : 0;
-}
-
 double nb_cloud_to_ground(double radius, const double from[3], const double unit[3])
 {
     const double along = nb_vector_dot(from, unit);
@@ -541,7 +534,7 @@ static void begin(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
     *walk = (nb_walk){
         .view = workspace->view, .workspace = workspace, .spread = spread, .knots = knots, .left = 1, .left_apart = 1};
     for (int c = 0; c < 3; c++) walk->from[c] = ray->origin[c] - atmosphere->center[c];
-    nb_cloud_raise(atmosphere->airs.radius, walk->from);
+    nb_air_raise(atmosphere->airs.radius, walk->from);
     memcpy(walk->unit, unit, sizeof walk->unit);
     walk->ray = nb_cloud_ray_make(workspace->view, unit);
     for (int k = 0; k < workspace->view->clouds->layer_count; k++)

@@ -268,19 +268,21 @@ nebel_result nebel_find_map_level(const nebel_layers *layers, const nebel_map *m
 typedef struct nb_sight {
     const nebel_layers *layers;
     double from[3], to[3]; /* to: of length 1 */
+    double far;            /* m, from the middle */
     double closest;        /* m along the ray, of the middle */
     double aside;          /* square of how far it is there */
     double t_max, time, spread;
     double sun[3], ambient[3], irradiance[3];
 } nb_sight;
 
-/* The first side of a ball that is met; less than 0: none. */
+/* The first side of a ball that is met; less than 0: none. From outside only what lies ahead is. */
 static double meet(const nb_sight *s, double radius)
 {
     const double square = radius * radius - s->aside;
     if (!(square >= 0)) return -1;
     const double half = sqrt(square), near = s->closest - half;
-    return near >= 0 ? near : s->closest + half;
+    if (nb_vector_above_ball(s->far, radius) > 0) return s->closest > 0 ? fmax(0, near) : -1;
+    return s->closest + half;
 }
 
 /* A place on a ball. */
@@ -424,6 +426,7 @@ static int set_ray(const nebel_ray *ray, nb_sight *s)
     }
     if (!nb_vector_make_unit(s->to)) return 0;
     double beside[3];
+    s->far = nb_vector_length(s->from);
     s->closest = -nb_vector_dot(s->from, s->to);
     nb_vector_cross(s->from, s->to, beside);
     s->aside = nb_vector_dot(beside, beside);

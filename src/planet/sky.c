@@ -149,10 +149,18 @@ static double bound_cosine(double cosine)
     return fmax(-1, fmin(1, cosine));
 }
 
+void nb_air_raise(double ground, double from[3])
+{
+    const double far = nb_vector_length(from);
+    if (far >= ground) return;
+    for (int c = 0; c < 3; c++) from[c] = far > 0 ? from[c] / far * ground : c == 1 ? ground : 0;
+}
+
 /* Relative to the planet's centre. What is below the ground counts as on it. */
 static double place_over(const nebel_atmosphere *atmosphere, const double place[3], double relative[3])
 {
     for (int c = 0; c < 3; c++) relative[c] = place[c] - atmosphere->center[c];
+    nb_air_raise(atmosphere->airs.radius, relative);
     return fmax(atmosphere->airs.radius, sqrt(nb_vector_dot(relative, relative)));
 }
 
