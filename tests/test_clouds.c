@@ -638,8 +638,8 @@ static void test_what_is_said_of_bad_layers(void **state)
     assert_layer_fault(&(nebel_cloud_layer){.base = (double)NAN},
                        "cloud layer: base: is nan; must be above the ground");
     assert_layer_fault(&(nebel_cloud_layer){.base = -5}, "cloud layer: base: is -5; must be above the ground");
-    assert_layer_fault(&(nebel_cloud_layer){.base = 5000},
-                       "cloud layer: top: is 2700, as none is given; must be above the base, 5000 m");
+    assert_layer_fault(&(nebel_cloud_layer){.base = 99000},
+                       "cloud layer: top: is 100800, as none is given; must be within the air, 100000 m");
     assert_layer_fault(&(nebel_cloud_layer){.coverage = 1.5},
                        "cloud layer: coverage: is 1.5; must be more than 0, at most 1");
     assert_layer_fault(&(nebel_cloud_layer){.detail = -.5},

@@ -80,7 +80,7 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
     if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: orthographic cameras see no planets; take a perspective one");
+                       "frame: orthographic cameras see no planets; take a perspective one or a panorama");
     const double tolerance = desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE;
     frame->air.tolerance = (float)tolerance;
     frame->air.pixel = nb_view_pixel(&frame->view, frame->height);

@@ -74,7 +74,7 @@ static nebel_result check_air(const nebel_gl_renderer *r, const nebel_gl_frame_d
 {
     if (desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
-                       "frame: orthographic cameras see no planets; take a perspective one");
+                       "frame: orthographic cameras see no planets; take a perspective one or a panorama");
     return r->particles.count > 0 ? refuse(&r->log, "particles in the air of a planet") : NEBEL_OK;
 }
 

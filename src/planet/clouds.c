@@ -212,7 +212,7 @@ static nebel_cloud_layer resolve(double thickness, const nebel_cloud_layer *desc
     const double scale = fmin(1, thickness / 1e5);
     nebel_cloud_layer whole = *desc;
     set_default(&whole.base, scale * kinds[desc->kind].base);
-    set_default(&whole.top, scale * kinds[desc->kind].top);
+    set_default(&whole.top, whole.base + scale * (kinds[desc->kind].top - kinds[desc->kind].base));
     set_default(&whole.coverage, kinds[desc->kind].coverage);
     set_default(&whole.extinction, fmin(NEBEL_MAX_AIR_EXTINCTION, kinds[desc->kind].extinction / scale));
     set_default(&whole.size, scale * kinds[desc->kind].size);
