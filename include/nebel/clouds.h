@@ -45,7 +45,8 @@ typedef enum nebel_cloud_kind {
  * planets with less than 100 km of air they shrink with it. */
 typedef struct nebel_cloud_layer {
     nebel_cloud_kind kind;
-    double base, top;  /* m above the ground, more than 0, base < top, within the air; top 0: a kind's height above the base */
+    double base,
+        top; /* m above the ground, more than 0, base < top, within the air; top 0: a kind's height above the base */
     double coverage;   /* part of the planet under clouds, 0 to 1; of cumulus before detail is cut out */
     double extinction; /* 1/m in their middle, to NEBEL_MAX_AIR_EXTINCTION */
     double
@@ -95,7 +96,7 @@ typedef struct nebel_cloud_view_desc {
     const nebel_clouds *clouds; /* must outlive the view */
     nebel_sun sun;              /* irradiance {0}: dark */
     double time;                /* within -1e12 and 1e12 */
-    double tolerance;           /* of transmittance, per ray; 0: NEBEL_DEFAULT_TOLERANCE */
+    double tolerance;           /* of transmittance, of each piece of a ray; 0: NEBEL_DEFAULT_TOLERANCE */
     nebel_isa isa;              /* the same bits for every one; DEFAULT: the best of this processor */
     nebel_allocator allocator;
     nebel_log log;
@@ -125,7 +126,7 @@ typedef struct nebel_cloud_knots {
     float t[NEBEL_MAX_CLOUD_KNOTS];                /* m, ascending */
     float transmittance[NEBEL_MAX_CLOUD_KNOTS];    /* of clouds alone, grey */
     float in_scattering[NEBEL_MAX_CLOUD_KNOTS][3]; /* of clouds alone, as if nothing else were on the way */
-    float error;                                   /* of transmittance: what quadrature tells */
+    float error;                                   /* of transmittance: what quadrature tells, of all pieces */
 } nebel_cloud_knots;
 
 /* Along n rays up to t_max or the ground. spreads: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is seen as
