@@ -71,11 +71,12 @@ static inline nb_real read_level(const nb_cloud_noise *noise, const nb_real part
 /* 0 to 1, 1 in the middle of a billow. Where they are halved too often all is their mean. */
 static inline nb_real read_billows(const nb_cloud_noise *noise, const nb_real parts[3], const nb_table *table)
 {
+    const nb_mask is_mean = table->level >= nb_splat(NB_BILLOW_LEVELS - 1);
+    if (nb_all(is_mean)) return nb_splat(noise->billow_mean);
     nb_real billows = read_level(noise, parts, table->low);
     if (nb_any(table->next > NB_F(0.0)))
         billows = mix(billows, read_level(noise, parts, table->low + NB_F(1.0)), table->next);
-    return nb_select(table->level < nb_splat(NB_BILLOW_LEVELS - 1), billows * nb_splat(1.0f / NB_BILLOW_MOST),
-                     nb_splat(noise->billow_mean));
+    return nb_select(is_mean, nb_splat(noise->billow_mean), billows * nb_splat(1.0f / NB_BILLOW_MOST));
 }
 
 /* Each scale's table for widths. Returns the variance that they lose by that. */

@@ -26,7 +26,7 @@
 
 /* Optical depth of a piece; and of a stretch of them, whose light is that of its middle. Both grow as less is seen. */
 #define MOST_DEPTH 1
-#define STRETCH_DEPTH 0.85
+#define STRETCH_DEPTH 0.65
 
 /* The first step from a piece towards the sun: optical depth in the middle of clouds; half of the least piece at most. */
 #define FIRST_DEPTH 0.3
