@@ -92,7 +92,7 @@ static void test_what_is_refused(void **state)
     d.data.planet_count = 0;
     check_refused(one, &d, NEBEL_ERROR_ARGUMENT, "other planets");
     d = open_planets(one);
-    planets[0].cloud_layers[0].base = 5000;
+    planets[0].cloud_layers[0].base = 99000;
     check_refused(one, &d, NEBEL_ERROR_FORMAT, "planet.clouds[0]");
 }
 
