@@ -45,8 +45,7 @@ typedef enum nebel_cloud_kind {
  * planets with less than 100 km of air they shrink with it. */
 typedef struct nebel_cloud_layer {
     nebel_cloud_kind kind;
-    double base,
-        top; /* m above the ground, more than 0, base < top, within the air; top 0: a kind's height above the base */
+    double base, top;  /* m above the ground, 0 < base < top, within the air; no top: as high as the kind */
     double coverage;   /* part of the planet under clouds, 0 to 1; of cumulus before detail is cut out */
     double extinction; /* 1/m in their middle, to NEBEL_MAX_AIR_EXTINCTION */
     double

@@ -90,10 +90,11 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
 /* NULL is fine. */
 void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
 
-/* What the air does along each of n rays, up to t_max, the ground or the end of the air, whichever comes first. A place below
- * the ground counts as that on it straight above, the centre as that at y, here and below. The light of the ground itself is not in it. Strides are in bytes. sun NULL: no light. `error` is
- * what the quality promises: see docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite
- * where it must not be, of no direction, of negative t_max). */
+/* What the air does along each of n rays, up to t_max, the ground or the end of the air, whichever comes first. A place
+ * below the ground counts as that on it straight above, the centre as that at y, here and below. The light of the ground
+ * itself is not in it. Strides are in bytes. sun NULL: no light. `error` is what the quality promises: see
+ * docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite where it must not be, of no
+ * direction, of negative t_max). */
 nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
                              size_t ray_stride, nebel_light *lights, size_t light_stride);
 

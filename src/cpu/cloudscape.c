@@ -74,7 +74,7 @@ static void ask_air(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t coun
     }
 }
 
-static nebel_result answer(const nb_frame *frame, nb_air_asked *asked)
+static nebel_result trace_asked(const nb_frame *frame, nb_air_asked *asked)
 {
     const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
     nebel_light_planes lights = {.error = NULL};
@@ -90,7 +90,7 @@ static nebel_result set_shade(const nb_frame *frame, const nebel_air_shade *shad
                               nb_air_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
-    const nebel_result result = answer(frame, asked);
+    const nebel_result result = trace_asked(frame, asked);
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i];
         float light[3][NB_SHADED_PIECES];
@@ -192,7 +192,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_air_asked *asked)
 {
     if (asked->count == 0) return NEBEL_OK;
-    const nebel_result result = answer(frame, asked);
+    const nebel_result result = trace_asked(frame, asked);
     for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
         const uint32_t lane = asked->lanes[i], first = asked->first[i];
         const nebel_cloud_knots *knots = &clouds->knots[lane];

@@ -16,8 +16,9 @@
 
 #define PI 3.14159265358979323846
 
-/* A pixel hides no more along a ray than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in sizes of heaps: of heaps, of
- * sheets. Beyond it the ray meets other cloud. As thin rays find, straight down to 9 degrees flat (test_clouds). */
+/* A pixel hides no more along a ray than a way through a ball of cloud that is so high, in parts of the layer, and so wide, in
+ * sizes of heaps: of heaps, of sheets. Beyond it the ray meets other cloud. As thin rays find, straight down to 9 degrees flat
+ * (test_clouds). */
 static const float hidden_heights[] = {0.37f, 0.75f}, hidden_widths[] = {0.42f, 0.55f};
 
 /* ---- places ---------------------------------------------------------------------------------- */
