@@ -171,8 +171,17 @@ typedef struct nb_cloud_grain {
     float wide;         /* between nodes of the other ways */
 } nb_cloud_grain;
 
-nb_cloud_depths nb_cloud_depths_at(nebel_cloud_workspace *workspace, const double place[3],
-                                   const nb_cloud_grain *grain);
+/* A place in clouds, and what is found there: nothing where all places are alike, as a pixel hides all of the layer. */
+typedef struct nb_cloud_asked {
+    double place[3];
+    nb_cloud_grain grain;
+    int is_alike;
+    nb_cloud_depths depths;
+} nb_cloud_asked;
+
+/* Of so many at most, whose first steps towards the sun fill the lanes of a look. */
+enum { NB_CLOUD_ASKED = 3 };
+void nb_cloud_find_depths(nebel_cloud_workspace *workspace, int n, nb_cloud_asked asked[]);
 /* That to the sun, from nodes that are about `width` apart. */
 float nb_cloud_sun_depth_at(nebel_cloud_workspace *workspace, const double place[3], float width);
 

@@ -3,6 +3,7 @@
  *
  * Where a walk looks next hangs on what it saw last. So that places can be looked at many at once, many walks go on together:
  * each says what it asks, and waits for it. */
+#include "cloud_knots.h"
 #include "cloud_looks.h"
 #include "cloud_view.h"
 
@@ -55,13 +56,8 @@
 /* Noise hardly ever rises by a seventh of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.15
 
-/* Between two knots transmittance falls by no more than about that. */
-#define MOST_FALL 0.12
-
-/* Gaps between clouds are long from this part of the way to their end on. */
-#define LONG_GAP 0.1
-
-enum { MOST = NEBEL_MAX_CLOUD_KNOTS, MOST_PIECES = 4096 };
+/* WALKS: so many go on together. */
+enum { MOST_PIECES = 4096, WALKS = 32 };
 
 /* Pieces one behind the other that have the same light. */
 typedef struct nb_stretch {
@@ -69,11 +65,6 @@ typedef struct nb_stretch {
     double seen, seen_apart; /* of all scattering, and of what leads away */
     double weight, moment;   /* of places by what is seen */
 } nb_stretch;
-
-/* What clouds have left and sent up to a place of a ray. */
-typedef struct nb_cloud_knot {
-    double t, left, left_apart, light[3];
-} nb_cloud_knot;
 
 /* A ray in a layer's axes. */
 typedef struct nb_turned {
@@ -93,11 +84,14 @@ typedef struct nb_stay {
 } nb_stay;
 
 /* What a walk waits for. */
-typedef enum nb_wait { NB_WAIT_NOTHING, NB_WAIT_ENTRY, NB_WAIT_STEP, NB_WAIT_PIECE } nb_wait;
+typedef enum nb_wait { NB_WAIT_NOTHING, NB_WAIT_ENTRY, NB_WAIT_STEP, NB_WAIT_PIECE, NB_WAIT_LIGHT } nb_wait;
+
+typedef struct nb_party nb_party;
 
 typedef struct nb_walk {
     const nebel_cloud_view *view;
     nebel_cloud_workspace *workspace;
+    nb_party *party;
     double from[3], unit[3], spread; /* from the planet's centre */
     nb_cloud_ray ray;
     nb_turned turned[NEBEL_MAX_CLOUD_LAYERS];
@@ -119,11 +113,9 @@ typedef struct nb_walk {
     nb_wait wait;
     int unanswered;
 
-    double depth, apart;     /* so far: optical depths, of all scattering and of what leads away */
-    double left, left_apart; /* e to the minus them */
-    double light[3], missed, cloud_end;
+    double missed;
     nb_stretch stretch;
-    nb_cloud_knot last, gap_end; /* the last that was written; the end of the last long gap between clouds */
+    nb_cloud_tally tally;
     nebel_cloud_knots *knots;
 } nb_walk;
 
@@ -217,7 +209,7 @@ static double least_step(const nb_walk *walk, const nb_stay *stay)
 {
     const double width = walk->spread * walk->t,
                  near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
-    const double times = nb_min(MOST_TIMES, nb_max(1, DIM / walk->left));
+    const double times = nb_min(MOST_TIMES, nb_max(1, DIM / walk->tally.left));
     return times * nb_min(STAY_STEP * (stay->end - stay->begin), nb_max(near, width));
 }
 
@@ -242,85 +234,33 @@ static int find_step(nb_walk *walk, const nb_stay *stay)
     return 0;
 }
 
-/* ---- knots ----------------------------------------------------------------------------------- */
+/* ---- light ----------------------------------------------------------------------------------- */
 
-static nb_cloud_knot knot_here(const nb_walk *walk, double t)
+/* Stretches whose light is found together. */
+typedef struct nb_lights {
+    int count;
+    nb_walk *walks[NB_CLOUD_ASKED];
+    int layers[NB_CLOUD_ASKED];
+    nb_stretch stretches[NB_CLOUD_ASKED];
+    double radius[NB_CLOUD_ASKED];
+    float crowd[NB_CLOUD_ASKED]; /* part of a mean of the layer */
+    nb_cloud_asked asked[NB_CLOUD_ASKED];
+} nb_lights;
+
+/* Walks, those of them that have something to ask or are at their end, and what they ask: of each layer, and of light. */
+struct nb_party {
+    nb_walk walks[WALKS], *ready[WALKS];
+    int ready_count;
+    nb_queue queues[NEBEL_MAX_CLOUD_LAYERS];
+    nb_lights lights;
+};
+
+/* How finely light is found. */
+static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
 {
-    nb_cloud_knot knot = {.t = t, .left = walk->left, .left_apart = walk->left_apart};
-    memcpy(knot.light, walk->light, sizeof knot.light);
-    return knot;
-}
-
-static void write_knot(nb_walk *walk, const nb_cloud_knot *knot)
-{
-    nebel_cloud_knots *knots = walk->knots;
-    const uint32_t i = knots->count++;
-    knots->t[i] = (float)knot->t;
-    knots->transmittance[i] = (float)knot->left;
-    for (int c = 0; c < 3; c++) knots->in_scattering[i][c] = (float)knot->light[c];
-    walk->last = *knot;
-}
-
-/* What light must have fallen for a knot to be worth its place: the more there are the more. */
-static double least_fall(const nb_walk *walk)
-{
-    return MOST_FALL * walk->knots->count / MOST;
-}
-
-/* Before it the end of the gap that clouds lie behind, if they have taken something. The last place may stay free until the end. */
-static void add_knot(nb_walk *walk, double t)
-{
-    const nebel_cloud_knots *knots = walk->knots;
-    const nb_cloud_knot here = knot_here(walk, t);
-    if (walk->gap_end.t > walk->last.t && walk->gap_end.left_apart - here.left_apart > least_fall(walk) &&
-        knots->count + 2 < MOST)
-        write_knot(walk, &walk->gap_end);
-    if (knots->count + 1 < MOST) write_knot(walk, &here);
-}
-
-/* A long gap before a cloud at t is full of air, and clouds leave as much of its light at both ends: a knot between two clouds would
- * have the mean of both. */
-static void bridge_gap(nb_walk *walk, double t)
-{
-    if (!(t - walk->cloud_end > LONG_GAP * t)) return;
-    if (walk->last.left_apart - walk->left_apart > least_fall(walk)) add_knot(walk, walk->cloud_end);
-    walk->gap_end = knot_here(walk, t);
-}
-
-/* Behind a stretch, whose light a knot has: where the clouds' transmittance has fallen, or the ray is far from the last knot. */
-static void pass(nb_walk *walk, double t)
-{
-    const double fallen = walk->last.left - walk->left;
-    if (fallen > MOST_FALL || (fallen > 0.02 && t > 1.5 * walk->last.t)) add_knot(walk, t);
-}
-
-/* Where the last cloud ends, not the stay in its layer, which may be beyond the horizon: the last light would come through all air before
- * that. It takes the place of a knot that is there already. */
-static void end_knots(nb_walk *walk)
-{
-    nebel_cloud_knots *knots = walk->knots;
-    const nb_cloud_knot end = knot_here(walk, walk->cloud_end);
-    if (knots->count == 0) return;
-    if (knots->count > 1 && walk->last.t >= walk->cloud_end) knots->count--;
-    if (walk->gap_end.t > walk->last.t && knots->count + 1 < MOST) write_knot(walk, &walk->gap_end);
-    write_knot(walk, &end);
-}
-
-/* ---- pieces ---------------------------------------------------------------------------------- */
-
-/* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
-static void add_light(nb_walk *walk, int k)
-{
-    const nb_stretch stretch = walk->stretch;
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    walk->stretch = (nb_stretch){.weight = 0};
-    if (!(stretch.weight > 0)) return;
-    const double t = stretch.moment / stretch.weight, width = walk->spread * t;
     const double thickness = 1 / (double)layer->per_thickness;
-    double place[3], up[3];
-    const double radius = radius_at(walk, t, place);
-    for (int c = 0; c < 3; c++) up[c] = place[c] / radius;
-    const nb_cloud_grain grain = {
+    return (nb_cloud_grain){
         .width = (float)width,
         .first = (float)fmin(0.1 * thickness,
                              fmax(2 * width, fmin(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
@@ -328,22 +268,68 @@ static void add_light(nb_walk *walk, int k)
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
                               0.08 * walk->least),
     };
-    const float crowd = nb_cloud_crowd_part(walk->workspace, k, (float)width);
-    nb_cloud_parts parts = {0, 0, 0, 0, 0, 0, 0};
-    if (crowd < 1) {
-        const nb_cloud_depths depths = nb_cloud_depths_at(walk->workspace, place, &grain);
-        parts = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
-    }
+}
+
+static void light_stretch(nb_lights *lights, int i)
+{
+    nb_walk *walk = lights->walks[i];
+    const int k = lights->layers[i];
+    const nb_cloud_asked *asked = &lights->asked[i];
+    const double cosine = walk->view->clouds->layers[k].mean_cosine;
+    const float crowd = lights->crowd[i];
+    double up[3];
+    for (int c = 0; c < 3; c++) up[c] = asked->place[c] / lights->radius[i];
+    nb_cloud_parts parts = nb_cloud_parts_of((float)cosine, &asked->depths);
     if (crowd > 0) {
         const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit);
         parts = nb_cloud_mix_parts(&parts, &mean, crowd);
     }
-    const nb_cloud_light light = nb_cloud_clear_light(walk->view, place, radius);
+    const nb_cloud_light light = nb_cloud_clear_light(walk->view, asked->place, lights->radius[i]);
     const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light, up);
+    const nb_stretch *stretch = &lights->stretches[i];
+    double sent[3];
     for (int c = 0; c < 3; c++)
-        walk->light[c] +=
-            stretch.seen * (double)(source.once[c] + source.ambient[c]) + stretch.seen_apart * (double)source.often[c];
+        sent[c] = stretch->seen * (double)(source.once[c] + source.ambient[c]) +
+                  stretch->seen_apart * (double)source.often[c];
+    nb_cloud_tally_light(&walk->tally, sent);
 }
+
+/* A walk that waited for its last light is ready. */
+static void find_lights(nb_party *party)
+{
+    nb_lights *lights = &party->lights;
+    nb_cloud_find_depths(lights->walks[0]->workspace, lights->count, lights->asked);
+    for (int i = 0; i < lights->count; i++) {
+        nb_walk *walk = lights->walks[i];
+        light_stretch(lights, i);
+        if (walk->wait != NB_WAIT_LIGHT || walk->tally.lit < walk->tally.asked) continue;
+        walk->wait = NB_WAIT_NOTHING;
+        party->ready[party->ready_count++] = walk;
+    }
+    lights->count = 0;
+}
+
+/* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
+static void add_light(nb_walk *walk, int k)
+{
+    nb_lights *lights = &walk->party->lights;
+    const nb_stretch stretch = walk->stretch;
+    walk->stretch = (nb_stretch){.weight = 0};
+    if (!(stretch.weight > 0)) return;
+    const double t = stretch.moment / stretch.weight;
+    const int i = lights->count++;
+    lights->walks[i] = walk;
+    lights->layers[i] = k;
+    lights->stretches[i] = stretch;
+    lights->radius[i] = radius_at(walk, t, lights->asked[i].place);
+    lights->asked[i].grain = grain_of(walk, k, walk->spread * t);
+    lights->crowd[i] = nb_cloud_crowd_part(walk->workspace, k, lights->asked[i].grain.width);
+    lights->asked[i].is_alike = lights->crowd[i] >= 1;
+    walk->tally.asked++;
+    if (lights->count == NB_CLOUD_ASKED) find_lights(walk->party);
+}
+
+/* ---- pieces ---------------------------------------------------------------------------------- */
 
 /* What counts of light that leads away and is left: all of it, but in the end nothing. */
 static double visible(double left)
@@ -355,25 +341,20 @@ static double visible(double left)
 /* How deep the next stretch gets: where nothing more is seen it has no end. */
 static double deepest_stretch(const nb_walk *walk)
 {
-    return walk->left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->left) : HUGE_VAL;
+    return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->tally.left) : HUGE_VAL;
 }
 
 /* Part of a piece that lies in one stretch. */
 static void take_part(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
 {
     nb_stretch *stretch = &walk->stretch;
-    const double apart = (double)walk->ray.apart[k], seen = walk->left * (1 - nb_exp(-depth));
-    const double before = visible(walk->left_apart);
+    const double apart = (double)walk->ray.apart[k], left = walk->tally.left, visibly = visible(walk->tally.left_apart);
     if (!(stretch->depth > 0)) stretch->most = deepest_stretch(walk);
     stretch->depth += depth;
     stretch->end = t + length;
+    nb_cloud_tally_pass(&walk->tally, t + length, depth, depth_apart);
+    const double seen = left - walk->tally.left, seen_apart = (visibly - visible(walk->tally.left_apart)) / apart;
     stretch->seen += seen;
-    walk->cloud_end = t + length;
-    walk->depth += depth;
-    walk->apart += depth_apart;
-    walk->left = nb_exp(-walk->depth);
-    walk->left_apart = nb_exp(-walk->apart);
-    const double seen_apart = (before - visible(walk->left_apart)) / apart;
     stretch->seen_apart += seen_apart;
     stretch->weight += seen + seen_apart;
     stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
@@ -392,17 +373,14 @@ static void take_piece(nb_walk *walk, int k, double t, double length, double dep
 {
     if (!(depth > 0)) return;
     if (t - walk->stretch.end > walk->least) add_light(walk, k);
-    if (walk->knots->count == 0)
-        add_knot(walk, t);
-    else
-        bridge_gap(walk, t);
+    nb_cloud_tally_enter(&walk->tally, t);
     for (double begin = 0; begin < 1;) {
         const double end = begin + rest_of_stretch(walk, depth), part = nb_min(end, 1) - begin;
         take_part(walk, k, t + begin * length, part * length, part * depth, part * depth_apart);
         if (end > 1) return;
         begin = end;
         add_light(walk, k);
-        pass(walk, t + end * length);
+        nb_cloud_tally_leave(&walk->tally, t + end * length);
     }
 }
 
@@ -424,8 +402,8 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
     const double depth_apart = length / 6 * (double)(here->apart + 4 * middle->apart + far->apart);
     const double least =
         nb_max(nb_min(0.5 * walk->spread * walk->t, STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
-    const double missed = walk->left * length / 6 * curve_of(here, middle, far);
-    if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->left)) && length > 2 * least) {
+    const double missed = walk->tally.left * length / 6 * curve_of(here, middle, far);
+    if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->tally.left)) && length > 2 * least) {
         walk->length *= 0.5;
         walk->far = walk->middle;
         walk->has_far = 1;
@@ -446,7 +424,8 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
 static nb_wait find_next(nb_walk *walk, const nb_stay *stay)
 {
     if (walk->is_searching) return find_step(walk, stay) ? NB_WAIT_STEP : NB_WAIT_NOTHING;
-    if (walk->pieces++ >= MOST_PIECES || !(walk->t < stay->end) || walk->left_apart <= UNSEEN) return NB_WAIT_NOTHING;
+    if (walk->pieces++ >= MOST_PIECES || !(walk->t < stay->end) || walk->tally.left_apart <= UNSEEN)
+        return NB_WAIT_NOTHING;
     if (!walk->has_far && walk->here.whole == 0) {
         walk->is_searching = 1;
         walk->clear = walk->unknown[0] = walk->unknown[1] = walk->unknown[2] = 0;
@@ -473,7 +452,7 @@ static void go_on(nb_walk *walk)
     walk->wait = find_next(walk, &walk->stays[walk->stay]);
     if (walk->wait != NB_WAIT_NOTHING) return;
     add_light(walk, walk->stays[walk->stay].layer);
-    if (++walk->stay < walk->stay_count && walk->left_apart > UNSEEN) enter(walk, &walk->stays[walk->stay]);
+    if (++walk->stay < walk->stay_count && walk->tally.left_apart > UNSEEN) enter(walk, &walk->stays[walk->stay]);
 }
 
 /* What it waited for has come. */
@@ -527,12 +506,16 @@ double nb_cloud_to_ground(double radius, const double from[3], const double unit
     return fmax(0, -along - sqrt((radius - near) * (radius + near)));
 }
 
-static void begin(nebel_cloud_workspace *workspace, const nebel_ray *ray, const double unit[3], double spread,
-                  nebel_cloud_knots *knots, nb_walk *walk)
+static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel_ray *ray, const double unit[3],
+                  double spread, nebel_cloud_knots *knots, nb_walk *walk)
 {
     const nebel_atmosphere *atmosphere = workspace->view->clouds->atmosphere;
-    *walk = (nb_walk){
-        .view = workspace->view, .workspace = workspace, .spread = spread, .knots = knots, .left = 1, .left_apart = 1};
+    *walk = (nb_walk){.view = workspace->view,
+                      .workspace = workspace,
+                      .party = party,
+                      .spread = spread,
+                      .knots = knots,
+                      .tally = {.left = 1, .left_apart = 1}};
     for (int c = 0; c < 3; c++) walk->from[c] = ray->origin[c] - atmosphere->center[c];
     nb_air_raise(atmosphere->airs.radius, walk->from);
     memcpy(walk->unit, unit, sizeof walk->unit);
@@ -543,15 +526,8 @@ static void begin(nebel_cloud_workspace *workspace, const nebel_ray *ray, const 
             walk->turned[k].from[i] = nb_vector_dot(turn, walk->from);
             walk->turned[k].direction[i] = nb_vector_dot(turn, unit);
         }
-    knots->count = 0;
     find_stays(walk, fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk->from, unit)));
     if (walk->stay_count > 0) enter(walk, &walk->stays[0]);
-}
-
-static void end(nb_walk *walk)
-{
-    end_knots(walk);
-    walk->knots->error = (float)walk->missed;
 }
 
 /* Where a walk halves its pieces hangs on all digits, and two renderers have the last of them from other sums: without them both
@@ -562,9 +538,6 @@ static void round_direction(double unit[3])
 }
 
 /* ---- many walks ------------------------------------------------------------------------------ */
-
-/* So many go on together. */
-enum { WALKS = 32 };
 
 typedef struct nb_rays {
     nebel_cloud_workspace *workspace;
@@ -584,20 +557,13 @@ static double spread_at(const nb_rays *rays, size_t i)
     return *(const double *)(const void *)(rays->spreads + i * rays->spread_stride);
 }
 
-/* Walks, those of them that have something to ask or are at their end, and what they ask of each layer. */
-typedef struct nb_party {
-    nb_walk walks[WALKS], *ready[WALKS];
-    int ready_count;
-    nb_queue queues[NEBEL_MAX_CLOUD_LAYERS];
-} nb_party;
-
 static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
 {
     const size_t i = rays->next++;
     double unit[3];
     (void)nb_air_is_ray(ray_at(rays, i), unit);
     round_direction(unit);
-    begin(rays->workspace, ray_at(rays, i), unit, (double)(float)spread_at(rays, i),
+    begin(rays->workspace, party, ray_at(rays, i), unit, (double)(float)spread_at(rays, i),
           (nebel_cloud_knots *)(void *)(rays->knots + i * rays->knot_stride), walk);
     party->ready[party->ready_count++] = walk;
 }
@@ -629,11 +595,11 @@ static int find_asked(const nb_rays *rays, const nb_party *party)
     return most;
 }
 
-/* Looks as soon as there is no room for two more questions about a layer, or nobody has any. */
+/* Looks as soon as there is no room for two more questions about a layer, or nobody has any; then the last lights are found. */
 static void trace(nb_rays *rays)
 {
     nb_party party;
-    party.ready_count = 0;
+    party.ready_count = party.lights.count = 0;
     for (int k = 0; k < NEBEL_MAX_CLOUD_LAYERS; k++) {
         party.queues[k].looks.count = 0;
         party.queues[k].looks.are_of_rays = 1;
@@ -642,13 +608,22 @@ static void trace(nb_rays *rays)
     for (;;) {
         if (party.ready_count == 0) {
             const int k = find_asked(rays, &party);
-            if (k < 0) return;
-            look(rays, k, &party);
+            if (k >= 0)
+                look(rays, k, &party);
+            else if (party.lights.count > 0)
+                find_lights(&party);
+            else
+                return;
             continue;
         }
         nb_walk *walk = party.ready[--party.ready_count];
         if (walk->wait == NB_WAIT_NOTHING) {
-            end(walk);
+            if (walk->tally.lit < walk->tally.asked) {
+                walk->wait = NB_WAIT_LIGHT;
+                continue;
+            }
+            nb_cloud_tally_end(&walk->tally, walk->knots);
+            walk->knots->error = (float)walk->missed;
             if (rays->next < rays->n) begin_next(rays, walk, &party);
             continue;
         }

@@ -1,0 +1,35 @@
+/* What clouds have left of light along a ray, and sent along it, and the few places between which both change evenly. */
+#ifndef NB_PLANET_CLOUD_KNOTS_H
+#define NB_PLANET_CLOUD_KNOTS_H
+
+#include <nebel/clouds.h>
+
+/* Up to a place: e to the minus optical depth, of all scattering and of what leads away; and the light of so many stretches. */
+typedef struct nb_cloud_knot {
+    double t, left, left_apart, light[3];
+    int stretches;
+} nb_cloud_knot;
+
+/* So far. Begins with nothing but left and left_apart, which are 1. */
+typedef struct nb_cloud_tally {
+    double depth, apart, left, left_apart;
+    double light[3];
+    int asked, lit;        /* stretches whose light was asked for, and has come */
+    double end;            /* of the last cloud */
+    nb_cloud_knot gap_end; /* the end of the last long gap between clouds */
+    uint32_t count;
+    nb_cloud_knot knots[NEBEL_MAX_CLOUD_KNOTS];
+} nb_cloud_tally;
+
+/* Cloud begins at t, behind a gap or none. */
+void nb_cloud_tally_enter(nb_cloud_tally *tally, double t);
+/* Cloud of such optical depths, up to t. */
+void nb_cloud_tally_pass(nb_cloud_tally *tally, double t, double depth, double apart);
+/* A stretch ends at t. */
+void nb_cloud_tally_leave(nb_cloud_tally *tally, double t);
+/* Light of the first stretch that has none yet, for all that lies behind it. */
+void nb_cloud_tally_light(nb_cloud_tally *tally, const double light[3]);
+/* Nothing follows, and all light has come. Sets all but the error. */
+void nb_cloud_tally_end(nb_cloud_tally *tally, nebel_cloud_knots *knots);
+
+#endif
