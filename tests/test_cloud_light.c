@@ -1,0 +1,177 @@
+/* The model of light in clouds: slabs, and ways to the sun. */
+#include "planet/cloud_view.h"
+
+#include "cloud_help.h"
+#include "dice.h"
+#include "near.h"
+
+/* What a slab of drops sends up against the sun's light and down with it, as paths say: the part of the light that comes
+ * back, sunlight at a cosine. */
+static double reflected_by_paths(double depth, double cosine, double g, int paths, uint64_t *numbers)
+{
+    int back = 0;
+    for (int i = 0; i < paths; i++) {
+        double z = 0, mu = cosine;
+        for (;;) {
+            z -= mu * log(dice(numbers, 1e-12, 1));
+            if (!(z >= 0 && z <= depth)) break;
+            const double s = dice(numbers, -1, 1), f = (1 - g * g) / (1 + g * s);
+            const double turn = (1 + g * g - f * f) / (2 * g), sine = sqrt(fmax(0, 1 - turn * turn));
+            mu = turn * mu + sine * sqrt(fmax(0, 1 - mu * mu)) * cos(dice(numbers, 0, 2 * PI));
+        }
+        back += z < 0;
+    }
+    return (double)back / paths;
+}
+
+/* The same of the model: its light integrated over the eyes above, in a slab that is seen under a cosine. */
+static double reflected_by_model(const nebel_cloud_view *view, double depth, double cosine)
+{
+    enum { EYES = 24, TURNS = 16, STEPS = 400 };
+    const nb_cloud_light white = {.sun = {1, 1, 1}};
+    const double up[3] = {0, 1, 0};
+    double sum = 0;
+    for (int i = 0; i < EYES * TURNS; i++) {
+        const double out = (i % EYES + .5) / EYES, level = sqrt(1 - out * out), turn = PI * (i / EYES + .5) / TURNS;
+        const double sine = sqrt(1 - cosine * cosine);
+        /* The eye looks down; the sun's place is in the x-y plane. */
+        const double direction[3] = {level * cos(turn), -out, level * sin(turn)};
+        nb_cloud_ray ray = nb_cloud_ray_make(view, direction);
+        ray.sun = sine * direction[0] + cosine * direction[1];
+        const nb_cloud_layer *layer = &view->clouds->layers[0];
+        const nebel_phase wide = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN,
+                                  .g = layer->mean_cosine / (1 + layer->mean_cosine)};
+        const nb_phase lobe = nb_phase_resolve(&wide);
+        ray.phase[0] = (float)nb_phase_at(&layer->phase, ray.sun);
+        ray.wide_phase[0] = (float)nb_phase_at(&lobe, ray.sun);
+        double radiance = 0;
+        const double step = depth / out / STEPS, apart = (double)ray.apart[0];
+        for (int k = 0; k < STEPS; k++) {
+            const double way = (k + .5) * step, x = way * out;
+            const nb_cloud_depths depths = {(float)(x / cosine), (float)((depth - x) / cosine), (float)x,
+                                            (float)(depth - x)};
+            const nb_cloud_parts parts = nb_cloud_parts_of((float)layer->mean_cosine, &depths);
+            const nb_cloud_source s = nb_cloud_source_of(&ray, 0, &parts, &white, up);
+            radiance += step * (exp(-way) * (double)s.once[1] + exp(-apart * way) * (double)s.often[1]);
+        }
+        sum += radiance * out * 2 * PI / (EYES * TURNS);
+    }
+    return sum / cosine;
+}
+
+static void test_light_of_slabs(void **state)
+{
+    (void)state;
+    static const struct {
+        double depth, cosine, off; /* and by what part of the light the model may be wrong */
+    } slabs[] = {{1, 1, .06},  {4, 1, .06},   {16, 1, .06},  {64, 1, .06},
+                 {4, .5, .08}, {16, .5, .08}, {64, .5, .06}, {16, .2, .08}};
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.seed = 1}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 5;
+    for (size_t i = 0; i < sizeof slabs / sizeof *slabs; i++) {
+        const double truth =
+            reflected_by_paths(slabs[i].depth, slabs[i].cosine, clouds->layers[0].mean_cosine, 20000, &numbers);
+        const double model = reflected_by_model(view, slabs[i].depth, slabs[i].cosine);
+        print_message(
+            "slab of depth %g, sun at a cosine of %g: %.3f of the light comes back by paths, %.3f by the model\n",
+            slabs[i].depth, slabs[i].cosine, truth, model);
+        assert_near(model, truth, slabs[i].off);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* As of a piece of a ray. */
+static float sun_depth_of(nebel_cloud_workspace *workspace, const double place[3], const nb_cloud_grain *grain)
+{
+    nb_cloud_asked asked = {.place = {place[0], place[1], place[2]}, .grain = *grain};
+    nb_cloud_find_depths(workspace, 1, &asked);
+    return asked.depths.sun;
+}
+
+/* What comes straight from the sun to places in clouds, by lattices, by what light of pieces of rays uses, and by steps of
+ * two metres. */
+static void test_ways_to_the_sun(void **state)
+{
+    (void)state;
+    enum { PLACES = 400 };
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.extinction = .005, .coverage = .6}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    const double *sun = view->sun.direction;
+    const nb_cloud_grain grain = {.width = 6, .first = 16, .wide = 100};
+    uint64_t numbers = 17;
+    double sum[2] = {0, 0}, bias[2] = {0, 0};
+    int between = 0;
+    for (int i = 0; i < PLACES; i++) {
+        const double x = dice(&numbers, -5e3, 5e3), z = dice(&numbers, -5e3, 5e3), y = dice(&numbers, 1000, 2000);
+        const nebel_ray ray = {{x, y, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
+        const double from[3] = {x, y + RADIUS, z};
+        const double truth = brute_force(clouds, &ray, 0, (2720 - y) / sun[1], 2);
+        const double left[2] = {exp(-(double)nb_cloud_sun_depth_at(workspace, from, 25)),
+                                exp(-(double)sun_depth_of(workspace, from, &grain))};
+        for (int k = 0; k < 2; k++) {
+            sum[k] += fabs(left[k] - truth) / PLACES;
+            bias[k] += (left[k] - truth) / PLACES;
+        }
+        between += truth > .02 && truth < .98;
+    }
+    for (int k = 0; k < 2; k++) {
+        print_message(
+            "sunlight at %d places, %d of them in part in shadow, %s: off by %.2g in the mean, all together by "
+            "%.2g\n",
+            PLACES, between, k == 0 ? "by lattices" : "as of pieces", sum[k], bias[k]);
+        assert_true(between > PLACES / 12 && sum[k] < .012 && fabs(bias[k]) < .004);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* A sun just below level is seen over the planet's bulge: through the layer, under it, and through it again. */
+static void test_ways_to_a_sun_below_level(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds =
+        make(1, (const nebel_cloud_layer[]){
+                    {.kind = NEBEL_CLOUD_STRATUS, .base = 400, .top = 1000, .extinction = 4e-5, .coverage = 1}});
+    const nebel_cloud_view_desc desc = {
+        .clouds = clouds, .sun = {.direction = {1, -.015, 0}, .irradiance = {5, 4, 3}}, .tolerance = 1e-3};
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+    const double *sun = view->sun.direction;
+    for (int i = 0; i < 8; i++) {
+        const double z = 3e3 * i, from[3] = {0, 900 + RADIUS, z};
+        const nebel_ray ray = {{0, 900, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
+        const double first = -log(brute_force(clouds, &ray, 0, 95e3, 20)),
+                     truth = first - log(brute_force(clouds, &ray, 95e3, 260e3, 20));
+        const double near = (double)sun_depth_of(workspace, from, &(nb_cloud_grain){6, 16, 100}),
+                     far = (double)nb_cloud_sun_depth_at(workspace, from, 100);
+        if (i == 0)
+            print_message(
+                "to a sun below level: depth %.3g, of it %.3g before the bulge; as of pieces %.3g, by lattices "
+                "%.3g\n",
+                truth, first, near, far);
+        assert_true(truth > 1.5 * first);
+        assert_near(near, truth, .15 * truth);
+        assert_near(far, truth, .2 * truth);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_light_of_slabs),
+        cmocka_unit_test(test_ways_to_the_sun),
+        cmocka_unit_test(test_ways_to_a_sun_below_level),
+    };
+    return cmocka_run_group_tests(tests, make_air, free_air);
+}
