@@ -65,9 +65,11 @@ typedef struct nb_air_scratch {
     nb_ground ground, next;                              /* the nearest one; that of one planet */
     int world[NB_BATCH];                                 /* whose ground it is */
     float sun_left[3][NB_BATCH], sky_there[3][NB_BATCH]; /* of models: see nb_daylight_at */
-    nb_air_knots knots[NB_AIR_KNOTS];                    /* the first where rays end */
-    uint8_t order[NB_BATCH][NB_AIR_KNOTS];               /* of a ray's knots along it */
+    nb_air_knots knots[NB_AIR_KNOTS], fresh;             /* the first where rays end; one that is being found */
+    int known[NB_BATCH];                                 /* a ray's knots */
+    uint8_t order[NB_BATCH][NB_AIR_KNOTS];               /* of those along it up to its end */
     int count[NB_BATCH];
+    int is_kept; /* knots but the first are of the rays that are followed next, too */
     nb_fog_shade fog_shade[NB_BATCH]; /* through the middles of pixels, of fog that is shaded by its place */
 } nb_air_scratch;
 

@@ -1,6 +1,7 @@
 #include "cloudscape.h"
 
 #include "fog_shade.h"
+#include "haze.h"
 
 #include <math.h>
 #include <string.h>
@@ -260,6 +261,7 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
     return find_air(frame, is_longer, clouds);
 }
 
+/* What is found of a ray up to one of its marks is known up to the others. */
 static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
 {
     nebel_result result = NEBEL_OK;
@@ -268,7 +270,9 @@ static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch 
     while (result == NEBEL_OK && any) {
         result = choose(frame, &scratch->clouds, &any);
         if (result == NEBEL_OK && any) result = mark(frame, haze, scratch);
+        if (result == NEBEL_OK && any) nb_haze_keep(scratch);
     }
+    nb_haze_forget(scratch);
     return result;
 }
 

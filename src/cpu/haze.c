@@ -155,13 +155,63 @@ static void shade_piece(nb_air_scratch *scratch, int lane, int place)
     knots->shade[lane] = shade->is_found ? nb_fog_shade_between(shade, before, knots->at[lane]) : none;
 }
 
-static void insert(const nb_air *air, nb_air_scratch *scratch, int lane, int place, int knot)
+static void insert(nb_air_scratch *scratch, int lane, int place, int knot)
 {
     uint8_t *order = scratch->order[lane];
     memmove(order + place + 1, order + place, (size_t)(scratch->count[lane] - place));
     order[place] = (uint8_t)knot;
     scratch->count[lane]++;
+}
+
+/* A fresh one, before the one at a place. */
+static void cut_at(const nb_air *air, nb_air_scratch *scratch, int lane, int place, float at)
+{
+    scratch->fresh.at[lane] = scratch->knots[scratch->known[lane]].at[lane] = at;
+    insert(scratch, lane, place, scratch->known[lane]++);
     for (int i = place; i < place + 2 && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
+}
+
+static void copy_lane(const nb_air_knots *from, int lane, nb_air_knots *to)
+{
+    to->at[lane] = from->at[lane];
+    for (int c = 0; c < 3; c++) {
+        to->fog_left[c][lane] = from->fog_left[c][lane];
+        to->fog_light[c][lane] = from->fog_light[c][lane];
+        to->air_left[c][lane] = from->air_left[c][lane];
+        to->air_light[c][lane] = from->air_light[c][lane];
+        to->fog_sun[c][lane] = from->fog_sun[c][lane];
+        to->fog_sky[c][lane] = from->fog_sky[c][lane];
+        to->sun[c][lane] = from->sun[c][lane];
+        to->sky[c][lane] = from->sky[c][lane];
+    }
+}
+
+/* Fresh knots have been found. */
+static void keep_fresh(nb_air_scratch *scratch)
+{
+    for (int i = 0; i < NB_BATCH; i++)
+        if (scratch->fresh.at[i] > 0) copy_lane(&scratch->fresh, i, &scratch->knots[scratch->known[i] - 1]);
+}
+
+/* Before which knot a place is. */
+static int place_of(const nb_air_scratch *scratch, int lane, float at)
+{
+    int place = 0;
+    while (scratch->knots[scratch->order[lane][place]].at[lane] < at) place++;
+    return place;
+}
+
+/* All that is known of a ray before its end, which comes last. */
+static void put_in_order(const nb_air *air, nb_air_scratch *scratch, int lane)
+{
+    const float end = scratch->knots[0].at[lane];
+    scratch->order[lane][0] = 0;
+    scratch->count[lane] = 1;
+    for (int k = 1; k < scratch->known[lane]; k++) {
+        const float at = scratch->knots[k].at[lane];
+        if (at < end) insert(scratch, lane, place_of(scratch, lane, at), k);
+    }
+    for (int i = 0; i < scratch->count[lane] && air->roof.is_shaded; i++) shade_piece(scratch, lane, i);
 }
 
 /* By clouds. */
@@ -202,28 +252,30 @@ static float tolerance_of(const nb_frame *frame, const nb_air_scratch *air, int 
     return frame->air.tolerance * brightest;
 }
 
-/* The first knot of daylit fog, which light at both ends of a ray does not tell of. */
+/* The first knot of daylit fog, which light at both ends of a ray does not tell of; 0: none, or it is there already. */
 static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lane)
 {
     const nb_air_knots *end = &scratch->air.knots[0];
     const float place = nb_daylit_fog_lowest(&frame->air, &scratch->rays, lane);
     float light = 0;
     for (int c = 0; c < 3; c++) light = fmaxf(light, end->fog_sun[c][lane] + end->fog_sky[c][lane]);
+    for (int k = 1; k < scratch->air.known[lane]; k++)
+        if (scratch->air.knots[k].at[lane] == place) return 0;
     return place < end->at[lane] && light > frame->air.tolerance ? place : 0;
 }
 
 /* One more knot for each lane that needs it; returns whether any did. */
-static int choose(const nb_frame *frame, nb_scratch *scratch, int number)
+static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
 {
     nb_air_scratch *air = &scratch->air;
-    const int is_first = number == 1 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even;
     int any = 0;
+    is_first = is_first && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even;
     for (int i = 0; i < NB_BATCH; i++) {
-        float all, *at = &air->knots[number].at[i];
-        *at = 0;
-        if (!scratch->inside[i]) continue;
-        if (is_first && (*at = first_cut(frame, scratch, i)) > 0) {
-            insert(&frame->air, air, i, 0, number);
+        float all, first;
+        air->fresh.at[i] = 0;
+        if (!scratch->inside[i] || air->known[i] == NB_AIR_KNOTS) continue;
+        if (is_first && (first = first_cut(frame, scratch, i)) > 0) {
+            cut_at(&frame->air, air, i, place_of(air, i, first), first);
             any = 1;
             continue;
         }
@@ -233,8 +285,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int number)
         const nb_knot a = knot_of(&frame->air, air, i, worst - 1), b = knot_of(&frame->air, air, i, worst);
         const float place = cut(frame, scratch, i, &a, &b, tolerance);
         if (!(place > a.at && place < b.at)) continue;
-        *at = place;
-        insert(&frame->air, air, i, worst, number);
+        cut_at(&frame->air, air, i, worst, place);
         any = 1;
     }
     return any;
@@ -278,14 +329,27 @@ static void set_first(const nb_frame *frame, nb_scratch *scratch)
 {
     nb_air_scratch *air = &scratch->air;
     for (int i = 0; i < NB_BATCH; i++) {
+        if (!air->is_kept) air->known[i] = 1;
         air->knots[0].at[i] = scratch->inside[i] ? fminf(scratch->distance[i], (float)frame->air.reach) : 0;
-        air->order[i][0] = 0;
-        air->count[i] = 1;
     }
     for (int c = 0; c < 3; c++) {
         memcpy(air->knots[0].fog_left[c], scratch->samples.transmittance[c], sizeof air->knots[0].fog_left[c]);
         memcpy(air->knots[0].fog_light[c], scratch->samples.in_scattering[c], sizeof air->knots[0].fog_light[c]);
     }
+}
+
+void nb_haze_keep(nb_scratch *scratch)
+{
+    nb_air_scratch *air = &scratch->air;
+    air->is_kept = 1;
+    for (int i = 0; i < NB_BATCH; i++)
+        if (air->knots[0].at[i] > 0 && air->known[i] < NB_AIR_KNOTS)
+            copy_lane(&air->knots[0], i, &air->knots[air->known[i]++]);
+}
+
+void nb_haze_forget(nb_scratch *scratch)
+{
+    scratch->air.is_kept = 0;
 }
 
 nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
@@ -308,9 +372,11 @@ nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, con
     }
     if (nb_daylit_fog_is(&frame->air)) nb_daylit_fog_light(frame, &scratch->rays, first);
     if (result == NEBEL_OK && frame->air.roof.is_shaded) result = nb_fog_shade_find(frame, scratch);
-    for (int i = 0; i < NB_BATCH && frame->air.roof.is_shaded; i++) shade_piece(&scratch->air, i, 0);
-    for (int k = 1; k < NB_AIR_KNOTS && result == NEBEL_OK && choose(frame, scratch, k); k++)
-        result = trace_knot(frame, fog, trace, scratch, &scratch->air.knots[k]);
+    for (int i = 0; i < NB_BATCH; i++) put_in_order(&frame->air, &scratch->air, i);
+    for (int k = 1; result == NEBEL_OK && choose(frame, scratch, k == 1); k++) {
+        result = trace_knot(frame, fog, trace, scratch, &scratch->air.fresh);
+        keep_fresh(&scratch->air);
+    }
     for (int i = 0; i < NB_BATCH && result == NEBEL_OK; i++) sum_up(&frame->air, scratch, i);
     return result;
 }

@@ -14,4 +14,8 @@
 nebel_result nb_haze_add(const nb_frame *frame, const nebel_ray_planes *fog, const nebel_trace_desc *trace,
                          nb_scratch *scratch);
 
+/* What has been found of rays counts when the same rays are followed to other ends, until it is forgotten. */
+void nb_haze_keep(nb_scratch *scratch);
+void nb_haze_forget(nb_scratch *scratch);
+
 #endif

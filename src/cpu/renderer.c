@@ -56,6 +56,7 @@ static nebel_result allocate_scratch(nebel_renderer *renderer)
         renderer->scratch[i].shafts = (nb_shafts){.shadows = NULL};
         renderer->scratch[i].lamp_shafts = (nb_lamp_shafts){.numbers = NULL};
         renderer->scratch[i].clouds.workspace = NULL;
+        renderer->scratch[i].air.is_kept = 0;
     }
     return NEBEL_OK;
 }

@@ -49,6 +49,7 @@ float nb_round(float x) { return nb_round_even(x); }
 #define nb_narrow(x) (x)
 #define nb_widen_mask(m) (m)
 #define nb_narrow_mask(m) (m)
+#define nb_any(m) (m)
 
 /* The functions of prelude_common.h; 0x3f3504f3 is sqrt(1/2), 0x3f800000 is 1. */
 float nb_copy_sign(float magnitude, float sign)

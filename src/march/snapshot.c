@@ -309,8 +309,9 @@ static nb_way_to_sun find_way_to_sun(const nebel_snapshot *s)
     const nb_volume *body = &s->media[0].body;
     if (s->medium_count != 1 || nb_volume_covers(body) || body->leaf_count != 1) return NB_WAY_MARCHED;
     if (body->density.type == NEBEL_DENSITY_GRID) return NB_WAY_GRID;
-    const int is_height = body->leaves[0].type == NB_LEAF_WORLD && body->density.type == NEBEL_DENSITY_HEIGHT &&
-                          body->density.below == NEBEL_BELOW_GROW;
+    if (body->leaves[0].type != NB_LEAF_WORLD) return NB_WAY_MARCHED;
+    if (body->density.type == NEBEL_DENSITY_ALTITUDE) return NB_WAY_ALTITUDE;
+    const int is_height = body->density.type == NEBEL_DENSITY_HEIGHT && body->density.below == NEBEL_BELOW_GROW;
     return is_height && s->to_sun[1] > 0 ? NB_WAY_HEIGHT : NB_WAY_MARCHED;
 }
 

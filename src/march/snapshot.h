@@ -41,6 +41,7 @@ typedef enum nb_way_to_sun {
     NB_WAY_ADDED,       /* convex bodies of constant density that add: what they cut out of the way, summed */
     NB_WAY_FLAT,        /* few of them, where all faces are flat: along any ray it is linear between turns */
     NB_WAY_HEIGHT,      /* one height fog without an end, and a sun above: a multiple of the density */
+    NB_WAY_ALTITUDE,    /* one fog of an altitude without an end: its integral from the place on */
     NB_WAY_GRID         /* one box of voxels: they are walked through from the place on */
 } nb_way_to_sun;
 

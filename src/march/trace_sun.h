@@ -199,6 +199,21 @@ static light_depth depth_of_height(const sunlight *sun, const march *m, nb_wide 
     return to_sun;
 }
 
+static light_depth depth_of_altitude(const sunlight *sun, const march *m, nb_wide t)
+{
+    const nb_medium *medium = &sun->snapshot->media[0];
+    const packet way = {nb_wadd3(m->rays.origin, nb_wscale3(m->rays.direction, t)), sun->direction, NB_WFAR};
+    contact k = {.medium = medium};
+    altitude_contact(&k, &way, &medium->body.density);
+    const nb_estimate along = altitude_integral(&k, NB_W(0.0), NB_WFAR);
+    light_depth to_sun = no_depth();
+    for (int c = 0; c < 3; c++) {
+        to_sun.depth[c] = REAL(medium->body.extinction[c]) * along.value;
+        to_sun.error[c] = REAL(medium->body.extinction[c]) * along.error;
+    }
+    return to_sun;
+}
+
 /* No body of finite bounds is longer than they are. */
 static nb_real longest_way(const nb_volume *body)
 {
@@ -301,6 +316,8 @@ static light_depth depth_to_sun(sunlight *sun, const march *m, nb_wide t, nb_wma
     switch (sun->snapshot->way_to_sun) {
     case NB_WAY_HEIGHT:
         return depth_of_height(sun, m, t);
+    case NB_WAY_ALTITUDE:
+        return depth_of_altitude(sun, m, t);
     case NB_WAY_ADDED:
     case NB_WAY_FLAT:
         return depth_of_bodies(sun, m, t, sun->direction, reach);
