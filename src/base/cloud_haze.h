@@ -176,6 +176,24 @@ static inline void nb_cloud_haze_sum(const nebel_cloud_knots *knots, int c, cons
     }
 }
 
+/* By how much light up to the last knot may be off at most, of the colour that is worst, as transmittances between two knots count as
+ * their mean: both fall all the way, and light may all come from where either begins. */
+static inline float nb_cloud_haze_missed(const nebel_cloud_knots *knots, const nb_cloud_haze *haze)
+{
+    float most = 0;
+    for (int c = 0; c < 3; c++) {
+        float sum = 0;
+        for (uint32_t k = 1; k < knots->count; k++) {
+            sum += 0.5f * fabsf(haze->left[c][k - 1] - haze->left[c][k]) *
+                   fabsf(knots->in_scattering[k][c] - knots->in_scattering[k - 1][c]);
+            sum += 0.5f * fabsf(knots->transmittance[k - 1] - knots->transmittance[k]) *
+                   fabsf(haze->light[c][k] - haze->light[c][k - 1]);
+        }
+        most = fmaxf(most, sum);
+    }
+    return most;
+}
+
 /* How far the ray through the middle of a pixel is followed for a sample that ends on the ground: not to where that does, for
  * seen aslant from far above its ground may lie before the other's clouds, but to the ground, or as near as it comes to it. */
 static inline double nb_cloud_ground_end(const double center[3], const double eye[3], const double unit[3], double end)

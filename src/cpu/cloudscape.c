@@ -288,6 +288,7 @@ static void mix_lane(int has_fog, nb_cloud_scratch *clouds, int lane)
         nb_cloud_haze_sum(knots, c, &haze, over);
         for (uint32_t k = 0; k < knots->count; k++) clouds->over[k][c][lane] = over[k];
     }
+    clouds->doubt[lane] += nb_cloud_haze_missed(knots, &haze);
 }
 
 static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)

@@ -60,7 +60,7 @@ typedef struct nb_cloud_scratch {
     nb_cloud_haze air[NB_BATCH];
     nb_cloud_marks marks[NB_BATCH];
     int next[NB_BATCH];    /* the knot to mark; -1: none */
-    float doubt[NB_BATCH]; /* of light, as fog counts as spread evenly between marks */
+    float doubt[NB_BATCH]; /* of light, as fog counts as spread evenly between marks, and transmittances as their means */
     float end[NB_BATCH];   /* m, how far clouds matter to a sample */
     float distance[NB_BATCH];
     nb_light_samples samples;
