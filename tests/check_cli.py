@@ -934,6 +934,14 @@ class InfoTest(PictureCase):
             self.assertAlmostEqual(float(re.search(r"visibility: (\S+) m", out)[1]), wanted, delta=1e-3 * wanted)
             self.assertNotIn("there is no fog", out)
 
+    def test_a_camera_below_the_ground_of_a_planet(self):
+        for planet, radius in (({"model": "physical", "preset": "mars"}, 3389500), ({"model": "layers"}, 6360000)):
+            for height, deep in ((0, None), (-5000, 5000), (-radius, radius)):
+                camera = {"position": [0, height, 0], "look_at": [9, height, 0]}
+                out = nebel("info", self.write_scene("deep.json", [], planet=planet, camera=camera)).out
+                found = re.search(r"the camera is (\S+) m below the ground of a planet", out)
+                self.assertEqual(None if found is None else float(found[1]), deep)
+
     def test_what_looks_like_a_mistake(self):
         scene = self.write_scene("odd.json", [
             {"name": "ghost", "shape": BOX, "extinction": 0}, {"shape": BOX, "extinction": 5},

@@ -319,6 +319,24 @@ static void warn_of_darkness(const nebel_scene_data *scene)
                  name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "", nb_endless_advice);
 }
 
+/* Less than a metre is none: level scenes stand on the ground. */
+static void warn_of_ground(const nebel_scene_data *scene)
+{
+    for (size_t i = 0; i < scene->planet_count; i++) {
+        const nebel_planet *planet = &scene->planets[i];
+        const int is_layers = planet->model == NEBEL_PLANET_LAYERS;
+        const double radius = is_layers ? planet->shells.radius : planet->air.radius;
+        double square = 0;
+        for (int c = 0; c < 3; c++) {
+            const double middle = is_layers ? planet->shells.center[c] : planet->air.ground[c] - (c == 1 ? radius : 0);
+            square += pow(scene->camera.position[c] - middle, 2);
+        }
+        if (radius - sqrt(square) >= 1)
+            (void)printf("warning: the camera is %.6g m below the ground of a planet: it sees what is seen from on it\n",
+                         radius - sqrt(square));
+    }
+}
+
 static void warn_of_scene(const nebel_scene_data *scene, double visibility)
 {
     size_t volumes = 0;
@@ -326,6 +344,7 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
     if (volumes == 0 && scene->nebula_count == 0 && scene->cells == NULL && scene->planet_count == 0)
         (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
+    warn_of_ground(scene);
     if (nb_is_air_dark(scene)) (void)printf("warning: %s\n", nb_dark_air_advice);
     if (scene->mesh_count > 0 && !is_lit(scene))
         (void)printf("warning: no sun, no lamps and no ambient light: the models are black\n");
