@@ -128,25 +128,55 @@ void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *
 /* Points of the grid to a block of size 0, and blocks to one of the next size. */
 enum { POINTS = 4, BLOCKS = 4 };
 
-static float block_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y)
+/* A rank of a column, with all that a width hides. */
+static float most_of(const nb_cloud_column *column)
+{
+    return column->rank + sqrtf(3 * column->variance);
+}
+
+static int is_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y, float least,
+                    nb_cloud_block *known);
+
+/* Part i of a block: a rank above `least`, or in *most the largest one. */
+static int is_part_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y, int i,
+                         float least, float *most)
+{
+    nb_cloud_block part;
+    int is;
+    if (size == 0) {
+        *most = most_of(point_at(workspace, grid, x * POINTS + i % (POINTS + 1), y * POINTS + i / (POINTS + 1)));
+        return *most > least;
+    }
+    is = is_above(workspace, grid, size - 1, x * BLOCKS + i % BLOCKS, y * BLOCKS + i / BLOCKS, least, &part);
+    *most = is ? part.above : part.highest;
+    return is;
+}
+
+/* Whether a column of a block has a rank above `least`. The first one that has is enough: where clouds are, most of a block need not be
+ * found. */
+static int is_above(nebel_cloud_workspace *workspace, const nb_grid *grid, int size, int x, int y, float least,
+                    nb_cloud_block *known)
 {
     const uint32_t key = grid->key ^ (uint32_t)size << 29;
+    const int parts = size == 0 ? (POINTS + 1) * (POINTS + 1) : BLOCKS * BLOCKS;
     nb_cloud_block *block = &workspace->blocks[nb_cloud_grid_hash(key, x, y) & (NB_CLOUD_BLOCKS - 1)];
-    if (block->key == key && block->at[0] == x && block->at[1] == y) return block->most;
-    float most = -HUGE_VALF;
-    if (size > 0) {
-        for (int i = 0; i < BLOCKS * BLOCKS; i++)
-            most =
-                nb_larger(most, block_at(workspace, grid, size - 1, x * BLOCKS + i % BLOCKS, y * BLOCKS + i / BLOCKS));
-    } else {
-        for (int i = 0; i < (POINTS + 1) * (POINTS + 1); i++) {
-            const nb_cloud_column *column =
-                point_at(workspace, grid, x * POINTS + i % (POINTS + 1), y * POINTS + i / (POINTS + 1));
-            most = nb_larger(most, column->rank + sqrtf(3 * column->variance));
+    const int is_there = block->key == key && block->at[0] == x && block->at[1] == y;
+    *known = is_there ? *block : (nb_cloud_block){.key = key, .at = {x, y}, .above = -HUGE_VALF, .highest = HUGE_VALF};
+    if (known->above > least) return 1;
+    if (known->highest <= least) return 0;
+    float highest = -HUGE_VALF;
+    for (int i = 0; i < parts; i++) {
+        float most;
+        if (is_part_above(workspace, grid, size, x, y, i, least, &most)) {
+            known->above = most;
+            *block = *known;
+            return 1;
         }
+        highest = nb_larger(highest, most);
     }
-    *block = (nb_cloud_block){.key = key, .at = {x, y}, .most = most};
-    return most;
+    known->highest = highest;
+    *block = *known;
+    return 0;
 }
 
 /* Beyond a face's edge there are points, too: blocks that lie across need no more than others. */
@@ -171,24 +201,45 @@ nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int l
     return out;
 }
 
-float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way)
+/* Of the two grids between which columns are mixed: those that count. */
+static int first_grid(const nb_cloud_outlook *out)
 {
-    static const double sides[3] = {POINTS, POINTS * BLOCKS, POINTS * BLOCKS * BLOCKS};
-    float most = -HUGE_VALF;
-    *way = HUGE_VAL;
-    for (int k = 0; k < 2; k++) {
-        if (k == 0 ? out->part >= 1 : out->part <= 0) continue;
-        const nb_grid grid = grid_of(workspace->view->clouds, out->layer, out->level + k, out->face);
-        const double side = grid.of->spacing * sides[size], per_side = 1 / side;
-        int block[2];
+    return out->part < 1 ? 0 : 1;
+}
+
+static int last_grid(const nb_cloud_outlook *out)
+{
+    return out->part > 0 ? 1 : 0;
+}
+
+static const double sides[3] = {POINTS, POINTS *BLOCKS, POINTS *BLOCKS *BLOCKS};
+
+/* From the edge of a block rays go on into the next one. In sides of blocks, more than rounding and nothing to ranks. */
+#define ONWARD 1e-9
+
+double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_outlook *out, int size)
+{
+    double way = HUGE_VAL;
+    for (int k = first_grid(out); k <= last_grid(out); k++) {
+        const double side = workspace->view->clouds->layers[out->layer].grids[out->level + k].spacing * sides[size],
+                     per_side = 1 / side;
         for (int i = 0; i < 2; i++) {
-            const double low = whole_below(out->at[i] * per_side), edge = (low + out->grows[i]) * side;
+            const double low = whole_below(out->at[i] * per_side + (out->grows[i] ? ONWARD : -ONWARD)),
+                         edge = (low + out->grows[i]) * side;
             const double ahead = (edge * out->over - out->place[i]) / (out->direction[i] - edge * out->rise);
-            if (ahead > 0 && ahead < *way) *way = ahead;
-            block[i] = (int)low;
+            if (ahead > 0 && ahead < way) way = ahead;
+            out->block[k][i] = (int)low;
         }
-        const float here = block_at(workspace, &grid, size, block[0], block[1]);
-        if (here > most) most = here;
     }
-    return most;
+    return way;
+}
+
+int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, float least)
+{
+    nb_cloud_block known;
+    for (int k = first_grid(out); k <= last_grid(out); k++) {
+        const nb_grid grid = grid_of(workspace->view->clouds, out->layer, out->level + k, out->face);
+        if (is_above(workspace, &grid, size, out->block[k][0], out->block[k][1], least, &known)) return 1;
+    }
+    return 0;
 }

@@ -76,11 +76,11 @@ typedef struct nb_cloud_patch {
     nb_four columns[4];
 } nb_cloud_patch;
 
-/* The largest rank, with all that a width hides, of a block of that grid. */
+/* Ranks, with all that a width hides, of a block of that grid: one that there is, and what none is above, as far as they are known. */
 typedef struct nb_cloud_block {
     uint32_t key;
     int32_t at[2];
-    float most;
+    float above, highest;
 } nb_cloud_block;
 
 /* What a place has of light, whoever looks at it: of the sun's, what was not scattered, or hardly turned; mean radiance of what
@@ -141,14 +141,16 @@ typedef struct nb_cloud_outlook {
     double over, rise;                    /* along the face's axis: of the place, of the direction */
     double at[2], place[2], direction[2]; /* across; at: on the face */
     int grows[2];                         /* whether that does */
+    int block[2][2];                      /* of each grid, of the size that was asked last */
 } nb_cloud_outlook;
 
 /* Place and direction in the layer's axes. */
 nb_cloud_outlook nb_cloud_look_out(const nebel_cloud_workspace *workspace, int layer, const double place[3],
                                    const double direction[3], float width);
-/* No column that the ray passes in the next *way metres, within a block of size 0, 1 or 2, has a higher rank; it counts
- * variance in. */
-float nb_cloud_most_rank(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, double *way);
+/* How far the ray stays within a block of size 0, 1 or 2, m. */
+double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_outlook *out, int size);
+/* Whether the rank of any column there is above `least`, with all that a width hides. */
+int nb_cloud_is_block_above(nebel_cloud_workspace *workspace, const nb_cloud_outlook *out, int size, float least);
 
 nebel_result nb_cloud_light_make(nebel_cloud_view *view);
 

@@ -191,14 +191,11 @@ static float least_between(const nb_walk *walk, int k, const nb_spot *a, double 
 static double clear_way(nb_walk *walk, int k)
 {
     const nb_spot *spot = &walk->spot;
-    const nb_cloud_outlook out =
-        nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
+    nb_cloud_outlook out = nb_cloud_look_out(walk->workspace, k, spot->place, walk->turned[k].direction, spot->width);
     for (int size = 2; size >= 0; size--) {
-        double way;
         if (walk->t < walk->unknown[size]) continue;
-        const float most = nb_cloud_most_rank(walk->workspace, &out, size, &way);
-        way += 1e-3 * walk->least;
-        if (least_between(walk, k, spot, way) >= most) return way;
+        const double way = nb_cloud_way_in_block(walk->workspace, &out, size) + 1e-3 * walk->least;
+        if (!nb_cloud_is_block_above(walk->workspace, &out, size, least_between(walk, k, spot, way))) return way;
         walk->unknown[size] = walk->t + way;
     }
     return 0;
@@ -213,12 +210,19 @@ static double least_step(const nb_walk *walk, const nb_stay *stay)
     return times * nb_min(STAY_STEP * (stay->end - stay->begin), nb_max(near, width));
 }
 
+/* A layer's clouds thin out to nothing where it ends: who goes there in one step would see nothing at either end of it. */
+static double step_before_end(double left, double step, double least)
+{
+    return step < left ? step : left > least ? nb_max(least, 0.5 * left) : left;
+}
+
 /* Goes on until there may be cloud, by as much as there can be none, or by the least step. Returns 0 at the stay's end, else 1 and
  * the step is from t as long as length. */
 static int find_step(nb_walk *walk, const nb_stay *stay)
 {
     const int k = stay->layer;
     while (walk->t < stay->end) {
+        const double least = least_step(walk, stay);
         if (walk->t >= walk->unknown[0]) {
             const double way = clear_way(walk, k);
             if (way > 0) {
@@ -228,7 +232,9 @@ static int find_step(nb_walk *walk, const nb_stay *stay)
                 continue;
             }
         }
-        walk->length = nb_min(stay->end - walk->t, nb_max(walk->clear / SLOPE_PART, least_step(walk, stay)));
+        const double left = stay->end - walk->t;
+        if (walk->clear >= left) return 0;
+        walk->length = step_before_end(left, nb_max(walk->clear / SLOPE_PART, least), least);
         return 1;
     }
     return 0;
