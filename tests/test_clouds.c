@@ -2,6 +2,8 @@
 #include "planet/cloud_looks.h"
 #include "planet/cloud_view.h"
 
+#include "base/vector.h"
+
 #include "cloud_help.h"
 #include "dice.h"
 #include "near.h"
@@ -257,25 +259,39 @@ static void test_no_lines_in_thin_clouds(void **state)
     nebel_destroy_clouds(clouds);
 }
 
-/* A closed sheet against a low sun: how much its light differs from the mean of neighbours, as a part of it. Where places of light
- * hung on where pieces of a ray ended, which are halves and doubles of each other, it was 1.9e-3 and looked like grain. */
-static void test_neighbours_have_light_of_neighbouring_places(void **state)
+/* Rows of pixels, seen from a place. */
+typedef struct window {
+    double eye[3], forward[3], right[3], up[3]; /* forward: through the first pixel; the others from pixel to pixel */
+} window;
+
+enum { SIDE = 48 };
+
+static nebel_ray pixel_ray(const window *w, int x, int y)
 {
-    (void)state;
-    enum { SIDE = 48, COUNT = SIDE * SIDE };
-    const double pixel = 2 / sqrt(3) / 360;
-    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 0.9});
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    for (int c = 0; c < 3; c++) {
+        ray.origin[c] = w->eye[c];
+        ray.direction[c] = w->forward[c] + x * w->right[c] - y * w->up[c];
+    }
+    return ray;
+}
+
+/* How much pixels' light differs from the mean of their neighbours, as a part of it, root of the mean square; *most at most. */
+static double find_grain(const nebel_cloud_layer *layer, const nebel_sun *sun, const window *w, double *most)
+{
+    enum { COUNT = SIDE * SIDE };
+    static nebel_cloud_knots knots[COUNT];
+    nebel_clouds *clouds = make(1, layer);
+    const nebel_cloud_view_desc desc = {.clouds = clouds, .sun = *sun};
+    const double pixel = sqrt(nb_vector_dot(w->right, w->right));
     nebel_cloud_view *view;
     nebel_cloud_workspace *workspace;
-    const nebel_cloud_view_desc desc = {.clouds = clouds, .sun = {.direction = {.3, .12, -1}, .irradiance = {5, 5, 5}}};
-    static nebel_cloud_knots knots[COUNT];
-    double square = 0, most = 0;
+    double square = 0;
+    *most = 0;
     assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
     assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
     for (int i = 0; i < COUNT; i++) {
-        const nebel_ray ray = {.origin = {0, 2, 0},
-                               .direction = {(i % SIDE - 180) * pixel, (110 - i / SIDE) * pixel, -1},
-                               .t_max = HUGE_VAL};
+        const nebel_ray ray = pixel_ray(w, i % SIDE, i / SIDE);
         assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &pixel, 0, &knots[i], 0), NEBEL_OK);
         assert_true(knots[i].count > 0);
     }
@@ -286,14 +302,97 @@ static void test_neighbours_have_light_of_neighbouring_places(void **state)
         for (int k = 0; k < 5; k++) light[k] = (double)knots[at[k]].in_scattering[knots[at[k]].count - 1][0];
         const double off = 4 * light[0] / (light[1] + light[2] + light[3] + light[4]) - 1;
         square += off * off;
-        most = fmax(most, fabs(off));
+        *most = fmax(*most, fabs(off));
     }
-    print_message("sheet against a low sun: pixels off the mean of neighbours by %.2g, %.2g at most\n",
-                  sqrt(square / COUNT), most);
-    assert_true(sqrt(square / COUNT) < 1.2e-3 && most < 7e-3);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     nebel_destroy_clouds(clouds);
+    return sqrt(square / COUNT);
+}
+
+/* A closed sheet against a low sun. Where places of light hung on where pieces of a ray ended, which are halves and doubles of each
+ * other, it was 1.9e-3 and looked like grain. */
+static void test_neighbours_have_light_of_neighbouring_places(void **state)
+{
+    (void)state;
+    const double pixel = 2 / sqrt(3) / 360;
+    const nebel_cloud_layer sheet = {.kind = NEBEL_CLOUD_STRATUS, .coverage = 0.9};
+    const nebel_sun sun = {.direction = {.3, .12, -1}, .irradiance = {5, 5, 5}};
+    const window w = {{0, 2, 0}, {-180 * pixel, 110 * pixel, -1}, {pixel, 0, 0}, {0, pixel, 0}};
+    double most;
+    const double grain = find_grain(&sheet, &sun, &w, &most);
+    print_message("sheet against a low sun: pixels off the mean of neighbours by %.2g, %.2g at most\n", grain, most);
+    assert_true(grain < 1.2e-3 && most < 7e-3);
+}
+
+/* Through thin cloud around the eye that lies in shadow to a sunlit heap 140 m behind it. Where hardly any cloud between was as good as
+ * none, or as cloud, some pixels had one light for both, from between them. */
+static void test_two_clouds_have_light_of_two_places(void **state)
+{
+    (void)state;
+    const nebel_cloud_layer heaps = {.seed = 3};
+    const nebel_sun sun = {.direction = {.3, .5, -1}, .irradiance = {5, 5, 5}};
+    const window w = {
+        {2000, 1500, .37}, {-.4199, .0283, -.9089}, {1.8235e-3, 0, -7.838e-4}, {6.17e-5, 1.9785e-3, 1.435e-4}};
+    double most;
+    const double grain = find_grain(&heaps, &sun, &w, &most);
+    print_message("two clouds: pixels off the mean of neighbours by %.2g, %.2g at most\n", grain, most);
+    assert_true(grain < .05 && most < .3);
+}
+
+/* What is left of a ray by short steps, less what is traced. */
+static double excess_of(const nebel_clouds *clouds, nebel_cloud_workspace *workspace, const nebel_ray *ray, double end)
+{
+    nebel_cloud_knots knots;
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
+    const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+    return left - brute_force(clouds, ray, 0, end, 2);
+}
+
+/* Blocks of columns lie along planes through the planet's middle, so that cameras at x or z = 0 are on their edges. A ray from there to
+ * the side of lesser numbers was taken to stay in the block of the others, and went on through all cloud: 45 of 500. */
+static void test_rays_from_edges_of_blocks(void **state)
+{
+    (void)state;
+    enum { RAYS = 120 };
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 1});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 7;
+    for (int i = 0; i < RAYS; i++) {
+        const double turn = dice(&numbers, -.05, .05), up = dice(&numbers, -.2, .2), far = dice(&numbers, -2e4, 2e4);
+        const double height = dice(&numbers, 1000, 2600);
+        const nebel_ray along_z = {{far, height, 0}, {turn, up, -1}, 4000},
+                        along_x = {{0, height, far}, {-1, up, turn}, 4000};
+        assert_true(excess_of(clouds, workspace, i % 2 ? &along_z : &along_x, 4000) < .2);
+    }
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
+/* Clouds thin out to nothing where their layer ends: a step that ended there saw nothing, and one ray of 600 passed all cloud. */
+static void test_bases_are_seen(void **state)
+{
+    (void)state;
+    enum { RAYS = 300 };
+    static const double details[] = {.1, .5};
+    for (int k = 0; k < 2; k++) {
+        nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 2, .detail = details[k]});
+        nebel_cloud_workspace *workspace;
+        nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+        const nebel_ray known = {{8113.37, 1500, -3450.79}, {-.6338, -.3746, -.6768}, HUGE_VAL};
+        uint64_t numbers = 3;
+        assert_true(excess_of(clouds, workspace, &known, 4e3) < .02);
+        for (int i = 0; i < RAYS; i++) {
+            const double turn = dice(&numbers, 0, 2 * PI), x = dice(&numbers, -3e4, 3e4), z = dice(&numbers, -3e4, 3e4);
+            const nebel_ray ray = {{x, 1500, z}, {sin(turn), -.4, cos(turn)}, HUGE_VAL};
+            assert_true(excess_of(clouds, workspace, &ray, 1500 / .4) < .1);
+        }
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+        nebel_destroy_clouds(clouds);
+    }
 }
 
 /* Steps are no longer than a layer is high, however large its heaps. */
@@ -627,6 +726,9 @@ int main(void)
         cmocka_unit_test(test_transmittance_is_that_of_the_density),
         cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_neighbours_have_light_of_neighbouring_places),
+        cmocka_unit_test(test_two_clouds_have_light_of_two_places),
+        cmocka_unit_test(test_rays_from_edges_of_blocks),
+        cmocka_unit_test(test_bases_are_seen),
         cmocka_unit_test(test_thin_layers),
         cmocka_unit_test(test_thick_cloud_ends_where_it_is_seen),
         cmocka_unit_test(test_below_the_ground_is_on_it),

@@ -29,6 +29,13 @@
 #define MOST_DEPTH 1
 #define STRETCH_DEPTH 0.65
 
+/* Stretches end sooner where there is less cloud than their layer's extinction would make: for each unit of optical depth that there
+ * is less, by so much of them, times what is seen of them. Light of two clouds would come from between them. */
+#define LOSS 1
+
+/* Nor has what is so far apart one light, in first steps. */
+#define WIDE_GAP 16
+
 /* The first step from a piece towards the sun: optical depth in the middle of clouds; half of the least piece at most. */
 #define FIRST_DEPTH 0.3
 
@@ -61,7 +68,8 @@ enum { MOST_PIECES = 4096, WALKS = 32 };
 
 /* Pieces one behind the other that have the same light. */
 typedef struct nb_stretch {
-    double end, depth, most; /* most: how deep it gets */
+    double end, most;        /* most: how deep it gets */
+    double spent;            /* part of it that it has come to */
     double seen, seen_apart; /* of all scattering, and of what leads away */
     double weight, moment;   /* of places by what is seen */
 } nb_stretch;
@@ -355,8 +363,6 @@ static void take_part(nb_walk *walk, int k, double t, double length, double dept
 {
     nb_stretch *stretch = &walk->stretch;
     const double apart = (double)walk->ray.apart[k], left = walk->tally.left, visibly = visible(walk->tally.left_apart);
-    if (!(stretch->depth > 0)) stretch->most = deepest_stretch(walk);
-    stretch->depth += depth;
     stretch->end = t + length;
     nb_cloud_tally_pass(&walk->tally, t + length, depth, depth_apart);
     const double seen = left - walk->tally.left, seen_apart = (visibly - visible(walk->tally.left_apart)) / apart;
@@ -366,27 +372,43 @@ static void take_part(nb_walk *walk, int k, double t, double length, double dept
     stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
 }
 
-/* What part of a piece of such depth is left until the stretch ends; more than 1 where it goes on. */
-static double rest_of_stretch(const nb_walk *walk, double depth)
+/* What part of a stretch such cloud is. */
+static double part_of_stretch(const nb_walk *walk, int k, double length, double depth)
 {
     const nb_stretch *stretch = &walk->stretch;
-    return ((stretch->depth > 0 ? stretch->most : deepest_stretch(walk)) - stretch->depth) / depth;
+    const double whole = (double)walk->view->clouds->layers[k].extinction * length;
+    const double seen = stretch->seen + (double)walk->ray.apart[k] * stretch->seen_apart;
+    return depth / stretch->most + LOSS * seen * (whole - depth);
 }
 
-/* Stretches end where cloud is so deep, wherever pieces end: neighbouring rays, whose pieces may be others, have their light from
- * neighbouring places. */
+/* The gap before t is part of a stretch, too. */
+static void take_gap(nb_walk *walk, int k, double t)
+{
+    nb_stretch *stretch = &walk->stretch;
+    if (stretch->weight > 0) stretch->spent += part_of_stretch(walk, k, t - stretch->end, 0);
+    if (stretch->spent >= 1 || t - stretch->end > WIDE_GAP * walk->least) add_light(walk, k);
+}
+
+/* Stretches end where they have come to so much, wherever pieces end: neighbouring rays, whose pieces may be others, have their light
+ * from neighbouring places. */
 static void take_piece(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
 {
+    nb_stretch *stretch = &walk->stretch;
     if (!(depth > 0)) return;
-    if (t - walk->stretch.end > walk->least) add_light(walk, k);
+    take_gap(walk, k, t);
     nb_cloud_tally_enter(&walk->tally, t);
     for (double begin = 0; begin < 1;) {
-        const double end = begin + rest_of_stretch(walk, depth), part = nb_min(end, 1) - begin;
+        if (!(stretch->weight > 0)) stretch->most = deepest_stretch(walk);
+        const double rest = 1 - begin, whole = part_of_stretch(walk, k, rest * length, rest * depth);
+        const double share = (1 - stretch->spent) / whole, part = nb_min(1, share) * rest;
         take_part(walk, k, t + begin * length, part * length, part * depth, part * depth_apart);
-        if (end > 1) return;
-        begin = end;
+        if (share > 1) {
+            stretch->spent += whole;
+            return;
+        }
+        begin = nb_min(1, begin + part);
         add_light(walk, k);
-        nb_cloud_tally_leave(&walk->tally, t + end * length);
+        nb_cloud_tally_leave(&walk->tally, t + begin * length);
     }
 }
 
