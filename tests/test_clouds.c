@@ -340,6 +340,43 @@ static void test_two_clouds_have_light_of_two_places(void **state)
     assert_true(grain < .05 && most < .3);
 }
 
+/* Rays without a width, to which small billows are as thick as they are: steps in search of clouds may go over some. From within, below
+ * and above. */
+static void test_billows_that_are_missed(void **state)
+{
+    (void)state;
+    enum { RAYS = 450 };
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 1});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    uint64_t numbers = 11;
+    double sum = 0, most = 0;
+    int untold = 0;
+    for (int i = 0; i < RAYS; i++) {
+        const double heights[3] = {dice(&numbers, 1000, 2600), 2, 5000}, turn = dice(&numbers, 0, 2 * PI);
+        const double rise = dice(&numbers, .15, .7) * (i % 3 == 2 ? -1 : 1), height = heights[i % 3];
+        const nebel_ray ray = {{dice(&numbers, -2e4, 2e4), height, dice(&numbers, -2e4, 2e4)},
+                               {cos(turn) * sqrt(1 - rise * rise), rise, sin(turn) * sqrt(1 - rise * rise)},
+                               i % 3 == 2 ? 4120 / -rise : HUGE_VAL};
+        const double begin = i % 3 == 0 ? 0 : (i % 3 == 1 ? 800 : 2200) / fabs(rise),
+                     end = (i % 3 == 2 ? 4120 : 2720 - height) / fabs(rise);
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
+        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
+        const double off = fabs(left - brute_force(clouds, &ray, begin, end, 1));
+        const double beyond = off - (knots.count > 0 ? (double)knots.error : 0);
+        sum += off / RAYS;
+        most = fmax(most, beyond);
+        untold += beyond > 2e-3;
+    }
+    print_message("%d thin rays: off by %.2g in the mean, %d by more than 2e-3 beyond what is told, by %.2g at most\n",
+                  RAYS, sum, untold, most);
+    assert_true(sum < 2e-3 && untold <= RAYS / 50 && most < .06);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* What is left of a ray by short steps, less what is traced. */
 static double excess_of(const nebel_clouds *clouds, nebel_cloud_workspace *workspace, const nebel_ray *ray, double end)
 {
@@ -727,6 +764,7 @@ int main(void)
         cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_neighbours_have_light_of_neighbouring_places),
         cmocka_unit_test(test_two_clouds_have_light_of_two_places),
+        cmocka_unit_test(test_billows_that_are_missed),
         cmocka_unit_test(test_rays_from_edges_of_blocks),
         cmocka_unit_test(test_bases_are_seen),
         cmocka_unit_test(test_thin_layers),

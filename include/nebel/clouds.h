@@ -119,7 +119,10 @@ nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cl
 /* NULL is fine. */
 void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace);
 
-/* What clouds do along a ray up to some places of it. Between two of them transmittance is in between. */
+/* What clouds do along a ray up to some places of it. Between two of them transmittance is in between. Together with the air, which leaves
+ * A up to each place and has the light L (nebel_trace_air to each t): from place to place the light of both grows by the mean of A at
+ * both times what in_scattering grows by, and by the mean of transmittance times what L grows by; before the first it is L, behind the
+ * last L grows times the last transmittance. */
 typedef struct nebel_cloud_knots {
     uint32_t count;                                /* 0: no cloud; else the first is where they begin */
     float t[NEBEL_MAX_CLOUD_KNOTS];                /* m, ascending */

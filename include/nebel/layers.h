@@ -26,7 +26,8 @@ extern "C" {
 
 #define NEBEL_MAX_MAP_SIZE 16384
 
-/* A picture. Around a ball its first row is at the north pole, and its columns go east from longitude -180. {0}: none. */
+/* A picture. Around a ball its first row is at the north pole, and its columns go east from longitude -180. Longitude 0 is where x is
+ * largest, 90 east where z is least. {0}: none. */
 typedef struct nebel_map {
     size_t width, height; /* 1 to NEBEL_MAX_MAP_SIZE */
     int channels;         /* 1, or 3: linear red, green and blue */

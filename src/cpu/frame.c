@@ -77,7 +77,8 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_scene_data *scene = renderer->scene;
     if (scene->planet_count == 0 || scene->planets[0].atmosphere == NULL) return NEBEL_OK;
     if (renderer->method != NEBEL_METHOD_EXACT)
-        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
+        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
+                       "planets are drawn by the method exact alone: leave another out, or the planet");
     if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: orthographic cameras see no planets; take a perspective one or a panorama");

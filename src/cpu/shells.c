@@ -10,7 +10,8 @@ nebel_result nb_shells_set(nb_frame *frame, const nebel_frame_desc *desc)
     const nebel_scene_data *scene = renderer->scene;
     if (scene->planet_count == 0 || scene->planets[0].layers == NULL) return NEBEL_OK;
     if (renderer->method != NEBEL_METHOD_EXACT)
-        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
+        return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
+                       "planets are drawn by the method exact alone: leave another out, or the planet");
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(&renderer->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12",
                        desc->time);

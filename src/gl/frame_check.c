@@ -85,7 +85,8 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
     if (has_air && r->scene->planets[0].cloud_layer_count > 0 && !desc->clouds_by_processor)
         return refuse(&r->log, "clouds with volume by itself");
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
-        return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED, "frame: planets are drawn with the method exact alone");
+        return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                       "planets are drawn by the method exact alone: leave another out, or the planet");
     if (has_layers) return check_layers(r, desc);
     return has_air ? check_air(r, desc) : NEBEL_OK;
 }

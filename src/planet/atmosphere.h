@@ -45,6 +45,8 @@ double nb_gathered_off(const nebel_atmosphere *atmosphere, const nb_gathered *ga
 /* The sun as all rays see it, its direction made a unit one; NULL: none. A sun without light may come from nowhere. 0
  * where it is not in order. */
 int nb_air_resolve_sun(const nebel_sun *sun, nebel_sun *resolved);
+/* What to say where it returns 0. */
+extern const char nb_air_sun_fault[];
 
 int nb_air_is_place(const double place[3]);
 

@@ -9,9 +9,11 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
     nebel_sun sun;
     if (view == NULL) return NEBEL_ERROR_ARGUMENT;
     *view = NULL;
-    if (desc == NULL || desc->clouds == NULL || !nb_allocator_is_valid(&desc->allocator) ||
-        !nb_air_resolve_sun(&desc->sun, &sun))
-        return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc->clouds == NULL)
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: clouds: is NULL; make some first");
+    if (!nb_air_resolve_sun(&desc->sun, &sun))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: %s", nb_air_sun_fault);
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: time is %g; must be within -1e12 and 1e12", desc->time);
     if (!(desc->tolerance >= 0 && desc->tolerance <= 1))

@@ -440,8 +440,9 @@ nebel_result nebel_create_clouds(const nebel_clouds_desc *desc, nebel_clouds **c
     nebel_cloud_layer layers[NEBEL_MAX_CLOUD_LAYERS];
     if (clouds == NULL) return NEBEL_ERROR_ARGUMENT;
     *clouds = NULL;
-    if (desc == NULL || desc->atmosphere == NULL || !nb_allocator_is_valid(&desc->allocator))
-        return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc->atmosphere == NULL)
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: atmosphere: is NULL; make one first");
     nebel_result result = check(desc, layers);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);

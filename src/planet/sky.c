@@ -130,6 +130,9 @@ double nb_gathered_off(const nebel_atmosphere *atmosphere, const nb_gathered *ga
 
 /* ---- places and directions ------------------------------------------------------------------- */
 
+const char nb_air_sun_fault[] =
+    "sun: each irradiance must be within 0 and 1e9, and a sun that shines needs a direction that is not 0";
+
 int nb_air_resolve_sun(const nebel_sun *sun, nebel_sun *resolved)
 {
     static const nebel_sun none = {.direction = {0, 1, 0}};

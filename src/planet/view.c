@@ -261,9 +261,15 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
     nebel_sun sun;
     if (view == NULL) return NEBEL_ERROR_ARGUMENT;
     *view = NULL;
-    if (desc == NULL || desc->atmosphere == NULL || !nb_allocator_is_valid(&desc->allocator) ||
-        !nb_air_resolve_sun(&desc->sun, &sun) || !nb_air_is_place(desc->position))
-        return NEBEL_ERROR_ARGUMENT;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    if (desc->atmosphere == NULL)
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "air view: atmosphere: is NULL; make one first");
+    if (!nb_air_resolve_sun(&desc->sun, &sun))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "air view: %s", nb_air_sun_fault);
+    if (!nb_air_is_place(desc->position))
+        return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT,
+                       "air view: position: is (%g, %g, %g); each must be within -1e15 and 1e15", desc->position[0],
+                       desc->position[1], desc->position[2]);
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_air_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "air: out of memory");
