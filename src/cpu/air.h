@@ -69,7 +69,7 @@ typedef struct nb_air_scratch {
     int known[NB_BATCH];                                 /* a ray's knots */
     uint8_t order[NB_BATCH][NB_AIR_KNOTS];               /* of those along it up to its end */
     int count[NB_BATCH];
-    int is_kept; /* knots but the first are of the rays that are followed next, too */
+    int is_kept;                      /* knots but the first are of the rays that are followed next, too */
     nb_fog_shade fog_shade[NB_BATCH]; /* through the middles of pixels, of fog that is shaded by its place */
 } nb_air_scratch;
 
