@@ -59,10 +59,9 @@ typedef struct nb_cloud_scratch {
     float over[NEBEL_MAX_CLOUD_KNOTS][3][NB_BATCH]; /* what a knot adds to light that came from behind */
     nb_cloud_haze air[NB_BATCH];
     nb_cloud_marks marks[NB_BATCH];
-    int next[NB_BATCH]; /* the knot to mark; -1: none */
-    float
-        doubt[NB_BATCH]; /* of light, as fog counts as spread evenly between marks, and transmittances as their means */
-    float end[NB_BATCH]; /* m, how far clouds matter to a sample */
+    int next[NB_BATCH];    /* the knot to mark; -1: none */
+    float doubt[NB_BATCH]; /* of light: by means between knots, and as fog counts as spread evenly between marks */
+    float end[NB_BATCH];   /* m, how far clouds matter to a sample */
     float distance[NB_BATCH];
     nb_light_samples samples;
 } nb_cloud_scratch;
