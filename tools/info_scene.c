@@ -332,8 +332,9 @@ static void warn_of_ground(const nebel_scene_data *scene)
             square += pow(scene->camera.position[c] - middle, 2);
         }
         if (radius - sqrt(square) >= 1)
-            (void)printf("warning: the camera is %.6g m below the ground of a planet: it sees what is seen from on it\n",
-                         radius - sqrt(square));
+            (void)printf(
+                "warning: the camera is %.6g m below the ground of a planet: it sees what is seen from on it\n",
+                radius - sqrt(square));
     }
 }
 
