@@ -654,7 +654,7 @@ static void memory_may_run_out(void **state)
         if (result == NEBEL_OK) break;
         assert_int_equal(result, NEBEL_ERROR_MEMORY);
         assert_null(atmosphere);
-        assert_true(calls < 20);
+        assert_true(calls < 100);
     }
 }
 

@@ -60,9 +60,9 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     for (int c = 0; c < 3; c++) made->center[c] = whole.ground[c] - (c == 1 ? whole.radius : 0);
     made->rule = nb_rule_make(NB_RULE_MOST);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
-    made->share_off = whole.quality == NEBEL_AIR_PRECISE ? 0.02 : 0.1;
     const nb_parts parts = {whole.run, whole.run_user};
     result = nb_scatter_make(&allocator, &parts, &made->airs, whole.quality, whole.ground_albedo, &made->scatter);
+    made->share_off = (whole.quality == NEBEL_AIR_PRECISE ? 0.02 : 0.1) + made->scatter.missing;
     if (result == NEBEL_OK) {
         *atmosphere = made;
         return NEBEL_OK;

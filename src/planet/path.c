@@ -75,6 +75,42 @@ static void lay_piece(const nb_airs *airs, const nb_rule *rule, nb_track track, 
     path->count += rule->count;
 }
 
+/* A piece's nodes are too few where more than that is lost within it and something is seen of it, in optical depths. */
+#define MOST_DEPTH 1.5
+#define UNSEEN_DEPTH 9
+
+/* Behind that nothing is seen of anything. */
+#define DARK_DEPTH 16
+
+static int is_too_deep(const double before[3], const double behind[3])
+{
+    for (int c = 0; c < 3; c++)
+        if (before[c] < UNSEEN_DEPTH && behind[c] - before[c] > MOST_DEPTH) return 1;
+    return 0;
+}
+
+static int is_dark(const double depth[3])
+{
+    return depth[0] > DARK_DEPTH && depth[1] > DARK_DEPTH && depth[2] > DARK_DEPTH;
+}
+
+/* Adds the nodes from a to b in pieces that are not too deep, as long as there are halvings left. */
+static void lay_pieces(const nb_airs *airs, const nb_rule *rule, nb_track track, double a, double b, int *halvings,
+                       double depth[3], nb_path *path)
+{
+    const int first = path->count;
+    double behind[3] = {depth[0], depth[1], depth[2]};
+    lay_piece(airs, rule, track, a, b, behind, path);
+    if (*halvings > 0 && is_too_deep(depth, behind)) {
+        --*halvings;
+        path->count = first;
+        lay_pieces(airs, rule, track, a, 0.5 * (a + b), halvings, depth, path);
+        lay_pieces(airs, rule, track, 0.5 * (a + b), b, halvings, depth, path);
+        return;
+    }
+    for (int c = 0; c < 3; c++) depth[c] = behind[c];
+}
+
 static void add_start(const nb_airs *airs, nb_track track, nb_path *path)
 {
     int i = path->count;
@@ -89,10 +125,12 @@ void nb_path_lay(const nb_airs *airs, const nb_rule *rule, nb_track track, doubl
 {
     nb_ends ends;
     double depth[3] = {0, 0, 0};
+    int halvings = NB_PATH_HALVINGS;
     path->count = 0;
     find_ends(airs, track, length, cut_count, cuts, &ends);
-    for (int i = 1; i < ends.count; i++)
-        if (ends.at[i] > ends.at[i - 1]) lay_piece(airs, rule, track, ends.at[i - 1], ends.at[i], depth, path);
+    for (int i = 1; i < ends.count && !is_dark(depth); i++)
+        if (ends.at[i] > ends.at[i - 1])
+            lay_pieces(airs, rule, track, ends.at[i - 1], ends.at[i], &halvings, depth, path);
     add_start(airs, track, path);
     for (int c = 0; c < 3; c++) path->left[c] = nb_exp(-depth[c]);
 }

@@ -7,8 +7,9 @@
 
 enum {
     NB_PATH_CUTS = 20,
+    NB_PATH_HALVINGS = 24,
     NB_PATH_LANES = 8,
-    NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS) * NB_RULE_MOST + NB_PATH_LANES,
+    NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS + NB_PATH_HALVINGS) * NB_RULE_MOST + NB_PATH_LANES,
 };
 
 /* Nodes in arrays, for kernels that take several at once. Behind the last one is another at the start of the ray, of weight

@@ -1,8 +1,8 @@
 #include "scatter.h"
 
 #include "gather.h"
+#include "orders.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -87,21 +87,26 @@ static void seal(nb_scatter *scatter)
 
 enum { MOST_TURNS = 16 };
 
+/* MOST_TIMES: as many entries over the height as are asked for. */
+enum { MOST_ROUNDS = 32, MOST_TIMES = 4 };
+
 /* Light changes with the slope, near the horizon, far more than with the turn, so that turns are as few as moments bear.
  * Numbers of a quality: entries of the table, directions up and down and around, nodes of a piece of a
- * ray, how often light is scattered, and by how many moments it is kept. */
+ * ray, how often light is scattered before what follows is guessed, and by how many moments it is kept; what part of it may be missing. */
 typedef struct nb_effort {
     int heights, suns, slopes, turns, nodes, orders, moments;
+    double most_missing;
 } nb_effort;
 
 static const nb_effort efforts[NEBEL_AIR_QUALITY_COUNT] = {
-    [NEBEL_AIR_FAST] = {12, 32, 8, 3, 3, 4, NB_FEW_MOMENTS},
-    [NEBEL_AIR_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS},
+    [NEBEL_AIR_FAST] = {12, 32, 8, 3, 3, 4, NB_FEW_MOMENTS, 1e-2},
+    [NEBEL_AIR_PRECISE] = {20, 40, 8, 5, 4, 5, NB_MOMENTS, 2e-3},
 };
 
 typedef struct nb_maker {
     const nb_airs *airs;
-    nb_scatter *scatter, *next;
+    const nb_scatter *scatter;
+    nb_scatter *next;
     const double *albedo;
     const nb_effort *effort;
     nb_rule slopes, nodes;
@@ -206,7 +211,7 @@ static void add_slope(const nb_maker *maker, int height, double zenith, double w
 {
     const nb_airs *airs = maker->airs;
     const nb_effort *effort = maker->effort;
-    const double radius = airs->radius + height_at(maker->scatter, airs, height);
+    const double radius = airs->radius + height_at(maker->next, airs, height);
     nb_fan fan;
     fan.maker = maker;
     fan.track = (nb_track){radius, radius * zenith};
@@ -215,7 +220,7 @@ static void add_slope(const nb_maker *maker, int height, double zenith, double w
     fan.end = fan.hits_ground ? ground : nb_track_leave(fan.track, airs->top);
     nb_path_lay(airs, &maker->nodes, fan.track, fan.end, 0, NULL, &fan.path);
     for (int i = 0; i < effort->suns; i++) {
-        const double sun = sun_at(maker->scatter, i), side = sqrt(fmax(0, 1 - sun * sun));
+        const double sun = sun_at(maker->next, i), side = sqrt(fmax(0, 1 - sun * sun));
         for (int k = 0; k < effort->turns; k++) {
             const double x = level * maker->turn_cosines[k];
             const nb_aspect aspect = {zenith, x * side + zenith * sun, sun};
@@ -234,7 +239,7 @@ static void add_height(void *data, size_t height)
 {
     const nb_maker *maker = data;
     const nb_airs *airs = maker->airs;
-    const double ratio = airs->radius / (airs->radius + height_at(maker->scatter, airs, (int)height));
+    const double ratio = airs->radius / (airs->radius + height_at(maker->next, airs, (int)height));
     const double horizon = -sqrt(fmax(0, 1 - ratio * ratio));
     for (int k = 0; k < maker->slopes.count; k++) {
         const double part = 0.5 * (1 + maker->slopes.nodes[k]), weight = maker->slopes.weights[k] * part;
@@ -248,13 +253,27 @@ static size_t entries(const nb_scatter *scatter)
     return (size_t)scatter->heights * (size_t)scatter->suns;
 }
 
-static nebel_result allocate(const nebel_allocator *allocator, const nb_airs *airs, const nb_effort *effort,
-                             nb_scatter *scatter)
+/* Light changes within an optical depth or two: deep air has more entries over its height. */
+static int count_heights(const nb_airs *airs, const nb_effort *effort)
 {
-    *scatter = (nb_scatter){.heights = effort->heights, .suns = effort->suns, .orders = effort->moments};
-    scatter->sun_scale = 0.25 * dip(airs);
-    scatter->first_sun = spread(-fmin(1, 2.5 * dip(airs)), scatter->sun_scale);
-    scatter->last_sun = spread(1, scatter->sun_scale);
+    double depth[3] = {0, 0, 0};
+    nb_track_depth(airs, (nb_track){airs->radius, airs->radius}, airs->top - airs->radius, depth);
+    const double deepest = fmax(depth[0], fmax(depth[1], depth[2]));
+    return (int)(effort->heights * fmin(MOST_TIMES, fmax(1, sqrt(2 * deepest))));
+}
+
+static nb_scatter layout_of(const nb_airs *airs, const nb_effort *effort)
+{
+    nb_scatter scatter = {.heights = count_heights(airs, effort), .suns = effort->suns, .orders = effort->moments};
+    scatter.sun_scale = 0.25 * dip(airs);
+    scatter.first_sun = spread(-fmin(1, 2.5 * dip(airs)), scatter.sun_scale);
+    scatter.last_sun = spread(1, scatter.sun_scale);
+    return scatter;
+}
+
+static nebel_result allocate(const nebel_allocator *allocator, const nb_scatter *layout, nb_scatter *scatter)
+{
+    *scatter = *layout;
     scatter->fields = nb_allocate_zero(allocator, entries(scatter), sizeof *scatter->fields);
     scatter->ground = nb_allocate_zero(allocator, (size_t)scatter->suns, sizeof *scatter->ground);
     return scatter->fields != NULL && scatter->ground != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
@@ -266,63 +285,101 @@ void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter)
     nb_release(allocator, scatter->ground);
 }
 
-/* Adds so many times another table, colour by colour. */
-static void add_table(nb_scatter *sum, const nb_scatter *more, const double times[3])
+static void copy(const nb_scatter *from, nb_scatter *to)
+{
+    memcpy(to->fields, from->fields, entries(from) * sizeof *from->fields);
+    memcpy(to->ground, from->ground, (size_t)from->suns * sizeof *from->ground);
+}
+
+static void add(const nb_scatter *more, nb_scatter *sum)
 {
     for (size_t i = 0; i < entries(sum); i++)
         for (int m = 0; m < NB_FIELD; m++)
-            for (int c = 0; c < 3; c++) sum->fields[i].moments[m][c] += times[c] * more->fields[i].moments[m][c];
+            for (int c = 0; c < 3; c++) sum->fields[i].moments[m][c] += more->fields[i].moments[m][c];
     for (int i = 0; i < sum->suns; i++)
-        for (int c = 0; c < 3; c++) sum->ground[i][c] += times[c] * more->ground[i][c];
+        for (int c = 0; c < 3; c++) sum->ground[i][c] += more->ground[i][c];
 }
 
-static double light_of(const nb_scatter *scatter, int c)
+static void clear(nb_scatter *scatter)
 {
-    double sum = 0;
-    for (size_t i = 0; i < entries(scatter); i++) sum += scatter->fields[i].moments[0][c];
-    return sum;
+    memset(scatter->fields, 0, entries(scatter) * sizeof *scatter->fields);
+    memset(scatter->ground, 0, (size_t)scatter->suns * sizeof *scatter->ground);
 }
 
-/* Late orders are each the same part of the one before: the orders behind the last one are a geometric series. */
-static void add_rest(nb_scatter *sum, const nb_scatter *last, const double before[3])
+/* ---- rounds ---------------------------------------------------------------------------------- */
+
+/* Tables of a cycle of rounds, one behind the other, the first of which is what it begins with. */
+typedef struct nb_rounds {
+    nb_scatter once, sealed, tables[NB_MOST_ROUNDS + 1];
+    double slowest[3]; /* by nb_orders_extrapolate */
+} nb_rounds;
+
+/* What air and ground make of sunlight, or of all light of a table. */
+static void scatter_again(nb_maker *maker, const nb_parts *parts, const nb_scatter *of, nb_scatter *sealed,
+                          nb_scatter *made)
 {
-    double times[3];
-    for (int c = 0; c < 3; c++) {
-        const double part = light_of(last, c) / fmax(before[c], DBL_MIN);
-        times[c] = part < 0.99 ? part / (1 - part) : 99;
+    maker->first = of == NULL;
+    if (of != NULL) {
+        copy(of, sealed);
+        seal(sealed);
     }
-    add_table(sum, last, times);
+    maker->scatter = sealed;
+    maker->next = made;
+    clear(made);
+    nb_parts_run(parts, (size_t)made->heights, add_height, maker);
 }
 
-/* One order after the other: `last` is what the order before has brought, `next` what this one brings. */
-static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_scatter *sum, nb_scatter *last, nb_scatter *next)
+/* Rounds from the first table on, until little may be missing or so many are done. Returns how many those are. */
+static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, int done, nb_scatter *sum)
 {
-    static const double once[3] = {1, 1, 1};
-    const int orders = nb_airs_are_empty(maker->airs) ? 0 : maker->effort->orders;
-    double before[3] = {0, 0, 0};
-    for (int order = 1; order <= orders; order++) {
-        maker->first = order == 1;
-        maker->scatter = last;
-        maker->next = next;
-        memset(next->fields, 0, entries(next) * sizeof *next->fields);
-        memset(next->ground, 0, (size_t)next->suns * sizeof *next->ground);
-        nb_parts_run(parts, (size_t)maker->effort->heights, add_height, maker);
-        add_table(sum, next, once);
-        if (order == orders) add_rest(sum, next, before);
-        for (int c = 0; c < 3; c++) before[c] = light_of(next, c);
-        seal(next);
-        const nb_scatter other = *last;
-        *last = *next;
-        *next = other;
+    const nb_effort *effort = maker->effort;
+    sum->missing = HUGE_VAL;
+    for (int i = 0; i < NB_MOST_ROUNDS && sum->missing > effort->most_missing; i++, done++) {
+        nb_scatter *next = &rounds->tables[i + 1];
+        if (done > 0) {
+            scatter_again(maker, parts, &rounds->tables[i], &rounds->sealed, next);
+            add(&rounds->once, next);
+        } else {
+            copy(&rounds->once, next);
+        }
+        if (done + 1 >= effort->orders && i > 0)
+            sum->missing = nb_orders_extrapolate(i + 1, rounds->tables, rounds->slowest, sum);
+    }
+    return done;
+}
+
+/* Each cycle begins where the one before leads. */
+static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, nb_scatter *sum)
+{
+    scatter_again(maker, parts, NULL, NULL, &rounds->once);
+    for (int done = 0; done < MOST_ROUNDS;) {
+        done = run_cycle(maker, parts, rounds, done, sum);
+        if (sum->missing <= maker->effort->most_missing) break;
+        copy(sum, &rounds->tables[0]);
     }
     seal(sum);
+}
+
+static nebel_result allocate_rounds(const nebel_allocator *allocator, const nb_scatter *like, nb_rounds *rounds)
+{
+    nebel_result result = allocate(allocator, like, &rounds->once);
+    if (result == NEBEL_OK) result = allocate(allocator, like, &rounds->sealed);
+    for (int i = 0; i <= NB_MOST_ROUNDS && result == NEBEL_OK; i++)
+        result = allocate(allocator, like, &rounds->tables[i]);
+    return result;
+}
+
+static void free_rounds(const nebel_allocator *allocator, nb_rounds *rounds)
+{
+    nb_scatter_free(allocator, &rounds->once);
+    nb_scatter_free(allocator, &rounds->sealed);
+    for (int i = 0; i <= NB_MOST_ROUNDS; i++) nb_scatter_free(allocator, &rounds->tables[i]);
 }
 
 nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *parts, const nb_airs *airs,
                              nebel_air_quality quality, const double albedo[3], nb_scatter *scatter)
 {
     const nb_effort *effort = &efforts[quality];
-    nb_scatter last, next;
     nb_maker maker = {.airs = airs,
                       .albedo = albedo,
                       .effort = effort,
@@ -330,12 +387,15 @@ nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *p
                       .nodes = nb_rule_make(effort->nodes),
                       .gather = nb_gather_choose(NEBEL_ISA_DEFAULT)};
     for (int k = 0; k < effort->turns; k++) maker.turn_cosines[k] = cos(PI * (k + 0.5) / effort->turns);
-    nebel_result result = allocate(allocator, airs, effort, scatter);
-    const nebel_result has_last = allocate(allocator, airs, effort, &last),
-                       has_next = allocate(allocator, airs, effort, &next);
-    if (result == NEBEL_OK) result = has_last == NEBEL_OK ? has_next : has_last;
-    if (result == NEBEL_OK) sum_orders(&maker, parts, scatter, &last, &next);
-    nb_scatter_free(allocator, &last);
-    nb_scatter_free(allocator, &next);
+    const nb_scatter layout = layout_of(airs, effort);
+    nb_rounds rounds = {.once = {.heights = 0}};
+    nebel_result result = allocate(allocator, &layout, scatter);
+    if (nb_airs_are_empty(airs)) {
+        seal(scatter);
+        return result;
+    }
+    if (result == NEBEL_OK) result = allocate_rounds(allocator, &layout, &rounds);
+    if (result == NEBEL_OK) sum_orders(&maker, parts, &rounds, scatter);
+    free_rounds(allocator, &rounds);
     return result;
 }
