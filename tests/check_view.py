@@ -348,7 +348,7 @@ class PlanetTest(FilmTest):
         first = viewer.take_picture()
         viewer.press("Planet")
         viewer.press("planet[0].clouds[0].open")
-        viewer.say("top: is 500; must be above the base, 900 m", lambda: viewer.type("planet[0].clouds[0].top", "500"))
+        viewer.say("top: is 500 m; must be above the base, 900 m", lambda: viewer.type("planet[0].clouds[0].top", "500"))
         viewer.type("planet[0].clouds[0].coverage", "0.9")
         self.assertFalse(self.same(viewer.take_picture(), first, 0.05))
         self.assertEqual(viewer.save()["planet"], {**planet, "clouds": [{"coverage": 0.9}]})

@@ -119,7 +119,7 @@ static void test_what_is_wrong(void **state)
     wrong faults[] = {{*own, "planet: sun_diameter"},
                       {*own, "ground_albedo"},
                       {*own, "scale_height"},
-                      {*own, "top: is 50; must be above the base, 60 m"},
+                      {*own, "top: is 50 m; must be above the base, 60 m"},
                       {*own, "overlap"},
                       {*own, "coverage"}};
     faults[0].planet.sun_diameter = (double)NAN;

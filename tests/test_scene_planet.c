@@ -154,16 +154,24 @@ static void test_what_is_wrong(void **state)
         {FORMAT, PHYSICAL("\"radius\": `0"), "planet.radius: is 0; must be a length from 1 to 1e12 m"},
         {FORMAT, PHYSICAL("\"radius\": `-6e6"), "planet.radius: is -6000000; must be"},
         {FORMAT, PHYSICAL("\"thickness\": `0"), "planet.thickness: is 0; must be"},
-        {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 6}"),
-         "planet: thickness: is 6; must be within 6.36 (a millionth of the radius) and 1e+12"},
+        {FORMAT, PHYSICAL("\"thickness\": `6"),
+         "planet.thickness: is 6 m; must be within 6.36 m (a millionth of the radius) and 1e+12 m"},
+        {FORMAT, SCENE("\"unit\": 0.01, ", "{\"model\": \"physical\", \"thickness\": `1}"),
+         "planet.thickness: is 0.01 m; must be within 6.36 m (a millionth of the radius) and 1e+12 m (in metres; the "
+         "file's unit is 0.01 m)"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 1e8}"),
-         "planet: airs[0] scale_height: is 8000; must be within 100000 (a thousandth of the thickness) and 1e+15; "
-         "these "
-         "airs are the preset's"},
+         "planet.airs[0].scale_height: is 8000 m; must be within 100000 m (a thousandth of the thickness) and 1e+15 m; "
+         "these airs are the preset's"},
         {FORMAT, SCENE("", "`{\"model\": \"physical\", \"thickness\": 9000}"),
-         "planet: airs[2] middle: is 25000; must be within 0 and 9000 (the thickness); these airs are the preset's"},
-        {FORMAT, SCENE("", "`{\"model\": \"physical\", \"airs\": [{\"type\": \"exponential\", \"scale_height\": 1}]}"),
-         "planet: airs[0] scale_height: is 1; must be within 100 (a thousandth of the thickness) and 1e+15"},
+         "planet.airs[2].middle: is 25000 m; must be within 0 m and 9000 m (the thickness); these airs are the "
+         "preset's"},
+        {FORMAT, PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": `1}]"),
+         "planet.airs[0].scale_height: is 1 m; must be within 100 m (a thousandth of the thickness) and 1e+15 m"},
+        {FORMAT,
+         SCENE("", "[" EARTH ", {\"model\": \"physical\", \"center\": [0, 9e7, 0], \"airs\": [{\"type\": \"layer\", "
+                   "\"middle\": 1, \"width\": 1e3}, {\"type\": \"layer\", \"middle\": `2e5, \"width\": 1e3}]}]"),
+         "planet[1].airs[1].middle: is 200000 m; must be within 0 m and 100000 m (the thickness)"},
+        {FORMAT, PHYSICAL("\"center\": `[0, 1e15, 0]"), "planet.center: lies so high"},
         {FORMAT, PHYSICAL("\"center\": [0, `2e15, 0]"), "planet.center[1]: is 2e+15"},
         {FORMAT, PHYSICAL("\"center\": `[0, 0]"), "planet.center: has 2 elements"},
         {FORMAT, PHYSICAL("\"ground_albedo\": `1.5"), "planet.ground_albedo: is 1.5"},
@@ -176,6 +184,8 @@ static void test_what_is_wrong(void **state)
         {FORMAT, AIR("\"absorption\": [0, `-1, 0]"), "planet.airs[0].absorption[1]: is -1"},
         {FORMAT, AIR("`\"width\": 5"), "planet.airs[0].width: unknown key"},
         {FORMAT, AIR("\"phase\": {\"type\": `\"mie\"}"), "planet.airs[0].phase.type: unknown"},
+        {LIMIT, PHYSICAL("\"airs\": [1, 2, 3, 4, `5]"),
+         "planet.airs[4]: is one too many; a planet has at most 4 kinds of air"},
         {LIMIT,
          PHYSICAL("\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": \"exponential\", "
                   "\"scale_height\": 8000}, {\"type\": \"exponential\", \"scale_height\": 8000}, {\"type\": "

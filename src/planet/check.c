@@ -18,7 +18,7 @@ nebel_atmosphere_desc nb_atmosphere_resolve(const nebel_atmosphere_desc *desc)
     return whole;
 }
 
-/* What is said of: "airs[2] " or "" where it is no kind of air. */
+/* What is said of: "airs[2]." or "" where it is no kind of air. */
 typedef struct subject {
     const nebel_log *log;
     char name[24];
@@ -29,33 +29,41 @@ static nebel_result refuse(const subject *of, const char *what, const char *faul
     return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: %s", of->name, what, fault);
 }
 
-/* `least_is` and `most_is` say what these are: "". */
+/* What a number is in, and what its limits are, where they come from other numbers: " (the thickness)", or "". */
+typedef struct meaning {
+    const char *unit, *least, *most;
+} meaning;
+
+static const meaning pure = {"", "", ""}, per_metre = {" per m", "", ""}, length = {" m", "", ""};
+
 static nebel_result check(const subject *of, const char *what, double number, double least, double most,
-                          const char *least_is, const char *most_is)
+                          const meaning *is)
 {
     if (number >= least && number <= most) return NEBEL_OK;
-    return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: is %g; must be within %g%s and %g%s", of->name, what,
-                   number, least, least_is, most, most_is);
+    return nb_fail(of->log, NEBEL_ERROR_VALUE, "atmosphere: %s%s: is %g%s; must be within %g%s%s and %g%s%s", of->name,
+                   what, number, is->unit, least, is->unit, is->least, most, is->unit, is->most);
 }
 
-static nebel_result check_all(const subject *of, const char *what, const double numbers[3], double least, double most)
+static nebel_result check_all(const subject *of, const char *what, const double numbers[3], double least, double most,
+                              const meaning *is)
 {
     nebel_result result = NEBEL_OK;
-    for (int c = 0; c < 3 && result == NEBEL_OK; c++) result = check(of, what, numbers[c], least, most, "", "");
+    for (int c = 0; c < 3 && result == NEBEL_OK; c++) result = check(of, what, numbers[c], least, most, is);
     return result;
 }
 
 static nebel_result check_profile(const subject *of, const nebel_air *air, double thickness)
 {
-    static const char thousandth[] = " (a thousandth of the thickness)";
+    static const meaning at_least = {" m", " (a thousandth of the thickness)", ""},
+                         within = {" m", "", " (the thickness)"};
     const double least = thickness / NEBEL_MAX_AIR_RATIO;
     nebel_result result;
     switch (air->profile) {
     case NEBEL_AIR_EXPONENTIAL:
-        return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, thousandth, "");
+        return check(of, "scale_height", air->scale_height, least, NEBEL_MAX_LENGTH, &at_least);
     case NEBEL_AIR_LAYER:
-        result = check(of, "middle", air->middle, 0, thickness, "", " (the thickness)");
-        return result == NEBEL_OK ? check(of, "width", air->width, least, NEBEL_MAX_LENGTH, thousandth, "") : result;
+        result = check(of, "middle", air->middle, 0, thickness, &within);
+        return result == NEBEL_OK ? check(of, "width", air->width, least, NEBEL_MAX_LENGTH, &at_least) : result;
     default:
         return refuse(of, "profile", "is unknown");
     }
@@ -63,8 +71,9 @@ static nebel_result check_profile(const subject *of, const nebel_air *air, doubl
 
 static nebel_result check_air(const subject *of, const nebel_air *air, double thickness)
 {
-    nebel_result result = check_all(of, "scattering", air->scattering, 0, NEBEL_MAX_AIR_EXTINCTION);
-    if (result == NEBEL_OK) result = check_all(of, "absorption", air->absorption, 0, NEBEL_MAX_AIR_EXTINCTION);
+    const double most = NEBEL_MAX_AIR_EXTINCTION;
+    nebel_result result = check_all(of, "scattering", air->scattering, 0, most, &per_metre);
+    if (result == NEBEL_OK) result = check_all(of, "absorption", air->absorption, 0, most, &per_metre);
     if (result == NEBEL_OK) result = check_profile(of, air, thickness);
     if (result != NEBEL_OK) return result;
     const char *fault = nb_phase_fault(&air->phase);
@@ -73,17 +82,17 @@ static nebel_result check_air(const subject *of, const nebel_air *air, double th
 
 nebel_result nb_atmosphere_check(const nebel_atmosphere_desc *desc)
 {
+    static const meaning at_least = {" m", " (a millionth of the radius)", ""};
     subject of = {&desc->log, ""};
-    nebel_result result = check_all(&of, "ground", desc->ground, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH);
-    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, "", "");
-    if (result == NEBEL_OK)
-        result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, " (a millionth of the radius)", "");
-    if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1);
+    nebel_result result = check_all(&of, "ground", desc->ground, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH, &length);
+    if (result == NEBEL_OK) result = check(&of, "radius", desc->radius, 1, 1e12, &length);
+    if (result == NEBEL_OK) result = check(&of, "thickness", desc->thickness, desc->radius / 1e6, 1e12, &at_least);
+    if (result == NEBEL_OK) result = check_all(&of, "ground_albedo", desc->ground_albedo, 0, 1, &pure);
     if (result != NEBEL_OK) return result;
     if (desc->air_count > NEBEL_MAX_AIRS) return refuse(&of, "air_count", "must be at most 4");
     if ((int)desc->quality < 0 || desc->quality >= NEBEL_AIR_QUALITY_COUNT) return refuse(&of, "quality", "is unknown");
     for (uint32_t i = 0; i < desc->air_count && result == NEBEL_OK; i++) {
-        (void)snprintf(of.name, sizeof of.name, "airs[%u] ", (unsigned)i);
+        (void)snprintf(of.name, sizeof of.name, "airs[%u].", (unsigned)i);
         result = check_air(&of, &desc->airs[i], desc->thickness);
     }
     return result;

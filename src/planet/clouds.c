@@ -228,9 +228,9 @@ static int is_part(double number)
     return number == NEBEL_CLOUD_NONE || (number >= 0 && number <= 1);
 }
 
-static nebel_result refuse(const nebel_log *log, const char *what, double number, const char *wanted)
+static nebel_result refuse(const nebel_log *log, const char *what, double number, const char *unit, const char *wanted)
 {
-    return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: %s: is %g; must be %s", what, number, wanted);
+    return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: %s: is %g%s; must be %s", what, number, unit, wanted);
 }
 
 static const char *origin_of(double given)
@@ -244,20 +244,20 @@ static nebel_result check_heights(double thickness, const nebel_cloud_layer *giv
 {
     const double base = layer->base, top = layer->top;
     const char *const of_base = origin_of(given->base), *const of_top = origin_of(given->top);
-    if (!(base > 0)) return refuse(log, "base", base, "above the ground");
+    if (!(base > 0)) return refuse(log, "base", base, " m", "above the ground");
     if (!(base < thickness))
-        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: base: is %.8g%s; must be within the air, %.8g m", base,
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: base: is %.8g m%s; must be within the air, %.8g m", base,
                        of_base, thickness);
     if (!(top > base))
-        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g%s; must be above the base, %.8g m%s", top,
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g m%s; must be above the base, %.8g m%s", top,
                        of_top, base, of_base);
     if (!(top <= thickness))
-        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g%s; must be within the air, %.8g m", top,
+        return nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: top: is %.8g m%s; must be within the air, %.8g m", top,
                        of_top, thickness);
     if (!(top - base >= thickness / NEBEL_MAX_CLOUD_RATIO))
         return nb_fail(
             log, NEBEL_ERROR_VALUE,
-            "cloud layer: top: is %.8g%s; must be at least %g m (a millionth of the air's thickness) above the base, "
+            "cloud layer: top: is %.8g m%s; must be at least %g m (a millionth of the air's thickness) above the base, "
             "%.8g m%s",
             top, of_top, thickness / NEBEL_MAX_CLOUD_RATIO, base, of_base);
     return NEBEL_OK;
@@ -267,16 +267,17 @@ static nebel_result check_looks(const nebel_cloud_layer *layer, const nebel_log 
 {
     static const char part[] = "within 0 and 1, or none (-1)";
     if (!(layer->coverage > 0 && layer->coverage <= 1))
-        return refuse(log, "coverage", layer->coverage, "more than 0, at most 1");
+        return refuse(log, "coverage", layer->coverage, "", "within 0 and 1 (0: the number of its kind)");
     if (!(layer->extinction > 0 && layer->extinction <= NEBEL_MAX_AIR_EXTINCTION))
-        return refuse(log, "extinction", layer->extinction, "more than 0, at most 1e3");
-    if (!(layer->size >= 1e-3 && layer->size <= 1e9)) return refuse(log, "size", layer->size, "within 1e-3 and 1e9");
-    if (!is_part(layer->detail)) return refuse(log, "detail", layer->detail, part);
-    if (!is_part(layer->variation)) return refuse(log, "variation", layer->variation, part);
+        return refuse(log, "extinction", layer->extinction, " per m", "within 0 and 1e3 (0: the number of its kind)");
+    if (!(layer->size >= 1e-3 && layer->size <= 1e9))
+        return refuse(log, "size", layer->size, " m", "within 1e-3 and 1e9");
+    if (!is_part(layer->detail)) return refuse(log, "detail", layer->detail, "", part);
+    if (!is_part(layer->variation)) return refuse(log, "variation", layer->variation, "", part);
     if (!(layer->diameter >= 5 && layer->diameter <= NEBEL_MAX_DROPLET))
-        return refuse(log, "diameter", layer->diameter, "within 5 and 50");
+        return refuse(log, "diameter", layer->diameter, " um", "within 5 and 50");
     for (int i = 0; i < 2; i++)
-        if (!(fabs(layer->wind[i]) <= 1e12)) return refuse(log, "wind", layer->wind[i], "within -1e12 and 1e12");
+        if (!(fabs(layer->wind[i]) <= 1e12)) return refuse(log, "wind", layer->wind[i], " m", "within -1e12 and 1e12");
     const char *fault = nb_map_fault(&layer->weather, 1);
     return fault == NULL ? NEBEL_OK : nb_fail(log, NEBEL_ERROR_VALUE, "cloud layer: weather: %s", fault);
 }

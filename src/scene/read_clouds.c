@@ -1,6 +1,7 @@
 /* The clouds of a physical planet. */
 #include "scene/scene_internal.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { KIND, BASE, TOP, COVERAGE, EXTINCTION, SIZE, DETAIL, VARIATION, DIAMETER, SEED, WIND, WEATHER, KEY_COUNT };
@@ -57,7 +58,7 @@ static bool try_layer(nb_scene_reader *in, const nb_json_node *node, double thic
     if (result == NEBEL_OK) return true;
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
-    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s", message);
+    return nb_value_fail_within(in->json, node, message, "");
 }
 
 static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planet,
@@ -65,11 +66,13 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
 {
     for (uint32_t i = 0; i < planet->cloud_layer_count; i++) {
         nebel_cloud_layer other;
+        char note[NB_UNIT_NOTE];
         (void)nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[i], NULL, &other);
         if (layer->base >= other.top || other.base >= layer->top) continue;
-        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
-                            "lies from %g to %g m and overlaps another, from %g to %g m; give each heights of its own",
-                            layer->base, layer->top, other.base, other.top);
+        return nb_json_fail(
+            in->json, NEBEL_ERROR_FORMAT, node,
+            "lies from %g to %g m and overlaps another, from %g to %g m; give each heights of its own%s", layer->base,
+            layer->top, other.base, other.top, nb_value_note_unit(in->json, note));
     }
     return true;
 }
@@ -77,9 +80,10 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
 static bool check_size(nb_json *json, const nb_json_node *node, const nebel_planet *planet, double size)
 {
     const double most = NEBEL_MAX_CLOUD_RADII * planet->air.radius;
-    return size <= most || nb_json_fail(json, NEBEL_ERROR_FORMAT, node,
-                                        "size: is %g m; must be at most %g m, which is %g of the radius", size, most,
-                                        NEBEL_MAX_CLOUD_RADII);
+    char message[120];
+    snprintf(message, sizeof message, "size: is %g m; must be at most %g m, which is %g of the radius", size, most,
+             NEBEL_MAX_CLOUD_RADII);
+    return size <= most || nb_value_fail_within(json, node, message, "");
 }
 
 /* Of no coverage: no layer. */
@@ -106,16 +110,6 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     return true;
 }
 
-/* Before any is read: two of five alike would be told of each other. */
-static bool check_count(nb_json *json, const nb_json_node *node)
-{
-    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
-        if (one->index == NEBEL_MAX_CLOUD_LAYERS)
-            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one,
-                                "is one too many; a planet has at most %d layers of clouds", NEBEL_MAX_CLOUD_LAYERS);
-    return true;
-}
-
 static bool has_air(const nebel_atmosphere_desc *desc)
 {
     for (uint32_t i = 0; i < desc->air_count; i++)
@@ -127,7 +121,8 @@ static bool has_air(const nebel_atmosphere_desc *desc)
 bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
 {
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds") || !check_count(in->json, node))
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of layers of clouds") ||
+        !nb_value_at_most(in->json, node, NEBEL_MAX_CLOUD_LAYERS, "a planet", "layers of clouds"))
         return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_layer(in, one, planet)) return false;

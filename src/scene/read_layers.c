@@ -115,26 +115,22 @@ static bool read_cloud(nb_scene_reader *in, const nb_json_node *node, nebel_clou
 static bool read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc)
 {
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of shells of clouds")) return false;
-    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
-        if (desc->cloud_count == NEBEL_MAX_CLOUD_SHELLS)
-            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one,
-                                "is one too many; a planet has at most %d shells of clouds", NEBEL_MAX_CLOUD_SHELLS);
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of shells of clouds") ||
+        !nb_value_at_most(in->json, node, NEBEL_MAX_CLOUD_SHELLS, "a planet", "shells of clouds"))
+        return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_cloud(in, one, &desc->clouds[desc->cloud_count++])) return false;
-    }
     return true;
 }
 
 static bool read_ramp(nb_json *json, const nb_json_node *node, nebel_air_shell *air)
 {
     if (node == NULL) return true;
-    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colours")) return false;
-    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one)) {
-        if (air->ramp_count == NEBEL_MAX_RAMP)
-            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one, "is one too many; a ramp has at most %d colours",
-                                NEBEL_MAX_RAMP);
+    if (!nb_value_is(json, node, NB_JSON_ARRAY, "an array of colours") ||
+        !nb_value_at_most(json, node, NEBEL_MAX_RAMP, "a ramp", "colours"))
+        return false;
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
         if (!nb_value_color(json, one, &nb_range_fraction, air->ramp[air->ramp_count++])) return false;
-    }
     return air->ramp_count > 0 || nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for a blue one");
 }
 

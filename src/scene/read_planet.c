@@ -55,13 +55,11 @@ static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmos
 {
     uint32_t count = 0;
     if (node == NULL) return true;
-    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of kinds of air")) return false;
-    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one)) {
-        if (count == NEBEL_MAX_AIRS)
-            return nb_json_fail(in->json, NEBEL_ERROR_LIMIT, one,
-                                "is one too many; a planet has at most %d kinds of air", NEBEL_MAX_AIRS);
+    if (!nb_value_is(in->json, node, NB_JSON_ARRAY, "an array of kinds of air") ||
+        !nb_value_at_most(in->json, node, NEBEL_MAX_AIRS, "a planet", "kinds of air"))
+        return false;
+    for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_air(in, one, &desc->airs[count++])) return false;
-    }
     /* None is one that does nothing to light. */
     if (count == 0) desc->airs[count++] = (nebel_air){.scale_height = desc->thickness};
     desc->air_count = count;
@@ -111,7 +109,9 @@ static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, ne
     nb_space_convert_place(&in->space, center);
     memcpy(desc->ground, center, sizeof center);
     desc->ground[1] += desc->radius;
-    return true;
+    return desc->ground[1] <= NEBEL_MAX_LENGTH ||
+           nb_json_fail(in->json, NEBEL_ERROR_FORMAT, found[CENTER],
+                        "lies so high that the ground above it is more than 1e15 m from the origin");
 }
 
 static bool is_text(const nb_json_node *node, const char *text)
@@ -146,7 +146,8 @@ nb_ball nb_find_ball(const nb_json *json, const nb_json_node *planet)
 /* The core knows what numbers do not go with each other. */
 static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_airs, nebel_planet *planet)
 {
-    static const char subject[] = "atmosphere: ";
+    static const char subject[] = "atmosphere: ",
+                      advice[] = "; these airs are the preset's: give \"airs\" that go with the other keys";
     planet->air.log = (nebel_log){nb_read_keep_message, in};
     const nebel_result result = nebel_resolve_atmosphere(&planet->air, &planet->air);
     planet->air.log = (nebel_log){NULL, NULL};
@@ -154,8 +155,7 @@ static bool try_planet(nb_scene_reader *in, const nb_json_node *node, bool has_a
     const char *message = in->core_message;
     if (strncmp(message, subject, sizeof subject - 1) == 0) message += sizeof subject - 1;
     const bool is_of_preset = !has_airs && strncmp(message, "airs[", 5) == 0;
-    return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "%s%s", message,
-                        is_of_preset ? "; these airs are the preset's: give \"airs\" that go with the other keys" : "");
+    return nb_value_fail_within(in->json, node, message, is_of_preset ? advice : "");
 }
 
 static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet)
@@ -220,23 +220,13 @@ static bool read_one_of_many(nb_scene_reader *in, const nb_json_node *node, nebe
     return check_apart(in, node, planets, number);
 }
 
-/* Before any is read: two of nine alike would be told of each other. */
-static bool check_count(nb_json *json, const nb_json_node *node)
-{
-    for (const nb_json_node *one = nb_json_first(json, node); one != NULL; one = nb_json_next(json, one))
-        if (one->index == NEBEL_MAX_PLANETS)
-            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one, "is one too many; a scene has at most %d planets",
-                                NEBEL_MAX_PLANETS);
-    return true;
-}
-
 static bool read_planets(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planets, size_t *count)
 {
     if (node->type != NB_JSON_ARRAY) {
         *count = 1;
         return read_planet(in, node, planets);
     }
-    if (!check_count(in->json, node)) return false;
+    if (!nb_value_at_most(in->json, node, NEBEL_MAX_PLANETS, "a scene", "planets")) return false;
     for (const nb_json_node *one = nb_json_first(in->json, node); one != NULL; one = nb_json_next(in->json, one))
         if (!read_one_of_many(in, one, planets, (*count)++)) return false;
     return *count > 0 || nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; leave it out for no planet");

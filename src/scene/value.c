@@ -314,6 +314,50 @@ void nb_vector_normalize(double *vector, size_t count)
     for (size_t i = 0; i < count; i++) vector[i] /= sqrt(square);
 }
 
+/* ---- arrays ---------------------------------------------------------------------------------- */
+
+bool nb_value_at_most(nb_json *json, const nb_json_node *array, uint32_t most, const char *owner, const char *what)
+{
+    for (const nb_json_node *one = nb_json_first(json, array); one != NULL; one = nb_json_next(json, one))
+        if (one->index == most)
+            return nb_json_fail(json, NEBEL_ERROR_LIMIT, one, "is one too many; %s has at most %u %s", owner,
+                                (unsigned)most, what);
+    return true;
+}
+
+/* ---- what the core says ---------------------------------------------------------------------- */
+
+const char *nb_value_note_unit(const nb_json *json, char note[NB_UNIT_NOTE])
+{
+    note[0] = '\0';
+    if (json->unit != 1) snprintf(note, NB_UNIT_NOTE, " (in metres; the file's unit is %.15g m)", json->unit);
+    return note;
+}
+
+/* The innermost of a node and what it holds that the path leads to or through. */
+static const nb_json_node *find_on_path(const nb_json *json, const nb_json_node *node, const char *path)
+{
+    for (const nb_json_node *one = nb_json_first(json, node); one != NULL;) {
+        char here[NB_JSON_PATH];
+        nb_json_path(json, one, here);
+        const size_t size = strlen(here);
+        const bool is_on_path = strncmp(path, here, size) == 0 && strchr(".[", path[size]) != NULL;
+        if (is_on_path) node = one;
+        one = is_on_path ? nb_json_first(json, node) : nb_json_next(json, one);
+    }
+    return node;
+}
+
+bool nb_value_fail_within(nb_json *json, const nb_json_node *object, const char *message, const char *more)
+{
+    char outer[NB_JSON_PATH], path[2 * NB_JSON_PATH], note[NB_UNIT_NOTE];
+    const int step = (int)strcspn(message, ":");
+    nb_json_path(json, object, outer);
+    snprintf(path, sizeof path, "%s.%.*s", outer, step, message);
+    return nb_json_fail_at(json, NEBEL_ERROR_FORMAT, find_on_path(json, object, path)->offset, path, "%s%s%s",
+                           message + step + 2, more, nb_value_note_unit(json, note));
+}
+
 /* ---- text ------------------------------------------------------------------------------------ */
 
 bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text)

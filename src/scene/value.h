@@ -63,6 +63,17 @@ bool nb_value_color(nb_json *json, const nb_json_node *node, const nb_range *ran
 /* Of one channel, >= 0. */
 double nb_value_linear_from_srgb(double value);
 
+/* Whether an array has no more elements. For before any is read: two too many alike would be told of each other. */
+bool nb_value_at_most(nb_json *json, const nb_json_node *array, uint32_t most, const char *owner, const char *what);
+
+/* What stands behind lengths in metres where the file's are in another unit; else "". */
+#define NB_UNIT_NOTE 64
+const char *nb_value_note_unit(const nb_json *json, char note[NB_UNIT_NOTE]);
+
+/* Fails with what the core said of numbers of an object, "airs[2].middle: is ...", and more. Points at the number, or at the
+ * innermost of what is around it that the file has. Returns false. */
+bool nb_value_fail_within(nb_json *json, const nb_json_node *object, const char *message, const char *more);
+
 /* Copies a string without zero bytes into the arena. */
 bool nb_value_text(nb_json *json, const nb_json_node *node, nb_arena *arena, const char **text);
 
