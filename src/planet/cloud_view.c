@@ -21,8 +21,8 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
                        desc->tolerance);
     const nb_cloud_kernel *kernel = nb_cloud_kernel_choose(desc->isa);
     if (kernel == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %s: not available here",
-                       nebel_isa_name(desc->isa));
+        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %d (%s): not available here",
+                       (int)desc->isa, desc->isa < NEBEL_ISA_COUNT ? nebel_isa_name(desc->isa) : "unknown");
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_cloud_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
