@@ -78,7 +78,7 @@ static void print_clouds(const nebel_planet *planet)
         nebel_cloud_layer layer;
         if (nebel_resolve_cloud_layer(planet->air.thickness, &planet->cloud_layers[i], NULL, &layer) != NEBEL_OK)
             return;
-        (void)printf("clouds: %s, %.6g to %.6g m, %.3g of the sky\n", kinds[layer.kind], layer.base, layer.top,
+        (void)printf("clouds: %s, %.6g to %.6g m, %.3g of the planet\n", kinds[layer.kind], layer.base, layer.top,
                      layer.coverage);
     }
 }
@@ -89,6 +89,24 @@ static int has_air(const nebel_atmosphere_desc *air)
     for (uint32_t i = 0; i < air->air_count; i++)
         for (int c = 0; c < 3; c++) sum += air->airs[i].scattering[c] + air->airs[i].absorption[c];
     return sum > 0;
+}
+
+/* Light of a larger optical depth is none for any picture. */
+#define MOST_DEPTH 80.
+
+/* Straight up from the ground. */
+static void print_depth(const nebel_planet *planet)
+{
+    const nebel_atmosphere_desc *air = &planet->air;
+    const nebel_ray up = {{air->ground[X], air->ground[Y], air->ground[Z]}, {0, 1, 0}, (double)INFINITY};
+    nebel_light light;
+    if (nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &light, 0) != NEBEL_OK) return;
+    (void)printf("air: optical depth straight up from the ground");
+    for (int c = 0; c < 3; c++) {
+        const double depth = 0 - log(light.transmittance[c]);
+        (void)printf(depth <= MOST_DEPTH ? " %.3g" : " more than %g", fmin(depth, MOST_DEPTH));
+    }
+    (void)printf("\n");
 }
 
 static void print_planet(const nebel_planet *planet)
@@ -102,6 +120,7 @@ static void print_planet(const nebel_planet *planet)
                      (unsigned)air->air_count);
     else
         (void)printf("planet: radius %.6g m, no air\n", air->radius);
+    if (planet->atmosphere != NULL && has_air(air)) print_depth(planet);
     print_clouds(planet);
 }
 
