@@ -194,36 +194,6 @@ static void test_wind_turns_the_shell(void **state)
 
 /* ---- along rays ------------------------------------------------------------------------------ */
 
-static void test_transmittance_is_that_of_the_density(void **state)
-{
-    (void)state;
-    enum { RAYS = 60 };
-    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.extinction = .005, .coverage = .6}});
-    nebel_cloud_workspace *workspace;
-    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
-    uint64_t numbers = 11;
-    double worst = 0, sum = 0;
-    int between = 0, untold = 0;
-    for (int i = 0; i < RAYS; i++) {
-        const double turn = dice(&numbers, 0, 2 * PI), up = dice(&numbers, .15, 1), level = sqrt(1 - up * up);
-        const nebel_ray ray = {{0, 2, 0}, {level * cos(turn), up, level * sin(turn)}, HUGE_VAL};
-        nebel_cloud_knots knots;
-        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0}, 0, &knots, 0), NEBEL_OK);
-        const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
-        const double truth = brute_force(clouds, &ray, 890 / up * .98, 2720 / up, 1), off = fabs(left - truth);
-        worst = fmax(worst, off);
-        sum += off / RAYS;
-        between += truth > .02 && truth < .98;
-        untold += off > (double)knots.error + 2e-3;
-    }
-    print_message("transmittance of %d rays, %d within clouds: off by %.2g at most, %.2g in the mean, %d untold\n",
-                  RAYS, between, worst, sum, untold);
-    assert_true(between > 12 && worst < 2e-2 && sum < 2e-3 && untold <= 2);
-    nebel_destroy_cloud_workspace(workspace);
-    nebel_destroy_cloud_view(view);
-    nebel_destroy_clouds(clouds);
-}
-
 /* Thin cloud around the eye: what a ray's transmittance is off by its neighbour's is off by, too. It is not where a long step is
  * taken for exact whose three values lie on a line by chance, or goes over a wisp: then lines and terraces are seen. */
 static void test_no_lines_in_thin_clouds(void **state)
@@ -764,7 +734,6 @@ int main(void)
         cmocka_unit_test(test_wisps_lie_along_the_wind),
         cmocka_unit_test(test_details_stand_still_at_the_size_of_a_planet),
         cmocka_unit_test(test_wind_turns_the_shell),
-        cmocka_unit_test(test_transmittance_is_that_of_the_density),
         cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_neighbours_have_light_of_neighbouring_places),
         cmocka_unit_test(test_two_clouds_have_light_of_two_places),
