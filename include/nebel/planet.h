@@ -104,7 +104,9 @@ typedef struct nebel_air_light {
     double sky[3]; /* irradiance on level ground below the place, of all that the air scatters */
 } nebel_air_light;
 
-/* The light at each of n places; strides in bytes. Any thread. Errors: ARGUMENT. */
+/* The light at each of n places; strides in bytes. Nothing tells an error: the sun's part is as exact as the optical depth, the
+ * sky's as the table of the quality, both in docs/planet.md, "How far off", whose rays down have this light behind them.
+ * Any thread. Errors: ARGUMENT. */
 nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
                              const double (*places)[3], size_t place_stride, nebel_air_light *lights,
                              size_t light_stride);
