@@ -27,6 +27,15 @@ typedef struct world {
     nebel_scene_data scene;
 } world;
 
+static void make_air(double coverage, world *w)
+{
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {{.coverage = coverage}}, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    w->planet.clouds = w->clouds;
+}
+
 /* With a sky of its own, which is the same all around. */
 static void make_world(double coverage, const double sun[3], world *w)
 {
@@ -39,11 +48,7 @@ static void make_world(double coverage, const double sun[3], world *w)
                           .triangle_count = 2,
                           .base_color = {.8f, .8f, .8f},
                           .texture = -1}};
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
-    const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {{.coverage = coverage}}, .layer_count = 1};
-    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
-    w->planet.atmosphere = w->atmosphere;
-    w->planet.clouds = w->clouds;
+    make_air(coverage, w);
     for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
     assert_int_equal(
         nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &w->map),
@@ -229,12 +234,44 @@ static void far_fog_has_both(void **state)
     free_world(&w);
 }
 
+/* The fog that programs make has no sun, then. Ambient light is no sky, which would be far brighter here than there. */
+static void shadows_stand_with_the_origin_by_night(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.6, high, &w);
+    const double radius = w.planet.air.radius;
+    double *const top = w.planet.air.ground;
+    nebel_destroy_clouds(w.clouds);
+    nebel_destroy_atmosphere(w.atmosphere);
+    for (int c = 0; c < 3; c++) top[c] = radius * (w.scene.sun_direction[c] + (c == 1));
+    make_air(.6, &w);
+    w.scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT, .radiance = {.1, .15, .2}};
+    nebel_volume_desc mist = make_mist(1e-3, 0, 0);
+    mist.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
+    mist.density = (nebel_density){.type = NEBEL_DENSITY_ALTITUDE,
+                                   .scale_height = 60,
+                                   .center = {top[0], top[1] - radius, top[2]},
+                                   .radius = radius};
+    nebel_camera camera = planet_camera(300, -.6);
+    for (int c = 0; c < 3; c++) {
+        camera.position[c] += top[c];
+        camera.look_at[c] += top[c];
+    }
+    pass_open(&context, NB_GL_330);
+    check("mist by day, the origin by night", &w, &mist, &camera);
+    pass_close(&context);
+    free_world(&w);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mist_has_the_shadows_of_clouds),
         cmocka_unit_test(shadows_are_long_in_a_low_sun),
         cmocka_unit_test(far_fog_has_both),
+        cmocka_unit_test(shadows_stand_with_the_origin_by_night),
     };
     if (argc > 1) scale = (uint32_t)atoi(argv[1]);
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -21,21 +21,34 @@ typedef struct world {
     nebel_cloud_workspace *workspace;
 } world;
 
+/* What comes of the planet and of the scene's sun. */
+static void make_air(world *w)
+{
+    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    const nebel_clouds_desc desc = {
+        .atmosphere = w->atmosphere, .layers = {w->planet.cloud_layers[0]}, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
+    w->planet.atmosphere = w->atmosphere;
+    w->planet.clouds = w->clouds;
+    nebel_cloud_view_desc view = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
+    memcpy(view.sun.direction, w->scene.sun_direction, sizeof view.sun.direction);
+    assert_int_equal(nebel_create_cloud_view(&view, &w->view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(w->view, &w->workspace), NEBEL_OK);
+}
+
 /* Air so thin that it hardly counts, and a sky of its own. */
 static void make_world(const nebel_cloud_layer *layer, const double sun[3], world *w)
 {
     static float pixels[4 * 2 * 3];
-    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_left = {1, 1, 1}, .cloud_layer_count = 1}};
+    *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"),
+                            .sun_left = {1, 1, 1},
+                            .cloud_layer_count = 1,
+                            .cloud_layers = {*layer}}};
     for (uint32_t k = 0; k < w->planet.air.air_count; k++)
         for (int c = 0; c < 3; c++) {
             w->planet.air.airs[k].scattering[c] *= 1e-4;
             w->planet.air.airs[k].absorption[c] *= 1e-4;
         }
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
-    const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {*layer}, .layer_count = 1};
-    assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
-    w->planet.atmosphere = w->atmosphere;
-    w->planet.clouds = w->clouds;
     for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
     assert_int_equal(
         nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &w->map),
@@ -47,10 +60,7 @@ static void make_world(const nebel_cloud_layer *layer, const double sun[3], worl
                                   .planets = &w->planet};
     memcpy(w->scene.sun_direction, sun, sizeof w->scene.sun_direction);
     assert_true(nb_vector_make_unit(w->scene.sun_direction));
-    nebel_cloud_view_desc view = {.clouds = w->clouds, .sun = {.irradiance = {5, 4, 3}}};
-    memcpy(view.sun.direction, w->scene.sun_direction, sizeof view.sun.direction);
-    assert_int_equal(nebel_create_cloud_view(&view, &w->view), NEBEL_OK);
-    assert_int_equal(nebel_create_cloud_workspace(w->view, &w->workspace), NEBEL_OK);
+    make_air(w);
 }
 
 static void free_world(world *w)
@@ -312,6 +322,78 @@ static void clear_places_stay_as_they_are(void **state)
     free_world(&w);
 }
 
+/* ---- one scene, told from two origins -------------------------------------------------------- */
+
+/* The planet's top in the scene: its middle, and all that is told of it, moves with it. */
+static void move_planet(const double top[3], world *w)
+{
+    memcpy(w->planet.air.ground, top, sizeof w->planet.air.ground);
+    nebel_destroy_cloud_workspace(w->workspace);
+    nebel_destroy_cloud_view(w->view);
+    nebel_destroy_clouds(w->clouds);
+    nebel_destroy_atmosphere(w->atmosphere);
+    make_air(w);
+}
+
+/* Mist or a ball of it on the top, with the sun that the origin has; ambient light is no sky, so that it is the same anywhere. */
+static test_picture see_top(world *w, const double top[3], int is_ball, double sun)
+{
+    const double radius = w->planet.air.radius;
+    nebel_camera camera = planet_camera(300, -.6);
+    nebel_volume_desc fog = {
+        .shape = {.type = NEBEL_SHAPE_WORLD}, .extinction = {1e-3, 1e-3, 1e-3}, .albedo = {.97, .97, .97}};
+    if (is_ball) {
+        fog.shape =
+            (nebel_shape){.type = NEBEL_SHAPE_SPHERE, .center = {top[0], top[1] + 50, top[2] - 600}, .radius = 300};
+    } else {
+        fog.density = (nebel_density){.type = NEBEL_DENSITY_ALTITUDE,
+                                      .scale_height = 60,
+                                      .center = {top[0], top[1] - radius, top[2]},
+                                      .radius = radius};
+    }
+    for (int c = 0; c < 3; c++) {
+        camera.position[c] += top[c];
+        camera.look_at[c] += top[c];
+    }
+    move_planet(top, w);
+    w->scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_CONSTANT, .radiance = {.1, .15, .2}};
+    nebel_snapshot *const snapshot = make_fog(w, &fog, sun, 1);
+    const test_picture picture = render(w, snapshot, &camera, 2);
+    nebel_release_snapshot(snapshot);
+    return picture;
+}
+
+/* Where it is night there, the fog that programs make has no sun, but the clouds over it shade it still. */
+static void shade_does_not_hang_on_the_origin(void **state)
+{
+    (void)state;
+    static const double sun[3] = {.3, .4, -1}, here[3] = {0, 0, 0};
+    for (int is_ball = 0; is_ball < 2; is_ball++) {
+        world w;
+        make_world(&(nebel_cloud_layer){.coverage = .6}, sun, &w);
+        /* The origin lies on the ground on the side away from the sun. */
+        const double radius = w.planet.air.radius,
+                     away[3] = {radius * w.scene.sun_direction[0], radius * (w.scene.sun_direction[1] + 1),
+                                radius * w.scene.sun_direction[2]};
+        test_picture day = see_top(&w, here, is_ball, sun_at(&w, here)), night = see_top(&w, away, is_ball, 0);
+        double worst = 0, least = 1, most = 0;
+        for (int i = 0; i < WIDTH * HEIGHT * 3; i++) {
+            const double left = (double)day.planes.transmittance[i], light = (double)day.planes.in_scattering[i];
+            assert_true(fabs(left - (double)night.planes.transmittance[i]) <= 1e-4);
+            worst = fmax(worst, fabs(light - (double)night.planes.in_scattering[i]));
+            if (!(left < .8)) continue;
+            least = fmin(least, light / (1 - left));
+            most = fmax(most, light / (1 - left));
+        }
+        print_message("%s with the origin by night: off by %.1e, of light from %.2f to %.2f\n",
+                      is_ball ? "a ball" : "mist", worst, least, most);
+        assert_true(worst <= 1e-6 && most > 1.5 * least);
+        test_picture_free(&day);
+        test_picture_free(&night);
+        free_world(&w);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -319,6 +401,7 @@ int main(void)
         cmocka_unit_test(a_bank_has_the_light_of_its_place),
         cmocka_unit_test(threads_change_nothing),
         cmocka_unit_test(clear_places_stay_as_they_are),
+        cmocka_unit_test(shade_does_not_hang_on_the_origin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

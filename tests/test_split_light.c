@@ -133,6 +133,7 @@ static void boxes_are_of_fog_that_scatters(void **state)
     nebel_release_snapshot(snapshot);
     snapshot = commit(2, volumes + 1, 0, NULL);
     assert_int_equal(nebel_snapshot_scattering_fog(snapshot, min, max), 0);
+    assert_int_equal(nebel_snapshot_skylit_fog(snapshot, min, max), 0);
     nebel_release_snapshot(snapshot);
     nebel_volume_desc level = volumes[0], bent;
     level.shape = (nebel_shape){.type = NEBEL_SHAPE_WORLD};
@@ -141,6 +142,8 @@ static void boxes_are_of_fog_that_scatters(void **state)
         (nebel_density){.type = NEBEL_DENSITY_ALTITUDE, .scale_height = 9, .center = {0, -1e6, 0}, .radius = 1e6};
     snapshot = commit(1, &level, 0, NULL);
     assert_int_equal(nebel_snapshot_scattering_fog(snapshot, min, max), 0);
+    assert_int_equal(nebel_snapshot_skylit_fog(snapshot, min, max), 1);
+    assert_true(max[0] == HUGE_VAL && min[2] == -HUGE_VAL);
     nebel_release_snapshot(snapshot);
     snapshot = commit(1, &bent, 0, NULL);
     assert_int_equal(nebel_snapshot_scattering_fog(snapshot, min, max), 1);
@@ -154,6 +157,23 @@ static void boxes_are_of_fog_that_scatters(void **state)
     assert_int_equal(nebel_split_light(snapshot, &suns[0], &split), NEBEL_OK);
     assert_null(split.own);
     nebel_release_split_light(&split);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_fog(fog);
+}
+
+static void boxes_hang_on_no_light(void **state)
+{
+    (void)state;
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    nebel_sunlit_fog sunlit;
+    double min[3], max[3];
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.sun = {.direction = {0, 1, 0}}}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &volumes[0], NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    assert_int_equal(nebel_snapshot_sunlit_fog(snapshot, &sunlit), 0);
+    assert_int_equal(nebel_snapshot_skylit_fog(snapshot, min, max), 1);
+    assert_true(fabs(min[1] + 4) < 1e-6 && fabs(max[1] - 8) < 1e-6);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
 }
@@ -193,6 +213,7 @@ int main(void)
         cmocka_unit_test(parts_add_up),
         cmocka_unit_test(another_sun_takes_the_place_of_the_first),
         cmocka_unit_test(boxes_are_of_fog_that_scatters),
+        cmocka_unit_test(boxes_hang_on_no_light),
         cmocka_unit_test(lost_memory_is_survived),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

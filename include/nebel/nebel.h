@@ -527,8 +527,10 @@ int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *
  * no end, and returns 1; or returns 0 where they light no fog, with min and max untouched. Cost O(n). Any thread. */
 int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
 
-/* The same of all fog that scatters, whatever light there is, but level fog without end along x or z, which is made for
- * places near the origin. */
+/* The same of all fog that scatters, which any sky would light: the snapshot need not have one, nor a sun. */
+int nebel_snapshot_skylit_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
+
+/* The same but for level fog without end along x or z, which is made for places near the origin. */
 int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3], double max[3]);
 
 /* The same fog lit by one light each, for renderers in which light changes from place to place: what the three add to a

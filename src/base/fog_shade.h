@@ -72,19 +72,15 @@ static inline nebel_result nb_fog_roof_compare(nebel_cloud_workspace *clouds, nb
     return result;
 }
 
-/* owns_ambient: see nb_fog_roof. Errors: ARGUMENT. */
+/* owns_ambient: see nb_fog_roof. Where the origin is in the night the snapshot has no sun, but fog may lie by day. Errors:
+ * ARGUMENT. */
 static inline nebel_result nb_fog_roof_set(nebel_cloud_workspace *clouds, const nebel_snapshot *snapshot,
                                            int owns_ambient, nb_fog_roof *roof)
 {
     static const double origin[1][3] = {{0, 0, 0}};
-    nebel_sunlit_fog fog;
     nb_part_range sun = {1, 0}, sky = {1, 0};
     *roof = (nb_fog_roof){.owns_ambient = owns_ambient, .clear_sky = 1};
-    if (!nebel_snapshot_sunlit_fog(snapshot, &fog)) return NEBEL_OK;
-    for (int c = 0; c < 3; c++) {
-        roof->min[c] = fog.min[c];
-        roof->max[c] = fog.max[c];
-    }
+    if (!nebel_snapshot_skylit_fog(snapshot, roof->min, roof->max)) return NEBEL_OK;
     nebel_result result = nb_fog_roof_ask(clouds, NB_FOG_SHADE_ORIGIN, origin, &sun, &sky);
     if (owns_ambient) roof->clear_sky = 1 / fmaxf(sky.most, 1e-6f);
     roof->is_shaded = !nb_fog_roof_is_small(roof);

@@ -67,12 +67,12 @@ static int is_local(const nb_volume *body)
            (isinf(body->low[0]) || isinf(body->high[0]) || isinf(body->low[2]) || isinf(body->high[2]));
 }
 
-int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3], double max[3])
+static int find_box(const nebel_snapshot *snapshot, int with_local, double min[3], double max[3])
 {
     int any = 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
-        if (!body->lit || !is_light(body->albedo) || is_local(body)) continue;
+        if (!body->lit || !is_light(body->albedo) || (!with_local && is_local(body))) continue;
         for (int c = 0; c < 3; c++) {
             min[c] = any ? fmin(min[c], body->low[c]) : body->low[c];
             max[c] = any ? fmax(max[c], body->high[c]) : body->high[c];
@@ -80,6 +80,16 @@ int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3],
         any = 1;
     }
     return any;
+}
+
+int nebel_snapshot_skylit_fog(const nebel_snapshot *snapshot, double min[3], double max[3])
+{
+    return find_box(snapshot, 1, min, max);
+}
+
+int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3], double max[3])
+{
+    return find_box(snapshot, 0, min, max);
 }
 
 nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_split_fog *split)
