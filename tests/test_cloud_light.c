@@ -150,7 +150,7 @@ static void test_ways_to_a_sun_below_level(void **state)
         const nebel_ray ray = {{0, 900, z}, {sun[0], sun[1], sun[2]}, HUGE_VAL};
         const double first = -log(brute_force(clouds, &ray, 0, 95e3, 20)),
                      truth = first - log(brute_force(clouds, &ray, 95e3, 260e3, 20));
-        const double near = (double)sun_depth_of(workspace, from, &(nb_cloud_grain){6, 16, 100}),
+        const double near = (double)sun_depth_of(workspace, from, &(nb_cloud_grain){6, 16, 100, 0}),
                      far = (double)nb_cloud_sun_depth_at(workspace, from, 100);
         if (i == 0)
             print_message(
@@ -166,12 +166,120 @@ static void test_ways_to_a_sun_below_level(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* 0 where more than a twentieth is seen through clouds. */
+static double light_of_opaque(nebel_cloud_workspace *workspace, const nebel_ray *ray, double spread)
+{
+    nebel_cloud_knots knots;
+    assert_int_equal(nebel_trace_clouds(workspace, 1, ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
+    return knots.count > 0 && knots.transmittance[knots.count - 1] < .05f
+               ? (double)knots.in_scattering[knots.count - 1][1]
+               : 0;
+}
+
+/* Mean of rays thinner by far within a pixel, or 0. */
+static double light_of_thin(nebel_cloud_workspace *workspace, double height, double x, double z, double spread)
+{
+    enum { SIDE = 4 };
+    double sum = 0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const double a = x + spread * ((i % SIDE + .5) / SIDE - .5), b = z + spread * ((i / SIDE + .5) / SIDE - .5);
+        const nebel_ray ray = {{0, height, 0}, {a, -1, b}, HUGE_VAL};
+        const double light = light_of_opaque(workspace, &ray, 1e-5);
+        if (!(light > 0)) return 0;
+        sum += light / (SIDE * SIDE);
+    }
+    return sum;
+}
+
+/* Pixels that are narrow beside flat heaps and wide beside their height have the light of thin rays within them: nodes as far apart as
+ * they are wide made contour lines. */
+static void test_light_of_flat_heaps(void **state)
+{
+    (void)state;
+    static const struct {
+        nebel_cloud_layer layer;
+        double height;
+    } cases[] = {
+        {{.size = 5e4, .coverage = .6, .detail = NEBEL_CLOUD_NONE}, 1e6},
+        {{.size = 5e4, .coverage = .6}, 1e6},
+        {{.size = 1e4, .coverage = .6}, 1e5},
+        {{.base = 900, .top = 1200, .extinction = .2, .coverage = .6}, 2e4},
+    };
+    const double spread = 3e-3;
+    uint64_t numbers = 29;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        nebel_clouds *clouds = make(1, &cases[i].layer);
+        nebel_cloud_workspace *workspace;
+        nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+        double sum = 0, squares = 0;
+        int count = 0;
+        for (int k = 0; k < 500; k++) {
+            const double x = dice(&numbers, -.2, .2), z = dice(&numbers, -.2, .2);
+            const nebel_ray ray = {{0, cases[i].height, 0}, {x, -1, z}, HUGE_VAL};
+            const double light = light_of_opaque(workspace, &ray, spread);
+            const double thin = light > 0 ? light_of_thin(workspace, cases[i].height, x, z, spread) : 0;
+            if (!(thin > 0)) continue;
+            sum += thin;
+            squares += (light - thin) * (light - thin);
+            count++;
+        }
+        const double off = sqrt(squares / count) * count / sum;
+        print_message("%d pixels of flat heaps from %.0f km: off light of thin rays by %.3f of it\n", count,
+                      1e-3 * cases[i].height, off);
+        assert_true(count > 50 && off < .18);
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+        nebel_destroy_clouds(clouds);
+    }
+}
+
+static double light_down(nebel_cloud_workspace *workspace, double x, double width)
+{
+    const nebel_ray ray = {{x, 1e5, 7e3}, {0, -1, 0}, HUGE_VAL};
+    return light_of_opaque(workspace, &ray, 1e-5 * width);
+}
+
+/* Flat heaps show the light of thin rays to pixels that do not hide them, from 110 m on without lattices; it does not jump as pixels
+ * grow. */
+static void test_light_as_pixels_grow(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds =
+        make(1, (const nebel_cloud_layer[]){{.size = 5e4, .coverage = .9, .detail = NEBEL_CLOUD_NONE}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    double jump = 0, off = 0;
+    int count = 0;
+    for (int i = 0; i < 24; i++) {
+        const double x = 18.5e3 * i, thin = light_down(workspace, x, 1);
+        double last = light_down(workspace, x, 30);
+        if (!(thin > 0)) continue;
+        count++;
+        for (double width = 30; width < 1400; width *= 1.01) {
+            const double light = light_down(workspace, x, width);
+            jump = fmax(jump, fabs(light / last - 1));
+            if (width > 110) off = fmax(off, fabs(light / thin - 1));
+            last = light;
+        }
+    }
+    print_message(
+        "%d places in flat heaps: light off that of thin rays by %.3f of it at most, off that of pixels a hundredth "
+        "narrower by %.3f\n",
+        count, off, jump);
+    assert_true(count > 12 && off < .2 && jump < .1);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_light_of_slabs),
         cmocka_unit_test(test_ways_to_the_sun),
         cmocka_unit_test(test_ways_to_a_sun_below_level),
+        cmocka_unit_test(test_light_of_flat_heaps),
+        cmocka_unit_test(test_light_as_pixels_grow),
     };
     return cmocka_run_group_tests(tests, make_air, free_air);
 }

@@ -202,17 +202,25 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
 }
 
 /* Away from the sun, up and down. */
-static void find_around(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[3])
+static void set_around(const nebel_cloud_workspace *workspace, const double place[3], const nb_steps *steps,
+                       nb_way ways[3])
 {
     const double radius = fmax(1, nb_vector_length(place));
-    const nb_steps steps = {width, GROWTH, width, MOST_STEPS};
     double away[3], up[3], down[3];
     for (int i = 0; i < 3; i++) {
         away[i] = -workspace->view->sun.direction[i];
         up[i] = place[i] / radius;
         down[i] = -up[i];
     }
-    nb_way ways[3] = {way_of(place, away, &steps), way_of(place, up, &steps), way_of(place, down, &steps)};
+    ways[0] = way_of(place, away, steps);
+    ways[1] = way_of(place, up, steps);
+    ways[2] = way_of(place, down, steps);
+}
+
+static void find_around(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[3])
+{
+    nb_way ways[3];
+    set_around(workspace, place, &(nb_steps){width, GROWTH, width, MOST_STEPS}, ways);
     find_ways(workspace, 0, 3, ways);
     for (int i = 0; i < 3; i++) depth[i] = (float)ways[i].depth;
 }
@@ -376,28 +384,72 @@ static nb_in_lattice find_behind(const nebel_cloud_workspace *workspace, const n
     return find_in_lattice(workspace, NB_CLOUD_TO_SUN, far, width);
 }
 
+/* Of a place's ways the first steps to the sun; then, where it has its own, what is behind them and the three around. */
+enum { FIRST_STEPS, BEHIND, AROUND, PLACE_WAYS = AROUND + 3 };
+
+/* Where a place's depths come from. */
+typedef struct nb_origin {
+    nb_cloud_asked *asked;
+    const nb_way *ways;
+    nb_in_lattice behind, around;
+} nb_origin;
+
+/* Returns how many ways there are. */
+static int set_ways(const nebel_cloud_workspace *workspace, const nb_cloud_asked *asked, nb_way ways[PLACE_WAYS])
+{
+    const nb_cloud_grain *grain = &asked->grain;
+    const double *sun = workspace->view->sun.direction;
+    nb_way *first = &ways[FIRST_STEPS];
+    nb_steps steps = {grain->first, GROWTH, grain->width, OWN_STEPS};
+    *first = way_of(asked->place, sun, &steps);
+    first->reach = (double)((OWN_GROWTH - 1) / (GROWTH - 1) * grain->first);
+    if (!(grain->own > 0)) return 1;
+    double far[3];
+    for (int c = 0; c < 3; c++) far[c] = first->from[c] + first->reach * sun[c];
+    steps.most = MOST_STEPS;
+    set_around(workspace, asked->place, &steps, &ways[AROUND]);
+    steps.first *= OWN_GROWTH;
+    ways[BEHIND] = way_of(far, sun, &steps);
+    return PLACE_WAYS;
+}
+
+static void find_origin(const nebel_cloud_workspace *workspace, nb_cloud_asked *asked, const nb_way *ways,
+                        nb_origin *origin)
+{
+    origin->asked = asked;
+    origin->ways = ways;
+    origin->behind.count = origin->around.count = 0;
+    if (asked->grain.own >= 1) return;
+    origin->behind = find_behind(workspace, &ways[FIRST_STEPS]);
+    origin->around = find_in_lattice(workspace, NB_CLOUD_AROUND, asked->place, asked->grain.wide);
+}
+
+static void take_depths(nebel_cloud_workspace *workspace, const nb_origin *origin)
+{
+    const nb_way *ways = origin->ways;
+    const float own = origin->asked->grain.own;
+    float sun[3], around[3];
+    read_lattice(workspace, &origin->behind, sun);
+    read_lattice(workspace, &origin->around, around);
+    if (own > 0) {
+        sun[0] += own * ((float)ways[BEHIND].depth - sun[0]);
+        for (int i = 0; i < 3; i++) around[i] += own * ((float)ways[AROUND + i].depth - around[i]);
+    }
+    origin->asked->depths = (nb_cloud_depths){(float)ways[FIRST_STEPS].depth + sun[0], around[0], around[1], around[2]};
+}
+
 void nb_cloud_find_depths(nebel_cloud_workspace *workspace, int n, nb_cloud_asked asked[])
 {
-    nb_way ways[NB_CLOUD_ASKED];
-    nb_in_lattice behind[NB_CLOUD_ASKED], around[NB_CLOUD_ASKED];
-    nb_cloud_asked *of[NB_CLOUD_ASKED];
-    int count = 0;
+    nb_way ways[NB_CLOUD_ASKED * PLACE_WAYS];
+    nb_origin origins[NB_CLOUD_ASKED];
+    int count = 0, way_count = 0;
     for (int i = 0; i < n; i++) {
-        const nb_cloud_grain *grain = &asked[i].grain;
-        const nb_steps steps = {grain->first, GROWTH, grain->width, OWN_STEPS};
+        nb_way *of_place = &ways[way_count];
         asked[i].depths = (nb_cloud_depths){0, 0, 0, 0};
         if (asked[i].is_alike) continue;
-        ways[count] = way_of(asked[i].place, workspace->view->sun.direction, &steps);
-        ways[count].reach = (double)((OWN_GROWTH - 1) / (GROWTH - 1) * grain->first);
-        behind[count] = find_behind(workspace, &ways[count]);
-        around[count] = find_in_lattice(workspace, NB_CLOUD_AROUND, asked[i].place, grain->wide);
-        of[count++] = &asked[i];
+        way_count += set_ways(workspace, &asked[i], of_place);
+        find_origin(workspace, &asked[i], of_place, &origins[count++]);
     }
-    find_ways(workspace, 0, count, ways);
-    for (int i = 0; i < count; i++) {
-        float sun[3], others[3];
-        read_lattice(workspace, &behind[i], sun);
-        read_lattice(workspace, &around[i], others);
-        of[i]->depths = (nb_cloud_depths){(float)ways[i].depth + sun[0], others[0], others[1], others[2]};
-    }
+    find_ways(workspace, 0, way_count, ways);
+    for (int i = 0; i < count; i++) take_depths(workspace, &origins[i]);
 }

@@ -171,6 +171,7 @@ float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3
 typedef struct nb_cloud_grain {
     float width, first; /* first: length of the first step towards the sun */
     float wide;         /* between nodes of the other ways */
+    float own;          /* part of what lattices give that comes from ways of the place's own: 0 to 1 */
 } nb_cloud_grain;
 
 /* A place in clouds, and what is found there: nothing where all places are alike, as a pixel hides all of the layer. */

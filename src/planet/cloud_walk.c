@@ -60,6 +60,15 @@
  * depths of their middle, and are half as bright (test_clouds). */
 #define NODES_PART 0.08
 
+/* Across a pixel heaps rise by so many times what they do in the mean, which is their height by their size: no less than the
+ * pixel is wide where they are as high as the usual ones. */
+#define STEEPNESS 1.5
+
+/* Pixels so wide beside a layer's height, times the square of how much wider they are than what they hide of it, hold nodes so far
+ * apart that light has a contour at each: a place has ways of its own then, in part from the first on, all from the second on. */
+#define NODES_GOOD 0.2
+#define NODES_BAD 0.3
+
 /* Noise hardly ever rises by a seventh of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.15
 
@@ -145,6 +154,20 @@ static nb_spot spot_at(const nb_walk *walk, int k, double t)
     return spot;
 }
 
+/* How much of the way through a layer a pixel hides, of a way so long from base to top: as much as heaps rise across it, but no
+ * less than their softness. */
+static double hidden_way(const nb_cloud_layer *layer, double length, double width)
+{
+    const double soft = (double)(layer->softness / NB_CLOUD_RANK_SLOPE);
+    return nb_min(width, length * nb_max(soft, STEEPNESS * width / (double)layer->size));
+}
+
+static double hidden_of_stay(const nb_walk *walk, const nb_stay *stay)
+{
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[stay->layer];
+    return hidden_way(layer, nb_max(layer->high - layer->low, stay->end - stay->begin), walk->spread * walk->t);
+}
+
 /* ---- looking --------------------------------------------------------------------------------- */
 
 /* Places of many walks that are looked at together. What is seen goes to where *seen is. */
@@ -209,10 +232,10 @@ static double clear_way(nb_walk *walk, int k)
     return 0;
 }
 
-/* Pixels wider than the least step make it longer, but no more than a part of the stay. */
+/* What pixels hide makes the least step longer, but no more than a part of the stay. */
 static double least_step(const nb_walk *walk, const nb_stay *stay)
 {
-    const double width = walk->spread * walk->t,
+    const double width = hidden_of_stay(walk, stay),
                  near = nb_max(LEAST_STEP * walk->least, nb_min(2 * width, FAR_STEP * walk->least));
     const double times = nb_min(MOST_TIMES, nb_max(1, DIM / walk->tally.left));
     return times * nb_min(STAY_STEP * (stay->end - stay->begin), nb_max(near, width));
@@ -273,14 +296,17 @@ struct nb_party {
 static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
-    const double thickness = 1 / (double)layer->per_thickness;
+    const double thickness = 1 / (double)layer->per_thickness, hidden = hidden_way(layer, thickness, width),
+                 flatness = hidden > 0 ? width / hidden : 1;
     return (nb_cloud_grain){
         .width = (float)width,
         .first = (float)fmin(0.1 * thickness,
-                             fmax(2 * width, fmin(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
+                             fmax(2 * hidden, fmin(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
         /* Wider lattices than the layer is high would show through it. */
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
                               0.08 * walk->least),
+        .own = (float)nb_max(
+            0, nb_min(1, (flatness * flatness * width / thickness - NODES_GOOD) / (NODES_BAD - NODES_GOOD))),
     };
 }
 
@@ -421,6 +447,11 @@ static double curve_of(const nb_cloud_seen *here, const nb_cloud_seen *middle, c
     return a > 0 && b > 0 && c > 0 ? curve : fmax(curve, fmax(a, fmax(b, c)));
 }
 
+static double least_piece(const nb_walk *walk, const nb_stay *stay)
+{
+    return nb_max(nb_min(0.5 * hidden_of_stay(walk, stay), STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
+}
+
 /* Takes a piece whose three values are known, or halves it. */
 static void judge_piece(nb_walk *walk, const nb_stay *stay)
 {
@@ -428,10 +459,9 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
     const nb_cloud_seen *here = &walk->here, *middle = &walk->middle, *far = &walk->far;
     const double depth = length / 6 * (double)(here->whole + 4 * middle->whole + far->whole);
     const double depth_apart = length / 6 * (double)(here->apart + 4 * middle->apart + far->apart);
-    const double least =
-        nb_max(nb_min(0.5 * walk->spread * walk->t, STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
     const double missed = walk->tally.left * length / 6 * curve_of(here, middle, far);
-    if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->tally.left)) && length > 2 * least) {
+    if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->tally.left)) &&
+        length > 2 * least_piece(walk, stay)) {
         walk->length *= 0.5;
         walk->far = walk->middle;
         walk->has_far = 1;
