@@ -390,11 +390,12 @@ nebel_result nb_scatter_make(const nebel_allocator *allocator, const nb_parts *p
     const nb_scatter layout = layout_of(airs, effort);
     nb_rounds rounds = {.once = {.heights = 0}};
     nebel_result result = allocate(allocator, &layout, scatter);
+    if (result != NEBEL_OK) return result;
     if (nb_airs_are_empty(airs)) {
         seal(scatter);
-        return result;
+        return NEBEL_OK;
     }
-    if (result == NEBEL_OK) result = allocate_rounds(allocator, &layout, &rounds);
+    result = allocate_rounds(allocator, &layout, &rounds);
     if (result == NEBEL_OK) sum_orders(&maker, parts, &rounds, scatter);
     free_rounds(allocator, &rounds);
     return result;
