@@ -18,6 +18,9 @@ struct nebel_atmosphere {
 /* In units of what was scattered once: what quadrature along a ray misses. */
 #define NB_ONCE_OFF 2e-3
 
+/* Half of the last digit of a transmittance in floats, and what its integral is off. */
+#define NB_LIGHT_ROUNDING 4e-8
+
 /* What a ray gathers for a sun of irradiance 1: scattered once, by each kind of air, for phase functions of 1; more
  * often; and about how much of that is missing for want of moments, and in twilight for want of entries. */
 typedef struct nb_gathered {

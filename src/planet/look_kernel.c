@@ -319,9 +319,10 @@ static void look_along(const nb_look_job *job)
         read_table(job->table, &looks, &read);
         nb_real error = nb_select(has_air, light_of(job->table, &looks, &read, light), NB_F(0.0));
         const nb_real off = looks.along * nb_load_lanes(read.extinction[3]);
+        const nb_real rounding = nb_select(has_air, NB_F(NB_LIGHT_ROUNDING), NB_F(0.0));
         for (int c = 0; c < 3; c++) {
             const nb_real left = nb_exp(-(looks.along * nb_load_lanes(read.extinction[c])));
-            error = nb_max(error, off * left);
+            error = nb_max(error, off * left + rounding);
             store_floats(part, left, lights->transmittance[c]);
             store_floats(part, nb_select(has_air, light[c], NB_F(0.0)), lights->in_scattering[c]);
         }

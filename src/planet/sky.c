@@ -209,7 +209,7 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     double depth[3];
     nb_track_depth(&atmosphere->airs, inside.track, inside.length, depth);
     for (int c = 0; c < 3; c++) light->transmittance[c] = nb_exp(-depth[c]);
-    light->error = 1e-8;
+    light->error = NB_LIGHT_ROUNDING;
     if (!(fmax(sun->irradiance[0], fmax(sun->irradiance[1], sun->irradiance[2])) > 0)) return;
     nb_gathered gathered;
     const nb_aspect aspect = {bound_cosine(inside.track.rise / inside.track.radius),
@@ -220,7 +220,7 @@ static void trace(const nebel_atmosphere *atmosphere, const nebel_sun *sun, cons
     for (int c = 0; c < 3; c++) {
         light->in_scattering[c] = sun->irradiance[c] * (once[c] + gathered.often[c]);
         const double off = nb_gathered_off(atmosphere, &gathered, once, c);
-        light->error = fmax(light->error, sun->irradiance[c] * off + 1e-8);
+        light->error = fmax(light->error, sun->irradiance[c] * off + NB_LIGHT_ROUNDING);
     }
 }
 
