@@ -936,13 +936,14 @@ class InfoTest(PictureCase):
 
     def test_the_depth_of_air(self):
         """Scattering times scale height, but for what is above the air; and clouds cover a part of the planet."""
-        air = {"type": "exponential", "scattering": [2e-5, 0, 1], "scale_height": 8000}
+        air = {"type": "exponential", "scattering": [2e-5, 0, 0], "absorption": [0, 0, 1], "scale_height": 8000}
         planet = {"model": "physical", "airs": [air], "clouds": [{"coverage": 0.3}]}
         out = nebel("info", self.write_scene("air.json", [], planet=planet)).out
-        self.assertIn("air: optical depth straight up from the ground 0.16 0 more than 80\n", out)
+        self.assertIn("air: optical depth straight up from the ground 0.16 0 more than 80\nwarning: air deeper than 10 ", out)
         self.assertIn("clouds: cumulus, 900 to 2700 m, 0.3 of the planet\n", out)
         moon = nebel("info", self.write_scene("moon.json", [], planet={"model": "physical", "preset": "moon"})).out
         self.assertNotIn("optical depth", moon)
+        self.assertNotIn("deeper", nebel("info", self.write_scene("e.json", [], planet={"model": "physical"})).out)
 
     def test_a_camera_below_the_ground_of_a_planet(self):
         for planet, radius in (({"model": "physical", "preset": "mars"}, 3389500), ({"model": "layers"}, 6360000)):

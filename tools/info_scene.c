@@ -91,8 +91,9 @@ static int has_air(const nebel_atmosphere_desc *air)
     return sum > 0;
 }
 
-/* Light of a larger optical depth is none for any picture. */
+/* Light of a larger optical depth is none for any picture. From DEEP on light that is scattered often is not found to its end. */
 #define MOST_DEPTH 80.
+#define DEEP 10.
 
 /* Straight up from the ground. */
 static void print_depth(const nebel_planet *planet)
@@ -101,12 +102,17 @@ static void print_depth(const nebel_planet *planet)
     const nebel_ray up = {{air->ground[X], air->ground[Y], air->ground[Z]}, {0, 1, 0}, (double)INFINITY};
     nebel_light light;
     if (nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &light, 0) != NEBEL_OK) return;
+    double most = 0;
     (void)printf("air: optical depth straight up from the ground");
     for (int c = 0; c < 3; c++) {
         const double depth = 0 - log(light.transmittance[c]);
         (void)printf(depth <= MOST_DEPTH ? " %.3g" : " more than %g", fmin(depth, MOST_DEPTH));
+        most = fmax(most, depth);
     }
     (void)printf("\n");
+    if (most > DEEP)
+        (void)printf("warning: air deeper than %g is drawn too dark or too bright where light is scattered often\n",
+                     DEEP);
 }
 
 static void print_planet(const nebel_planet *planet)
