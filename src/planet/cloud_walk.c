@@ -33,6 +33,9 @@
  * is less, by so much of them, times what is seen of them. Light of two clouds would come from between them. */
 #define LOSS 1
 
+/* Stretches of which so little is seen have no light: a hundredth of a grey level of the brightest cloud. */
+#define FAINT 6e-5
+
 /* Nor has what is so far apart one light, in first steps. */
 #define WIDE_GAP 16
 
@@ -355,7 +358,7 @@ static void add_light(nb_walk *walk, int k)
     nb_lights *lights = &walk->party->lights;
     const nb_stretch stretch = walk->stretch;
     walk->stretch = (nb_stretch){.weight = 0};
-    if (!(stretch.weight > 0)) return;
+    if (!(stretch.weight > FAINT)) return;
     const double t = stretch.moment / stretch.weight;
     const int i = lights->count++;
     lights->walks[i] = walk;
