@@ -87,8 +87,9 @@ static void seal(nb_scatter *scatter)
 
 enum { MOST_TURNS = 16 };
 
-/* MOST_TIMES: as many entries over the height as are asked for. */
-enum { MOST_ROUNDS = 32, MOST_TIMES = 4 };
+/* Air deeper than HOPELESS would need hundreds of rounds. */
+enum { MOST_HEIGHTS = 48, MOST_ROUNDS = 32, FEW_ROUNDS = 16 };
+#define HOPELESS 12
 
 /* Light changes with the slope, near the horizon, far more than with the turn, so that turns are as few as moments bear.
  * Numbers of a quality: entries of the table, directions up and down and around, nodes of a piece of a
@@ -253,13 +254,18 @@ static size_t entries(const nb_scatter *scatter)
     return (size_t)scatter->heights * (size_t)scatter->suns;
 }
 
-/* Light changes within an optical depth or two: deep air has more entries over its height. */
-static int count_heights(const nb_airs *airs, const nb_effort *effort)
+/* Of all air straight up, of the colour of which it is the most. */
+static double deepest(const nb_airs *airs)
 {
     double depth[3] = {0, 0, 0};
     nb_track_depth(airs, (nb_track){airs->radius, airs->radius}, airs->top - airs->radius, depth);
-    const double deepest = fmax(depth[0], fmax(depth[1], depth[2]));
-    return (int)(effort->heights * fmin(MOST_TIMES, fmax(1, sqrt(2 * deepest))));
+    return fmax(depth[0], fmax(depth[1], depth[2]));
+}
+
+/* Light changes within an optical depth or two: deep air has more entries over its height. */
+static int count_heights(const nb_airs *airs, const nb_effort *effort)
+{
+    return (int)fmin(MOST_HEIGHTS, effort->heights * fmax(1, sqrt(2 * deepest(airs))));
 }
 
 static nb_scatter layout_of(const nb_airs *airs, const nb_effort *effort)
@@ -351,8 +357,9 @@ static int run_cycle(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, 
 /* Each cycle begins where the one before leads. */
 static void sum_orders(nb_maker *maker, const nb_parts *parts, nb_rounds *rounds, nb_scatter *sum)
 {
+    const int most = deepest(maker->airs) > HOPELESS ? FEW_ROUNDS : MOST_ROUNDS;
     scatter_again(maker, parts, NULL, NULL, &rounds->once);
-    for (int done = 0; done < MOST_ROUNDS;) {
+    for (int done = 0; done < most;) {
         done = run_cycle(maker, parts, rounds, done, sum);
         if (sum->missing <= maker->effort->most_missing) break;
         copy(sum, &rounds->tables[0]);
