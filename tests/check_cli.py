@@ -939,7 +939,7 @@ class InfoTest(PictureCase):
         air = {"type": "exponential", "scattering": [2e-5, 0, 0], "absorption": [0, 0, 1], "scale_height": 8000}
         planet = {"model": "physical", "airs": [air], "clouds": [{"coverage": 0.3}]}
         out = nebel("info", self.write_scene("air.json", [], planet=planet)).out
-        self.assertIn("air: optical depth straight up from the ground 0.16 0 more than 80\nwarning: air deeper than 10 ", out)
+        self.assertIn("air: optical depth straight up from the ground 0.16 0 more than 80\nwarning: air deeper than 12 ", out)
         self.assertIn("clouds: cumulus, 900 to 2700 m, 0.3 of the planet\n", out)
         moon = nebel("info", self.write_scene("moon.json", [], planet={"model": "physical", "preset": "moon"})).out
         self.assertNotIn("optical depth", moon)

@@ -93,7 +93,7 @@ static int has_air(const nebel_atmosphere_desc *air)
 
 /* Light of a larger optical depth is none for any picture. From DEEP on light that is scattered often is not found to its end. */
 #define MOST_DEPTH 80.
-#define DEEP 10.
+#define DEEP 12.
 
 /* Straight up from the ground. */
 static void print_depth(const nebel_planet *planet)
