@@ -22,22 +22,17 @@ static double gain(const nb_scatter tables[], int round, size_t entry, int c)
     return tables[round + 1].fields[entry].moments[0][c] - tables[round].fields[entry].moments[0][c];
 }
 
-static size_t entries(const nb_scatter *scatter)
-{
-    return (size_t)scatter->heights * (size_t)scatter->suns;
-}
-
 static void multiply(int count, const nb_scatter tables[], int c, nb_products products)
 {
     double most = DBL_MIN;
     memset(products, 0, sizeof(nb_products));
-    for (size_t e = 0; e < entries(tables); e++) most = fmax(most, tables[count].fields[e].moments[0][c]);
-    for (size_t e = 0; e < entries(tables); e++) {
+    for (size_t e = 0; e < nb_scatter_entries(tables); e++) most = fmax(most, tables[count].fields[e].moments[0][c]);
+    for (size_t e = 0; e < nb_scatter_entries(tables); e++) {
         const double all = tables[count].fields[e].moments[0][c] + DARK * most;
         double parts[NB_MOST_ROUNDS];
         for (int i = 0; i < count; i++) parts[i] = gain(tables, i, e, c) / all;
         for (int i = 0; i < count; i++)
-            for (int j = 0; j <= i; j++) products[i][j] += parts[i] * parts[j] / (double)entries(tables);
+            for (int j = 0; j <= i; j++) products[i][j] += parts[i] * parts[j] / (double)nb_scatter_entries(tables);
     }
     for (int i = 0; i < count; i++)
         for (int j = i + 1; j < count; j++) products[i][j] = products[j][i];
@@ -116,7 +111,7 @@ double nb_orders_extrapolate(int count, const nb_scatter tables[], double slowes
         const double last = products[count - 1][count - 1], before = products[count - 2][count - 2];
         if (before > 0) slowest[c] = fmin(MOST_PART, fmax(slowest[c], sqrt(last / before)));
         missing = fmax(missing, left * slowest[c] / (1 - slowest[c]));
-        for (size_t e = 0; e < entries(all); e++) mix_field(count, tables, e, c, weights, &all->fields[e]);
+        for (size_t e = 0; e < nb_scatter_entries(all); e++) mix_field(count, tables, e, c, weights, &all->fields[e]);
         for (int s = 0; s < all->suns; s++) mix_ground(count, tables, s, c, weights, &all->ground[s][c]);
     }
     return missing;

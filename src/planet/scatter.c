@@ -249,11 +249,6 @@ static void add_height(void *data, size_t height)
     }
 }
 
-static size_t entries(const nb_scatter *scatter)
-{
-    return (size_t)scatter->heights * (size_t)scatter->suns;
-}
-
 /* Of all air straight up, of the colour of which it is the most. */
 static double deepest(const nb_airs *airs)
 {
@@ -280,7 +275,7 @@ static nb_scatter layout_of(const nb_airs *airs, const nb_effort *effort)
 static nebel_result allocate(const nebel_allocator *allocator, const nb_scatter *layout, nb_scatter *scatter)
 {
     *scatter = *layout;
-    scatter->fields = nb_allocate_zero(allocator, entries(scatter), sizeof *scatter->fields);
+    scatter->fields = nb_allocate_zero(allocator, nb_scatter_entries(scatter), sizeof *scatter->fields);
     scatter->ground = nb_allocate_zero(allocator, (size_t)scatter->suns, sizeof *scatter->ground);
     return scatter->fields != NULL && scatter->ground != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
@@ -293,13 +288,13 @@ void nb_scatter_free(const nebel_allocator *allocator, nb_scatter *scatter)
 
 static void copy(const nb_scatter *from, nb_scatter *to)
 {
-    memcpy(to->fields, from->fields, entries(from) * sizeof *from->fields);
+    memcpy(to->fields, from->fields, nb_scatter_entries(from) * sizeof *from->fields);
     memcpy(to->ground, from->ground, (size_t)from->suns * sizeof *from->ground);
 }
 
 static void add(const nb_scatter *more, nb_scatter *sum)
 {
-    for (size_t i = 0; i < entries(sum); i++)
+    for (size_t i = 0; i < nb_scatter_entries(sum); i++)
         for (int m = 0; m < NB_FIELD; m++)
             for (int c = 0; c < 3; c++) sum->fields[i].moments[m][c] += more->fields[i].moments[m][c];
     for (int i = 0; i < sum->suns; i++)
@@ -308,7 +303,7 @@ static void add(const nb_scatter *more, nb_scatter *sum)
 
 static void clear(nb_scatter *scatter)
 {
-    memset(scatter->fields, 0, entries(scatter) * sizeof *scatter->fields);
+    memset(scatter->fields, 0, nb_scatter_entries(scatter) * sizeof *scatter->fields);
     memset(scatter->ground, 0, (size_t)scatter->suns * sizeof *scatter->ground);
 }
 

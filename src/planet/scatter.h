@@ -16,6 +16,11 @@ typedef struct nb_scatter {
     double missing;      /* part of it that may not have been scattered often enough */
 } nb_scatter;
 
+static inline size_t nb_scatter_entries(const nb_scatter *scatter)
+{
+    return (size_t)scatter->heights * (size_t)scatter->suns;
+}
+
 nb_field nb_scatter_look_up(const nb_scatter *scatter, const nb_airs *airs, double radius, double sun);
 void nb_scatter_look_up_ground(const nb_scatter *scatter, double sun, double irradiance[3]);
 
