@@ -1,5 +1,6 @@
 #include "cloudscape.h"
 
+#include "cloud_air.h"
 #include "fog_shade.h"
 #include "haze.h"
 
@@ -42,90 +43,6 @@ void nb_cloudscape_free(nb_frame *frame)
 
 /* ---- along the middles of pixels ------------------------------------------------------------- */
 
-static nebel_ray ray_of(const nb_frame *frame, const nb_cloud_scratch *clouds, uint32_t lane)
-{
-    nebel_ray ray = {.t_max = HUGE_VAL};
-    for (int c = 0; c < 3; c++) {
-        ray.origin[c] = frame->view.position[c];
-        ray.direction[c] = clouds->rays.direction[c][lane];
-    }
-    return ray;
-}
-
-/* What is asked of the air at once: ends along the rays of some lanes. */
-typedef struct nb_air_asked {
-    uint32_t lane_count, lanes[NB_BATCH], first[NB_BATCH]; /* of a lane's ends */
-    uint32_t count;
-    double direction[3][NB_WORLDS_RAYS];
-    float t[NB_WORLDS_RAYS], left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS];
-} nb_air_asked;
-
-static int has_room(const nb_air_asked *asked, uint32_t count)
-{
-    return asked->count + count <= NB_WORLDS_RAYS;
-}
-
-static void ask_air(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, const float *t, nb_air_asked *asked)
-{
-    asked->lanes[asked->lane_count] = lane;
-    asked->first[asked->lane_count++] = asked->count;
-    for (uint32_t k = 0; k < count; k++) {
-        for (int c = 0; c < 3; c++) asked->direction[c][asked->count] = clouds->rays.direction[c][lane];
-        asked->t[asked->count++] = t[k];
-    }
-}
-
-static nebel_result trace_asked(const nb_frame *frame, nb_air_asked *asked)
-{
-    const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
-    nebel_light_planes lights = {.error = NULL};
-    for (int c = 0; c < 3; c++) {
-        lights.transmittance[c] = asked->left[c];
-        lights.in_scattering[c] = asked->light[c];
-    }
-    return nb_air_trace(&frame->air, asked->count, direction, asked->t, &lights);
-}
-
-/* The shade of those that were asked; begins anew. */
-static nebel_result set_shade(const nb_frame *frame, const nebel_air_shade *shades, nb_cloud_scratch *clouds,
-                              nb_air_asked *asked)
-{
-    if (asked->count == 0) return NEBEL_OK;
-    const nebel_result result = trace_asked(frame, asked);
-    for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
-        const uint32_t lane = asked->lanes[i];
-        float light[3][NB_SHADED_PIECES];
-        for (int c = 0; c < 3; c++)
-            memcpy(light[c], asked->light[c] + asked->first[i], (shades[lane].count + 1) * sizeof light[c][0]);
-        clouds->shaded_count[lane] = nb_shaded_set(&shades[lane], light, clouds->shaded[lane]);
-    }
-    asked->lane_count = asked->count = 0;
-    return result;
-}
-
-static int is_in_picture(const nb_frame *frame, const nb_place *place, uint32_t lane)
-{
-    return nb_lane_x(place->first + lane) < frame->width - place->left &&
-           nb_lane_y(place->first + lane) < frame->height - place->top;
-}
-
-static nebel_result shade_air(const nb_frame *frame, const nb_place *place, nb_cloud_scratch *clouds)
-{
-    nebel_result result = NEBEL_OK;
-    nebel_air_shade shades[NB_BATCH];
-    nb_air_asked asked;
-    asked.lane_count = asked.count = 0;
-    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        if (!is_in_picture(frame, place, i)) continue;
-        const nebel_ray ray = ray_of(frame, clouds, i);
-        result = nebel_shade_air(clouds->workspace, 1, &ray, 0, &shades[i], 0);
-        if (result != NEBEL_OK || shades[i].count == 0) continue;
-        if (!has_room(&asked, shades[i].count + 1)) result = set_shade(frame, shades, clouds, &asked);
-        ask_air(clouds, i, shades[i].count + 1, shades[i].t, &asked);
-    }
-    return result == NEBEL_OK ? set_shade(frame, shades, clouds, &asked) : result;
-}
-
 nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
@@ -134,7 +51,7 @@ nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, n
     memset(clouds->reach, 0, sizeof clouds->reach);
     nb_fog_shade_start(scratch);
     for (uint32_t i = 0; i < NB_BATCH; i++) clouds->knots[i].count = clouds->shaded_count[i] = 0;
-    return shade_air(frame, place, clouds);
+    return nb_cloud_air_shade(frame, place, clouds);
 }
 
 /* How far clouds matter to a sample. A ray that goes on from there to the ground is not followed beyond it. */
@@ -142,7 +59,7 @@ static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t l
 {
     const float distance = scratch->distance[lane];
     if (!(scratch->air.ground.distance[lane] < HUGE_VALF)) return distance;
-    const nebel_ray ray = ray_of(frame, &scratch->clouds, lane);
+    const nebel_ray ray = nb_cloud_air_ray(frame, &scratch->clouds, lane);
     const double length = (double)scratch->clouds.rays.length[lane];
     double unit[3];
     for (int c = 0; c < 3; c++) unit[c] = ray.direction[c] / length;
@@ -169,7 +86,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
         if (!scratch->inside[i]) continue;
         clouds->end[i] = end_of(frame, scratch, i);
         if (is_found(clouds, (int)i)) continue;
-        clouds->asked[count] = ray_of(frame, clouds, i);
+        clouds->asked[count] = nb_cloud_air_ray(frame, clouds, i);
         clouds->asked[count].t_max = (double)clouds->end[i];
         clouds->spreads[count] = frame->air.pixel / (double)clouds->rays.length[i];
         lanes[count++] = i;
@@ -188,41 +105,6 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
 }
 
 /* ---- among air and fog ----------------------------------------------------------------------- */
-
-/* What the air does up to the knots of those that were asked; begins anew. */
-static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_air_asked *asked)
-{
-    if (asked->count == 0) return NEBEL_OK;
-    const nebel_result result = trace_asked(frame, asked);
-    for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
-        const uint32_t lane = asked->lanes[i], first = asked->first[i];
-        const nebel_cloud_knots *knots = &clouds->knots[lane];
-        nb_cloud_haze *air = &clouds->air[lane];
-        for (int c = 0; c < 3; c++)
-            for (uint32_t k = 0; k < knots->count; k++) {
-                air->left[c][k] = asked->left[c][first + k];
-                air->light[c][k] = nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k],
-                                                   asked->light[c][first + k]);
-            }
-    }
-    asked->lane_count = asked->count = 0;
-    return result;
-}
-
-/* Of all lanes that are marked. */
-static nebel_result find_air(const nb_frame *frame, const int is_asked[NB_BATCH], nb_cloud_scratch *clouds)
-{
-    nebel_result result = NEBEL_OK;
-    nb_air_asked asked;
-    asked.lane_count = asked.count = 0;
-    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
-        const nebel_cloud_knots *knots = &clouds->knots[i];
-        if (!is_asked[i]) continue;
-        if (!has_room(&asked, knots->count)) result = set_air(frame, clouds, &asked);
-        ask_air(clouds, i, knots->count, knots->t, &asked);
-    }
-    return result == NEBEL_OK ? set_air(frame, clouds, &asked) : result;
-}
 
 /* Marks the knots that are next. */
 static nebel_result mark(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
@@ -258,7 +140,7 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
         *any |= clouds->next[i] >= 0;
         is_longer[i] = knots->count > count;
     }
-    return find_air(frame, is_longer, clouds);
+    return nb_cloud_air_find(frame, is_longer, clouds);
 }
 
 /* What is found of a ray up to one of its marks is known up to the others. */
@@ -296,7 +178,7 @@ static nebel_result mix(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scra
     nb_cloud_scratch *clouds = &scratch->clouds;
     for (int i = 0; i < NB_BATCH; i++)
         if (clouds->is_new[i]) clouds->doubt[i] = 0;
-    nebel_result result = find_air(frame, clouds->is_new, clouds);
+    nebel_result result = nb_cloud_air_find(frame, clouds->is_new, clouds);
     if (result == NEBEL_OK && frame->air.has_fog) {
         memcpy(clouds->distance, scratch->distance, sizeof clouds->distance);
         clouds->samples = scratch->samples;

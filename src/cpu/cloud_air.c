@@ -1,0 +1,207 @@
+#include "cloud_air.h"
+
+#include <math.h>
+#include <string.h>
+
+nebel_ray nb_cloud_air_ray(const nb_frame *frame, const nb_cloud_scratch *clouds, uint32_t lane)
+{
+    nebel_ray ray = {.t_max = HUGE_VAL};
+    for (int c = 0; c < 3; c++) {
+        ray.origin[c] = frame->view.position[c];
+        ray.direction[c] = clouds->rays.direction[c][lane];
+    }
+    return ray;
+}
+
+/* ---- asking ---------------------------------------------------------------------------------- */
+
+/* What is asked of the air at once: ends along the rays of some lanes. */
+typedef struct nb_air_asked {
+    uint32_t lane_count, lanes[NB_BATCH], first[NB_BATCH]; /* of a lane's ends */
+    uint32_t count;
+    double direction[3][NB_WORLDS_RAYS];
+    float t[NB_WORLDS_RAYS], left[3][NB_WORLDS_RAYS], light[3][NB_WORLDS_RAYS];
+} nb_air_asked;
+
+static int has_room(const nb_air_asked *asked, uint32_t count)
+{
+    return asked->count + count <= NB_WORLDS_RAYS;
+}
+
+static void ask(const nb_cloud_scratch *clouds, uint32_t lane, uint32_t count, const float *t, nb_air_asked *asked)
+{
+    asked->lanes[asked->lane_count] = lane;
+    asked->first[asked->lane_count++] = asked->count;
+    for (uint32_t k = 0; k < count; k++) {
+        for (int c = 0; c < 3; c++) asked->direction[c][asked->count] = clouds->rays.direction[c][lane];
+        asked->t[asked->count++] = t[k];
+    }
+}
+
+static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
+{
+    const double *const direction[3] = {asked->direction[0], asked->direction[1], asked->direction[2]};
+    nebel_light_planes lights = {.error = NULL};
+    for (int c = 0; c < 3; c++) {
+        lights.transmittance[c] = asked->left[c];
+        lights.in_scattering[c] = asked->light[c];
+    }
+    return nb_air_trace(&frame->air, asked->count, direction, asked->t, &lights);
+}
+
+/* ---- shade ----------------------------------------------------------------------------------- */
+
+/* Shade is a mean over many pixels: between the pixels at the corners of a block, where they are so much alike, it is linear. FAR: of the
+ * way to a piece's end; PART: of light. */
+#define ALIKE_FAR 0.1f
+#define ALIKE_PART 0.05f
+
+/* The shade of those that were asked; begins anew. */
+static nebel_result set_shade(const nb_frame *frame, const nebel_air_shade *shades, nb_cloud_scratch *clouds,
+                              nb_air_asked *asked)
+{
+    if (asked->count == 0) return NEBEL_OK;
+    const nebel_result result = trace(frame, asked);
+    for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
+        const uint32_t lane = asked->lanes[i];
+        float light[3][NB_SHADED_PIECES];
+        for (int c = 0; c < 3; c++)
+            memcpy(light[c], asked->light[c] + asked->first[i], (shades[lane].count + 1) * sizeof light[c][0]);
+        clouds->shaded_count[lane] = nb_shaded_set(&shades[lane], light, clouds->shaded[lane]);
+    }
+    asked->lane_count = asked->count = 0;
+    return result;
+}
+
+/* Of lanes whose own it is. */
+static nebel_result find_shade(const nb_frame *frame, const int is_own[NB_BATCH], nb_cloud_scratch *clouds)
+{
+    nebel_result result = NEBEL_OK;
+    nebel_air_shade shades[NB_BATCH];
+    nb_air_asked asked;
+    asked.lane_count = asked.count = 0;
+    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        if (!is_own[i]) continue;
+        const nebel_ray ray = nb_cloud_air_ray(frame, clouds, i);
+        result = nebel_shade_air(clouds->workspace, 1, &ray, 0, &shades[i], 0);
+        if (result != NEBEL_OK || shades[i].count == 0) continue;
+        if (!has_room(&asked, shades[i].count + 1)) result = set_shade(frame, shades, clouds, &asked);
+        ask(clouds, i, shades[i].count + 1, shades[i].t, &asked);
+    }
+    return result == NEBEL_OK ? set_shade(frame, shades, clouds, &asked) : result;
+}
+
+/* Lanes of a block's corners, x first. */
+static const uint32_t corners[4] = {0, NB_BLOCK - 1, NB_PACKET - NB_BLOCK, NB_PACKET - 1};
+
+static int is_close(const nb_shaded_piece *a, const nb_shaded_piece *b)
+{
+    int is = fabsf(b->t - a->t) <= ALIKE_FAR * a->t;
+    for (int c = 0; c < 3; c++) is &= fabsf(b->part[c] - a->part[c]) <= ALIKE_PART;
+    return is;
+}
+
+static int are_alike(const nb_cloud_scratch *clouds, uint32_t block)
+{
+    const nb_shaded_piece *first = clouds->shaded[block];
+    const uint32_t count = clouds->shaded_count[block];
+    for (int i = 1; i < 4; i++) {
+        const uint32_t lane = block + corners[i];
+        if (clouds->shaded_count[lane] != count) return 0;
+        for (uint32_t k = 0; k < count; k++)
+            if (!is_close(&first[k], &clouds->shaded[lane][k])) return 0;
+    }
+    return 1;
+}
+
+/* A piece between those at the corners. */
+static nb_shaded_piece between(const nb_shaded_piece *const at[4], uint32_t k, const float weights[4])
+{
+    nb_shaded_piece piece = {.t = 0};
+    for (int i = 0; i < 4; i++) {
+        piece.t += weights[i] * at[i][k].t;
+        for (int c = 0; c < 3; c++) {
+            piece.part[c] += weights[i] * at[i][k].part[c];
+            piece.rest[c] += weights[i] * at[i][k].rest[c];
+        }
+    }
+    return piece;
+}
+
+static void fill_block(uint32_t block, nb_cloud_scratch *clouds)
+{
+    const nb_shaded_piece *at[4];
+    for (int i = 0; i < 4; i++) at[i] = clouds->shaded[block + corners[i]];
+    for (uint32_t i = 0; i < NB_PACKET; i++) {
+        const float u = (float)(i % NB_BLOCK) / (NB_BLOCK - 1), v = (float)(i / NB_BLOCK) / (NB_BLOCK - 1);
+        const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+        if (i == corners[0] || i == corners[1] || i == corners[2] || i == corners[3]) continue;
+        clouds->shaded_count[block + i] = clouds->shaded_count[block];
+        for (uint32_t k = 0; k < clouds->shaded_count[block]; k++)
+            clouds->shaded[block + i][k] = between(at, k, weights);
+    }
+}
+
+static int is_in_picture(const nb_frame *frame, const nb_place *place, uint32_t lane)
+{
+    return nb_lane_x(place->first + lane) < frame->width - place->left &&
+           nb_lane_y(place->first + lane) < frame->height - place->top;
+}
+
+/* First the corners, then those whose corners are not alike. At the picture's edge each pixel has its own. */
+nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_place *place, nb_cloud_scratch *clouds)
+{
+    int is_first[NB_BATCH], is_later[NB_BATCH];
+    for (uint32_t i = 0; i < NB_BATCH; i++) {
+        const uint32_t in_block = i % NB_PACKET, last = i - in_block + NB_PACKET - 1;
+        const int is_corner =
+            in_block == corners[0] || in_block == corners[1] || in_block == corners[2] || in_block == corners[3];
+        const int is_whole = is_in_picture(frame, place, last);
+        clouds->shaded_count[i] = 0;
+        is_first[i] = is_in_picture(frame, place, i) && (is_corner || !is_whole);
+        is_later[i] = is_whole && !is_corner;
+    }
+    const nebel_result result = find_shade(frame, is_first, clouds);
+    for (uint32_t block = 0; block < NB_BATCH && result == NEBEL_OK; block += NB_PACKET) {
+        if (!is_later[block + 1] || !are_alike(clouds, block)) continue;
+        fill_block(block, clouds);
+        for (uint32_t i = 0; i < NB_PACKET; i++) is_later[block + i] = 0;
+    }
+    return result == NEBEL_OK ? find_shade(frame, is_later, clouds) : result;
+}
+
+/* ---- up to knots ----------------------------------------------------------------------------- */
+
+/* What the air does up to the knots of those that were asked; begins anew. */
+static nebel_result set_air(const nb_frame *frame, nb_cloud_scratch *clouds, nb_air_asked *asked)
+{
+    if (asked->count == 0) return NEBEL_OK;
+    const nebel_result result = trace(frame, asked);
+    for (uint32_t i = 0; i < asked->lane_count && result == NEBEL_OK; i++) {
+        const uint32_t lane = asked->lanes[i], first = asked->first[i];
+        const nebel_cloud_knots *knots = &clouds->knots[lane];
+        nb_cloud_haze *air = &clouds->air[lane];
+        for (int c = 0; c < 3; c++)
+            for (uint32_t k = 0; k < knots->count; k++) {
+                air->left[c][k] = asked->left[c][first + k];
+                air->light[c][k] = nb_shaded_light(clouds->shaded[lane], clouds->shaded_count[lane], c, knots->t[k],
+                                                   asked->light[c][first + k]);
+            }
+    }
+    asked->lane_count = asked->count = 0;
+    return result;
+}
+
+nebel_result nb_cloud_air_find(const nb_frame *frame, const int is_asked[NB_BATCH], nb_cloud_scratch *clouds)
+{
+    nebel_result result = NEBEL_OK;
+    nb_air_asked asked;
+    asked.lane_count = asked.count = 0;
+    for (uint32_t i = 0; i < NB_BATCH && result == NEBEL_OK; i++) {
+        const nebel_cloud_knots *knots = &clouds->knots[i];
+        if (!is_asked[i]) continue;
+        if (!has_room(&asked, knots->count)) result = set_air(frame, clouds, &asked);
+        ask(clouds, i, knots->count, knots->t, &asked);
+    }
+    return result == NEBEL_OK ? set_air(frame, clouds, &asked) : result;
+}
