@@ -292,7 +292,7 @@ static const nb_cloud_cell *cell_at(nebel_cloud_workspace *workspace, nb_cloud_w
         const int32_t at[3] = {in->low[0] + (k & 1), in->low[1] + (k >> 1 & 1), in->low[2] + (k >> 2)};
         float depth[3];
         read_node(workspace, ways, at, in->level, depth);
-        for (int i = 0; i < 3; i++) found.depth[i][k] = depth[i];
+        for (int i = 0; i < 3; i++) found.depth[i][k & 1][k >> 1] = depth[i];
     }
     *cell = found;
     return cell;
@@ -339,9 +339,7 @@ static void read_lattice(nebel_cloud_workspace *workspace, const nb_in_lattice *
         const float *part = in->cells[n].part;
         const nb_cloud_cell *cell = cell_at(workspace, in->ways, &in->cells[n]);
         for (int i = 0; i < (in->ways == NB_CLOUD_TO_SUN ? 1 : 3); i++) {
-            const float *d = cell->depth[i];
-            float row[4];
-            for (int k = 0; k < 4; k++) row[k] = d[2 * k] + part[0] * (d[2 * k + 1] - d[2 * k]);
+            const nb_four low = cell->depth[i][0], row = low + part[0] * (cell->depth[i][1] - low);
             const float near = row[0] + part[1] * (row[1] - row[0]), far = row[2] + part[1] * (row[3] - row[2]);
             depth[i] += in->cells[n].weight * (near + part[2] * (far - near));
         }

@@ -35,7 +35,7 @@ static nb_cloud_light clear_light(const nebel_cloud_view *view, double radius, d
 {
     const nebel_atmosphere *atmosphere = view->clouds->atmosphere;
     const nb_field field = nb_scatter_look_up(&atmosphere->scatter, &atmosphere->airs, radius, sun);
-    nb_cloud_light light;
+    nb_cloud_light light = {.sun = {0}};
     double direct[3];
     nb_track_sunlight(&atmosphere->airs, (nb_track){radius, radius * sun}, direct);
     for (int c = 0; c < 3; c++) {
@@ -66,28 +66,26 @@ typedef struct nb_between {
 
 static nb_between between(double place, int count)
 {
-    const double bounded = fmax(0, fmin(count - 1, place));
+    const double bounded = nb_max(0, nb_min(count - 1, place));
     const int low = bounded < count - 2 ? (int)bounded : count - 2;
     return (nb_between){low, (float)(bounded - low)};
 }
 
 nb_cloud_light nb_cloud_clear_light(const nebel_cloud_view *view, const double place[3], double radius)
 {
-    enum { NUMBERS = sizeof(nb_cloud_light) / sizeof(float) };
     const double sun = nb_vector_dot(place, view->sun.direction) / radius;
     const nb_between h =
         between((radius - view->low) / (view->high - view->low) * (NB_CLOUD_HEIGHTS - 1), NB_CLOUD_HEIGHTS);
     const nb_between s =
         between((sun - view->lowest_sun) / (1 - view->lowest_sun) * (NB_CLOUD_SUNS - 1), NB_CLOUD_SUNS);
-    float sum[NUMBERS], corner[NUMBERS];
-    memset(sum, 0, sizeof sum);
+    nb_cloud_light light = {.sun = {0}};
     for (int k = 0; k < 4; k++) {
         const float weight = (k & 1 ? h.part : 1 - h.part) * (k & 2 ? s.part : 1 - s.part);
-        memcpy(corner, &view->lights[h.low + (k & 1)][s.low + (k >> 1)], sizeof corner);
-        for (int i = 0; i < NUMBERS; i++) sum[i] += weight * corner[i];
+        const nb_cloud_light *corner = &view->lights[h.low + (k & 1)][s.low + (k >> 1)];
+        light.sun += weight * corner->sun;
+        light.above += weight * corner->above;
+        light.below += weight * corner->below;
     }
-    nb_cloud_light light;
-    memcpy(&light, sum, sizeof light);
     return light;
 }
 

@@ -15,9 +15,12 @@ enum {
     NB_CLOUD_BLOCKS = 1 << 15,
 };
 
-/* Light at a place in clear air: of the sun on what faces it, and the mean radiance of each half of the sky. */
+/* So many are added at once. */
+typedef float nb_four __attribute__((vector_size(16)));
+
+/* Light of three colours at a place in clear air: of the sun on what faces it, and the mean radiance of each half of the sky. */
 typedef struct nb_cloud_light {
-    float sun[3], above[3], below[3];
+    nb_four sun, above, below;
 } nb_cloud_light;
 
 struct nebel_cloud_view {
@@ -40,11 +43,11 @@ typedef struct nb_cloud_node {
     float depth[3]; /* of a roof: not depths but parts of light */
 } nb_cloud_node;
 
-/* The eight nodes around a cell of that lattice, x first. */
+/* The eight nodes around a cell of that lattice: of each depth those at its low x, and those at its high x; y first. */
 typedef struct nb_cloud_cell {
     int32_t low[3];
     int16_t level, is_set;
-    float depth[3][8];
+    nb_four depth[3][2];
 } nb_cloud_cell;
 
 /* Which ways a lattice is of: to the sun; away from it, up and down; or through a roof to the sun, and up. */
@@ -67,9 +70,7 @@ typedef struct nb_cloud_point {
     nb_cloud_column column;
 } nb_cloud_point;
 
-/* The four columns around a cell of that grid, x first; of each rank, scale, variance and nothing, so that they are added at once. */
-typedef float nb_four __attribute__((vector_size(16)));
-
+/* The four columns around a cell of that grid, x first; of each rank, scale, variance and nothing. */
 typedef struct nb_cloud_patch {
     uint32_t key;
     int32_t at[2];
