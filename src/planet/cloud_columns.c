@@ -45,10 +45,14 @@ static inline nb_grid grid_of(const nebel_clouds *clouds, int layer, int level, 
     };
 }
 
-static double whole_below(double x)
+/* The whole numbers below, of which 32 bits are enough. */
+static nb_two two_below(nb_two x)
 {
-    const double toward_zero = (double)(int64_t)x;
-    return toward_zero - (toward_zero > x);
+    typedef int32_t nb_two_counts __attribute__((vector_size(8)));
+    typedef int64_t nb_two_bits __attribute__((vector_size(16)));
+    const nb_two toward_zero = __builtin_convertvector(__builtin_convertvector(x, nb_two_counts), nb_two);
+    const nb_two one = {1, 1};
+    return toward_zero - (nb_two)((nb_two_bits)(toward_zero > x) & (nb_two_bits)one);
 }
 
 static const nb_cloud_column *point_at(nebel_cloud_workspace *workspace, const nb_grid *grid, int x, int y)
@@ -213,22 +217,23 @@ static int last_grid(const nb_cloud_outlook *out)
 }
 
 static const double sides[3] = {POINTS, POINTS *BLOCKS, POINTS *BLOCKS *BLOCKS};
+static const double per_sides[3] = {1.0 / POINTS, 1.0 / (POINTS * BLOCKS), 1.0 / (POINTS * BLOCKS * BLOCKS)};
 
 /* From the edge of a block rays go on into the next one. In sides of blocks, more than rounding and nothing to ranks. */
 #define ONWARD 1e-9
 
 double nb_cloud_way_in_block(const nebel_cloud_workspace *workspace, nb_cloud_outlook *out, int size)
 {
+    const nb_cloud_grid *grids = &workspace->view->clouds->layers[out->layer].grids[out->level];
     double way = HUGE_VAL;
     for (int k = first_grid(out); k <= last_grid(out); k++) {
-        const double side = workspace->view->clouds->layers[out->layer].grids[out->level + k].spacing * sides[size],
-                     per_side = 1 / side;
+        const double side = grids[k].spacing * sides[size], per_side = grids[k].per_spacing * per_sides[size];
+        const nb_two low = two_below(out->at * per_side + ONWARD * (2 * out->grows - 1));
+        const nb_two edge = (low + out->grows) * side;
+        const nb_two ahead = (edge * out->over - out->place) / (out->direction - edge * out->rise);
         for (int i = 0; i < 2; i++) {
-            const double low = whole_below(out->at[i] * per_side + (out->grows[i] ? ONWARD : -ONWARD)),
-                         edge = (low + out->grows[i]) * side;
-            const double ahead = (edge * out->over - out->place[i]) / (out->direction[i] - edge * out->rise);
-            if (ahead > 0 && ahead < way) way = ahead;
-            out->block[k][i] = (int)low;
+            if (ahead[i] > 0 && ahead[i] < way) way = ahead[i];
+            out->block[k][i] = (int)low[i];
         }
     }
     return way;

@@ -29,7 +29,7 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
                                {-along + inner, -along + outer}};
     int count = 0;
     for (int i = 0; i < (inner >= 0 ? 2 : 1); i++) {
-        const double a = fmax(0, ends[i][0]), b = fmin(t_max, ends[i][1]);
+        const double a = nb_max(0, ends[i][0]), b = nb_min(t_max, ends[i][1]);
         if (!(a < b)) continue;
         pieces[count][0] = a;
         pieces[count++][1] = b;
@@ -205,7 +205,7 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
 static void set_around(const nebel_cloud_workspace *workspace, const double place[3], const nb_steps *steps,
                        nb_way ways[3])
 {
-    const double radius = fmax(1, nb_vector_length(place));
+    const double radius = nb_max(1, nb_vector_length(place));
     double away[3], up[3], down[3];
     for (int i = 0; i < 3; i++) {
         away[i] = -workspace->view->sun.direction[i];
@@ -317,14 +317,19 @@ static nb_in_cell find_cell(const nebel_cloud_workspace *workspace, nb_cloud_way
     return in;
 }
 
-/* Levels blend over the last quarter before the next. */
+/* Levels blend over so much before the next, in parts of it: a place between two has nodes of both filled. What roofs let through
+ * lies on smooth ground and air. */
+#define BLEND 0.125
+#define ROOFS_BLEND 0.25
+
 static nb_in_lattice find_in_lattice(const nebel_cloud_workspace *workspace, nb_cloud_ways ways, const double place[3],
                                      float width)
 {
     int level;
     /* Numbers of nodes must be whole. */
     const double least = workspace->view->high * 0x1p-29, mantissa = frexp(nb_max((double)width, least), &level);
-    const float part = (float)nb_max(0, 4 * (mantissa - 0.75));
+    const double blend = ways < NB_CLOUD_ROOFS ? BLEND : ROOFS_BLEND;
+    const float part = (float)nb_max(0, (mantissa - (1 - blend)) / blend);
     nb_in_lattice in = {.ways = ways};
     if (part < 1) in.cells[in.count++] = find_cell(workspace, ways, place, level - 1, 1 - part);
     if (part > 0) in.cells[in.count++] = find_cell(workspace, ways, place, level, part);

@@ -99,7 +99,7 @@ float nb_cloud_part_through(float depth, float mean_cosine)
 
 nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3])
 {
-    nb_cloud_ray ray = {.sun = fmax(-1, fmin(1, nb_vector_dot(direction, view->sun.direction)))};
+    nb_cloud_ray ray = {.sun = nb_max(-1, nb_min(1, nb_vector_dot(direction, view->sun.direction)))};
     memcpy(ray.direction, direction, sizeof ray.direction);
     for (int k = 0; k < view->clouds->layer_count; k++) {
         const nb_cloud_layer *layer = &view->clouds->layers[k];

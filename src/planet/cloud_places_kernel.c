@@ -75,9 +75,9 @@ static inline void find_cells(const nb_cloud_layer *layer, int number, const nb_
     const nb_halvings halvings = nb_halve(numbers);
     const nb_real next = nb_max(NB_F(0.0), NB_F(2.0) * halvings.part - NB_F(1.0));
     nb_store_lanes(looks->next + p, next);
-    find_in_grid(faces, halvings.whole, layer->per_spacing, number, p, &looks->cells[0]);
+    find_in_grid(faces, halvings.whole, layer->grids[0].per_spacing, number, p, &looks->cells[0]);
     if (nb_any(next > NB_F(0.0)))
-        find_in_grid(faces, halvings.whole + NB_F(1.0), layer->per_spacing, number, p, &looks->cells[1]);
+        find_in_grid(faces, halvings.whole + NB_F(1.0), layer->grids[0].per_spacing, number, p, &looks->cells[1]);
 }
 
 /* ---- billows --------------------------------------------------------------------------------- */

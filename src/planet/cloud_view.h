@@ -15,8 +15,9 @@ enum {
     NB_CLOUD_BLOCKS = 1 << 15,
 };
 
-/* So many are added at once. */
+/* Numbers that are counted together. */
 typedef float nb_four __attribute__((vector_size(16)));
+typedef double nb_two __attribute__((vector_size(16)));
 
 /* Light of three colours at a place in clear air: of the sun on what faces it, and the mean radiance of each half of the sky. */
 typedef struct nb_cloud_light {
@@ -138,11 +139,11 @@ void nb_cloud_look(nebel_cloud_workspace *workspace, int layer, nb_cloud_looks *
 /* A place of a ray on a face of the cube, on which blocks of columns are. */
 typedef struct nb_cloud_outlook {
     int layer, face, level;
-    float part;                           /* of the next level */
-    double over, rise;                    /* along the face's axis: of the place, of the direction */
-    double at[2], place[2], direction[2]; /* across; at: on the face */
-    int grows[2];                         /* whether that does */
-    int block[2][2];                      /* of each grid, of the size that was asked last */
+    float part;                  /* of the next level */
+    double over, rise;           /* along the face's axis: of the place, of the direction */
+    nb_two at, place, direction; /* across; at: on the face */
+    nb_two grows;                /* whether that does: 0, 1 */
+    int block[2][2];             /* of each grid, of the size that was asked last */
 } nb_cloud_outlook;
 
 /* Place and direction in the layer's axes. */

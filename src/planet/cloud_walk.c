@@ -303,8 +303,8 @@ static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
                  flatness = hidden > 0 ? width / hidden : 1;
     return (nb_cloud_grain){
         .width = (float)width,
-        .first = (float)fmin(0.1 * thickness,
-                             fmax(2 * hidden, fmin(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
+        .first = (float)nb_min(0.1 * thickness,
+                               nb_max(2 * hidden, nb_min(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
         /* Wider lattices than the layer is high would show through it. */
         .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
                               0.08 * walk->least),
@@ -447,7 +447,7 @@ static double curve_of(const nb_cloud_seen *here, const nb_cloud_seen *middle, c
 {
     const double a = (double)here->whole, b = (double)middle->whole, c = (double)far->whole;
     const double curve = fabs(a - 2 * b + c);
-    return a > 0 && b > 0 && c > 0 ? curve : fmax(curve, fmax(a, fmax(b, c)));
+    return a > 0 && b > 0 && c > 0 ? curve : nb_max(curve, nb_max(a, nb_max(b, c)));
 }
 
 static double least_piece(const nb_walk *walk, const nb_stay *stay)

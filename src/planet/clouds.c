@@ -343,9 +343,8 @@ static void set_octaves(const nebel_cloud_layer *desc, double radius, nb_cloud_l
     layer->grid = layer->octaves[NB_CLOUD_OCTAVES - 1].cell / 12;
     for (int i = 0; i < NB_CLOUD_GRIDS; i++) {
         const double wide = ldexp((double)layer->grid, i);
-        layer->grids[i] = (nb_cloud_grid){wide / layer->low, i == 0 ? 0 : (float)wide};
+        layer->grids[i] = (nb_cloud_grid){wide / layer->low, layer->low / wide, i == 0 ? 0 : (float)wide};
     }
-    layer->per_spacing = layer->low / (double)layer->grid;
     /* Wisps are bent, and that noise has a slope, too. */
     if (desc->kind == NEBEL_CLOUD_CIRRUS) layer->slope *= 2;
 }

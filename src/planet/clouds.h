@@ -32,8 +32,8 @@ typedef struct nb_cloud_octave {
 
 /* Each is twice as wide as the one before. */
 typedef struct nb_cloud_grid {
-    double spacing; /* between columns, on faces of a cube */
-    float width;    /* m, of what a column hides */
+    double spacing, per_spacing; /* between columns, on faces of a cube; one by it */
+    float width;                 /* m, of what a column hides */
 } nb_cloud_grid;
 
 typedef struct nb_cloud_layer {
@@ -52,7 +52,6 @@ typedef struct nb_cloud_layer {
     float slope, most;           /* of that sum, at most, per m; the sum itself */
     float grid;                  /* m, between columns that are kept */
     nb_cloud_grid grids[NB_CLOUD_GRIDS];
-    double per_spacing; /* of the first */
     float coverage;
     nb_layer_map weather; /* level_count 0: none */
     nb_phase phase;
