@@ -29,10 +29,10 @@ static inline float nb_cloud_grid_level(float grid, float width)
     return nb_level_of(nb_smaller(2 * width / grid, (float)(1U << (NB_CLOUD_GRIDS - 2))));
 }
 
-/* The next grid's part: levels blend over the second half of the way to it. */
+/* The next grid's part: levels blend over the last quarter of the way to it. */
 static inline float nb_cloud_next_part(float level, int32_t low)
 {
-    return nb_larger(0, 2 * (level - (float)low) - 1);
+    return nb_larger(0, 4 * (level - (float)low) - 3);
 }
 
 /* Cells of grids. */
