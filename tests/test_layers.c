@@ -413,11 +413,9 @@ static void bad_rays_are_refused(void **state)
     nebel_layer_hits hits;
     const nebel_layer_view good = {.time = 0};
     const nebel_ray ray = {{9, 0, 0}, {-1, 0, 0}, HUGE_VAL};
-    const nebel_ray rays[] = {{{(double)NAN, 0, 0}, {-1, 0, 0}, 1},
-                              {{9, 0, 0}, {0, 0, 0}, 1},
-                              {{9, 0, 0}, {(double)NAN, 0, 0}, 1},
-                              {{9, 0, 0}, {-1, 0, 0}, -1},
-                              {{HUGE_VAL, 0, 0}, {-1, 0, 0}, 1}};
+    const nebel_ray rays[] = {
+        {{(double)NAN, 0, 0}, {-1, 0, 0}, 1}, {{0, 1.1e15, 0}, {-1, 0, 0}, 1}, {{9, 0, 0}, {0, 0, 0}, 1},
+        {{9, 0, 0}, {(double)NAN, 0, 0}, 1},  {{9, 0, 0}, {-1, 0, 0}, -1},     {{HUGE_VAL, 0, 0}, {-1, 0, 0}, 1}};
     const nebel_layer_view views[] = {{.time = (double)NAN},
                                       {.time = HUGE_VAL},
                                       {.spread = -1},

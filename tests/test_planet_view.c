@@ -367,6 +367,14 @@ static void bad_calls_are_refused(void **state)
         assert_null(view);
     }
     nebel_destroy_air_view(NULL);
+    const double x[1] = {1}, *const directions[3] = {x, NULL, x};
+    float distance;
+    assert_int_equal(nebel_create_air_view(&(nebel_air_view_desc){.atmosphere = air}, &view), NEBEL_OK);
+    assert_int_equal(nebel_trace_air_view(view, 1, directions, NULL, &(nebel_light_planes){.error = NULL}),
+                     NEBEL_ERROR_ARGUMENT);
+    assert_int_equal(nebel_find_ground(view, 1, directions, &(nebel_ground_planes){.distance = &distance}),
+                     NEBEL_ERROR_ARGUMENT);
+    nebel_destroy_air_view(view);
     nebel_destroy_atmosphere(air);
     nebel_atmosphere_desc whole = {.radius = 5};
     assert_int_equal(nebel_resolve_atmosphere(&(nebel_atmosphere_desc){.radius = -1}, &whole), NEBEL_ERROR_VALUE);

@@ -130,6 +130,17 @@ static void boxes_are_of_fog_that_scatters(void **state)
     assert_int_equal(nebel_split_light(snapshot, NULL, &split), NEBEL_ERROR_ARGUMENT);
     assert_null(split.sun);
     assert_int_equal(nebel_split_light(snapshot, &suns[0], NULL), NEBEL_ERROR_ARGUMENT);
+    const nebel_sun bad[] = {{.direction = {0, (double)NAN, 0}, .irradiance = {1, 1, 1}},
+                             {.irradiance = {1, 1, 1}},
+                             {.direction = {0, 1, 0}, .irradiance = {-1, 1, 1}}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        nebel_snapshot *lit = snapshot;
+        assert_int_equal(nebel_split_light(snapshot, &bad[i], &split), NEBEL_ERROR_VALUE);
+        assert_null(split.sun);
+        assert_int_equal(nebel_relight(snapshot, &bad[i], &lit), NEBEL_ERROR_VALUE);
+        assert_null(lit);
+    }
+    nebel_release_split_light(NULL);
     nebel_release_snapshot(snapshot);
     snapshot = commit(2, volumes + 1, 0, NULL);
     assert_int_equal(nebel_snapshot_scattering_fog(snapshot, min, max), 0);

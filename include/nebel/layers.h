@@ -133,7 +133,7 @@ typedef struct nebel_layer_hits {
 } nebel_layer_hits;
 
 /* What each of n rays meets up to its t_max. Strides are in bytes. Any thread. Errors: ARGUMENT (NULL, a view or a ray
- * that is NaN, infinite where it must not be, of no direction, of negative t_max). */
+ * that is NaN, infinite where it must not be, from more than 1e15 m away, of no direction, of negative t_max). */
 nebel_result nebel_trace_layers(const nebel_layers *layers, const nebel_layer_view *view, size_t n,
                                 const nebel_ray *rays, size_t ray_stride, nebel_layer_hits *hits, size_t hit_stride);
 

@@ -541,7 +541,7 @@ typedef struct nebel_split_fog {
 } nebel_split_fog;
 
 /* Makes the three, for nebel_release_split_light. `sun` takes the place of the snapshot's. Cost of each as nebel_commit_fog.
- * On an error *split is all NULL. Any thread. Errors: ARGUMENT, MEMORY and those of nebel_commit_fog. */
+ * On an error *split is all NULL. Any thread. Errors: ARGUMENT, MEMORY, those of nebel_set_sun and of nebel_commit_fog. */
 nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *sun, nebel_split_fog *split);
 void nebel_release_split_light(nebel_split_fog *split);
 

@@ -138,8 +138,8 @@ void nebel_destroy_air_view(nebel_air_view *view);
 
 /* What nebel_trace_air says of n rays from the view's place, from the table. Planes have no gaps: strides of `lights` are
  * not read, its planes of three are given all or none. t_max NULL: to the ground or the end of the air. A direction may be of any
- * length; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
- * nebel_trace_air tells. Any thread. Errors: ARGUMENT (NULL). */
+ * length from 1e-150 to 1e150; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
+ * nebel_trace_air tells. Any thread. Errors: ARGUMENT (NULL, a component of the direction too). */
 nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],
                                   const float *t_max, const nebel_light_planes *lights);
 

@@ -2,6 +2,8 @@
 #include "fog.h"
 #include "snapshot.h"
 
+#include "media/check.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -96,7 +98,8 @@ nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *
 {
     if (split != NULL) memset(split, 0, sizeof *split);
     if (snapshot == NULL || sun == NULL || split == NULL) return NEBEL_ERROR_ARGUMENT;
-    nebel_result result = make_part(snapshot, (selection){.sun = sun}, &split->sun);
+    nebel_result result = nb_check_sun(&snapshot->log, sun);
+    if (result == NEBEL_OK) result = make_part(snapshot, (selection){.sun = sun}, &split->sun);
     if (result == NEBEL_OK) result = make_part(snapshot, (selection){.sky = 1}, &split->sky);
     if (result == NEBEL_OK && has_own(snapshot)) result = make_part(snapshot, (selection){.own = 1}, &split->own);
     if (result != NEBEL_OK) nebel_release_split_light(split);
@@ -107,11 +110,13 @@ nebel_result nebel_relight(const nebel_snapshot *snapshot, const nebel_sun *sun,
 {
     if (lit != NULL) *lit = NULL;
     if (snapshot == NULL || sun == NULL || lit == NULL) return NEBEL_ERROR_ARGUMENT;
-    return make_part(snapshot, (selection){.sun = sun, .sky = 1, .own = 1}, lit);
+    const nebel_result result = nb_check_sun(&snapshot->log, sun);
+    return result == NEBEL_OK ? make_part(snapshot, (selection){.sun = sun, .sky = 1, .own = 1}, lit) : result;
 }
 
 void nebel_release_split_light(nebel_split_fog *split)
 {
+    if (split == NULL) return;
     nebel_release_snapshot(split->sun);
     nebel_release_snapshot(split->sky);
     nebel_release_snapshot(split->own);

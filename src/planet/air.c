@@ -15,18 +15,6 @@ double nb_air_density(const nb_air *air, double height)
     return nb_density_of(air, height);
 }
 
-/* ---- shells ---------------------------------------------------------------------------------- */
-
-/* Not where there is one close by. */
-static void add_shell(nb_airs *airs, double height)
-{
-    if (!(height > 0 && height < airs->top - airs->radius)) return;
-    for (int i = 0; i < airs->shell_count; i++)
-        if (fabs(airs->shells[i] - airs->radius - height) < 0.3 * height) return;
-    airs->shells[airs->shell_count++] = airs->radius + height;
-}
-
-/* The edges of layers; else shells are thin near the ground, where the air changes most. */
 int nb_airs_are_empty(const nb_airs *airs)
 {
     for (int k = 0; k < airs->count; k++)
@@ -35,15 +23,47 @@ int nb_airs_are_empty(const nb_airs *airs)
     return 1;
 }
 
+/* ---- shells ---------------------------------------------------------------------------------- */
+
+static int has_shell(const nb_airs *airs, double low, double high)
+{
+    for (int i = 0; i < airs->shell_count; i++) {
+        const double height = airs->shells[i] - airs->radius;
+        if (height > low && height < high) return 1;
+    }
+    return 0;
+}
+
+static void add_shell(nb_airs *airs, double height)
+{
+    if (height > 0 && height < airs->top - airs->radius) airs->shells[airs->shell_count++] = airs->radius + height;
+}
+
+/* Of air that is as thick as others shells are as good. */
+static void cut_exponential(nb_airs *airs, double scale)
+{
+    if (!has_shell(airs, 0.5 * scale, 4 * scale)) add_shell(airs, 2 * scale);
+    if (!has_shell(airs, 3 * scale, 12 * scale)) add_shell(airs, 6 * scale);
+}
+
+/* The edges of layers; else shells are thin near the ground, where the air changes most. Nodes between two of them see no layer that is
+ * thin beside their distance. */
 void nb_airs_cut(nb_airs *airs)
 {
     airs->shell_count = 0;
     for (int i = 0; i < airs->count; i++) {
         const nb_air *air = &airs->airs[i];
-        if (air->scale > 0) continue;
-        for (int k = -1; k <= 1; k++) add_shell(airs, air->center + k * air->width);
+        for (int k = -1; k <= 1 && !(air->scale > 0); k++) {
+            const double edge = air->center + k * air->width, near = 0.01 * air->width;
+            if (!has_shell(airs, edge - near, edge + near)) add_shell(airs, edge);
+        }
     }
-    for (int i = 1; i < 4; i++) add_shell(airs, (airs->top - airs->radius) * (i * i * i) / 64);
+    for (int i = 1; i < 4; i++) {
+        const double height = (airs->top - airs->radius) * (i * i * i) / 64;
+        if (!has_shell(airs, 0.7 * height, 1.3 * height)) add_shell(airs, height);
+    }
+    for (int i = 0; i < airs->count; i++)
+        if (airs->airs[i].scale > 0) cut_exponential(airs, airs->airs[i].scale);
 }
 
 /* ---- where rays go --------------------------------------------------------------------------- */

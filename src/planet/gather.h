@@ -19,10 +19,14 @@ typedef struct nb_gather_job {
     const nb_scatter *scatter; /* NULL: sunlight alone */
     int wants_sun;
     nb_track track;
-    nb_aspect aspect; /* of the ray's direction, where it starts */
+    nb_aspect aspect;            /* of the ray's direction, where it starts */
+    double rest[NEBEL_MAX_AIRS]; /* by nb_gather_aim, else 0: nothing is missing */
     const nb_path *path;
     int first, count; /* nodes; first: a multiple of NB_PATH_LANES */
 } nb_gather_job;
+
+/* To be called once for each ray that scatters light of a table: finds what orders behind those that are kept give towards it. */
+void nb_gather_aim(nb_gather_job *job);
 
 typedef void nb_gather_fn(const nb_gather_job *job, nb_node_light *light);
 

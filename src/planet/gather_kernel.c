@@ -49,6 +49,18 @@ static void add_sun(const nb_gather_job *job, const nb_nodes *nodes, nb_node_lig
 
 /* ---- scattered often ------------------------------------------------------------------------- */
 
+/* What air gives of all orders behind those that are kept, 1/m. */
+NB_MOMENTS_INLINE nb_real weigh_rest(const nb_gather_job *job, int at, int c)
+{
+    nb_real sum = NB_F(0.0);
+    for (int k = 0; k < job->airs->count; k++) {
+        const nb_air *air = &job->airs->airs[k];
+        const double times = job->rest[k] / NB_FOUR_PI * air->scattering[c] * air->moments[job->scatter->orders];
+        if (air->scattering[c] > 0) sum = sum + nb_splat(times) * nb_load_lanes(job->path->density[k] + at);
+    }
+    return nb_abs(sum);
+}
+
 /* What air gives of the moments of one order, 1/m. */
 NB_MOMENTS_INLINE nb_real weigh(const nb_gather_job *job, int at, int order, int c)
 {
@@ -62,7 +74,7 @@ NB_MOMENTS_INLINE nb_real weigh(const nb_gather_job *job, int at, int order, int
 }
 
 /* For a first moment of 1: what the field of the spots gives towards a direction, and about what it would give more or
- * less if the next order were kept, too, as if its moments were as large as those of the last one. */
+ * less if all orders were kept, as if the next one's moments were as large as those of the last one. */
 typedef struct nb_scattered {
     nb_real light, missing;
 } nb_scattered;
@@ -81,7 +93,7 @@ NB_MOMENTS_INLINE nb_scattered scatter(const nb_gather_job *job, int orders, con
         }
         sum = sum + weigh(job, at, order, c) * part;
     }
-    return (nb_scattered){nb_max(NB_F(0.0), sum), nb_abs(weigh(job, at, orders, c)) * nb_sqrt(square)};
+    return (nb_scattered){nb_max(NB_F(0.0), sum), weigh_rest(job, at, c) * nb_sqrt(square)};
 }
 
 NB_MOMENTS_INLINE void add_often(const nb_gather_job *job, int orders, const nb_nodes *nodes, nb_node_light *light)

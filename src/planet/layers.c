@@ -422,7 +422,7 @@ static int set_ray(const nebel_ray *ray, nb_sight *s)
     for (int i = 0; i < 3; i++) {
         s->from[i] = ray->origin[i] - s->layers->desc.center[i];
         s->to[i] = ray->direction[i];
-        if (!isfinite(s->from[i])) return 0;
+        if (!(fabs(s->from[i]) <= NEBEL_MAX_LENGTH)) return 0;
     }
     if (!nb_vector_make_unit(s->to)) return 0;
     double beside[3];

@@ -52,10 +52,15 @@ static nb_look_table table_of(const nebel_air_view *view)
     return table;
 }
 
+static int has_directions(const double *const direction[3])
+{
+    return direction != NULL && direction[0] != NULL && direction[1] != NULL && direction[2] != NULL;
+}
+
 nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],
                                   const float *t_max, const nebel_light_planes *lights)
 {
-    if (view == NULL || direction == NULL || lights == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (view == NULL || !has_directions(direction) || lights == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_look_table table = table_of(view);
     const nb_look_job job = {.table = &table,
                              .count = n,
@@ -69,7 +74,7 @@ nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const do
 nebel_result nebel_find_ground(const nebel_air_view *view, size_t n, const double *const direction[3],
                                const nebel_ground_planes *planes)
 {
-    if (view == NULL || direction == NULL || planes == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (view == NULL || !has_directions(direction) || planes == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_look_table table = table_of(view);
     const nb_look_job job = {
         .table = &table, .count = n, .direction = {direction[0], direction[1], direction[2]}, .ground = *planes};

@@ -13,7 +13,7 @@ typedef struct nb_scatter {
     nb_field *fields;    /* [height][sun]: of sunlight that was scattered at least once, for a sun of irradiance 1: the
                          logarithm of the first moment, and the others as parts of it */
     double (*ground)[3]; /* [sun]: the logarithm of the same light's irradiance on the ground */
-    double missing;      /* part of it that may not have been scattered often enough */
+    double missing;      /* part of it that may not have been scattered often enough, or lie between entries */
 } nb_scatter;
 
 static inline size_t nb_scatter_entries(const nb_scatter *scatter)

@@ -93,6 +93,7 @@ nb_gathered nb_gather_path(const nebel_atmosphere *atmosphere, nb_track track, n
                                     .track = track,
                                     .aspect = aspect,
                                     .path = path};
+    nb_gather_aim(&gathering.job);
     for (int k = 0, i = 0; k < count; k++) {
         const int to = k + 1 == count ? path->count : node_at(path, i, ends[k]);
         gather_nodes(&gathering, i, to, &sum);
