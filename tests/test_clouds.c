@@ -295,6 +295,24 @@ static void test_neighbours_have_light_of_neighbouring_places(void **state)
     assert_true(grain < 1.2e-3 && most < 7e-3);
 }
 
+/* A sheet with thin places before a low sun: where the light of a piece came from its middle, wherever its cloud was, pixels were 1.1e-3 off
+ * the mean of their neighbours, 7.7e-3 at most. */
+static void test_sunset_under_a_sheet_has_little_grain(void **state)
+{
+    (void)state;
+    const double pixel = 2 * tan(25 * 3.14159265358979323846 / 180) / 216, up[3] = {0, .92848, .37139};
+    const nebel_cloud_layer sheet = {.kind = NEBEL_CLOUD_STRATUS};
+    const nebel_sun sun = {.direction = {.3, .1, -1}, .irradiance = {20, 20, 20}};
+    const window w = {{0, 2, 0},
+                      {-30 * pixel, .37139 + 30 * pixel * up[1], -.92848 + 30 * pixel * up[2]},
+                      {pixel, 0, 0},
+                      {0, pixel * up[1], pixel * up[2]}};
+    double most;
+    const double grain = find_grain(&sheet, &sun, &w, &most);
+    print_message("sunset under a sheet: pixels off the mean of neighbours by %.2g, %.2g at most\n", grain, most);
+    assert_true(grain < 9e-4 && most < 6.5e-3);
+}
+
 /* Through thin cloud around the eye that lies in shadow to a sunlit heap 140 m behind it. Where hardly any cloud between was as good as
  * none, or as cloud, some pixels had one light for both, from between them. */
 static void test_two_clouds_have_light_of_two_places(void **state)
@@ -737,6 +755,7 @@ int main(void)
         cmocka_unit_test(test_no_lines_in_thin_clouds),
         cmocka_unit_test(test_neighbours_have_light_of_neighbouring_places),
         cmocka_unit_test(test_two_clouds_have_light_of_two_places),
+        cmocka_unit_test(test_sunset_under_a_sheet_has_little_grain),
         cmocka_unit_test(test_billows_that_are_missed),
         cmocka_unit_test(test_rays_from_edges_of_blocks),
         cmocka_unit_test(test_bases_are_seen),

@@ -29,6 +29,9 @@
 #define MOST_DEPTH 1
 #define STRETCH_DEPTH 0.65
 
+/* Halves of a piece whose parts of its depth differ by less than twice that count as one. */
+#define EVEN 0.03
+
 /* Stretches end sooner where there is less cloud than their layer's extinction would make: for each unit of optical depth that there
  * is less, by so much of them, times what is seen of them. Light of two clouds would come from between them. */
 #define LOSS 1
@@ -407,7 +410,7 @@ static double part_of_stretch(const nb_walk *walk, int k, double length, double 
     const nb_stretch *stretch = &walk->stretch;
     const double whole = (double)walk->view->clouds->layers[k].extinction * length;
     const double seen = stretch->seen + (double)walk->ray.apart[k] * stretch->seen_apart;
-    return depth / stretch->most + LOSS * seen * (whole - depth);
+    return depth / stretch->most + LOSS * seen * nb_max(0, whole - depth);
 }
 
 /* The gap before t is part of a stretch, too. */
@@ -455,6 +458,26 @@ static double least_piece(const nb_walk *walk, const nb_stay *stay)
     return nb_max(nb_min(0.5 * hidden_of_stay(walk, stay), STAY_PIECE * (stay->end - stay->begin)), 1e-3 * walk->least);
 }
 
+/* What part of a piece's depth lies in its first half: by the parabola through its three values, but no more than either half can have. */
+static double part_before(const nb_walk *walk, const nb_stay *stay, double depth)
+{
+    const double most = 0.5 * walk->length * (double)walk->view->clouds->layers[stay->layer].extinction;
+    const double first = walk->length / 24 * (double)(5 * walk->here.whole + 8 * walk->middle.whole - walk->far.whole);
+    return nb_max(nb_max(0, depth - most), nb_min(nb_min(depth, most), first)) / depth;
+}
+
+/* Light is that of where cloud is: a piece that is thin at one end counts as two. */
+static void take_halves(nb_walk *walk, const nb_stay *stay, double depth, double depth_apart)
+{
+    const double half = 0.5 * walk->length, before = depth > 0 ? part_before(walk, stay, depth) : 0.5;
+    if (fabs(before - 0.5) < EVEN) {
+        take_piece(walk, stay->layer, walk->t, walk->length, depth, depth_apart);
+        return;
+    }
+    take_piece(walk, stay->layer, walk->t, half, before * depth, before * depth_apart);
+    take_piece(walk, stay->layer, walk->t + half, half, (1 - before) * depth, (1 - before) * depth_apart);
+}
+
 /* Takes a piece whose three values are known, or halves it. */
 static void judge_piece(nb_walk *walk, const nb_stay *stay)
 {
@@ -471,7 +494,7 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
         return;
     }
     walk->missed += missed / PIECES;
-    take_piece(walk, stay->layer, walk->t, length, depth, depth_apart);
+    take_halves(walk, stay, depth, depth_apart);
     walk->t += length;
     walk->here = walk->far;
     walk->has_far = 0;
