@@ -94,6 +94,11 @@ static nebel_result find_shade(const nb_frame *frame, const int is_own[NB_BATCH]
 /* Lanes of a block's corners, x first. */
 static const uint32_t corners[4] = {0, NB_BLOCK - 1, NB_PACKET - NB_BLOCK, NB_PACKET - 1};
 
+static int is_corner(uint32_t in_block)
+{
+    return in_block == corners[0] || in_block == corners[1] || in_block == corners[2] || in_block == corners[3];
+}
+
 static int is_close(const nb_shaded_piece *a, const nb_shaded_piece *b)
 {
     int is = fabsf(b->t - a->t) <= ALIKE_FAR * a->t;
@@ -135,7 +140,7 @@ static void fill_block(uint32_t block, nb_cloud_scratch *clouds)
     for (uint32_t i = 0; i < NB_PACKET; i++) {
         const float u = (float)(i % NB_BLOCK) / (NB_BLOCK - 1), v = (float)(i / NB_BLOCK) / (NB_BLOCK - 1);
         const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
-        if (i == corners[0] || i == corners[1] || i == corners[2] || i == corners[3]) continue;
+        if (is_corner(i)) continue;
         clouds->shaded_count[block + i] = clouds->shaded_count[block];
         for (uint32_t k = 0; k < clouds->shaded_count[block]; k++)
             clouds->shaded[block + i][k] = between(at, k, weights);
@@ -154,12 +159,10 @@ nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_place *place, nb
     int is_first[NB_BATCH], is_later[NB_BATCH];
     for (uint32_t i = 0; i < NB_BATCH; i++) {
         const uint32_t in_block = i % NB_PACKET, last = i - in_block + NB_PACKET - 1;
-        const int is_corner =
-            in_block == corners[0] || in_block == corners[1] || in_block == corners[2] || in_block == corners[3];
         const int is_whole = is_in_picture(frame, place, last);
         clouds->shaded_count[i] = 0;
-        is_first[i] = is_in_picture(frame, place, i) && (is_corner || !is_whole);
-        is_later[i] = is_whole && !is_corner;
+        is_first[i] = is_in_picture(frame, place, i) && (is_corner(in_block) || !is_whole);
+        is_later[i] = is_whole && !is_corner(in_block);
     }
     const nebel_result result = find_shade(frame, is_first, clouds);
     for (uint32_t block = 0; block < NB_BATCH && result == NEBEL_OK; block += NB_PACKET) {
