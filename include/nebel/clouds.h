@@ -129,6 +129,7 @@ typedef struct nebel_cloud_knots {
     float transmittance[NEBEL_MAX_CLOUD_KNOTS];    /* of clouds alone, grey */
     float in_scattering[NEBEL_MAX_CLOUD_KNOTS][3]; /* of clouds alone, as if nothing else were on the way */
     float error;                                   /* of transmittance: what quadrature tells, of all pieces */
+    uint32_t looks; /* how often density was asked behind where the ray enters layers; 0: it comes near no cloud */
 } nebel_cloud_knots;
 
 /* Along n rays up to t_max or the ground. spreads: width of a ray's pixel per metre of the way, 0 to 10: what is narrower is seen as

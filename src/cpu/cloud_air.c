@@ -51,8 +51,8 @@ static nebel_result trace(const nb_frame *frame, nb_air_asked *asked)
 
 /* ---- shade ----------------------------------------------------------------------------------- */
 
-/* Shade is a mean over many pixels: between the pixels at the corners of a block, where they are so much alike, it is linear. FAR: of the
- * way to a piece's end; PART: of light. */
+/* Shade is a mean over many pixels: between four of them, at the corners of a cell as high as a batch, it is linear where they are so much
+ * alike. FAR: of the way to a piece's end; PART: of light. Cells share the columns of their corners. */
 #define ALIKE_FAR 0.1f
 #define ALIKE_PART 0.05f
 
@@ -91,12 +91,18 @@ static nebel_result find_shade(const nb_frame *frame, const int is_own[NB_BATCH]
     return result == NEBEL_OK ? set_shade(frame, shades, clouds, &asked) : result;
 }
 
-/* Lanes of a block's corners, x first. */
-static const uint32_t corners[4] = {0, NB_BLOCK - 1, NB_PACKET - NB_BLOCK, NB_PACKET - 1};
+enum { CELL = 9, CELLS = (NB_REGION - 1) / CELL };
+_Static_assert((int)CELL *(int)CELLS == (int)NB_REGION - 1, "the last cell ends where a batch does");
 
-static int is_corner(uint32_t in_block)
+/* Lanes of a cell's corners, x first. */
+static void set_corners(uint32_t cell, uint32_t lanes[4])
 {
-    return in_block == corners[0] || in_block == corners[1] || in_block == corners[2] || in_block == corners[3];
+    for (uint32_t i = 0; i < 4; i++) lanes[i] = nb_lane_at(CELL * (cell + (i & 1)), (i >> 1) * (NB_BLOCK - 1));
+}
+
+static int is_corner(uint32_t x, uint32_t y)
+{
+    return x % CELL == 0 && (y == 0 || y == NB_BLOCK - 1);
 }
 
 static int is_close(const nb_shaded_piece *a, const nb_shaded_piece *b)
@@ -106,15 +112,14 @@ static int is_close(const nb_shaded_piece *a, const nb_shaded_piece *b)
     return is;
 }
 
-static int are_alike(const nb_cloud_scratch *clouds, uint32_t block)
+static int are_alike(const nb_cloud_scratch *clouds, const uint32_t corners[4])
 {
-    const nb_shaded_piece *first = clouds->shaded[block];
-    const uint32_t count = clouds->shaded_count[block];
+    const nb_shaded_piece *first = clouds->shaded[corners[0]];
+    const uint32_t count = clouds->shaded_count[corners[0]];
     for (int i = 1; i < 4; i++) {
-        const uint32_t lane = block + corners[i];
-        if (clouds->shaded_count[lane] != count) return 0;
+        if (clouds->shaded_count[corners[i]] != count) return 0;
         for (uint32_t k = 0; k < count; k++)
-            if (!is_close(&first[k], &clouds->shaded[lane][k])) return 0;
+            if (!is_close(&first[k], &clouds->shaded[corners[i]][k])) return 0;
     }
     return 1;
 }
@@ -133,17 +138,26 @@ static nb_shaded_piece between(const nb_shaded_piece *const at[4], uint32_t k, c
     return piece;
 }
 
-static void fill_block(uint32_t block, nb_cloud_scratch *clouds)
+static void fill_pixel(const uint32_t corners[4], float u, float v, uint32_t lane, nb_cloud_scratch *clouds)
 {
     const nb_shaded_piece *at[4];
-    for (int i = 0; i < 4; i++) at[i] = clouds->shaded[block + corners[i]];
-    for (uint32_t i = 0; i < NB_PACKET; i++) {
-        const float u = (float)(i % NB_BLOCK) / (NB_BLOCK - 1), v = (float)(i / NB_BLOCK) / (NB_BLOCK - 1);
-        const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
-        if (is_corner(i)) continue;
-        clouds->shaded_count[block + i] = clouds->shaded_count[block];
-        for (uint32_t k = 0; k < clouds->shaded_count[block]; k++)
-            clouds->shaded[block + i][k] = between(at, k, weights);
+    const float weights[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+    for (int i = 0; i < 4; i++) at[i] = clouds->shaded[corners[i]];
+    clouds->shaded_count[lane] = clouds->shaded_count[corners[0]];
+    for (uint32_t k = 0; k < clouds->shaded_count[lane]; k++) clouds->shaded[lane][k] = between(at, k, weights);
+}
+
+/* Where corners are alike; what is filled needs no shade of its own. */
+static void fill_cell(uint32_t cell, int is_own[NB_BATCH], nb_cloud_scratch *clouds)
+{
+    uint32_t corners[4];
+    set_corners(cell, corners);
+    if (!are_alike(clouds, corners)) return;
+    for (uint32_t i = 0; i < NB_BLOCK * (CELL + 1); i++) {
+        const uint32_t x = i % (CELL + 1), y = i / (CELL + 1), lane = nb_lane_at(CELL * cell + x, y);
+        if (!is_own[lane]) continue;
+        fill_pixel(corners, (float)x / CELL, (float)y / (NB_BLOCK - 1), lane, clouds);
+        is_own[lane] = 0;
     }
 }
 
@@ -156,20 +170,18 @@ static int is_in_picture(const nb_frame *frame, const nb_place *place, uint32_t 
 /* First the corners, then those whose corners are not alike. At the picture's edge each pixel has its own. */
 nebel_result nb_cloud_air_shade(const nb_frame *frame, const nb_place *place, nb_cloud_scratch *clouds)
 {
-    int is_first[NB_BATCH], is_later[NB_BATCH];
+    int is_first[NB_BATCH], is_later[NB_BATCH], is_whole[CELLS];
+    for (uint32_t cell = 0; cell < CELLS; cell++)
+        is_whole[cell] = is_in_picture(frame, place, nb_lane_at(CELL * (cell + 1), NB_BLOCK - 1));
     for (uint32_t i = 0; i < NB_BATCH; i++) {
-        const uint32_t in_block = i % NB_PACKET, last = i - in_block + NB_PACKET - 1;
-        const int is_whole = is_in_picture(frame, place, last);
+        const uint32_t x = nb_lane_x(i), y = nb_lane_y(i), cell = x / CELL < CELLS ? x / CELL : CELLS - 1;
         clouds->shaded_count[i] = 0;
-        is_first[i] = is_in_picture(frame, place, i) && (is_corner(in_block) || !is_whole);
-        is_later[i] = is_whole && !is_corner(in_block);
+        is_first[i] = is_in_picture(frame, place, i) && (is_corner(x, y) || !is_whole[cell]);
+        is_later[i] = is_whole[cell] && !is_corner(x, y);
     }
     const nebel_result result = find_shade(frame, is_first, clouds);
-    for (uint32_t block = 0; block < NB_BATCH && result == NEBEL_OK; block += NB_PACKET) {
-        if (!is_later[block + 1] || !are_alike(clouds, block)) continue;
-        fill_block(block, clouds);
-        for (uint32_t i = 0; i < NB_PACKET; i++) is_later[block + i] = 0;
-    }
+    for (uint32_t cell = 0; cell < CELLS && result == NEBEL_OK; cell++)
+        if (is_whole[cell]) fill_cell(cell, is_later, clouds);
     return result == NEBEL_OK ? find_shade(frame, is_later, clouds) : result;
 }
 

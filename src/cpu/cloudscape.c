@@ -4,8 +4,13 @@
 #include "fog_shade.h"
 #include "haze.h"
 
+#include "base/cloud_share.h"
+
 #include <math.h>
 #include <string.h>
+
+_Static_assert((int)NB_CLOUD_SHARE_COLUMNS == (int)NB_REGION && (int)NB_CLOUD_SHARE == (int)NB_BATCH,
+               "a batch is a block");
 
 /* ---- the frame ------------------------------------------------------------------------------- */
 
@@ -75,31 +80,61 @@ static int is_found(const nb_cloud_scratch *clouds, int lane)
     return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
 }
 
-/* As far as samples go, all of a batch at once. *any: whether there are clouds. */
-static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
+static uint32_t lane_of(int pixel)
 {
-    nb_cloud_scratch *clouds = &scratch->clouds;
+    return nb_lane_at((uint32_t)pixel % NB_REGION, (uint32_t)pixel / NB_REGION);
+}
+
+/* Some pixels of a block, all at once. */
+static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CLOUD_SHARE], nb_cloud_scratch *clouds)
+{
     uint32_t count = 0, lanes[NB_BATCH];
-    *any = 0;
-    for (uint32_t i = 0; i < NB_BATCH; i++) {
-        clouds->is_new[i] = 0;
-        if (!scratch->inside[i]) continue;
-        clouds->end[i] = end_of(frame, scratch, i);
-        if (is_found(clouds, (int)i)) continue;
-        clouds->asked[count] = nb_cloud_air_ray(frame, clouds, i);
-        clouds->asked[count].t_max = (double)clouds->end[i];
-        clouds->spreads[count] = frame->air.pixel / (double)clouds->rays.length[i];
-        lanes[count++] = i;
+    for (int i = 0; i < NB_CLOUD_SHARE; i++) {
+        const uint32_t lane = lane_of(i);
+        if (!is_asked[i]) continue;
+        clouds->asked[count] = nb_cloud_air_ray(frame, clouds, lane);
+        clouds->asked[count].t_max = (double)clouds->end[lane];
+        clouds->spreads[count] = frame->air.pixel / (double)clouds->rays.length[lane];
+        lanes[count++] = lane;
     }
     const nebel_result result =
         nebel_trace_clouds(clouds->workspace, count, clouds->asked, sizeof *clouds->asked, clouds->spreads,
                            sizeof *clouds->spreads, clouds->found, sizeof *clouds->found);
-    for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
-        const uint32_t i = lanes[k];
-        clouds->knots[i] = clouds->found[k];
-        clouds->reach[i] = clouds->end[i];
-        clouds->is_new[i] = clouds->knots[i].count > 0;
-        *any |= clouds->is_new[i];
+    for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) clouds->knots[lanes[k]] = clouds->found[k];
+    return result;
+}
+
+static nebel_result trace_block(const nb_frame *frame, nb_cloud_block *block, nb_cloud_scratch *clouds)
+{
+    nebel_result result = NEBEL_OK;
+    nb_cloud_block_begin(block);
+    for (int level = 0; level < NB_CLOUD_SHARE_LEVELS && result == NEBEL_OK; level++) {
+        int is_asked[NB_CLOUD_SHARE];
+        nb_cloud_block_ask(block, level, is_asked);
+        result = trace_pixels(frame, is_asked, clouds);
+    }
+    return result;
+}
+
+/* As far as samples go. *any: whether there are clouds. */
+static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
+{
+    nb_cloud_scratch *clouds = &scratch->clouds;
+    nb_cloud_block block;
+    for (int i = 0; i < NB_CLOUD_SHARE; i++) {
+        const uint32_t lane = lane_of(i);
+        if (scratch->inside[lane]) clouds->end[lane] = end_of(frame, scratch, lane);
+        block.is_wanted[i] = scratch->inside[lane] && !is_found(clouds, (int)lane);
+        block.is_open[i] = scratch->distance[lane] == HUGE_VALF || scratch->air.ground.distance[lane] < HUGE_VALF;
+        block.knots[i] = &clouds->knots[lane];
+    }
+    const nebel_result result = trace_block(frame, &block, clouds);
+    *any = 0;
+    for (int i = 0; i < NB_CLOUD_SHARE; i++) {
+        const uint32_t lane = lane_of(i);
+        if (block.is_wanted[i]) clouds->reach[lane] = clouds->end[lane];
+        clouds->is_new[lane] = block.is_wanted[i] && clouds->knots[lane].count > 0;
+        *any |= clouds->is_new[lane];
     }
     return result;
 }

@@ -86,11 +86,6 @@ static void widen(const float *lanes, uint32_t columns, uint32_t rows, nb_rows m
     }
 }
 
-static uint32_t lane_of(uint32_t x, uint32_t y)
-{
-    return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
-}
-
 static float brightest(const nb_light_samples *samples, uint32_t lane)
 {
     float most = 0;
@@ -109,7 +104,7 @@ static int is_smooth(uint32_t columns, uint32_t rows, nb_light_samples *samples)
     }
     for (uint32_t y = 0; y < rows; y++)
         for (uint32_t x = 0; x < columns; x++) {
-            const uint32_t i = lane_of(x, y);
+            const uint32_t i = nb_lane_at(x, y);
             if (!(off[y][x] <= MOST_OFF * brightest(samples, i) && left[y][x] <= MOST_OFF)) return 0;
             samples->error[i] += off[y][x];
         }

@@ -56,4 +56,10 @@ static inline uint32_t nb_lane_y(uint32_t i)
     return i / NB_BATCH * NB_BLOCK + i % NB_PACKET / NB_BLOCK;
 }
 
+/* The lane of a column and row of a batch. */
+static inline uint32_t nb_lane_at(uint32_t x, uint32_t y)
+{
+    return x / NB_BLOCK * NB_PACKET + y * NB_BLOCK + x % NB_BLOCK;
+}
+
 #endif

@@ -14,7 +14,8 @@
 typedef struct job {
     nb_gl_clouds *clouds;
     const nb_cloud_picture *picture, *middle; /* middle: of the middles of pixels, where picture is of a sample */
-    void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);
+    void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);                  /* NULL: */
+    void (*rows)(const struct job *j, nb_cloud_part *part, uint32_t top, uint32_t end); /* from the first row on */
     const nb_world *worlds;
     int world_count, has_fog;
     float *marks; /* where fog is to be known next */
@@ -25,16 +26,22 @@ typedef struct job {
     uint32_t begin;  /* the first row of each part in this round */
 } job;
 
-/* Rows of each part between two times of asking whether to go on: of a picture of 1280x720 a tenth of a second. */
-enum { ROUND = 2 };
+/* Rows of each part between two times of asking whether to go on: of a picture of 1280x720 some tenths of a second. Parts and rounds
+ * begin where blocks do. */
+enum { ROUND = NB_CLOUD_SHARE_ROWS };
 
+/* Counted from the picture's first row. */
 static uint32_t first_row(const job *j, size_t part)
 {
-    return (uint32_t)((uint64_t)j->picture->view->height * part / NB_CLOUD_PARTS);
+    const uint64_t height = j->picture->view->height, rounds = (height + ROUND - 1) / ROUND;
+    const uint64_t row = rounds * part / NB_CLOUD_PARTS * ROUND;
+    return (uint32_t)(row < height ? row : height);
 }
 
 static nebel_result open_workspace(const nb_gl_clouds *clouds, nb_cloud_part *part)
 {
+    if (part->bundle == NULL) part->bundle = nb_allocate(&clouds->allocator, 1, sizeof *part->bundle);
+    if (part->bundle == NULL) return NEBEL_ERROR_MEMORY;
     return part->workspace != NULL ? NEBEL_OK : nebel_create_cloud_workspace(clouds->view, &part->workspace);
 }
 
@@ -45,7 +52,9 @@ static void do_part(void *data, size_t i)
     const uint32_t first = first_row(j, i) + j->begin, next = first_row(j, i + 1);
     const uint32_t end = first + ROUND < next ? first + ROUND : next;
     part->result = open_workspace(j->clouds, part);
-    for (uint32_t y = first; y < end && part->result == NEBEL_OK; y++) j->row(j, part, y);
+    if (j->row == NULL && first < end && part->result == NEBEL_OK) j->rows(j, part, first, end);
+    for (uint32_t y = first; j->row != NULL && y < end && part->result == NEBEL_OK; y++)
+        j->row(j, part, j->picture->view->height - 1 - y);
 }
 
 static nebel_result do_round(job *j)
@@ -61,7 +70,8 @@ static nebel_result do_round(job *j)
 
 static nebel_result do_parts(job *j)
 {
-    const uint32_t rows = (j->picture->view->height + NB_CLOUD_PARTS - 1) / NB_CLOUD_PARTS;
+    const uint32_t rounds = (j->picture->view->height + ROUND - 1) / ROUND;
+    const uint32_t rows = (rounds + NB_CLOUD_PARTS - 1) / NB_CLOUD_PARTS * ROUND;
     nebel_result result = NEBEL_OK;
     for (j->begin = 0; j->begin < rows && result == NEBEL_OK; j->begin += ROUND) {
         result = do_round(j);
@@ -127,6 +137,7 @@ void nb_gl_clouds_release(nb_gl_clouds *clouds)
 {
     forget(clouds);
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
+        nb_release(&clouds->allocator, clouds->parts[i].bundle);
         nb_release(&clouds->allocator, clouds->parts[i].knots);
         nb_release(&clouds->allocator, clouds->parts[i].before);
         nb_release(&clouds->allocator, clouds->parts[i].pieces);
@@ -192,26 +203,76 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
     return NEBEL_OK;
 }
 
-/* Through a pixel, up to t_max. */
-static nebel_result trace_pixel(nb_cloud_part *part, const nb_cloud_picture *picture, uint32_t x, uint32_t y,
-                                double t_max, nebel_ray *ray, nebel_cloud_knots *knots)
+static double ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, nebel_ray *ray)
 {
-    const double length = direction_at(picture, x, y, ray->direction), spread = picture->pixel / length;
+    const double length = direction_at(picture, x, y, ray->direction);
     memcpy(ray->origin, picture->eye, sizeof ray->origin);
-    ray->t_max = t_max;
-    return nebel_trace_clouds(part->workspace, 1, ray, 0, &spread, 0, knots, 0);
+    ray->t_max = HUGE_VAL;
+    return picture->pixel / length;
 }
 
-static void trace_row(const job *j, nb_cloud_part *part, uint32_t y)
+/* Some of its pixels. */
+static nebel_result trace_pixels(nb_cloud_part *part, const int is_asked[NB_CLOUD_SHARE])
 {
-    const nb_cloud_picture *const picture = j->picture;
-    for (uint32_t x = 0; x < picture->view->width && part->result == NEBEL_OK; x++) {
-        const size_t i = (size_t)y * picture->view->width + x;
-        nebel_ray ray;
-        nebel_cloud_knots knots;
-        part->result = trace_pixel(part, picture, x, y, HUGE_VAL, &ray, &knots);
-        if (part->result == NEBEL_OK) part->result = shade_air(j, part, &ray, &j->clouds->pixels[i]);
-        if (part->result == NEBEL_OK) part->result = keep_knots(j, part, &knots, &j->clouds->pixels[i]);
+    nb_cloud_bundle *const bundle = part->bundle;
+    uint32_t count = 0;
+    for (int i = 0; i < NB_CLOUD_SHARE; i++) {
+        if (!is_asked[i]) continue;
+        bundle->asked[count] = bundle->rays[i];
+        bundle->asked_spreads[count++] = bundle->spreads[i];
+    }
+    const nebel_result result =
+        nebel_trace_clouds(part->workspace, count, bundle->asked, sizeof *bundle->asked, bundle->asked_spreads,
+                           sizeof *bundle->asked_spreads, bundle->found, sizeof *bundle->found);
+    count = 0;
+    for (int i = 0; i < NB_CLOUD_SHARE && result == NEBEL_OK; i++)
+        if (is_asked[i]) bundle->knots[i] = bundle->found[count++];
+    return result;
+}
+
+/* The pixels of a block in some rows; end: its last row's next. */
+static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left, uint32_t top, uint32_t end)
+{
+    const nebel_view *const view = j->picture->view;
+    nb_cloud_bundle *const bundle = part->bundle;
+    nb_cloud_block block;
+    nebel_result result = NEBEL_OK;
+    for (uint32_t i = 0; i < NB_CLOUD_SHARE; i++) {
+        const uint32_t x = left + i % NB_CLOUD_SHARE_COLUMNS, y = top + i / NB_CLOUD_SHARE_COLUMNS;
+        block.is_wanted[i] = x < view->width && y < end;
+        block.is_open[i] = 1;
+        block.knots[i] = &bundle->knots[i];
+        if (block.is_wanted[i]) bundle->spreads[i] = ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
+    }
+    nb_cloud_block_begin(&block);
+    for (int level = 0; level < NB_CLOUD_SHARE_LEVELS && result == NEBEL_OK; level++) {
+        int is_asked[NB_CLOUD_SHARE];
+        nb_cloud_block_ask(&block, level, is_asked);
+        result = trace_pixels(part, is_asked);
+    }
+    return result;
+}
+
+static nebel_result keep_block(const job *j, nb_cloud_part *part, uint32_t left, uint32_t top, uint32_t end)
+{
+    const nebel_view *const view = j->picture->view;
+    nebel_result result = NEBEL_OK;
+    for (uint32_t i = 0; i < NB_CLOUD_SHARE && result == NEBEL_OK; i++) {
+        const uint32_t x = left + i % NB_CLOUD_SHARE_COLUMNS, y = top + i / NB_CLOUD_SHARE_COLUMNS;
+        if (x >= view->width || y >= end) continue;
+        nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)(view->height - 1 - y) * view->width + x];
+        result = shade_air(j, part, &part->bundle->rays[i], pixel);
+        if (result == NEBEL_OK) result = keep_knots(j, part, &part->bundle->knots[i], pixel);
+    }
+    return result;
+}
+
+static void trace_rows(const job *j, nb_cloud_part *part, uint32_t top, uint32_t end)
+{
+    for (uint32_t left = 0; left < j->picture->view->width; left += NB_CLOUD_SHARE_COLUMNS) {
+        part->result = trace_block(j, part, left, top, end);
+        if (part->result == NEBEL_OK) part->result = keep_block(j, part, left, top, end);
+        if (part->result != NEBEL_OK) return;
     }
 }
 
@@ -224,7 +285,7 @@ nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *pi
         return NEBEL_ERROR_MEMORY;
     clouds->pixels = list;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].count = clouds->parts[i].piece_count = 0;
-    job j = {.clouds = clouds, .picture = picture, .row = trace_row, .worlds = worlds, .world_count = count};
+    job j = {.clouds = clouds, .picture = picture, .rows = trace_rows, .worlds = worlds, .world_count = count};
     return do_parts(&j);
 }
 
@@ -237,12 +298,10 @@ static void write_shade_row(const job *j, nb_cloud_part *part, uint32_t y)
     for (uint32_t x = 0; x < width && part->result == NEBEL_OK; x++) {
         const size_t i = y * width + x;
         const nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
-        nebel_ray ray = {.t_max = HUGE_VAL};
+        nebel_ray ray;
         nb_fog_shade fog;
-        const double length = direction_at(picture, x, y, ray.direction);
-        memcpy(ray.origin, picture->eye, sizeof ray.origin);
-        if (j->roof != NULL)
-            part->result = nb_fog_shade_along(part->workspace, j->roof, ray, picture->pixel / length, &fog);
+        const double spread = ray_at(picture, x, y, &ray);
+        if (j->roof != NULL) part->result = nb_fog_shade_along(part->workspace, j->roof, ray, spread, &fog);
         if (part->result != NEBEL_OK) return;
         const uint32_t layers = nb_gl_cloud_shade_write(
             part->pieces + pixel->first_piece, pixel->piece_count, j->roof != NULL ? &fog : NULL,
@@ -364,7 +423,7 @@ static nb_cloud_part *part_of(nb_gl_clouds *clouds, const nb_cloud_picture *pict
 {
     const job j = {.picture = picture};
     size_t i = 0;
-    while (y >= first_row(&j, i + 1)) i++;
+    while (picture->view->height - 1 - y >= first_row(&j, i + 1)) i++;
     return &clouds->parts[i];
 }
 
@@ -475,7 +534,9 @@ static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uin
         lay_over(part->knots + pixel->first, pixel->count, end, over);
         return NEBEL_OK;
     }
-    nebel_result result = trace_pixel(part, j->middle, x, y, (double)end, &ray, &knots);
+    const double spread = ray_at(j->middle, x, y, &ray);
+    ray.t_max = (double)end;
+    nebel_result result = nebel_trace_clouds(part->workspace, 1, &ray, 0, &spread, 0, &knots, 0);
     if (result != NEBEL_OK) return result;
     nb_cloud_pixel anew = *pixel;
     anew.count = knots.count;

@@ -4,6 +4,7 @@
 
 #include "base/air_shade.h"
 #include "base/base.h"
+#include "base/cloud_share.h"
 #include "base/fog_shade.h"
 #include "base/pixel.h"
 #include "base/worlds.h"
@@ -22,8 +23,16 @@ typedef struct nb_cloud_knot {
     int is_marked;
 } nb_cloud_knot;
 
+/* Of the pixels of a block, row by row; and of those of them that are asked together. */
+typedef struct nb_cloud_bundle {
+    nebel_ray rays[NB_CLOUD_SHARE], asked[NB_CLOUD_SHARE];
+    double spreads[NB_CLOUD_SHARE], asked_spreads[NB_CLOUD_SHARE];
+    nebel_cloud_knots knots[NB_CLOUD_SHARE], found[NB_CLOUD_SHARE];
+} nb_cloud_bundle;
+
 typedef struct nb_cloud_part {
     nebel_cloud_workspace *workspace;
+    nb_cloud_bundle *bundle;
     nb_cloud_knot *knots, *before; /* before: while more are put between them */
     size_t count, capacity, capacity_before;
     nb_shaded_piece *pieces;

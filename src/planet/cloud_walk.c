@@ -135,6 +135,7 @@ typedef struct nb_walk {
 
     nb_wait wait;
     int unanswered;
+    uint32_t looks; /* with questions */
 
     double missed;
     nb_stretch stretch;
@@ -558,6 +559,7 @@ static void put_questions(nb_walk *walk, nb_queue *queue)
         ask(queue, walk, k, walk->t, &walk->here);
         return;
     }
+    walk->looks++;
     if (walk->wait == NB_WAIT_PIECE) ask(queue, walk, k, walk->t + 0.5 * walk->length, &walk->middle);
     if (!walk->has_far) ask(queue, walk, k, walk->t + walk->length, &walk->far);
 }
@@ -708,6 +710,7 @@ static void trace(nb_rays *rays)
             }
             nb_cloud_tally_end(&walk->tally, walk->knots);
             walk->knots->error = (float)walk->missed;
+            walk->knots->looks = walk->looks;
             if (rays->next < rays->n) begin_next(rays, walk, &party);
             continue;
         }

@@ -1,0 +1,176 @@
+/* Clouds through pixels between others: who has rays, and what the others have. */
+#include "base/cloud_share.h"
+
+#include "unit.h"
+
+#include <string.h>
+
+enum { COLUMNS = NB_CLOUD_SHARE_COLUMNS, ROWS = NB_CLOUD_SHARE_ROWS, ALL = NB_CLOUD_SHARE };
+
+static int at(int x, int y)
+{
+    return y * COLUMNS + x;
+}
+
+typedef struct picture {
+    nb_cloud_block block;
+    nebel_cloud_knots knots[ALL], truth[ALL];
+    int is_asked[ALL];
+} picture;
+
+/* A wall of cloud from 1 km on, so deep, so bright, and its light red. */
+static nebel_cloud_knots wall(float left, float light)
+{
+    return (nebel_cloud_knots){.count = 3,
+                               .t = {1000, 1200, 1400},
+                               .transmittance = {1, .5f * (1 + left), left},
+                               .in_scattering = {{0}, {.5f * light}, {light}},
+                               .error = 1e-3f,
+                               .looks = 20};
+}
+
+static void begin(picture *p)
+{
+    memset(p, 0, sizeof *p);
+    for (int i = 0; i < ALL; i++) {
+        p->block.is_wanted[i] = p->block.is_open[i] = 1;
+        p->block.knots[i] = &p->knots[i];
+        p->truth[i] = wall(.2f, 1);
+    }
+}
+
+/* As renderers do. Returns how many rays there were. */
+static int trace(picture *p)
+{
+    int count = 0;
+    nb_cloud_block_begin(&p->block);
+    for (int level = 0; level < NB_CLOUD_SHARE_LEVELS; level++) {
+        int is_asked[ALL];
+        nb_cloud_block_ask(&p->block, level, is_asked);
+        for (int i = 0; i < ALL; i++) {
+            if (!is_asked[i]) continue;
+            p->knots[i] = p->truth[i];
+            p->is_asked[i] = 1;
+            count++;
+        }
+    }
+    return count;
+}
+
+static void assert_same(const nebel_cloud_knots *a, const nebel_cloud_knots *b)
+{
+    assert_int_equal(a->count, b->count);
+    for (uint32_t k = 0; k < a->count; k++) {
+        assert_float_equal(a->t[k], b->t[k], 0);
+        assert_float_equal(a->transmittance[k], b->transmittance[k], 1e-7);
+        for (int c = 0; c < 3; c++) assert_float_equal(a->in_scattering[k][c], b->in_scattering[k][c], 1e-7);
+    }
+}
+
+static void test_even_clouds_need_a_quarter_of_rays(void **state)
+{
+    (void)state;
+    static picture p;
+    begin(&p);
+    /* A quarter, and at the left and the right border of each row at most two more. */
+    assert_in_range(trace(&p), ALL / 4, ALL / 4 + 2 * ROWS);
+    for (int i = 0; i < ALL; i++) {
+        assert_same(&p.knots[i], &p.truth[i]);
+        assert_true(p.knots[i].error >= p.truth[i].error);
+    }
+}
+
+static void test_slopes_are_kept(void **state)
+{
+    (void)state;
+    static picture p;
+    begin(&p);
+    for (int i = 0; i < ALL; i++) {
+        const float x = (float)(i % COLUMNS), y = (float)(i / COLUMNS);
+        p.truth[i] = wall(.2f + .002f * x + .001f * y, 1 + .01f * x - .005f * y);
+    }
+    assert_true(trace(&p) < ALL / 2);
+    for (int i = 0; i < ALL; i++) {
+        assert_float_equal(p.knots[i].transmittance[2], p.truth[i].transmittance[2], 1e-6);
+        assert_float_equal(p.knots[i].in_scattering[2][0], p.truth[i].in_scattering[2][0], 1e-6);
+    }
+}
+
+static void test_edges_have_rays(void **state)
+{
+    (void)state;
+    static picture p;
+    for (int x = 8; x < 16; x++) {
+        begin(&p);
+        for (int i = 0; i < ALL; i++)
+            if (i % COLUMNS < x) p.truth[i] = wall(.6f, 1);
+        trace(&p);
+        for (int i = 0; i < ALL; i++) assert_same(&p.knots[i], &p.truth[i]);
+        begin(&p);
+        for (int i = 0; i < ALL; i++)
+            if (i % COLUMNS < x) p.truth[i] = wall(.2f, .8f);
+        trace(&p);
+        for (int i = 0; i < ALL; i++) assert_same(&p.knots[i], &p.truth[i]);
+    }
+}
+
+/* Wherever it is, a puff as wide as a pixel is seen, unless all rays around say that no cloud is near. */
+static void test_puffs_beside_clear_rays_are_seen(void **state)
+{
+    (void)state;
+    static picture p;
+    for (int puff = 0; puff < ALL; puff++)
+        for (uint32_t looks = 0; looks < 2; looks++) {
+            begin(&p);
+            for (int i = 0; i < ALL; i++) p.truth[i] = (nebel_cloud_knots){.looks = looks};
+            p.truth[puff] = wall(.2f, 1);
+            const int count = trace(&p);
+            assert_true(looks == 1 ? count == ALL : count < ALL / 2);
+            assert_true(looks == 0 || p.knots[puff].count == 3);
+        }
+}
+
+static void test_surfaces_have_rays(void **state)
+{
+    (void)state;
+    static picture p;
+    begin(&p);
+    p.block.is_open[at(20, 1)] = 0;
+    p.block.is_wanted[at(40, 2)] = 0;
+    trace(&p);
+    for (int y = 0; y < 3; y++)
+        for (int x = 19; x < 22; x++) assert_true(p.is_asked[at(x, y)]);
+    assert_false(p.is_asked[at(40, 2)]);
+    assert_true(p.is_asked[at(39, 2)] && p.is_asked[at(41, 2)]);
+}
+
+/* Two walls, of which one begins and ends before the other. */
+static void test_mean_is_between(void **state)
+{
+    (void)state;
+    nebel_cloud_knots a = wall(.2f, 1), b = wall(.22f, 1.02f);
+    for (int k = 0; k < 3; k++) b.t[k] += 100;
+    const nebel_cloud_knots mean = nb_cloud_mean(&a, &b), clear = {.looks = 3}, half = nb_cloud_mean(&clear, &a);
+    assert_int_equal(mean.count, 3);
+    assert_true(mean.t[0] == 1000 && mean.t[2] == 1500);
+    assert_true(mean.transmittance[0] == 1 && mean.in_scattering[0][0] == 0);
+    assert_float_equal(mean.transmittance[1], .5f * (.6f + .805f), 1e-6);
+    assert_float_equal(mean.transmittance[2], .21, 1e-6);
+    assert_float_equal(mean.in_scattering[2][0], 1.01, 1e-6);
+    assert_float_equal(half.transmittance[2], .6, 1e-6);
+    assert_float_equal(half.in_scattering[2][0], .5, 1e-6);
+    assert_int_equal(nb_cloud_mean(&clear, &clear).count, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_even_clouds_need_a_quarter_of_rays),
+        cmocka_unit_test(test_slopes_are_kept),
+        cmocka_unit_test(test_edges_have_rays),
+        cmocka_unit_test(test_puffs_beside_clear_rays_are_seen),
+        cmocka_unit_test(test_surfaces_have_rays),
+        cmocka_unit_test(test_mean_is_between),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
