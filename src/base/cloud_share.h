@@ -1,10 +1,10 @@
 /* Clouds through the pixels of a picture: a quarter of them have rays, others the mean of two beside them where all around are alike, else
- * rays of their own. First pixels between four that are two columns or one row away,
+ * rays of their own. By levels,
  *
  *     0 2 1 2 0 2 1 2
  *     1 2 0 2 1 2 0 2
  *
- * which is their level, then those of the columns between. */
+ * those of 0 have rays; those of 1 lie between four that are two columns or one row away, those of 2 between the columns of both. */
 #ifndef NB_CLOUD_SHARE_H
 #define NB_CLOUD_SHARE_H
 
@@ -33,8 +33,10 @@ typedef struct nb_cloud_block {
  * the brightest, or of that part of what it would be without gaps: the sky behind is bright as well. */
 #define NB_CLOUD_LEAST_LEFT 0.5f
 #define NB_CLOUD_LEAST_LIGHT 0.2f
-#define NB_CLOUD_HARDLY 0.9f
 static const float nb_cloud_alike[NB_CLOUD_SHARE_LEVELS] = {0, 0.05f, 0.07f};
+
+/* Where more than that comes through hardly any cloud is. */
+#define NB_CLOUD_HARDLY 0.9f
 
 /* ---- what is alike --------------------------------------------------------------------------- */
 
