@@ -981,13 +981,16 @@ class InfoTest(PictureCase):
                 self.assertEqual(f"warning: {scene}: no sunlight reaches fog or models: fog[1]" in said, is_dark)
 
     def test_a_planet_without_a_sun(self):
-        air, up = {"model": "physical"}, [0, 1, 0]
-        for planet, sun, is_dark in ((air, None, True), (air, {"direction": up, "irradiance": 0}, True),
-                                     (air, {"direction": up}, False), ({"model": "layers"}, None, False)):
-            scene = self.write_scene("night.json", [], planet=planet, **({} if sun is None else {"sun": sun}))
-            self.assertEqual("warning: the planet's air is black" in nebel("info", scene).out, is_dark, (planet, sun))
-            done = nebel("render", scene, "-o", self.folder / "night.png", "-s", "8x8", "-q")
-            self.assertEqual(f"warning: {scene}: the planet's air is black" in done.err, is_dark, (planet, sun))
+        air, layers, sun = {"model": "physical"}, {"model": "layers"}, {"direction": [0, 1, 0]}
+        dark_air, dark = "the planet's air is black", "the planet is black"
+        for planet, light, warning in ((air, {}, dark_air), (air, {"ambient": 1}, dark_air), (air, {"sun": sun}, None),
+                                       (air, {"sun": {**sun, "irradiance": 0}}, dark_air), (layers, {}, dark),
+                                       (layers, {"ambient": 1}, None), (layers, {"sun": sun}, None)):
+            scene = self.write_scene("night.json", [], planet=planet, **light)
+            told = (nebel("info", scene).out, nebel("render", scene, "-o", self.folder / "night.png", "-s", "8x8", "-q").err)
+            for text, head in zip(told, ("warning: ", f"warning: {scene}: ")):
+                for one in (dark_air, dark):
+                    self.assertEqual(head + one in text, one == warning, (planet, light))
 
     def test_a_scene_or_a_model_that_is_wrong(self):
         self.assert_failed(nebel("info", self.folder / "none.json"), "none.json")

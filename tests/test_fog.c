@@ -520,7 +520,7 @@ static void test_instruction_sets_have_names(void **unused)
     for (int i = 0; i < NEBEL_ISA_COUNT; i++) assert_string_equal(nebel_isa_name((nebel_isa)i), names[i]);
     for (int i = -3; i < 100; i = i < 0 ? i + 1 : i * 2 + NEBEL_ISA_COUNT) {
         if (i >= 0 && i < NEBEL_ISA_COUNT) i = NEBEL_ISA_COUNT;
-        assert_string_equal(nebel_isa_name((nebel_isa)i), "default");
+        assert_string_equal(nebel_isa_name((nebel_isa)i), "unknown");
         assert_int_equal(nebel_isa_available((nebel_isa)i), 0);
     }
     assert_int_equal(nebel_isa_available(NEBEL_ISA_DEFAULT), 1);

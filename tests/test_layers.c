@@ -397,6 +397,7 @@ static void bad_descriptions_are_refused(void **state)
                                      {.cloud_count = 1, .clouds = {{.wrap = {1e9, 0, 0}}}},
                                      {.cloud_count = 1, .clouds = {{.map = {COLUMNS, ROWS, 3, ground[0][0]}}}},
                                      {.cloud_count = 1, .clouds = {{.map = {0, ROWS, 1, clouds[0]}}}},
+                                     {.cloud_count = 1, .clouds = {{.map = {COLUMNS, ROWS, 1, NULL}}}},
                                      {.ground = {SIZE_MAX, SIZE_MAX, 3, ground[0][0]}}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         assert_int_equal(nebel_create_layers(&bad[i], &layers), NEBEL_ERROR_VALUE);

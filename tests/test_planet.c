@@ -562,6 +562,10 @@ static void bad_numbers_are_refused(void **state)
     assert_int_equal(nebel_trace_air(earth, &dark, 1, &still, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_air(earth, &dark, 1, &back, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
     assert_int_equal(nebel_trace_air(NULL, &dark, 1, &good, 0, &light, 0), NEBEL_ERROR_ARGUMENT);
+    const nebel_ray last_is_bad[2] = {good, back};
+    light.error = -7;
+    assert_int_equal(nebel_trace_air(earth, &dark, 2, last_is_bad, sizeof good, &light, 0), NEBEL_ERROR_ARGUMENT);
+    assert_true(light.error == -7);
     assert_int_equal(nebel_trace_air(earth, NULL, 0, NULL, 0, NULL, 0), NEBEL_OK);
     nebel_destroy_atmosphere(earth);
     nebel_destroy_atmosphere(NULL);

@@ -384,6 +384,29 @@ static void bad_calls_are_refused(void **state)
     assert_int_equal(nebel_resolve_atmosphere(NULL, &whole), NEBEL_ERROR_ARGUMENT);
 }
 
+/* The same light as of rays that end where they begin. */
+static void ends_that_are_none_count_as_zero(void **state)
+{
+    (void)state;
+    static bundle rays;
+    static float bad[3][2], zero[3][2], error[2];
+    const double *const direction[3] = {rays.direction[0], rays.direction[1], rays.direction[2]};
+    const nebel_light_planes told = {.in_scattering = {bad[0], bad[1], bad[2]}, .error = error},
+                             wanted = {.in_scattering = {zero[0], zero[1], zero[2]}};
+    nebel_atmosphere *earth = make("earth");
+    nebel_air_view *view;
+    const nebel_air_view_desc desc = {
+        .atmosphere = earth, .sun = {{0, 1, 0}, {1, 1, 1}}, .position = {0, 1e4, 0}, .has_distances = 1};
+    assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+    rays.direction[1][0] = rays.direction[0][1] = 1;
+    assert_int_equal(nebel_trace_air_view(view, 2, direction, (const float[]){NAN, -1}, &told), NEBEL_OK);
+    assert_int_equal(nebel_trace_air_view(view, 2, direction, (const float[]){0, 0}, &wanted), NEBEL_OK);
+    assert_memory_equal(bad, zero, sizeof bad);
+    assert_true(error[0] >= 0 && error[1] >= 0);
+    nebel_destroy_air_view(view);
+    nebel_destroy_atmosphere(earth);
+}
+
 /* What the kernels of an instruction set say of rays and of the ground. */
 typedef struct answers {
     float transmittance[3][RAYS], in_scattering[3][RAYS], error[RAYS];
@@ -453,6 +476,7 @@ int main(void)
         cmocka_unit_test(order_of_work_changes_nothing),
         cmocka_unit_test(odd_places_have_answers),
         cmocka_unit_test(bad_calls_are_refused),
+        cmocka_unit_test(ends_that_are_none_count_as_zero),
         cmocka_unit_test(all_instruction_sets_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

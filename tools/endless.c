@@ -52,20 +52,30 @@ size_t nb_find_endless(const nebel_scene_data *scene)
     return i;
 }
 
-const char nb_dark_air_advice[] = "the planet's air is black, as no sun shines on it: give the scene a \"sun\"";
-
-int nb_is_air_dark(const nebel_scene_data *scene)
+int nb_has_ambient(const nebel_scene_data *scene)
 {
-    if (scene->has_sun && !is_black(scene->sun_irradiance)) return 0;
+    const nebel_environment *const environment = &scene->environment;
+    if (environment->type == NEBEL_ENVIRONMENT_GRADIENT)
+        return !is_black(environment->zenith) || !is_black(environment->horizon) || !is_black(environment->ground);
+    return environment->type == NEBEL_ENVIRONMENT_MAP || !is_black(scene->ambient);
+}
+
+const char *nb_find_dark_planet(const nebel_scene_data *scene)
+{
+    if (scene->has_sun && !is_black(scene->sun_irradiance)) return NULL;
     for (size_t i = 0; i < scene->planet_count; i++)
-        if (scene->planets[i].model == NEBEL_PLANET_PHYSICAL) return 1;
-    return 0;
+        if (scene->planets[i].model == NEBEL_PLANET_PHYSICAL)
+            return "the planet's air is black, as no sun shines on it: give the scene a \"sun\"";
+    if (scene->planet_count > 0 && !nb_has_ambient(scene))
+        return "the planet is black, as neither sun nor ambient light is on it: give the scene a \"sun\"";
+    return NULL;
 }
 
 void nb_warn_of_darkness(const nebel_scene_data *scene, const char *path)
 {
     const size_t endless = nb_find_endless(scene);
-    if (nb_is_air_dark(scene)) nb_report_message("warning: %s: %s", path, nb_dark_air_advice);
+    const char *const dark = nb_find_dark_planet(scene);
+    if (dark != NULL) nb_report_message("warning: %s: %s", path, dark);
     if (endless == scene->volume_count) return;
     nb_report_message("warning: %s: no sunlight reaches fog or models: fog[%zu] %s", path, endless, nb_endless_advice);
 }

@@ -11,9 +11,11 @@ size_t nb_find_endless(const nebel_scene_data *scene);
 /* What to say of it, behind its name. */
 extern const char nb_endless_advice[];
 
-/* Whether there is a planet of air that no sun shines on, which is black whatever ambient light there is. */
-int nb_is_air_dark(const nebel_scene_data *scene);
-extern const char nb_dark_air_advice[];
+/* Whether ambient light of the scene is other than black. */
+int nb_has_ambient(const nebel_scene_data *scene);
+
+/* What to say of a planet that no light is on, or NULL. Air without a sun is black whatever ambient light there is. */
+const char *nb_find_dark_planet(const nebel_scene_data *scene);
 
 /* Says both on standard error, where it is so; no quiet hides that. `path` is the scene's. */
 void nb_warn_of_darkness(const nebel_scene_data *scene, const char *path);

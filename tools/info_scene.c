@@ -119,11 +119,11 @@ static void print_planet(const nebel_planet *planet)
 {
     const nebel_atmosphere_desc *air = &planet->air;
     if (planet->model == NEBEL_PLANET_LAYERS)
-        (void)printf("planet: radius %.6g m, %u shells of clouds\n", planet->shells.radius,
-                     (unsigned)planet->shells.cloud_count);
+        (void)printf("planet: radius %.6g m, %u %s of clouds\n", planet->shells.radius,
+                     (unsigned)planet->shells.cloud_count, planet->shells.cloud_count == 1 ? "shell" : "shells");
     else if (has_air(air))
-        (void)printf("planet: radius %.6g m, %.6g m of air of %u kinds\n", air->radius, air->thickness,
-                     (unsigned)air->air_count);
+        (void)printf("planet: radius %.6g m, %.6g m of air of %u %s\n", air->radius, air->thickness,
+                     (unsigned)air->air_count, air->air_count == 1 ? "kind" : "kinds");
     else
         (void)printf("planet: radius %.6g m, no air\n", air->radius);
     if (planet->atmosphere != NULL && has_air(air)) print_depth(planet);
@@ -298,17 +298,9 @@ static int is_black(const double *color)
     return color[0] == 0 && color[1] == 0 && color[2] == 0;
 }
 
-static int has_ambient(const nebel_scene_data *scene)
-{
-    const nebel_environment *const environment = &scene->environment;
-    if (environment->type == NEBEL_ENVIRONMENT_GRADIENT)
-        return !is_black(environment->zenith) || !is_black(environment->horizon) || !is_black(environment->ground);
-    return environment->type == NEBEL_ENVIRONMENT_MAP || !is_black(scene->ambient);
-}
-
 static int is_lit(const nebel_scene_data *scene)
 {
-    return (scene->has_sun && !is_black(scene->sun_irradiance)) || has_ambient(scene) || scene->lamp_count > 0;
+    return (scene->has_sun && !is_black(scene->sun_irradiance)) || nb_has_ambient(scene) || scene->lamp_count > 0;
 }
 
 static const char *find_mistake(const nebel_scene_data *scene, const nebel_volume_desc *volume)
@@ -371,7 +363,8 @@ static void warn_of_scene(const nebel_scene_data *scene, double visibility)
         (void)printf("warning: there is no fog\n");
     if (visibility < 1) (void)printf("warning: the camera is in dense fog: one sees less than 1 m\n");
     warn_of_ground(scene);
-    if (nb_is_air_dark(scene)) (void)printf("warning: %s\n", nb_dark_air_advice);
+    const char *const dark = nb_find_dark_planet(scene);
+    if (dark != NULL) (void)printf("warning: %s\n", dark);
     if (scene->mesh_count > 0 && !is_lit(scene))
         (void)printf("warning: no sun, no lamps and no ambient light: the models are black\n");
 }

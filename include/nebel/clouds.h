@@ -50,11 +50,12 @@ typedef struct nebel_cloud_layer {
     double extinction; /* 1/m in their middle, to NEBEL_MAX_AIR_EXTINCTION */
     double
         size; /* m, of the largest heaps: half of the distance from one to the next; 1e-3 to 1e9, at most NEBEL_MAX_CLOUD_RADII */
-    double detail;     /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */
-    double variation;  /* how much more clouds are here than there, over ten sizes and more, to 1, or NONE */
-    double diameter;   /* um, of drops: 5 to 50 */
-    uint32_t seed;     /* of the noise */
-    double wind[2];    /* m per unit of time along x and z at the ground place over the centre: the shell turns */
+    double detail;    /* how deep billows cut into them, to 1; NEBEL_CLOUD_NONE: not at all */
+    double variation; /* how much more clouds are here than there, over ten sizes and more, to 1, or NONE */
+    double diameter;  /* um, of drops: 5 to 50 */
+    uint32_t seed;    /* of the noise */
+    double wind
+        [2]; /* m per unit of time, within 1e12, along x and z at the ground place over the centre: the shell turns */
     nebel_map weather; /* one channel; times the coverage; as maps of layers lie. {0}: 1 everywhere */
 } nebel_cloud_layer;
 
@@ -108,9 +109,8 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
 /* NULL is fine. */
 void nebel_destroy_cloud_view(nebel_cloud_view *view);
 
-/* What was found so far of shadows in a view, which must outlive it: some 13 MB
- * and 6 for each layer. Results do not hang on it. One thread at
- * a time. */
+/* What was found so far of shadows in a view, which must outlive it: some 20 MB and 6 for each layer. Results do not hang on it.
+ * One thread at a time. */
 typedef struct nebel_cloud_workspace nebel_cloud_workspace;
 
 /* With the view's allocator. Errors: ARGUMENT, MEMORY; *workspace is then NULL. */

@@ -109,8 +109,8 @@ typedef enum nebel_isa {
 /* 1 when this build and this processor can run `isa`, else 0. Any thread. */
 int nebel_isa_available(nebel_isa isa);
 
-/* The name as the command line takes it: "scalar", "sse2", "avx2", "avx512", "neon"; "default" for DEFAULT and unknown
- * numbers. Any thread. */
+/* The name as the command line takes it: "scalar", "sse2", "avx2", "avx512", "neon"; "default" for DEFAULT, "unknown" for
+ * unknown numbers. Any thread. */
 const char *nebel_isa_name(nebel_isa isa);
 
 /* ---- describing fog -------------------------------------------------------------------------- */

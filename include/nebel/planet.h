@@ -61,7 +61,7 @@ typedef struct nebel_atmosphere_desc {
     double thickness; /* of the air: m, at most 1e12, at least radius / 1e6; 0: 1e5 */
     nebel_air airs[NEBEL_MAX_AIRS];
     uint32_t air_count;      /* 0: the Earth's air, see nebel_find_atmosphere */
-    double ground_albedo[3]; /* what the ground gives back to the air, 0 to 1 */
+    double ground_albedo[3]; /* what the ground gives back to the air, 0 to 1; {0}: black, presets have their own */
     nebel_air_quality quality;
     nebel_air_run_fn run; /* for threads that make the table; NULL: one part after the other */
     void *run_user;
@@ -94,7 +94,7 @@ void nebel_destroy_atmosphere(nebel_atmosphere *atmosphere);
  * below the ground counts as that on it straight above, the centre as that at y, here and below. The light of the ground
  * itself is not in it. Strides are in bytes. sun NULL: no light. `error` is what the quality promises: see
  * docs/planet.md. Any thread. Errors: ARGUMENT (NULL, a sun or a ray that is NaN, infinite where it must not be, of no
- * direction, of negative t_max). */
+ * direction, of negative t_max); then no lights are written. */
 nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
                              size_t ray_stride, nebel_light *lights, size_t light_stride);
 
@@ -106,7 +106,7 @@ typedef struct nebel_air_light {
 
 /* The light at each of n places; strides in bytes. Nothing tells an error: the sun's part is as exact as the optical depth, the
  * sky's as the table of the quality, both in docs/planet.md, "How far off", whose rays down have this light behind them.
- * Any thread. Errors: ARGUMENT. */
+ * Any thread. Errors: ARGUMENT; then no lights are written. */
 nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
                              const double (*places)[3], size_t place_stride, nebel_air_light *lights,
                              size_t light_stride);
@@ -137,7 +137,7 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
 void nebel_destroy_air_view(nebel_air_view *view);
 
 /* What nebel_trace_air says of n rays from the view's place, from the table. Planes have no gaps: strides of `lights` are
- * not read, its planes of three are given all or none. t_max NULL: to the ground or the end of the air. A direction may be of any
+ * not read, its planes of three are given all or none. t_max NULL: to the ground or the end of the air; one that is NaN or negative counts as 0. A direction may be of any
  * length from 1e-150 to 1e150; those of none meet no air. `error` adds what the table misses, estimated from its own differences, to what
  * nebel_trace_air tells. Any thread. Errors: ARGUMENT (NULL, a component of the direction too). */
 nebel_result nebel_trace_air_view(const nebel_air_view *view, size_t n, const double *const direction[3],

@@ -28,8 +28,10 @@ const char *nebel_isa_name(nebel_isa isa)
         return "avx512";
     case NEBEL_ISA_NEON:
         return "neon";
-    default:
+    case NEBEL_ISA_DEFAULT:
         return "default";
+    default:
+        return "unknown";
     }
 }
 

@@ -21,12 +21,13 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
                        desc->tolerance);
     const nb_cloud_kernel *kernel = nb_cloud_kernel_choose(desc->isa);
     if (kernel == NULL)
-        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %d (%s): not available here",
-                       (int)desc->isa, desc->isa < NEBEL_ISA_COUNT ? nebel_isa_name(desc->isa) : "unknown");
+        return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %s: not available here",
+                       nebel_isa_name(desc->isa));
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_cloud_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
     made->allocator = allocator;
+    made->log = desc->log;
     made->clouds = desc->clouds;
     made->kernel = kernel;
     made->sun = sun;
@@ -64,7 +65,7 @@ nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cl
     *workspace = NULL;
     if (view == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_cloud_workspace *made = nb_allocate_zero(&view->allocator, 1, sizeof *made);
-    if (made == NULL) return NEBEL_ERROR_MEMORY;
+    if (made == NULL) return nb_fail(&view->log, NEBEL_ERROR_MEMORY, "clouds: workspace: out of memory");
     made->view = view;
     made->blocks = nb_allocate_zero(&view->allocator, NB_CLOUD_BLOCKS, sizeof *made->blocks);
     made->points = nb_allocate_zero(&view->allocator, NB_CLOUD_POINTS, sizeof *made->points);
@@ -84,7 +85,7 @@ nebel_result nebel_create_cloud_workspace(const nebel_cloud_view *view, nebel_cl
         return NEBEL_OK;
     }
     nebel_destroy_cloud_workspace(made);
-    return NEBEL_ERROR_MEMORY;
+    return nb_fail(&view->log, NEBEL_ERROR_MEMORY, "clouds: workspace: out of memory");
 }
 
 void nebel_destroy_cloud_workspace(nebel_cloud_workspace *workspace)

@@ -26,6 +26,7 @@ typedef struct nb_cloud_light {
 
 struct nebel_cloud_view {
     nebel_allocator allocator;
+    nebel_log log;
     const nebel_clouds *clouds;
     const nb_cloud_kernel *kernel;
     nebel_sun sun;

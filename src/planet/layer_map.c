@@ -11,7 +11,7 @@
 
 const char *nb_map_fault(const nebel_map *map, int channels)
 {
-    if (map->texels == NULL) return NULL;
+    if (map->texels == NULL) return map->width > 0 || map->height > 0 ? "has a size, but no texels" : NULL;
     if (map->width < 1 || map->width > NEBEL_MAX_MAP_SIZE || map->height < 1 || map->height > NEBEL_MAX_MAP_SIZE)
         return "must have 1 to 16384 rows and columns";
     if (map->channels != channels) return channels == 1 ? "must have 1 channel" : "must have 3 channels";

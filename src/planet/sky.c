@@ -238,19 +238,31 @@ int nb_air_is_ray(const nebel_ray *ray, double unit[3])
     return nb_air_is_place(ray->origin) && nb_vector_make_unit(unit) && ray->t_max >= 0;
 }
 
+static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
+{
+    return (const nebel_ray *)(const void *)((const char *)rays + i * stride);
+}
+
 nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
                              size_t ray_stride, nebel_light *lights, size_t light_stride)
 {
     nebel_sun resolved;
     if (atmosphere == NULL || (n > 0 && (rays == NULL || lights == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
+    double unit[3];
+    for (size_t i = 0; i < n; i++)
+        if (!nb_air_is_ray(ray_at(rays, ray_stride, i), unit)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
-        double unit[3];
-        if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
+        const nebel_ray *ray = ray_at(rays, ray_stride, i);
+        (void)nb_air_is_ray(ray, unit);
         trace(atmosphere, &resolved, ray, unit, (nebel_light *)(void *)((char *)lights + i * light_stride));
     }
     return NEBEL_OK;
+}
+
+static const double *place_at(const double (*places)[3], size_t stride, size_t i)
+{
+    return (const double *)(const void *)((const char *)places + i * stride);
 }
 
 nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
@@ -260,10 +272,11 @@ nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun
     nebel_sun resolved;
     if (atmosphere == NULL || (n > 0 && (places == NULL || lights == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++)
+        if (!nb_air_is_place(place_at(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
+        const double *place = place_at(places, place_stride, i);
         nebel_air_light *light = (nebel_air_light *)(void *)((char *)lights + i * light_stride);
-        if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
         const nb_inside inside = find_inside(atmosphere, place, resolved.direction, HUGE_VAL, resolved.direction);
         if (inside.track.radius > atmosphere->airs.top)
             light->sun[0] = light->sun[1] = light->sun[2] = 1;
