@@ -1,4 +1,4 @@
-/* Scenes whose sunlight reaches nothing: fog without an end on the way to the sun, air without a sun. */
+/* Scenes whose light reaches nothing: fog without an end on the way to the sun, planets without light. */
 #ifndef NB_ENDLESS_H
 #define NB_ENDLESS_H
 
