@@ -23,8 +23,8 @@ verdict() {
 }
 
 text() {
-    cmake -DSOURCE="$PWD" -DDIALECT="$1" -DOUTPUT="$work/text" -P cmake/NebelShaderText.cmake
-    cat "$work/text"
+    if [ ! -e "$work/text_$1" ]; then cmake -DSOURCE="$PWD" -DDIALECT="$1" -DOUTPUT="$work/text_$1" -P cmake/NebelShaderText.cmake; fi
+    cat "$work/text_$1"
 }
 
 calls='
@@ -58,7 +58,10 @@ try_opengl() {
     verdict "$1 $3" glslangValidator "$work/fog.frag"
 }
 
-for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
+# Each feature alone, so that nothing calls what is not declared without another.
+alone=()
+for ((bit = 0; bit < 25; bit++)); do alone+=("#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES $((1 << bit))\n"); done
+for defines in "${alone[@]}" "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n" "uniform highp vec4 w[99];\n#define NEBEL_WORD(i) w[i]\n"; do
     try_opengl glsl_330 "330 core" "$defines"
 done
 for defines in "" "#define NEBEL_TEXTURE\n" "#define NEBEL_FEATURES 2\n" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2097154\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 4194306\n" "#define NEBEL_VOXELS\n#define NEBEL_DIFFUSION\n#define NEBEL_ENVIRONMENT\n"; do

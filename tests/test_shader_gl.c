@@ -411,8 +411,9 @@ static void test_features(void **state)
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
         nebel_snapshot *snapshot = commit_random_fog((random_fog_kind)kind, 1);
         const double eye[3] = {fog.shift[0] + 8, fog.shift[1] + 3, fog.shift[2] - 11};
-        char defines[64], name[64];
-        snprintf(defines, sizeof defines, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(snapshot));
+        char defines[96], name[64];
+        snprintf(defines, sizeof defines, "%s#define NEBEL_FEATURES %u\n",
+                 kind % 2 ? "" : "#define NEBEL_PLAIN_FEATURES\n", (unsigned)nebel_pack_features(snapshot));
         snprintf(name, sizeof name, "%s with features %u", kinds[kind], (unsigned)nebel_pack_features(snapshot));
         tracer t;
         open_tracer(&t, NB_GL_330, TEXTURE, defines, trace_body);

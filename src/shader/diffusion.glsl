@@ -4,7 +4,7 @@
 #define NEBEL_NODE(i) nb_vec4(0.0, 0.0, 0.0, 0.0)
 #endif
 
-#ifndef NB_DECLARES_NO_DIFFUSION
+#if NB_DECLARES(NB_HAS_DIFFUSION)
 
 /* Pieces that leave less than this are halved, so often at most: fog may begin anywhere in them. Where they leave more than that they
  * grow again. */

@@ -162,10 +162,12 @@ nb_vec3 nebel_environment_reflected(nb_vec3 normal)
 nb_vec3 nb_opaque_radiance(int medium, nb_vec3 direction)
 {
     nb_vec3 radiance = NEBEL_WORD(medium + 2).xyz;
+#if NB_DECLARES(NB_HAS_ENVIRONMENT)
     if (NB_HAS(NB_HAS_ENVIRONMENT)) {
         int table = int(NEBEL_WORD(medium + NB_MEDIUM_FILTER).w);
         if (table > 0) radiance *= NEBEL_SKY_PART * nb_environment_scattered(table, direction);
     }
+#endif
     return radiance;
 }
 

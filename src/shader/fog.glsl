@@ -147,8 +147,10 @@ float nb_profile_rate(nb_profile profile)
         rate = slope;
     else if (NB_HAS(NB_HAS_GAUSSIAN) && profile.kind == NB_KIND_GAUSSIAN)
         rate = 2.5 * slope;
+#if NB_DECLARES(NB_HAS_ALTITUDE)
     else if (NB_HAS(NB_HAS_ALTITUDE) && profile.kind == NB_KIND_ALTITUDE)
         rate = nb_altitude_rate(profile);
+#endif
     else if (NB_HAS(NB_HAS_RADIAL) && profile.kind >= NB_KIND_RADIAL)
         rate = slope;
     return rate;
@@ -158,14 +160,24 @@ float nb_profile_rate(nb_profile profile)
 float nb_profile_kink(nb_profile profile, float near)
 {
     float kink = NB_FAR;
+#if NB_DECLARES(NB_HAS_SOFT_EDGE)
     if (NB_HAS(NB_HAS_SOFT_EDGE) && profile.kind == NB_KIND_SOFT_EDGE)
         kink = nb_soft_edge_kink(profile.offset, profile.slope, profile.size, near);
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_ROUND)
     if (NB_HAS(NB_HAS_SOFT_ROUND) && profile.kind == NB_KIND_SOFT_ROUND)
         kink = nb_round_edge_kink(profile.offset, profile.slope, profile.size, profile.form, near);
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_PLANES)
     if (NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES) kink = nb_planes_kink(profile, near);
+#endif
+#if NB_DECLARES(NB_HAS_GRID)
     if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID)
         kink = nb_grid_kink(profile.offset, profile.slope, profile.first, near);
+#endif
+#if NB_DECLARES(NB_HAS_ALTITUDE)
     if (NB_HAS(NB_HAS_ALTITUDE) && profile.kind == NB_KIND_ALTITUDE) kink = nb_altitude_kink(profile, near);
+#endif
     if (NB_HAS(NB_HAS_SLOPE) && (profile.kind == NB_KIND_LINEAR || profile.kind == NB_KIND_HEIGHT_CAPPED)) {
         float inverse = nb_rcp_bounded(profile.slope.x);
         float zero = -profile.offset.x * inverse;
@@ -367,10 +379,12 @@ void nb_add_slot(inout nb_leg leg, nb_piece piece, int k, nb_ray ray)
     bool curved = NB_HAS(NB_HAS_ALTITUDE) && int(extinction.w) == NB_KIND_ALTITUDE;
     nb_profile profile = nb_profile_of(at, int(extinction.w), ray, piece.start + (curved ? leg.from : 0.0));
     profile.offset += profile.slope * leg.from;
+#if NB_DECLARES(NB_HAS_GRID)
     if (NB_HAS(NB_HAS_GRID) && profile.kind == NB_KIND_GRID) {
         nb_add_grid(leg, profile, extinction.xyz, light, glow, 0.5 * (piece.end - piece.start) - leg.from);
         return;
     }
+#endif
     /* linear within a piece, which ends at kinks: dear to find for many faces */
     bool flat_sided = NB_HAS(NB_HAS_SOFT_PLANES) && profile.kind == NB_KIND_SOFT_PLANES;
     float first = 0.0;
@@ -548,12 +562,16 @@ void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit
     leg.first_is_curved = leg.number > 0 && leg.last_is_curved;
     leg.last_is_curved = false;
     leg.stop = min(piece.end, lit.y) - piece.start;
+#if NB_DECLARES(NB_HAS_SUN)
     if (leg.sunlight > 0.0) {
         nb_turning turning = nb_find_turn(ray, t, piece.start + leg.stop);
         leg.stop = turning.next - piece.start;
         leg.last_is_curved = turning.curved;
+#if NB_DECLARES(NB_HAS_GRID)
         if (NB_HAS(NB_HAS_GRID)) leg.most = nb_most_in_shadow(ray, 0.5 * (t + turning.next));
+#endif
     }
+#endif
 }
 
 /* Moves behind a leg, or makes it shorter. Returns what is left of the piece [m]. */
@@ -565,6 +583,7 @@ float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, nb_ray r
     bool is_last = leg.number >= nb_most_legs(piece);
     bool fits = even || strain <= NB_LEG_BEARS || is_last;
     float rest = piece.end - piece.start - leg.from;
+#if NB_DECLARES(NB_HAS_SUN)
     if (nb_is_sunlit(leg) && fits) {
         bool closed = nb_sun_is_closed();
         nb_vec3 most = leg.shine * nb_exp3(-g.depth) * nb_attenuate(depth).mean;
@@ -581,6 +600,7 @@ float nb_end_leg(inout nb_gathered g, inout nb_leg leg, nb_piece piece, nb_ray r
         }
         even = even && (closed || faint);
     }
+#endif
     if (fits) {
         if (lit) g.radiance += even ? nb_light_even(leg.light, depth, g.depth) : nb_light_mixed(leg, g.depth);
         g.light += leg.light;

@@ -29,7 +29,7 @@ nb_lamplit nb_open_lamplit()
     return l;
 }
 
-#ifndef NB_DECLARES_NO_LAMPS
+#if NB_DECLARES(NB_HAS_LAMPS)
 
 /* A lamp that is passed by a ray. */
 struct nb_lamp_pass {

@@ -29,10 +29,12 @@ nb_vec3 nb_depth_to_light_within(int at, nb_ray ray, nb_stretch s, bool to_sun)
 {
     nb_vec4 extinction = NEBEL_WORD(at);
     nb_vec3 depth = nb_splat3(0.0);
-    if (NB_HAS(NB_HAS_GRID) && NB_HAS(NB_HAS_SUN) && to_sun && int(extinction.w) == NB_KIND_GRID)
-        depth = extinction.xyz * nb_amount_to_sun(at, ray, s);
-    else
-        depth = nb_depth_within(at, ray, s);
+    bool walked = true;
+#if NB_DECLARES(NB_HAS_GRID) && NB_DECLARES(NB_HAS_SUN)
+    walked = !(NB_HAS(NB_HAS_GRID) && NB_HAS(NB_HAS_SUN) && to_sun && int(extinction.w) == NB_KIND_GRID);
+    if (!walked) depth = extinction.xyz * nb_amount_to_sun(at, ray, s);
+#endif
+    if (walked) depth = nb_depth_within(at, ray, s);
     return depth;
 }
 
@@ -96,15 +98,21 @@ nb_cover nb_cover_at(nb_ray ray, nb_media media, float t, inout int turns)
 nb_vec3 nb_depth_of(nb_ray ray, nb_media media, inout int turns)
 {
     nb_vec3 depth = nb_splat3(0.0);
+#if NB_DECLARES(NB_HAS_COVER)
     float t = 0.0;
     nb_ray part = ray;
-    if (!NB_HAS(NB_HAS_COVER)) return nb_added_depth(ray, media, 0.0, 0, turns);
     while (t < ray.t_max) {
-        nb_cover cover = nb_cover_at(ray, media, t, turns);
+        nb_cover cover;
+        cover.floor = 0;
+        cover.end = ray.t_max;
+        if (NB_HAS(NB_HAS_COVER)) cover = nb_cover_at(ray, media, t, turns);
         part.t_max = cover.end;
         depth += nb_added_depth(part, media, t, cover.floor, turns);
         t = cover.end;
     }
+#elif NB_DECLARES(NB_HAS_SUN | NB_HAS_LAMPS)
+    depth = nb_added_depth(ray, media, 0.0, 0, turns);
+#endif
     return depth;
 }
 

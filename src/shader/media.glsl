@@ -3,15 +3,14 @@
 #ifndef NEBEL_FEATURES
 #define NEBEL_FEATURES NB_HAS_ALL
 #endif
-/* Compilers take long for functions that are left out later, too; but not every preprocessor can reckon with 123u. */
+/* Compilers put functions into each other before they leave out what no condition lets through: that takes most of the time and memory of a
+ * small program. What is large stands between #if NB_DECLARES(...) as well; but not every preprocessor can reckon with 123u. */
 #ifdef NEBEL_PLAIN_FEATURES
-#if (NEBEL_FEATURES & NB_HAS_LAMPS) == 0
-#define NB_DECLARES_NO_LAMPS
+#define NB_DECLARED NEBEL_FEATURES
+#else
+#define NB_DECLARED NB_HAS_ALL
 #endif
-#if (NEBEL_FEATURES & NB_HAS_DIFFUSION) == 0
-#define NB_DECLARES_NO_DIFFUSION
-#endif
-#endif
+#define NB_DECLARES(features) ((NB_DECLARED & (features)) != 0)
 #ifndef NEBEL_MOST_LIGHT
 #define NEBEL_MOST_LIGHT 65504.0
 #endif
@@ -124,14 +123,22 @@ nb_interval nb_leaf_interval(int leaf, nb_ray ray)
         nb_vec3 p = local.origin + place;
         if (NB_HAS(NB_HAS_BOX) && type == NB_TYPE_BOX)
             span = nb_interval_box(local.origin, d, place, NEBEL_WORD(leaf + 2).xyz, 0.0);
+#if NB_DECLARES(NB_HAS_BALL)
         else if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL)
             span = nb_interval_ball(p, d, head.y, NB_NO_REACH);
+#endif
+#if NB_DECLARES(NB_HAS_TUBE)
         else if (NB_HAS(NB_HAS_TUBE) && type == NB_TYPE_TUBE)
             span = nb_interval_tube(p, d, NB_NO_REACH);
+#endif
+#if NB_DECLARES(NB_HAS_CONE)
         else if (NB_HAS(NB_HAS_CONE) && type == NB_TYPE_CONE)
             span = nb_interval_cone(p, d, head.y, head.z, NB_NO_REACH);
+#endif
+#if NB_DECLARES(NB_HAS_CAPSULE)
         else if (NB_HAS(NB_HAS_CAPSULE) && type == NB_TYPE_CAPSULE)
             span = nb_interval_capsule(p, d, head.y, NB_NO_REACH);
+#endif
     }
     return span;
 }
@@ -149,8 +156,9 @@ nb_stretch nb_stretch_of(float enter, float leave)
     return s;
 }
 
+#if NB_DECLARES(NB_HAS_GROUP)
 /* Where a body of several leaves, the first at `leaf`, next has the ray inside at or behind `from`: from event to event of its
- * leaves. The program's stack is the bits of an int. */
+ * leaves. The program's stack is the bits of an int. A body of one leaf comes here, too: so shapes stand in a program once. */
 nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
 {
     float begin = -1.0;
@@ -161,6 +169,7 @@ nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
         for (int i = 0; i < count; i++) {
             int at = leaf + NB_LEAF_WORDS * i;
             nb_interval span = nb_leaf_interval(at, ray);
+            if (count == 1) return nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
             bool some = span.enter < span.leave;
             if (some && span.enter > t) next = min(next, span.enter);
             if (some && span.leave > t) next = min(next, span.leave);
@@ -178,26 +187,28 @@ nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
     }
     return nb_stretch_of(begin < 0.0 ? ray.t_max : begin, ray.t_max);
 }
+#endif
 
 /* Where the body of a medium next has the ray inside, at or behind `from`. */
 nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
 {
-    int at = medium + NB_MEDIUM_LEAF;
-    nb_stretch s;
+    int leaf = medium + NB_MEDIUM_LEAF;
     if (NB_HAS(NB_HAS_DISTANCES) && ray.from_eye) {
         from = max(from, NEBEL_WORD(medium + NB_MEDIUM_START).w);
         ray.t_max = min(ray.t_max, NEBEL_WORD(medium + NB_MEDIUM_CUTOFF).w);
     }
+#if NB_DECLARES(NB_HAS_GROUP)
     if (NB_HAS(NB_HAS_GROUP) && leaves > 1) {
-        nb_vec4 low = NEBEL_WORD(at);
-        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(at + 1).xyz, 0.0);
-        s = nb_stretch_of(from, from);
-        if (max(bounds.enter, from) < min(bounds.leave, ray.t_max)) s = nb_group_stretch(int(low.w), leaves, ray, from);
-    } else {
-        nb_interval span = nb_leaf_interval(at, ray);
-        s = nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
+        nb_vec4 low = NEBEL_WORD(leaf);
+        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(leaf + 1).xyz, 0.0);
+        if (!(max(bounds.enter, from) < min(bounds.leave, ray.t_max))) return nb_stretch_of(from, from);
+        leaf = int(low.w);
     }
-    return s;
+    return nb_group_stretch(leaf, NB_HAS(NB_HAS_GROUP) ? leaves : 1, ray, from);
+#else
+    nb_interval span = nb_leaf_interval(leaf, ray);
+    return nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
+#endif
 }
 
 /* ---- profiles -------------------------------------------------------------------------------- */
@@ -332,17 +343,23 @@ nb_profile nb_profile_of(int medium, int kind, nb_ray ray, float start)
         if (NB_HAS(NB_HAS_SLOPE) && kind <= NB_KIND_LINEAR) {
             profile.slope.x = dot(word.xyz, ray.direction);
             profile.offset.x = word.w + dot(word.xyz, ray.origin) + profile.slope.x * start;
+#if NB_DECLARES(NB_HAS_ALTITUDE)
         } else if (NB_HAS(NB_HAS_ALTITUDE) && kind == NB_KIND_ALTITUDE) {
             profile = nb_altitude_profile(profile, word, ray, start);
+#endif
         } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
             profile = nb_round_profile(profile, word.xyz + ray.origin, ray.direction, word.w, start);
+#if NB_DECLARES(NB_HAS_SOFT_ROUND)
         } else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND) {
             profile = nb_round_body_profile(profile, medium + NB_MEDIUM_LEAF, word, ray, start);
+#endif
         } else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES) {
             profile = nb_planes_profile(profile, medium + NB_MEDIUM_LEAF, ray, start);
+#if NB_DECLARES(NB_HAS_GRID)
         } else if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID) {
             profile = nb_grid_profile(profile, medium + NB_MEDIUM_LEAF, word, ray, start);
             profile.level = NB_ENOUGH / max(nb_smallest(NEBEL_WORD(medium).xyz), NB_TINY);
+#endif
         } else {
             profile = nb_leaf_profile(profile, medium + NB_MEDIUM_LEAF, word.w, ray, start);
         }
@@ -416,18 +433,30 @@ float nb_density(nb_profile profile, float s)
             density = nb_height_capped_density(u);
         else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_LINEAR)
             density = nb_linear_density(u);
+#if NB_DECLARES(NB_HAS_GAUSSIAN)
         else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN)
             density = nb_gaussian_density(profile.level, u);
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_EDGE)
         else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE)
             density = nb_soft_edge_density(profile.offset + profile.slope * s, profile.size);
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_ROUND)
         else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND)
             density = nb_round_edge_density(profile.side, profile.offset + profile.slope * s, profile.size.x, profile.form);
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_PLANES)
         else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES)
             density = nb_planes_density(profile, s);
+#endif
+#if NB_DECLARES(NB_HAS_ALTITUDE)
         else if (NB_HAS(NB_HAS_ALTITUDE) && kind == NB_KIND_ALTITUDE)
             density = min(nb_height_density(nb_arc_height(nb_profile_arc(profile), s) / profile.size.x), profile.size.z);
+#endif
+#if NB_DECLARES(NB_HAS_RADIAL)
         else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE)
             density = nb_radial_density(profile.level, u, kind - NB_KIND_RADIAL + 1);
+#endif
     }
     return density;
 }
@@ -452,23 +481,37 @@ float nb_integral(nb_profile profile, float h)
                 integral = nb_height_capped_integral(from, rise, h).value;
         } else if (NB_HAS(NB_HAS_SLOPE) && kind == NB_KIND_LINEAR) {
             integral = nb_linear_integral(u, slope, h).value;
+#if NB_DECLARES(NB_HAS_GAUSSIAN)
         } else if (NB_HAS(NB_HAS_GAUSSIAN) && kind == NB_KIND_GAUSSIAN) {
             integral = nb_gaussian_integral(profile.level, u, u + slope * h, slope).value;
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_EDGE)
         } else if (NB_HAS(NB_HAS_SOFT_EDGE) && kind == NB_KIND_SOFT_EDGE) {
             integral = nb_soft_edge_integral(profile.offset, profile.slope, profile.size, h).value;
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_ROUND)
         } else if (NB_HAS(NB_HAS_SOFT_ROUND) && kind == NB_KIND_SOFT_ROUND) {
             integral =
                 nb_round_edge_integral(profile.side, profile.offset, profile.slope, profile.size, profile.form, h).value;
+#endif
+#if NB_DECLARES(NB_HAS_SOFT_PLANES)
         } else if (NB_HAS(NB_HAS_SOFT_PLANES) && kind == NB_KIND_SOFT_PLANES) {
             integral = nb_planes_integral(profile, h);
+#endif
+#if NB_DECLARES(NB_HAS_GRID)
         } else if (NB_HAS(NB_HAS_GRID) && kind == NB_KIND_GRID) {
             integral = nb_grid_integral(profile.offset, profile.slope, profile.first, h, profile.level);
+#endif
+#if NB_DECLARES(NB_HAS_ALTITUDE)
         } else if (NB_HAS(NB_HAS_ALTITUDE) && kind == NB_KIND_ALTITUDE) {
             nb_arc arc = nb_profile_arc(profile);
             nb_chord deep = nb_arc_chord(arc, -profile.size.y);
             integral = nb_altitude_integral(arc, profile.size.x, deep, profile.size.z, 0.0, h).value;
+#endif
+#if NB_DECLARES(NB_HAS_RADIAL)
         } else if (NB_HAS(NB_HAS_RADIAL) && kind >= NB_KIND_RADIAL && kind < NB_KIND_EXCLUDE) {
             integral = nb_radial_integral(profile.level, u, slope, h, kind - NB_KIND_RADIAL + 1).value;
+#endif
         }
     }
     return integral;

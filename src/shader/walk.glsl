@@ -137,8 +137,10 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
             over = nb_end_leg(g, leg, piece, ray, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
         else if (begins)
             leg = nb_first_leg(piece, lit);
+#if NB_DECLARES(NB_HAS_GRID) && NB_DECLARES(NB_HAS_SUN)
         else if (celled)
             turns = nb_walk_voxels(g, piece, ray, window.used, tolerance, sunlit, turns);
+#endif
         else if (foggy)
             nb_pass_piece(g, piece, lit);
         stepping = !over;
@@ -213,17 +215,21 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
     bool covers = NB_HAS(NB_HAS_COVER) && sum.met && sum.covers;
     bool mixed = (NB_HAS(NB_HAS_MIXED) && sum.mixed) || (NB_HAS(NB_HAS_SUN) && sum.scatters);
     bool walks = lit && (covers || mixed);
+#if NB_DECLARES(NB_HAS_COVER)
     if (covers && (!lit || (NB_MAY_TIRE && last))) {
         nb_vec3 depth = nb_depth_of(ray, media, turns);
         sum.light *= depth / max(sum.depth, nb_splat3(NB_TINY)); /* what is not walked is as bright as all together */
         sum.depth = depth;
         light.transmittance = nb_exp3(-depth);
     }
+#endif
+#if NB_DECLARES(NB_HAS_COVER | NB_HAS_MIXED | NB_HAS_SUN)
     if (walks && p.stage == NB_STAGE_WALK && !(NB_RESUMES && last)) nb_walk(p.walked, ray, first, count, listed, lit, turns);
     if (walks && p.stage == NB_STAGE_WALK && NB_MAY_TIRE && last && (NB_RESUMES || p.walked.is_cut)) {
         p.walked = covers ? nb_pass_even(p.walked, sum) : nb_pass_rest(p.walked, sum, ray, first, count, listed);
         p.walked.is_cut = false;
     }
+#endif
     if (walks) light.in_scattering = p.walked.radiance;
     if (walks && covers) light.transmittance = nb_exp3(-p.walked.depth);
     if (p.stage == NB_STAGE_WALK && !(NB_MAY_TIRE && p.walked.is_cut)) p.stage = NB_STAGE_LAMPS;
@@ -282,6 +288,7 @@ nebel_light nb_clear()
     return light;
 }
 
+#ifndef NEBEL_RESUMES
 /* `lit`: in-scattering is asked for, too. `from_eye`: distances along the ray count. */
 nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count, bool listed, bool lit,
                            bool from_eye)
@@ -294,6 +301,7 @@ nebel_light nb_trace_media(nb_vec3 origin, nb_vec3 direction, float t_max, int f
     }
     return light;
 }
+#endif
 
 #ifdef NEBEL_RESUMES
 /* How far a ray has come, in words from pass to pass; all 0 at first. First of them: light or what there is of it, and up to where;
@@ -360,34 +368,13 @@ nb_progress_words nb_resume(nb_progress_words words, nb_vec3 origin, nb_vec3 dir
 }
 #endif
 
-nebel_light nebel_trace(nb_vec3 origin, nb_vec3 direction, float t_max)
-{
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, true, true);
-}
-
-nb_vec3 nebel_transmit(nb_vec3 origin, nb_vec3 direction, float t_max)
-{
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, true).transmittance;
-}
-
-nb_vec3 nebel_transmit_light(nb_vec3 origin, nb_vec3 direction, float t_max)
-{
-    return nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, false, false).transmittance;
-}
-
+/* No functions: of each that a program does not call it would hold another copy of the whole walk until its compiler finds that out. */
+#define nb_trace_all(origin, direction, t_max, lit, from_eye) nb_trace_media(origin, direction, t_max, 0, int(NEBEL_WORD(0).x), false, lit, from_eye)
+#define nebel_trace(origin, direction, t_max) nb_trace_all(origin, direction, t_max, true, true)
+#define nebel_transmit(origin, direction, t_max) nb_trace_all(origin, direction, t_max, false, true).transmittance
+#define nebel_transmit_light(origin, direction, t_max) nb_trace_all(origin, direction, t_max, false, false).transmittance
 #ifdef NEBEL_INDEX
-nebel_light nebel_trace_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
-{
-    return nb_trace_media(origin, direction, t_max, first, count, true, true, true);
-}
-
-nb_vec3 nebel_transmit_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
-{
-    return nb_trace_media(origin, direction, t_max, first, count, true, false, true).transmittance;
-}
-
-nb_vec3 nebel_transmit_light_list(nb_vec3 origin, nb_vec3 direction, float t_max, int first, int count)
-{
-    return nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance;
-}
+#define nebel_trace_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, true, true)
+#define nebel_transmit_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, false, true).transmittance
+#define nebel_transmit_light_list(origin, direction, t_max, first, count) nb_trace_media(origin, direction, t_max, first, count, true, false, false).transmittance
 #endif
