@@ -150,6 +150,40 @@ static void tables_are_as_far_off_as_they_say(void **state)
     }
 }
 
+/* The planet's shadow stands in sight in air that is deep for its radius. */
+static void deep_air_has_no_stairs(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *what;
+        double height, sun, most_of_99, most;
+    } eyes[] = {{"night in deep air", 2, -.3, 4e-3, 4e-2}, {"morning in deep air", 500, .3, 8e-3, 8e-2}};
+    const nebel_atmosphere_desc deep = {
+        .radius = 1e3,
+        .thickness = 1e3,
+        .airs = {{.scattering = {1e-4, 2e-4, 4e-4}, .phase.type = NEBEL_PHASE_RAYLEIGH, .scale_height = 300}},
+        .air_count = 1};
+    nebel_atmosphere *air;
+    uint32_t seed = 5;
+    assert_int_equal(nebel_create_atmosphere(&deep, &air), NEBEL_OK);
+    for (size_t i = 0; i < sizeof eyes / sizeof *eyes; i++) {
+        const nebel_air_view_desc desc = {
+            .atmosphere = air, .sun = {{1, eyes[i].sun, .2}, {1, 1, 1}}, .position = {0, eyes[i].height, 0}};
+        nebel_air_view *view;
+        tally all = {.count = 0};
+        assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
+        for (int part = 0; part < 6; part++) {
+            bundle rays;
+            aim(&rays, &deep, eyes[i].height, &seed);
+            trace_both(&rays, &desc, view);
+            count(&rays, &all);
+        }
+        nebel_destroy_air_view(view);
+        check(eyes[i].what, &all, eyes[i].most_of_99, eyes[i].most);
+    }
+    nebel_destroy_atmosphere(air);
+}
+
 static void rays_may_end_within_the_air(void **state)
 {
     (void)state;
@@ -469,15 +503,11 @@ static void all_instruction_sets_agree(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tables_are_as_far_off_as_they_say),
-        cmocka_unit_test(rays_may_end_within_the_air),
-        cmocka_unit_test(thin_air_is_passed_up_to_the_ground),
-        cmocka_unit_test(ground_is_lit_as_places_are),
-        cmocka_unit_test(order_of_work_changes_nothing),
-        cmocka_unit_test(odd_places_have_answers),
-        cmocka_unit_test(bad_calls_are_refused),
-        cmocka_unit_test(ends_that_are_none_count_as_zero),
-        cmocka_unit_test(all_instruction_sets_agree),
+        cmocka_unit_test(tables_are_as_far_off_as_they_say), cmocka_unit_test(deep_air_has_no_stairs),
+        cmocka_unit_test(rays_may_end_within_the_air),       cmocka_unit_test(thin_air_is_passed_up_to_the_ground),
+        cmocka_unit_test(ground_is_lit_as_places_are),       cmocka_unit_test(order_of_work_changes_nothing),
+        cmocka_unit_test(odd_places_have_answers),           cmocka_unit_test(bad_calls_are_refused),
+        cmocka_unit_test(ends_that_are_none_count_as_zero),  cmocka_unit_test(all_instruction_sets_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

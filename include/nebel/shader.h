@@ -14,7 +14,8 @@
  * is enough anywhere in the world. No graphics interface is called here: this works for OpenGL, OpenGL ES, WebGL,
  * Vulkan and Direct3D alike; nebel/gl.h does the rest for OpenGL.
  *
- * What the text declares, in every dialect (vec3 is float3 in HLSL):
+ * What the text declares, in every dialect (vec3 is float3 in HLSL); the functions along a ray are macros, so that a
+ * program holds those that it calls, once for each call:
  *
  *     struct nebel_light { vec3 transmittance; vec3 in_scattering; };
  *     nebel_light nebel_trace(vec3 origin, vec3 direction, float t_max);

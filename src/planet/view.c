@@ -239,6 +239,13 @@ static nebel_result allocate(nebel_air_view *view)
     return view->entries != NULL && view->extinction != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
 }
 
+/* From space day and night are seen at once, and so they are in air that is deep for the planet. */
+static int sees_day_and_night(const nebel_air_view *view)
+{
+    const nb_outlook *outlook = &view->outlook;
+    return outlook->height > outlook->thickness || outlook->thickness > 0.1 * view->atmosphere->airs.radius;
+}
+
 static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
 {
     const nebel_atmosphere *atmosphere = desc->atmosphere;
@@ -246,8 +253,7 @@ static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
     for (int c = 0; c < 3; c++) place[c] = desc->position[c] - atmosphere->center[c];
     set_axes(view, place);
     view->outlook = nb_outlook_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
-    const int is_outside = view->outlook.height > view->outlook.thickness;
-    view->columns = is_outside ? NB_VIEW_SPACE_COLUMNS : NB_VIEW_COLUMNS;
+    view->columns = sees_day_and_night(view) ? NB_VIEW_MORE_COLUMNS : NB_VIEW_COLUMNS;
     view->levels = desc->has_distances ? NB_VIEW_LEVELS : 1;
     view->rule = nb_rule_make(desc->has_distances ? NODES : NB_RULE_MOST);
     for (int k = 0; k < atmosphere->airs.count; k++) {

@@ -10,9 +10,9 @@ enum {
     NB_VIEW_FALLING = 48, /* rows that end at the ground */
     NB_VIEW_RISING = 64,  /* and others */
     NB_VIEW_ROWS = NB_VIEW_FALLING + NB_VIEW_RISING,
-    NB_VIEW_COLUMNS = 25,       /* from within the air */
-    NB_VIEW_SPACE_COLUMNS = 73, /* from space day and night are seen at once */
-    NB_VIEW_LEVELS = 12,        /* beside the one at the start; at the squares of their number */
+    NB_VIEW_COLUMNS = 25,      /* from within shallow air */
+    NB_VIEW_MORE_COLUMNS = 73, /* where day and night are seen at once */
+    NB_VIEW_LEVELS = 12,       /* beside the one at the start; at the squares of their number */
     NB_VIEW_SUNS = 257,
 };
 
