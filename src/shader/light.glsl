@@ -101,11 +101,11 @@ nb_vec3 nb_depth_of(nb_ray ray, nb_media media, inout int turns)
 #if NB_DECLARES(NB_HAS_COVER)
     float t = 0.0;
     nb_ray part = ray;
+#ifndef NEBEL_PLAIN_FEATURES
+    if (!NB_HAS(NB_HAS_COVER)) return nb_added_depth(ray, media, 0.0, 0, turns);
+#endif
     while (t < ray.t_max) {
-        nb_cover cover;
-        cover.floor = 0;
-        cover.end = ray.t_max;
-        if (NB_HAS(NB_HAS_COVER)) cover = nb_cover_at(ray, media, t, turns);
+        nb_cover cover = nb_cover_at(ray, media, t, turns);
         part.t_max = cover.end;
         depth += nb_added_depth(part, media, t, cover.floor, turns);
         t = cover.end;

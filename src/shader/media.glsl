@@ -158,7 +158,7 @@ nb_stretch nb_stretch_of(float enter, float leave)
 
 #if NB_DECLARES(NB_HAS_GROUP)
 /* Where a body of several leaves, the first at `leaf`, next has the ray inside at or behind `from`: from event to event of its
- * leaves. The program's stack is the bits of an int. A body of one leaf comes here, too: so shapes stand in a program once. */
+ * leaves. The program's stack is the bits of an int. */
 nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
 {
     float begin = -1.0;
@@ -169,7 +169,6 @@ nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
         for (int i = 0; i < count; i++) {
             int at = leaf + NB_LEAF_WORDS * i;
             nb_interval span = nb_leaf_interval(at, ray);
-            if (count == 1) return nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
             bool some = span.enter < span.leave;
             if (some && span.enter > t) next = min(next, span.enter);
             if (some && span.leave > t) next = min(next, span.leave);
@@ -192,23 +191,24 @@ nb_stretch nb_group_stretch(int leaf, int count, nb_ray ray, float from)
 /* Where the body of a medium next has the ray inside, at or behind `from`. */
 nb_stretch nb_next_stretch(int medium, int leaves, nb_ray ray, float from)
 {
-    int leaf = medium + NB_MEDIUM_LEAF;
+    int at = medium + NB_MEDIUM_LEAF;
     if (NB_HAS(NB_HAS_DISTANCES) && ray.from_eye) {
         from = max(from, NEBEL_WORD(medium + NB_MEDIUM_START).w);
         ray.t_max = min(ray.t_max, NEBEL_WORD(medium + NB_MEDIUM_CUTOFF).w);
     }
+    nb_stretch s = nb_stretch_of(from, from);
 #if NB_DECLARES(NB_HAS_GROUP)
     if (NB_HAS(NB_HAS_GROUP) && leaves > 1) {
-        nb_vec4 low = NEBEL_WORD(leaf);
-        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(leaf + 1).xyz, 0.0);
-        if (!(max(bounds.enter, from) < min(bounds.leave, ray.t_max))) return nb_stretch_of(from, from);
-        leaf = int(low.w);
-    }
-    return nb_group_stretch(leaf, NB_HAS(NB_HAS_GROUP) ? leaves : 1, ray, from);
-#else
-    nb_interval span = nb_leaf_interval(leaf, ray);
-    return nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
+        nb_vec4 low = NEBEL_WORD(at);
+        nb_interval bounds = nb_interval_box(ray.origin, ray.direction, low.xyz, NEBEL_WORD(at + 1).xyz, 0.0);
+        if (max(bounds.enter, from) < min(bounds.leave, ray.t_max)) s = nb_group_stretch(int(low.w), leaves, ray, from);
+    } else
 #endif
+    {
+        nb_interval span = nb_leaf_interval(at, ray);
+        s = nb_stretch_of(max(span.enter, from), min(span.leave, ray.t_max));
+    }
+    return s;
 }
 
 /* ---- profiles -------------------------------------------------------------------------------- */
