@@ -155,7 +155,7 @@ static void test_300_es_block(void **state)
 static void trace_sunlit_fog(random_fog_kind kind, uint64_t seed)
 {
     tracer t;
-    char features[64];
+    char features[96];
     random_fog_make(&fog, kind, seed);
     uint64_t state = seed + 100;
     random_fog_light(&fog, &state);
@@ -167,7 +167,8 @@ static void trace_sunlit_fog(random_fog_kind kind, uint64_t seed)
     for (int k = 0; k < 3; k++) eye[k] = fog.shift[k] + dice(&state, -20, 20) * (seed % 3 == 0 ? .2 : 1);
     snprintf(name, sizeof name, "sunlit %s %d", kinds[kind], (int)seed);
     camera_rays(eye, fog.shift, seed);
-    snprintf(features, sizeof features, "#define NEBEL_FEATURES %u\n", (unsigned)nebel_pack_features(snapshot));
+    snprintf(features, sizeof features, "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n",
+             (unsigned)nebel_pack_features(snapshot));
     open_tracer(&t, seed % 2 == 0 ? NB_GL_330 : NB_GL_300ES, TEXTURE, features, trace_body);
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
@@ -233,7 +234,8 @@ static void try_volumes(const char *defines, const nebel_volume_desc *volumes, s
     static const double middle[3] = {0, 0, 0};
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, count);
     char all[128];
-    snprintf(all, sizeof all, "%s#define NEBEL_FEATURES %u\n", defines, (unsigned)nebel_pack_features(snapshot));
+    snprintf(all, sizeof all, "%s#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES %u\n", defines,
+             (unsigned)nebel_pack_features(snapshot));
     tracer t;
     open_tracer(&t, NB_GL_330, TEXTURE, all, trace_body);
     camera_rays(eye, middle, count);

@@ -29,14 +29,14 @@ static int tries_all; /* an argument asks for more scenes */
 
 static const nebel_sun low_sun = {{.8, .42, .4}, {3, 2.5, 2}};
 
-/* Against light in double, which is found without lattices; features as packed. */
+/* Against light in double, which is found without lattices; features as packed, to the preprocessor as well in one language. */
 static void trace_packed(const nebel_snapshot *snapshot, const double eye[3], double scale, const char *name,
                          nb_gl_language language)
 {
-    char defines[96];
+    char defines[128];
     tracer t;
-    snprintf(defines, sizeof defines, "#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n",
-             (unsigned)nebel_pack_features(snapshot));
+    snprintf(defines, sizeof defines, "%s#define NEBEL_VOXELS\n#define NEBEL_FEATURES %u\n",
+             language == NB_GL_330 ? "#define NEBEL_PLAIN_FEATURES\n" : "", (unsigned)nebel_pack_features(snapshot));
     open_tracer(&t, language, TEXTURE, defines, trace_body);
     pack_and_upload(&t, snapshot, eye);
     upload_voxels(&t, snapshot);
