@@ -289,7 +289,7 @@ static void test_texts(void **state)
         assert_non_null(text);
         assert_null(strstr(text, "#version"));
         assert_null(strstr(text, "#include"));
-        assert_non_null(strstr(text, "nebel_light nebel_trace("));
+        assert_non_null(strstr(text, "#define nebel_trace("));
         assert_int_equal(strstr(text, "nebel_fog_block") != NULL, dialect <= NEBEL_DIALECT_GLSL_300_ES);
         for (const char *c = text; *c != 0; c++) assert_true(*c == '\n' || (*c >= ' ' && *c <= '~'));
     }
