@@ -11,7 +11,7 @@ target_compile_definitions(formula_fast PRIVATE NB_FAST=1)
 
 foreach(test IN ITEMS test_shapes test_profiles test_formulas_gl)
     if(TARGET ${test})
-        target_sources(${test} PRIVATE formula_inputs.c formula_truth.c
-            $<TARGET_OBJECTS:formula_float> $<TARGET_OBJECTS:formula_double> $<TARGET_OBJECTS:formula_fast>)
+        target_sources(${test} PRIVATE $<TARGET_OBJECTS:formula_float> $<TARGET_OBJECTS:formula_double>
+            $<TARGET_OBJECTS:formula_fast>)
     endif()
 endforeach()
