@@ -945,6 +945,14 @@ class InfoTest(PictureCase):
         self.assertNotIn("optical depth", moon)
         self.assertNotIn("deeper", nebel("info", self.write_scene("e.json", [], planet={"model": "physical"})).out)
 
+    def test_deep_air_is_said_with_its_picture(self):
+        air = {"type": "exponential", "scattering": [2e-3, 2e-3, 2e-3], "scale_height": 8000}
+        for airs, told in (([air], 1), ([], 0)):
+            scene = self.write_scene("air.json", [], planet={"model": "physical", "airs": airs} if airs else {"model": "physical"})
+            warning = f"nebel: warning: {scene}: planet[0]: air deeper than 12 "
+            for command in (["render", scene, "-o", self.folder / "a.png", "-s", "8x8", "-q"], ["trace", scene]):
+                self.assertEqual(nebel(*command, text=RAY).err.count(warning), told)
+
     def test_a_camera_below_the_ground_of_a_planet(self):
         for planet, radius in (({"model": "physical", "preset": "mars"}, 3389500), ({"model": "layers"}, 6360000)):
             for height, deep in ((0, None), (-5000, 5000), (-radius, radius)):

@@ -1,6 +1,7 @@
 /* nebel render: a scene to a picture, to many, or to a film. */
 #define _POSIX_C_SOURCE 200809L
 
+#include "air_depth.h"
 #include "commands.h"
 #include "endless.h"
 #include "finer.h"
@@ -388,9 +389,11 @@ static void note_stillness(const nebel_scene *scene, const nb_render_call *wante
                       wanted->scene, name_movers(data));
 }
 
-static void warn_of_darkness(const nebel_scene_data *scene, const nb_render_call *wanted)
+static void warn_of_light(const nebel_scene_data *scene, const nb_render_call *wanted)
 {
-    if (wanted->method == NEBEL_METHOD_EXACT) nb_warn_of_darkness(scene, wanted->scene);
+    if (wanted->method != NEBEL_METHOD_EXACT) return;
+    nb_warn_of_darkness(scene, wanted->scene);
+    nb_warn_of_deep_air(scene, wanted->scene);
 }
 
 /* What the scene has beside its cells is not drawn. */
@@ -564,7 +567,7 @@ static int set_up(studio *all)
     int status = load(all);
     if (status != NB_DONE || nb_interrupt_is_requested()) return status;
     if (!wanted->quiet && wanted->last_frame > wanted->first_frame) note_stillness(all->loaded.scene, wanted);
-    warn_of_darkness(nebel_scene_contents(all->loaded.scene), wanted);
+    warn_of_light(nebel_scene_contents(all->loaded.scene), wanted);
     status = check_classic(all);
     if (status == NB_DONE) status = make_cells(all);
     if (status == NB_DONE) status = tessellate(all);

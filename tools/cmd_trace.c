@@ -1,6 +1,7 @@
 /* nebel trace: rays in, numbers out. */
 #define _POSIX_C_SOURCE 200809L
 
+#include "air_depth.h"
 #include "commands.h"
 #include "endless.h"
 #include "isa.h"
@@ -297,6 +298,7 @@ static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
     int status = nb_load_scene(path, 0, wanted->frame, &listener, &loaded);
     if (status != NB_DONE) return status;
     nb_warn_of_darkness(nebel_scene_contents(loaded.scene), path);
+    nb_warn_of_deep_air(nebel_scene_contents(loaded.scene), path);
     status = read_rays(rays);
     if (status == NB_DONE) {
         wanted->threads = useful_threads(rays->count, wanted->threads);

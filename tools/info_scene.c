@@ -1,5 +1,6 @@
 #include "info_scene.h"
 
+#include "air_depth.h"
 #include "endless.h"
 #include "load.h"
 #include "report.h"
@@ -83,36 +84,17 @@ static void print_clouds(const nebel_planet *planet)
     }
 }
 
-static int has_air(const nebel_atmosphere_desc *air)
-{
-    double sum = 0;
-    for (uint32_t i = 0; i < air->air_count; i++)
-        for (int c = 0; c < 3; c++) sum += air->airs[i].scattering[c] + air->airs[i].absorption[c];
-    return sum > 0;
-}
-
-/* Light of a larger optical depth is none for any picture. From DEEP on light that is scattered often is not found to its end. */
-#define MOST_DEPTH 80.
-#define DEEP 12.
-
 /* Straight up from the ground. */
 static void print_depth(const nebel_planet *planet)
 {
-    const nebel_atmosphere_desc *air = &planet->air;
-    const nebel_ray up = {{air->ground[X], air->ground[Y], air->ground[Z]}, {0, 1, 0}, (double)INFINITY};
-    nebel_light light;
-    if (nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &light, 0) != NEBEL_OK) return;
-    double most = 0;
+    double depth[3];
+    nb_find_air_depth(planet, depth);
     (void)printf("air: optical depth straight up from the ground");
-    for (int c = 0; c < 3; c++) {
-        const double depth = 0 - log(light.transmittance[c]);
-        (void)printf(depth <= MOST_DEPTH ? " %.3g" : " more than %g", fmin(depth, MOST_DEPTH));
-        most = fmax(most, depth);
-    }
+    for (int c = 0; c < 3; c++)
+        (void)printf(depth[c] <= NB_MOST_DEPTH ? " %.3g" : " more than %g", fmin(depth[c], NB_MOST_DEPTH));
     (void)printf("\n");
-    if (most > DEEP)
-        (void)printf("warning: air deeper than %g is drawn too dark or too bright where light is scattered often\n",
-                     DEEP);
+    const char *const deep = nb_find_deep_air(depth);
+    if (deep != NULL) (void)printf("warning: %s\n", deep);
 }
 
 static void print_planet(const nebel_planet *planet)
@@ -121,12 +103,12 @@ static void print_planet(const nebel_planet *planet)
     if (planet->model == NEBEL_PLANET_LAYERS)
         (void)printf("planet: radius %.6g m, %u %s of clouds\n", planet->shells.radius,
                      (unsigned)planet->shells.cloud_count, planet->shells.cloud_count == 1 ? "shell" : "shells");
-    else if (has_air(air))
+    else if (nb_has_air(planet))
         (void)printf("planet: radius %.6g m, %.6g m of air of %u %s\n", air->radius, air->thickness,
                      (unsigned)air->air_count, air->air_count == 1 ? "kind" : "kinds");
     else
         (void)printf("planet: radius %.6g m, no air\n", air->radius);
-    if (planet->atmosphere != NULL && has_air(air)) print_depth(planet);
+    if (planet->atmosphere != NULL && nb_has_air(planet)) print_depth(planet);
     print_clouds(planet);
 }
 
