@@ -23,7 +23,8 @@ void nb_find_air_depth(const nebel_planet *planet, double depth[3])
     const nebel_ray up = {{ground[0], ground[1], ground[2]}, {0, 1, 0}, (double)INFINITY};
     nebel_light light;
     for (int c = 0; c < 3; c++) depth[c] = 0;
-    if (planet->atmosphere == NULL || nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &light, 0) != NEBEL_OK) return;
+    if (planet->atmosphere == NULL || nebel_trace_air(planet->atmosphere, NULL, 1, &up, 0, &light, 0) != NEBEL_OK)
+        return;
     for (int c = 0; c < 3; c++) depth[c] = 0 - log(light.transmittance[c]);
 }
 
