@@ -15,10 +15,9 @@ enum { OCTAVES = 7 };
 /* What the corner's direction makes of the way from there. Its middles of the twelve edges of a cube. */
 static double slope(uint32_t hash, const double way[3])
 {
-    static const signed char directions[12][3] = {{1, 1, 0}, {-1, 1, 0}, {1, -1, 0}, {-1, -1, 0},
-                                                  {1, 0, 1}, {-1, 0, 1}, {1, 0, -1}, {-1, 0, -1},
-                                                  {0, 1, 1}, {0, -1, 1}, {0, 1, -1}, {0, -1, -1}};
-    const signed char *d = directions[hash % 12];
+    static const double directions[12][3] = {{1, 1, 0},  {-1, 1, 0},  {1, -1, 0}, {-1, -1, 0}, {1, 0, 1},  {-1, 0, 1},
+                                             {1, 0, -1}, {-1, 0, -1}, {0, 1, 1},  {0, -1, 1},  {0, 1, -1}, {0, -1, -1}};
+    const double *d = directions[hash % 12];
     return d[0] * way[0] + d[1] * way[1] + d[2] * way[2];
 }
 
@@ -33,23 +32,23 @@ static uint32_t cell_of(double low, uint32_t period)
 /* About -1 to 1, 0 in the mean. It repeats after `period` cells along x and half as many along y and z; 0: nowhere. */
 static double gradient_noise(uint32_t seed, const double place[3], uint32_t period)
 {
-    double share[3], way[3], values[8];
-    uint32_t cells[3][2];
+    double share[3], way[3][2], values[8];
+    uint32_t hashes[8] = {seed}; /* of a corner: axis by axis, so that those that differ in later ones share the work */
     for (int i = 0; i < 3; i++) {
         const double low = floor(place[i]), u = place[i] - low;
-        way[i] = u;
+        const uint32_t repeat = i == 0 ? period : period / 2,
+                       cells[2] = {cell_of(low, repeat), cell_of(low + 1, repeat)};
+        way[i][0] = u;
+        way[i][1] = u - 1;
         share[i] = u * u * u * (u * (u * 6 - 15) + 10);
-        cells[i][0] = cell_of(low, i == 0 ? period : period / 2);
-        cells[i][1] = cell_of(low + 1, i == 0 ? period : period / 2);
+        for (int corner = 0; corner < 1 << i; corner++) {
+            hashes[corner + (1 << i)] = nb_mix_bits(hashes[corner] + cells[1]);
+            hashes[corner] = nb_mix_bits(hashes[corner] + cells[0]);
+        }
     }
     for (int corner = 0; corner < 8; corner++) {
-        uint32_t hash = seed;
-        double from[3];
-        for (int i = 0; i < 3; i++) {
-            hash = nb_mix_bits(hash + cells[i][corner >> i & 1]);
-            from[i] = way[i] - (corner >> i & 1);
-        }
-        values[corner] = slope(hash, from);
+        const double from[3] = {way[0][corner & 1], way[1][corner >> 1 & 1], way[2][corner >> 2]};
+        values[corner] = slope(hashes[corner], from);
     }
     for (int i = 0, count = 4; i < 3; i++, count /= 2)
         for (int k = 0; k < count; k++) values[k] = values[2 * k] + share[i] * (values[2 * k + 1] - values[2 * k]);
