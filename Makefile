@@ -2,7 +2,8 @@
 
 BUILD ?= build
 V ?= 0
-# Options of ctest that choose among the sanitizers' tests: make asan CHOSEN='-R grid'.
+# Of the sanitizers: options of cmake, and those of ctest that choose among the tests: make asan CHOSEN='-R grid'.
+OPTIONS ?=
 CHOSEN ?=
 # A compiler that is newer than this source may have new warnings: they stop CI, not a first build.
 WERROR ?= $(if $(CI),ON,OFF)
@@ -64,7 +65,7 @@ bench: all
 asan: $(MODELS)
 	@scripts/install_packages.sh build demo test
 	@echo "nebel: building with sanitizers"
-	@$(CONFIGURE) -B $(BUILD)-asan -DCMAKE_BUILD_TYPE=Debug -DNEBEL_SANITIZE=ON
+	@$(CONFIGURE) -B $(BUILD)-asan -DCMAKE_BUILD_TYPE=Debug -DNEBEL_SANITIZE=ON $(OPTIONS)
 	@$(COMPILE) $(BUILD)-asan -j $(JOBS)
 	@ctest --test-dir $(BUILD)-asan --output-on-failure --no-tests=error -j 2 $(CHOSEN)
 

@@ -33,9 +33,10 @@ configure() {
 build_windows() {
     configure windows mingw-w64
     cmake --build "$windows" -j "$(nproc)"
-    configure windows-dll mingw-w64 -DBUILD_SHARED_LIBS=ON -DCMAKE_RUNTIME_OUTPUT_DIRECTORY="$build/windows-dll/bin"
+    # What a DLL exports and the bits of light hang on no optimization, without which they are built in a third of the time.
+    configure windows-dll mingw-w64 -DCMAKE_BUILD_TYPE=Debug -DBUILD_SHARED_LIBS=ON -DCMAKE_RUNTIME_OUTPUT_DIRECTORY="$build/windows-dll/bin"
     cmake --build "$build/windows-dll" -j "$(nproc)" --target bits
-    configure windows-32 mingw-w64-32
+    configure windows-32 mingw-w64-32 -DCMAKE_BUILD_TYPE="$([ -n "$wine32" ] && echo Release || echo Debug)"
     cmake --build "$build/windows-32" -j "$(nproc)" --target "$([ -n "$wine32" ] && echo all || echo nebel)"
 }
 

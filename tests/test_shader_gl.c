@@ -14,8 +14,11 @@
 #include "shader_help.h"
 
 /* All that NEBEL_FEATURES may name but what lights fog and voxels, which take drivers most of a minute to compile: the random
- * fog here has none of them. The whole text is tried once in each language. */
+ * fog here has none of them. test_shader_grid_gl tries the whole text. */
 #define UNLIT "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 17301503\n"
+
+/* And but bodies of several leaves, which take half of the rest. */
+#define UNGROUPED "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 17301375\n"
 
 /* ---- random scenes --------------------------------------------------------------------------- */
 
@@ -39,7 +42,7 @@ static void test_soft_edges_in_haze(void **unused)
 {
     (void)unused;
     tracer t;
-    open_tracer(&t, NB_GL_300ES, BLOCK, UNLIT, trace_body);
+    open_tracer(&t, NB_GL_300ES, BLOCK, UNGROUPED, trace_body);
     for (uint64_t seed = 0; seed < 60; seed++) {
         random_fog_make(&fog, RANDOM_FOG_OVERLAP, seed);
         fog.count = 2;
@@ -86,7 +89,7 @@ static void test_rays_to_a_light_know_no_distances(void **unused)
 {
     (void)unused;
     tracer t;
-    open_tracer(&t, NB_GL_300ES, TEXTURE, UNLIT,
+    open_tracer(&t, NB_GL_300ES, TEXTURE, UNGROUPED,
                 "out0 = vec4(nebel_transmit_light(in0.xyz, in1.xyz, in0.w), 0.0); out1 = vec4(0.0);\n");
     const nebel_trace_desc desc = {.tolerance = 1e-5, .ignore_distances = 1, .transmittance_only = 1};
     for (uint64_t seed = 1; seed < 12; seed += 2) {
@@ -128,7 +131,7 @@ static void try_language(nb_gl_language language, word_store store, const char *
 static void test_330_texture(void **state)
 {
     (void)state;
-    try_language(NB_GL_330, TEXTURE, "", 5);
+    try_language(NB_GL_330, TEXTURE, UNLIT, 5);
 }
 
 static void test_330_block(void **state)
@@ -146,7 +149,7 @@ static void test_300_es_texture(void **state)
 static void test_300_es_block(void **state)
 {
     (void)state;
-    try_language(NB_GL_300ES, BLOCK, "", 1);
+    try_language(NB_GL_300ES, BLOCK, UNLIT, 1);
 }
 
 /* ---- sunlight -------------------------------------------------------------------------------- */
@@ -289,7 +292,7 @@ static void test_silhouettes_from_afar(void **state)
 {
     (void)state;
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, "", trace_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     for (int decade = 1; decade <= 5; decade++) {
         const double distance = pow(10, decade), eye[3] = {1e7, -1e7, 1e7};
         const nebel_volume_desc ball = ball_of(eye[0], eye[1], eye[2] - distance, 1);
@@ -328,7 +331,7 @@ static void test_eyes_and_orders(void **state)
     static nebel_volume_desc reversed[RANDOM_FOG_VOLUMES];
     static answer first[RAYS];
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, "", trace_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     nebel_snapshot *snapshot = commit_random_fog(RANDOM_FOG_PROFILES, 3);
     const double eye[3] = {8, 3, -11};
     camera_rays(eye, fog.shift, 3);
@@ -373,7 +376,7 @@ static void test_lists(void **state)
     const double eye[3] = {8, 3, -11};
     size_t kept = 0;
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNGROUPED, trace_body);
     nebel_snapshot *snapshot = commit_random_fog(RANDOM_FOG_PROFILES, 3);
     for (size_t i = 0; i < fog.count; i++)
         fog.volumes[i].extinction[0] = .01 * (double)(i + 1); /* their canonical order */
@@ -389,14 +392,14 @@ static void test_lists(void **state)
     memcpy(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
-    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT "#define NEBEL_INDEX(i) (i)\n", list_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNGROUPED "#define NEBEL_INDEX(i) (i)\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)fog.count;
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
     assert_memory_equal(all, answers, sizeof all);
     nb_gl_close(&t.gl);
 
-    open_tracer(&t, NB_GL_300ES, TEXTURE, UNLIT "#define NEBEL_INDEX(i) (2 * (i))\n", list_body);
+    open_tracer(&t, NB_GL_300ES, TEXTURE, UNGROUPED "#define NEBEL_INDEX(i) (2 * (i))\n", list_body);
     for (int i = 0; i < RAYS; i++) items[i].unused = (float)kept;
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
@@ -463,7 +466,7 @@ static void test_rays_that_are_none(void **state)
                          {.direction = {NAN, 0, 0}, .t_max = 5}, {.direction = {0, 0, NAN}, .t_max = 5}};
     enum { NONE = sizeof none / sizeof *none };
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, "", trace_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     for (int i = 0; i < RAYS; i++) items[i] = i < NONE ? none[i] : (item){.direction = {1, 0, 0}, .t_max = HUGE_VALF};
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
@@ -487,7 +490,7 @@ static void test_light_without_end(void **state)
     nebel_snapshot *snapshot = fog_commit(&(nebel_fog_desc){0}, volumes, 2);
     const double eye[3] = {0, 0, 0};
     tracer t;
-    open_tracer(&t, NB_GL_330, TEXTURE, "", trace_body);
+    open_tracer(&t, NB_GL_330, TEXTURE, UNLIT, trace_body);
     for (int i = 0; i < RAYS; i++) items[i] = (item){.direction = {0, 1, 0}, .t_max = 1e18f};
     pack_and_upload(&t, snapshot, eye);
     evaluate(&t);
