@@ -6,20 +6,25 @@ cd "$(dirname "$0")/.."
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-passed=0
-failed=0
+texts=0
 
-# verdict NAME COMMAND...: a warning is a failure.
+# verdict NAME COMMAND...: beside as many others as there are processors. A warning is a failure.
 verdict() {
-    local name=$1
+    local name=$1 output=$work/output_$texts
     shift
-    if "$@" >"$work/output" 2>&1 && ! grep -q '^WARNING' "$work/output"; then
-        passed=$((passed + 1))
+    if [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; then wait -n; fi
+    if "$@" >"$output" 2>&1 && ! grep -q '^WARNING' "$output"; then
+        rm "$output"
     else
-        failed=$((failed + 1))
         echo "check_shaders: $name:"
-        head -40 "$work/output"
-    fi
+        head -40 "$output"
+    fi &
+}
+
+# Where the next text goes: $file, but for its ending.
+name_file() {
+    texts=$((texts + 1))
+    file=$work/fog_$texts
 }
 
 text() {
@@ -48,14 +53,15 @@ calls='
 
 # try_opengl DIALECT VERSION DEFINES
 try_opengl() {
+    name_file
     {
         printf '#version %s\n#define NEBEL_VIEW\n#define NEBEL_TILES\n#define NEBEL_TRANSPARENT\n#define NEBEL_AIR\n%b' "$2" "$3"
         printf 'uniform highp sampler2D opaque;\n#define NEBEL_OPAQUE_DEPTH(at) texture(opaque, at).x\n'
         text "$1"
         printf 'in highp vec3 place; out highp vec4 color;\nvoid main()\n{%s\n' "$calls"
         printf '    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n'
-    } >"$work/fog.frag"
-    verdict "$1 $3" glslangValidator "$work/fog.frag"
+    } >"$file.frag"
+    verdict "$1 $3" glslangValidator "$file.frag"
 }
 
 # Each feature alone, so that nothing calls what is not declared without another.
@@ -70,6 +76,7 @@ done
 
 # try_vulkan DEFINES
 try_vulkan() {
+    name_file
     {
         cat <<'GLSL'
 #version 450
@@ -97,12 +104,13 @@ GLSL
         printf '%b' "$1"
         text glsl_450
         printf 'void main()\n{%s\n    color = vec4(light.transmittance + light.in_scattering, 1.0);\n}\n' "$calls"
-    } >"$work/fog.frag"
-    verdict "glsl_450 $1" glslangValidator -V "$work/fog.frag" -o "$work/fog.spv"
+    } >"$file.frag"
+    verdict "glsl_450 $1" glslangValidator -V "$file.frag" -o "$file.spv"
 }
 
 # try_hlsl DEFINES
 try_hlsl() {
+    name_file
     {
         cat <<'HLSL'
 cbuffer fog { float4 words[1024]; };
@@ -129,8 +137,8 @@ HLSL
         text hlsl
         printf 'float4 main(float3 place : TEXCOORD0) : SV_Target\n{%s\n' "$calls"
         printf '    return float4(light.transmittance + light.in_scattering, 1.0);\n}\n'
-    } >"$work/fog.hlsl"
-    verdict "hlsl $1" glslangValidator -D -S frag -e main -V "$work/fog.hlsl" -o "$work/fog.spv"
+    } >"$file.hlsl"
+    verdict "hlsl $1" glslangValidator -D -S frag -e main -V "$file.hlsl" -o "$file.spv"
 }
 
 for defines in "" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#define NEBEL_FEATURES 2\n"; do
@@ -138,9 +146,12 @@ for defines in "" "#define NEBEL_FEATURES 2u\n" "#define NEBEL_PLAIN_FEATURES\n#
     try_hlsl "$defines"
 done
 
+name_file
 text glsl_330 >"$work/glsl_330"
-sed -n '/^```glsl$/,/^```$/p' docs/shaders.md | sed '/^```/d' | sed -e "/^\/\/ here:/r $work/glsl_330" >"$work/docs.frag"
-verdict docs/shaders.md glslangValidator "$work/docs.frag"
+sed -n '/^```glsl$/,/^```$/p' docs/shaders.md | sed '/^```/d' | sed -e "/^\/\/ here:/r $work/glsl_330" >"$file.frag"
+verdict docs/shaders.md glslangValidator "$file.frag"
 
-echo "check_shaders: $passed texts passed, $failed failed"
+wait
+failed=$(find "$work" -name 'output_*' | wc -l)
+echo "check_shaders: $((texts - failed)) texts passed, $failed failed"
 [ "$failed" -eq 0 ]
