@@ -52,12 +52,10 @@ nebel_result nb_shells_find(const nb_frame *frame, nb_scratch *scratch)
             ray.t_max = frame->view.advance * (double)scratch->rays.length[i] + (double)scratch->hits.t[i];
         const nebel_result result = nebel_trace_layers(frame->layers, &frame->layer_view, 1, &ray, 0, hits, 0);
         if (result != NEBEL_OK) return result;
-        const nebel_layer_hit *last = &hits->hits[hits->count - 1];
-        const int has_ground = hits->count > 0 && last->is_ground;
-        if (has_ground) {
-            shells->ground[i] = (float)last->t;
-            scratch->hits.surface[i] = NB_NONE;
+        if (hits->count > 0 && hits->hits[hits->count - 1].is_ground) {
             hits->count--;
+            shells->ground[i] = (float)hits->hits[hits->count].t;
+            scratch->hits.surface[i] = NB_NONE;
         }
         shells->most = hits->count > shells->most ? hits->count : shells->most;
     }
