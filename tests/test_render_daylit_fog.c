@@ -130,6 +130,49 @@ static void a_ball_has_the_light_of_its_place(void **state)
     }
 }
 
+/* Of each channel the brightest that the sun makes of a ball at a height before the camera. */
+static void light_ball(world *w, double height, double brightest[3])
+{
+    static const double origin[3] = {0, 0, 0};
+    const nebel_environment none = {.type = NEBEL_ENVIRONMENT_CONSTANT};
+    const nebel_air_light light = light_at(w, origin);
+    const nebel_camera camera = planet_camera(height, 0);
+    test_picture pictures[2];
+    for (int k = 0; k < 2; k++) {
+        nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, height, -70}, .radius = 20},
+                                  .extinction = {.03, .03, .03}};
+        for (int c = 0; c < 3; c++) ball.albedo[c] = k;
+        nebel_snapshot *fog = make_fog(w, &ball, light.sun, &none);
+        pictures[k] = render(w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
+        nebel_release_snapshot(fog);
+    }
+    for (int c = 0; c < 3; c++) brightest[c] = 0;
+    for (int i = 0; i < WIDTH * HEIGHT * 3; i++)
+        brightest[i % 3] = fmax(brightest[i % 3], (double)pictures[1].planes.in_scattering[i] -
+                                                      (double)pictures[0].planes.in_scattering[i]);
+    for (int k = 0; k < 2; k++) test_picture_free(&pictures[k]);
+}
+
+/* However near the origin; near the ground it has that of the origin. */
+static void a_ball_high_up_has_its_own_sun(void **state)
+{
+    (void)state;
+    static const double to_sun[3] = {-1, .04, -.3}, origin[3] = {0, 0, 0}, high[3] = {0, 9000, -70};
+    double by_ground[3], above[3];
+    world w;
+    make_world(to_sun, &w);
+    light_ball(&w, 30, by_ground);
+    light_ball(&w, high[1], above);
+    const nebel_air_light here = light_at(&w, origin), there = light_at(&w, high);
+    for (int c = 0; c < 3; c++) {
+        print_message("sun at 9 km: %.3g times that on the ground, fog %.3g times as bright\n",
+                      there.sun[c] / here.sun[c], above[c] / by_ground[c]);
+        assert_true(there.sun[c] > 1.5 * here.sun[c]);
+        assert_true(fabs(above[c] / by_ground[c] * here.sun[c] / there.sun[c] - 1) < .02);
+    }
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
 /* In the shadow of a moon a ball of fog that scatters all light is black. */
 static void a_ball_in_eclipse_is_black(void **state)
 {
@@ -328,6 +371,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ball_has_the_light_of_its_place),
+        cmocka_unit_test(a_ball_high_up_has_its_own_sun),
         cmocka_unit_test(a_ball_in_eclipse_is_black),
         cmocka_unit_test(mist_is_lit_by_place),
         cmocka_unit_test(every_thread_and_processor_gives_the_same),

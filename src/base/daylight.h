@@ -26,18 +26,6 @@ typedef struct nb_daylight {
 /* Of a sun of irradiance 1: less counts as none. */
 #define NB_DAYLIGHT_LEAST_SKY 2e-30
 
-/* Fog that is all so near the origin along each axis, m and parts of the planet's radius, takes the origin's light. */
-#define NB_DAYLIGHT_NEAR 1e4
-#define NB_DAYLIGHT_NEAR_PART (1 / 600.)
-
-static inline int nb_daylight_is_near(const nebel_planet *home, const double min[3], const double max[3])
-{
-    const double most = fmin(NB_DAYLIGHT_NEAR, NB_DAYLIGHT_NEAR_PART * home->air.radius);
-    for (int c = 0; c < 3; c++)
-        if (min[c] < -most || max[c] > most) return 0;
-    return 1;
-}
-
 /* Skies lie evenly over this function of the cosine of the sun's angle to the zenith. */
 #define NB_DAYLIGHT_TWILIGHT 0.05
 
@@ -46,14 +34,51 @@ static inline double nb_daylight_spread(double sun)
     return copysign(log(1 + fabs(sun) / NB_DAYLIGHT_TWILIGHT), sun);
 }
 
-static inline nebel_air_light nb_daylight_ask(const nb_daylight *daylight, const nebel_atmosphere *atmosphere,
+static inline nebel_air_light nb_daylight_ask(const nebel_sun *sun, const nebel_atmosphere *atmosphere,
                                               const double place[3])
 {
     nebel_air_light light;
     /* Places and suns are in order, so that it cannot fail. */
     memset(&light, 0, sizeof light);
-    (void)nebel_light_air(atmosphere, &daylight->sun, 1, (const double(*)[3])place, 0, &light, 0);
+    (void)nebel_light_air(atmosphere, sun, 1, (const double(*)[3])place, 0, &light, 0);
     return light;
+}
+
+/* Fog that is all so near the origin along each axis, m and parts of the planet's radius, takes the origin's light, */
+#define NB_DAYLIGHT_NEAR 1e4
+#define NB_DAYLIGHT_NEAR_PART (1 / 600.)
+
+/* unless the sun is so much brighter somewhere about it, or dimmer, as a part of the brighter one. */
+#define NB_DAYLIGHT_OTHER (1 / 16.)
+
+static inline int nb_daylight_is_other(const nebel_air_light *a, const nebel_air_light *b)
+{
+    double brightest = 0, change = 0;
+    for (int c = 0; c < 3; c++) {
+        brightest = fmax(brightest, fmax(a->sun[c], b->sun[c]));
+        change = fmax(change, fabs(a->sun[c] - b->sun[c]));
+    }
+    return change > NB_DAYLIGHT_OTHER * brightest;
+}
+
+/* The box is that of all fog. What of it is below the ground has light of the ground. */
+static inline int nb_daylight_is_near(const nebel_planet *home, const double to_sun[3], const double min[3],
+                                      const double max[3])
+{
+    static const double origin[3] = {0, 0, 0};
+    const double most = fmin(NB_DAYLIGHT_NEAR, NB_DAYLIGHT_NEAR_PART * home->air.radius);
+    for (int c = 0; c < 3; c++)
+        if (min[c] < -most || max[c] > most) return 0;
+    const nebel_sun sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
+    const nebel_air_light here = nb_daylight_ask(&sun, home->atmosphere, origin);
+    for (int corner = 0; corner < 8; corner++) {
+        double place[3];
+        for (int c = 0; c < 3; c++) place[c] = (corner >> c & 1) != 0 ? max[c] : min[c];
+        place[1] = fmax(0, place[1]);
+        const nebel_air_light there = nb_daylight_ask(&sun, home->atmosphere, place);
+        if (nb_daylight_is_other(&here, &there)) return 0;
+    }
+    return 1;
 }
 
 /* At a height, with the sun so high. `across` is at right angles to the way to it. */
@@ -64,7 +89,7 @@ static inline nebel_air_light nb_daylight_under(const nb_daylight *daylight, con
     double place[3];
     for (int c = 0; c < 3; c++)
         place[c] = daylight->center[c] + radius * (sun * daylight->sun.direction[c] + side * across[c]);
-    return nb_daylight_ask(daylight, daylight->atmosphere, place);
+    return nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
 }
 
 static inline void nb_daylight_set_depths(nb_daylight *daylight, const double across[3])
@@ -84,7 +109,7 @@ static inline void nb_daylight_set_depths(nb_daylight *daylight, const double ac
 static inline void nb_daylight_set_skies(nb_daylight *daylight, const nebel_atmosphere *home, const double across[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light there = nb_daylight_ask(daylight, home, origin);
+    const nebel_air_light there = nb_daylight_ask(&daylight->sun, home, origin);
     for (int s = 0; s < NB_DAYLIGHT_SKIES; s++) {
         const double place = (2. * s / (NB_DAYLIGHT_SKIES - 1) - 1) * nb_daylight_spread(1);
         const nebel_air_light light = nb_daylight_under(

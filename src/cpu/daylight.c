@@ -39,7 +39,7 @@ void nb_daylight_at(const nb_daylight *daylight, const double place[3], double s
     if (height <= daylight->thickness && cosine >= 0) {
         find_sun(daylight, height, cosine, sun);
     } else {
-        const nebel_air_light light = nb_daylight_ask(daylight, daylight->atmosphere, place);
+        const nebel_air_light light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
         memcpy(sun, light.sun, sizeof light.sun);
     }
 }

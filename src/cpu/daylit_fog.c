@@ -84,8 +84,8 @@ nebel_result nb_daylit_fog_set(nb_frame *frame)
     nebel_sun sun;
     double min[3], max[3], middle[3] = {0, 0, 0};
     if (!air->has_fog || !scene->has_sun) return NEBEL_OK;
-    const int is_far =
-        nebel_snapshot_scattering_fog(renderer->fog, min, max) && !nb_daylight_is_near(&scene->planets[0], min, max);
+    const int is_far = nebel_snapshot_scattering_fog(renderer->fog, min, max) &&
+                       !nb_daylight_is_near(&scene->planets[0], scene->sun_direction, min, max);
     nebel_result result = nb_fog_shade_set(frame);
     if (result != NEBEL_OK || !(is_far || air->roof.is_shaded)) return result;
     memcpy(sun.direction, scene->sun_direction, sizeof sun.direction);

@@ -20,7 +20,8 @@ static nebel_result find_changes(const nebel_scene_data *scene, nebel_cloud_work
     double min[3], max[3];
     *found = (changes){.by_air = 0};
     if (fog == NULL || nb_gl_air_planet(scene) == NULL || !scene->has_sun) return NEBEL_OK;
-    found->by_air = nebel_snapshot_scattering_fog(fog, min, max) && !nb_daylight_is_near(&scene->planets[0], min, max);
+    found->by_air = nebel_snapshot_scattering_fog(fog, min, max) &&
+                    !nb_daylight_is_near(&scene->planets[0], scene->sun_direction, min, max);
     if (clouds == NULL || nebel_snapshot_volume_count(fog) == 0) return NEBEL_OK;
     return nb_fog_roof_set(clouds, fog, nb_gl_air_owns_ambient(scene), &found->roof);
 }
