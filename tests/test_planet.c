@@ -509,6 +509,44 @@ static void below_the_ground_is_on_it(void **state)
     nebel_destroy_atmosphere(air);
 }
 
+static nebel_air_light light_above(const nebel_atmosphere *air, const nebel_sun *sun, const double up[3], double height)
+{
+    nebel_air_light light;
+    double place[1][3], radius = air->airs.radius + height;
+    for (int c = 0; c < 3; c++) place[0][c] = air->center[c] + radius * up[c];
+    assert_int_equal(nebel_light_air(air, sun, 1, (const double(*)[3])place, 0, &light, 0), NEBEL_OK);
+    return light;
+}
+
+/* The sky is that of the ground below, whatever is between, and nothing changes suddenly where the air ends. */
+static void light_goes_on_above_the_air(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"earth", "mars", "toy"};
+    static const double up[3] = {.48, .6, -.64}, across[3] = {.8, 0, .6}, parts[] = {.999, 1, 1.001, 2, 1e3, 1e7};
+    for (int n = 0; n < 3; n++) {
+        nebel_atmosphere *air = make(nebel_find_atmosphere(names[n]));
+        const double thickness = air->airs.top - air->airs.radius;
+        double before = 0;
+        for (int degrees = -20; degrees <= 90; degrees += 10) {
+            const double x = cos(degrees * DEGREES), y = sin(degrees * DEGREES);
+            const nebel_sun sun = {.direction = {x * across[0] + y * up[0], y * up[1], x * across[2] + y * up[2]},
+                                   .irradiance = {1, 1, 1}};
+            const nebel_air_light ground = light_above(air, &sun, up, 0);
+            const nebel_air_light below = light_above(air, &sun, up, thickness * (1 - 1e-6));
+            const nebel_air_light above = light_above(air, &sun, up, thickness * (1 + 1e-6));
+            for (int c = 0; c < 3; c++) {
+                for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
+                    expect_near("sky", light_above(air, &sun, up, parts[k] * thickness).sky[c], ground.sky[c], 1e-6);
+                assert_true(fabs(above.sun[c] - below.sun[c]) <= 1e-4);
+            }
+            assert_true(ground.sky[1] > before);
+            before = ground.sky[1];
+        }
+        nebel_destroy_atmosphere(air);
+    }
+}
+
 /* The planet seen from 1e15 m away is the same as from close by. */
 static void distance_changes_nothing(void **state)
 {
@@ -682,6 +720,7 @@ int main(void)
         cmocka_unit_test(memory_may_run_out),
         cmocka_unit_test(all_instruction_sets_agree),
         cmocka_unit_test(below_the_ground_is_on_it),
+        cmocka_unit_test(light_goes_on_above_the_air),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -101,7 +101,7 @@ nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun
 /* Light that arrives at a place. */
 typedef struct nebel_air_light {
     double sun[3]; /* irradiance on a surface that faces the sun; 0 in the planet's shadow */
-    double sky[3]; /* irradiance on level ground below the place, of all that the air scatters */
+    double sky[3]; /* irradiance on level ground below the place, of all that the air scatters; above the air, too */
 } nebel_air_light;
 
 /* The light at each of n places; strides in bytes. Nothing tells an error: the sun's part is as exact as the optical depth, the

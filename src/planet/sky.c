@@ -160,7 +160,7 @@ void nb_air_raise(double ground, double from[3])
     for (int c = 0; c < 3; c++) from[c] = far > 0 ? from[c] / far * ground : c == 1 ? ground : 0;
 }
 
-/* Relative to the planet's centre. What is below the ground counts as on it. */
+/* Relative to the planet's centre; returns how far that is. What is below the ground counts as on it. */
 static double place_over(const nebel_atmosphere *atmosphere, const double place[3], double relative[3])
 {
     for (int c = 0; c < 3; c++) relative[c] = place[c] - atmosphere->center[c];
@@ -265,6 +265,25 @@ static const double *place_at(const double (*places)[3], size_t stride, size_t i
     return (const double *)(const void *)((const char *)places + i * stride);
 }
 
+/* The sky is that of the ground straight below, wherever the way to the sun comes into the air, or if it never does. */
+static void light_place(const nebel_atmosphere *atmosphere, const nebel_sun *sun, const double place[3],
+                        nebel_air_light *light)
+{
+    double from[3];
+    const double radius = place_over(atmosphere, place, from);
+    const nb_inside inside = find_inside(atmosphere, place, sun->direction, HUGE_VAL, sun->direction);
+    if (inside.track.radius > atmosphere->airs.top)
+        light->sun[0] = light->sun[1] = light->sun[2] = 1;
+    else
+        nb_track_sunlight(&atmosphere->airs, inside.track, light->sun);
+    nb_scatter_look_up_ground(&atmosphere->scatter, bound_cosine(nb_vector_dot(from, sun->direction) / radius),
+                              light->sky);
+    for (int c = 0; c < 3; c++) {
+        light->sun[c] *= sun->irradiance[c];
+        light->sky[c] *= sun->irradiance[c];
+    }
+}
+
 nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n,
                              const double (*places)[3], size_t place_stride, nebel_air_light *lights,
                              size_t light_stride)
@@ -275,18 +294,8 @@ nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun
     for (size_t i = 0; i < n; i++)
         if (!nb_air_is_place(place_at(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const double *place = place_at(places, place_stride, i);
         nebel_air_light *light = (nebel_air_light *)(void *)((char *)lights + i * light_stride);
-        const nb_inside inside = find_inside(atmosphere, place, resolved.direction, HUGE_VAL, resolved.direction);
-        if (inside.track.radius > atmosphere->airs.top)
-            light->sun[0] = light->sun[1] = light->sun[2] = 1;
-        else
-            nb_track_sunlight(&atmosphere->airs, inside.track, light->sun);
-        nb_scatter_look_up_ground(&atmosphere->scatter, inside.height_of_sun, light->sky);
-        for (int c = 0; c < 3; c++) {
-            light->sun[c] *= resolved.irradiance[c];
-            light->sky[c] *= resolved.irradiance[c];
-        }
+        light_place(atmosphere, &resolved, place_at(places, place_stride, i), light);
     }
     return NEBEL_OK;
 }
