@@ -309,7 +309,75 @@ static void air_and_fog_share_a_ray(void **state)
     nebel_destroy_atmosphere(w.atmosphere);
 }
 
-/* All its light, however few pixels it is, and no more: the picture with it less the one without. */
+/* A ball of black fog 5 m over the ground, in the sun and beside a lamp. */
+static nebel_snapshot *black_ball(const double shift[3])
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc ball = {
+        .shape = {.type = NEBEL_SHAPE_SPHERE, .center = {shift[0] + 1.5, shift[1] + 5, shift[2] - 12}, .radius = 3},
+        .extinction = {2, 2, 2}};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* The ball, its shadows and a planet, all of them `shift` off, before a camera that goes with them. */
+static test_picture render_shadow(const double shift[3], const nebel_mesh *mesh)
+{
+    const double to_sun[3] = {.48, .6, -.64};
+    nebel_lamp lamp = {.position = {shift[0] + 6, shift[1] + 7, shift[2] - 8}, .intensity = {300, 300, 300}};
+    nebel_camera camera = planet_camera(14, -1);
+    world w;
+    make_world("moon", to_sun, &w);
+    nebel_destroy_atmosphere(w.atmosphere);
+    for (int c = 0; c < 3; c++) {
+        w.planet.air.ground[c] += shift[c];
+        camera.position[c] += shift[c];
+        camera.look_at[c] += shift[c];
+    }
+    assert_int_equal(nebel_create_atmosphere(&w.planet.air, &w.atmosphere), NEBEL_OK);
+    w.planet.atmosphere = w.atmosphere;
+    w.scene.lamp_count = 1;
+    w.scene.lamps = &lamp;
+    w.scene.mesh_count = mesh != NULL;
+    w.scene.meshes = mesh;
+    nebel_snapshot *fog = black_ball(shift);
+    const test_picture picture = render(&w, fog, &camera, NEBEL_ISA_DEFAULT, 1, 1);
+    nebel_release_snapshot(fog);
+    nebel_destroy_atmosphere(w.atmosphere);
+    return picture;
+}
+
+/* Places of the ground count from the camera, wherever the scene's origin is, or the nearest model. */
+static void shadows_of_fog_are_the_same_everywhere(void **state)
+{
+    (void)state;
+    static const double shifts[][3] = {{0, 0, 0}, {0, -12720000, 0}, {6360000, 3e6, -5e6}, {-2e7, 1e8, 3e7}};
+    const nebel_mesh wall = wall_at(2000);
+    test_picture near_by = render_shadow(shifts[0], NULL);
+    double brightest = 0;
+    int dark = 0;
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) brightest = fmax(brightest, (double)near_by.planes.color[3 * i]);
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+        dark += near_by.planes.transmittance[3 * i] == 1 && (double)near_by.planes.color[3 * i] < .3 * brightest;
+    assert_true(dark > 10);
+    for (size_t k = 2; k < 2 * sizeof shifts / sizeof *shifts; k++) {
+        const double *shift = shifts[k / 2];
+        test_picture far_off = render_shadow(shift, k % 2 != 0 ? &wall : NULL);
+        double worst = 0;
+        for (uint32_t i = 0; i < 3 * WIDTH * HEIGHT; i++)
+            worst = fmax(worst, fabs((double)far_off.planes.color[i] - (double)near_by.planes.color[i]));
+        print_message("%g %g %g m off: %d dark pixels, %.1e of the brightest\n", shift[0], shift[1], shift[2], dark,
+                      worst / brightest);
+        assert_true(worst <= 1e-4 * brightest);
+        test_picture_free(&far_off);
+    }
+    test_picture_free(&near_by);
+}
+
 /* Where one sample does for a pixel, many agree: with the disc of the sun, the horizon and the limb in the picture. */
 static void many_samples_are_the_mean_of_single_ones(void **state)
 {
@@ -372,6 +440,7 @@ static void many_samples_are_the_mean_of_single_ones(void **state)
     }
 }
 
+/* All its light, however few pixels it is, and no more: the picture with it less the one without. */
 static void the_sun_is_a_disc(void **state)
 {
     (void)state;
@@ -473,6 +542,7 @@ int main(void)
         cmocka_unit_test(daylight_is_that_of_the_air),
         cmocka_unit_test(models_take_the_light_of_their_place),
         cmocka_unit_test(air_and_fog_share_a_ray),
+        cmocka_unit_test(shadows_of_fog_are_the_same_everywhere),
         cmocka_unit_test(many_samples_are_the_mean_of_single_ones),
         cmocka_unit_test(the_sun_is_a_disc),
         cmocka_unit_test(every_thread_and_processor_gives_the_same),

@@ -147,6 +147,19 @@ int nb_air_sees_ground(const nb_air_scratch *scratch)
     return any;
 }
 
+/* The ground is not lifted: no surface hides fog and lamps from it there. */
+static void set_starts(const double position[3], const nb_rays *rays, const nb_points *points, nb_air_scratch *scratch)
+{
+    for (int i = 0; i < NB_BATCH; i++) {
+        const float distance = scratch->ground.distance[i];
+        const double ahead = (double)distance / (double)rays->length[i];
+        const int is_ground = distance < HUGE_VALF;
+        for (int c = 0; c < 3; c++)
+            scratch->start[c][i] =
+                (float)(is_ground ? ahead * rays->direction[c][i] : (double)points->start[c][i] - position[c]);
+    }
+}
+
 void nb_air_set_points(const nb_air *air, double advance, const double position[3], const double origin[3],
                        const float sun[3], const nb_rays *rays, nb_air_scratch *scratch, nb_hits *hits,
                        nb_points *points)
@@ -178,6 +191,7 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
         hits->surface[i] = NB_GROUND;
         hits->t[i] = (float)((double)distance - advance * (double)rays->length[i]);
     }
+    set_starts(position, rays, points, scratch);
 }
 
 void nb_air_light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])

@@ -64,6 +64,7 @@ typedef struct nb_ground {
 typedef struct nb_air_scratch {
     nb_ground ground, next;                              /* the nearest one; that of one planet */
     int world[NB_BATCH];                                 /* whose ground it is */
+    float start[3][NB_BATCH];                            /* of rays to lights, relative to the camera */
     float sun_left[3][NB_BATCH], sky_there[3][NB_BATCH]; /* of models: see nb_daylight_at */
     nb_air_knots knots[NB_AIR_KNOTS], fresh;             /* the first where rays end; one that is being found */
     int known[NB_BATCH];                                 /* a ray's knots */
@@ -99,7 +100,8 @@ void nb_air_find_ground(const nb_air *air, double advance, const nb_rays *rays, 
 int nb_air_sees_ground(const nb_air_scratch *scratch);
 
 /* Makes hits and points of where the ground is seen, which other planets may hide from the sun. `position` is the camera's,
- * relative to `origin`, that of the geometry. */
+ * relative to `origin`, that of the geometry. scratch->start has all points relative to the camera: floats that count from
+ * a geometry far away, or from the scene's origin where there is none, put the ground metres off. */
 void nb_air_set_points(const nb_air *air, double advance, const double position[3], const double origin[3],
                        const float sun[3], const nb_rays *rays, nb_air_scratch *scratch, nb_hits *hits,
                        nb_points *points);

@@ -165,14 +165,27 @@ NB_CLONES static void mask_ends(const int *restrict lit, float *restrict distanc
     for (int i = 0; i < NB_BATCH; i++) distance[i] = lit[i] ? HUGE_VALF : 0;
 }
 
+/* On planets what is seen need not be near the geometry. */
+static nb_starts starts_of(const nb_frame *frame, const nb_scratch *scratch)
+{
+    const int has_air = frame->air.count > 0;
+    nb_starts starts;
+    for (int c = 0; c < 3; c++) {
+        starts.origin[c] = has_air ? frame->view.position[c] : frame->renderer->geometry.origin[c];
+        starts.offset[c] = has_air ? scratch->air.start[c] : scratch->points.start[c];
+    }
+    return starts;
+}
+
 /* What fog leaves of the sun's light where it is lit at all. */
 static nebel_result trace_sun_fog(const nb_frame *frame, nb_scratch *scratch, float (*transmittance)[NB_BATCH])
 {
+    const nb_starts starts = starts_of(frame, scratch);
     nebel_ray_planes rays = {.t_max = scratch->distance};
     nebel_light_planes lights = {.error = NULL};
     for (int c = 0; c < 3; c++) {
-        rays.origin[c] = frame->renderer->geometry.origin[c];
-        rays.offset[c] = scratch->points.start[c];
+        rays.origin[c] = starts.origin[c];
+        rays.offset[c] = starts.offset[c];
         rays.direction[c] = frame->lighting.sun_direction[c];
         lights.transmittance[c] = transmittance[c];
     }
@@ -221,14 +234,14 @@ static nebel_result set_sunlight(const nb_frame *frame, nb_scratch *scratch)
 }
 
 /* What fog leaves of a lamp's light where it is lit at all. */
-static nebel_result trace_lamp_fog(const nb_frame *frame, nb_scratch *scratch)
+static nebel_result trace_lamp_fog(const nb_frame *frame, const nb_starts *starts, nb_scratch *scratch)
 {
     nb_lamp_ways *ways = &scratch->lamp;
     nebel_ray_planes rays = {.t_max = ways->reach};
     nebel_light_planes lights = {.error = NULL};
     for (int c = 0; c < 3; c++) {
-        rays.origin[c] = frame->renderer->geometry.origin[c];
-        rays.offset[c] = scratch->points.start[c];
+        rays.origin[c] = starts->origin[c];
+        rays.offset[c] = starts->offset[c];
         rays.direction_float[c] = ways->direction[c];
         lights.transmittance[c] = scratch->light_transmittance[c];
     }
@@ -263,16 +276,15 @@ static nebel_result add_lamplight(const nb_frame *frame, nb_scratch *scratch)
 {
     const nebel_renderer *renderer = frame->renderer;
     const nb_geometry *geometry = &renderer->geometry;
+    const nb_starts starts = starts_of(frame, scratch);
     const int is_dimmed = dims_sun(renderer);
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < renderer->scene->lamp_count && result == NEBEL_OK; i++) {
         const nebel_lamp *lamp = &renderer->scene->lamps[i];
-        float place[3];
-        for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - geometry->origin[c]);
-        nb_lamp_ways_set(lamp, place, &scratch->hits, &scratch->points, &scratch->lamp);
+        nb_lamp_ways_set(lamp, &starts, &scratch->hits, &scratch->points, &scratch->lamp);
         nb_lamp_ways_shadow(geometry->scene, &scratch->points, &scratch->lamp, &scratch->packets);
         if (!is_lit_anywhere(&scratch->lamp)) continue;
-        if (is_dimmed) result = trace_lamp_fog(frame, scratch);
+        if (is_dimmed) result = trace_lamp_fog(frame, &starts, scratch);
         add_lamp(lamp, is_dimmed, scratch);
     }
     return result;

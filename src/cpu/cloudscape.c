@@ -263,8 +263,9 @@ static double find_place(const nb_frame *frame, const nb_scratch *scratch, int l
 {
     double square = 0;
     for (int c = 0; c < 3; c++) {
-        place[0][c] = frame->renderer->geometry.origin[c] + (double)scratch->points.start[c][lane];
-        square += pow(place[0][c] - frame->view.position[c], 2);
+        const double from_eye = (double)scratch->air.start[c][lane];
+        place[0][c] = frame->view.position[c] + from_eye;
+        square += from_eye * from_eye;
     }
     return 4 * frame->air.pixel * sqrt(square);
 }

@@ -22,13 +22,15 @@ static cone cone_of(const nebel_lamp *lamp)
 }
 
 NB_CLONES static void set_ways(const cone *within, float radius, float clear, const float *restrict place,
-                               const nb_hits *hits, const nb_points *points, nb_lamp_ways *ways)
+                               const nb_starts *starts, const nb_hits *hits, const nb_points *points,
+                               nb_lamp_ways *ways)
 {
     const float lx = place[0], ly = place[1], lz = place[2], edge = within->edge, rise = within->rise;
+    const float *sx = starts->offset[0], *sy = starts->offset[1], *sz = starts->offset[2];
     const float ax = within->axis[0], ay = within->axis[1], az = within->axis[2];
     NB_SIMD
     for (int i = 0; i < NB_BATCH; i++) {
-        const float x = lx - points->start[0][i], y = ly - points->start[1][i], z = lz - points->start[2][i];
+        const float x = lx - sx[i], y = ly - sy[i], z = lz - sz[i];
         const float square = x * x + y * y + z * z, distance = sqrtf(square);
         const float scale = 1 / (distance > 1e-18f ? distance : 1e-18f);
         const float dx = x * scale, dy = y * scale, dz = z * scale;
@@ -49,11 +51,13 @@ NB_CLONES static void set_ways(const cone *within, float radius, float clear, co
     }
 }
 
-void nb_lamp_ways_set(const nebel_lamp *lamp, const float place[3], const nb_hits *hits, const nb_points *points,
+void nb_lamp_ways_set(const nebel_lamp *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
                       nb_lamp_ways *ways)
 {
     const cone within = cone_of(lamp);
-    set_ways(&within, (float)nb_bulb(lamp->radius), (float)lamp->radius, place, hits, points, ways);
+    float place[3];
+    for (int c = 0; c < 3; c++) place[c] = (float)(lamp->position[c] - starts->origin[c]);
+    set_ways(&within, (float)nb_bulb(lamp->radius), (float)lamp->radius, place, starts, hits, points, ways);
 }
 
 void nb_lamp_ways_shadow(RTCScene scene, nb_points *points, nb_lamp_ways *ways, nb_packets *packets)

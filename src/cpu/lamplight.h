@@ -13,9 +13,8 @@ typedef struct nb_lamp_ways {
     _Alignas(64) int lit[NB_BATCH];
 } nb_lamp_ways;
 
-/* Lanes are lit where they are hits, the lamp is above shading normal and triangle, and within the lamp's cone. `place`
- * is the lamp's, relative to the origin of the geometry. */
-void nb_lamp_ways_set(const nebel_lamp *lamp, const float place[3], const nb_hits *hits, const nb_points *points,
+/* Lanes are lit where they are hits, the lamp is above shading normal and triangle, and within the lamp's cone. */
+void nb_lamp_ways_set(const nebel_lamp *lamp, const nb_starts *starts, const nb_hits *hits, const nb_points *points,
                       nb_lamp_ways *ways);
 
 /* Lanes behind a surface are no longer lit. */

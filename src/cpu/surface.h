@@ -21,6 +21,12 @@ typedef struct nb_points {
     _Alignas(64) int lit[NB_BATCH], away[NB_BATCH];
 } nb_points;
 
+/* Where rays to lights begin, for fog and lamps: `origin` + `offset`. */
+typedef struct nb_starts {
+    double origin[3];
+    const float *offset[3];
+} nb_starts;
+
 void nb_srgb_table_set(nb_srgb_table *table);
 
 /* The points of all hits. `sun` is the unit direction towards the sun. Lanes without a hit are not lit. */
