@@ -4,6 +4,7 @@
 #include "test_render_scene.h"
 
 #include "base/vector.h"
+#include "cpu/daylight.h"
 
 enum { WIDTH = 32, HEIGHT = 20 };
 
@@ -237,8 +238,10 @@ typedef struct steps {
     double light[3], at_origin[3]; /* with fog in the light of its place; of the origin */
 } steps;
 
-/* Many short pieces, each of air, of fog in sunlight and of fog in the sky's light for itself. */
-static steps step_along(const world *w, const nebel_snapshot *by_sun, const nebel_snapshot *by_sky, nebel_ray ray)
+/* Many short pieces, each of air, of fog in sunlight and of fog in the sky's light for itself. How much brighter the sky is than at the
+ * origin is for test_render_planet to try. */
+static steps step_along(const world *w, const nb_daylight *daylight, const nebel_snapshot *by_sun,
+                        const nebel_snapshot *by_sky, nebel_ray ray)
 {
     enum { STEPS = 4000 };
     static const double origin[3] = {0, 0, 0};
@@ -260,14 +263,16 @@ static steps step_along(const world *w, const nebel_snapshot *by_sun, const nebe
         }
         ray.t_max = to - from;
         const nebel_air_light there = light_at(w, middle);
+        double sun_left[3], brighter[3];
+        nb_daylight_at(daylight, NB_DAYLIGHT_OF_FOG, middle, sun_left, brighter);
         assert_int_equal(nebel_trace_air(w->atmosphere, &w->sun, 1, &ray, 0, &air, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(by_sun, NULL, 1, &ray, 0, &sun, 0), NEBEL_OK);
         assert_int_equal(nebel_trace(by_sky, NULL, 1, &ray, 0, &sky, 0), NEBEL_OK);
         for (int c = 0; c < 3; c++) {
             const double of_air = .5 * (1 + sky.transmittance[c]) * air.in_scattering[c];
             const double above = w->sun.irradiance[c], seen = .5 * (1 + air.transmittance[c]) * left[c];
-            sum.light[c] += left[c] * of_air + seen * (sun.in_scattering[c] * there.sun[c] / above +
-                                                       sky.in_scattering[c] * there.sky[c] / home.sky[c]);
+            sum.light[c] += left[c] * of_air +
+                            seen * (sun.in_scattering[c] * there.sun[c] / above + sky.in_scattering[c] * brighter[c]);
             sum.at_origin[c] +=
                 left[c] * of_air + seen * (sun.in_scattering[c] * home.sun[c] / above + sky.in_scattering[c]);
             left[c] *= air.transmittance[c] * sky.transmittance[c];
@@ -306,9 +311,11 @@ static void mist_is_lit_by_place(void **state)
     static const struct {
         double height, pitch, sun[3];
     } views[] = {{1.5e6, -1, {.995, .1, 0}}, {2e4, -.1, {0, .05, -1}}, {1e5, -.2, {0, .05, 1}}, {300, 0, {.2, .03, 1}}};
+    static nb_daylight daylight;
     for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
         world w;
         make_world(views[v].sun, &w);
+        nb_daylight_set(&daylight, &w.planet, &w.planet, w.sun.direction);
         nebel_environment_map *map = make_sky(&w);
         const double none[3] = {0, 0, 0}, origin[3] = {0, 0, 0};
         const nebel_environment dark = {.type = NEBEL_ENVIRONMENT_CONSTANT};
@@ -322,7 +329,7 @@ static void mist_is_lit_by_place(void **state)
         double worst = 0, apart = 0;
         for (uint32_t i = 7; i < WIDTH * HEIGHT; i += 83) {
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
-            const steps exact = step_along(&w, by_sun, by_sky, ray);
+            const steps exact = step_along(&w, &daylight, by_sun, by_sky, ray);
             for (int c = 0; c < 3; c++) {
                 const double off = fabs((double)picture.planes.in_scattering[3 * i + (uint32_t)c] - exact.light[c]);
                 /* Tables of daylight: 9e-4 of fog that is at most .4 bright; and the steps. */

@@ -231,7 +231,7 @@ static void daylight_is_that_of_the_air(void **state)
                                          (radius + height) * level * sin(turn)}};
             double sun[3], sky[3];
             assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, place, 0, &there, 0), NEBEL_OK);
-            nb_daylight_at(&daylight, place[0], sun, sky);
+            nb_daylight_at(&daylight, NB_DAYLIGHT_OF_SURFACES, place[0], sun, sky);
             for (int c = 0; c < 3; c++) {
                 worst_sun = fmax(worst_sun, fabs(sun[c] - there.sun[c]));
                 worst_sky = fmax(worst_sky, fabs(sky[c] * at_origin.sky[c] - there.sky[c]) / at_origin.sky[c]);
@@ -239,6 +239,79 @@ static void daylight_is_that_of_the_air(void **state)
         }
         print_message("%s: sun off by %.1e, sky by %.1e of that at the origin\n", names[n], worst_sun, worst_sky);
         assert_true(worst_sun <= 2e-3 && worst_sky <= 6e-3);
+        nebel_destroy_atmosphere(w.atmosphere);
+    }
+}
+
+/* On the ground where the sun is so high: of the sky by 48 x 48 directions, the same on both sides of the sun, and of the ground. */
+static void look_around(const world *w, const double to_sun[3], double height_of_sun, double place[3], double light[3])
+{
+    enum { SLOPES = 48, TURNS = 48 };
+    static nebel_ray rays[SLOPES * TURNS];
+    static nebel_light found[SLOPES * TURNS];
+    const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
+    const double level = sqrt(1 - height_of_sun * height_of_sun), radius = w->planet.air.radius;
+    double other[3] = {to_sun[1], -to_sun[0], 0}, up[3], ahead[3], across[3];
+    assert_true(nb_vector_make_unit(other));
+    for (int c = 0; c < 3; c++) {
+        up[c] = height_of_sun * to_sun[c] + level * other[c];
+        ahead[c] = level * to_sun[c] - height_of_sun * other[c];
+        place[c] = radius * up[c] - (c == 1 ? radius : 0);
+    }
+    nb_vector_cross(up, ahead, across);
+    for (int i = 0; i < SLOPES * TURNS; i++) {
+        const double slope = (i / TURNS + .5) / SLOPES, flat = sqrt(1 - slope * slope),
+                     turn = test_pi * (i % TURNS + .5) / TURNS;
+        rays[i].t_max = HUGE_VAL;
+        memcpy(rays[i].origin, place, sizeof rays[i].origin);
+        for (int c = 0; c < 3; c++)
+            rays[i].direction[c] = slope * up[c] + flat * (cos(turn) * ahead[c] + sin(turn) * across[c]);
+    }
+    nebel_air_light there;
+    assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, (const double(*)[3])place, 0, &there, 0), NEBEL_OK);
+    assert_int_equal(nebel_trace_air(w->atmosphere, &white, SLOPES * TURNS, rays, sizeof *rays, found, sizeof *found),
+                     NEBEL_OK);
+    for (int c = 0; c < 3; c++) {
+        light[c] = 2 * w->planet.air.ground_albedo[c] * (there.sky[c] + fmax(0, height_of_sun) * there.sun[c]);
+        for (int i = 0; i < SLOPES * TURNS; i++)
+            light[c] += 2 * test_pi / (SLOPES * TURNS) * (double)found[i].in_scattering[c];
+    }
+}
+
+/* By the shape of the sky, too: the irradiance of level ground changes eight times as much from noon to dusk. */
+static void fog_has_the_sky_from_all_sides(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"earth", "mars"};
+    static const double to_sun[3] = {.48, .6, .64};
+    static const double heights[] = {.999, .7, .3, .1, .03, 0, -.03, -.1, -.3};
+    static nb_daylight daylight;
+    for (int n = 0; n < 2; n++) {
+        world w;
+        make_world(names[n], to_sun, &w);
+        double place[3], there[3], at_origin[3], worst = 0, by_level = 0;
+        const nebel_sun white = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {1, 1, 1}};
+        nebel_air_light level, level_at_origin;
+        nb_daylight_set(&daylight, &w.planet, &w.planet, to_sun);
+        look_around(&w, to_sun, to_sun[1], place, at_origin);
+        assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, (const double(*)[3])place, 0, &level_at_origin, 0),
+                         NEBEL_OK);
+        for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
+            double sun[3], sky[3];
+            look_around(&w, to_sun, heights[i], place, there);
+            nb_daylight_at(&daylight, NB_DAYLIGHT_OF_FOG, place, sun, sky);
+            assert_int_equal(nebel_light_air(w.atmosphere, &white, 1, (const double(*)[3])place, 0, &level, 0),
+                             NEBEL_OK);
+            for (int c = 0; c < 3; c++) {
+                const double off = fabs(log(sky[c] * at_origin[c] / there[c]));
+                assert_true(heights[i] > -.15 ||
+                            off < .25); /* of a sky that is all at the horizon, a millionth as bright */
+                if (heights[i] > -.15) worst = fmax(worst, off);
+                by_level = fmax(by_level, fabs(log(level.sky[c] / level_at_origin.sky[c] * at_origin[c] / there[c])));
+            }
+        }
+        print_message("%s: off by %.2g; by level ground it would be by %.2g\n", names[n], worst, by_level);
+        assert_true(worst < .08 && by_level > 4 * worst);
         nebel_destroy_atmosphere(w.atmosphere);
     }
 }
@@ -540,6 +613,7 @@ int main(void)
         cmocka_unit_test(sky_and_ground_are_those_of_the_air),
         cmocka_unit_test(models_are_seen_through_air),
         cmocka_unit_test(daylight_is_that_of_the_air),
+        cmocka_unit_test(fog_has_the_sky_from_all_sides),
         cmocka_unit_test(models_take_the_light_of_their_place),
         cmocka_unit_test(air_and_fog_share_a_ray),
         cmocka_unit_test(shadows_of_fog_are_the_same_everywhere),

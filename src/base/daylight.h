@@ -10,6 +10,10 @@
 
 enum { NB_DAYLIGHT_HEIGHTS = 65, NB_DAYLIGHT_SUNS = 65, NB_DAYLIGHT_SKIES = 129 };
 
+/* Whose light of the sky: level surfaces have what falls on them, fog what comes from all sides, the ground below included. Under a
+ * sun in the zenith that is 18 times as much, by night 3 times. */
+typedef enum nb_daylight_of { NB_DAYLIGHT_OF_SURFACES, NB_DAYLIGHT_OF_FOG, NB_DAYLIGHT_OF_COUNT } nb_daylight_of;
+
 typedef struct nb_daylight {
     const nebel_atmosphere *atmosphere;
     nebel_sun sun; /* of irradiance 1 */
@@ -17,7 +21,7 @@ typedef struct nb_daylight {
     /* Optical depth of the way to a sun that is not below the level: denser near the ground, and where the sun is low. Where
      * it is lower the air is asked itself: the edge of the planet's shadow bears no interpolation. */
     float depth[NB_DAYLIGHT_HEIGHTS][NB_DAYLIGHT_SUNS][3];
-    float sky[NB_DAYLIGHT_SKIES][3]; /* logarithm of the sky's irradiance, as parts of that at the scene's origin */
+    float sky[NB_DAYLIGHT_OF_COUNT][NB_DAYLIGHT_SKIES][3]; /* logarithms of parts of that at the scene's origin */
 } nb_daylight;
 
 /* Deeper than this counts as night. */
@@ -82,14 +86,12 @@ static inline int nb_daylight_is_near(const nebel_planet *home, const double to_
 }
 
 /* At a height, with the sun so high. `across` is at right angles to the way to it. */
-static inline nebel_air_light nb_daylight_under(const nb_daylight *daylight, const double across[3], double height,
-                                                double sun)
+static inline void nb_daylight_place(const nb_daylight *daylight, const double across[3], double height, double sun,
+                                     double place[3])
 {
     const double radius = daylight->radius + height, side = sqrt(fmax(0, 1 - sun * sun));
-    double place[3];
     for (int c = 0; c < 3; c++)
         place[c] = daylight->center[c] + radius * (sun * daylight->sun.direction[c] + side * across[c]);
-    return nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
 }
 
 static inline void nb_daylight_set_depths(nb_daylight *daylight, const double across[3])
@@ -98,7 +100,9 @@ static inline void nb_daylight_set_depths(nb_daylight *daylight, const double ac
         const double part = h / (NB_DAYLIGHT_HEIGHTS - 1.), height = daylight->thickness * part * part;
         for (int s = 0; s < NB_DAYLIGHT_SUNS; s++) {
             const double root = s / (NB_DAYLIGHT_SUNS - 1.);
-            const nebel_air_light light = nb_daylight_under(daylight, across, height, root * root);
+            double place[3];
+            nb_daylight_place(daylight, across, height, root * root, place);
+            const nebel_air_light light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
             for (int c = 0; c < 3; c++)
                 daylight->depth[h][s][c] = (float)(light.sun[c] > 0 ? fmin(NB_DAYLIGHT_MOST_DEPTH, -log(light.sun[c]))
                                                                     : NB_DAYLIGHT_MOST_DEPTH);
@@ -106,19 +110,101 @@ static inline void nb_daylight_set_depths(nb_daylight *daylight, const double ac
     }
 }
 
-static inline void nb_daylight_set_skies(nb_daylight *daylight, const nebel_atmosphere *home, const double across[3])
+/* A column of right angles at a place: up, towards the sun, across. */
+static inline void nb_daylight_turn(const double center[3], const double to_sun[3], const double place[3],
+                                    double axes[3][3])
+{
+    for (int c = 0; c < 3; c++) axes[0][c] = place[c] - center[c];
+    if (!nb_vector_make_unit(axes[0])) axes[0][1] = 1;
+    const double rise = nb_vector_dot(axes[0], to_sun);
+    for (int c = 0; c < 3; c++) axes[1][c] = to_sun[c] - rise * axes[0][c];
+    if (!(fabs(rise) < 1 - 1e-12) || !nb_vector_make_unit(axes[1])) {
+        const double other[3] = {fabs(axes[0][0]) < 0.5, 0, !(fabs(axes[0][0]) < 0.5)};
+        nb_vector_cross(axes[0], other, axes[1]);
+        (void)nb_vector_make_unit(axes[1]);
+    }
+    nb_vector_cross(axes[0], axes[1], axes[2]);
+}
+
+/* The light from all sides at the ground below a place: of the sky, by Gauss's rule over slopes, the same on both sides of the
+ * sun, and of the ground. */
+static inline void nb_daylight_around(const nebel_planet *planet, const nebel_sun *sun, const double place[3],
+                                      double light[3])
+{
+    enum { SLOPES = 5, TURNS = 6 };
+    static const double pi = 3.14159265358979323846;
+    static const double slopes[SLOPES] = {0.04691007703066802, 0.23076534494715845, 0.5, 0.76923465505284155,
+                                          0.95308992296933198};
+    static const double weights[SLOPES] = {0.11846344252809454, 0.23931433524968324, 0.28444444444444444,
+                                           0.23931433524968324, 0.11846344252809454};
+    const nebel_atmosphere_desc *const air = &planet->air;
+    const double center[3] = {air->ground[0], air->ground[1] - air->radius, air->ground[2]};
+    double axes[3][3], ground[3];
+    nebel_ray rays[SLOPES * TURNS];
+    nebel_light found[SLOPES * TURNS];
+    nb_daylight_turn(center, sun->direction, place, axes);
+    for (int c = 0; c < 3; c++) ground[c] = center[c] + air->radius * axes[0][c];
+    for (int i = 0; i < SLOPES * TURNS; i++) {
+        const double slope = slopes[i / TURNS], level = sqrt(1 - slope * slope), turn = pi * (i % TURNS + 0.5) / TURNS;
+        rays[i].t_max = HUGE_VAL;
+        for (int c = 0; c < 3; c++) {
+            rays[i].origin[c] = ground[c];
+            rays[i].direction[c] = slope * axes[0][c] + level * (cos(turn) * axes[1][c] + sin(turn) * axes[2][c]);
+        }
+    }
+    memset(found, 0, sizeof found);
+    (void)nebel_trace_air(planet->atmosphere, sun, SLOPES * TURNS, rays, sizeof *rays, found, sizeof *found);
+    const nebel_air_light on_ground = nb_daylight_ask(sun, planet->atmosphere, ground);
+    const double rise = fmax(0, nb_vector_dot(axes[0], sun->direction));
+    for (int c = 0; c < 3; c++) {
+        light[c] = 2 * air->ground_albedo[c] * (on_ground.sky[c] + rise * on_ground.sun[c]);
+        for (int i = 0; i < SLOPES * TURNS; i++)
+            light[c] += 2 * pi / TURNS * weights[i / TURNS] * (double)found[i].in_scattering[c];
+    }
+}
+
+static inline float nb_daylight_part(double light, double there)
+{
+    return (float)(there > NB_DAYLIGHT_LEAST_SKY ? log(fmax(light, NB_DAYLIGHT_LEAST_SKY) / there) : 0);
+}
+
+/* The place on the ground that a row of skies is of. */
+static inline void nb_daylight_place_of(const nb_daylight *daylight, const double across[3], int row, double place[3])
+{
+    const double part = (2. * row / (NB_DAYLIGHT_SKIES - 1) - 1) * nb_daylight_spread(1);
+    const double sun = copysign(NB_DAYLIGHT_TWILIGHT * expm1(fabs(part)), part);
+    nb_daylight_place(daylight, across, 0, fmax(-1, fmin(1, sun)), place);
+}
+
+static inline void nb_daylight_set_level_skies(nb_daylight *daylight, const nebel_planet *home, const double across[3])
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light there = nb_daylight_ask(&daylight->sun, home, origin);
-    for (int s = 0; s < NB_DAYLIGHT_SKIES; s++) {
-        const double place = (2. * s / (NB_DAYLIGHT_SKIES - 1) - 1) * nb_daylight_spread(1);
-        const nebel_air_light light = nb_daylight_under(
-            daylight, across, 0, fmax(-1, fmin(1, copysign(NB_DAYLIGHT_TWILIGHT * expm1(fabs(place)), place))));
+    const nebel_air_light there = nb_daylight_ask(&daylight->sun, home->atmosphere, origin);
+    for (int row = 0; row < NB_DAYLIGHT_SKIES; row++) {
+        double place[3];
+        nb_daylight_place_of(daylight, across, row, place);
+        const nebel_air_light light = nb_daylight_ask(&daylight->sun, daylight->atmosphere, place);
         for (int c = 0; c < 3; c++)
-            daylight->sky[s][c] = (float)(there.sky[c] > NB_DAYLIGHT_LEAST_SKY
-                                              ? log(fmax(light.sky[c], NB_DAYLIGHT_LEAST_SKY) / there.sky[c])
-                                              : 0);
+            daylight->sky[NB_DAYLIGHT_OF_SURFACES][row][c] = nb_daylight_part(light.sky[c], there.sky[c]);
     }
+}
+
+/* Every second row is asked for, which takes thirty rays each. */
+static inline void nb_daylight_set_round_skies(nb_daylight *daylight, const nebel_planet *planet,
+                                               const nebel_planet *home, const double across[3])
+{
+    static const double origin[3] = {0, 0, 0};
+    float(*const skies)[3] = daylight->sky[NB_DAYLIGHT_OF_FOG];
+    double there[3];
+    nb_daylight_around(home, &daylight->sun, origin, there);
+    for (int row = 0; row < NB_DAYLIGHT_SKIES; row += 2) {
+        double place[3], light[3];
+        nb_daylight_place_of(daylight, across, row, place);
+        nb_daylight_around(planet, &daylight->sun, place, light);
+        for (int c = 0; c < 3; c++) skies[row][c] = nb_daylight_part(light[c], there[c]);
+    }
+    for (int row = 1; row < NB_DAYLIGHT_SKIES; row += 2)
+        for (int c = 0; c < 3; c++) skies[row][c] = 0.5f * (skies[row - 1][c] + skies[row + 1][c]);
 }
 
 /* Tables for a sun in a direction of length 1. `home` is the planet whose sky is that of the scene's origin. Both have
@@ -137,7 +223,8 @@ static inline void nb_daylight_set(nb_daylight *daylight, const nebel_planet *pl
     nb_vector_cross(to_sun, axis, across);
     nb_vector_make_unit(across);
     nb_daylight_set_depths(daylight, across);
-    nb_daylight_set_skies(daylight, home->atmosphere, across);
+    nb_daylight_set_level_skies(daylight, home, across);
+    nb_daylight_set_round_skies(daylight, planet, home, across);
 }
 
 #endif

@@ -194,10 +194,10 @@ void nb_air_set_points(const nb_air *air, double advance, const double position[
     set_starts(position, rays, points, scratch);
 }
 
-void nb_air_light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])
+void nb_air_light_at(const nb_air *air, nb_daylight_of of, const double place[3], double sun[3], double sky[3])
 {
     const int nearest = nb_worlds_nearest(air->worlds, air->count, place);
-    nb_daylight_at(air->worlds[nearest].daylight, place, sun, sky);
+    nb_daylight_at(air->worlds[nearest].daylight, of, place, sun, sky);
     const double left = uneclipsed(air, nearest, place);
     for (int c = 0; c < 3; c++) sun[c] *= left;
 }
@@ -214,7 +214,7 @@ void nb_air_set_daylight(const nb_air *air, const double origin[3], const nb_hit
         double place[3], sun[3] = {0, 0, 0}, sky[3] = {1, 1, 1};
         const int is_model = hits->surface[i] != NB_NONE && hits->surface[i] != NB_GROUND;
         for (int c = 0; c < 3; c++) place[c] = origin[c] + (double)points->start[c][i];
-        if (is_model && air->worlds[0].daylight != NULL) nb_air_light_at(air, place, sun, sky);
+        if (is_model && air->worlds[0].daylight != NULL) nb_air_light_at(air, NB_DAYLIGHT_OF_SURFACES, place, sun, sky);
         for (int c = 0; c < 3; c++) {
             scratch->sun_left[c][i] = (float)sun[c];
             scratch->sky_there[c][i] = air->owns_ambient ? (float)sky[c] : 1;

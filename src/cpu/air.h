@@ -83,8 +83,8 @@ void nb_air_free(nb_air *air);
 /* Makes tables of daylight where there are none. Errors: MEMORY. */
 nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const nebel_log *log);
 
-/* By these: what is left of the sun at a place, and how much brighter the sky is than at the origin. */
-void nb_air_light_at(const nb_air *air, const double place[3], double sun[3], double sky[3]);
+/* By these: what is left of the sun at a place, and how much brighter the sky is than at the origin, for whom. */
+void nb_air_light_at(const nb_air *air, nb_daylight_of of, const double place[3], double sun[3], double sky[3]);
 
 /* Without tables: for a sun of irradiance 1. */
 nebel_air_light nb_air_ask(const nb_air *air, const double place[3]);

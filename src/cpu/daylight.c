@@ -23,7 +23,7 @@ static void find_sun(const nb_daylight *daylight, double height, double cosine, 
     }
 }
 
-void nb_daylight_at(const nb_daylight *daylight, const double place[3], double sun[3], double sky[3])
+void nb_daylight_at(const nb_daylight *daylight, nb_daylight_of of, const double place[3], double sun[3], double sky[3])
 {
     double from[3];
     for (int c = 0; c < 3; c++) from[c] = place[c] - daylight->center[c];
@@ -35,7 +35,7 @@ void nb_daylight_at(const nb_daylight *daylight, const double place[3], double s
         part_of(0.5 * (nb_daylight_spread(cosine) / nb_daylight_spread(1) + 1) * (NB_DAYLIGHT_SKIES - 1),
                 NB_DAYLIGHT_SKIES, &s);
     for (int c = 0; c < 3; c++)
-        sky[c] = exp((1 - part) * (double)daylight->sky[s][c] + part * (double)daylight->sky[s + 1][c]);
+        sky[c] = exp((1 - part) * (double)daylight->sky[of][s][c] + part * (double)daylight->sky[of][s + 1][c]);
     if (height <= daylight->thickness && cosine >= 0) {
         find_sun(daylight, height, cosine, sun);
     } else {

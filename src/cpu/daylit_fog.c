@@ -57,7 +57,7 @@ static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
 
 static void light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])
 {
-    nb_air_light_at(air, place, sun, sky);
+    nb_air_light_at(air, NB_DAYLIGHT_OF_FOG, place, sun, sky);
     for (int c = 0; c < 3; c++) {
         sun[c] *= (double)air->cloud_shade;
         if (!air->owns_ambient) sky[c] = 1;
@@ -65,14 +65,19 @@ static void light_at(const nb_air *air, const double place[3], double sun[3], do
 }
 
 /* Without tables, to `sun`, where it is the same everywhere. */
-static void set_even_light(nb_air *air, const double place[3], nebel_sun *sun)
+static void set_even_light(nb_air *air, const nebel_planet *home, const double place[3], nebel_sun *sun)
 {
     static const double origin[3] = {0, 0, 0};
-    const nebel_air_light there = nb_air_ask(air, place), here = nb_air_ask(air, origin);
+    const nebel_air_light there = nb_air_ask(air, place);
+    const nebel_sun bright = {.direction = {air->to_sun[0], air->to_sun[1], air->to_sun[2]}, .irradiance = {1, 1, 1}};
+    double around_there[3], around_here[3];
+    nb_daylight_around(air->worlds[nb_worlds_nearest(air->worlds, air->count, place)].planet, &bright, place,
+                       around_there);
+    nb_daylight_around(home, &bright, origin, around_here);
     for (int c = 0; c < 3; c++) {
         sun->irradiance[c] *= there.sun[c] * (double)air->cloud_shade;
         air->sun_at_eye[c] = 1;
-        air->sky_at_eye[c] = air->owns_ambient && here.sky[c] > NB_DAYLIGHT_LEAST_SKY ? there.sky[c] / here.sky[c] : 1;
+        air->sky_at_eye[c] = air->owns_ambient ? exp((double)nb_daylight_part(around_there[c], around_here[c])) : 1;
     }
 }
 
@@ -94,7 +99,7 @@ nebel_result nb_daylit_fog_set(nb_frame *frame)
     air->is_fog_even = !is_far || is_even(air, min, max);
     result = find_cloud_shade(frame, &air->cloud_shade);
     if (air->is_fog_even)
-        set_even_light(air, middle, &sun);
+        set_even_light(air, &scene->planets[0], middle, &sun);
     else if (result == NEBEL_OK)
         result = nb_air_set_daylights(air, &scene->planets[0], &renderer->log);
     if (result == NEBEL_OK && !air->is_fog_even) light_at(air, air->position, air->sun_at_eye, air->sky_at_eye);

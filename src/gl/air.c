@@ -32,7 +32,11 @@ nebel_sun nb_gl_air_sun(const nebel_scene_data *scene)
 }
 
 /* Depths, and behind them skies, of nb_daylight. */
-enum { DEPTHS = NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS, DAYLIGHT_WORDS = DEPTHS + NB_DAYLIGHT_SKIES };
+enum {
+    DEPTHS = NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS,
+    SKIES = NB_DAYLIGHT_OF_COUNT * NB_DAYLIGHT_SKIES,
+    DAYLIGHT_WORDS = DEPTHS + SKIES
+};
 
 static int are_same(const nb_gl_air *air, const nebel_air_view_desc *desc, const nb_world *worlds, int count,
                     int is_lit)
@@ -118,10 +122,9 @@ static nebel_result measure(nb_gl_air *air, size_t *total)
 
 static void pack_daylight(const nb_daylight *daylight, nebel_word *words)
 {
-    const float *const depth = daylight->depth[0][0], *const sky = daylight->sky[0];
+    const float *const depth = daylight->depth[0][0], *const sky = daylight->sky[0][0];
     for (int i = 0; i < DEPTHS; i++) words[i] = (nebel_word){{depth[3 * i], depth[3 * i + 1], depth[3 * i + 2], 0}};
-    for (int i = 0; i < NB_DAYLIGHT_SKIES; i++)
-        words[DEPTHS + i] = (nebel_word){{sky[3 * i], sky[3 * i + 1], sky[3 * i + 2], 0}};
+    for (int i = 0; i < SKIES; i++) words[DEPTHS + i] = (nebel_word){{sky[3 * i], sky[3 * i + 1], sky[3 * i + 2], 0}};
 }
 
 static nebel_result pack(const nb_gl_air *air, nebel_word *words, size_t total)

@@ -10,8 +10,10 @@ const char *nb_air_head(int worlds, char text[NB_AIR_HEAD])
     if (worlds > 0)
         (void)snprintf(text, NB_AIR_HEAD,
                        "#define NEBEL_AIR\n#define SCENE_WORLDS %d\n#define NB_DAYLIGHT_HEIGHTS %d.0\n#define "
-                       "NB_DAYLIGHT_SUNS %d.0\n#define NB_DAYLIGHT_SKIES %d.0\n#define NB_DAYLIGHT_TWILIGHT %g\n",
-                       worlds, NB_DAYLIGHT_HEIGHTS, NB_DAYLIGHT_SUNS, NB_DAYLIGHT_SKIES, NB_DAYLIGHT_TWILIGHT);
+                       "NB_DAYLIGHT_SUNS %d.0\n#define NB_DAYLIGHT_SKIES %d.0\n#define NB_DAYLIGHT_TWILIGHT %g\n"
+                       "#define NB_DAYLIGHT_OF_SURFACES %d\n#define NB_DAYLIGHT_OF_FOG %d\n",
+                       worlds, NB_DAYLIGHT_HEIGHTS, NB_DAYLIGHT_SUNS, NB_DAYLIGHT_SKIES, NB_DAYLIGHT_TWILIGHT,
+                       NB_DAYLIGHT_OF_SURFACES, NB_DAYLIGHT_OF_FOG);
     return text;
 }
 
@@ -147,17 +149,17 @@ const char nb_air_places_text[] =
     "    if (lowest <= thickness) low = daylight_depth(first, lowest / thickness, 0.0);\n"
     "    return exp(min(own - 2.0 * low, 0.0));\n"
     "}\n"
-    "vec3 daylight_sky(int first, float cosine)\n"
+    "vec3 daylight_sky(int first, int of, float cosine)\n"
     "{\n"
     "    float spread = sign(cosine) * log(1.0 + abs(cosine) / NB_DAYLIGHT_TWILIGHT) / log(1.0 + 1.0 / "
     "NB_DAYLIGHT_TWILIGHT);\n"
     "    vec2 s = nb_air_place(0.5 * (spread + 1.0) * (NB_DAYLIGHT_SKIES - 1.0), NB_DAYLIGHT_SKIES);\n"
-    "    int at = first + int(NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS) + int(s.x);\n"
+    "    int at = first + int(NB_DAYLIGHT_HEIGHTS * NB_DAYLIGHT_SUNS) + of * int(NB_DAYLIGHT_SKIES) + int(s.x);\n"
     "    return exp(nb_toward(NEBEL_AIR_WORD(at).xyz, NEBEL_AIR_WORD(at + 1).xyz, s.y));\n"
     "}\n"
-    /* What is left of the sun, and how much brighter the sky is than at the scene's origin: those of the planet that is
+    /* What is left of the sun, and how much brighter the sky is than at the scene's origin, for whom: those of the planet that is
        nearest by tangents to the balls of air. */
-    "void daylight_at(vec3 at, out vec3 sun, out vec3 sky)\n"
+    "void daylight_at(vec3 at, int of, out vec3 sun, out vec3 sky)\n"
     "{\n"
     "    int world = 0;\n"
     "    for (int k = 1; k < SCENE_WORLDS; k++)\n"
@@ -170,7 +172,7 @@ const char nb_air_places_text[] =
     "    choose_world(world);\n"
     "    sun = uneclipsed(world, at) * daylight_sun(world, first, power, rise);\n"
     "    float far = radius + height_of(radius, power);\n"
-    "    if (sky_is_ambient) sky = daylight_sky(first, far > 0.0 ? clamp(rise / far, -1.0, 1.0) : 1.0);\n"
+    "    if (sky_is_ambient) sky = daylight_sky(first, of, far > 0.0 ? clamp(rise / far, -1.0, 1.0) : 1.0);\n"
     "}\n";
 
 /* Air and fog let through less the farther a ray goes and add light all the way, so that between two places the integral
@@ -229,7 +231,7 @@ const char nb_air_pieces_text[] =
     "uniform float even_shade;\n"
     "void pass_set_daylight(inout pass_knot knot, vec3 direction)\n"
     "{\n"
-    "    daylight_at(knot.at * direction, knot.sun, knot.sky);\n"
+    "    daylight_at(knot.at * direction, NB_DAYLIGHT_OF_FOG, knot.sun, knot.sky);\n"
     "    knot.sun *= even_shade;\n"
     "}\n"
     "float pass_next_lowest(vec3 direction, float after)\n"
@@ -399,7 +401,7 @@ const char nb_air_light_text[] = "float sky_left()\n"
                                  "void light_model(vec3 at, inout vec3 light, inout vec3 shining)\n"
                                  "{\n"
                                  "    vec3 sun, sky;\n"
-                                 "    daylight_at(at, sun, sky);\n"
+                                 "    daylight_at(at, NB_DAYLIGHT_OF_SURFACES, sun, sky);\n"
                                  "    shining *= sun;\n"
                                  "    light *= sky;\n"
                                  "    if (sky_is_ambient) light *= sky_left();\n"

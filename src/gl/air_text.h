@@ -3,7 +3,7 @@
 #define NB_GL_AIR_TEXT_H
 
 /* In the head of a program; "" where there are no planets. Returns text. */
-enum { NB_AIR_HEAD = 192 };
+enum { NB_AIR_HEAD = 256 };
 const char *nb_air_head(int worlds, char text[NB_AIR_HEAD]);
 
 /* Before the fog's text: where it finds words. */
