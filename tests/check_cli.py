@@ -949,9 +949,10 @@ class InfoTest(PictureCase):
         air = {"type": "exponential", "scattering": [2e-3, 2e-3, 2e-3], "scale_height": 8000}
         for airs, told in (([air], 1), ([], 0)):
             scene = self.write_scene("air.json", [], planet={"model": "physical", "airs": airs} if airs else {"model": "physical"})
-            warning = f"nebel: warning: {scene}: planet[0]: air deeper than 12 "
+            warning = f"nebel: warning: {scene}: planet: air deeper than 12 "
             for command in (["render", scene, "-o", self.folder / "a.png", "-s", "8x8", "-q"], ["trace", scene]):
                 self.assertEqual(nebel(*command, text=RAY).err.count(warning), told)
+        self.assertIn(f"note: {scene}: rays meet fog alone", nebel("trace", scene, text=RAY).err)
 
     def test_a_camera_below_the_ground_of_a_planet(self):
         for planet, radius in (({"model": "physical", "preset": "mars"}, 3389500), ({"model": "layers"}, 6360000)):

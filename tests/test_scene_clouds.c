@@ -88,7 +88,7 @@ static void test_what_is_wrong(void **state)
          "planet.clouds[0].top: is 1000 m; must be above the base, 1000 m"},
         {FORMAT, PLANET("", "[{\"base\": `1e-300}]"), "planet.clouds[0].base: is 1e-300; must be a height"},
         {FORMAT, ONE("\"size\": `3e7"),
-         "planet.clouds[0].size: is 3e+07 m; must be at most 2.544e+07 m, which is 4 of the radius"},
+         "planet.clouds[0].size: is 3e+07 m; must be at most 2.544e+07 m, which is 4 times the radius"},
         {FORMAT, ONE("\"top\": `2e5"), "planet.clouds[0].top: is 200000 m; must be within the air, 100000 m"},
         {FORMAT, ONE("\"base\": `2e5, \"top\": 3e5"),
          "planet.clouds[0].base: is 200000 m; must be within the air, 100000 m"},

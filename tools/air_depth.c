@@ -40,6 +40,10 @@ void nb_warn_of_deep_air(const nebel_scene_data *scene, const char *path)
         double depth[3];
         nb_find_air_depth(&scene->planets[i], depth);
         const char *const deep = nb_find_deep_air(depth);
-        if (deep != NULL) nb_report_message("warning: %s: planet[%zu]: %s", path, i, deep);
+        if (deep == NULL) continue;
+        if (scene->planet_count > 1)
+            nb_report_message("warning: %s: planet[%zu]: %s", path, i, deep);
+        else
+            nb_report_message("warning: %s: planet: %s", path, deep);
     }
 }

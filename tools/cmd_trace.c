@@ -291,6 +291,14 @@ static int useful_threads(size_t rays, int threads)
     return shares < (size_t)threads ? (int)shares : threads;
 }
 
+static void note_planets(const nebel_scene_data *scene, const char *path)
+{
+    if (scene->planet_count > 0)
+        nb_report_message("note: %s: rays meet fog alone, in the light that reaches it; air, ground and clouds of "
+                          "planets are left out",
+                          path);
+}
+
 static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
 {
     nb_report_listener listener = {0};
@@ -299,6 +307,7 @@ static int trace_scene(const char *path, settings *wanted, nb_rays *rays)
     if (status != NB_DONE) return status;
     nb_warn_of_darkness(nebel_scene_contents(loaded.scene), path);
     nb_warn_of_deep_air(nebel_scene_contents(loaded.scene), path);
+    note_planets(nebel_scene_contents(loaded.scene), path);
     status = read_rays(rays);
     if (status == NB_DONE) {
         wanted->threads = useful_threads(rays->count, wanted->threads);

@@ -78,7 +78,7 @@ static nebel_result set_air(nb_frame *frame, const nebel_frame_desc *desc)
     if (scene->planet_count == 0 || scene->planets[0].atmosphere == NULL) return NEBEL_OK;
     if (renderer->method != NEBEL_METHOD_EXACT)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
-                       "planets are drawn by the method exact alone: leave another out, or the planet");
+                       "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
     if (frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "frame: orthographic cameras see no planets; take a perspective one or a panorama");

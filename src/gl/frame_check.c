@@ -86,7 +86,7 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
         return refuse(&r->log, "clouds with volume by itself");
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
-                       "planets are drawn by the method exact alone: leave another out, or the planet");
+                       "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
     if (has_layers) return check_layers(r, desc);
     return has_air ? check_air(r, desc) : NEBEL_OK;
 }

@@ -81,7 +81,7 @@ static bool check_size(nb_json *json, const nb_json_node *node, const nebel_plan
 {
     const double most = NEBEL_MAX_CLOUD_RADII * planet->air.radius;
     char message[120];
-    snprintf(message, sizeof message, "size: is %g m; must be at most %g m, which is %g of the radius", size, most,
+    snprintf(message, sizeof message, "size: is %g m; must be at most %g m, which is %g times the radius", size, most,
              NEBEL_MAX_CLOUD_RADII);
     return size <= most || nb_value_fail_within(json, node, message, "");
 }
