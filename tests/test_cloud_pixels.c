@@ -206,6 +206,22 @@ static void test_light_under_a_low_sun(void **state)
     }
 }
 
+/* From below no cloud lies downwards, not that of the planet's other side. */
+static void test_no_cloud_is_seen_through_the_planet(void **state)
+{
+    (void)state;
+    nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    const double from[3] = {0, RADIUS + 250, 0};
+    assert_true(nb_cloud_depth_along(workspace, from, (const double[3]){0, 1, 0}, 10, 10, 1) > 5);
+    assert_true(nb_cloud_depth_along(workspace, from, (const double[3]){0, -1, 0}, 10, 10, 1) == 0);
+    assert_true(nb_cloud_depth_along(workspace, from, (const double[3]){.6, -.8, 0}, 10, 10, 1) == 0);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 /* From afar pixels are mixed of columns with cloud and without: beyond a sharp edge of the weather there is none, before it there is. */
 static void test_weather_ends_where_it_ends(void **state)
 {
@@ -243,9 +259,10 @@ static void test_weather_ends_where_it_ends(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_weather_ends_where_it_ends),      cmocka_unit_test(test_wide_pixels_see_means),
-        cmocka_unit_test(test_wide_pixels_let_as_much_through), cmocka_unit_test(test_light_of_pixels),
-        cmocka_unit_test(test_light_of_pixels_that_hide_heaps), cmocka_unit_test(test_light_under_a_low_sun),
+        cmocka_unit_test(test_weather_ends_where_it_ends),          cmocka_unit_test(test_wide_pixels_see_means),
+        cmocka_unit_test(test_wide_pixels_let_as_much_through),     cmocka_unit_test(test_light_of_pixels),
+        cmocka_unit_test(test_light_of_pixels_that_hide_heaps),     cmocka_unit_test(test_light_under_a_low_sun),
+        cmocka_unit_test(test_no_cloud_is_seen_through_the_planet),
     };
     return cmocka_run_group_tests(tests, make_air, free_air);
 }

@@ -69,13 +69,15 @@ typedef struct nb_way {
 } nb_way;
 
 /* The pieces of a way in a layer. Just below the horizon it may leave the layer over the planet's bulge and enter it again
- * behind; but not through the ground. */
+ * behind; but not through the ground: who looks down from below a layer sees none of its clouds, not those on the planet's other
+ * side. */
 static int stays_of(const nebel_cloud_view *view, int k, const nb_way *way, double pieces[2][2])
 {
     const nb_cloud_layer *layer = &view->clouds->layers[k];
     const int count = nb_cloud_pieces(layer->low, layer->high, way->from, way->unit, way->reach, pieces);
-    if (count < 2) return count;
-    return nb_cloud_to_ground(view->clouds->atmosphere->airs.radius, way->from, way->unit) < pieces[1][0] ? 1 : 2;
+    if (count == 0 || !(pieces[count - 1][0] > 0)) return count;
+    const double ground = nb_cloud_to_ground(view->clouds->atmosphere->airs.radius, way->from, way->unit);
+    return pieces[count - 1][0] > ground ? count - 1 : count;
 }
 
 /* Steps of several ways in a layer whose places are asked at once, and whose depths they are. */
