@@ -206,6 +206,57 @@ static void test_light_under_a_low_sun(void **state)
     }
 }
 
+/* Mean light of rays from below a layer, so high above the level, over a sixth of the horizon. */
+static double show_horizon(nebel_cloud_workspace *workspace, double height, double degrees, double spread)
+{
+    enum { RAYS = 16 };
+    const double rise = sin(degrees * PI / 180), level = cos(degrees * PI / 180);
+    double sum = 0;
+    for (int i = 0; i < RAYS; i++) {
+        const double turn = PI / 3 * (i + .5 - RAYS / 2) / RAYS;
+        const nebel_ray ray = {{0, height, 0}, {level * sin(turn), rise, -level * cos(turn)}, HUGE_VAL};
+        nebel_cloud_knots knots;
+        assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
+        assert_true(knots.count > 0 && knots.transmittance[knots.count - 1] < .02f);
+        sum += (double)knots.in_scattering[knots.count - 1][1] / RAYS;
+    }
+    return sum;
+}
+
+/* From below closed clouds pixels of all widths show what is in their shadow, down to the horizon: none has light of their tops. */
+static void compare_horizons(const nebel_cloud_layer *layer, double height, const double degrees[2], double tolerance)
+{
+    static const double suns[][3] = {{.3, .5, -1}, {.1, .15, -1}, {-.3, .5, 1}}, spreads[] = {6e-4, 2e-3, 5e-3, .03};
+    nebel_clouds *clouds = make(1, layer);
+    for (int i = 0; i < 3; i++) {
+        const nebel_cloud_view_desc desc = {
+            .clouds = clouds, .sun = {.direction = {suns[i][0], suns[i][1], suns[i][2]}, .irradiance = {5, 4, 3}}};
+        nebel_cloud_workspace *workspace;
+        nebel_cloud_view *view;
+        assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
+        assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
+        for (int k = 0; k < 2; k++) {
+            const double thin = show_horizon(workspace, height, degrees[k], 1e-5);
+            for (int s = 0; s < 4; s++) {
+                const double seen = show_horizon(workspace, height, degrees[k], spreads[s]);
+                print_message("sun %d, %.2f degrees: light of %.4f, of thin rays %.4f\n", i, degrees[k], seen, thin);
+                assert_near(seen, thin, tolerance * thin);
+            }
+        }
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+    }
+    nebel_destroy_clouds(clouds);
+}
+
+static void test_closed_clouds_are_dark_at_the_horizon(void **state)
+{
+    (void)state;
+    compare_horizons(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, 100, (double[]){0, .25}, .05);
+    compare_horizons(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, 100, (double[]){1, 3}, .05);
+    compare_horizons(&(nebel_cloud_layer){.coverage = 1, .size = 2e7}, 2, (double[]){.5, 2}, .1);
+}
+
 /* From below no cloud lies downwards, not that of the planet's other side. */
 static void test_no_cloud_is_seen_through_the_planet(void **state)
 {
@@ -259,9 +310,13 @@ static void test_weather_ends_where_it_ends(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_weather_ends_where_it_ends),          cmocka_unit_test(test_wide_pixels_see_means),
-        cmocka_unit_test(test_wide_pixels_let_as_much_through),     cmocka_unit_test(test_light_of_pixels),
-        cmocka_unit_test(test_light_of_pixels_that_hide_heaps),     cmocka_unit_test(test_light_under_a_low_sun),
+        cmocka_unit_test(test_weather_ends_where_it_ends),
+        cmocka_unit_test(test_wide_pixels_see_means),
+        cmocka_unit_test(test_wide_pixels_let_as_much_through),
+        cmocka_unit_test(test_light_of_pixels),
+        cmocka_unit_test(test_light_of_pixels_that_hide_heaps),
+        cmocka_unit_test(test_light_under_a_low_sun),
+        cmocka_unit_test(test_closed_clouds_are_dark_at_the_horizon),
         cmocka_unit_test(test_no_cloud_is_seen_through_the_planet),
     };
     return cmocka_run_group_tests(tests, make_air, free_air);

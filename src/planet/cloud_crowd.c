@@ -29,10 +29,14 @@
 /* Of the layer's height, wide: ways up, down and away from the sun, as smooth as between nodes. */
 #define AROUND_PART 0.13
 
+/* Cosine to straight up of the flattest views of the table. */
+#define FLATTEST 0.025f
+
 enum { TRIES = 24576 };
 
-static const float views[NB_CROWD_VIEWS] = {-1,   -.55f, -.25f, -.08f,
-                                            .08f, .25f,  .55f,  1}; /* rays' cosines to straight up */
+/* Rays' cosines to straight up. From above clouds show what the sun lights, from below what is in their shadow, however flat the
+ * ray: between the two in the middle nothing is linear (nb_cloud_crowd_at). */
+static const float views[NB_CROWD_VIEWS] = {-1, -.55f, -.25f, -.08f, -FLATTEST, FLATTEST, .08f, .25f, .55f, 1};
 static const float suns[NB_CROWD_SUNS] = {-.15f, -.05f, 0, .05f, .1f, .2f, .35f, .55f, .8f, 1};
 static const float turns[NB_CROWD_TURNS] = {-1, 0, 1}; /* cosines between ray and sun, both seen from straight above */
 
@@ -140,6 +144,15 @@ static const nb_cloud_parts *parts_under(nebel_cloud_workspace *workspace, int k
     return crowd->parts[sun];
 }
 
+/* No ray from below a layer is flatter than one that just passes its base. */
+#define PAST_BASE 1.02
+
+static double steepness_of(const nb_cloud_layer *layer, const nb_crowd_place *place, int view)
+{
+    const double part = layer->low / nb_vector_length(place->from), least = sqrt(fmax(0, 1 - part * part));
+    return views[view] < 0 ? (double)views[view] : fmin(1, fmax((double)views[view], PAST_BASE * least));
+}
+
 /* What counts is how places differ: where none is seen, too, some are seen more than others. */
 static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_cloud_crowd *crowd, int view, int turn)
 {
@@ -152,7 +165,7 @@ static const nb_crowd_seen *seen_by(nebel_cloud_workspace *workspace, int k, nb_
     for (int i = 0; i < crowd->count; i++) {
         const nb_crowd_place *place = &crowd->places[i];
         double ray[3];
-        direct(place, (double)views[view], place->turn + acos((double)turns[turn]), ray);
+        direct(place, steepness_of(layer, place, view), place->turn + acos((double)turns[turn]), ray);
         for (int c = 0; c < 3; c++) ray[c] = -ray[c];
         seen[i].whole = nb_cloud_depth_along(workspace, place->from, ray, fine.first, fine.width, 1);
         least = nb_smaller(least, seen[i].whole);
@@ -212,16 +225,26 @@ float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int k, float width)
     return crowd->count > 0 ? part : 0;
 }
 
-nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const double up[3], const double ray[3])
+/* The part of what is seen from below between the flattest views: a ray keeps the side on which it came into the layer up to
+ * where it is steep; from within, it has the more of a side the nearer to that it begins. */
+static float part_below(float view, float entered)
+{
+    const float steep = nb_larger(-1, nb_smaller(1, view / FLATTEST)), below = 1 - 2 * entered;
+    return nb_larger(0, nb_smaller(1, 0.5f + 0.5f * steep + below * (1 - fabsf(steep))));
+}
+
+nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int k, const double up[3], const double ray[3],
+                                 float entered)
 {
     const double *to_sun = workspace->view->sun.direction;
     const double sun = nb_vector_dot(up, to_sun), view = nb_vector_dot(up, ray);
     const double across = sqrt(fmax(0, (1 - sun * sun) * (1 - view * view)));
     const double turn = across > 1e-6 ? (nb_vector_dot(ray, to_sun) - sun * view) / across : 0;
     int low[3];
-    const float part[3] = {place_among(views, NB_CROWD_VIEWS, (float)view, &low[0]),
-                           place_among(turns, NB_CROWD_TURNS, (float)turn, &low[1]),
-                           place_among(suns, NB_CROWD_SUNS, (float)sun, &low[2])};
+    float part[3] = {place_among(views, NB_CROWD_VIEWS, (float)view, &low[0]),
+                     place_among(turns, NB_CROWD_TURNS, (float)turn, &low[1]),
+                     place_among(suns, NB_CROWD_SUNS, (float)sun, &low[2])};
+    if (low[0] == NB_CROWD_VIEWS / 2 - 1) part[0] = part_below((float)view, entered);
     nb_cloud_parts sum = {0, 0, 0, 0, 0, 0, 0};
     for (int corner = 0; corner < 8; corner++) {
         float weight = 1;

@@ -105,9 +105,10 @@ static inline nb_real step_up(nb_real x)
 /* Bases are flat, where vapour begins to condense, and thin there: drops grow on their way up. */
 static inline nb_real thin_out(nebel_cloud_kind kind, nb_real height)
 {
-    const nb_real end = step_up(NB_F(10.0) * (NB_F(1.0) - height));
-    if (kind != NEBEL_CLOUD_CUMULUS) return end * step_up(NB_F(6.0) * height);
-    return end * step_up(NB_F(16.0) * height) * (NB_F(0.45) + NB_F(0.55) * nb_min(NB_F(1.0), NB_F(2.0) * height));
+    const nb_real end = step_up(nb_splat(NB_CLOUD_TOP_THINS) * (NB_F(1.0) - height)) *
+                        step_up(nb_splat(nb_cloud_base_thins(kind)) * height);
+    if (kind != NEBEL_CLOUD_CUMULUS) return end;
+    return end * (NB_F(0.45) + NB_F(0.55) * nb_min(NB_F(1.0), NB_F(2.0) * height));
 }
 
 /* nb_cloud_least_rank. */

@@ -97,6 +97,25 @@ float nb_cloud_part_through(float depth, float mean_cosine)
     return (5 - falling(apart)) / (4 + 3 * (1 - g / (1 + g)) * apart);
 }
 
+/* Integral of 3 x^2 - 2 x^3 up to x = 1, and of 1 behind it: nb_cloud_base_thins. */
+static float integral_of_rise(float x)
+{
+    return x < 1 ? x * x * x * (1 - 0.5f * x) : x - 0.5f;
+}
+
+nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_view *view, int k, double radius, const nb_cloud_depths *depths)
+{
+    const nb_cloud_layer *layer = &view->clouds->layers[k];
+    const float height = (float)(radius - layer->low) * layer->per_thickness;
+    const float all = layer->extinction / layer->per_thickness, base = nb_cloud_base_thins(layer->kind);
+    nb_cloud_depths bounded = *depths;
+    if (layer->high >= view->high)
+        bounded.up =
+            nb_smaller(bounded.up, all * integral_of_rise(NB_CLOUD_TOP_THINS * (1 - height)) / NB_CLOUD_TOP_THINS);
+    if (layer->low <= view->low) bounded.down = nb_smaller(bounded.down, all * integral_of_rise(base * height) / base);
+    return bounded;
+}
+
 nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3])
 {
     nb_cloud_ray ray = {.sun = nb_max(-1, nb_min(1, nb_vector_dot(direction, view->sun.direction)))};

@@ -104,7 +104,7 @@ typedef struct nb_crowd_seen {
 } nb_crowd_seen;
 
 enum {
-    NB_CROWD_VIEWS = 8,
+    NB_CROWD_VIEWS = 10,
     NB_CROWD_TURNS = 3,
     NB_CROWD_SUNS = 10,
     NB_CROWD_PLACES = 768,
@@ -205,6 +205,11 @@ double nb_cloud_to_ground(double radius, const double from[3], const double unit
 /* What comes through a slab of such depth, straight or scattered, for a mean cosine. */
 float nb_cloud_part_through(float depth, float mean_cosine);
 
+/* Nodes of lattices are as far apart as a layer takes to become dense from its ends on, and depths that are linear between them
+ * are too deep there by far: no cloud up or down is denser than its layer's. Only where no other layer lies that way. */
+nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_view *view, int layer, double radius,
+                                      const nb_cloud_depths *depths);
+
 nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depths);
 
 /* What a layer's drops send towards the eye, per unit of extinction. */
@@ -230,8 +235,9 @@ nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_
 /* How much of light is of clouds that a pixel so wide hides: 0 to 1. Always 0 where hardly any cloud is in the layer. */
 float nb_cloud_crowd_part(nebel_cloud_workspace *workspace, int layer, float width);
 
-/* Mean of places in a layer, by how much of each a ray sees. */
-nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, const double up[3], const double ray[3]);
+/* Mean of places in a layer, by how much of each a ray sees that came into it, or began in it, at a part of its height. */
+nb_cloud_parts nb_cloud_crowd_at(nebel_cloud_workspace *workspace, int layer, const double up[3], const double ray[3],
+                                 float entered);
 nb_cloud_parts nb_cloud_mix_parts(const nb_cloud_parts *a, const nb_cloud_parts *b, float part);
 
 #endif

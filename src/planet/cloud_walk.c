@@ -287,7 +287,8 @@ typedef struct nb_lights {
     int layers[NB_CLOUD_ASKED];
     nb_stretch stretches[NB_CLOUD_ASKED];
     double radius[NB_CLOUD_ASKED];
-    float crowd[NB_CLOUD_ASKED]; /* part of a mean of the layer */
+    float crowd[NB_CLOUD_ASKED];   /* part of a mean of the layer */
+    float entered[NB_CLOUD_ASKED]; /* of that: part of its height where the ray came into it */
     nb_cloud_asked asked[NB_CLOUD_ASKED];
 } nb_lights;
 
@@ -304,14 +305,14 @@ static nb_cloud_grain grain_of(const nb_walk *walk, int k, double width)
 {
     const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
     const double thickness = 1 / (double)layer->per_thickness, hidden = hidden_way(layer, thickness, width),
-                 flatness = hidden > 0 ? width / hidden : 1;
+                 flatness = hidden > 0 ? width / hidden : 1, nodes = NODES_PART * thickness;
     return (nb_cloud_grain){
         .width = (float)width,
         .first = (float)nb_min(0.1 * thickness,
                                nb_max(2 * hidden, nb_min(0.5 * walk->least, FIRST_DEPTH / (double)layer->extinction))),
-        /* Wider lattices than the layer is high would show through it. */
-        .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, NODES_PART * thickness), 0.8 * thickness)),
-                              0.08 * walk->least),
+        /* Wider lattices than the layer is high would show through it, also where heaps are far wider than that. */
+        .wide = (float)nb_max(nb_min(20 * width, nb_min(nb_max(2 * width, nodes), 0.8 * thickness)),
+                              nb_min(0.08 * walk->least, nodes)),
         .own = (float)nb_max(
             0, nb_min(1, (flatness * flatness * width / thickness - NODES_GOOD) / (NODES_BAD - NODES_GOOD))),
     };
@@ -324,11 +325,12 @@ static void light_stretch(nb_lights *lights, int i)
     const nb_cloud_asked *asked = &lights->asked[i];
     const double cosine = walk->view->clouds->layers[k].mean_cosine;
     const float crowd = lights->crowd[i];
+    const nb_cloud_depths depths = nb_cloud_bound_depths(walk->view, k, lights->radius[i], &asked->depths);
     double up[3];
     for (int c = 0; c < 3; c++) up[c] = asked->place[c] / lights->radius[i];
-    nb_cloud_parts parts = nb_cloud_parts_of((float)cosine, &asked->depths);
+    nb_cloud_parts parts = nb_cloud_parts_of((float)cosine, &depths);
     if (crowd > 0) {
-        const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit);
+        const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
         parts = nb_cloud_mix_parts(&parts, &mean, crowd);
     }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, asked->place, lights->radius[i]);
@@ -356,6 +358,15 @@ static void find_lights(nb_party *party)
     lights->count = 0;
 }
 
+/* Part of a layer's height where the ray came into it, or began. */
+static float height_entered(const nb_walk *walk, int k)
+{
+    const nb_cloud_layer *layer = &walk->view->clouds->layers[k];
+    double place[3];
+    const double height = radius_at(walk, walk->stays[walk->stay].begin, place) - layer->low;
+    return (float)nb_max(0, nb_min(1, height * (double)layer->per_thickness));
+}
+
 /* Light of a stretch as of its middle, weighted by how much of it is seen: that is right where it changes evenly. */
 static void add_light(nb_walk *walk, int k)
 {
@@ -371,6 +382,7 @@ static void add_light(nb_walk *walk, int k)
     lights->radius[i] = radius_at(walk, t, lights->asked[i].place);
     lights->asked[i].grain = grain_of(walk, k, walk->spread * t);
     lights->crowd[i] = nb_cloud_crowd_part(walk->workspace, k, lights->asked[i].grain.width);
+    lights->entered[i] = lights->crowd[i] > 0 ? height_entered(walk, k) : 0;
     lights->asked[i].is_alike = lights->crowd[i] >= 1;
     walk->tally.asked++;
     if (lights->count == NB_CLOUD_ASKED) find_lights(walk->party);

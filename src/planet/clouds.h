@@ -95,6 +95,14 @@ static inline float nb_cloud_sheet_bulge(nebel_cloud_kind kind)
     return kind == NEBEL_CLOUD_STRATUS ? 0.5f : 0.7f;
 }
 
+/* Clouds are thin at both ends of a layer: extinction is 3 x^2 - 2 x^3 of it, or less, where the part of the layer's height to that
+ * end, times so much, is x below 1. */
+#define NB_CLOUD_TOP_THINS 10.0f
+static inline float nb_cloud_base_thins(nebel_cloud_kind kind)
+{
+    return kind == NEBEL_CLOUD_CUMULUS ? 16.0f : 6.0f;
+}
+
 /* Where rank is less there is no cloud at a part of the layer's height; a width is counted by the column's variance. Heaps are domes:
  * where their rank falls as a parabola from the middle, its root is a half ball. */
 #define NB_CLOUD_RANK_SLOPE 2.8f /* of it over height, at most */
