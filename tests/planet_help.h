@@ -54,4 +54,22 @@ static inline nebel_snapshot *planet_fog(const double to_sun[3])
     return snapshot;
 }
 
+/* Mist around a whole planet, which thins out upwards. */
+static inline nebel_snapshot *planet_mist(double radius, const double to_sun[3])
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc mist = {
+        .shape = {.type = NEBEL_SHAPE_WORLD},
+        .density = {.type = NEBEL_DENSITY_ALTITUDE, .center = {0, -radius, 0}, .radius = radius, .scale_height = 400},
+        .extinction = {.002, .002, .002},
+        .albedo = {.95, .95, .95}};
+    const nebel_fog_desc desc = {.sun = {.direction = {to_sun[0], to_sun[1], to_sun[2]}, .irradiance = {5, 4, 3}}};
+    assert_int_equal(nebel_create_fog(&desc, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &mist, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
 #endif

@@ -162,6 +162,48 @@ static void test_mean_is_between(void **state)
     assert_int_equal(nb_cloud_mean(&clear, &clear).count, 0);
 }
 
+/* Seen aslant from far above, the next row's sheet lies farther off than it is deep, as does the ground below it. Each pixel has its
+ * own where it is, before its ground. */
+static void test_sheets_lie_over_the_ground(void **state)
+{
+    (void)state;
+    static picture p;
+    begin(&p);
+    for (int i = 0; i < ALL; i++) {
+        const float ground = 1e6f / (1.2f + .04f * (float)(i / COLUMNS) + 1e-4f * (float)(i % COLUMNS));
+        p.block.ground[i] = ground;
+        for (int k = 0; k < 3; k++) p.truth[i].t[k] = ground * (.992f + .001f * (float)k);
+    }
+    assert_true(trace(&p) < ALL / 2);
+    for (int i = 0; i < ALL; i++) {
+        assert_int_equal(p.knots[i].count, 3);
+        for (int k = 0; k < 3; k++) assert_float_equal(p.knots[i].t[k], p.truth[i].t[k], 1);
+    }
+}
+
+/* What stands before it stays there, however far the ground is. */
+static void test_heaps_stand_before_the_ground(void **state)
+{
+    (void)state;
+    static picture p;
+    begin(&p);
+    for (int i = 0; i < ALL; i++) p.block.ground[i] = 1e5f / (1 + .2f * (float)(i / COLUMNS));
+    assert_true(trace(&p) < ALL / 2);
+    for (int i = 0; i < ALL; i++) assert_same(&p.knots[i], &p.truth[i]);
+}
+
+/* Beside the planet's edge all have rays. */
+static void test_the_edge_of_the_ground_has_rays(void **state)
+{
+    (void)state;
+    static picture p;
+    begin(&p);
+    for (int i = 0; i < ALL; i++) p.block.ground[i] = i / COLUMNS < 2 ? 0 : 2e6f;
+    trace(&p);
+    for (int y = 1; y < 3; y++)
+        for (int x = 0; x < COLUMNS; x++) assert_true(p.is_asked[at(x, y)]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -171,6 +213,9 @@ int main(void)
         cmocka_unit_test(test_puffs_beside_clear_rays_are_seen),
         cmocka_unit_test(test_surfaces_have_rays),
         cmocka_unit_test(test_mean_is_between),
+        cmocka_unit_test(test_sheets_lie_over_the_ground),
+        cmocka_unit_test(test_heaps_stand_before_the_ground),
+        cmocka_unit_test(test_the_edge_of_the_ground_has_rays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -399,6 +399,44 @@ static void fog_lies_among_clouds(void **state)
     }
 }
 
+/* By how much the pixel that stands out most is darker or brighter than all eight around it, of light. */
+static double find_dot(const test_picture *picture)
+{
+    double most = 0;
+    for (int i = 0; i < (HEIGHT - 2) * (WIDTH - 2) * 3; i++) {
+        const int x = 1 + i / 3 % (WIDTH - 2), y = 1 + i / 3 / (WIDTH - 2), c = i % 3;
+        const float *const here = picture->planes.color + 3 * (y * WIDTH + x) + c;
+        double low = HUGE_VAL, high = 0;
+        for (int k = 0; k < 9; k++) {
+            const double there = (double)here[3 * ((k / 3 - 1) * WIDTH + k % 3 - 1)];
+            if (k == 4) continue;
+            low = fmin(low, there);
+            high = fmax(high, there);
+        }
+        most = fmax(most, fmax(low - (double)*here, (double)*here - high));
+    }
+    return most;
+}
+
+/* From orbit the next row's sheet lies farther off than it is deep, and mist below it. */
+static void sheets_over_mist_have_no_dots(void **state)
+{
+    (void)state;
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, &w);
+    memcpy(w.scene.sun_direction, (const double[3]){.927, .046, -.371}, sizeof w.scene.sun_direction);
+    nebel_snapshot *const mist = planet_mist(w.planet.air.radius, w.scene.sun_direction);
+    nebel_camera camera = planet_camera(3e5, -.55);
+    camera.vertical_fov = 10;
+    test_picture picture = render_in(&w, mist, &camera, 2, 1, 0);
+    const double dot = find_dot(&picture);
+    print_message("a sheet over mist: no pixel stands out by %.2g of light\n", dot);
+    assert_true(dot < 4e-3);
+    test_picture_free(&picture);
+    nebel_release_snapshot(mist);
+    free_world(&w);
+}
+
 /* From orbit closed clouds hide the ground up to its edge, whatever samples meet beside the middles of pixels: on the way to
  * the ground seen aslant they lie within less than a pixel. */
 static void clouds_hide_the_ground_from_orbit(void **state)
@@ -688,6 +726,7 @@ int main(void)
         cmocka_unit_test(the_ground_has_shadows),
         cmocka_unit_test(air_under_clouds_is_dim),
         cmocka_unit_test(surfaces_under_clouds_have_less_sky),
+        cmocka_unit_test(sheets_over_mist_have_no_dots),
         cmocka_unit_test(clouds_hide_the_ground_from_orbit),
         cmocka_unit_test(a_flight_through_clouds_has_no_jump),
         cmocka_unit_test(no_clouds_change_nothing),

@@ -23,8 +23,9 @@ enum {
 
 /* Its pixels row by row. */
 typedef struct nb_cloud_block {
-    int is_wanted[NB_CLOUD_SHARE];            /* they need clouds */
-    int is_open[NB_CLOUD_SHARE];              /* and end at no surface: in the sky, or on the planet's ground */
+    int is_wanted[NB_CLOUD_SHARE]; /* they need clouds */
+    int is_open[NB_CLOUD_SHARE];   /* and end at no surface: in the sky, or on the planet's ground */
+    float ground[NB_CLOUD_SHARE];  /* m, of the planet with clouds, through their middles; 0: they do not meet it */
     nebel_cloud_knots *knots[NB_CLOUD_SHARE]; /* and keep them here */
     int level[NB_CLOUD_SHARE];                /* by nb_cloud_block_begin */
 } nb_cloud_block;
@@ -102,6 +103,43 @@ static inline nebel_cloud_knots nb_cloud_mean(const nebel_cloud_knots *a, const 
     return mean;
 }
 
+/* ---- where they are -------------------------------------------------------------------------- */
+
+static inline void nb_cloud_stretch(nebel_cloud_knots *knots, float times)
+{
+    for (uint32_t k = 0; k < knots->count; k++) knots->t[k] *= times;
+}
+
+/* How far from each other clouds begin and end along two rays. */
+static inline float nb_cloud_shift(const nebel_cloud_knots *a, float scale_a, const nebel_cloud_knots *b, float scale_b)
+{
+    return fabsf(scale_a * a->t[0] - scale_b * b->t[0]) +
+           fabsf(scale_a * a->t[a->count - 1] - scale_b * b->t[b->count - 1]);
+}
+
+/* Whether clouds of two rays that meet the ground lie at the same parts of the ways to it, rather than as far from the eye: seen
+ * aslant from above a sheet is many of its heights nearer in one row than in the next, and what lies below it, fog and the ground, is as
+ * well. By how far the ground is on each way, and between them. */
+static inline int nb_cloud_is_by_ground(const nebel_cloud_knots *a, float ground_a, const nebel_cloud_knots *b,
+                                        float ground_b, float ground)
+{
+    if (!(ground_a > 0 && ground_b > 0 && ground > 0)) return 0;
+    if (a->count == 0 || b->count == 0 || a->t[a->count - 1] > ground || b->t[b->count - 1] > ground) return 1;
+    return nb_cloud_shift(a, ground / ground_a, b, ground / ground_b) < nb_cloud_shift(a, 1, b, 1);
+}
+
+/* The mean of pixels a and b for pixel i, which is between them. */
+static inline nebel_cloud_knots nb_cloud_between(const nb_cloud_block *block, int i, int a, int b)
+{
+    nebel_cloud_knots of_a = *block->knots[a], of_b = *block->knots[b];
+    const float *const ground = block->ground;
+    if (nb_cloud_is_by_ground(&of_a, ground[a], &of_b, ground[b], ground[i])) {
+        nb_cloud_stretch(&of_a, ground[i] / ground[a]);
+        nb_cloud_stretch(&of_b, ground[i] / ground[b]);
+    }
+    return nb_cloud_mean(&of_a, &of_b);
+}
+
 /* ---- a block --------------------------------------------------------------------------------- */
 
 static inline int nb_cloud_level(int x, int y)
@@ -109,7 +147,7 @@ static inline int nb_cloud_level(int x, int y)
     return (x & 1) != 0 ? 2 : ((x >> 1) + y) & 1;
 }
 
-/* Pixels around one, as many as are in its block; 0: it or one of them needs no clouds or ends at a surface, or is not in its row. */
+/* Pixels around one, as many as are in its block; 0: it or one of them needs no clouds or ends at a surface, or is not in its row, or one alone meets the ground. */
 static inline int nb_cloud_around(const nb_cloud_block *block, int i, int around[NB_CLOUD_SHARE_AROUND])
 {
     static const int counts[NB_CLOUD_SHARE_LEVELS] = {0, 4, 6};
@@ -123,7 +161,7 @@ static inline int nb_cloud_around(const nb_cloud_block *block, int i, int around
         if (row < 0 || row >= NB_CLOUD_SHARE_ROWS) continue;
         if (column < 0 || column >= NB_CLOUD_SHARE_COLUMNS) return 0;
         const int at = row * NB_CLOUD_SHARE_COLUMNS + column;
-        if (!block->is_wanted[at] || !block->is_open[at]) return 0;
+        if (!block->is_wanted[at] || !block->is_open[at] || (block->ground[at] > 0) != (block->ground[i] > 0)) return 0;
         around[count++] = at;
     }
     return count;
@@ -158,7 +196,7 @@ static inline int nb_cloud_share(const nb_cloud_block *block, int i)
     }
     const float apart = nb_cloud_apart(knots, count, nb_cloud_alike[level]);
     if (!(apart < HUGE_VALF)) return 0;
-    *block->knots[i] = nb_cloud_mean(knots[first], knots[first + 1]);
+    *block->knots[i] = nb_cloud_between(block, i, around[first], around[first + 1]);
     block->knots[i]->error += apart;
     return 1;
 }

@@ -51,6 +51,25 @@ static inline int nb_worlds_set(nb_world worlds[NEBEL_MAX_PLANETS], const nebel_
     return count;
 }
 
+/* How far the ground is from an eye above it; 0: the ray does not meet it. */
+static inline double nb_world_ground(const nb_world *world, const double eye[3], const double unit[3])
+{
+    double to[3];
+    for (int c = 0; c < 3; c++) to[c] = world->center[c] - eye[c];
+    const double height = nb_vector_length(to) - world->radius, along = nb_vector_dot(to, unit);
+    const double tangent = height * (height + 2 * world->radius), rest = along * along - tangent; /* squares */
+    return height > 0 && along > 0 && rest > 0 ? tangent / (along + sqrt(rest)) : 0;
+}
+
+/* The same of the planet with clouds. */
+static inline double nb_worlds_cloudy_ground(const nb_world *worlds, int count, const double eye[3],
+                                             const double unit[3])
+{
+    for (int k = 0; k < count; k++)
+        if (worlds[k].planet->clouds != NULL) return nb_world_ground(&worlds[k], eye, unit);
+    return 0;
+}
+
 /* Whose shadow, and whose sky, a place is in. */
 static inline int nb_worlds_nearest(const nb_world *worlds, int count, const double place[3])
 {

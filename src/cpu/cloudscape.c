@@ -59,15 +59,28 @@ nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, n
     return nb_cloud_air_shade(frame, place, clouds);
 }
 
+static void unit_of(const nb_cloud_scratch *clouds, const nebel_ray *ray, uint32_t lane, double unit[3])
+{
+    for (int c = 0; c < 3; c++) unit[c] = ray->direction[c] / (double)clouds->rays.length[lane];
+}
+
+/* How far the ground is through the middle of a pixel. */
+static float ground_of(const nb_frame *frame, const nb_cloud_scratch *clouds, uint32_t lane)
+{
+    const nebel_ray ray = nb_cloud_air_ray(frame, clouds, lane);
+    double unit[3];
+    unit_of(clouds, &ray, lane, unit);
+    return (float)nb_worlds_cloudy_ground(frame->air.worlds, frame->air.count, ray.origin, unit);
+}
+
 /* How far clouds matter to a sample. A ray that goes on from there to the ground is not followed beyond it. */
 static float end_of(const nb_frame *frame, const nb_scratch *scratch, uint32_t lane)
 {
     const float distance = scratch->distance[lane];
     if (!(scratch->air.ground.distance[lane] < HUGE_VALF)) return distance;
     const nebel_ray ray = nb_cloud_air_ray(frame, &scratch->clouds, lane);
-    const double length = (double)scratch->clouds.rays.length[lane];
     double unit[3];
-    for (int c = 0; c < 3; c++) unit[c] = ray.direction[c] / length;
+    unit_of(&scratch->clouds, &ray, lane, unit);
     const nb_world *world = &frame->air.worlds[scratch->air.world[lane]];
     return (float)nb_cloud_ground_end(world->center, ray.origin, unit, (double)distance);
 }
@@ -124,6 +137,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t lane = lane_of(i);
         if (scratch->inside[lane]) clouds->end[lane] = end_of(frame, scratch, lane);
+        block.ground[i] = ground_of(frame, clouds, lane);
         block.is_wanted[i] = scratch->inside[lane] && !is_found(clouds, (int)lane);
         block.is_open[i] = scratch->distance[lane] == HUGE_VALF || scratch->air.ground.distance[lane] < HUGE_VALF;
         block.knots[i] = &clouds->knots[lane];

@@ -230,6 +230,15 @@ static nebel_result trace_pixels(nb_cloud_part *part, const int is_asked[NB_CLOU
     return result;
 }
 
+/* How far the ground is along a ray. */
+static float ground_of(const job *j, const nebel_ray *ray)
+{
+    const double length = nb_vector_length(ray->direction);
+    double unit[3];
+    for (int c = 0; c < 3; c++) unit[c] = ray->direction[c] / length;
+    return (float)nb_worlds_cloudy_ground(j->worlds, j->world_count, ray->origin, unit);
+}
+
 /* The pixels of a block in some rows; end: its last row's next. */
 static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left, uint32_t top, uint32_t end)
 {
@@ -242,7 +251,9 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
         block.is_wanted[i] = x < view->width && y < end;
         block.is_open[i] = 1;
         block.knots[i] = &bundle->knots[i];
-        if (block.is_wanted[i]) bundle->spreads[i] = ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
+        if (!block.is_wanted[i]) continue;
+        bundle->spreads[i] = ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
+        block.ground[i] = ground_of(j, &bundle->rays[i]);
     }
     nb_cloud_block_begin(&block);
     for (int level = 0; level < NB_CLOUD_SHARE_LEVELS && result == NEBEL_OK; level++) {
