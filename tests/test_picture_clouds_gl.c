@@ -26,7 +26,7 @@ typedef struct world {
 } world;
 
 /* `lift`: of the origin above the ground. */
-static void make_world(double coverage, double lift, world *w)
+static void make_world_under(const nebel_cloud_layer *layer, double lift, world *w)
 {
     static const double sun[3] = {.6, .64, .48};
     *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_diameter = .53, .cloud_layer_count = 1},
@@ -39,8 +39,7 @@ static void make_world(double coverage, double lift, world *w)
                           .texture = -1}};
     w->planet.air.ground[1] = -lift;
     assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
-    const nebel_clouds_desc desc = {
-        .atmosphere = w->atmosphere, .layers = {{.coverage = coverage, .wind = {100, 0}}}, .layer_count = 1};
+    const nebel_clouds_desc desc = {.atmosphere = w->atmosphere, .layers = {*layer}, .layer_count = 1};
     assert_int_equal(nebel_create_clouds(&desc, &w->clouds), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
     w->planet.clouds = w->clouds;
@@ -51,6 +50,11 @@ static void make_world(double coverage, double lift, world *w)
                                   .planets = &w->planet,
                                   .meshes = &w->mesh};
     memcpy(w->scene.sun_direction, sun, sizeof sun);
+}
+
+static void make_world(double coverage, double lift, world *w)
+{
+    make_world_under(&(nebel_cloud_layer){.coverage = coverage, .wind = {100, 0}}, lift, w);
 }
 
 static void free_world(world *w)
@@ -174,6 +178,32 @@ static void clouds_lie_in_fog(void **state)
     check("in fog", &w, fog, &camera);
     pass_close(&context);
     nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
+/* From orbit all mist is at the end of long rays, under a sheet and a low sun: pieces that are too long must not be walked to the end again
+ * and again, or llvmpipe has no turns left. */
+static void sheets_lie_over_mist(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world_under(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .coverage = .5}, 0, &w);
+    memcpy(w.scene.sun_direction, (const double[3]){.78, .046, -.624}, sizeof w.scene.sun_direction);
+    nebel_snapshot *const mist = planet_mist(w.planet.air.radius, w.scene.sun_direction);
+    memset(w.scene.ambient, 0, sizeof w.scene.ambient);
+    for (int c = 0; c < 3; c++) w.scene.sun_irradiance[c] = 20;
+    nebel_camera camera = planet_camera(3e5, -.41);
+    camera.look_at[0] = -.29;
+    camera.vertical_fov = 5;
+    picture_pair pair = picture_make(32 * scale, 9 * scale);
+    pair.tolerance = NEBEL_DEFAULT_TOLERANCE;
+    pass_open(&context, NB_GL_330);
+    picture_render(&w.scene, mist, &camera, 1, &pair);
+    compare("a sheet over mist", 1e-3, &pair);
+    pass_close(&context);
+    picture_free(&pair);
+    nebel_release_snapshot(mist);
     free_world(&w);
 }
 
@@ -371,6 +401,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(the_sky_comes_through_them),
         cmocka_unit_test(walls_stand_amid_clouds),
         cmocka_unit_test(clouds_lie_in_fog),
+        cmocka_unit_test(sheets_lie_over_mist),
         cmocka_unit_test(threads_and_frames_change_nothing),
         cmocka_unit_test(frames_stop_amid_clouds),
         cmocka_unit_test(the_processor_must_be_asked),

@@ -286,6 +286,7 @@ const char nb_air_haze_text[] =
     "    pass_open_fog_shade();\n"
     "#endif\n"
     "    vec3 light = vec3(0.0);\n"
+    "    float far = 1e30;\n" /* the nearest end that was too far */
     "    bool is_last = false;\n"
     "    for (int i = 0; i < PASS_KNOTS && from.at < sight.t_max && !is_last; i++) {\n"
     "        nb_progress further = progress;\n"
@@ -319,6 +320,9 @@ const char nb_air_haze_text[] =
     "        is_done = is_done || from.at >= end;\n"
     "        if (!is_done && shade.cut > from.at && pass_largest(in_doubt) > 0.5 * doubt) way = shade.cut - from.at;\n"
     "#endif\n"
+    /* The way to what was too far once would cost as many turns again, were it tried from each place on: pieces come to it by halves. */
+    "        if (!is_done) far = here.at;\n"
+    "        if (is_done && far > here.at) way = min(way, max(0.5 * (far - here.at), here.at - from.at));\n"
     "        if (is_done) {\n"
     "            light += pass_piece(from, here);\n"
     "            from = here;\n"
