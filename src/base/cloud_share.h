@@ -147,7 +147,8 @@ static inline int nb_cloud_level(int x, int y)
     return (x & 1) != 0 ? 2 : ((x >> 1) + y) & 1;
 }
 
-/* Pixels around one, as many as are in its block; 0: it or one of them needs no clouds or ends at a surface, or is not in its row, or one alone meets the ground. */
+/* Pixels around one, as many as are in its block; 0: it or one of them needs no clouds or ends at a surface, or is not in its row, or
+ * one alone meets the ground. */
 static inline int nb_cloud_around(const nb_cloud_block *block, int i, int around[NB_CLOUD_SHARE_AROUND])
 {
     static const int counts[NB_CLOUD_SHARE_LEVELS] = {0, 4, 6};
