@@ -110,7 +110,7 @@ static inline void nb_daylight_set_depths(nb_daylight *daylight, const double ac
     }
 }
 
-/* A column of right angles at a place: up, towards the sun, across. */
+/* Axes at right angles at a place: up, level towards the sun, across. */
 static inline void nb_daylight_turn(const double center[3], const double to_sun[3], const double place[3],
                                     double axes[3][3])
 {
