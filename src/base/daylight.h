@@ -138,10 +138,10 @@ static inline void nb_daylight_around(const nebel_planet *planet, const nebel_su
     static const double weights[SLOPES] = {0.11846344252809454, 0.23931433524968324, 0.28444444444444444,
                                            0.23931433524968324, 0.11846344252809454};
     const nebel_atmosphere_desc *const air = &planet->air;
-    const double center[3] = {air->ground[0], air->ground[1] - air->radius, air->ground[2]};
-    double axes[3][3], ground[3];
+    double center[3], axes[3][3], ground[3];
     nebel_ray rays[SLOPES * TURNS];
     nebel_light found[SLOPES * TURNS];
+    nb_vector_ball_middle(air->ground, air->radius, center);
     nb_daylight_turn(center, sun->direction, place, axes);
     for (int c = 0; c < 3; c++) ground[c] = center[c] + air->radius * axes[0][c];
     for (int i = 0; i < SLOPES * TURNS; i++) {
@@ -217,7 +217,7 @@ static inline void nb_daylight_set(nb_daylight *daylight, const nebel_planet *pl
     daylight->thickness = planet->air.thickness;
     daylight->sun = (nebel_sun){.irradiance = {1, 1, 1}};
     memcpy(daylight->sun.direction, to_sun, sizeof daylight->sun.direction);
-    for (int c = 0; c < 3; c++) daylight->center[c] = planet->air.ground[c] - (c == 1 ? planet->air.radius : 0);
+    nb_vector_ball_middle(planet->air.ground, planet->air.radius, daylight->center);
     const double axis[3] = {fabs(to_sun[0]) < 0.5, 0, !(fabs(to_sun[0]) < 0.5)};
     double across[3];
     nb_vector_cross(to_sun, axis, across);

@@ -34,6 +34,12 @@ static inline int nb_vector_make_unit(double v[3])
     return 1;
 }
 
+/* The middle of a ball, of its highest place. */
+static inline void nb_vector_ball_middle(const double highest[3], double radius, double middle[3])
+{
+    for (int c = 0; c < 3; c++) middle[c] = highest[c] - (c == 1 ? radius : 0);
+}
+
 /* How far a place is above a ball, of which it is so far from the middle. Within 1e-12 of the radius, where rounding does not say on
  * which side of it, it is just above. */
 static inline double nb_vector_above_ball(double far, double radius)

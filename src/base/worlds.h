@@ -30,7 +30,7 @@ static inline nb_world nb_world_of(const nebel_planet *planet)
 {
     nb_world world = {
         .planet = planet, .radius = planet->air.radius, .top = planet->air.radius + planet->air.thickness};
-    for (int c = 0; c < 3; c++) world.center[c] = planet->air.ground[c] - (c == 1 ? planet->air.radius : 0);
+    nb_vector_ball_middle(planet->air.ground, planet->air.radius, world.center);
     return world;
 }
 

@@ -2,6 +2,8 @@
 
 #include "check.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 
 /* Those of the form of Henyey and Greenstein are g^order; those of its product with 1 + alpha c^2 follow from the
@@ -57,7 +59,7 @@ nebel_result nebel_create_atmosphere(const nebel_atmosphere_desc *desc, nebel_at
     made->airs.count = (int)whole.air_count;
     for (int i = 0; i < made->airs.count; i++) resolve_air(&whole.airs[i], &made->airs.airs[i]);
     nb_airs_cut(&made->airs);
-    for (int c = 0; c < 3; c++) made->center[c] = whole.ground[c] - (c == 1 ? whole.radius : 0);
+    nb_vector_ball_middle(whole.ground, whole.radius, made->center);
     made->rule = nb_rule_make(NB_RULE_MOST);
     made->gather = nb_gather_choose(NEBEL_ISA_DEFAULT);
     const nb_parts parts = {whole.run, whole.run_user};

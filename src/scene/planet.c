@@ -115,7 +115,8 @@ static double uneclipsed(const nebel_scene_data *data, const double to_sun[3])
     double left = 1;
     for (size_t i = 1; i < data->planet_count; i++) {
         const nebel_atmosphere_desc *air = &data->planets[i].air;
-        const double center[3] = {air->ground[0], air->ground[1] - air->radius, air->ground[2]};
+        double center[3];
+        nb_vector_ball_middle(air->ground, air->radius, center);
         left *= nb_eclipse_left(origin, center, air->radius, to_sun, sun);
     }
     return left;

@@ -198,11 +198,13 @@ static bool read_planet(nb_scene_reader *in, const nb_json_node *node, nebel_pla
 static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const nebel_planet *planets, size_t number)
 {
     const nebel_atmosphere_desc *air = &planets[number].air;
+    double middle[3];
+    nb_vector_ball_middle(air->ground, air->radius, middle);
     for (size_t i = 0; i < number; i++) {
         const nebel_atmosphere_desc *other = &planets[i].air;
-        const double between[3] = {air->ground[0] - other->ground[0],
-                                   air->ground[1] - air->radius - (other->ground[1] - other->radius),
-                                   air->ground[2] - other->ground[2]};
+        double between[3];
+        nb_vector_ball_middle(other->ground, other->radius, between);
+        for (int c = 0; c < 3; c++) between[c] = middle[c] - between[c];
         if (nb_vector_length(between) > air->radius + air->thickness + other->radius + other->thickness) continue;
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node,
                             "overlaps planet[%zu], air included; give it a \"center\" of its own", i);
