@@ -29,4 +29,10 @@
 /* X(NAME, suffix) for each: C first, then ascending. */
 #define NB_LEVELS(X) X(SCALAR, scalar) NB_LEVEL_NEON(X) NB_LEVEL_SSE2(X) NB_LEVEL_AVX2(X) NB_LEVEL_AVX512(X)
 
+/* What a kernel calls its symbol in the level that it is compiled for: NB_SUFFIXED(nb_trace_) is nb_trace_avx2. The build defines
+ * NB_SUFFIX. */
+#define NB_JOIN(prefix, suffix) prefix##suffix
+#define NB_JOIN_VALUES(prefix, suffix) NB_JOIN(prefix, suffix)
+#define NB_SUFFIXED(prefix) NB_JOIN_VALUES(prefix, NB_SUFFIX)
+
 #endif

@@ -5,13 +5,12 @@
 
 #include "fog_box.h"
 
+#include "base/levels.h"
+
 #include <math.h>
 
 /* Packets travel in registers only inside one function. */
 #define NB_INLINE static inline __attribute__((always_inline))
-
-#define NB_JOIN_NAMES(a, b) a##b
-#define NB_SUFFIXED(prefix, suffix) NB_JOIN_NAMES(prefix, suffix)
 
 /* 2^x for x <= 0, 0 below -126.5 and 1 for a NaN: 2^n as an exponent times 2^f, |f| <= 1/2, by the weighted minimax
  * polynomial that scripts/fit_elementary.py finds, in Estrin's order, because packets wait for each other's results;

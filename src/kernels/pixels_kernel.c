@@ -144,7 +144,7 @@ static void set_scene(const nb_pixels_job *job, scene *s)
     memcpy(s->step, job->step_x, sizeof s->step);
 }
 
-void NB_SUFFIXED(nb_pixels_, NB_SUFFIX)(const nb_pixels_job *job)
+void NB_SUFFIXED(nb_pixels_)(const nb_pixels_job *job)
 {
     scene s;
     set_scene(job, &s);

@@ -313,7 +313,7 @@ static void transmit_spread(const nb_transmit_job *job, const nb_slabs *boxes, s
     }
 }
 
-void NB_SUFFIXED(nb_transmit_, NB_SUFFIX)(const nb_transmit_job *job)
+void NB_SUFFIXED(nb_transmit_)(const nb_transmit_job *job)
 {
     const size_t packed = 3 * sizeof(float);
     nb_slabs boxes[NB_FOG_BOXES];

@@ -161,7 +161,7 @@ NB_INLINE void write_colors(const nb_vertices_job *job)
     }
 }
 
-void NB_SUFFIXED(nb_vertices_, NB_SUFFIX)(const nb_vertices_job *job)
+void NB_SUFFIXED(nb_vertices_)(const nb_vertices_job *job)
 {
     const nb_vertices_job j = *job; /* no store to a stream can change it */
     put_curve_in(&j);

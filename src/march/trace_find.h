@@ -68,7 +68,7 @@ static double find_depth(march *m, int channel, nb_real wanted)
     return HUGE_VAL;
 }
 
-nebel_result SUFFIXED(nb_find_, NB_SUFFIX)(nb_find_job *job)
+nebel_result NB_SUFFIXED(nb_find_)(nb_find_job *job)
 {
     workspace w;
     open_workspace(&w);

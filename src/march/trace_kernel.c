@@ -12,6 +12,8 @@
 
 #include "trace_kernel.h"
 
+#include "base/levels.h"
+
 #include "media/grid_voxels.h"
 
 #include "formulas/prelude.h"
@@ -53,9 +55,6 @@
 #include "trace_walk.h"
 #include "trace_mixed.h"
 #include "trace_workspace.h"
-
-#define JOIN_NAMES(a, b) a##b
-#define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
 
 /* ---- rays in --------------------------------------------------------------------------------- */
 
@@ -649,7 +648,7 @@ static nebel_result trace_lit(nb_trace_job *job, workspace *w)
     return result;
 }
 
-nebel_result SUFFIXED(nb_trace_, NB_SUFFIX)(nb_trace_job *job)
+nebel_result NB_SUFFIXED(nb_trace_)(nb_trace_job *job)
 {
 #if !defined(NB_DOUBLE)
     if (job->ray_planes != NULL && is_straight(job)) return trace_all_straight(job);

@@ -250,8 +250,7 @@ static inline void find_in_packet(const nb_cloud_noise *noise, const nb_cloud_la
         nb_store_lanes(looks->clear + p, nb_select(is_in, clear_of(layer, looks, drops.missing, p), NB_F(0.0)));
 }
 
-void SUFFIXED(nb_cloud_find_drops_, NB_SUFFIX)(const nb_cloud_noise *noise, const nb_cloud_layer *layer,
-                                               nb_cloud_looks *looks)
+void NB_SUFFIXED(nb_cloud_find_drops_)(const nb_cloud_noise *noise, const nb_cloud_layer *layer, nb_cloud_looks *looks)
 {
     for (int p = 0; p < looks->count; p += NB_WIDTH) find_in_packet(noise, layer, p, looks);
 }

@@ -2,8 +2,7 @@
 #ifndef NB_PLANET_CLOUD_KERNEL_H
 #define NB_PLANET_CLOUD_KERNEL_H
 
-#define JOIN(prefix, suffix) prefix##suffix
-#define SUFFIXED(prefix, suffix) JOIN(prefix, suffix)
+#include "base/levels.h"
 
 /* nb_level_of, as a whole number and a part of the next. */
 typedef struct nb_halvings {

@@ -127,7 +127,7 @@ static inline void find_climb(const nb_cloud_layer *layer, const nb_wide place[3
 /* Drops are found eight at a time at most, or twice as many as places. */
 enum { TOGETHER = NB_WIDTH < 4 ? 2 * NB_WIDTH : 8 };
 
-void SUFFIXED(nb_cloud_find_places_, NB_SUFFIX)(const nb_cloud_layer *layer, int number, nb_cloud_looks *looks)
+void NB_SUFFIXED(nb_cloud_find_places_)(const nb_cloud_layer *layer, int number, nb_cloud_looks *looks)
 {
     const nb_wide low = nb_wsplat(layer->low);
     const nb_real per = nb_splat(layer->per_thickness);

@@ -5,6 +5,8 @@
 
 #include "gather.h"
 
+#include "base/levels.h"
+
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
@@ -12,9 +14,6 @@
 
 #include "depth.h"
 #include "moments.h"
-
-#define JOIN_NAMES(a, b) a##b
-#define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
 
 /* Behind the terminator light comes from near the horizon, and changes fast with the sun's height: where the sun is 5, 7 and
  * 10 degrees below the horizon a far finer table has up to 5, 8 and 21 % more or less of all light (`precise`: 3, 7 and 8).
@@ -121,7 +120,7 @@ static void add_often_by_all(const nb_gather_job *job, const nb_nodes *nodes, nb
     add_often(job, NB_MOMENTS, nodes, light);
 }
 
-void SUFFIXED(nb_gather_, NB_SUFFIX)(const nb_gather_job *job, nb_node_light *light)
+void NB_SUFFIXED(nb_gather_)(const nb_gather_job *job, nb_node_light *light)
 {
     for (int at = job->first; at < job->first + job->count; at += NB_WIDTH) {
         const nb_nodes nodes = nodes_at(job, at);

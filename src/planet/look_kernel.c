@@ -5,6 +5,8 @@
 
 #include "look.h"
 
+#include "base/levels.h"
+
 #include <math.h>
 
 #include "formulas/prelude.h"
@@ -15,9 +17,6 @@
 
 #include "atmosphere.h"
 #include "moments.h"
-
-#define JOIN_NAMES(a, b) a##b
-#define SUFFIXED(prefix, suffix) JOIN_NAMES(prefix, suffix)
 
 /* ---- lanes ----------------------------------------------------------------------------------- */
 
@@ -407,4 +406,4 @@ static void look_down(const nb_look_job *job)
     }
 }
 
-const nb_look_kernel SUFFIXED(nb_look_kernel_, NB_SUFFIX) = {look_along, look_down};
+const nb_look_kernel NB_SUFFIXED(nb_look_kernel_) = {look_along, look_down};
