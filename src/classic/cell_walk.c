@@ -1,6 +1,7 @@
 /* The way from the eye to a point, as pieces in cells, as layers of fog. */
 #include "cells.h"
 
+#include "base/stride.h"
 #include "base/vector.h"
 #include "classic/layout.h"
 
@@ -268,8 +269,8 @@ nebel_result nebel_fog_cells(const nebel_cells *cells, const nebel_cell_view *vi
     const nb_span to = {(uintptr_t)fog, sizeof *fog, fog_stride};
     if (!are_streams(&from, &to, n)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const nebel_cell_point *point = (const void *)((const char *)points + i * point_stride);
-        nebel_cell_fog *out = (void *)((char *)fog + i * fog_stride);
+        const nebel_cell_point *point = nb_stride_from(points, point_stride, i);
+        nebel_cell_fog *out = nb_stride_to(fog, fog_stride, i);
         *out = (nebel_cell_fog){{0, 0, 0}, 0};
         if (set_point(&way, point)) find_layers(&way, add_layer, out);
     }

@@ -7,6 +7,8 @@
 
 #include "transmit.h"
 
+#include "base/stride.h"
+
 #include "formulas/prelude.h"
 
 #include "formulas/elementary.inc"
@@ -18,17 +20,12 @@
 #include <stdint.h>
 #include <string.h>
 
-static const float *at(const float *base, size_t stride, size_t i)
-{
-    return (const float *)(const void *)((const char *)base + i * stride);
-}
-
 /* Three floats of NB_WIDTH neighbours, `count` of which exist; the others repeat the first. */
 static nb_vec3 load_points(const float *base, size_t stride, size_t first, size_t count)
 {
     float lane[3][NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++) {
-        const float *p = at(base, stride, first + (i < count ? i : 0));
+        const float *p = nb_stride_from(base, stride, first + (i < count ? i : 0));
         for (int c = 0; c < 3; c++) lane[c][i] = p[c];
     }
     return nb_vec3(nb_load_lanes(lane[0]), nb_load_lanes(lane[1]), nb_load_lanes(lane[2]));
@@ -106,7 +103,7 @@ static void store_points(const nb_transmit_job *job, size_t first, size_t count,
 {
     float lane[NB_WIDTH];
     nb_store_lanes(lane, value);
-    for (size_t i = 0; i < count; i++) *(float *)(void *)((char *)job->out + (first + i) * job->out_stride) = lane[i];
+    for (size_t i = 0; i < count; i++) *(float *)nb_stride_to(job->out, job->out_stride, first + i) = lane[i];
 }
 
 /* Copies, which no store to the output can change; relative to the start where all segments share it. */

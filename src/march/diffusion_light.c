@@ -1,6 +1,7 @@
 /* What light that was scattered more than once adds to rays, and what it takes from ambient light. */
 #include "diffusion.h"
 
+#include "base/stride.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -419,19 +420,19 @@ nebel_result nb_diffusion_gather(const nebel_snapshot *fog, const nb_diffusion *
 static nebel_ray ray_of(const nb_trace_job *job, size_t i)
 {
     if (job->ray_planes != NULL) return nb_trace_ray_in_planes(job->ray_planes, i);
-    return *(const nebel_ray *)(const void *)((const char *)job->rays + i * job->ray_stride);
+    return *(const nebel_ray *)nb_stride_from(job->rays, job->ray_stride, i);
 }
 
 static void add(const nb_trace_job *job, size_t i, int c, double light)
 {
     if (job->light_planes == NULL) {
-        nebel_light *out = (nebel_light *)(void *)((char *)job->lights + i * job->light_stride);
+        nebel_light *out = nb_stride_to(job->lights, job->light_stride, i);
         out->in_scattering[c] = fmax(out->in_scattering[c] + light, 0);
         return;
     }
     const nebel_light_planes *planes = job->light_planes;
     if (planes->in_scattering[c] == NULL) return;
-    float *out = (float *)(void *)((char *)planes->in_scattering[c] + i * planes->in_scattering_stride);
+    float *out = nb_stride_to(planes->in_scattering[c], planes->in_scattering_stride, i);
     *out = fmaxf(*out + (float)light, 0);
 }
 

@@ -1,6 +1,7 @@
 /* Fog at places and bounds of it along rays: what stochastic renderers ask. */
 #include "places.h"
 
+#include "base/stride.h"
 #include "base/vector.h"
 #include "media/density.h"
 
@@ -127,10 +128,10 @@ nebel_result nebel_sample_fog(const nebel_snapshot *snapshot, size_t n, const ne
     if (n > 0 && (places == NULL || matter == NULL))
         return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "places and matter: must not be NULL");
     for (size_t i = 0; i < n; i++) {
-        const nebel_place *place = (const nebel_place *)(const void *)((const char *)places + i * place_stride);
+        const nebel_place *place = nb_stride_from(places, place_stride, i);
         const char *fault = fault_of_place(place);
         if (fault != NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "place %zu: %s", i, fault);
-        sample(snapshot, place, (nebel_matter *)(void *)((char *)matter + i * matter_stride));
+        sample(snapshot, place, nb_stride_to(matter, matter_stride, i));
     }
     return NEBEL_OK;
 }

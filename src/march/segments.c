@@ -4,17 +4,13 @@
 
 #include "base/cpu.h"
 #include "base/levels.h"
+#include "base/stride.h"
 #include "kernels/transmit.h"
 
 #include <math.h>
 
 #define KERNEL(NAME, suffix) [NEBEL_ISA_##NAME] = nb_transmit_##suffix,
 static nb_transmit_fn *const kernels[NEBEL_ISA_COUNT + 1] = {NB_LEVELS(KERNEL)};
-
-static const float *point_at(const float *base, size_t stride, size_t i)
-{
-    return (const float *)(const void *)((const char *)base + i * stride);
-}
 
 /* A ray of no length where the segment has none or is not finite. */
 static nebel_ray ray_of_segment(const nebel_segments *segments, const float *from, const float *to)
@@ -54,8 +50,8 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
         nebel_light lights[BATCH];
         const size_t count = n - first < BATCH ? n - first : BATCH;
         for (size_t i = 0; i < count; i++) {
-            rays[i] = ray_of_segment(segments, point_at(segments->from, segments->from_stride, first + i),
-                                     point_at(segments->to, segments->to_stride, first + i));
+            rays[i] = ray_of_segment(segments, nb_stride_from(segments->from, segments->from_stride, first + i),
+                                     nb_stride_from(segments->to, segments->to_stride, first + i));
             if (starts_too_far(&rays[i]))
                 return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "segment %zu: must start at most 1e15 m away",
                                first + i);
@@ -63,7 +59,7 @@ static nebel_result trace_segments(const nebel_snapshot *snapshot, nebel_isa isa
         const nebel_result result = nebel_trace(snapshot, &desc, count, rays, sizeof *rays, lights, sizeof *lights);
         if (result != NEBEL_OK) return result;
         for (size_t i = 0; i < count; i++)
-            *(float *)(void *)((char *)out + (first + i) * out_stride) = (float)lights[i].transmittance[channel];
+            *(float *)nb_stride_to(out, out_stride, first + i) = (float)lights[i].transmittance[channel];
     }
     return NEBEL_OK;
 }

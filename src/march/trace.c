@@ -4,6 +4,7 @@
 #include "base/cpu.h"
 #include "base/levels.h"
 #include "base/precision.h"
+#include "base/stride.h"
 
 #include <math.h>
 
@@ -65,7 +66,7 @@ static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const n
 {
     if (n > 0 && rays == NULL) return nb_fail(&snapshot->log, NEBEL_ERROR_ARGUMENT, "rays: must not be NULL");
     for (size_t i = 0; i < n; i++) {
-        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * stride);
+        const nebel_ray *ray = nb_stride_from(rays, stride, i);
         if (is_valid(ray)) continue;
         const char *fault = fault_of_ray(ray); /* NULL for a direction so long that only its sum overflows */
         if (fault == NULL) continue;
@@ -77,8 +78,8 @@ static nebel_result check_rays(const nebel_snapshot *snapshot, size_t n, const n
 
 static double element(const void *plane, size_t size, size_t stride, size_t i)
 {
-    const char *at = (const char *)plane + i * stride;
-    return size == sizeof(double) ? *(const double *)(const void *)at : (double)*(const float *)(const void *)at;
+    const void *at = nb_stride_from(plane, stride, i);
+    return size == sizeof(double) ? *(const double *)at : (double)*(const float *)at;
 }
 
 nebel_ray nb_trace_ray_in_planes(const nebel_ray_planes *planes, size_t i)

@@ -68,7 +68,7 @@ static nb_real settle_doubts(const nb_trace_job *job, const gathered *g, nb_real
             light.transmittance[c] = (double)nb_lane(g->transmittance[c], i);
             light.in_scattering[c] = (double)nb_lane(g->radiance[c], i);
         }
-        lane[i] = (nb_scalar)settle_lane(job, job->failed + i, ray_at(rays, stride, i), &light);
+        lane[i] = (nb_scalar)settle_lane(job, job->failed + i, nb_stride_from(rays, stride, i), &light);
     }
     return nb_load_lanes(lane);
 }
@@ -89,8 +89,8 @@ static nebel_result ask_again(nb_trace_job *job, size_t i)
     one.count = 1;
     one.first_toggle = toggles_of(job, i);
     one.first_lamplit = job->first_lamplit + i;
-    one.rays = ray_at(job->rays, job->ray_stride, i);
-    one.lights = light_at(job->lights, job->light_stride, i);
+    one.rays = nb_stride_from(job->rays, job->ray_stride, i);
+    one.lights = nb_stride_to(job->lights, job->light_stride, i);
     job->failed = i;
     return nb_trace_quad(&one);
 }

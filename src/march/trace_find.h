@@ -76,7 +76,7 @@ nebel_result NB_SUFFIXED(nb_find_)(nb_find_job *job)
     w.m.ignores_distances = 0;
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < job->count && result == NEBEL_OK; i++) {
-        const nebel_ray *ray = ray_at(job->rays, job->ray_stride, i);
+        const nebel_ray *ray = nb_stride_from(job->rays, job->ray_stride, i);
         w.m.rays = load_packet(ray, job->ray_stride, 1);
         if (!meet_fog(&w, job->snapshot)) {
             result = NEBEL_ERROR_MEMORY;

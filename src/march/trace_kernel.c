@@ -13,6 +13,7 @@
 #include "trace_kernel.h"
 
 #include "base/levels.h"
+#include "base/stride.h"
 
 #include "media/grid_voxels.h"
 
@@ -58,16 +59,6 @@
 
 /* ---- rays in --------------------------------------------------------------------------------- */
 
-static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
-{
-    return (const nebel_ray *)(const void *)((const char *)rays + i * stride);
-}
-
-static nebel_light *light_at(nebel_light *lights, size_t stride, size_t i)
-{
-    return (nebel_light *)(void *)((char *)lights + i * stride);
-}
-
 /* Unit length; adding +0 makes every zero positive, on which the ownership of faces rests. */
 static nb_wvec3 divided(nb_wvec3 d, nb_wide length)
 {
@@ -108,7 +99,7 @@ static packet load_packet(const nebel_ray *rays, size_t stride, size_t count)
 {
     double origin[3][NB_WIDTH], direction[3][NB_WIDTH], t_max[NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++) {
-        const nebel_ray *ray = ray_at(rays, stride, i < count ? i : 0);
+        const nebel_ray *ray = nb_stride_from(rays, stride, i < count ? i : 0);
         for (int c = 0; c < 3; c++) {
             origin[c][i] = ray->origin[c];
             direction[c][i] = ray->direction[c];
@@ -518,7 +509,7 @@ static void store_light(const nb_trace_job *job, const gathered *g, nb_real erro
     }
     nb_store_lanes(lane[6], error);
     for (size_t i = 0; i < count; i++) {
-        nebel_light *light = light_at(job->lights, job->light_stride, first + i);
+        nebel_light *light = nb_stride_to(job->lights, job->light_stride, first + i);
         for (int c = 0; c < 3; c++) {
             light->transmittance[c] = (double)lane[c][i];
             light->in_scattering[c] = (double)lane[3 + c][i];
@@ -579,7 +570,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
 static nebel_result trace_packet(nb_trace_job *job, workspace *w, const allowance *may, size_t first)
 {
     const size_t count = packet_size(job, first);
-    const nebel_ray *rays = ray_at(job->rays, job->ray_stride, first);
+    const nebel_ray *rays = nb_stride_from(job->rays, job->ray_stride, first);
     gathered g;
     w->m.rays = load_packet(rays, job->ray_stride, count);
     const nebel_result result = answer_packet(job, w, may, first, count, &g);

@@ -15,7 +15,7 @@ NEVER_INLINE nb_real gather_floats(const float *plane, size_t stride, size_t fir
 {
     float lane[NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++)
-        lane[i] = *(const float *)(const void *)((const char *)plane + (first + (i < count ? i : 0)) * stride);
+        lane[i] = *(const float *)nb_stride_from(plane, stride, first + (i < count ? i : 0));
     return nb_load_lanes(lane);
 }
 
@@ -23,7 +23,7 @@ NEVER_INLINE nb_wide gather_doubles(const double *plane, size_t stride, size_t f
 {
     double lane[NB_WIDTH];
     for (size_t i = 0; i < NB_WIDTH; i++)
-        lane[i] = *(const double *)(const void *)((const char *)plane + (first + (i < count ? i : 0)) * stride);
+        lane[i] = *(const double *)nb_stride_from(plane, stride, first + (i < count ? i : 0));
     return nb_wload_lanes(lane);
 }
 
@@ -31,7 +31,7 @@ NEVER_INLINE void scatter_floats(float *plane, size_t stride, size_t first, size
 {
     float lane[NB_WIDTH];
     nb_store_lanes(lane, x);
-    for (size_t i = 0; i < count; i++) *(float *)(void *)((char *)plane + (first + i) * stride) = lane[i];
+    for (size_t i = 0; i < count; i++) *(float *)nb_stride_to(plane, stride, first + i) = lane[i];
 }
 
 FORCE_INLINE nb_real load_floats(const float *plane, size_t stride, size_t first, size_t count)

@@ -2,6 +2,7 @@
  * through clouds above; sunlight aslant, the sky's from above. */
 #include "cloud_view.h"
 
+#include "base/stride.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -132,10 +133,10 @@ nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const n
 {
     if (workspace == NULL || (n > 0 && (rays == NULL || shades == NULL))) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
+        const nebel_ray *ray = nb_stride_from(rays, ray_stride, i);
         double unit[3];
         if (!nb_air_is_ray(ray, unit)) return NEBEL_ERROR_ARGUMENT;
-        shade(workspace, ray, unit, (nebel_air_shade *)(void *)((char *)shades + i * shade_stride));
+        shade(workspace, ray, unit, nb_stride_to(shades, shade_stride, i));
     }
     return NEBEL_OK;
 }
@@ -147,7 +148,7 @@ nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, siz
         return NEBEL_ERROR_ARGUMENT;
     const nebel_clouds *clouds = workspace->view->clouds;
     for (size_t i = 0; i < n; i++) {
-        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
+        const double *place = nb_stride_from(places, place_stride, i);
         double from[3];
         if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
         for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];

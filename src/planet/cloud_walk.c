@@ -7,6 +7,7 @@
 #include "cloud_looks.h"
 #include "cloud_view.h"
 
+#include "base/stride.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -640,19 +641,20 @@ static void round_direction(double unit[3])
 typedef struct nb_rays {
     nebel_cloud_workspace *workspace;
     size_t n, next;
-    const char *rays, *spreads;
-    char *knots;
+    const nebel_ray *rays;
+    const double *spreads;
+    nebel_cloud_knots *knots;
     size_t ray_stride, spread_stride, knot_stride;
 } nb_rays;
 
 static const nebel_ray *ray_at(const nb_rays *rays, size_t i)
 {
-    return (const nebel_ray *)(const void *)(rays->rays + i * rays->ray_stride);
+    return nb_stride_from(rays->rays, rays->ray_stride, i);
 }
 
 static double spread_at(const nb_rays *rays, size_t i)
 {
-    return *(const double *)(const void *)(rays->spreads + i * rays->spread_stride);
+    return *(const double *)nb_stride_from(rays->spreads, rays->spread_stride, i);
 }
 
 static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
@@ -662,7 +664,7 @@ static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
     (void)nb_air_is_ray(ray_at(rays, i), unit);
     round_direction(unit);
     begin(rays->workspace, party, ray_at(rays, i), unit, (double)(float)spread_at(rays, i),
-          (nebel_cloud_knots *)(void *)(rays->knots + i * rays->knot_stride), walk);
+          nb_stride_to(rays->knots, rays->knot_stride, i), walk);
     party->ready[party->ready_count++] = walk;
 }
 
@@ -741,9 +743,9 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
 {
     nb_rays all = {.workspace = workspace,
                    .n = n,
-                   .rays = (const char *)rays,
-                   .spreads = (const char *)spreads,
-                   .knots = (char *)knots,
+                   .rays = rays,
+                   .spreads = spreads,
+                   .knots = knots,
                    .ray_stride = ray_stride,
                    .spread_stride = spread_stride,
                    .knot_stride = knot_stride};
@@ -767,7 +769,7 @@ nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, 
     const nebel_clouds *clouds = view->clouds;
     const double *sun = view->sun.direction, least = fmax(width, 1e-3 * (view->high - view->low));
     for (size_t i = 0; i < n; i++) {
-        const double *place = (const double *)(const void *)((const char *)places + i * place_stride);
+        const double *place = nb_stride_from(places, place_stride, i);
         double from[3], pieces[2][2];
         parts[i] = 1;
         if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;

@@ -4,6 +4,7 @@
 #include "base/cpu.h"
 #include "base/hash.h"
 #include "base/levels.h"
+#include "base/stride.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -473,11 +474,6 @@ void nebel_destroy_clouds(nebel_clouds *clouds)
     nb_release(&allocator, clouds);
 }
 
-static const double *place_of(const double (*places)[3], size_t stride, size_t i)
-{
-    return (const double *)(const void *)((const char *)places + i * stride);
-}
-
 static void add_layer(const nebel_clouds *clouds, int k, double time, float width, size_t n, const double (*places)[3],
                       size_t stride, float *extinction)
 {
@@ -487,7 +483,7 @@ static void add_layer(const nebel_clouds *clouds, int k, double time, float widt
         const size_t count = n - first < NB_CLOUD_LANES ? n - first : NB_CLOUD_LANES;
         float means[NB_CLOUD_LANES];
         for (size_t i = 0; i < count; i++) {
-            const double *place = place_of(places, stride, first + i);
+            const double *place = nb_stride_from(places, stride, first + i);
             double from[3];
             for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
             nb_cloud_ask(&looks, &pose, from, width);
@@ -504,7 +500,7 @@ nebel_result nebel_cloud_extinction(const nebel_clouds *clouds, double time, dou
         !(width >= 0 && width <= NEBEL_MAX_LENGTH))
         return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        if (!nb_air_is_place(place_of(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
+        if (!nb_air_is_place(nb_stride_from(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
         extinction[i] = 0;
     }
     for (int k = 0; k < clouds->layer_count; k++)

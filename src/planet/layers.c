@@ -1,4 +1,5 @@
 #include "base/base.h"
+#include "base/stride.h"
 #include "base/vector.h"
 #include "layer_map.h"
 
@@ -443,10 +444,8 @@ nebel_result nebel_trace_layers(const nebel_layers *layers, const nebel_layer_vi
     if (ray_stride == 0) ray_stride = sizeof *rays;
     if (hit_stride == 0) hit_stride = sizeof *hits;
     for (size_t i = 0; i < n; i++) {
-        const nebel_ray *ray = (const nebel_ray *)(const void *)((const char *)rays + i * ray_stride);
-        nebel_layer_hits *out = (nebel_layer_hits *)(void *)((char *)hits + i * hit_stride);
-        if (!set_ray(ray, &s)) return NEBEL_ERROR_ARGUMENT;
-        look(&s, out);
+        if (!set_ray(nb_stride_from(rays, ray_stride, i), &s)) return NEBEL_ERROR_ARGUMENT;
+        look(&s, nb_stride_to(hits, hit_stride, i));
     }
     return NEBEL_OK;
 }

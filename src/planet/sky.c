@@ -1,6 +1,7 @@
 /* Light along rays through air, and at places. */
 #include "atmosphere.h"
 
+#include "base/stride.h"
 #include "base/vector.h"
 
 #include <math.h>
@@ -238,11 +239,6 @@ int nb_air_is_ray(const nebel_ray *ray, double unit[3])
     return nb_air_is_place(ray->origin) && nb_vector_make_unit(unit) && ray->t_max >= 0;
 }
 
-static const nebel_ray *ray_at(const nebel_ray *rays, size_t stride, size_t i)
-{
-    return (const nebel_ray *)(const void *)((const char *)rays + i * stride);
-}
-
 nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun *sun, size_t n, const nebel_ray *rays,
                              size_t ray_stride, nebel_light *lights, size_t light_stride)
 {
@@ -251,18 +247,13 @@ nebel_result nebel_trace_air(const nebel_atmosphere *atmosphere, const nebel_sun
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
     double unit[3];
     for (size_t i = 0; i < n; i++)
-        if (!nb_air_is_ray(ray_at(rays, ray_stride, i), unit)) return NEBEL_ERROR_ARGUMENT;
+        if (!nb_air_is_ray(nb_stride_from(rays, ray_stride, i), unit)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++) {
-        const nebel_ray *ray = ray_at(rays, ray_stride, i);
+        const nebel_ray *ray = nb_stride_from(rays, ray_stride, i);
         (void)nb_air_is_ray(ray, unit);
-        trace(atmosphere, &resolved, ray, unit, (nebel_light *)(void *)((char *)lights + i * light_stride));
+        trace(atmosphere, &resolved, ray, unit, nb_stride_to(lights, light_stride, i));
     }
     return NEBEL_OK;
-}
-
-static const double *place_at(const double (*places)[3], size_t stride, size_t i)
-{
-    return (const double *)(const void *)((const char *)places + i * stride);
 }
 
 /* The sky is that of the ground straight below, wherever the way to the sun comes into the air, or if it never does. */
@@ -292,10 +283,9 @@ nebel_result nebel_light_air(const nebel_atmosphere *atmosphere, const nebel_sun
     if (atmosphere == NULL || (n > 0 && (places == NULL || lights == NULL))) return NEBEL_ERROR_ARGUMENT;
     if (!nb_air_resolve_sun(sun, &resolved)) return NEBEL_ERROR_ARGUMENT;
     for (size_t i = 0; i < n; i++)
-        if (!nb_air_is_place(place_at(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
-    for (size_t i = 0; i < n; i++) {
-        nebel_air_light *light = (nebel_air_light *)(void *)((char *)lights + i * light_stride);
-        light_place(atmosphere, &resolved, place_at(places, place_stride, i), light);
-    }
+        if (!nb_air_is_place(nb_stride_from(places, place_stride, i))) return NEBEL_ERROR_ARGUMENT;
+    for (size_t i = 0; i < n; i++)
+        light_place(atmosphere, &resolved, nb_stride_from(places, place_stride, i),
+                    nb_stride_to(lights, light_stride, i));
     return NEBEL_OK;
 }
