@@ -53,6 +53,12 @@ extern const char nb_air_sun_fault[];
 
 int nb_air_is_place(const double place[3]);
 
+/* A place of the scene from the planet's centre. */
+static inline void nb_air_from_center(const nebel_atmosphere *atmosphere, const double place[3], double from[3])
+{
+    for (int c = 0; c < 3; c++) from[c] = place[c] - atmosphere->center[c];
+}
+
 /* A place from the centre, of which one below the ground becomes that straight above it; the centre itself that at y. */
 void nb_air_raise(double ground, double from[3]);
 

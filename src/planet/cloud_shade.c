@@ -6,6 +6,7 @@
 #include "base/vector.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Pieces of rays end so far from where they come under clouds, in heights of the lowest layer's top; the last one has no end. */
 static const double ends[NEBEL_MAX_AIR_SHADES - 1] = {0.75, 2.2, 6, 15, 40};
@@ -87,10 +88,8 @@ static int find_under(const nebel_cloud_view *view, const nebel_ray *ray, const 
     const double ground = atmosphere->airs.radius;
     const int lowest = layer_over(view->clouds, 0);
     double pieces[2][2];
-    for (int c = 0; c < 3; c++) {
-        under->from[c] = ray->origin[c] - atmosphere->center[c];
-        under->unit[c] = unit[c];
-    }
+    memcpy(under->unit, unit, sizeof under->unit);
+    nb_air_from_center(atmosphere, ray->origin, under->from);
     nb_air_raise(ground, under->from);
     const double end = fmin(ray->t_max, nb_cloud_to_ground(ground, under->from, unit));
     if (lowest < 0 || !nb_cloud_pieces(0, view->high, under->from, unit, end, pieces)) return 0;
@@ -151,7 +150,7 @@ nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, siz
         const double *place = nb_stride_from(places, place_stride, i);
         double from[3];
         if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
-        for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+        nb_air_from_center(clouds->atmosphere, place, from);
         const double radius = nb_vector_length(from);
         const int k = layer_over(clouds, radius);
         const double least = LEAST_WIDTH * (workspace->view->high - clouds->atmosphere->airs.radius);

@@ -615,7 +615,7 @@ static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel
                       .spread = spread,
                       .knots = knots,
                       .tally = {.left = 1, .left_apart = 1}};
-    for (int c = 0; c < 3; c++) walk->from[c] = ray->origin[c] - atmosphere->center[c];
+    nb_air_from_center(atmosphere, ray->origin, walk->from);
     nb_air_raise(atmosphere->airs.radius, walk->from);
     memcpy(walk->unit, unit, sizeof walk->unit);
     walk->ray = nb_cloud_ray_make(workspace->view, unit);
@@ -773,7 +773,7 @@ nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, 
         double from[3], pieces[2][2];
         parts[i] = 1;
         if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
-        for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+        nb_air_from_center(clouds->atmosphere, place, from);
         if (!nb_cloud_pieces(view->low, view->high, from, sun, HUGE_VAL, pieces)) continue;
         for (int c = 0; c < 3; c++) from[c] += pieces[0][0] * sun[c];
         const float depth = nb_cloud_sun_depth_at(workspace, from, (float)fmax(least, 0.005 * pieces[0][0]));

@@ -483,9 +483,8 @@ static void add_layer(const nebel_clouds *clouds, int k, double time, float widt
         const size_t count = n - first < NB_CLOUD_LANES ? n - first : NB_CLOUD_LANES;
         float means[NB_CLOUD_LANES];
         for (size_t i = 0; i < count; i++) {
-            const double *place = nb_stride_from(places, stride, first + i);
             double from[3];
-            for (int c = 0; c < 3; c++) from[c] = place[c] - clouds->atmosphere->center[c];
+            nb_air_from_center(clouds->atmosphere, nb_stride_from(places, stride, first + i), from);
             nb_cloud_ask(&looks, &pose, from, width);
         }
         nb_cloud_find_means(clouds, k, &looks, means);

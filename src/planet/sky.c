@@ -164,7 +164,7 @@ void nb_air_raise(double ground, double from[3])
 /* Relative to the planet's centre; returns how far that is. What is below the ground counts as on it. */
 static double place_over(const nebel_atmosphere *atmosphere, const double place[3], double relative[3])
 {
-    for (int c = 0; c < 3; c++) relative[c] = place[c] - atmosphere->center[c];
+    nb_air_from_center(atmosphere, place, relative);
     nb_air_raise(atmosphere->airs.radius, relative);
     return fmax(atmosphere->airs.radius, sqrt(nb_vector_dot(relative, relative)));
 }

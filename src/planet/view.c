@@ -250,7 +250,7 @@ static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
 {
     const nebel_atmosphere *atmosphere = desc->atmosphere;
     double place[3];
-    for (int c = 0; c < 3; c++) place[c] = desc->position[c] - atmosphere->center[c];
+    nb_air_from_center(atmosphere, desc->position, place);
     set_axes(view, place);
     view->outlook = nb_outlook_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
     view->columns = sees_day_and_night(view) ? NB_VIEW_MORE_COLUMNS : NB_VIEW_COLUMNS;
