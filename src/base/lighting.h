@@ -26,6 +26,23 @@ static inline nebel_environment nb_scene_environment(const nebel_scene_data *sce
     return environment;
 }
 
+/* Whether ambient light is the planet's sky. */
+static inline int nb_scene_owns_ambient(const nebel_scene_data *scene)
+{
+    return scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
+}
+
+/* Above all air; where there is none one of no light. */
+static inline nebel_sun nb_scene_sun(const nebel_scene_data *scene)
+{
+    nebel_sun sun = {.direction = {0, 1, 0}};
+    for (int c = 0; c < 3 && scene->has_sun; c++) {
+        sun.direction[c] = scene->sun_direction[c];
+        sun.irradiance[c] = scene->sun_irradiance[c];
+    }
+    return sun;
+}
+
 static inline int nb_lighting_is_light(const double rgb[3])
 {
     return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0 && isfinite(rgb[0] + rgb[1] + rgb[2]);

@@ -51,6 +51,30 @@ static inline int nb_worlds_set(nb_world worlds[NEBEL_MAX_PLANETS], const nebel_
     return count;
 }
 
+/* No air of any planet is farther from a position. */
+static inline double nb_worlds_reach(const nb_world *worlds, int count, const double position[3])
+{
+    double reach = 0;
+    for (int k = 0; k < count; k++) {
+        const double square = nb_world_power(&worlds[k], position) + worlds[k].top * worlds[k].top;
+        reach = fmax(reach, sqrt(square) + worlds[k].top);
+    }
+    return reach;
+}
+
+/* The angular radius of the sun's disc; 0: there is none. The scene has a planet. */
+static inline double nb_worlds_disc(const nebel_scene_data *scene)
+{
+    return scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (3.14159265358979323846 / 180) : 0;
+}
+
+/* Its mean radiance above all air. */
+static inline void nb_worlds_disc_light(const nebel_scene_data *scene, double radius, double light[3])
+{
+    for (int c = 0; c < 3; c++)
+        light[c] = radius > 0 ? scene->sun_irradiance[c] / (3.14159265358979323846 * pow(sin(radius), 2)) : 0;
+}
+
 /* How far the ground is from an eye above it; 0: the ray does not meet it. */
 static inline double nb_world_ground(const nb_world *world, const double eye[3], const double unit[3])
 {

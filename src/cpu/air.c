@@ -26,38 +26,26 @@ nebel_result nb_air_set_daylights(nb_air *air, const nebel_planet *home, const n
     return NEBEL_OK;
 }
 
-static void set_sun(nb_air *air, const nebel_scene_data *scene, const double to_sun[3], nebel_air_view_desc *desc)
-{
-    memcpy(air->to_sun, to_sun, sizeof air->to_sun);
-    air->sun_radius = scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (PI / 180) : 0;
-    for (int c = 0; c < 3 && air->sun_radius > 0; c++)
-        air->sun_light[c] = scene->sun_irradiance[c] / (PI * pow(sin(air->sun_radius), 2));
-    if (!scene->has_sun) return;
-    memcpy(desc->sun.direction, scene->sun_direction, sizeof desc->sun.direction);
-    memcpy(desc->sun.irradiance, scene->sun_irradiance, sizeof desc->sun.irradiance);
-}
-
 nebel_result nb_air_set(nb_air *air, const nebel_scene_data *scene, const nebel_allocator *allocator,
                         const nebel_log *log, const double position[3], const double to_sun[3], int ends, int threads)
 {
-    nebel_air_view_desc desc = {.sun = {.direction = {0, 1, 0}},
-                                .run = nebel_run_parts,
-                                .run_user = &threads,
-                                .allocator = *allocator,
-                                .log = *log};
+    nebel_air_view_desc desc = {
+        .sun = nb_scene_sun(scene), .run = nebel_run_parts, .run_user = &threads, .allocator = *allocator, .log = *log};
     nebel_result result = NEBEL_OK;
     air->allocator = allocator;
     air->count = nb_worlds_set(air->worlds, scene, position);
-    set_sun(air, scene, to_sun, &desc);
+    air->sun_radius = nb_worlds_disc(scene);
+    nb_worlds_disc_light(scene, air->sun_radius, air->sun_light);
+    memcpy(air->to_sun, to_sun, sizeof air->to_sun);
     memcpy(air->position, position, sizeof air->position);
     memcpy(desc.position, position, sizeof desc.position);
     air->ends = desc.has_distances = ends || air->count > 1; /* the ground of one planet ends the air of others */
-    air->owns_ambient = scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
+    air->owns_ambient = nb_scene_owns_ambient(scene);
+    air->reach = nb_worlds_reach(air->worlds, air->count, position);
     for (int i = 0; i < air->count && result == NEBEL_OK; i++) {
         nb_world *world = &air->worlds[i];
         desc.atmosphere = world->planet->atmosphere;
         result = nebel_create_air_view(&desc, &world->view);
-        air->reach = fmax(air->reach, sqrt(nb_world_power(world, position) + world->top * world->top) + world->top);
     }
     if (result == NEBEL_OK && scene->has_sun && scene->mesh_count > 0)
         result = nb_air_set_daylights(air, &scene->planets[0], log);

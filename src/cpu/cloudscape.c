@@ -19,17 +19,13 @@ nebel_result nb_cloudscape_set(nb_frame *frame, const nebel_frame_desc *desc)
     nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
     if (frame->air.count == 0 || scene->planets[0].clouds == NULL) return NEBEL_OK;
-    nebel_cloud_view_desc view = {.clouds = scene->planets[0].clouds,
-                                  .sun = {.direction = {0, 1, 0}},
-                                  .time = desc->time,
-                                  .tolerance = fmin(1, desc->tolerance),
-                                  .isa = renderer->fog_isa,
-                                  .allocator = renderer->allocator,
-                                  .log = renderer->log};
-    if (scene->has_sun) {
-        memcpy(view.sun.direction, scene->sun_direction, sizeof view.sun.direction);
-        memcpy(view.sun.irradiance, scene->sun_irradiance, sizeof view.sun.irradiance);
-    }
+    const nebel_cloud_view_desc view = {.clouds = scene->planets[0].clouds,
+                                        .sun = nb_scene_sun(scene),
+                                        .time = desc->time,
+                                        .tolerance = fmin(1, desc->tolerance),
+                                        .isa = renderer->fog_isa,
+                                        .allocator = renderer->allocator,
+                                        .log = renderer->log};
     nebel_result result = nebel_create_cloud_view(&view, &frame->cloud_view);
     for (int i = 0; i < renderer->threads && result == NEBEL_OK; i++)
         result = nebel_create_cloud_workspace(frame->cloud_view, &renderer->scratch[i].clouds.workspace);

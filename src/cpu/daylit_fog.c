@@ -86,15 +86,13 @@ nebel_result nb_daylit_fog_set(nb_frame *frame)
     nb_air *air = &frame->air;
     const nebel_renderer *renderer = frame->renderer;
     const nebel_scene_data *scene = renderer->scene;
-    nebel_sun sun;
     double min[3], max[3], middle[3] = {0, 0, 0};
     if (!air->has_fog || !scene->has_sun) return NEBEL_OK;
     const int is_far = nebel_snapshot_scattering_fog(renderer->fog, min, max) &&
                        !nb_daylight_is_near(&scene->planets[0], scene->sun_direction, min, max);
     nebel_result result = nb_fog_shade_set(frame);
     if (result != NEBEL_OK || !(is_far || air->roof.is_shaded)) return result;
-    memcpy(sun.direction, scene->sun_direction, sizeof sun.direction);
-    memcpy(sun.irradiance, scene->sun_irradiance, sizeof sun.irradiance);
+    nebel_sun sun = nb_scene_sun(scene);
     if (is_far) find_middle(min, max, middle);
     air->is_fog_even = !is_far || is_even(air, min, max);
     result = find_cloud_shade(frame, &air->cloud_shade);

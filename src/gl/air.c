@@ -2,34 +2,19 @@
 
 #include "words.h"
 
+#include "base/lighting.h"
+
 #include <epoxy/gl.h>
 #include <math.h>
 #include <nebel/shader.h>
 #include <string.h>
-
-static const double pi = 3.14159265358979323846;
 
 const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene)
 {
     return scene->planet_count > 0 && scene->planets[0].atmosphere != NULL ? &scene->planets[0] : NULL;
 }
 
-int nb_gl_air_owns_ambient(const nebel_scene_data *scene)
-{
-    return scene->environment.type == NEBEL_ENVIRONMENT_MAP && scene->environment_file == NULL;
-}
-
 /* ---- the tables ------------------------------------------------------------------------------ */
-
-nebel_sun nb_gl_air_sun(const nebel_scene_data *scene)
-{
-    nebel_sun sun = {.direction = {0, 1, 0}};
-    for (int c = 0; c < 3 && scene->has_sun; c++) {
-        sun.direction[c] = scene->sun_direction[c];
-        sun.irradiance[c] = scene->sun_irradiance[c];
-    }
-    return sun;
-}
 
 /* Depths, and behind them skies, of nb_daylight. */
 enum {
@@ -162,7 +147,7 @@ nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, con
     nb_world worlds[NEBEL_MAX_PLANETS];
     const int count = nb_worlds_set(worlds, scene, eye);
     /* The ground of one planet ends the air of others. */
-    const nebel_air_view_desc desc = {.sun = nb_gl_air_sun(scene),
+    const nebel_air_view_desc desc = {.sun = nb_scene_sun(scene),
                                       .position = {eye[0], eye[1], eye[2]},
                                       .has_distances = ends || count > 1,
                                       .run = air->run,
@@ -226,29 +211,21 @@ void nb_gl_air_set_worlds(const nb_gl_air *air, unsigned program)
 
 void nb_gl_air_set_light(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene)
 {
-    const double radius = scene->has_sun ? 0.5 * scene->planets[0].sun_diameter * (pi / 180) : 0;
-    float light[3] = {0, 0, 0};
-    for (int c = 0; c < 3 && radius > 0; c++) light[c] = (float)(scene->sun_irradiance[c] / (pi * pow(sin(radius), 2)));
+    const double radius = nb_worlds_disc(scene);
+    double bright[3];
+    float light[3];
+    nb_worlds_disc_light(scene, radius, bright);
+    for (int c = 0; c < 3; c++) light[c] = (float)bright[c];
     nb_gl_air_set_worlds(air, program);
     glUniform1f(glGetUniformLocation(program, "disc_radius"), (float)radius);
     glUniform3fv(glGetUniformLocation(program, "disc_light"), 1, light);
-    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), nb_gl_air_owns_ambient(scene));
-}
-
-/* No air of any planet is farther from the eye. */
-static double find_reach(const nb_gl_air *air)
-{
-    double reach = 0;
-    for (int i = 0; i < air->count; i++) {
-        const nb_world *const world = &air->worlds[i];
-        reach = fmax(reach, sqrt(nb_world_power(world, air->of.position) + world->top * world->top) + world->top);
-    }
-    return reach;
+    glUniform1i(glGetUniformLocation(program, "sky_is_ambient"), nb_scene_owns_ambient(scene));
 }
 
 void nb_gl_air_set_reach(const nb_gl_air *air, unsigned program)
 {
-    glUniform1f(glGetUniformLocation(program, "daylight_reach"), (float)find_reach(air));
+    glUniform1f(glGetUniformLocation(program, "daylight_reach"),
+                (float)nb_worlds_reach(air->worlds, air->count, air->of.position));
 }
 
 void nb_gl_air_set_daylight(const nb_gl_air *air, unsigned program, const nebel_scene_data *scene, float even_shade)

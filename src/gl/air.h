@@ -23,12 +23,6 @@ typedef struct nb_gl_air {
 /* The first planet of a scene where it has air; NULL: there is none. */
 const nebel_planet *nb_gl_air_planet(const nebel_scene_data *scene);
 
-/* The sun of a scene; where there is none one of no light. */
-nebel_sun nb_gl_air_sun(const nebel_scene_data *scene);
-
-/* Whether ambient light is the planet's sky. */
-int nb_gl_air_owns_ambient(const nebel_scene_data *scene);
-
 /* Makes the texture where it is not there already, bound to the active unit; wants the usual unpacking. `ends`: rays may end
  * before the ground. `is_lit`: the light at places is asked for. VALUE (a place or a sun that is none), MEMORY, LIMIT. */
 nebel_result nb_gl_air_set(nb_gl_air *air, const nebel_allocator *allocator, const nebel_log *log,

@@ -154,7 +154,7 @@ static nebel_result draw_shade(nb_gl_frame *f, const nb_cloud_picture *picture)
 nebel_result nb_frame_set_clouds(nb_gl_frame *f, nebel_cloud_workspace **workspace)
 {
     nb_gl_clouds *const clouds = &f->renderer->clouds;
-    const nebel_sun sun = nb_gl_air_sun(f->renderer->scene);
+    const nebel_sun sun = nb_scene_sun(f->renderer->scene);
     nebel_result result = nb_gl_clouds_set(clouds, f->clouds, &sun, f->desc->time, log_of(f));
     if (result == NEBEL_OK) result = nb_gl_clouds_workspace(clouds, workspace);
     return fail_memory(f, result);

@@ -2,6 +2,7 @@
 #include "scene/scene_internal.h"
 
 #include "base/eclipse.h"
+#include "base/lighting.h"
 
 #include <math.h>
 #include <string.h>
@@ -10,15 +11,6 @@
 enum { WIDTH = 64, HEIGHT = WIDTH / 2, WITHIN = 4, LOOKS = WIDTH * WITHIN * WITHIN };
 
 static const double pi = 3.14159265358979323846;
-
-static nebel_sun sun_of(const nebel_scene_data *data)
-{
-    nebel_sun sun = {.direction = {0, 1, 0}};
-    if (!data->has_sun) return sun;
-    memcpy(sun.direction, data->sun_direction, sizeof sun.direction);
-    memcpy(sun.irradiance, data->sun_irradiance, sizeof sun.irradiance);
-    return sun;
-}
 
 /* One row of pixels, as nebel_environment_map_desc has them. */
 typedef struct nb_sky_row {
@@ -127,7 +119,7 @@ nebel_result nb_planet_light(nebel_scene *scene)
     static const double origin[1][3] = {{0, 0, 0}};
     nebel_planet *planet = scene->planets;
     if (planet == NULL || planet->atmosphere == NULL) return NEBEL_OK;
-    const nebel_sun sun = sun_of(&scene->data),
+    const nebel_sun sun = nb_scene_sun(&scene->data),
                     white = {{sun.direction[0], sun.direction[1], sun.direction[2]}, {1, 1, 1}};
     nebel_air_light light;
     nebel_result result = nebel_light_air(planet->atmosphere, &white, 1, origin, 0, &light, 0);
@@ -171,7 +163,7 @@ static nebel_result shade_origin(const nebel_scene *scene, double frame, float *
     enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_cloud_view_desc desc = {.clouds = scene->clouds,
-                                        .sun = sun_of(&scene->data),
+                                        .sun = nb_scene_sun(&scene->data),
                                         .time = frame,
                                         .allocator = scene->allocator,
                                         .log = scene->log};
@@ -193,7 +185,7 @@ nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebe
     if (scene == NULL || sunlight == NULL || ambient == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = scene->clouds != NULL ? shade_origin(scene, frame, &sun, &sky) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
-    *sunlight = sun_of(&scene->data);
+    *sunlight = nb_scene_sun(&scene->data);
     *ambient = scene->data.environment;
     for (int c = 0; c < 3 && scene->atmospheres[0] != NULL; c++)
         sunlight->irradiance[c] *= (double)sun * scene->planets->sun_left[c];
