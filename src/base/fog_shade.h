@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-/* As wide as nebel_find_scene_light takes the shade of the origin, m. */
+/* How wide the shade of the origin is, m: as scenes are in which fog stands. */
 #define NB_FOG_SHADE_ORIGIN 200.
 
 /* Of shade, over all of the fog: less is a step of a picture of 255. */

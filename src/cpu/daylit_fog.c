@@ -45,14 +45,13 @@ static int is_even(const nb_air *air, const double min[3], const double max[3])
     return 1;
 }
 
-/* Where it is even, clouds shade all fog as they do the origin, as wide as nebel_find_scene_sunlight takes them. */
+/* Where it is even, clouds shade all fog as they do the origin. */
 static nebel_result find_cloud_shade(const nb_frame *frame, float *part)
 {
-    enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     *part = 1;
     if (frame->cloud_view == NULL || frame->air.roof.is_shaded) return NEBEL_OK;
-    return nebel_shade_clouds(frame->renderer->scratch[0].clouds.workspace, WIDE, 1, origin, 0, part);
+    return nebel_shade_clouds(frame->renderer->scratch[0].clouds.workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, part);
 }
 
 static void light_at(const nb_air *air, const double place[3], double sun[3], double sky[3])

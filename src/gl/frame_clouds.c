@@ -123,15 +123,14 @@ static nebel_result find_all_fog(nb_gl_frame *f, const nb_cloud_picture *picture
     return result;
 }
 
-/* All fog has that of the origin, as wide as nebel_find_scene_sunlight takes it. */
+/* All fog has that of the origin. */
 static nebel_result find_shade(nb_gl_frame *f)
 {
-    enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_gl_renderer *const r = f->renderer;
     return r->daylit.lit == NULL || r->cloud_shade.clear_sky > 0
                ? NEBEL_OK
-               : nebel_shade_clouds(r->clouds.parts[0].workspace, WIDE, 1, origin, 0, &f->even_shade);
+               : nebel_shade_clouds(r->clouds.parts[0].workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, &f->even_shade);
 }
 
 /* On air, and on fog by its place, for all samples. */

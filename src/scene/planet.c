@@ -2,6 +2,7 @@
 #include "scene/scene_internal.h"
 
 #include "base/eclipse.h"
+#include "base/fog_shade.h"
 #include "base/lighting.h"
 
 #include <math.h>
@@ -157,10 +158,8 @@ static nebel_result set_clouds(nebel_scene *scene)
     return result;
 }
 
-/* The shadow is as wide as scenes are in which fog stands. */
 static nebel_result shade_origin(const nebel_scene *scene, double frame, float *sun, float *sky)
 {
-    enum { WIDE = 200 };
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_cloud_view_desc desc = {.clouds = scene->clouds,
                                         .sun = nb_scene_sun(&scene->data),
@@ -171,8 +170,8 @@ static nebel_result shade_origin(const nebel_scene *scene, double frame, float *
     nebel_cloud_workspace *workspace = NULL;
     nebel_result result = nebel_create_cloud_view(&desc, &view);
     if (result == NEBEL_OK) result = nebel_create_cloud_workspace(view, &workspace);
-    if (result == NEBEL_OK) result = nebel_shade_clouds(workspace, WIDE, 1, origin, 0, sun);
-    if (result == NEBEL_OK) result = nebel_shade_sky(workspace, WIDE, 1, origin, 0, sky);
+    if (result == NEBEL_OK) result = nebel_shade_clouds(workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, sun);
+    if (result == NEBEL_OK) result = nebel_shade_sky(workspace, NB_FOG_SHADE_ORIGIN, 1, origin, 0, sky);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     return result;
