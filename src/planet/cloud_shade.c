@@ -140,6 +140,29 @@ nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const n
     return NEBEL_OK;
 }
 
+/* Below clouds their shadow is that of the place where the way to the sun enters them. */
+nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
+                                size_t place_stride, float *parts)
+{
+    if (workspace == NULL || (n > 0 && (places == NULL || parts == NULL)) || !(width >= 0 && width <= NEBEL_MAX_LENGTH))
+        return NEBEL_ERROR_ARGUMENT;
+    const nebel_cloud_view *view = workspace->view;
+    const nebel_clouds *clouds = view->clouds;
+    const double *sun = view->sun.direction, least = fmax(width, 1e-3 * (view->high - view->low));
+    for (size_t i = 0; i < n; i++) {
+        const double *place = nb_stride_from(places, place_stride, i);
+        double from[3], pieces[2][2];
+        parts[i] = 1;
+        if (!nb_air_is_place(place)) return NEBEL_ERROR_ARGUMENT;
+        nb_air_from_center(clouds->atmosphere, place, from);
+        if (!nb_cloud_pieces(view->low, view->high, from, sun, HUGE_VAL, pieces)) continue;
+        for (int c = 0; c < 3; c++) from[c] += pieces[0][0] * sun[c];
+        const float depth = nb_cloud_sun_depth_at(workspace, from, (float)fmax(least, 0.005 * pieces[0][0]));
+        if (depth > 0) parts[i] = nb_cloud_part_through(depth, (float)clouds->layers[0].mean_cosine);
+    }
+    return NEBEL_OK;
+}
+
 nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
                              size_t place_stride, float *parts)
 {
