@@ -15,13 +15,20 @@
 
 #include "formulas/elementary.inc"
 
+/* How near the line of a ray comes to the planet's middle; along: how far behind that place the ray begins. */
+static double pass(const double from[3], const double unit[3], double *along)
+{
+    double aside[3];
+    *along = nb_vector_dot(from, unit);
+    for (int c = 0; c < 3; c++) aside[c] = from[c] - *along * unit[c];
+    return nb_vector_length(aside);
+}
+
 int nb_cloud_pieces(double low, double high, const double from[3], const double unit[3], double t_max,
                     double pieces[2][2])
 {
-    const double along = nb_vector_dot(from, unit);
-    double aside[3];
-    for (int c = 0; c < 3; c++) aside[c] = from[c] - along * unit[c];
-    const double near = sqrt(nb_vector_dot(aside, aside));
+    double along;
+    const double near = pass(from, unit, &along);
     if (!(near < high)) return 0;
     const double outer = sqrt((high - near) * (high + near));
     const double inner = near < low ? sqrt((low - near) * (low + near)) : -1;
@@ -35,6 +42,14 @@ int nb_cloud_pieces(double low, double high, const double from[3], const double 
         pieces[count++][1] = b;
     }
     return count;
+}
+
+double nb_cloud_to_ground(double radius, const double from[3], const double unit[3])
+{
+    double along;
+    const double near = pass(from, unit, &along);
+    if (!(along < 0 && near < radius)) return HUGE_VAL;
+    return fmax(0, -along - sqrt((radius - near) * (radius + near)));
 }
 
 /* ---- ways ------------------------------------------------------------------------------------ */

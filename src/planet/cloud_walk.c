@@ -595,16 +595,6 @@ static void find_stays(nb_walk *walk, double t_max)
     }
 }
 
-double nb_cloud_to_ground(double radius, const double from[3], const double unit[3])
-{
-    const double along = nb_vector_dot(from, unit);
-    double aside[3];
-    for (int c = 0; c < 3; c++) aside[c] = from[c] - along * unit[c];
-    const double near = nb_vector_length(aside);
-    if (!(along < 0 && near < radius)) return HUGE_VAL;
-    return fmax(0, -along - sqrt((radius - near) * (radius + near)));
-}
-
 static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel_ray *ray, const double unit[3],
                   double spread, nebel_cloud_knots *knots, nb_walk *walk)
 {
