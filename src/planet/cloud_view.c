@@ -4,25 +4,51 @@
 
 #include <math.h>
 
-nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view)
+/* What a view needs that is not in the description as it is. */
+static nebel_result check(const nebel_cloud_view_desc *desc, nebel_sun *sun, const nb_cloud_kernel **kernel)
 {
-    nebel_sun sun;
-    if (view == NULL) return NEBEL_ERROR_ARGUMENT;
-    *view = NULL;
-    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
     if (desc->clouds == NULL)
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: clouds: is NULL; make some first");
-    if (!nb_air_resolve_sun(&desc->sun, &sun))
+    if (!nb_air_resolve_sun(&desc->sun, sun))
         return nb_fail(&desc->log, NEBEL_ERROR_ARGUMENT, "clouds: view: %s", nb_air_sun_fault);
     if (!(fabs(desc->time) <= 1e12))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: time is %g; must be within -1e12 and 1e12", desc->time);
     if (!(desc->tolerance >= 0 && desc->tolerance <= 1))
         return nb_fail(&desc->log, NEBEL_ERROR_VALUE, "clouds: tolerance is %g; must be within 0 and 1",
                        desc->tolerance);
-    const nb_cloud_kernel *kernel = nb_cloud_kernel_choose(desc->isa);
-    if (kernel == NULL)
+    *kernel = nb_cloud_kernel_choose(desc->isa);
+    if (*kernel == NULL)
         return nb_fail(&desc->log, NEBEL_ERROR_UNSUPPORTED, "clouds: instruction set %s: not available here",
                        nebel_isa_name(desc->isa));
+    return NEBEL_OK;
+}
+
+/* Where layers are at a time, and how low the sun is at most where light is asked for. */
+static void set_layers(nebel_cloud_view *view, double time)
+{
+    const nebel_clouds *clouds = view->clouds;
+    const double ground = clouds->atmosphere->airs.radius;
+    view->low = HUGE_VAL;
+    for (int k = 0; k < clouds->layer_count; k++) {
+        const nb_cloud_layer *layer = &clouds->layers[k];
+        view->poses[k] = nb_cloud_pose_at(layer, time);
+        view->low = fmin(view->low, layer->low);
+        view->high = fmax(view->high, layer->high);
+    }
+    if (clouds->layer_count == 0) view->low = view->high = ground;
+    const double ratio = fmin(1, ground / view->high);
+    view->lowest_sun = -1.05 * sqrt((1 - ratio) * (1 + ratio)) - 0.2;
+}
+
+nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cloud_view **view)
+{
+    nebel_sun sun;
+    const nb_cloud_kernel *kernel;
+    if (view == NULL) return NEBEL_ERROR_ARGUMENT;
+    *view = NULL;
+    if (desc == NULL || !nb_allocator_is_valid(&desc->allocator)) return NEBEL_ERROR_ARGUMENT;
+    nebel_result result = check(desc, &sun, &kernel);
+    if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
     nebel_cloud_view *made = nb_allocate_zero(&allocator, 1, sizeof *made);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "clouds: out of memory");
@@ -32,17 +58,8 @@ nebel_result nebel_create_cloud_view(const nebel_cloud_view_desc *desc, nebel_cl
     made->kernel = kernel;
     made->sun = sun;
     made->tolerance = fmax(1e-6, desc->tolerance > 0 ? desc->tolerance : NEBEL_DEFAULT_TOLERANCE);
-    made->low = HUGE_VAL;
-    for (int k = 0; k < desc->clouds->layer_count; k++) {
-        const nb_cloud_layer *layer = &desc->clouds->layers[k];
-        made->poses[k] = nb_cloud_pose_at(layer, desc->time);
-        made->low = fmin(made->low, layer->low);
-        made->high = fmax(made->high, layer->high);
-    }
-    if (desc->clouds->layer_count == 0) made->low = made->high = desc->clouds->atmosphere->airs.radius;
-    const double ratio = fmin(1, desc->clouds->atmosphere->airs.radius / made->high);
-    made->lowest_sun = -1.05 * sqrt((1 - ratio) * (1 + ratio)) - 0.2;
-    const nebel_result result = nb_cloud_light_make(made);
+    set_layers(made, desc->time);
+    result = nb_cloud_light_make(made);
     if (result == NEBEL_OK) {
         *view = made;
         return NEBEL_OK;
