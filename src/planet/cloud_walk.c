@@ -685,7 +685,39 @@ static int find_asked(const nb_rays *rays, const nb_party *party)
     return most;
 }
 
-/* Looks as soon as there is no room for two more questions about a layer, or nobody has any; then the last lights are found. */
+/* A walk that is ready has questions, for which there must be room, or waits for its last light, or is at its end: then the next ray
+ * takes its place. */
+static void attend(nb_rays *rays, nb_walk *walk, nb_party *party)
+{
+    if (walk->wait != NB_WAIT_NOTHING) {
+        const int k = walk->stays[walk->stay].layer;
+        walk->unanswered = 0;
+        if (party->queues[k].looks.count > NB_CLOUD_LANES - 2) look(rays, k, party);
+        put_questions(walk, &party->queues[k]);
+        return;
+    }
+    if (walk->tally.lit < walk->tally.asked) {
+        walk->wait = NB_WAIT_LIGHT;
+        return;
+    }
+    nb_cloud_tally_end(&walk->tally, walk->knots);
+    walk->knots->error = (float)walk->missed;
+    walk->knots->looks = walk->looks;
+    if (rays->next < rays->n) begin_next(rays, walk, party);
+}
+
+/* When no walk is ready: questions about one layer, or, where nobody has any, of light. Returns 0 where there are none either. */
+static int answer(const nb_rays *rays, nb_party *party)
+{
+    const int k = find_asked(rays, party);
+    if (k < 0 && party->lights.count == 0) return 0;
+    if (k >= 0)
+        look(rays, k, party);
+    else
+        find_lights(party);
+    return 1;
+}
+
 static void trace(nb_rays *rays)
 {
     nb_party party;
@@ -695,34 +727,9 @@ static void trace(nb_rays *rays)
         party.queues[k].looks.are_of_rays = 1;
     }
     for (int i = 0; i < WALKS && rays->next < rays->n; i++) begin_next(rays, &party.walks[i], &party);
-    for (;;) {
-        if (party.ready_count == 0) {
-            const int k = find_asked(rays, &party);
-            if (k >= 0)
-                look(rays, k, &party);
-            else if (party.lights.count > 0)
-                find_lights(&party);
-            else
-                return;
-            continue;
-        }
-        nb_walk *walk = party.ready[--party.ready_count];
-        if (walk->wait == NB_WAIT_NOTHING) {
-            if (walk->tally.lit < walk->tally.asked) {
-                walk->wait = NB_WAIT_LIGHT;
-                continue;
-            }
-            nb_cloud_tally_end(&walk->tally, walk->knots);
-            walk->knots->error = (float)walk->missed;
-            walk->knots->looks = walk->looks;
-            if (rays->next < rays->n) begin_next(rays, walk, &party);
-            continue;
-        }
-        const int k = walk->stays[walk->stay].layer;
-        walk->unanswered = 0;
-        if (party.queues[k].looks.count > NB_CLOUD_LANES - 2) look(rays, k, &party);
-        put_questions(walk, &party.queues[k]);
-    }
+    do {
+        while (party.ready_count > 0) attend(rays, party.ready[--party.ready_count], &party);
+    } while (answer(rays, &party));
 }
 
 /* ---- the face -------------------------------------------------------------------------------- */
