@@ -215,7 +215,7 @@ nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depth
 /* What a layer's drops send towards the eye, per unit of extinction. */
 typedef struct nb_cloud_source {
     float once[3];    /* of sunlight, seen through all cloud between */
-    float often[3];   /* seen through what scatters it out of its way: see nb_cloud_layer_ray */
+    float often[3];   /* seen through what scatters it out of its way: see nb_cloud_ray's apart */
     float ambient[3]; /* of the sky and the ground; through all cloud */
 } nb_cloud_source;
 
