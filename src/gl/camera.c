@@ -74,6 +74,11 @@ nebel_result nebel_gl_camera_view(const nebel_camera *camera, uint32_t width, ui
     return nb_camera_look(camera, width, height, log, view);
 }
 
+double nb_camera_pixel(const nebel_view *view, int panorama)
+{
+    return panorama ? pi / view->height : 2 / (view->clip_from_eye[5] * view->height);
+}
+
 /* ---- samples --------------------------------------------------------------------------------- */
 
 nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point)

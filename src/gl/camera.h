@@ -12,6 +12,9 @@
 nebel_result nb_camera_look(const nebel_camera *camera, uint32_t width, uint32_t height, const nebel_log *log,
                             nebel_view *view);
 
+/* How wide a pixel is in the middle of a view at distance 1; of an orthographic one at any. */
+double nb_camera_pixel(const nebel_view *view, int panorama);
+
 /* The view whose pixel centres see what `view` sees at `point`. */
 nebel_view nb_camera_move(const nebel_view *view, nb_pixel_point point);
 

@@ -8,8 +8,6 @@
 #include <math.h>
 #include <string.h>
 
-static const double pi = 3.14159265358979323846;
-
 static const nebel_log *log_of(const nb_gl_frame *f)
 {
     return &f->renderer->log;
@@ -37,14 +35,13 @@ static nebel_result ask(void *user)
 
 static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pixel_point point)
 {
-    nb_cloud_picture picture = {.view = view,
-                                .panorama = f->panorama,
-                                .point = point,
-                                .eye = {f->eye[0], f->eye[1], f->eye[2]},
-                                .ask = ask,
-                                .ask_user = f};
-    picture.pixel = f->panorama ? pi / view->height : 2 / (view->clip_from_eye[5] * view->height);
-    return picture;
+    return (nb_cloud_picture){.view = view,
+                              .panorama = f->panorama,
+                              .pixel = nb_camera_pixel(view, f->panorama),
+                              .point = point,
+                              .eye = {f->eye[0], f->eye[1], f->eye[2]},
+                              .ask = ask,
+                              .ask_user = f};
 }
 
 static nb_cloud_picture picture_of_middles(nb_gl_frame *f)

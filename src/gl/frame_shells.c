@@ -8,8 +8,6 @@
 
 #include <math.h>
 
-static const double pi = 3.14159265358979323846;
-
 /* ---- balls ----------------------------------------------------------------------------------- */
 
 /* Clouds are counted from 0; as many as there are of them: the air. */
@@ -35,8 +33,7 @@ static double turns(double day, double time)
 static double pixel_spread(const nb_gl_frame *f)
 {
     if (f->desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC) return 0;
-    const double pixel = f->panorama ? pi / f->view.height : 2 / (f->view.clip_from_eye[5] * f->view.height);
-    return pixel / sqrt((double)f->samples);
+    return nb_camera_pixel(&f->view, f->panorama) / sqrt((double)f->samples);
 }
 
 static void set_ambient(const nb_gl_frame *f, unsigned program, const char *name)
