@@ -418,6 +418,19 @@ double picture_fog_apart(const picture_pair *pair)
     return (double)apart / (double)pixels;
 }
 
+double picture_in_scattering_apart(const picture_pair *pair, double most)
+{
+    const size_t pixels = (size_t)pair->width * pair->height;
+    size_t apart = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        int is = 0;
+        for (size_t c = 3 * i; c < 3 * i + 3; c++)
+            is |= !(fabs((double)pair->cpu.in_scattering[c] - (double)pair->gl.in_scattering[c]) <= most);
+        apart += (size_t)is;
+    }
+    return (double)apart / (double)pixels;
+}
+
 double picture_depth_apart(const picture_pair *pair, double least)
 {
     const size_t pixels = (size_t)pair->width * pair->height;

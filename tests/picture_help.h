@@ -66,6 +66,9 @@ double picture_largest_light(const picture_pair *pair);
 /* Of pixels the share of which transmittance or, as a share of that radiance, in-scattering is more than 1/255 apart. */
 double picture_fog_apart(const picture_pair *pair);
 
+/* Of pixels the share of which in-scattering alone is more than so much apart. */
+double picture_in_scattering_apart(const picture_pair *pair, double most);
+
 /* Of pixels the share of which depth is more than a thousandth apart, of at least `least` metres. */
 double picture_depth_apart(const picture_pair *pair, double least);
 

@@ -1,9 +1,10 @@
-/* What tests of planets share: a camera above the ground, the rays through its pixels, fog in the air. */
+/* What tests of planets share: a camera above the ground, the rays through its pixels, a sky, fog in the air. */
 #ifndef PLANET_HELP_H
 #define PLANET_HELP_H
 
 #include "unit.h"
 
+#include <nebel/environment.h>
 #include <nebel/nebel.h>
 #include <nebel/render.h>
 
@@ -31,6 +32,19 @@ static inline nebel_ray planet_ray(const nebel_camera *camera, double pitch, uin
     ray.direction[1] = sin(pitch) + up * cos(pitch);
     ray.direction[2] = -cos(pitch) + up * sin(pitch);
     return ray;
+}
+
+/* Gives a scene a sky that is everywhere as bright, of a planet's own kind; to be released. */
+static inline nebel_environment_map *planet_even_sky(nebel_scene_data *scene)
+{
+    static float pixels[4 * 2 * 3];
+    nebel_environment_map *map;
+    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
+    assert_int_equal(
+        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
+        NEBEL_OK);
+    scene->environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
+    return map;
 }
 
 /* A ball that shines, far before the camera, in a lit height fog. */

@@ -126,17 +126,11 @@ static void clouds_are_the_same_from_everywhere(void **state)
 static void the_sky_comes_through_them(void **state)
 {
     (void)state;
-    static float pixels[4 * 2 * 3];
     static const double low[3] = {.2, .12, -.97};
     nb_gl context;
-    nebel_environment_map *map;
     world w;
     make_world(.7, 0, &w);
-    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
-    assert_int_equal(
-        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
-        NEBEL_OK);
-    w.scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
+    nebel_environment_map *const map = planet_even_sky(&w.scene);
     w.scene.mesh_count = 1;
     memcpy(w.scene.sun_direction, low, sizeof low);
     pass_open(&context, NB_GL_330);

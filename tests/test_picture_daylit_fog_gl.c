@@ -19,15 +19,7 @@ static uint32_t scale = 1;
 static double fog_apart(const picture_pair *pair)
 {
     const double most = fmax(picture_largest_light(pair) / 255, 3.5e-3 * .2);
-    const size_t pixels = (size_t)pair->width * pair->height;
-    size_t apart = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        int is = 0;
-        for (size_t c = 3 * i; c < 3 * i + 3; c++)
-            is |= !(fabs((double)pair->cpu.in_scattering[c] - (double)pair->gl.in_scattering[c]) <= most);
-        apart += (size_t)is;
-    }
-    return (double)apart / (double)pixels;
+    return picture_in_scattering_apart(pair, most);
 }
 
 static void compare(const char *name, const picture_pair *pair)
@@ -139,19 +131,6 @@ static nebel_snapshot *make_ball(const worlds *s, double angle, const nebel_envi
     return snapshot;
 }
 
-/* A sky that is everywhere as bright, of a planet's own kind. */
-static nebel_environment_map *make_sky(worlds *s)
-{
-    static float pixels[4 * 2 * 3];
-    nebel_environment_map *map;
-    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
-    assert_int_equal(
-        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
-        NEBEL_OK);
-    s->scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
-    return map;
-}
-
 /* On the CPU, in the middle of the picture, where the ball is. */
 static double ball_light(const picture_pair *pair, int channel)
 {
@@ -196,8 +175,8 @@ static void balls_have_the_light_of_their_place(void **state)
     for (size_t i = 0; i < sizeof balls / sizeof *balls; i++) {
         worlds s;
         worlds_make(1, worlds_near, balls[i].sun, .53, &s);
-        const int is_dark = balls[i].sun[1] < 0; /* no sky is as bright as that of make_sky then */
-        nebel_environment_map *const map = is_dark ? NULL : make_sky(&s);
+        const int is_dark = balls[i].sun[1] < 0; /* no sky is as bright as that of planet_even_sky then */
+        nebel_environment_map *const map = is_dark ? NULL : planet_even_sky(&s.scene);
         check_ball(&balls[i], &s, &s.scene.environment);
         nebel_release_environment_map(map);
         worlds_free(&s);

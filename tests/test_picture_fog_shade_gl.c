@@ -39,7 +39,6 @@ static void make_air(double coverage, world *w)
 /* With a sky of its own, which is the same all around. */
 static void make_world(double coverage, const double sun[3], world *w)
 {
-    static float pixels[4 * 2 * 3];
     *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"), .sun_diameter = .53, .cloud_layer_count = 1},
                  .mesh = {.origin = {0, 0, -150},
                           .positions = wall[0],
@@ -49,16 +48,9 @@ static void make_world(double coverage, const double sun[3], world *w)
                           .base_color = {.8f, .8f, .8f},
                           .texture = -1}};
     make_air(coverage, w);
-    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
-    assert_int_equal(
-        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &w->map),
-        NEBEL_OK);
-    w->scene = (nebel_scene_data){.has_sun = 1,
-                                  .sun_irradiance = {5, 4, 3},
-                                  .environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = w->map, .intensity = 1},
-                                  .planet_count = 1,
-                                  .planets = &w->planet,
-                                  .meshes = &w->mesh};
+    w->scene = (nebel_scene_data){
+        .has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = 1, .planets = &w->planet, .meshes = &w->mesh};
+    w->map = planet_even_sky(&w->scene);
     memcpy(w->scene.sun_direction, sun, sizeof w->scene.sun_direction);
     assert_true(nb_vector_make_unit(w->scene.sun_direction));
 }
@@ -106,15 +98,7 @@ static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume)
 static double light_apart(const picture_pair *pair)
 {
     const double most = picture_largest_light(pair) / 255;
-    const size_t pixels = (size_t)pair->width * pair->height;
-    size_t apart = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        int is = 0;
-        for (size_t c = 3 * i; c < 3 * i + 3; c++)
-            is |= !(fabs((double)pair->cpu.in_scattering[c] - (double)pair->gl.in_scattering[c]) <= most);
-        apart += (size_t)is;
-    }
-    return (double)apart / (double)pixels;
+    return picture_in_scattering_apart(pair, most);
 }
 
 /* How much of the light of fog changes where clouds are not there: less than that of another picture cannot be told. */

@@ -554,19 +554,6 @@ static void air_under_clouds_is_dim(void **state)
     free_world(&w);
 }
 
-/* A sky that is everywhere as bright, of a planet's own kind. */
-static nebel_environment_map *make_sky(world *w)
-{
-    static float pixels[4 * 2 * 3];
-    nebel_environment_map *map;
-    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
-    assert_int_equal(
-        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
-        NEBEL_OK);
-    w->scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
-    return map;
-}
-
 /* What a surface sends out, without haze. */
 static double light_of(const test_picture *picture, size_t i, int c)
 {
@@ -604,7 +591,7 @@ static void surfaces_under_clouds_have_less_sky(void **state)
     make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .base = 1500, .top = 2500, .coverage = 1}, &w);
     memcpy(w.scene.sun_direction, (const double[3]){0, .17, -.985}, sizeof w.scene.sun_direction);
     for (int c = 0; c < 3; c++) w.planet.air.ground_albedo[c] = .5;
-    nebel_environment_map *const map = make_sky(&w);
+    nebel_environment_map *const map = planet_even_sky(&w.scene);
     w.scene.mesh_count = 1;
     w.scene.meshes = &wall;
     const nebel_camera camera = planet_camera(100, 0);

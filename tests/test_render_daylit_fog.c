@@ -281,19 +281,6 @@ static steps step_along(const world *w, const nb_daylight *daylight, const nebel
     return sum;
 }
 
-/* A sky that is everywhere as bright, of a planet's own kind. */
-static nebel_environment_map *make_sky(world *w)
-{
-    static float pixels[4 * 2 * 3];
-    nebel_environment_map *map;
-    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
-    assert_int_equal(
-        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &map),
-        NEBEL_OK);
-    w->scene.environment = (nebel_environment){.type = NEBEL_ENVIRONMENT_MAP, .map = map, .intensity = 1};
-    return map;
-}
-
 static nebel_volume_desc mist_of(const world *w)
 {
     return (nebel_volume_desc){.shape = {.type = NEBEL_SHAPE_WORLD},
@@ -316,7 +303,7 @@ static void mist_is_lit_by_place(void **state)
         world w;
         make_world(views[v].sun, &w);
         nb_daylight_set(&daylight, &w.planet, &w.planet, w.sun.direction);
-        nebel_environment_map *map = make_sky(&w);
+        nebel_environment_map *map = planet_even_sky(&w.scene);
         const double none[3] = {0, 0, 0}, origin[3] = {0, 0, 0};
         const nebel_environment dark = {.type = NEBEL_ENVIRONMENT_CONSTANT};
         const nebel_air_light home = light_at(&w, origin);
@@ -356,7 +343,7 @@ static void every_thread_and_processor_gives_the_same(void **state)
     const double to_sun[3] = {.995, .1, 0}, irradiance[3] = {2, 2, 2};
     world w;
     make_world(to_sun, &w);
-    nebel_environment_map *map = make_sky(&w);
+    nebel_environment_map *map = planet_even_sky(&w.scene);
     const nebel_volume_desc mist = mist_of(&w);
     nebel_snapshot *fog = make_fog(&w, &mist, irradiance, &w.scene.environment);
     const nebel_camera camera = planet_camera(1e5, -.2);

@@ -39,7 +39,6 @@ static void make_air(world *w)
 /* Air so thin that it hardly counts, and a sky of its own. */
 static void make_world(const nebel_cloud_layer *layer, const double sun[3], world *w)
 {
-    static float pixels[4 * 2 * 3];
     *w = (world){.planet = {.air = *nebel_find_atmosphere("earth"),
                             .sun_left = {1, 1, 1},
                             .cloud_layer_count = 1,
@@ -49,15 +48,11 @@ static void make_world(const nebel_cloud_layer *layer, const double sun[3], worl
             w->planet.air.airs[k].scattering[c] *= 1e-4;
             w->planet.air.airs[k].absorption[c] *= 1e-4;
         }
-    for (int i = 0; i < 4 * 2 * 3; i++) pixels[i] = (float)(.1 + .05 * (i % 3));
-    assert_int_equal(
-        nebel_create_environment_map(&(nebel_environment_map_desc){.width = 4, .height = 2, .pixels = pixels}, &w->map),
-        NEBEL_OK);
     w->scene = (nebel_scene_data){.has_sun = 1,
                                   .sun_irradiance = {irradiance[0], irradiance[1], irradiance[2]},
-                                  .environment = {.type = NEBEL_ENVIRONMENT_MAP, .map = w->map, .intensity = 1},
                                   .planet_count = 1,
                                   .planets = &w->planet};
+    w->map = planet_even_sky(&w->scene);
     memcpy(w->scene.sun_direction, sun, sizeof w->scene.sun_direction);
     assert_true(nb_vector_make_unit(w->scene.sun_direction));
     make_air(w);
