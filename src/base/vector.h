@@ -34,6 +34,15 @@ static inline int nb_vector_make_unit(double v[3])
     return 1;
 }
 
+/* A direction of length 1 at right angles to another. */
+static inline void nb_vector_find_aside(const double v[3], double aside[3])
+{
+    const int is_by_x = fabs(v[0]) < fabs(v[1]);
+    const double axis[3] = {is_by_x, !is_by_x, 0};
+    nb_vector_cross(v, axis, aside);
+    (void)nb_vector_make_unit(aside);
+}
+
 /* The middle of a ball, of its highest place. */
 static inline void nb_vector_ball_middle(const double highest[3], double radius, double middle[3])
 {

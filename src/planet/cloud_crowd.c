@@ -104,9 +104,7 @@ static void direct(const nb_crowd_place *place, double cosine, double turn, doub
     double up[3], east[3], north[3];
     const double radius = nb_vector_length(place->from), sine = sqrt(1 - cosine * cosine);
     for (int c = 0; c < 3; c++) up[c] = place->from[c] / radius;
-    const double axis[3] = {fabs(up[0]) < fabs(up[1]), !(fabs(up[0]) < fabs(up[1])), 0};
-    nb_vector_cross(up, axis, east);
-    nb_vector_make_unit(east);
+    nb_vector_find_aside(up, east);
     nb_vector_cross(up, east, north);
     for (int c = 0; c < 3; c++) direction[c] = cosine * up[c] + sine * (cos(turn) * east[c] + sin(turn) * north[c]);
 }

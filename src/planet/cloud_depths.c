@@ -194,10 +194,8 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
                 first = nb_smaller(fine, 0.1f / layer->per_thickness);
     const float cosine = (float)layer->mean_cosine;
     const int count = width > 2 * fine ? MOST_COLUMNS : width > fine ? 2 : 1;
-    const double axis[3] = {fabs(place[0]) < fabs(place[1]), !(fabs(place[0]) < fabs(place[1])), 0};
     double across[2][3];
-    nb_vector_cross(place, axis, across[0]);
-    nb_vector_make_unit(across[0]);
+    nb_vector_find_aside(place, across[0]);
     nb_vector_cross(place, across[0], across[1]);
     nb_vector_make_unit(across[1]);
     const int is_alone = width > MOST_COLUMNS * layer->size;
