@@ -288,7 +288,7 @@ static int passes_rim(const nb_world *world, const double position[3], double pi
 
 int nb_air_sees_rim(const nb_air *air, const nb_rays *rays)
 {
-    for (int k = 0; k < air->count && air->count > 1; k++)
+    for (int k = 0; k < air->count; k++)
         if (passes_rim(&air->worlds[k], air->position, air->pixel, rays)) return 1;
     return 0;
 }

@@ -117,7 +117,7 @@ void nb_air_dim_sun(const float *sunlight, const nb_hits *hits, const nb_air_scr
 /* Whether any of the rays sees the disc of the sun, or is within two pixels of it. The middle's pixels are the widest. */
 int nb_air_sees_sun(const nb_air *air, const nb_lighting *lighting, const nb_rays *rays);
 
-/* Whether any of the rays passes within two pixels of the edge of a planet, where there are several. */
+/* Whether any of the rays passes within two pixels of the edge of a planet. */
 int nb_air_sees_rim(const nb_air *air, const nb_rays *rays);
 
 /* Radiance behind all air and fog in one direction: the scene's background, and the sun. */
