@@ -382,6 +382,56 @@ static void air_and_fog_share_a_ray(void **state)
     nebel_destroy_atmosphere(w.atmosphere);
 }
 
+/* A ball that glows at night. */
+static nebel_snapshot *glowing_ball(void)
+{
+    nebel_fog *fog;
+    nebel_snapshot *snapshot;
+    const nebel_volume_desc ball = {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {0, 3, -30}, .radius = 12},
+                                    .density = {.type = NEBEL_DENSITY_GAUSSIAN, .center = {0, 3, -30}, .sigma = 5},
+                                    .extinction = {.02, .02, .02},
+                                    .source = {.05, .05, .05}};
+    assert_int_equal(nebel_create_fog(&(nebel_fog_desc){.max_opacity = 0}, &fog), NEBEL_OK);
+    assert_int_equal(nebel_add_volume(fog, &ball, NULL), NEBEL_OK);
+    assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
+    nebel_destroy_fog(fog);
+    return snapshot;
+}
+
+/* Fog and air along a ray are composed to a tolerance; in the dark it is so much less that no ring shows where one more piece is
+ * taken. */
+static void fog_in_the_dark_is_as_exact(void **state)
+{
+    (void)state;
+    static const double night[3] = {.29, -.19, -.94};
+    const nebel_camera camera = planet_camera(3, -.1);
+    nebel_snapshot *snapshot = glowing_ball();
+    nebel_renderer *renderer;
+    test_picture exact = test_picture_make(WIDTH, HEIGHT);
+    world w;
+    make_world("earth", night, &w);
+    test_picture usual = render(&w, snapshot, &camera, NEBEL_ISA_DEFAULT, 2, 1);
+    assert_int_equal(nebel_create_renderer(&w.scene, snapshot, &(nebel_renderer_desc){.threads = 2}, &renderer),
+                     NEBEL_OK);
+    const nebel_frame_desc fine = {.camera = camera, .width = WIDTH, .height = HEIGHT, .samples = 1, .tolerance = 1e-6};
+    assert_int_equal(nebel_render_frame(renderer, &fine, &exact.planes), NEBEL_OK);
+    nebel_destroy_renderer(renderer);
+    double worst = 0;
+    int lit = 0;
+    for (uint32_t i = 0; i < 3 * WIDTH * HEIGHT; i++) {
+        const double light = (double)exact.planes.in_scattering[i];
+        lit += light > 1e-3;
+        worst = fmax(worst, fabs((double)usual.planes.in_scattering[i] - light) / fmax(light, 1. / 32));
+    }
+    print_message("a glow at night: %d of %d are lit, off by %.1e of their light or a 32nd\n", lit, 3 * WIDTH * HEIGHT,
+                  worst);
+    assert_true(lit > 300 && worst <= 4e-3);
+    test_picture_free(&usual);
+    test_picture_free(&exact);
+    nebel_release_snapshot(snapshot);
+    nebel_destroy_atmosphere(w.atmosphere);
+}
+
 /* A ball of black fog 5 m over the ground, in the sun and beside a lamp. */
 static nebel_snapshot *black_ball(const double shift[3])
 {
@@ -668,6 +718,7 @@ int main(void)
         cmocka_unit_test(shadows_of_fog_are_the_same_everywhere),
         cmocka_unit_test(many_samples_are_the_mean_of_single_ones),
         cmocka_unit_test(the_horizon_has_no_steps),
+        cmocka_unit_test(fog_in_the_dark_is_as_exact),
         cmocka_unit_test(the_sun_is_a_disc),
         cmocka_unit_test(every_thread_and_processor_gives_the_same),
         cmocka_unit_test(odd_cameras),

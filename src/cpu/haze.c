@@ -85,27 +85,58 @@ static float fog_doubt(const nb_knot *a, const nb_knot *b, int c)
            0.5f * fabsf((b->sky[c] - a->sky[c]) * (b->fog_sky[c] - a->fog_sky[c])) + shade_doubt(a, b, c);
 }
 
+/* Light of 1 may be off by the tolerance, brighter light by as much more, and light darker than DARK by less, though no less than
+ * LEAST_PART: eyes and screens tell dark shades apart that are nearer to each other. */
+#define DARK 0.25f
+#define LEAST_PART 0.03125f
+
+/* The light of a lane by what is known. */
+static void sum_light(const nb_air *air, const nb_air_scratch *scratch, int lane, float light[3])
+{
+    nb_knot before = start_of(air);
+    for (int c = 0; c < 3; c++) light[c] = 0;
+    for (int i = 0; i < scratch->count[lane]; i++) {
+        const nb_knot here = knot_of(air, scratch, lane, i);
+        for (int c = 0; c < 3; c++)
+            light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
+                        0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
+        before = here;
+    }
+}
+
+/* What may be off of each colour of a lane, in tolerances. */
+static void find_scales(const nb_air *air, const nb_air_scratch *scratch, int lane, float scales[3])
+{
+    float light[3];
+    sum_light(air, scratch, lane, light);
+    for (int c = 0; c < 3; c++) scales[c] = fmaxf(light[c], fmaxf(LEAST_PART, fminf(1, light[c] / DARK)));
+}
+
 /* What is in doubt of the light between two knots. */
-static float doubt(const nb_knot *a, const nb_knot *b)
+static float color_doubt(const nb_knot *a, const nb_knot *b, int c)
+{
+    return 0.5f * fabsf((a->fog_left[c] - b->fog_left[c]) * (b->air_light[c] - a->air_light[c])) +
+           0.5f * fabsf((a->air_left[c] - b->air_left[c]) * fog_between(a, b, c)) +
+           0.5f * (a->air_left[c] + b->air_left[c]) * fog_doubt(a, b, c);
+}
+
+static float doubt(const nb_knot *a, const nb_knot *b, const float scales[3])
 {
     float most = 0;
-    for (int c = 0; c < 3; c++)
-        most = fmaxf(most, 0.5f * fabsf((a->fog_left[c] - b->fog_left[c]) * (b->air_light[c] - a->air_light[c])) +
-                               0.5f * fabsf((a->air_left[c] - b->air_left[c]) * fog_between(a, b, c)) +
-                               0.5f * (a->air_left[c] + b->air_left[c]) * fog_doubt(a, b, c));
+    for (int c = 0; c < 3; c++) most = fmaxf(most, color_doubt(a, b, c) / scales[c]);
     return most;
 }
 
-/* The piece of a lane that is in doubt most, and all doubts. */
-static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane, float *all)
+/* The piece of a lane that is in doubt most, and all doubts, in those scales. */
+static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane, const float scales[3], float *all)
 {
     int worst = 0;
     float most = -1;
-    nb_knot before = knot_of(air, scratch, lane, -1);
+    nb_knot before = start_of(air);
     *all = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
         const nb_knot here = knot_of(air, scratch, lane, i);
-        const float is = doubt(&before, &here);
+        const float is = doubt(&before, &here, scales);
         *all += is;
         if (is > most) {
             most = is;
@@ -117,31 +148,29 @@ static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane
 }
 
 /* Whether most of the doubt is about where in the shade of clouds fog is. */
-static int is_by_shade(const nb_knot *a, const nb_knot *b)
+static int is_by_shade(const nb_knot *a, const nb_knot *b, const float scales[3])
 {
     float most = 0;
-    for (int c = 0; c < 3; c++) most = fmaxf(most, 0.5f * (a->air_left[c] + b->air_left[c]) * shade_doubt(a, b, c));
-    return most > 0.5f * doubt(a, b);
+    for (int c = 0; c < 3; c++)
+        most = fmaxf(most, 0.5f * (a->air_left[c] + b->air_left[c]) * shade_doubt(a, b, c) / scales[c]);
+    return most > 0.5f * doubt(a, b, scales);
 }
 
 /* Fog is mostly near and air far: what begins at the eye is cut where air begins to count, other long pieces nearer to
  * their start. */
 static float cut(const nb_frame *frame, const nb_scratch *scratch, int lane, const nb_knot *a, const nb_knot *b,
-                 float tolerance)
+                 const float scales[3])
 {
     const nb_rays *const rays = &scratch->rays;
-    if (is_by_shade(a, b)) return nb_fog_shade_cut(&scratch->air.fog_shade[lane], a->at, b->at);
+    if (is_by_shade(a, b, scales)) return nb_fog_shade_cut(&scratch->air.fog_shade[lane], a->at, b->at);
     if (a->at == 0 && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even) {
         const float enters = nb_daylit_fog_enters(&frame->air, rays, lane);
         if (enters > 0 && enters < b->at) return enters;
     }
     if (a->at > 0) return b->at > 8 * a->at ? 4 * a->at : 0.5f * (a->at + b->at);
-    float light = 0, gone = 0;
-    for (int c = 0; c < 3; c++) {
-        light = fmaxf(light, b->air_light[c]);
-        gone = fmaxf(gone, 1 - b->air_left[c]);
-    }
-    return b->at * fminf(0.5f, fmaxf(1e-6f, tolerance / fmaxf(light, gone)));
+    float counts = 0;
+    for (int c = 0; c < 3; c++) counts = fmaxf(counts, fmaxf(b->air_light[c], 1 - b->air_left[c]) / scales[c]);
+    return b->at * fminf(0.5f, fmaxf(1e-6f, frame->air.tolerance / counts));
 }
 
 /* Of the piece up to a knot. */
@@ -244,14 +273,6 @@ static nebel_result trace_knot(const nb_frame *frame, const nebel_ray_planes *fo
     return result;
 }
 
-/* Of light, which is as uncertain as it is bright where that is more than 1. */
-static float tolerance_of(const nb_frame *frame, const nb_air_scratch *air, int lane)
-{
-    float brightest = 1;
-    for (int c = 0; c < 3; c++) brightest = fmaxf(brightest, air->knots[0].air_light[c][lane]);
-    return frame->air.tolerance * brightest;
-}
-
 /* The first knot of daylit fog, which light at both ends of a ray does not tell of; 0: none, or it is there already. */
 static float first_cut(const nb_frame *frame, const nb_scratch *scratch, int lane)
 {
@@ -271,7 +292,7 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
     int any = 0;
     is_first = is_first && nb_daylit_fog_is(&frame->air) && !frame->air.is_fog_even;
     for (int i = 0; i < NB_BATCH; i++) {
-        float all, first;
+        float all, first, scales[3];
         air->fresh.at[i] = 0;
         if (!scratch->inside[i] || air->known[i] == NB_AIR_KNOTS) continue;
         if (is_first && (first = first_cut(frame, scratch, i)) > 0) {
@@ -279,11 +300,11 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
             any = 1;
             continue;
         }
-        const int worst = find_worst(&frame->air, air, i, &all);
-        const float tolerance = tolerance_of(frame, air, i);
-        if (all <= tolerance) continue;
+        find_scales(&frame->air, air, i, scales);
+        const int worst = find_worst(&frame->air, air, i, scales, &all);
+        if (all <= frame->air.tolerance) continue;
         const nb_knot a = knot_of(&frame->air, air, i, worst - 1), b = knot_of(&frame->air, air, i, worst);
-        const float place = cut(frame, scratch, i, &a, &b, tolerance);
+        const float place = cut(frame, scratch, i, &a, &b, scales);
         if (!(place > a.at && place < b.at)) continue;
         cut_at(&frame->air, air, i, worst, place);
         any = 1;
@@ -304,19 +325,18 @@ static void take_air(nb_scratch *scratch)
 
 static void sum_up(const nb_air *of, nb_scratch *scratch, int lane)
 {
+    static const float plain[3] = {1, 1, 1};
     const nb_air_scratch *air = &scratch->air;
     nb_light_samples *samples = &scratch->samples;
-    nb_knot before = knot_of(of, air, lane, -1);
-    float light[3] = {0, 0, 0}, all = 0;
-    (void)find_worst(of, air, lane, &all);
+    nb_knot before = start_of(of);
+    float light[3], all = 0;
+    (void)find_worst(of, air, lane, plain, &all);
     for (int i = 0; i < air->count[lane]; i++) {
         const nb_knot here = knot_of(of, air, lane, i);
-        for (int c = 0; c < 3; c++)
-            light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
-                        0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
         all += within(&before, &here);
         before = here;
     }
+    sum_light(of, air, lane, light);
     for (int c = 0; c < 3; c++) {
         samples->transmittance[c][lane] *= air->knots[0].air_left[c][lane];
         samples->in_scattering[c][lane] = fmaxf(light[c], 0);
