@@ -34,7 +34,19 @@ static nebel_atmosphere *make(const char *name)
     return atmosphere;
 }
 
-/* From a height over the ground, half of the rays near the horizon or, from space, at the rim of the planet. */
+/* A part of the way through the air, of a ray that meets it, and somewhat beyond. */
+static double end_within(const nebel_atmosphere_desc *desc, double height, double up, double part)
+{
+    const double r = desc->radius + height, top = desc->radius + desc->thickness, b = -r * up;
+    const double in_air = b * b - (r * r - top * top), in_ground = b * b - (r * r - desc->radius * desc->radius);
+    if (!(in_air > 0)) return 1;
+    const double end = in_ground > 0 && b > 0 ? b - sqrt(in_ground) : b + sqrt(in_air);
+    const double start = height > desc->thickness ? b - sqrt(in_air) : 0;
+    return start + (end - start) * 1.1 * part;
+}
+
+/* From a height over the ground, half of the rays near the horizon or, from space, at the rim of the planet; half of them end
+ * somewhere within the air, others anywhere. */
 static void aim(bundle *rays, const nebel_atmosphere_desc *desc, double height, uint32_t *state)
 {
     const double r = desc->radius + height, horizon = -sqrt(1 - pow(desc->radius / r, 2));
@@ -51,7 +63,9 @@ static void aim(bundle *rays, const nebel_atmosphere_desc *desc, double height, 
         rays->direction[0][i] = 3 * level * cos(turn);
         rays->direction[1][i] = 3 * up;
         rays->direction[2][i] = 3 * level * sin(turn);
-        rays->t_max[i] = (float)(desc->thickness * pow(10, 6 * draw(state) - 5));
+        const double part = draw(state);
+        rays->t_max[i] =
+            (float)(i % 4 < 2 ? desc->thickness * pow(10, 6 * part - 5) : end_within(desc, height, up, part));
     }
 }
 
@@ -184,29 +198,66 @@ static void deep_air_has_no_stairs(void **state)
     nebel_destroy_atmosphere(air);
 }
 
-static void rays_may_end_within_the_air(void **state)
+static void look_along_ends(const nebel_atmosphere_desc *desc, const double heights[], int height_count, tally *all)
 {
-    (void)state;
-    static const double heights[] = {2, 1e4};
-    nebel_atmosphere *air = make("earth");
+    nebel_atmosphere *air;
     uint32_t seed = 2;
-    tally all = {.count = 0};
-    for (int h = 0; h < 2; h++)
+    assert_int_equal(nebel_create_atmosphere(desc, &air), NEBEL_OK);
+    for (int h = 0; h < height_count; h++)
         for (int s = 0; s < 3; s++) {
-            const nebel_air_view_desc desc = {.atmosphere = air,
+            const nebel_air_view_desc from = {.atmosphere = air,
                                               .sun = {{0.3, 0.02 + 0.2 * s, 1}, {1, 1, 1}},
                                               .position = {0, heights[h], 0},
                                               .has_distances = 1};
             nebel_air_view *view;
             bundle rays;
-            assert_int_equal(nebel_create_air_view(&desc, &view), NEBEL_OK);
-            aim(&rays, nebel_find_atmosphere("earth"), heights[h], &seed);
-            trace_both(&rays, &desc, view);
-            count(&rays, &all);
+            assert_int_equal(nebel_create_air_view(&from, &view), NEBEL_OK);
+            aim(&rays, desc, heights[h], &seed);
+            trace_both(&rays, &from, view);
+            count(&rays, all);
             nebel_destroy_air_view(view);
         }
-    check("ends within the air", &all, 1.5e-2, 5e-2);
     nebel_destroy_atmosphere(air);
+}
+
+static void rays_may_end_within_the_air(void **state)
+{
+    (void)state;
+    static const double low[] = {2, 1e4}, high[] = {3e4, 9e4}, above[] = {4e5, 2e7};
+    const nebel_atmosphere_desc *earth = nebel_find_atmosphere("earth");
+    tally from_low = {.count = 0}, from_high = {.count = 0}, from_above = {.count = 0};
+    look_along_ends(earth, low, 2, &from_low);
+    look_along_ends(earth, high, 2, &from_high);
+    look_along_ends(earth, above, 2, &from_above);
+    check("ends within the air, from 2 m and 10 km", &from_low, 1.5e-2, 5e-2);
+    check("ends within the air, from 30 and 90 km", &from_high, 6e-3, 4e-2);
+    check("ends within the air, from 400 and 20,000 km", &from_above, 4e-3, 4e-2);
+    assert_true(from_high.worst_clear <= 4e-2 && from_above.worst_clear <= 4e-2);
+}
+
+/* Rows and levels are wider than this air: it is off, and says so. */
+static void thin_air_from_space_is_told(void **state)
+{
+    (void)state;
+    static const double height[] = {1e6};
+    const nebel_atmosphere_desc layer = {.radius = 6.36e6,
+                                         .thickness = 1e5,
+                                         .airs = {{.scattering = {2e-5, 4e-5, 8e-5},
+                                                   .phase.type = NEBEL_PHASE_RAYLEIGH,
+                                                   .profile = NEBEL_AIR_LAYER,
+                                                   .middle = 2.5e4,
+                                                   .width = 3e3}},
+                                         .air_count = 1},
+                                thin = {.radius = 6.36e6,
+                                        .thickness = 100,
+                                        .airs = {{.scattering = {1e-3, 2e-3, 4e-3}, .scale_height = 10}},
+                                        .air_count = 1};
+    tally of_layer = {.count = 0}, of_thin = {.count = 0};
+    look_along_ends(&layer, height, 1, &of_layer);
+    look_along_ends(&thin, height, 1, &of_thin);
+    check("a layer of 6 km", &of_layer, 1, 1);
+    check("100 m of air", &of_thin, 1, 1);
+    assert_true(of_thin.worst_clear <= .1);
 }
 
 /* Under air that is thinner than float's digits of the way to it, rays that end at the ground pass all of it. */
@@ -503,11 +554,17 @@ static void all_instruction_sets_agree(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tables_are_as_far_off_as_they_say), cmocka_unit_test(deep_air_has_no_stairs),
-        cmocka_unit_test(rays_may_end_within_the_air),       cmocka_unit_test(thin_air_is_passed_up_to_the_ground),
-        cmocka_unit_test(ground_is_lit_as_places_are),       cmocka_unit_test(order_of_work_changes_nothing),
-        cmocka_unit_test(odd_places_have_answers),           cmocka_unit_test(bad_calls_are_refused),
-        cmocka_unit_test(ends_that_are_none_count_as_zero),  cmocka_unit_test(all_instruction_sets_agree),
+        cmocka_unit_test(tables_are_as_far_off_as_they_say),
+        cmocka_unit_test(deep_air_has_no_stairs),
+        cmocka_unit_test(rays_may_end_within_the_air),
+        cmocka_unit_test(thin_air_from_space_is_told),
+        cmocka_unit_test(thin_air_is_passed_up_to_the_ground),
+        cmocka_unit_test(ground_is_lit_as_places_are),
+        cmocka_unit_test(order_of_work_changes_nothing),
+        cmocka_unit_test(odd_places_have_answers),
+        cmocka_unit_test(bad_calls_are_refused),
+        cmocka_unit_test(ends_that_are_none_count_as_zero),
+        cmocka_unit_test(all_instruction_sets_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

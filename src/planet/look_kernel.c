@@ -130,7 +130,9 @@ static inline nb_reach reach_of(const nb_outlook *outlook, const nb_bearings *b)
     return (nb_reach){.falls = down,
                       .begin = nb_select(down, falling.begin, rising.begin),
                       .span = nb_select(down, falling.span, rising.span),
-                      .row = nb_select(down, falling.row, rising.row)};
+                      .row = nb_select(down, falling.row, rising.row),
+                      .dense = nb_select(down, falling.dense, rising.dense),
+                      .soft = nb_select(down, falling.soft, rising.soft)};
 }
 
 /* ---- places in the table --------------------------------------------------------------------- */
@@ -170,15 +172,18 @@ static inline nb_looks looks_along(const nb_look_job *job, nb_part part)
     const nb_real half =
         nb_select(b.level > NB_F(0.0), nb_sqrt(nb_max(NB_F(0.0), NB_F(0.5) * (NB_F(1.0) - cosine))), NB_F(0.0));
     const nb_mask ends = l.along < reach.span;
-    const nb_real share = nb_select(ends, nb_sqrt(l.along / nb_select(ends, reach.span, NB_F(1.0))), NB_F(1.0));
+    const nb_real share = l.along / nb_select(ends, reach.span, NB_F(1.0));
+    const nb_real level = nb_select(ends, nb_level_at(reach.dense, reach.soft, share), NB_F(1.0));
     const nb_real rows = nb_select(reach.falls, nb_splat(table->falling), nb_splat(table->rising));
     l.row = place_in(reach.row * (rows - NB_F(1.0)), rows - NB_F(2.0), &l.row_part) +
             nb_select(reach.falls, NB_F(0.0), nb_splat(table->falling));
     l.column =
         place_in(nb_min(NB_F(1.0), half) * nb_splat(table->columns - 1), nb_splat(table->columns - 2), &l.column_part);
-    l.level = place_in(share * nb_splat(table->levels), nb_splat(table->levels - 1), &l.level_part);
+    l.level = place_in(level * nb_splat(table->levels), nb_splat(table->levels - 1), &l.level_part);
+    if (table->levels == 1) return l;
     /* Near the eye means are linear. */
-    if (table->levels > 1) l.level_part = nb_select(l.level > NB_F(0.0), l.level_part, l.level_part * l.level_part);
+    const nb_real first = nb_level_end(reach.dense, reach.soft, nb_splat(1.0 / table->levels));
+    l.level_part = nb_select(l.level > NB_F(0.0), l.level_part, nb_min(NB_F(1.0), share / first));
     return l;
 }
 

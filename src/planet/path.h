@@ -6,7 +6,7 @@
 #include "rule.h"
 
 enum {
-    NB_PATH_CUTS = 20,
+    NB_PATH_CUTS = 22,
     NB_PATH_HALVINGS = 24,
     NB_PATH_LANES = 8,
     NB_PATH_MOST = (2 * NB_MOST_SHELLS + 2 + NB_PATH_CUTS + NB_PATH_HALVINGS) * NB_RULE_MOST + NB_PATH_LANES,

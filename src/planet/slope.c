@@ -16,10 +16,11 @@ nb_outlook nb_outlook_make(const nb_airs *airs, double radius)
                         .half_arc = sqrt(0.5 * share)};
 }
 
-/* To the place at `arc` from below. */
 static nb_slope fall_slope(const nb_outlook *outlook, double row)
 {
-    const double half = row * outlook->half_arc;
+    const int outside = outlook->height > outlook->thickness;
+    const double left = 1 - row, lacks = outside ? left * left / (left + NB_FALLING_CROWD * row) : left;
+    const double half = (1 - lacks) * outlook->half_arc;
     const double across = outlook->ground * 2 * half * sqrt((1 - half) * (1 + half));
     const double down = outlook->height + 2 * outlook->ground * half * half;
     const double way = sqrt(across * across + down * down);

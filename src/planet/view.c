@@ -12,10 +12,13 @@
 
 enum { NODES = 4 }; /* of a piece of a ray: pieces are many */
 
-/* Estimates of errors from second differences are this often taken. */
+/* Estimates of errors from second differences are this often taken, */
 #define SAFETY 3
+/* and what is missed amid entries. */
+#define SAFETY_AMID 2
 
-static nb_slope row_slope(const nebel_air_view *view, int row, nb_reach *reach)
+/* Rows may be asked for between those of the table. */
+static nb_slope row_slope(const nebel_air_view *view, double row, nb_reach *reach)
 {
     if (row < NB_VIEW_FALLING) return nb_outlook_slope(&view->outlook, 1, row / (NB_VIEW_FALLING - 1.0), reach);
     return nb_outlook_slope(&view->outlook, 0, (row - NB_VIEW_FALLING) / (NB_VIEW_RISING - 1.0), reach);
@@ -24,7 +27,7 @@ static nb_slope row_slope(const nebel_air_view *view, int row, nb_reach *reach)
 /* ---- making ---------------------------------------------------------------------------------- */
 
 /* Columns lie evenly over the sine of half the turn, in which light is smooth at both ends. */
-static double column_cosine(const nebel_air_view *view, int column)
+static double column_cosine(const nebel_air_view *view, double column)
 {
     const double half = column / (view->columns - 1.0);
     return 1 - 2 * half * half;
@@ -50,11 +53,11 @@ typedef struct nb_row {
     nb_slope slope;
     nb_reach reach;
     nb_track track;
-    double ends[NB_VIEW_LEVELS];
+    double ends[NB_VIEW_MORE_LEVELS];
     nb_path path;
 } nb_row;
 
-static nb_aspect column_aspect(const nebel_air_view *view, const nb_row *row, int column)
+static nb_aspect column_aspect(const nebel_air_view *view, const nb_row *row, double column)
 {
     const nb_slope slope = row->slope, to_sun = view->sun_slope;
     const double sun = slope.cosine * to_sun.cosine + slope.sine * to_sun.sine * column_cosine(view, column);
@@ -78,7 +81,7 @@ static nb_gathered gather_column(const nebel_air_view *view, const nb_row *row, 
 
 static void fill_column(nebel_air_view *view, int number, const nb_row *row, int column)
 {
-    nb_gathered gathered[NB_VIEW_LEVELS];
+    nb_gathered gathered[NB_VIEW_MORE_LEVELS];
     const nb_gathered start = gather_column(view, row, column_aspect(view, row, column), gathered);
     write_entry(view, &start, 1, nb_view_entry(view, number, column, 0));
     for (int level = 0; level < view->levels; level++)
@@ -86,7 +89,7 @@ static void fill_column(nebel_air_view *view, int number, const nb_row *row, int
                     row->reach.span > 0 ? 1 / row->ends[level] : 1, nb_view_entry(view, number, column, level + 1));
 }
 
-static void fill_extinction(nebel_air_view *view, int row, nb_track track, double length)
+static void fill_extinction(nebel_air_view *view, int row, nb_track track, const double ends[])
 {
     const nb_airs *airs = &view->atmosphere->airs;
     for (int c = 0; c < 3; c++) nb_view_extinction(view, row, 0)[c] = 0;
@@ -95,7 +98,7 @@ static void fill_extinction(nebel_air_view *view, int row, nb_track track, doubl
             nb_view_extinction(view, row, 0)[c] +=
                 airs->airs[k].extinction[c] * nb_air_density(&airs->airs[k], track.radius - airs->radius);
     for (int level = 1; level <= view->levels; level++) {
-        const double share = (double)level / view->levels, way = length * share * share;
+        const double way = ends[level - 1];
         double *extinction = nb_view_extinction(view, row, level);
         for (int c = 0; c < 3; c++) extinction[c] = nb_view_extinction(view, row, 0)[c];
         if (!(way > 0)) continue;
@@ -104,16 +107,18 @@ static void fill_extinction(nebel_air_view *view, int row, nb_track track, doubl
     }
 }
 
-static void set_row(const nebel_air_view *view, int number, nb_row *row)
+/* before: how far before the levels of the table its ends are, 0 or 1/2 of a step. */
+static void set_row(const nebel_air_view *view, double number, double before, nb_row *row)
 {
     const nb_airs *airs = &view->atmosphere->airs;
     row->slope = row_slope(view, number, &row->reach);
     row->track = (nb_track){row->reach.begin > 0 ? airs->top : view->outlook.radius,
                             view->outlook.radius * row->slope.cosine + row->reach.begin};
-    for (int level = 0; level < view->levels; level++) {
-        const double share = (level + 1.0) / view->levels;
-        row->ends[level] = row->reach.span * share * share;
-    }
+    for (int level = 0; level < view->levels; level++)
+        row->ends[level] =
+            row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, (level + 1 - before) / view->levels);
+    if (before > 0)
+        row->ends[0] = 0.5 * row->reach.span * nb_level_end(row->reach.dense, row->reach.soft, 1.0 / view->levels);
     nb_path_lay(airs, &view->rule, row->track, row->reach.span, view->levels, row->ends, &row->path);
 }
 
@@ -121,8 +126,8 @@ static void fill_row(void *data, size_t number)
 {
     nebel_air_view *view = data;
     nb_row row;
-    set_row(view, (int)number, &row);
-    fill_extinction(view, (int)number, row.track, row.reach.span);
+    set_row(view, (double)number, 0, &row);
+    fill_extinction(view, (int)number, row.track, row.ends);
     for (int column = 0; column < view->columns; column++) fill_column(view, (int)number, &row, column);
 }
 
@@ -135,58 +140,158 @@ static double brightness(const nebel_air_view *view, const float *entry, int c)
     return view->sun.irradiance[c] * sum;
 }
 
-/* The second difference of three entries, of which the first and last may be missing. */
-static double bend(const nebel_air_view *view, const float *before, const float *entry, const float *behind, int c)
+/* What interpolation misses amid entries: between two rows and two levels, of extinction, and of light as a part of the
+ * brightest entry around. */
+typedef struct nb_missed {
+    double extinction, light;
+} nb_missed;
+
+typedef struct nb_estimates {
+    nebel_air_view *view;
+    nb_missed missed[NB_VIEW_ROWS]
+                    [NB_VIEW_MORE_LEVELS]; /* behind the row, and before the level beside that at the start */
+} nb_estimates;
+
+/* The two levels between which an end of set_row with `before` is; whole rays have entries of their own. */
+static int first_level(const nebel_air_view *view, int cell)
+{
+    return view->levels > 1 ? cell : 1;
+}
+
+static double missed_extinction(nebel_air_view *view, int number, const nb_row *row, int cell)
+{
+    double depth[3] = {0, 0, 0}, most = 0;
+    nb_track_depth(&view->atmosphere->airs, row->track, row->ends[cell], depth);
+    for (int c = 0; c < 3; c++) {
+        double sum = 0;
+        for (int i = 0; i < 2; i++)
+            sum += nb_view_extinction(view, number + i, first_level(view, cell))[c] +
+                   nb_view_extinction(view, number + i, cell + 1)[c];
+        most = fmax(most, fabs(depth[c] / row->ends[cell] - sum / 4));
+    }
+    return most;
+}
+
+static double missed_light(const nebel_air_view *view, int number, int column, const nb_gathered *gathered, double end,
+                           int cell)
+{
+    float exact[NB_VIEW_SIZE];
+    double worst = 0, brightest = 0;
+    write_entry(view, gathered, 1 / end, exact);
+    for (int c = 0; c < 3; c++) {
+        double sum = 0;
+        for (int i = 0; i < 8; i++) {
+            const int level = i / 4 == 0 ? first_level(view, cell) : cell + 1;
+            const double light = brightness(view, nb_view_entry(view, number + i % 2, column + i / 2 % 2, level), c);
+            sum += light;
+            brightest = fmax(brightest, light);
+        }
+        worst = fmax(worst, fabs(brightness(view, exact, c) - sum / 8));
+    }
+    return brightest > 0 ? worst / brightest : 0;
+}
+
+/* Behind a row, in three of the columns. */
+static void measure_row(void *data, size_t row_number)
+{
+    nb_estimates *estimates = data;
+    nebel_air_view *view = estimates->view;
+    const int number = (int)row_number;
+    nb_row row;
+    nb_gathered gathered[NB_VIEW_MORE_LEVELS];
+    if (number == NB_VIEW_FALLING - 1 || number == NB_VIEW_ROWS - 1) return;
+    set_row(view, number + 0.5, view->levels > 1 ? 0.5 : 0, &row);
+    if (!(row.ends[0] > 0)) return;
+    for (int cell = 0; cell < view->levels; cell++)
+        estimates->missed[number][cell].extinction = missed_extinction(view, number, &row, cell);
+    for (int i = 0; i < 3; i++) {
+        const int column = i * (view->columns - 2) / 2;
+        gather_column(view, &row, column_aspect(view, &row, column + 0.5), gathered);
+        for (int cell = 0; cell < view->levels; cell++) {
+            double *light = &estimates->missed[number][cell].light;
+            *light = fmax(*light, missed_light(view, number, column, &gathered[cell], row.ends[cell], cell));
+        }
+    }
+}
+
+/* The most that is missed around an entry. */
+static nb_missed missed_around(const nb_estimates *estimates, int row, int level)
+{
+    nb_missed most = {0, 0};
+    for (int i = 0; i < 4; i++) {
+        const int before = row - i / 2, cell = level - i % 2;
+        if (before < 0 || cell < 0 || cell >= estimates->view->levels) continue;
+        const nb_missed *missed = &estimates->missed[before][cell];
+        most.extinction = fmax(most.extinction, missed->extinction);
+        most.light = fmax(most.light, missed->light);
+    }
+    return most;
+}
+
+/* The second difference of three entries, of which the first and last may be missing; `most` becomes at least as bright as each. */
+static double bend(const nebel_air_view *view, const float *before, const float *entry, const float *behind, int c,
+                   double *most)
 {
     if (before == NULL || behind == NULL) return 0;
-    return fabs(brightness(view, before, c) - 2 * brightness(view, entry, c) + brightness(view, behind, c));
+    const double first = brightness(view, before, c), last = brightness(view, behind, c);
+    *most = fmax(*most, fmax(first, last));
+    return fabs(first - 2 * brightness(view, entry, c) + last);
 }
 
 /* Linear interpolation between values a step apart misses an eighth of the second difference. */
-static void estimate_extinction(nebel_air_view *view, int row)
+static void estimate_extinction(nebel_air_view *view, int row, int level, double missed)
 {
     const int first = row == 0 || row == NB_VIEW_FALLING, last = row == NB_VIEW_FALLING - 1 || row == NB_VIEW_ROWS - 1;
-    for (int level = 0; level <= view->levels; level++) {
-        double worst = 0;
-        for (int c = 0; c < 3; c++) {
-            const double here = nb_view_extinction(view, row, level)[c];
-            double off = 0;
-            if (!first && !last)
-                off += fabs(nb_view_extinction(view, row - 1, level)[c] - 2 * here +
-                            nb_view_extinction(view, row + 1, level)[c]);
-            if (level > 0 && level < view->levels)
-                off += fabs(nb_view_extinction(view, row, level - 1)[c] - 2 * here +
-                            nb_view_extinction(view, row, level + 1)[c]);
-            worst = fmax(worst, off);
-        }
-        nb_view_extinction(view, row, level)[3] = SAFETY * worst / 8;
+    double worst = 0;
+    for (int c = 0; c < 3; c++) {
+        const double here = nb_view_extinction(view, row, level)[c];
+        double off = 0;
+        if (!first && !last)
+            off += fabs(nb_view_extinction(view, row - 1, level)[c] - 2 * here +
+                        nb_view_extinction(view, row + 1, level)[c]);
+        if (level > 0 && level < view->levels)
+            off += fabs(nb_view_extinction(view, row, level - 1)[c] - 2 * here +
+                        nb_view_extinction(view, row, level + 1)[c]);
+        worst = fmax(worst, off);
     }
+    nb_view_extinction(view, row, level)[3] = fmax(SAFETY * worst / 8, SAFETY_AMID * missed);
 }
 
 /* The same of light. */
 static void estimate_row(void *data, size_t number)
 {
-    nebel_air_view *view = data;
+    const nb_estimates *estimates = data;
+    nebel_air_view *view = estimates->view;
     const int row = (int)number;
     const int first = row == 0 || row == NB_VIEW_FALLING, last = row == NB_VIEW_FALLING - 1 || row == NB_VIEW_ROWS - 1;
-    estimate_extinction(view, row);
-    for (int column = 0; column < view->columns; column++)
-        for (int level = 0; level <= view->levels; level++) {
+    for (int level = 0; level <= view->levels; level++) {
+        const nb_missed missed = missed_around(estimates, row, level);
+        estimate_extinction(view, row, level, missed.extinction);
+        for (int column = 0; column < view->columns; column++) {
             float *entry = nb_view_entry(view, row, column, level);
             double most = 0, worst = 0;
             for (int c = 0; c < 3; c++) {
                 const double off =
                     bend(view, first ? NULL : nb_view_entry(view, row - 1, column, level), entry,
-                         last ? NULL : nb_view_entry(view, row + 1, column, level), c) +
+                         last ? NULL : nb_view_entry(view, row + 1, column, level), c, &most) +
                     bend(view, column == 0 ? NULL : nb_view_entry(view, row, column - 1, level), entry,
-                         column == view->columns - 1 ? NULL : nb_view_entry(view, row, column + 1, level), c) +
+                         column == view->columns - 1 ? NULL : nb_view_entry(view, row, column + 1, level), c, &most) +
                     bend(view, level == 0 ? NULL : entry - view->size, entry,
-                         level == view->levels ? NULL : entry + view->size, c);
+                         level == view->levels ? NULL : entry + view->size, c, &most);
                 worst = fmax(worst, off / 8);
                 most = fmax(most, brightness(view, entry, c));
             }
-            entry[nb_view_often(view) + 4] = (float)(most > 0 ? SAFETY * worst / most : 0);
+            const double part = most > 0 ? SAFETY * worst / most : 0;
+            entry[nb_view_often(view) + 4] = (float)fmax(part, SAFETY_AMID * missed.light);
         }
+    }
+}
+
+static void estimate(nebel_air_view *view, const nb_parts *parts)
+{
+    nb_estimates estimates = {.view = view};
+    nb_parts_run(parts, NB_VIEW_ROWS, measure_row, &estimates);
+    nb_parts_run(parts, NB_VIEW_ROWS, estimate_row, &estimates);
 }
 
 static void set_sunlight(nebel_air_view *view)
@@ -246,6 +351,12 @@ static int sees_day_and_night(const nebel_air_view *view)
     return outlook->height > outlook->thickness || outlook->thickness > 0.1 * view->atmosphere->airs.radius;
 }
 
+/* Rays may pass places where air is many times as dense as at the eye. */
+static int is_high(const nebel_air_view *view)
+{
+    return view->outlook.height > 0.2 * view->outlook.thickness;
+}
+
 static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
 {
     const nebel_atmosphere *atmosphere = desc->atmosphere;
@@ -254,7 +365,7 @@ static void set_up(nebel_air_view *view, const nebel_air_view_desc *desc)
     set_axes(view, place);
     view->outlook = nb_outlook_make(&atmosphere->airs, fmax(atmosphere->airs.radius, nb_vector_length(place)));
     view->columns = sees_day_and_night(view) ? NB_VIEW_MORE_COLUMNS : NB_VIEW_COLUMNS;
-    view->levels = desc->has_distances ? NB_VIEW_LEVELS : 1;
+    view->levels = !desc->has_distances ? 1 : is_high(view) ? NB_VIEW_MORE_LEVELS : NB_VIEW_LEVELS;
     view->rule = nb_rule_make(desc->has_distances ? NODES : NB_RULE_MOST);
     for (int k = 0; k < atmosphere->airs.count; k++) {
         const double *scattering = atmosphere->airs.airs[k].scattering;
@@ -291,7 +402,7 @@ nebel_result nebel_create_air_view(const nebel_air_view_desc *desc, nebel_air_vi
     const nb_parts parts = {desc->run, desc->run_user};
     if (!nb_airs_are_empty(&made->atmosphere->airs)) {
         nb_parts_run(&parts, NB_VIEW_ROWS, fill_row, made);
-        nb_parts_run(&parts, NB_VIEW_ROWS, estimate_row, made);
+        estimate(made, &parts);
         made->brightest = brightest_of(made);
     }
     set_sunlight(made);

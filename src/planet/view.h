@@ -7,12 +7,13 @@
 #include "slope.h"
 
 enum {
-    NB_VIEW_FALLING = 48, /* rows that end at the ground */
+    NB_VIEW_FALLING = 60, /* rows that end at the ground */
     NB_VIEW_RISING = 64,  /* and others */
     NB_VIEW_ROWS = NB_VIEW_FALLING + NB_VIEW_RISING,
     NB_VIEW_COLUMNS = 25,      /* from within shallow air */
     NB_VIEW_MORE_COLUMNS = 73, /* where day and night are seen at once */
-    NB_VIEW_LEVELS = 12,       /* beside the one at the start; at the squares of their number */
+    NB_VIEW_LEVELS = 12,       /* from low in the air, beside the one at the start */
+    NB_VIEW_MORE_LEVELS = 20,  /* from high up */
     NB_VIEW_SUNS = 257,
 };
 
@@ -24,7 +25,7 @@ struct nebel_air_view {
     double up[3], ahead[3], aside[3]; /* ahead: level, towards the sun */
     nb_slope sun_slope;
     int columns;
-    int levels; /* NB_VIEW_LEVELS, or 1: the ends alone */
+    int levels; /* NB_VIEW_LEVELS or NB_VIEW_MORE_LEVELS, or 1: the ends alone */
     int scatterers[NEBEL_MAX_AIRS], scatterer_count;
     int size;                /* of an entry, a multiple of four: see below */
     float *entries;          /* [row][column][level 0..levels] */

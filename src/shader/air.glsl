@@ -49,6 +49,7 @@ nb_vec3 nb_toward(nb_vec3 a, nb_vec3 b, float part) { return a + (b - a) * part;
 struct nb_air_ray {
     float begin; /* where it enters the air [m] */
     float span;  /* and how far it goes there */
+    float dense, soft; /* see nb_reach */
     int entry; /* of the first row and column that it lies between */
     int extinction;
     float row;       /* part of the way to the next row, of which entries are so many words on */
@@ -80,6 +81,8 @@ nb_air_ray nb_find_air(nb_vec3 direction)
     int levels = int(sizes.y) + 1;
     ray.begin = reach.begin;
     ray.span = reach.span;
+    ray.dense = reach.dense;
+    ray.soft = reach.soft;
     ray.entry = int(parts.x) + (at * int(sizes.x) + int(column.x)) * levels * (int(sizes.z) + 1);
     ray.extinction = int(parts.y) + at * levels;
     ray.row = row.y;
@@ -111,9 +114,11 @@ nebel_light nb_air_light(nb_air_ray ray, float t_max)
         int size = scatterers + 1;
         int across = (int(sizes.y) + 1) * size;
         int down = int(sizes.x) * across;
-        nb_vec2 place = nb_air_place((along < ray.span ? sqrt(along / ray.span) : 1.0) * sizes.y, sizes.y + 1.0);
+        float share = along / ray.span;
+        nb_vec2 place = nb_air_place((along < ray.span ? nb_level_at(ray.dense, ray.soft, share) : 1.0) * sizes.y, sizes.y + 1.0);
         float level = place.y;
-        if (place.x == 0.0 && sizes.y > 1.0) level = level * level; /* near the eye means are linear */
+        /* Near the eye means are linear. */
+        if (place.x == 0.0 && sizes.y > 1.0) level = min(1.0, share / nb_level_end(ray.dense, ray.soft, 1.0 / sizes.y));
         int row = ray.extinction + int(place.x);
         nb_vec3 near = nb_toward(NEBEL_AIR_WORD(row).xyz, NEBEL_AIR_WORD(row + int(sizes.y) + 1).xyz, ray.row);
         nb_vec3 far = nb_toward(NEBEL_AIR_WORD(row + 1).xyz, NEBEL_AIR_WORD(row + int(sizes.y) + 2).xyz, ray.row);

@@ -160,7 +160,7 @@
 #define NB_AIR_SKIES 9
 #define NB_AIR_LOBES 10
 #define NB_AIR_WORDS 18
-#define NB_AIR_FALLING 48.0
+#define NB_AIR_FALLING 60.0
 #define NB_AIR_RISING 64.0
 #define NB_AIR_SUNS 257.0
 
