@@ -36,7 +36,7 @@ static double reflected_by_model(const nebel_cloud_view *view, double depth, dou
         const double sine = sqrt(1 - cosine * cosine);
         /* The eye looks down; the sun's place is in the x-y plane. */
         const double direction[3] = {level * cos(turn), -out, level * sin(turn)};
-        nb_cloud_ray ray = nb_cloud_ray_make(view, direction);
+        nb_cloud_ray ray = nb_cloud_ray_make(view, direction, 0);
         ray.sun = sine * direction[0] + cosine * direction[1];
         const nb_cloud_layer *layer = &view->clouds->layers[0];
         const nebel_phase wide = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN,

@@ -6,6 +6,8 @@
 #include "near.h"
 #include "unit.h"
 
+#include "base/vector.h"
+
 #include <math.h>
 
 /* From afar a cloud is the mean of what is seen near. */
@@ -307,6 +309,173 @@ static void test_weather_ends_where_it_ends(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* ---- before the sun -------------------------------------------------------------------------- */
+
+typedef struct nb_before_sun {
+    nebel_clouds *clouds;
+    nebel_cloud_view *view;
+    nebel_cloud_workspace *workspace;
+    double sun[3], across[2][3]; /* across: level, and up */
+} nb_before_sun;
+
+static nb_before_sun begin_before_sun(nebel_cloud_kind kind, double degrees)
+{
+    const double rise = sin(degrees * PI / 180), level = cos(degrees * PI / 180);
+    nb_before_sun scene = {.clouds = make(1, &(nebel_cloud_layer){.kind = kind}),
+                           .sun = {0, rise, -level},
+                           .across = {{1, 0, 0}, {0, level, rise}}};
+    const nebel_cloud_view_desc desc = {.clouds = scene.clouds,
+                                        .sun = {.direction = {0, rise, -level}, .irradiance = {20, 20, 20}}};
+    assert_int_equal(nebel_create_cloud_view(&desc, &scene.view), NEBEL_OK);
+    assert_int_equal(nebel_create_cloud_workspace(scene.view, &scene.workspace), NEBEL_OK);
+    return scene;
+}
+
+static void end_before_sun(nb_before_sun *scene)
+{
+    nebel_destroy_cloud_workspace(scene->workspace);
+    nebel_destroy_cloud_view(scene->view);
+    nebel_destroy_clouds(scene->clouds);
+}
+
+typedef struct nb_look {
+    double light, left;
+} nb_look;
+
+/* From 50 m above the ground, so far beside the sun, in radians. */
+static nebel_ray ray_beside_sun(const nb_before_sun *scene, const double from[2], const double aside[2])
+{
+    nebel_ray ray = {{from[0], 50, from[1]}, {0, 0, 0}, HUGE_VAL};
+    for (int c = 0; c < 3; c++)
+        ray.direction[c] = scene->sun[c] + aside[0] * scene->across[0][c] + aside[1] * scene->across[1][c];
+    return ray;
+}
+
+static nb_look look_along(const nb_before_sun *scene, const nebel_ray *ray, double spread)
+{
+    nebel_cloud_knots knots;
+    assert_int_equal(nebel_trace_clouds(scene->workspace, 1, ray, 0, &spread, 0, &knots, 0), NEBEL_OK);
+    if (knots.count == 0) return (nb_look){0, 1};
+    return (nb_look){(double)knots.in_scattering[knots.count - 1][1], (double)knots.transmittance[knots.count - 1]};
+}
+
+/* Straight before the sun all light that is scattered once comes through the same cloud, wherever it was scattered: by steps of some metres. */
+static double once_before_sun(const nb_before_sun *scene, const nebel_ray *ray, double step)
+{
+    const nb_cloud_layer *layer = &scene->clouds->layers[0];
+    const double from[3] = {ray->origin[0], ray->origin[1] + RADIUS, ray->origin[2]};
+    double pieces[2][2], depth = 0, light = 0;
+    assert_int_equal(nb_cloud_pieces(layer->low, layer->high, from, ray->direction, HUGE_VAL, pieces), 1);
+    for (double t = pieces[0][0] + .5 * step; t < pieces[0][1] && depth < 40; t += step) {
+        double place[3];
+        for (int c = 0; c < 3; c++) place[c] = ray->origin[c] + t * ray->direction[c];
+        const double passed = step * (double)extinction_at(scene->clouds, 0, 0, place[0], place[1], place[2]);
+        if (!(passed > 0)) continue;
+        place[1] += RADIUS;
+        depth += passed;
+        light += passed * (double)nb_cloud_clear_light(scene->view, place, nb_vector_length(place)).sun[1];
+    }
+    return light * exp(-depth) *
+           nb_phase_at(&layer->phase, nb_vector_dot(ray->direction, scene->sun) / nb_vector_length(ray->direction));
+}
+
+static void compare_straight_before_sun(nebel_cloud_kind kind, double degrees)
+{
+    enum { RAYS = 400 };
+    nb_before_sun scene = begin_before_sun(kind, degrees);
+    uint64_t numbers = 37;
+    double sum = 0, truth = 0, most = 0;
+    for (int i = 0; i < RAYS; i++) {
+        const double from[2] = {dice(&numbers, -3e5, 3e5), dice(&numbers, -3e5, 3e5)};
+        const nebel_ray ray = ray_beside_sun(&scene, from, (const double[2]){1e-3, 1e-3});
+        const nb_look look = look_along(&scene, &ray, 1e-5);
+        const double once = look.left < 1 ? once_before_sun(&scene, &ray, kind == NEBEL_CLOUD_CIRRUS ? 60 : 6) : 0;
+        sum += look.light / RAYS;
+        truth += once / RAYS;
+        if (look.left < 1e-4) most = fmax(most, look.light - once);
+    }
+    print_message(
+        "kind %d, sun %g degrees high: light of %.4g before it, %.4g scattered once; in the dark at most %.3g more\n",
+        (int)kind, degrees, sum, truth, most);
+    assert_near(sum, truth, .1 * truth + .5);
+    assert_true(most < 6);
+    end_before_sun(&scene);
+}
+
+static void test_light_straight_before_the_sun(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++) {
+        compare_straight_before_sun((nebel_cloud_kind)kind, 2.6);
+        compare_straight_before_sun((nebel_cloud_kind)kind, 8);
+        compare_straight_before_sun((nebel_cloud_kind)kind, 26);
+    }
+}
+
+/* Mean light of pixels, and of thin rays within them: where hardly any light comes through thin rays, and elsewhere. */
+typedef struct nb_beside {
+    int count;
+    double seen, truth, most;
+} nb_beside;
+
+static void add_pixel(const nb_before_sun *scene, const double from[2], const double aside[2], double spread,
+                      nb_beside sums[2])
+{
+    enum { SIDE = 3 };
+    const nebel_ray middle = ray_beside_sun(scene, from, aside);
+    const nb_look seen = look_along(scene, &middle, spread);
+    nb_look thin = {0, 0};
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        const double u = (k % SIDE + .5) / SIDE - .5, v = (k / SIDE + .5) / SIDE - .5;
+        const nebel_ray ray =
+            ray_beside_sun(scene, from, (const double[2]){aside[0] + u * spread, aside[1] + v * spread});
+        const nb_look look = look_along(scene, &ray, 1e-5);
+        thin.light += look.light / (SIDE * SIDE);
+        thin.left += look.left / (SIDE * SIDE);
+    }
+    nb_beside *sum = &sums[thin.left > 1e-4];
+    sum->count++;
+    sum->seen += seen.light;
+    sum->truth += thin.light;
+    sum->most = fmax(sum->most, seen.light);
+}
+
+static void compare_beside_sun(nebel_cloud_kind kind, double degrees)
+{
+    const double spread = 6e-3;
+    enum { PIXELS = 500 };
+    static const double angles[] = {.1, .5, 1.5};
+    nb_before_sun scene = begin_before_sun(kind, degrees);
+    for (size_t i = 0; i < sizeof angles / sizeof *angles; i++) {
+        uint64_t numbers = 41;
+        nb_beside sums[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
+        for (int k = 0; k < PIXELS; k++) {
+            const double from[2] = {dice(&numbers, -3e5, 3e5), dice(&numbers, -3e5, 3e5)};
+            const double turn = dice(&numbers, 0, PI), angle = angles[i] * PI / 180;
+            add_pixel(&scene, from, (const double[2]){angle * cos(turn), angle * sin(turn)}, spread, sums);
+        }
+        for (int c = 0; c < 2; c++) {
+            const nb_beside *sum = &sums[c];
+            if (sum->count < 10) continue;
+            const double seen = sum->seen / sum->count, truth = sum->truth / sum->count;
+            print_message(
+                "kind %d, sun %g degrees high, %.1f beside it: %d %s pixels, light of %.4g, %.4g at most; of thin rays "
+                "%.4g\n",
+                (int)kind, degrees, angles[i], sum->count, c == 0 ? "dark" : "other", seen, sum->most, truth);
+            assert_near(seen, truth, .3 * truth);
+        }
+    }
+    end_before_sun(&scene);
+}
+
+static void test_light_of_pixels_beside_the_sun(void **state)
+{
+    (void)state;
+    static const double degrees[] = {2.6, 8, 26};
+    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++)
+        for (int i = 0; i < 3; i++) compare_beside_sun((nebel_cloud_kind)kind, degrees[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -316,6 +485,8 @@ int main(void)
         cmocka_unit_test(test_light_of_pixels),
         cmocka_unit_test(test_light_of_pixels_that_hide_heaps),
         cmocka_unit_test(test_light_under_a_low_sun),
+        cmocka_unit_test(test_light_straight_before_the_sun),
+        cmocka_unit_test(test_light_of_pixels_beside_the_sun),
         cmocka_unit_test(test_closed_clouds_are_dark_at_the_horizon),
         cmocka_unit_test(test_no_cloud_is_seen_through_the_planet),
     };

@@ -206,6 +206,22 @@ static inline nb_real through(const nb_drops *drops, nb_real depth, nb_real leng
     return nb_clamp(-nb_log1p(-mean_lost(drops, depth)) / length, NB_F(0.0), mean);
 }
 
+/* The mean of extinction, weighted by what it lets through: of the same. Never more than what lets as much through. */
+static inline nb_real passed_by(const nb_drops *drops, nb_real depth, nb_real most)
+{
+    const nb_real low = drops->part - drops->spread, high = drops->part + drops->spread;
+    const nb_real from = nb_clamp(low, NB_F(0.0), NB_F(1.0)), to = nb_clamp(high, NB_F(0.0), NB_F(1.0));
+    const nb_real full = nb_max(NB_F(0.0), high - NB_F(1.0)) - nb_max(NB_F(0.0), low - NB_F(1.0));
+    const nb_real clear = nb_max(NB_F(0.0), -low) - nb_max(NB_F(0.0), -high);
+    const nb_real wide = depth * (to - from), ratio = nb_exp_ratio(wide), falls = nb_exp(-wide);
+    const nb_mask is_narrow = wide < NB_F(0.01);
+    const nb_real middle = nb_select(is_narrow, NB_F(0.5) - wide * nb_splat(1.0f / 3),
+                                     (ratio - falls) / nb_select(is_narrow, NB_F(1.0), wide));
+    const nb_real thin = (to - from) * nb_exp(-depth * from), thick = full * nb_exp(-depth);
+    const nb_real weighted = thin * (from * ratio + (to - from) * middle) + thick, all = thin * ratio + thick + clear;
+    return nb_clamp(drops->most * weighted / nb_max(all, NB_F(1e-30)), NB_F(0.0), most);
+}
+
 /* Stores what lets as much through as drops do. */
 static inline void see_through(const nb_cloud_layer *layer, const nb_drops *drops, nb_mask is_cloud, int p,
                                nb_cloud_looks *looks)
@@ -213,16 +229,22 @@ static inline void see_through(const nb_cloud_layer *layer, const nb_drops *drop
     const nb_real length = load(looks->hidden, p), depth = drops->most * length, spread = drops->spread;
     const nb_real mean = nb_select(is_cloud, drops->most * mean_ramp(drops->part, drops->spread), NB_F(0.0));
     const nb_real part = nb_splat(layer->apart);
-    nb_real whole = mean, apart = part * mean;
+    nb_real whole = mean, apart = part * mean, passed = mean;
     /* Else the mean is right to a thousandth of what a full place has. */
     const nb_mask is_uneven = nb_and(nb_and(is_cloud, drops->part - spread < NB_F(1.0)),
                                      nb_and(spread >= LEAST_SPREAD, depth * spread * spread > NB_F(6e-3)));
     if (nb_any(is_uneven)) {
         whole = nb_select(is_uneven, through(drops, depth, length, whole), whole);
-        if (looks->are_of_rays) apart = nb_select(is_uneven, through(drops, part * depth, length, apart), apart);
+        if (looks->are_of_rays) {
+            apart = nb_select(is_uneven, through(drops, part * depth, length, apart), apart);
+            passed = nb_select(is_uneven, passed_by(drops, depth, whole), passed);
+        }
     }
     nb_store_lanes(looks->whole + p, whole);
-    if (looks->are_of_rays) nb_store_lanes(looks->apart + p, apart);
+    if (looks->are_of_rays) {
+        nb_store_lanes(looks->apart + p, apart);
+        nb_store_lanes(looks->passed + p, passed);
+    }
 }
 
 /* Of billows, the slope of the first scales counts, whatever the others do. */

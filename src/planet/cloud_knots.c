@@ -20,6 +20,7 @@ static nb_cloud_knot knot_here(const nb_cloud_tally *tally, double t)
 {
     nb_cloud_knot knot = {.t = t, .left = tally->left, .left_apart = tally->left_apart, .stretches = tally->asked};
     memcpy(knot.light, tally->light, sizeof knot.light);
+    memcpy(knot.ahead, tally->ahead, sizeof knot.ahead);
     return knot;
 }
 
@@ -83,15 +84,24 @@ void nb_cloud_tally_leave(nb_cloud_tally *tally, double t)
     if (fallen > MOST_FALL || (fallen > 0.02 && t > 1.5 * last_of(tally)->t)) add_knot(tally, t);
 }
 
-void nb_cloud_tally_light(nb_cloud_tally *tally, const double light[3])
+static void add_to_knot(nb_cloud_knot *knot, const double light[3], const double ahead[3])
+{
+    for (int c = 0; c < 3; c++) {
+        knot->light[c] += light[c];
+        knot->ahead[c] += ahead[c];
+    }
+}
+
+void nb_cloud_tally_light(nb_cloud_tally *tally, const double light[3], const double ahead[3])
 {
     const int number = ++tally->lit;
     for (int c = 0; c < 3; c++) {
         tally->light[c] += light[c];
-        if (tally->gap_end.stretches >= number) tally->gap_end.light[c] += light[c];
-        for (uint32_t i = tally->count; i > 0 && tally->knots[i - 1].stretches >= number; i--)
-            tally->knots[i - 1].light[c] += light[c];
+        tally->ahead[c] += ahead[c];
     }
+    if (tally->gap_end.stretches >= number) add_to_knot(&tally->gap_end, light, ahead);
+    for (uint32_t i = tally->count; i > 0 && tally->knots[i - 1].stretches >= number; i--)
+        add_to_knot(&tally->knots[i - 1], light, ahead);
 }
 
 /* The last cloud's end is the last knot, not that of the stay in its layer, which may be beyond the horizon: the last light would come
@@ -105,13 +115,14 @@ static void add_end(nb_cloud_tally *tally)
     write_knot(tally, &end);
 }
 
-void nb_cloud_tally_end(nb_cloud_tally *tally, nebel_cloud_knots *knots)
+void nb_cloud_tally_end(nb_cloud_tally *tally, double through, nebel_cloud_knots *knots)
 {
     add_end(tally);
     knots->count = tally->count;
     for (uint32_t i = 0; i < tally->count; i++) {
         knots->t[i] = (float)tally->knots[i].t;
         knots->transmittance[i] = (float)tally->knots[i].left;
-        for (int c = 0; c < 3; c++) knots->in_scattering[i][c] = (float)tally->knots[i].light[c];
+        for (int c = 0; c < 3; c++)
+            knots->in_scattering[i][c] = (float)(tally->knots[i].light[c] + through * tally->knots[i].ahead[c]);
     }
 }

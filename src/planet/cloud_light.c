@@ -116,7 +116,64 @@ nb_cloud_depths nb_cloud_bound_depths(const nebel_cloud_view *view, int k, doubl
     return bounded;
 }
 
-nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3])
+/* ---- rays ------------------------------------------------------------------------------------ */
+
+/* Angles between ray and sun: up to the first the way to the sun is the rest of the ray, from the second on it is one of its own, on which
+ * other clouds lie. */
+#define AHEAD_ANGLE 0.010
+#define ASIDE_ANGLE 0.026
+
+/* Light of a crowd of places knows nothing of which clouds are before the sun: up to the first of these angles a place's own way to it
+ * counts, from the second on that of the crowd. */
+#define OWN_ANGLE 0.07
+#define CROWD_ANGLE 0.17
+
+/* The phase function has a peak half a degree wide: a pixel so many times its width from where that counts has a mean of it, over places
+ * so far apart. */
+#define NEAR_WIDTHS 3
+#define PEAK_STEP 1e-3
+enum { MOST_PEAK_STEPS = 24 };
+
+/* 1 up to an angle, 0 from another on. */
+static double part_within(double cosine, double from, double to)
+{
+    const double angle = sqrt(nb_max(0, 2 - 2 * cosine)), part = nb_min(1, nb_max(0, (to - angle) / (to - from)));
+    return part * part * (3 - 2 * part);
+}
+
+static void add_direction(const nebel_cloud_view *view, double cosine, double weight, nb_cloud_ray *ray)
+{
+    const double ahead = part_within(cosine, AHEAD_ANGLE, ASIDE_ANGLE);
+    ray->ahead += (float)(weight * ahead);
+    for (int k = 0; k < view->clouds->layer_count; k++) {
+        const double phase = weight * nb_phase_at(&view->clouds->layers[k].phase, cosine);
+        ray->phase[k] += (float)((1 - ahead) * phase);
+        ray->ahead_phase[k] += (float)(ahead * phase);
+    }
+}
+
+/* Over a pixel where the phase function's peak is near, else of its middle. */
+static void set_phases(const nebel_cloud_view *view, double spread, nb_cloud_ray *ray)
+{
+    const double width = nb_min(0.5, spread), near = nb_min(1.5, ASIDE_ANGLE + NEAR_WIDTHS * width);
+    const int is_near = 2 - 2 * ray->sun < near * near;
+    const int n = is_near ? (int)nb_min(MOST_PEAK_STEPS, 1 + width / PEAK_STEP) : 1;
+    const double *direction = ray->direction, *sun = view->sun.direction;
+    const double axis[3] = {fabs(direction[0]) < 0.7, !(fabs(direction[0]) < 0.7), 0};
+    double across[2][3];
+    nb_vector_cross(direction, axis, across[0]);
+    nb_vector_make_unit(across[0]);
+    nb_vector_cross(direction, across[0], across[1]);
+    const double aside[2] = {width * nb_vector_dot(across[0], sun), width * nb_vector_dot(across[1], sun)};
+    for (int i = 0; i < n * n; i++) {
+        const double u = (i % n + 0.5) / n - 0.5, v = (i / n + 0.5) / n - 0.5;
+        const double length = sqrt(1 + width * width * (u * u + v * v));
+        const double cosine = (ray->sun + u * aside[0] + v * aside[1]) / length;
+        add_direction(view, nb_max(-1, nb_min(1, cosine)), 1.0 / (n * n), ray);
+    }
+}
+
+nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3], double spread)
 {
     nb_cloud_ray ray = {.sun = nb_max(-1, nb_min(1, nb_vector_dot(direction, view->sun.direction)))};
     memcpy(ray.direction, direction, sizeof ray.direction);
@@ -125,10 +182,11 @@ nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direct
         const double g = layer->mean_cosine, wide = g / (1 + g);
         const nebel_phase phase = {.type = NEBEL_PHASE_HENYEY_GREENSTEIN, .g = wide};
         const nb_phase lobe = nb_phase_resolve(&phase);
-        ray.phase[k] = (float)nb_phase_at(&layer->phase, ray.sun);
         ray.wide_phase[k] = (float)nb_phase_at(&lobe, ray.sun);
         ray.apart[k] = layer->apart;
     }
+    set_phases(view, spread, &ray);
+    ray.own = (float)part_within(ray.sun, OWN_ANGLE, CROWD_ANGLE);
     return ray;
 }
 
@@ -160,9 +218,11 @@ nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_
 {
     const float apart = ray->apart[layer], rise = (float)nb_vector_dot(ray->direction, up);
     const float often = nb_larger(0, parts->mean + parts->to_sun * (float)ray->sun + parts->to_up * rise);
+    const float wide = apart * ray->wide_phase[layer];
     nb_cloud_source source;
     for (int c = 0; c < 3; c++) {
-        source.once[c] = light->sun[c] * parts->left * (ray->phase[layer] - apart * ray->wide_phase[layer]);
+        source.once[c] = light->sun[c] * parts->left * (ray->phase[layer] - (1 - ray->ahead) * wide);
+        source.ahead[c] = light->sun[c] * (ray->ahead_phase[layer] - ray->ahead * wide);
         source.often[c] = light->sun[c] * apart * (often + parts->left_wide * ray->wide_phase[layer]);
         source.ambient[c] = parts->above * light->above[c] + parts->below * light->below[c];
     }

@@ -65,8 +65,9 @@ struct nb_cloud_looks {
     /* By find_drops, 1/m: what extinction lets as much through as the mean of all that is hidden; 0 where no cloud is. Where half
      * of it is cloud half of the light comes through, however thick that is. */
     float whole[NB_CLOUD_LANES];
-    /* Of rays: the same of what leads away; where no cloud is, how far there is none ahead as far as slopes of noise say, m. */
-    float apart[NB_CLOUD_LANES], clear[NB_CLOUD_LANES];
+    /* Of rays: the same of what leads away; the mean of extinction, weighted by what it lets through; where no cloud is, how far there
+     * is none ahead as far as slopes of noise say, m. */
+    float apart[NB_CLOUD_LANES], passed[NB_CLOUD_LANES], clear[NB_CLOUD_LANES];
 };
 
 /* In this order, with the columns between; number: of the layer. The same bits for every instruction set, and for every place

@@ -215,6 +215,7 @@ nb_cloud_parts nb_cloud_parts_of(float mean_cosine, const nb_cloud_depths *depth
 /* What a layer's drops send towards the eye, per unit of extinction. */
 typedef struct nb_cloud_source {
     float once[3];    /* of sunlight, seen through all cloud between */
+    float ahead[3];   /* of sunlight that goes on along the ray: what comes through all cloud on it */
     float often[3];   /* seen through what scatters it out of its way: see nb_cloud_ray's apart */
     float ambient[3]; /* of the sky and the ground; through all cloud */
 } nb_cloud_source;
@@ -222,12 +223,18 @@ typedef struct nb_cloud_source {
 /* What is the same along a ray. */
 typedef struct nb_cloud_ray {
     float phase[NEBEL_MAX_CLOUD_LAYERS], wide_phase[NEBEL_MAX_CLOUD_LAYERS]; /* towards the eye */
+    /* Of phase that part of light whose way to the sun is the rest of the ray, and how much of what a pixel sees that is; phase has the
+     * other. */
+    float ahead_phase[NEBEL_MAX_CLOUD_LAYERS], ahead;
+    float
+        own; /* how much what comes straight from the sun is that of a place's own way, where pixels hide heaps, too */
     float apart[NEBEL_MAX_CLOUD_LAYERS]; /* 1 - g^2: what part of scattering leads away */
     double sun;                          /* cosine between ray and sun */
     double direction[3];
 } nb_cloud_ray;
 
-nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3]);
+/* Of a pixel, so wide at a distance of 1. */
+nb_cloud_ray nb_cloud_ray_make(const nebel_cloud_view *view, const double direction[3], double spread);
 
 nb_cloud_source nb_cloud_source_of(const nb_cloud_ray *ray, int layer, const nb_cloud_parts *parts,
                                    const nb_cloud_light *light, const double up[3]);

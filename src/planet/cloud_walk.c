@@ -79,6 +79,9 @@
 /* Noise hardly ever rises by a seventh of its largest slope all the way to the next cloud. */
 #define SLOPE_PART 0.15
 
+/* Behind a surface the way to the sun is found as finely as in that part of all layers' height. */
+#define REST_PART 1e-3
+
 /* WALKS: so many go on together. */
 enum { MOST_PIECES = 4096, WALKS = 32 };
 
@@ -87,6 +90,7 @@ typedef struct nb_stretch {
     double end, most;        /* most: how deep it gets */
     double spent;            /* part of it that it has come to */
     double seen, seen_apart; /* of all scattering, and of what leads away */
+    double passed;           /* optical depth of what light that goes on along the ray is scattered by */
     double weight, moment;   /* of places by what is seen */
 } nb_stretch;
 
@@ -117,6 +121,7 @@ typedef struct nb_walk {
     nebel_cloud_workspace *workspace;
     nb_party *party;
     double from[3], unit[3], spread; /* from the planet's centre */
+    double t_max;                    /* up to a surface; HUGE_VAL: to none */
     nb_cloud_ray ray;
     nb_turned turned[NEBEL_MAX_CLOUD_LAYERS];
     nb_stay stays[2 * NEBEL_MAX_CLOUD_LAYERS];
@@ -203,7 +208,7 @@ static void see(const nb_queue *queue, int i)
 {
     const nb_cloud_looks *looks = &queue->looks;
     nb_walk *walk = queue->walks[i];
-    *queue->seen[i] = (nb_cloud_seen){looks->whole[i], looks->apart[i]};
+    *queue->seen[i] = (nb_cloud_seen){looks->whole[i], looks->apart[i], looks->passed[i]};
     walk->unanswered--;
     if (walk->wait != NB_WAIT_STEP || looks->whole[i] > 0) return;
     walk->spot = (nb_spot){
@@ -332,16 +337,20 @@ static void light_stretch(nb_lights *lights, int i)
     nb_cloud_parts parts = nb_cloud_parts_of((float)cosine, &depths);
     if (crowd > 0) {
         const nb_cloud_parts mean = nb_cloud_crowd_at(walk->workspace, k, up, walk->unit, lights->entered[i]);
+        const float left = parts.left + crowd * (1 - walk->ray.own) * (mean.left - parts.left);
         parts = nb_cloud_mix_parts(&parts, &mean, crowd);
+        parts.left = left;
     }
     const nb_cloud_light light = nb_cloud_clear_light(walk->view, asked->place, lights->radius[i]);
     const nb_cloud_source source = nb_cloud_source_of(&walk->ray, k, &parts, &light, up);
     const nb_stretch *stretch = &lights->stretches[i];
-    double sent[3];
-    for (int c = 0; c < 3; c++)
+    double sent[3], ahead[3];
+    for (int c = 0; c < 3; c++) {
         sent[c] = stretch->seen * (double)(source.once[c] + source.ambient[c]) +
                   stretch->seen_apart * (double)source.often[c];
-    nb_cloud_tally_light(&walk->tally, sent);
+        ahead[c] = stretch->passed * (double)source.ahead[c];
+    }
+    nb_cloud_tally_light(&walk->tally, sent, ahead);
 }
 
 /* A walk that waited for its last light is ready. */
@@ -384,7 +393,7 @@ static void add_light(nb_walk *walk, int k)
     lights->asked[i].grain = grain_of(walk, k, walk->spread * t);
     lights->crowd[i] = nb_cloud_crowd_part(walk->workspace, k, lights->asked[i].grain.width);
     lights->entered[i] = lights->crowd[i] > 0 ? height_entered(walk, k) : 0;
-    lights->asked[i].is_alike = lights->crowd[i] >= 1;
+    lights->asked[i].is_alike = lights->crowd[i] >= 1 && !(walk->ray.own > 0);
     walk->tally.asked++;
     if (lights->count == NB_CLOUD_ASKED) find_lights(walk->party);
 }
@@ -404,16 +413,27 @@ static double deepest_stretch(const nb_walk *walk)
     return walk->tally.left_apart > UNSEEN ? STRETCH_DEPTH / (0.15 + walk->tally.left) : HUGE_VAL;
 }
 
+/* Optical depths of a piece: of all scattering, of what leads away, and of what light that goes on along the ray is scattered by. */
+typedef struct nb_piece {
+    double whole, apart, passed;
+} nb_piece;
+
+static nb_piece part_of(const nb_piece *piece, double part)
+{
+    return (nb_piece){part * piece->whole, part * piece->apart, part * piece->passed};
+}
+
 /* Part of a piece that lies in one stretch. */
-static void take_part(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
+static void take_part(nb_walk *walk, int k, double t, double length, nb_piece depth)
 {
     nb_stretch *stretch = &walk->stretch;
     const double apart = (double)walk->ray.apart[k], left = walk->tally.left, visibly = visible(walk->tally.left_apart);
     stretch->end = t + length;
-    nb_cloud_tally_pass(&walk->tally, t + length, depth, depth_apart);
+    nb_cloud_tally_pass(&walk->tally, t + length, depth.whole, depth.apart);
     const double seen = left - walk->tally.left, seen_apart = (visibly - visible(walk->tally.left_apart)) / apart;
     stretch->seen += seen;
     stretch->seen_apart += seen_apart;
+    stretch->passed += depth.passed;
     stretch->weight += seen + seen_apart;
     stretch->moment += (seen + seen_apart) * (t + 0.5 * length);
 }
@@ -437,17 +457,17 @@ static void take_gap(nb_walk *walk, int k, double t)
 
 /* Stretches end where they have come to so much, wherever pieces end: neighbouring rays, whose pieces may be others, have their light
  * from neighbouring places. */
-static void take_piece(nb_walk *walk, int k, double t, double length, double depth, double depth_apart)
+static void take_piece(nb_walk *walk, int k, double t, double length, nb_piece depth)
 {
     nb_stretch *stretch = &walk->stretch;
-    if (!(depth > 0)) return;
+    if (!(depth.whole > 0)) return;
     take_gap(walk, k, t);
     nb_cloud_tally_enter(&walk->tally, t);
     for (double begin = 0; begin < 1;) {
         if (!(stretch->weight > 0)) stretch->most = deepest_stretch(walk);
-        const double rest = 1 - begin, whole = part_of_stretch(walk, k, rest * length, rest * depth);
+        const double rest = 1 - begin, whole = part_of_stretch(walk, k, rest * length, rest * depth.whole);
         const double share = (1 - stretch->spent) / whole, part = nb_min(1, share) * rest;
-        take_part(walk, k, t + begin * length, part * length, part * depth, part * depth_apart);
+        take_part(walk, k, t + begin * length, part * length, part_of(&depth, part));
         if (share > 1) {
             stretch->spent += whole;
             return;
@@ -481,15 +501,25 @@ static double part_before(const nb_walk *walk, const nb_stay *stay, double depth
 }
 
 /* Light is that of where cloud is: a piece that is thin at one end counts as two. */
-static void take_halves(nb_walk *walk, const nb_stay *stay, double depth, double depth_apart)
+static void take_halves(nb_walk *walk, const nb_stay *stay, const nb_piece *depth)
 {
-    const double half = 0.5 * walk->length, before = depth > 0 ? part_before(walk, stay, depth) : 0.5;
+    const double half = 0.5 * walk->length, before = depth->whole > 0 ? part_before(walk, stay, depth->whole) : 0.5;
     if (fabs(before - 0.5) < EVEN) {
-        take_piece(walk, stay->layer, walk->t, walk->length, depth, depth_apart);
+        take_piece(walk, stay->layer, walk->t, walk->length, *depth);
         return;
     }
-    take_piece(walk, stay->layer, walk->t, half, before * depth, before * depth_apart);
-    take_piece(walk, stay->layer, walk->t + half, half, (1 - before) * depth, (1 - before) * depth_apart);
+    take_piece(walk, stay->layer, walk->t, half, part_of(depth, before));
+    take_piece(walk, stay->layer, walk->t + half, half, part_of(depth, 1 - before));
+}
+
+/* By Simpson's rule. */
+static nb_piece piece_of(const nb_walk *walk)
+{
+    const nb_cloud_seen *a = &walk->here, *b = &walk->middle, *c = &walk->far;
+    const double sixth = walk->length / 6;
+    return (nb_piece){.whole = sixth * (double)(a->whole + 4 * b->whole + c->whole),
+                      .apart = sixth * (double)(a->apart + 4 * b->apart + c->apart),
+                      .passed = sixth * (double)(a->passed + 4 * b->passed + c->passed)};
 }
 
 /* Takes a piece whose three values are known, or halves it. */
@@ -497,10 +527,9 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
 {
     const double tolerance = PIECES * walk->view->tolerance, length = walk->length;
     const nb_cloud_seen *here = &walk->here, *middle = &walk->middle, *far = &walk->far;
-    const double depth = length / 6 * (double)(here->whole + 4 * middle->whole + far->whole);
-    const double depth_apart = length / 6 * (double)(here->apart + 4 * middle->apart + far->apart);
+    const nb_piece depth = piece_of(walk);
     const double missed = walk->tally.left * length / 6 * curve_of(here, middle, far);
-    if ((missed > tolerance || depth > MOST_DEPTH / (0.15 + walk->tally.left)) &&
+    if ((missed > tolerance || depth.whole > MOST_DEPTH / (0.15 + walk->tally.left)) &&
         length > 2 * least_piece(walk, stay)) {
         walk->length *= 0.5;
         walk->far = walk->middle;
@@ -508,7 +537,7 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
         return;
     }
     walk->missed += missed / PIECES;
-    take_halves(walk, stay, depth, depth_apart);
+    take_halves(walk, stay, &depth);
     walk->t += length;
     walk->here = walk->far;
     walk->has_far = 0;
@@ -595,6 +624,22 @@ static void find_stays(nb_walk *walk, double t_max)
     }
 }
 
+/* Of the sun's light what comes through all clouds on the ray and, where that ends before them, through what is behind that; it fades out as all
+ * that is seen does. */
+static double through_all(nb_walk *walk)
+{
+    const nb_cloud_tally *tally = &walk->tally;
+    const double seen = tally->left * visible(tally->left_apart) / tally->left_apart;
+    double end[3], pieces[2][2];
+    if (!(walk->ray.ahead > 0 && seen > 0 && walk->t_max < HUGE_VAL)) return seen;
+    const nebel_cloud_view *view = walk->view;
+    (void)radius_at(walk, walk->t_max, end);
+    if (nb_cloud_pieces(view->low, view->high, end, view->sun.direction, HUGE_VAL, pieces) == 0) return seen;
+    for (int c = 0; c < 3; c++) end[c] += pieces[0][0] * view->sun.direction[c];
+    const double width = fmax(walk->spread * walk->t_max, REST_PART * (view->high - view->low));
+    return seen * nb_exp(-(double)nb_cloud_sun_depth_at(walk->workspace, end, (float)width));
+}
+
 static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel_ray *ray, const double unit[3],
                   double spread, nebel_cloud_knots *knots, nb_walk *walk)
 {
@@ -608,14 +653,15 @@ static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel
     nb_air_from_center(atmosphere, ray->origin, walk->from);
     nb_air_raise(atmosphere->airs.radius, walk->from);
     memcpy(walk->unit, unit, sizeof walk->unit);
-    walk->ray = nb_cloud_ray_make(workspace->view, unit);
+    walk->ray = nb_cloud_ray_make(workspace->view, unit, spread);
     for (int k = 0; k < workspace->view->clouds->layer_count; k++)
         for (int i = 0; i < 3; i++) {
             const double *turn = workspace->view->poses[k].turn[i];
             walk->turned[k].from[i] = nb_vector_dot(turn, walk->from);
             walk->turned[k].direction[i] = nb_vector_dot(turn, unit);
         }
-    find_stays(walk, fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk->from, unit)));
+    walk->t_max = fmin(ray->t_max, nb_cloud_to_ground(atmosphere->airs.radius, walk->from, unit));
+    find_stays(walk, walk->t_max);
     if (walk->stay_count > 0) enter(walk, &walk->stays[0]);
 }
 
@@ -700,7 +746,7 @@ static void attend(nb_rays *rays, nb_walk *walk, nb_party *party)
         walk->wait = NB_WAIT_LIGHT;
         return;
     }
-    nb_cloud_tally_end(&walk->tally, walk->knots);
+    nb_cloud_tally_end(&walk->tally, through_all(walk), walk->knots);
     walk->knots->error = (float)walk->missed;
     walk->knots->looks = walk->looks;
     if (rays->next < rays->n) begin_next(rays, walk, party);

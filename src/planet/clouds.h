@@ -115,9 +115,9 @@ static inline float nb_cloud_least_rank(nebel_cloud_kind kind, float height)
 
 /* ---- drops ----------------------------------------------------------------------------------- */
 
-/* How much of extinction is seen: of all; of that part of scattering which leads away. */
+/* How much of extinction is seen: of all; of that part of scattering which leads away; of all where light comes through. */
 typedef struct nb_cloud_seen {
-    float whole, apart;
+    float whole, apart, passed;
 } nb_cloud_seen;
 
 /* Places that are asked at once (cloud_looks.h). */
