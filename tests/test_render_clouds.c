@@ -399,6 +399,41 @@ static void fog_lies_among_clouds(void **state)
     }
 }
 
+/* Where the light is in the mean that a ball adds, in pixels. */
+static void find_center(const world *w, nebel_snapshot *fog, uint32_t samples, double center[2])
+{
+    const nebel_camera camera = planet_camera(2, .4);
+    test_picture picture = render_in(w, fog, &camera, 2, samples, 0), clear = render(w, &camera, 2, samples, 0);
+    double sum = 0;
+    center[0] = center[1] = 0;
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+        const double more = (double)picture.planes.color[3 * i] - (double)clear.planes.color[3 * i];
+        sum += more;
+        center[0] += more * (i % WIDTH);
+        center[1] += more * (double)(i / WIDTH);
+    }
+    for (int c = 0; c < 2; c++) center[c] /= sum;
+    test_picture_free(&picture);
+    test_picture_free(&clear);
+}
+
+/* The first of several samples is beside the middle of its pixel, where clouds are found. */
+static void samples_leave_fog_before_clouds_where_it_is(void **state)
+{
+    (void)state;
+    double one[2], several[2];
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
+    nebel_snapshot *const fog = make_ball(&(ball){{0, 200, -600}, 150, 6e-3});
+    find_center(&w, fog, 1, one);
+    find_center(&w, fog, 4, several);
+    print_message("a ball before closed clouds: at %.3f %.3f, of 4 samples at %.3f %.3f\n", one[0], one[1], several[0],
+                  several[1]);
+    for (int c = 0; c < 2; c++) assert_true(fabs(several[c] - one[c]) < .05);
+    nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
 /* By how much the pixel that stands out most is darker or brighter than all eight around it, of light. */
 static double find_dot(const test_picture *picture)
 {
@@ -710,6 +745,7 @@ int main(void)
         cmocka_unit_test(pictures_are_still),
         cmocka_unit_test(clouds_end_at_surfaces),
         cmocka_unit_test(fog_lies_among_clouds),
+        cmocka_unit_test(samples_leave_fog_before_clouds_where_it_is),
         cmocka_unit_test(the_ground_has_shadows),
         cmocka_unit_test(air_under_clouds_is_dim),
         cmocka_unit_test(surfaces_under_clouds_have_less_sky),

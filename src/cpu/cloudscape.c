@@ -188,11 +188,13 @@ static nebel_result choose(const nb_frame *frame, nb_cloud_scratch *clouds, int 
     return nb_cloud_air_find(frame, is_longer, clouds);
 }
 
-/* What is found of a ray up to one of its marks is known up to the others. */
+/* Along the middles of pixels, as air and clouds are: what is found of a ray up to one of its marks is known up to the others. */
 static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch *scratch)
 {
     nebel_result result = NEBEL_OK;
     int any = 1;
+    scratch->clouds.rays_of_samples = scratch->rays;
+    scratch->rays = scratch->clouds.rays;
     memset(scratch->clouds.marks, 0, sizeof scratch->clouds.marks);
     while (result == NEBEL_OK && any) {
         result = choose(frame, &scratch->clouds, &any);
@@ -200,6 +202,7 @@ static nebel_result find_fog(const nb_frame *frame, nb_haze_fn haze, nb_scratch 
         if (result == NEBEL_OK && any) nb_haze_keep(scratch);
     }
     nb_haze_forget(scratch);
+    scratch->rays = scratch->clouds.rays_of_samples;
     return result;
 }
 

@@ -47,8 +47,8 @@ typedef struct nb_shell_scratch {
 /* Clouds through the middles of pixels. */
 typedef struct nb_cloud_scratch {
     nebel_cloud_workspace *workspace; /* for a frame with clouds */
-    nb_rays rays;
-    float reach[NB_BATCH]; /* m, how far they are known */
+    nb_rays rays, rays_of_samples;    /* the latter meanwhile */
+    float reach[NB_BATCH];            /* m, how far they are known */
     int is_new[NB_BATCH];
     nebel_cloud_knots knots[NB_BATCH];
     nebel_ray asked[NB_BATCH]; /* one behind the other: rays that clouds are looked for along, and what is found */
