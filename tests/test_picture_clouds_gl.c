@@ -85,17 +85,23 @@ static void compare(const char *name, double most, const picture_pair *pair)
     assert_true(shown <= most && left <= most);
 }
 
-static void check(const char *name, const world *w, nebel_snapshot *fog, const nebel_camera *camera)
+static void check_samples(const char *name, const world *w, nebel_snapshot *fog, const nebel_camera *camera,
+                          uint32_t samples)
 {
     picture_pair pair = picture_make(96 * scale, 54 * scale);
     const int objects = pass_count_objects();
     pair.time = 5;
     pair.tolerance = NEBEL_DEFAULT_TOLERANCE; /* that OpenGL takes for clouds */
-    picture_render(&w->scene, fog, camera, 1, &pair);
+    picture_render(&w->scene, fog, camera, samples, &pair);
     assert_int_equal(pass_count_objects(), objects);
     /* Of clouds one pixel: a ray whose digits round apart takes other pieces, as rays do that end at models, at floats. */
     compare(name, w->scene.mesh_count > 0 ? 1e-3 : 2e-4, &pair);
     picture_free(&pair);
+}
+
+static void check(const char *name, const world *w, nebel_snapshot *fog, const nebel_camera *camera)
+{
+    check_samples(name, w, fog, camera, 1);
 }
 
 static void clouds_are_the_same_from_everywhere(void **state)
@@ -170,6 +176,24 @@ static void clouds_lie_in_fog(void **state)
     pass_open(&context, NB_GL_330);
     const nebel_camera camera = planet_camera(120, .25);
     check("in fog", &w, fog, &camera);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+    free_world(&w);
+}
+
+/* Of two samples one sees the ground, the other clouds beyond the horizon, as the middle of the pixel does; in the first row of a
+ * block, so that no clouds are shared with pixels of the ground. */
+static void the_horizon_lies_between_samples(void **state)
+{
+    (void)state;
+    nb_gl context;
+    world w;
+    make_world(.4, 0, &w);
+    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
+    pass_open(&context, NB_GL_330);
+    const double pixel = 2 * tan(30 * acos(-1) / 180) / (54 * scale), dip = .62 * pixel;
+    const nebel_camera camera = planet_camera(.5 * dip * dip * w.planet.air.radius, pixel);
+    check_samples("the horizon between samples", &w, fog, &camera, 2);
     pass_close(&context);
     nebel_release_snapshot(fog);
     free_world(&w);
@@ -395,6 +419,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(the_sky_comes_through_them),
         cmocka_unit_test(walls_stand_amid_clouds),
         cmocka_unit_test(clouds_lie_in_fog),
+        cmocka_unit_test(the_horizon_lies_between_samples),
         cmocka_unit_test(sheets_lie_over_mist),
         cmocka_unit_test(threads_and_frames_change_nothing),
         cmocka_unit_test(frames_stop_amid_clouds),

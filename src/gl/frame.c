@@ -600,6 +600,15 @@ static nebel_result set_sample(frame *f, nb_pixel_point point)
                    "camera: it is too far out, or its view too narrow, for numbers");
 }
 
+/* Fog among them is found along the rays that they are found along. */
+static nebel_result trace_clouds(frame *f)
+{
+    const nb_pixel_point point = f->point;
+    nebel_result result = set_sample(f, nb_pixel_sample(0, 1));
+    if (result == NEBEL_OK) result = nb_frame_trace_clouds(f);
+    return result == NEBEL_OK ? set_sample(f, point) : result;
+}
+
 static nebel_result draw_sample(frame *f, uint32_t sample)
 {
     nebel_result result = set_sample(f, nb_pixel_sample(sample, f->samples));
@@ -607,7 +616,7 @@ static nebel_result draw_sample(frame *f, uint32_t sample)
     draw_surfaces(f);
     if (sample == 0 && f->casts) result = nb_frame_prepare_sun(f);
     if (result == NEBEL_OK && f->layers != NULL) result = nb_frame_draw_shells(f);
-    if (result == NEBEL_OK && sample == 0 && f->clouds != NULL) result = nb_frame_trace_clouds(f);
+    if (result == NEBEL_OK && sample == 0 && f->clouds != NULL) result = trace_clouds(f);
     f->place = f->renderer->targets.place;
     f->depth = f->renderer->targets.depth;
     if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
