@@ -34,6 +34,14 @@ static inline int nb_vector_make_unit(double v[3])
     return 1;
 }
 
+/* Without the last digits of a direction of length 1, which two renderers have from other sums, so that what hangs on all digits,
+ * such as where walks through clouds halve their pieces, is the same in both, but for one ray of ten thousand. Across 20,000 km they
+ * are a third of a millimetre. */
+static inline void nb_vector_round(double v[3])
+{
+    for (int c = 0; c < 3; c++) v[c] = round(v[c] * 0x1p36) * 0x1p-36;
+}
+
 /* A direction of length 1 at right angles to another. */
 static inline void nb_vector_find_aside(const double v[3], double aside[3])
 {

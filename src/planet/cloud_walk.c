@@ -665,13 +665,6 @@ static void begin(nebel_cloud_workspace *workspace, nb_party *party, const nebel
     if (walk->stay_count > 0) enter(walk, &walk->stays[0]);
 }
 
-/* Where a walk halves its pieces hangs on all digits, and two renderers have the last of them from other sums: without them both
- * walk alike, but for one ray of ten thousand. Across 20,000 km they are a third of a millimetre. */
-static void round_direction(double unit[3])
-{
-    for (int c = 0; c < 3; c++) unit[c] = round(unit[c] * 0x1p36) * 0x1p-36;
-}
-
 /* ---- many walks ------------------------------------------------------------------------------ */
 
 typedef struct nb_rays {
@@ -698,7 +691,7 @@ static void begin_next(nb_rays *rays, nb_walk *walk, nb_party *party)
     const size_t i = rays->next++;
     double unit[3];
     (void)nb_air_is_ray(ray_at(rays, i), unit);
-    round_direction(unit);
+    nb_vector_round(unit);
     begin(rays->workspace, party, ray_at(rays, i), unit, (double)(float)spread_at(rays, i),
           nb_stride_to(rays->knots, rays->knot_stride, i), walk);
     party->ready[party->ready_count++] = walk;
