@@ -107,7 +107,8 @@ static void fill_extinction(nebel_air_view *view, int row, nb_track track, const
     }
 }
 
-/* before: how far before the levels of the table its ends are, 0 or 1/2 of a step. */
+/* before: how far before the levels of the table its ends are, 0 or 1/2 of a step; the first one half of the way, as means are
+ * linear there. */
 static void set_row(const nebel_air_view *view, double number, double before, nb_row *row)
 {
     const nb_airs *airs = &view->atmosphere->airs;
@@ -148,8 +149,8 @@ typedef struct nb_missed {
 
 typedef struct nb_estimates {
     nebel_air_view *view;
-    nb_missed missed[NB_VIEW_ROWS]
-                    [NB_VIEW_MORE_LEVELS]; /* behind the row, and before the level beside that at the start */
+    /* Behind the row, and before the level; that at the start is not counted. */
+    nb_missed missed[NB_VIEW_ROWS][NB_VIEW_MORE_LEVELS];
 } nb_estimates;
 
 /* The two levels between which an end of set_row with `before` is; whole rays have entries of their own. */
