@@ -166,19 +166,25 @@ static void walls_stand_amid_clouds(void **state)
     free_world(&w);
 }
 
+/* Gives the world back. */
+static void check_in_fog(const char *name, world *w, const nebel_camera *camera, uint32_t samples)
+{
+    nb_gl context;
+    nebel_snapshot *const fog = planet_fog(w->scene.sun_direction);
+    pass_open(&context, NB_GL_330);
+    check_samples(name, w, fog, camera, samples);
+    pass_close(&context);
+    nebel_release_snapshot(fog);
+    free_world(w);
+}
+
 static void clouds_lie_in_fog(void **state)
 {
     (void)state;
-    nb_gl context;
+    const nebel_camera camera = planet_camera(120, .25);
     world w;
     make_world(.4, 0, &w);
-    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
-    pass_open(&context, NB_GL_330);
-    const nebel_camera camera = planet_camera(120, .25);
-    check("in fog", &w, fog, &camera);
-    pass_close(&context);
-    nebel_release_snapshot(fog);
-    free_world(&w);
+    check_in_fog("in fog", &w, &camera, 1);
 }
 
 /* Of two samples one sees the ground, the other clouds beyond the horizon, as the middle of the pixel does; in the first row of a
@@ -186,17 +192,11 @@ static void clouds_lie_in_fog(void **state)
 static void the_horizon_lies_between_samples(void **state)
 {
     (void)state;
-    nb_gl context;
     world w;
     make_world(.4, 0, &w);
-    nebel_snapshot *const fog = planet_fog(w.scene.sun_direction);
-    pass_open(&context, NB_GL_330);
     const double pixel = 2 * tan(30 * acos(-1) / 180) / (54 * scale), dip = .62 * pixel;
     const nebel_camera camera = planet_camera(.5 * dip * dip * w.planet.air.radius, pixel);
-    check_samples("the horizon between samples", &w, fog, &camera, 2);
-    pass_close(&context);
-    nebel_release_snapshot(fog);
-    free_world(&w);
+    check_in_fog("the horizon between samples", &w, &camera, 2);
 }
 
 /* From orbit all mist is at the end of long rays, under a sheet and a low sun: pieces that are too long must not be walked to the end again
