@@ -187,16 +187,30 @@ static void clouds_lie_in_fog(void **state)
     check_in_fog("in fog", &w, &camera, 1);
 }
 
-/* Of two samples one sees the ground, the other clouds beyond the horizon, as the middle of the pixel does; in the first row of a
- * block, so that no clouds are shared with pixels of the ground. */
+/* A camera under a low sun that sees the horizon so many pixels below the middle of the picture, which is that of the first row of a
+ * block, so that no clouds are shared with pixels of the ground; the middles of pixels are half of one away. */
+static nebel_camera make_horizon(double below, world *w)
+{
+    const double pixel = 2 * tan(30 * acos(-1) / 180) / (54 * scale), dip = below * pixel;
+    make_world(.4, 0, w);
+    return planet_camera(.5 * dip * dip * w->planet.air.radius, pixel);
+}
+
+/* Of two samples one sees the ground, the other clouds beyond the horizon; the middle of the pixel sees either. */
 static void the_horizon_lies_between_samples(void **state)
 {
     (void)state;
+    static const double low[3] = {.2, -.03, -.97};
+    nb_gl context;
     world w;
-    make_world(.4, 0, &w);
-    const double pixel = 2 * tan(30 * acos(-1) / 180) / (54 * scale), dip = .62 * pixel;
-    const nebel_camera camera = planet_camera(.5 * dip * dip * w.planet.air.radius, pixel);
-    check_in_fog("the horizon between samples", &w, &camera, 2);
+    nebel_camera camera = make_horizon(.62, &w);
+    check_in_fog("the horizon below the middle of a pixel", &w, &camera, 2);
+    camera = make_horizon(.4, &w);
+    memcpy(w.scene.sun_direction, low, sizeof low);
+    pass_open(&context, NB_GL_330);
+    check_samples("above it, without fog", &w, NULL, &camera, 2);
+    pass_close(&context);
+    check_in_fog("above it, in fog", &w, &camera, 2);
 }
 
 /* From orbit all mist is at the end of long rays, under a sheet and a low sun: pieces that are too long must not be walked to the end again

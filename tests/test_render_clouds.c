@@ -434,6 +434,34 @@ static void samples_leave_fog_before_clouds_where_it_is(void **state)
     free_world(&w);
 }
 
+/* Of a row's pixels in the mean, of red. */
+static double row_light(const test_picture *picture, int y)
+{
+    double sum = 0;
+    for (int x = 0; x < WIDTH; x++) sum += (double)picture->planes.color[3 * (y * WIDTH + x)];
+    return sum / WIDTH;
+}
+
+/* Closed clouds hide a dusk: no row stands out, wherever in a pixel the horizon lies; the air is a tenth brighter there at most. */
+static void dusk_does_not_shine_through_at_the_horizon(void **state)
+{
+    (void)state;
+    double most = 0;
+    world w;
+    make_world(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, &w);
+    memcpy(w.scene.sun_direction, (const double[3]){.2, -.07, -.98}, sizeof w.scene.sun_direction);
+    for (int i = 0; i < 8; i++) {
+        const nebel_camera camera = planet_camera(60, .125 * i * 2 * tan(30 * test_pi / 180) / HEIGHT);
+        test_picture picture = render(&w, &camera, 2, 4, 0);
+        for (int y = 1; y + 1 < HEIGHT; y++)
+            most = fmax(most, row_light(&picture, y) / fmax(row_light(&picture, y - 1), row_light(&picture, y + 1)));
+        test_picture_free(&picture);
+    }
+    print_message("under closed clouds at dusk a row has %.3f of the light of those beside it at most\n", most);
+    assert_true(most < 1.1);
+    free_world(&w);
+}
+
 /* By how much the pixel that stands out most is darker or brighter than all eight around it, of light. */
 static double find_dot(const test_picture *picture)
 {
@@ -746,6 +774,7 @@ int main(void)
         cmocka_unit_test(clouds_end_at_surfaces),
         cmocka_unit_test(fog_lies_among_clouds),
         cmocka_unit_test(samples_leave_fog_before_clouds_where_it_is),
+        cmocka_unit_test(dusk_does_not_shine_through_at_the_horizon),
         cmocka_unit_test(the_ground_has_shadows),
         cmocka_unit_test(air_under_clouds_is_dim),
         cmocka_unit_test(surfaces_under_clouds_have_less_sky),

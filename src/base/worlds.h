@@ -94,6 +94,40 @@ static inline double nb_worlds_cloudy_ground(const nb_world *worlds, int count, 
     return 0;
 }
 
+/* Of a pixel's width: samples are no farther from its middle. Rays are lifted to above the horizon by that part of it. */
+#define NB_WORLD_CORNER 0.75
+#define NB_WORLD_LIFT_OVER 1e-3
+
+/* A pixel whose middle meets the ground may have samples that see the sky: the ray through its middle (of any length, `pixel` radians
+ * wide), where it is no more than a pixel's corner below the horizon, lifted to just above it. Returns whether it was. */
+static inline int nb_world_lift(const nb_world *world, const double eye[3], double pixel, double direction[3])
+{
+    const double length = nb_vector_length(direction);
+    double down[3], unit[3];
+    for (int c = 0; c < 3; c++) {
+        down[c] = world->center[c] - eye[c];
+        unit[c] = direction[c] / length;
+    }
+    if (!(nb_world_ground(world, eye, unit) > 0)) return 0;
+    const double far = nb_vector_length(down), height = far - world->radius;
+    const double cosine = nb_vector_dot(down, unit) / far, sine = sqrt(fmax(0, (1 - cosine) * (1 + cosine)));
+    const double below = atan2(world->radius, sqrt(height * (far + world->radius))) - atan2(sine, cosine);
+    if (!(below < NB_WORLD_CORNER * pixel && sine > 0)) return 0;
+    const double lift = below + NB_WORLD_LIFT_OVER * pixel, aside = sin(lift) / sine;
+    for (int c = 0; c < 3; c++)
+        direction[c] = length * (cos(lift) * unit[c] + aside * (cosine * unit[c] - down[c] / far));
+    return 1;
+}
+
+/* The same by the ground of the planet with clouds. */
+static inline int nb_worlds_lift(const nb_world *worlds, int count, const double eye[3], double pixel,
+                                 double direction[3])
+{
+    for (int k = 0; k < count; k++)
+        if (worlds[k].planet->clouds != NULL) return nb_world_lift(&worlds[k], eye, pixel, direction);
+    return 0;
+}
+
 /* Whose shadow, and whose sky, a place is in. */
 static inline int nb_worlds_nearest(const nb_world *worlds, int count, const double place[3])
 {

@@ -44,12 +44,30 @@ void nb_cloudscape_free(nb_frame *frame)
 
 /* ---- along the middles of pixels ------------------------------------------------------------- */
 
+/* The air has the shade of those that are lifted. */
+static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
+{
+    const nb_air *air = &frame->air;
+    clouds->middles = clouds->rays;
+    for (int i = 0; i < NB_BATCH; i++) {
+        const double pixel = air->pixel / (double)clouds->rays.length[i];
+        double direction[3];
+        for (int c = 0; c < 3; c++) direction[c] = clouds->rays.direction[c][i];
+        clouds->is_lifted[i] = clouds->has_lifted[i] =
+            frame->samples > 1 && nb_worlds_lift(air->worlds, air->count, air->position, pixel, direction);
+        for (int c = 0; c < 3; c++) clouds->rays.direction[c][i] = direction[c];
+    }
+    nb_view_finish_rays(&frame->view, &clouds->rays);
+    clouds->lifted = clouds->rays;
+}
+
 nebel_result nb_cloudscape_start(const nb_frame *frame, const nb_place *place, nb_scratch *scratch)
 {
     nb_cloud_scratch *clouds = &scratch->clouds;
     nb_view_rays(&frame->view, place->left, place->top, scratch->centers.x + place->first,
                  scratch->centers.y + place->first, &clouds->rays);
     memset(clouds->reach, 0, sizeof clouds->reach);
+    lift_rays(frame, clouds);
     nb_fog_shade_start(scratch);
     for (uint32_t i = 0; i < NB_BATCH; i++) clouds->knots[i].count = clouds->shaded_count[i] = 0;
     return nb_cloud_air_shade(frame, place, clouds);
@@ -87,6 +105,27 @@ static int is_found(const nb_cloud_scratch *clouds, int lane)
     const nebel_cloud_knots *knots = &clouds->knots[lane];
     const float last = knots->count > 0 ? knots->t[knots->count - 1] : 0;
     return nb_cloud_is_found(knots->count, knots->t[0], last, clouds->reach[lane], clouds->end[lane]);
+}
+
+static void take_ray(const nb_rays *from, int lane, nb_rays *to)
+{
+    to->length[lane] = from->length[lane];
+    for (int c = 0; c < 3; c++) {
+        to->direction[c][lane] = from->direction[c][lane];
+        to->unit[c][lane] = from->unit[c][lane];
+        to->start[c][lane] = from->start[c][lane];
+    }
+}
+
+/* As a sample sees the sky or does not. What was found along the other ray is no more. */
+static void choose_ray(const nb_scratch *scratch, int lane, nb_cloud_scratch *clouds)
+{
+    const int sees_sky = scratch->distance[lane] == HUGE_VALF;
+    if (!clouds->has_lifted[lane] || clouds->is_lifted[lane] == sees_sky) return;
+    take_ray(sees_sky ? &clouds->lifted : &clouds->middles, lane, &clouds->rays);
+    clouds->is_lifted[lane] = sees_sky;
+    clouds->knots[lane].count = 0;
+    clouds->reach[lane] = 0;
 }
 
 static uint32_t lane_of(int pixel)
@@ -132,10 +171,14 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
     nb_cloud_block block;
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t lane = lane_of(i);
-        if (scratch->inside[lane]) clouds->end[lane] = end_of(frame, scratch, lane);
+        if (scratch->inside[lane]) {
+            choose_ray(scratch, (int)lane, clouds);
+            clouds->end[lane] = end_of(frame, scratch, lane);
+        }
         block.ground[i] = ground_of(frame, clouds, lane);
         block.is_wanted[i] = scratch->inside[lane] && !is_found(clouds, (int)lane);
         block.is_open[i] = scratch->distance[lane] == HUGE_VALF || scratch->air.ground.distance[lane] < HUGE_VALF;
+        block.is_open[i] &= !(clouds->has_lifted[lane] && clouds->is_lifted[lane]);
         block.knots[i] = &clouds->knots[lane];
     }
     const nebel_result result = trace_block(frame, &block, clouds);

@@ -18,9 +18,9 @@ static nebel_result find(const nb_frame *frame, const nb_cloud_scratch *clouds, 
     nebel_ray ray;
     for (int c = 0; c < 3; c++) {
         ray.origin[c] = air->position[c];
-        ray.direction[c] = clouds->rays.direction[c][lane];
+        ray.direction[c] = clouds->lifted.direction[c][lane];
     }
-    return nb_fog_shade_along(clouds->workspace, &air->roof, ray, air->pixel / (double)clouds->rays.length[lane],
+    return nb_fog_shade_along(clouds->workspace, &air->roof, ray, air->pixel / (double)clouds->lifted.length[lane],
                               shade);
 }
 

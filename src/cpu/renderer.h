@@ -44,11 +44,14 @@ typedef struct nb_shell_scratch {
     float fog_left[3][NB_BATCH], light[3][NB_BATCH], light_before[3][NB_BATCH]; /* of fog up to there */
 } nb_shell_scratch;
 
-/* Clouds through the middles of pixels. */
+/* Clouds through the middles of pixels; for samples that see the sky where the middle just meets the ground along that ray lifted to
+ * above the horizon. */
 typedef struct nb_cloud_scratch {
     nebel_cloud_workspace *workspace; /* for a frame with clouds */
     nb_rays rays, rays_of_samples;    /* the latter meanwhile */
-    float reach[NB_BATCH];            /* m, how far they are known */
+    nb_rays middles, lifted;          /* one of them each ray is */
+    int has_lifted[NB_BATCH], is_lifted[NB_BATCH];
+    float reach[NB_BATCH]; /* m, how far they are known */
     int is_new[NB_BATCH];
     nebel_cloud_knots knots[NB_BATCH];
     nebel_ray asked[NB_BATCH]; /* one behind the other: rays that clouds are looked for along, and what is found */

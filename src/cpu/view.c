@@ -146,6 +146,12 @@ double nb_view_pixel(const nb_view *view, uint32_t height)
     return view->projection == NEBEL_PROJECTION_PANORAMA ? pi / height : nb_vector_length(view->step_y);
 }
 
+void nb_view_finish_rays(const nb_view *view, nb_rays *rays)
+{
+    set_units(rays);
+    set_starts(view, rays);
+}
+
 void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays)
 {
     double base[3];
@@ -162,6 +168,5 @@ void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float 
         panorama_directions(view, base, x, y, rays);
         break;
     }
-    set_units(rays);
-    set_starts(view, rays);
+    nb_view_finish_rays(view, rays);
 }

@@ -45,4 +45,7 @@ double nb_view_pixel(const nb_view *view, uint32_t height);
 /* The rays through the points left + x, top + y. */
 void nb_view_rays(const nb_view *view, uint32_t left, uint32_t top, const float *x, const float *y, nb_rays *rays);
 
+/* What follows of directions that were changed. */
+void nb_view_finish_rays(const nb_view *view, nb_rays *rays);
+
 #endif

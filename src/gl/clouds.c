@@ -16,9 +16,7 @@ typedef struct job {
     const nb_cloud_picture *picture, *middle; /* middle: of the middles of pixels, where picture is of a sample */
     void (*row)(const struct job *j, nb_cloud_part *part, uint32_t y);                  /* NULL: */
     void (*rows)(const struct job *j, nb_cloud_part *part, uint32_t top, uint32_t end); /* from the first row on */
-    const nb_world *worlds;
-    int world_count, has_fog;
-    float *marks; /* where fog is to be known next */
+    float *marks; /* where fog is to be known next, and along which ray */
     const float *places;
     float *over, *shade;
     const nb_fog_roof *roof;
@@ -94,6 +92,29 @@ static double direction_at(const nb_cloud_picture *picture, uint32_t x, uint32_t
     const double up = ((2 * y + 1.) / view->height - 1 + clip[9]) / clip[5];
     for (int i = 0; i < 3; i++) direction[i] = right * eye[4 * i] + up * eye[4 * i + 1] - eye[4 * i + 2];
     return nb_vector_length(direction);
+}
+
+/* Returns how many radians wide it is. */
+static double ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, nebel_ray *ray)
+{
+    const double length = direction_at(picture, x, y, ray->direction);
+    memcpy(ray->origin, picture->eye, sizeof ray->origin);
+    ray->t_max = HUGE_VAL;
+    return picture->pixel / length;
+}
+
+/* To above the horizon, where samples may see the sky though the middle of their pixel meets the ground. Returns whether it was. */
+static int lift(const nb_cloud_picture *picture, double spread, nebel_ray *ray)
+{
+    return picture->lifts && nb_worlds_lift(picture->worlds, picture->world_count, ray->origin, spread, ray->direction);
+}
+
+/* Along which knots are found for all samples at once: among fog, which is not asked again, it is lifted. */
+static double first_ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, nebel_ray *ray)
+{
+    const double spread = ray_at(picture, x, y, ray);
+    if (picture->has_fog) (void)lift(picture, spread, ray);
+    return spread;
 }
 
 /* ---- the view -------------------------------------------------------------------------------- */
@@ -196,19 +217,11 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
         lights.transmittance[c] = left[c];
         lights.in_scattering[c] = light[c];
     }
-    result = nb_worlds_trace(j->worlds, j->world_count, shade.count + 1, direction, shade.t, &lights);
+    result = nb_worlds_trace(j->picture->worlds, j->picture->world_count, shade.count + 1, direction, shade.t, &lights);
     if (result != NEBEL_OK) return result;
     pixel->piece_count = nb_shaded_set(&shade, light, part->pieces + part->piece_count);
     part->piece_count += pixel->piece_count;
     return NEBEL_OK;
-}
-
-static double ray_at(const nb_cloud_picture *picture, uint32_t x, uint32_t y, nebel_ray *ray)
-{
-    const double length = direction_at(picture, x, y, ray->direction);
-    memcpy(ray->origin, picture->eye, sizeof ray->origin);
-    ray->t_max = HUGE_VAL;
-    return picture->pixel / length;
 }
 
 /* Some of its pixels. */
@@ -236,7 +249,7 @@ static float ground_of(const job *j, const nebel_ray *ray)
     const double length = nb_vector_length(ray->direction);
     double unit[3];
     for (int c = 0; c < 3; c++) unit[c] = ray->direction[c] / length;
-    return (float)nb_worlds_cloudy_ground(j->worlds, j->world_count, ray->origin, unit);
+    return (float)nb_worlds_cloudy_ground(j->picture->worlds, j->picture->world_count, ray->origin, unit);
 }
 
 /* The pixels of a block in some rows; end: its last row's next. */
@@ -252,7 +265,7 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
         block.is_open[i] = 1;
         block.knots[i] = &bundle->knots[i];
         if (!block.is_wanted[i]) continue;
-        bundle->spreads[i] = ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
+        bundle->spreads[i] = first_ray_at(j->picture, x, view->height - 1 - y, &bundle->rays[i]);
         block.ground[i] = ground_of(j, &bundle->rays[i]);
     }
     nb_cloud_block_begin(&block);
@@ -272,7 +285,9 @@ static nebel_result keep_block(const job *j, nb_cloud_part *part, uint32_t left,
         const uint32_t x = left + i % NB_CLOUD_SHARE_COLUMNS, y = top + i / NB_CLOUD_SHARE_COLUMNS;
         if (x >= view->width || y >= end) continue;
         nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)(view->height - 1 - y) * view->width + x];
-        result = shade_air(j, part, &part->bundle->rays[i], pixel);
+        nebel_ray ray = part->bundle->rays[i];
+        (void)lift(j->picture, part->bundle->spreads[i], &ray);
+        result = shade_air(j, part, &ray, pixel);
         if (result == NEBEL_OK) result = keep_knots(j, part, &part->bundle->knots[i], pixel);
     }
     return result;
@@ -287,8 +302,7 @@ static void trace_rows(const job *j, nb_cloud_part *part, uint32_t top, uint32_t
     }
 }
 
-nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
-                                int count)
+nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *picture)
 {
     void *list = clouds->pixels;
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
@@ -296,7 +310,7 @@ nebel_result nb_gl_clouds_trace(nb_gl_clouds *clouds, const nb_cloud_picture *pi
         return NEBEL_ERROR_MEMORY;
     clouds->pixels = list;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) clouds->parts[i].count = clouds->parts[i].piece_count = 0;
-    job j = {.clouds = clouds, .picture = picture, .rows = trace_rows, .worlds = worlds, .world_count = count};
+    job j = {.clouds = clouds, .picture = picture, .rows = trace_rows};
     return do_parts(&j);
 }
 
@@ -312,6 +326,7 @@ static void write_shade_row(const job *j, nb_cloud_part *part, uint32_t y)
         nebel_ray ray;
         nb_fog_shade fog;
         const double spread = ray_at(picture, x, y, &ray);
+        (void)lift(picture, spread, &ray);
         if (j->roof != NULL) part->result = nb_fog_shade_along(part->workspace, j->roof, ray, spread, &fog);
         if (part->result != NEBEL_OK) return;
         const uint32_t layers = nb_gl_cloud_shade_write(
@@ -360,8 +375,8 @@ static nebel_result find_mix(const job *j, const nb_cloud_part *part, const nb_c
         memcpy(mix->knots.in_scattering[k], list[k].light, sizeof list[k].light);
     }
     nb_cloud_haze_ask(&mix->knots, direction, &mix->air, &rays);
-    const nebel_result result =
-        nb_worlds_trace(j->worlds, j->world_count, pixel->count, rays.direction, mix->knots.t, &rays.lights);
+    const nebel_result result = nb_worlds_trace(j->picture->worlds, j->picture->world_count, pixel->count,
+                                                rays.direction, mix->knots.t, &rays.lights);
     for (uint32_t k = 0; k < pixel->count && result == NEBEL_OK; k++) {
         if (list[k].is_marked) nb_cloud_mark(&mix->marks, k, list[k].haze_left, list[k].haze_light);
         for (int c = 0; c < 3; c++) mix->air.light[c][k] = shaded_at(part, pixel, c, list[k].t, mix->air.light[c][k]);
@@ -395,17 +410,18 @@ static void choose_row(const job *j, nb_cloud_part *part, uint32_t y)
     for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
         const size_t i = (size_t)y * j->picture->view->width + x;
         nb_cloud_pixel *const pixel = &j->clouds->pixels[i];
-        double direction[3];
-        (void)direction_at(j->picture, x, y, direction);
+        float *const mark = j->marks + 4 * i;
+        nebel_ray ray;
+        const double inverse = first_ray_at(j->picture, x, y, &ray) / j->picture->pixel;
         pixel->next = -1;
-        if (pixel->count > 0) part->result = choose_pixel(j, part, pixel, direction);
+        if (pixel->count > 0) part->result = choose_pixel(j, part, pixel, ray.direction);
         if (part->result != NEBEL_OK) return;
-        j->marks[i] = pixel->next >= 0 ? part->knots[pixel->first + (uint32_t)pixel->next].t : 0;
+        mark[0] = pixel->next >= 0 ? part->knots[pixel->first + (uint32_t)pixel->next].t : 0;
+        for (int c = 0; c < 3; c++) mark[1 + c] = (float)(ray.direction[c] * inverse);
     }
 }
 
-nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds,
-                                 int count, float *places, int *any)
+nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *picture, float *places, int *any)
 {
     const size_t pixels = (size_t)picture->view->width * picture->view->height;
     for (int i = 0; i < NB_CLOUD_PARTS; i++) {
@@ -418,12 +434,7 @@ nebel_result nb_gl_clouds_choose(nb_gl_clouds *clouds, const nb_cloud_picture *p
         part->capacity_before = capacity;
         part->count = 0;
     }
-    job j = {.clouds = clouds,
-             .picture = picture,
-             .row = choose_row,
-             .worlds = worlds,
-             .world_count = count,
-             .marks = places};
+    job j = {.clouds = clouds, .picture = picture, .row = choose_row, .marks = places};
     const nebel_result result = do_parts(&j);
     *any = 0;
     for (size_t i = 0; i < pixels && result == NEBEL_OK; i++) *any |= clouds->pixels[i].next >= 0;
@@ -454,6 +465,7 @@ void nb_gl_clouds_mark(nb_gl_clouds *clouds, const nb_cloud_picture *picture, co
     }
 }
 
+/* Without fog where none is marked. */
 static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel,
                               const double direction[3], nb_cloud_knot *list)
 {
@@ -463,7 +475,7 @@ static nebel_result mix_pixel(const job *j, const nb_cloud_part *part, const nb_
     nb_cloud_haze haze = mix.air;
     for (int c = 0; c < 3; c++) {
         float over[NEBEL_MAX_CLOUD_KNOTS];
-        if (j->has_fog) nb_cloud_haze_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
+        if (mix.marks.is_set[0]) nb_cloud_haze_add_fog(&mix.knots, &mix.marks, c, &mix.air, &haze);
         nb_cloud_haze_sum(&mix.knots, c, &haze, over);
         for (uint32_t k = 0; k < pixel->count; k++) list[k].light[c] = over[k];
     }
@@ -474,21 +486,15 @@ static void mix_row(const job *j, nb_cloud_part *part, uint32_t y)
 {
     for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
         const nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)y * j->picture->view->width + x];
-        double direction[3];
-        (void)direction_at(j->picture, x, y, direction);
-        if (pixel->count > 0) part->result = mix_pixel(j, part, pixel, direction, part->knots + pixel->first);
+        nebel_ray ray;
+        (void)first_ray_at(j->picture, x, y, &ray);
+        if (pixel->count > 0) part->result = mix_pixel(j, part, pixel, ray.direction, part->knots + pixel->first);
     }
 }
 
-nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_world *worlds, int count,
-                              int has_fog)
+nebel_result nb_gl_clouds_mix(nb_gl_clouds *clouds, const nb_cloud_picture *picture)
 {
-    job j = {.clouds = clouds,
-             .picture = picture,
-             .row = mix_row,
-             .worlds = worlds,
-             .world_count = count,
-             .has_fog = has_fog};
+    job j = {.clouds = clouds, .picture = picture, .row = mix_row};
     return do_parts(&j);
 }
 
@@ -511,50 +517,70 @@ static void lay_over(const nb_cloud_knot *knots, uint32_t count, float end, floa
     over[3] = (1 - part) * a->left + part * b->left;
 }
 
-/* How far clouds matter to a ray that ends at t, which is known to some float digits. */
-static float cloud_end(const job *j, const double direction[3], float t)
+/* Where a ray ends, and how far clouds matter to it. */
+typedef struct nb_cloud_end {
+    float t;
+    int is_on_ground, is_in_sky;
+} nb_cloud_end;
+
+/* t: 0: in the sky; it is known to some float digits. */
+static nb_cloud_end end_at(const job *j, const double direction[3], float t)
 {
     const double length = nb_vector_length(direction);
     double unit[3];
+    if (!(t > 0)) return (nb_cloud_end){.t = HUGE_VALF, .is_in_sky = 1};
     for (int c = 0; c < 3; c++) unit[c] = direction[c] / length;
-    for (int k = 0; k < j->world_count; k++) {
-        const nb_world *const world = &j->worlds[k];
+    for (int k = 0; k < j->picture->world_count; k++) {
+        const nb_world *const world = &j->picture->worlds[k];
         double from[3];
         for (int c = 0; c < 3; c++) from[c] = j->picture->eye[c] + (double)t * unit[c] - world->center[c];
-        if (nb_vector_length(from) - world->radius < NEAR_GROUND * ((double)t + world->radius))
-            return (float)nb_cloud_ground_end(world->center, j->picture->eye, unit, (double)t);
+        if (nb_vector_length(from) - world->radius < NEAR_GROUND * ((double)t + world->radius)) {
+            const double end = nb_cloud_ground_end(world->center, j->picture->eye, unit, (double)t);
+            return (nb_cloud_end){.t = (float)end, .is_on_ground = 1};
+        }
     }
-    return t;
+    return (nb_cloud_end){.t = t};
 }
 
-/* Whether knots up to the ground do for a ray that ends there: among fog, which is not asked again, they must. */
+/* Whether knots up to the ground do for a ray that ends there: among fog they must. */
 static int is_found(const job *j, const nb_cloud_part *part, const nb_cloud_pixel *pixel, float end)
 {
     const nb_cloud_knot *const knots = part->knots + pixel->first;
-    if (pixel->count == 0 || j->has_fog) return 1;
+    if (pixel->count == 0 || j->picture->has_fog) return 1;
     return nb_cloud_is_found(pixel->count, knots[0].t, knots[pixel->count - 1].t, HUGE_VALF, end);
 }
 
-static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uint32_t y, float end, float over[4])
+/* Along another ray, or up to another place. */
+static nebel_result lay_anew(const job *j, nb_cloud_part *part, const nb_cloud_pixel *pixel, const nebel_ray *ray,
+                             double spread, float over[4])
 {
-    const nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)y * j->picture->view->width + x];
+    nb_cloud_pixel anew = *pixel;
     nb_cloud_knot list[NEBEL_MAX_CLOUD_KNOTS];
     nebel_cloud_knots knots;
-    nebel_ray ray;
-    if (is_found(j, part, pixel, end)) {
-        lay_over(part->knots + pixel->first, pixel->count, end, over);
-        return NEBEL_OK;
-    }
-    const double spread = ray_at(j->middle, x, y, &ray);
-    ray.t_max = (double)end;
-    nebel_result result = nebel_trace_clouds(part->workspace, 1, &ray, 0, &spread, 0, &knots, 0);
+    nebel_result result = nebel_trace_clouds(part->workspace, 1, ray, 0, &spread, 0, &knots, 0);
     if (result != NEBEL_OK) return result;
-    nb_cloud_pixel anew = *pixel;
     anew.count = knots.count;
     set_knots(&knots, list);
-    if (knots.count > 0) result = mix_pixel(j, part, &anew, ray.direction, list);
-    lay_over(list, knots.count, end, over);
+    if (knots.count > 0) result = mix_pixel(j, part, &anew, ray->direction, list);
+    lay_over(list, knots.count, (float)ray->t_max, over);
     return result;
+}
+
+/* Along the middle of the pixel, or lifted from there for what is in the sky. Fog is not asked again: what is on the ground has none
+ * among its clouds where the pixel's is that of the sky. */
+static nebel_result lay_pixel(const job *j, nb_cloud_part *part, uint32_t x, uint32_t y, const nb_cloud_end *end,
+                              float over[4])
+{
+    const nb_cloud_pixel *const pixel = &j->clouds->pixels[(size_t)y * j->picture->view->width + x];
+    nebel_ray ray;
+    const double spread = ray_at(j->middle, x, y, &ray);
+    nebel_ray lifted = ray;
+    const int has_other = lift(j->middle, spread, &lifted);
+    ray.t_max = lifted.t_max = (double)end->t;
+    if ((has_other && (j->picture->has_fog ? end->is_on_ground : end->is_in_sky)) || !is_found(j, part, pixel, end->t))
+        return lay_anew(j, part, pixel, end->is_in_sky ? &lifted : &ray, spread, over);
+    lay_over(part->knots + pixel->first, pixel->count, end->t, over);
+    return NEBEL_OK;
 }
 
 static nebel_result shade(const job *j, nb_cloud_part *part, const double direction[3], double t, float left[4])
@@ -573,26 +599,21 @@ static void end_row(const job *j, nb_cloud_part *part, uint32_t y)
     for (uint32_t x = 0; x < j->picture->view->width && part->result == NEBEL_OK; x++) {
         const size_t i = (size_t)y * j->picture->view->width + x;
         const float t = j->places[4 * i];
-        const float end = t > 0 ? t : HUGE_VALF;
         double direction[3];
         (void)direction_at(j->picture, x, y, direction);
-        const float cloudy = t > 0 ? cloud_end(j, direction, t) : end;
-        part->result = lay_pixel(j, part, x, y, cloudy, j->over + 4 * i);
+        const nb_cloud_end end = end_at(j, direction, t);
+        part->result = lay_pixel(j, part, x, y, &end, j->over + 4 * i);
         if (t > 0 && part->result == NEBEL_OK) part->result = shade(j, part, direction, (double)t, j->shade + 4 * i);
     }
 }
 
 nebel_result nb_gl_clouds_end(nb_gl_clouds *clouds, const nb_cloud_picture *picture, const nb_cloud_picture *middle,
-                              const nb_world *worlds, int count, int has_fog, const float *places, float *over,
-                              float *shade_plane)
+                              const float *places, float *over, float *shade_plane)
 {
     job j = {.clouds = clouds,
              .picture = picture,
              .middle = middle,
              .row = end_row,
-             .worlds = worlds,
-             .world_count = count,
-             .has_fog = has_fog,
              .places = places,
              .over = over,
              .shade = shade_plane};

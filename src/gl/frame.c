@@ -269,6 +269,7 @@ static nebel_result draw_exact_fog(const frame *f)
                              .daylight = r->daylit.lit != NULL && r->daylit.by_air ? r->scene : NULL,
                              .even_shade = f->even_shade,
                              .cloud_shade = f->clouds != NULL ? &r->cloud_shade : NULL,
+                             .is_turned = f->clouds != NULL && f->place == r->cloud_ends,
                              .shafts = f->shafts ? &r->shafts : NULL};
     double low[3], high[3];
     if (has_lamps(f) && r->fog != NULL && nebel_snapshot_lamplit_fog(r->fog, low, high))

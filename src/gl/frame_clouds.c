@@ -23,9 +23,14 @@ static size_t count_pixels(const nb_gl_frame *f)
     return (size_t)f->view.width * f->view.height;
 }
 
-static float *make_plane(const nb_gl_frame *f, size_t channels)
+static float *make_plane(const nb_gl_frame *f)
 {
-    return nb_allocate(&f->renderer->allocator, count_pixels(f) * channels, sizeof(float));
+    return nb_allocate(&f->renderer->allocator, 4 * count_pixels(f), sizeof(float));
+}
+
+static int has_fog(const nb_gl_frame *f)
+{
+    return f->renderer->fog != NULL && nebel_snapshot_volume_count(f->renderer->fog) > 0;
 }
 
 static nebel_result ask(void *user)
@@ -40,24 +45,27 @@ static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pi
                               .pixel = nb_camera_pixel(view, f->panorama),
                               .point = point,
                               .eye = {f->eye[0], f->eye[1], f->eye[2]},
+                              .worlds = f->renderer->air.worlds,
+                              .world_count = f->renderer->air.count,
+                              .has_fog = has_fog(f),
                               .ask = ask,
                               .ask_user = f};
 }
 
 static nb_cloud_picture picture_of_middles(nb_gl_frame *f)
 {
-    return picture_of(f, &f->view, nb_pixel_sample(0, 1));
+    nb_cloud_picture picture = picture_of(f, &f->view, nb_pixel_sample(0, 1));
+    picture.lifts = f->samples > 1;
+    return picture;
 }
 
-/* The usual unpacking. A plane of 4 numbers, or of 1, which is that of all colours. */
-static nebel_result upload(const nb_gl_frame *f, unsigned *texture, int channels, const float *texels)
+/* The usual unpacking. A plane of 4 numbers. */
+static nebel_result upload(const nb_gl_frame *f, unsigned *texture, const float *texels)
 {
     glActiveTexture(GL_TEXTURE0);
     nb_words_bind(texture);
-    glTexImage2D(GL_TEXTURE_2D, 0, channels == 4 ? GL_RGBA32F : GL_R32F, (GLsizei)f->view.width,
-                 (GLsizei)f->view.height, 0, channels == 4 ? GL_RGBA : GL_RED, GL_FLOAT, texels);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_G, channels == 4 ? GL_GREEN : GL_RED);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_B, channels == 4 ? GL_BLUE : GL_RED);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, (GLsizei)f->view.width, (GLsizei)f->view.height, 0, GL_RGBA, GL_FLOAT,
+                 texels);
     return nb_context_check_memory(log_of(f), "clouds; ask for fewer pixels");
 }
 
@@ -70,17 +78,12 @@ static void read_back(const nb_gl_frame *f, unsigned framebuffer, int attachment
 
 /* ---- the whole frame ------------------------------------------------------------------------- */
 
-static int has_fog(const nb_gl_frame *f)
-{
-    return f->renderer->fog != NULL && nebel_snapshot_volume_count(f->renderer->fog) > 0;
-}
-
 /* Where there are no clouds rays end at once. */
 static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *light)
 {
     nebel_gl_renderer *const r = f->renderer;
-    for (size_t i = 0; i < count_pixels(f); i++) ends[i] = fmaxf(ends[i], 1e-30f);
-    nebel_result result = upload(f, &r->cloud_ends, 1, ends);
+    for (size_t i = 0; i < count_pixels(f); i++) ends[4 * i] = fmaxf(ends[4 * i], 1e-30f);
+    nebel_result result = upload(f, &r->cloud_ends, ends);
     f->place = r->cloud_ends;
     if (result == NEBEL_OK) result = nb_frame_draw_fog(f);
     if (result != NEBEL_OK) return result;
@@ -89,7 +92,7 @@ static nebel_result find_fog(nb_gl_frame *f, float *ends, float *left, float *li
     return NEBEL_OK;
 }
 
-/* Planes of the frame: where fog is asked for, and what air and fog do up to there. */
+/* Planes of the frame: where fog is asked for and along which ray, and what air and fog do up to there. */
 typedef struct fog_planes {
     float *places, *left, *light;
 } fog_planes;
@@ -100,7 +103,7 @@ static nebel_result find_marks(nb_gl_frame *f, const nb_cloud_picture *picture, 
     nebel_gl_renderer *const r = f->renderer;
     for (;;) {
         int any;
-        nebel_result result = nb_gl_clouds_choose(&r->clouds, picture, r->air.worlds, r->air.count, fog->places, &any);
+        nebel_result result = nb_gl_clouds_choose(&r->clouds, picture, fog->places, &any);
         if (result != NEBEL_OK || !any) return result;
         result = find_fog(f, fog->places, fog->left, fog->light);
         if (result != NEBEL_OK) return result;
@@ -111,7 +114,7 @@ static nebel_result find_marks(nb_gl_frame *f, const nb_cloud_picture *picture, 
 static nebel_result find_all_fog(nb_gl_frame *f, const nb_cloud_picture *picture)
 {
     nebel_gl_renderer *const r = f->renderer;
-    const fog_planes fog = {.places = make_plane(f, 1), .left = make_plane(f, 4), .light = make_plane(f, 4)};
+    const fog_planes fog = {.places = make_plane(f), .left = make_plane(f), .light = make_plane(f)};
     nebel_result result = fog.places != NULL && fog.left != NULL && fog.light != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK) result = find_marks(f, picture, &fog);
     nb_release(&r->allocator, fog.places);
@@ -160,11 +163,11 @@ nebel_result nb_frame_trace_clouds(nb_gl_frame *f)
 {
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of_middles(f);
-    nebel_result result = nb_gl_clouds_trace(&r->clouds, &picture, r->air.worlds, r->air.count);
+    nebel_result result = nb_gl_clouds_trace(&r->clouds, &picture);
     if (result == NEBEL_OK) result = find_shade(f);
     if (result == NEBEL_OK) result = draw_shade(f, &picture);
     if (result == NEBEL_OK && has_fog(f)) result = find_all_fog(f, &picture);
-    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture, r->air.worlds, r->air.count, has_fog(f));
+    if (result == NEBEL_OK) result = nb_gl_clouds_mix(&r->clouds, &picture);
     return fail_memory(f, result);
 }
 
@@ -175,16 +178,15 @@ nebel_result nb_frame_end_clouds(nb_gl_frame *f)
     nebel_gl_renderer *const r = f->renderer;
     const nb_cloud_picture picture = picture_of(f, f->panorama ? &f->view : &f->sample_view, f->point);
     const nb_cloud_picture middle = picture_of_middles(f);
-    float *const places = make_plane(f, 4), *const over = make_plane(f, 4), *const shade = make_plane(f, 4);
+    float *const places = make_plane(f), *const over = make_plane(f), *const shade = make_plane(f);
     nebel_result result = places != NULL && over != NULL && shade != NULL ? NEBEL_OK : NEBEL_ERROR_MEMORY;
     if (result == NEBEL_OK) {
         read_back(f, r->targets.surface_buffer, 0, places);
-        result = nb_gl_clouds_end(&r->clouds, &picture, &middle, r->air.worlds, r->air.count, has_fog(f), places, over,
-                                  shade);
+        result = nb_gl_clouds_end(&r->clouds, &picture, &middle, places, over, shade);
     }
     result = fail_memory(f, result);
-    if (result == NEBEL_OK) result = upload(f, &r->cloud_over, 4, over);
-    if (result == NEBEL_OK) result = upload(f, &r->cloud_dimming, 4, shade);
+    if (result == NEBEL_OK) result = upload(f, &r->cloud_over, over);
+    if (result == NEBEL_OK) result = upload(f, &r->cloud_dimming, shade);
     nb_release(&r->allocator, places);
     nb_release(&r->allocator, over);
     nb_release(&r->allocator, shade);

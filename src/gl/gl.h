@@ -63,7 +63,8 @@ typedef struct nb_gl_picture {
     const nebel_scene_data *daylight; /* whose sun lights fog in that air, by its place; NULL: the fog's own sun does */
     float even_shade;                 /* part of that sun that clouds leave */
     const struct nb_gl_cloud_shade *cloud_shade; /* of clouds; NULL: there are none */
-    const struct nb_shafts *shafts;              /* where surfaces shade fog; NULL: nowhere. Changes their units */
+    int is_turned; /* behind its distances the depth texture has the directions of rays; with cloud_shade only */
+    const struct nb_shafts *shafts; /* where surfaces shade fog; NULL: nowhere. Changes their units */
 } nb_gl_picture;
 
 /* nebel_gl_draw_fog along these. */

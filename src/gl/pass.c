@@ -267,7 +267,10 @@ static void set_uniforms(const task *t, GLuint target_framebuffer)
     if (t->picture->daylight != NULL)
         nb_gl_air_set_daylight(t->picture->air, p->name, t->picture->daylight, t->picture->even_shade);
     if (is_shaded(t->picture)) nb_gl_air_set_reach(t->picture->air, p->name);
-    if (t->picture->cloud_shade != NULL) nb_gl_cloud_shade_set(t->picture->cloud_shade, p->name);
+    if (t->picture->cloud_shade != NULL) {
+        nb_gl_cloud_shade_set(t->picture->cloud_shade, p->name);
+        glUniform1i(glGetUniformLocation(p->name, "pass_is_turned"), t->picture->is_turned);
+    }
     if (t->picture->shafts != NULL) nb_shafts_set(t->picture->shafts, p->name);
 }
 

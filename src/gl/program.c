@@ -35,6 +35,9 @@ static const char fragment_text[] =
     "uniform highp sampler2D pass_depth;\n"
     "#define PASS_COLOR highp sampler2D\n"
     "#endif\n"
+    "#ifdef PASS_CLOUDS\n"
+    "uniform bool pass_is_turned;\n" /* rays go where pass_depth says behind the distance */
+    "#endif\n"
     "#ifdef PASS_COMPOSE\n"
     "uniform PASS_COLOR pass_color;\n"
     "#endif\n"
@@ -71,9 +74,12 @@ static const char fragment_text[] =
     "}\n";
 
 static const char whole_text[] =
-    "nebel_light pass_fog(vec2 pixel, float depth)\n"
+    "nebel_light pass_fog(vec2 pixel, vec4 place)\n"
     "{\n"
-    "    nebel_sight sight = pass_sight(pixel, depth);\n"
+    "    nebel_sight sight = pass_sight(pixel, place.x);\n"
+    "#ifdef PASS_CLOUDS\n"
+    "    if (pass_is_turned) sight.direction = place.yzw;\n"
+    "#endif\n"
     "    int entry = pass_entry(sight, pixel);\n"
     "#ifdef NEBEL_AIR\n"
     "    return pass_haze(sight, entry);\n"
@@ -115,7 +121,7 @@ static const char whole_text[] =
     "    vec3 transmittance = vec3(0.0), in_scattering = vec3(0.0);\n"
     "    vec4 composed = vec4(0.0);\n"
     "    for (int s = pass_sample_range.x; s < pass_sample_range.y; s++) {\n"
-    "        nebel_light fog = pass_fog(low + pass_sample_places[s], texelFetch(pass_depth, texel, s).x);\n"
+    "        nebel_light fog = pass_fog(low + pass_sample_places[s], texelFetch(pass_depth, texel, s));\n"
     "        transmittance += fog.transmittance;\n"
     "        in_scattering += fog.in_scattering;\n"
     "        composed += pass_over(fog, texel, s);\n"
@@ -123,7 +129,7 @@ static const char whole_text[] =
     "    float share = 1.0 / float(pass_sample_range.y - pass_sample_range.x);\n"
     "    pass_write(share * transmittance, share * in_scattering, share * composed);\n"
     "#else\n"
-    "    nebel_light fog = pass_fog(low + 0.5, texelFetch(pass_depth, texel, 0).x);\n"
+    "    nebel_light fog = pass_fog(low + 0.5, texelFetch(pass_depth, texel, 0));\n"
     "    pass_write(fog.transmittance, fog.in_scattering, pass_over(fog, texel, 0));\n"
     "#endif\n"
     "}\n";
