@@ -468,6 +468,31 @@ static void compare_beside_sun(nebel_cloud_kind kind, double degrees)
     end_before_sun(&scene);
 }
 
+/* How much pixels differ falls with their width step by step: a line would be across pictures from above where it falls. */
+static void test_heaps_fade_with_the_width_of_pixels(void **state)
+{
+    (void)state;
+    static const double unit[3] = {0, -.42261826174069944, -.9063077870366499};
+    nebel_clouds *clouds = make(1, (const nebel_cloud_layer[]){{.coverage = .4}});
+    nebel_cloud_workspace *workspace;
+    nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+    double before = 0, least = 1, last = 0;
+    for (double width = 250; width < 4000; width *= 1.12) {
+        uint64_t numbers = 8;
+        const nb_shown shown = show_pixels(workspace, unit, width, 800, &numbers);
+        last = shown.deviation / shown.mean;
+        if (before > 0) least = fmin(least, last / before);
+        before = last;
+    }
+    print_message(
+        "pixels an eighth wider differ by %.2f of what others do at least, those of 4 km by %.2f of their light\n",
+        least, last);
+    assert_true(least > .75 && last < .6);
+    nebel_destroy_cloud_workspace(workspace);
+    nebel_destroy_cloud_view(view);
+    nebel_destroy_clouds(clouds);
+}
+
 static void test_light_of_pixels_beside_the_sun(void **state)
 {
     (void)state;
@@ -483,6 +508,7 @@ int main(void)
         cmocka_unit_test(test_wide_pixels_see_means),
         cmocka_unit_test(test_wide_pixels_let_as_much_through),
         cmocka_unit_test(test_light_of_pixels),
+        cmocka_unit_test(test_heaps_fade_with_the_width_of_pixels),
         cmocka_unit_test(test_light_of_pixels_that_hide_heaps),
         cmocka_unit_test(test_light_under_a_low_sun),
         cmocka_unit_test(test_light_straight_before_the_sun),

@@ -29,10 +29,15 @@ static inline float nb_cloud_grid_level(float grid, float width)
     return nb_level_of(nb_smaller(2 * width / grid, (float)(1U << (NB_CLOUD_GRIDS - 2))));
 }
 
-/* The next grid's part: levels blend over the last quarter of the way to it. */
+/* Grids blend over the last quarter of the way to the next one; from grid 4 on, a third of a heap wide, where heaps fade, over all of
+ * it: they would end at a line across pictures. */
+enum { NB_CLOUD_FADING = 4 };
+
+/* The next grid's part. */
 static inline float nb_cloud_next_part(float level, int32_t low)
 {
-    return nb_larger(0, 4 * (level - (float)low) - 3);
+    const float times = low < NB_CLOUD_FADING ? 4 : 1;
+    return nb_larger(0, 1 - times * (1 - (level - (float)low)));
 }
 
 /* Cells of grids. */

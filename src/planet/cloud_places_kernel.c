@@ -73,7 +73,8 @@ static inline void find_cells(const nb_cloud_layer *layer, int number, const nb_
     const nb_real widest = nb_splat((float)(1U << (NB_CLOUD_GRIDS - 2)));
     const nb_real numbers = nb_min(NB_F(2.0) * nb_load_lanes(looks->width + p) / nb_splat(layer->grid), widest);
     const nb_halvings halvings = nb_halve(numbers);
-    const nb_real next = nb_max(NB_F(0.0), NB_F(4.0) * halvings.part - NB_F(3.0));
+    const nb_real times = nb_select(halvings.whole < nb_splat(NB_CLOUD_FADING), NB_F(4.0), NB_F(1.0));
+    const nb_real next = nb_max(NB_F(0.0), NB_F(1.0) - times * (NB_F(1.0) - halvings.part));
     nb_store_lanes(looks->next + p, next);
     find_in_grid(faces, halvings.whole, layer->grids[0].per_spacing, number, p, &looks->cells[0]);
     if (nb_any(next > NB_F(0.0)))
