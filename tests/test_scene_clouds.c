@@ -27,6 +27,12 @@ static void test_an_empty_layer_is_a_good_one(void **state)
     assert_int_equal(nebel_resolve_cloud_layer(1e4, &planet->cloud_layers[0], NULL, &layer), NEBEL_OK);
     assert_number(layer.top, 270);
     assert_number(layer.extinction, .5);
+    assert_number(layer.size, 220);
+    /* But not below the height of a layer that is given. */
+    const nebel_cloud_layer high = {.base = 100, .top = 1000};
+    assert_int_equal(nebel_resolve_cloud_layer(1e4, &high, NULL, &layer), NEBEL_OK);
+    assert_number(layer.extinction, .1);
+    assert_number(layer.size, 1100);
     assert_null(planet->clouds);
     assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
     assert_non_null(planet->clouds);

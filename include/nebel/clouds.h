@@ -42,7 +42,7 @@ typedef enum nebel_cloud_kind {
 } nebel_cloud_kind;
 
 /* One layer. 0 stands for the number of its kind, but for kind and wind. Lengths of a kind are those of the Earth: on
- * planets with less than 100 km of air they shrink with it. */
+ * planets with less than 100 km of air they shrink with it, `size` no further than with the layer's height. */
 typedef struct nebel_cloud_layer {
     nebel_cloud_kind kind;
     double base, top;  /* m above the ground, 0 < base < top, within the air; no top: as high as the kind */

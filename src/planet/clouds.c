@@ -209,15 +209,17 @@ static void set_default(double *number, double value)
     if (*number == 0) *number = value;
 }
 
+/* In little air heaps are as small as it is, or as the layer is that was asked for. */
 static nebel_cloud_layer resolve(double thickness, const nebel_cloud_layer *desc)
 {
-    const double scale = fmin(1, thickness / 1e5);
+    const double scale = fmin(1, thickness / 1e5), depth = kinds[desc->kind].top - kinds[desc->kind].base;
     nebel_cloud_layer whole = *desc;
     set_default(&whole.base, scale * kinds[desc->kind].base);
-    set_default(&whole.top, whole.base + scale * (kinds[desc->kind].top - kinds[desc->kind].base));
+    set_default(&whole.top, whole.base + scale * depth);
+    const double wide = fmin(1, fmax(scale, (whole.top - whole.base) / depth));
     set_default(&whole.coverage, kinds[desc->kind].coverage);
-    set_default(&whole.extinction, fmin(NEBEL_MAX_AIR_EXTINCTION, kinds[desc->kind].extinction / scale));
-    set_default(&whole.size, scale * kinds[desc->kind].size);
+    set_default(&whole.extinction, fmin(NEBEL_MAX_AIR_EXTINCTION, kinds[desc->kind].extinction / wide));
+    set_default(&whole.size, wide * kinds[desc->kind].size);
     set_default(&whole.detail, kinds[desc->kind].detail);
     set_default(&whole.variation, kinds[desc->kind].variation);
     set_default(&whole.diameter, kinds[desc->kind].diameter);
