@@ -85,16 +85,23 @@ static inline double nb_world_ground(const nb_world *world, const double eye[3],
     return height > 0 && along > 0 && rest > 0 ? tangent / (along + sqrt(rest)) : 0;
 }
 
-/* The same of the planet with clouds. */
+/* The planet with clouds; NULL: there is none. */
+static inline const nb_world *nb_worlds_cloudy(const nb_world *worlds, int count)
+{
+    for (int k = 0; k < count; k++)
+        if (worlds[k].planet->clouds != NULL) return &worlds[k];
+    return NULL;
+}
+
+/* How far its ground is; 0 where there is none. */
 static inline double nb_worlds_cloudy_ground(const nb_world *worlds, int count, const double eye[3],
                                              const double unit[3])
 {
-    for (int k = 0; k < count; k++)
-        if (worlds[k].planet->clouds != NULL) return nb_world_ground(&worlds[k], eye, unit);
-    return 0;
+    const nb_world *world = nb_worlds_cloudy(worlds, count);
+    return world != NULL ? nb_world_ground(world, eye, unit) : 0;
 }
 
-/* Of a pixel's width: samples are no farther from its middle. Rays are lifted to above the horizon by that part of it. */
+/* In widths of a pixel: no sample is farther from its middle; how far above the horizon rays are lifted. */
 #define NB_WORLD_CORNER 0.75
 #define NB_WORLD_LIFT_OVER 1e-3
 
@@ -119,13 +126,12 @@ static inline int nb_world_lift(const nb_world *world, const double eye[3], doub
     return 1;
 }
 
-/* The same by the ground of the planet with clouds. */
+/* By the ground of the planet with clouds. */
 static inline int nb_worlds_lift(const nb_world *worlds, int count, const double eye[3], double pixel,
                                  double direction[3])
 {
-    for (int k = 0; k < count; k++)
-        if (worlds[k].planet->clouds != NULL) return nb_world_lift(&worlds[k], eye, pixel, direction);
-    return 0;
+    const nb_world *world = nb_worlds_cloudy(worlds, count);
+    return world != NULL && nb_world_lift(world, eye, pixel, direction);
 }
 
 /* Whose shadow, and whose sky, a place is in. */

@@ -48,6 +48,7 @@ void nb_cloudscape_free(nb_frame *frame)
 static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
 {
     const nb_air *air = &frame->air;
+    int any = 0;
     clouds->middles = clouds->rays;
     for (int i = 0; i < NB_BATCH; i++) {
         const double pixel = air->pixel / (double)clouds->rays.length[i];
@@ -56,8 +57,9 @@ static void lift_rays(const nb_frame *frame, nb_cloud_scratch *clouds)
         clouds->is_lifted[i] = clouds->has_lifted[i] =
             frame->samples > 1 && nb_worlds_lift(air->worlds, air->count, air->position, pixel, direction);
         for (int c = 0; c < 3; c++) clouds->rays.direction[c][i] = direction[c];
+        any |= clouds->has_lifted[i];
     }
-    nb_view_finish_rays(&frame->view, &clouds->rays);
+    if (any) nb_view_finish_rays(&frame->view, &clouds->rays);
     clouds->lifted = clouds->rays;
 }
 
@@ -178,7 +180,7 @@ static nebel_result trace(const nb_frame *frame, nb_scratch *scratch, int *any)
         block.ground[i] = ground_of(frame, clouds, lane);
         block.is_wanted[i] = scratch->inside[lane] && !is_found(clouds, (int)lane);
         block.is_open[i] = scratch->distance[lane] == HUGE_VALF || scratch->air.ground.distance[lane] < HUGE_VALF;
-        block.is_open[i] &= !(clouds->has_lifted[lane] && clouds->is_lifted[lane]);
+        block.is_open[i] &= !clouds->is_lifted[lane];
         block.knots[i] = &clouds->knots[lane];
     }
     const nebel_result result = trace_block(frame, &block, clouds);

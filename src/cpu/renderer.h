@@ -49,8 +49,8 @@ typedef struct nb_shell_scratch {
 typedef struct nb_cloud_scratch {
     nebel_cloud_workspace *workspace; /* for a frame with clouds */
     nb_rays rays, rays_of_samples;    /* the latter meanwhile */
-    nb_rays middles, lifted;          /* one of them each ray is */
-    int has_lifted[NB_BATCH], is_lifted[NB_BATCH];
+    nb_rays middles, lifted;          /* one of them each ray is: which, and whether they differ */
+    int is_lifted[NB_BATCH], has_lifted[NB_BATCH];
     float reach[NB_BATCH]; /* m, how far they are known */
     int is_new[NB_BATCH];
     nebel_cloud_knots knots[NB_BATCH];
