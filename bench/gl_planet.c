@@ -141,6 +141,7 @@ const char *nb_bench_opengl_planet(const nb_bench_desc *desc, nb_figures *figure
     nb_gl_planet_bench b = {.air = NULL};
     const char *fault = "opengl: a planet cannot be set up";
     if (set_up(desc, &b) == 0) fault = measure(desc, &b, figures);
+    if (fault == NULL) nb_bench_published_planet(figures);
     nebel_destroy_gl_renderer(b.layered_renderer);
     nebel_destroy_gl_renderer(b.renderer);
     nebel_destroy_layers(b.layers);

@@ -19,4 +19,7 @@ const char *nb_bench_sunlight(const nb_bench_desc *desc, nb_figures *figures);
 const char *nb_bench_tessellation(const nb_bench_desc *desc, nb_figures *figures); /* of the group vertices */
 const char *nb_bench_vertices(const nb_bench_desc *desc, nb_figures *figures);
 
+/* Adds what others have published for the group planet. */
+void nb_bench_published_planet(nb_figures *figures);
+
 #endif

@@ -196,6 +196,7 @@ const char *nb_bench_planet(const nb_bench_desc *desc, nb_figures *figures)
     const char *fault = "out of memory";
     if (set_up(desc, &bench) == 0) fault = measure(desc, &bench, figures);
     if (fault == NULL) fault = measure_clouds(desc, &bench, figures);
+    if (fault == NULL) nb_bench_published_planet(figures);
     nebel_destroy_renderer(bench.sky);
     nebel_destroy_renderer(bench.nothing);
     nebel_destroy_atmosphere(bench.air);

@@ -76,7 +76,9 @@ class BenchTest(unittest.TestCase):
             self.skipTest("built without OpenGL")
         self.assertEqual(done.returncode, 0, done.stderr)
         figures = json.loads(self.file.read_text())["figures"]
-        self.assertEqual([figure["floor"]["name"] for figure in figures], 4 * ["a copy of the picture"])
+        floors = [figure["floor"]["name"] for figure in figures if not figure["group"].startswith("Published")]
+        self.assertEqual(floors, 4 * ["a copy of the picture"])
+        self.assertGreater(len(figures), 4)  # what others have published
 
     def test_wrong_calls(self):
         for words in (["--group", "nothing"], ["scene.json"], ["--fast"], ["--device", "none"],

@@ -73,7 +73,7 @@ enum { MODEL, PRESET, CENTER, RADIUS, THICKNESS, AIRS, GROUND_ALBEDO, QUALITY, S
 static const char *const planet_names[] = {"model", "preset",        "center",  "radius",       "thickness",
                                            "airs",  "ground_albedo", "quality", "sun_diameter", "clouds"};
 static const nb_keys planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANET_KEY_COUNT) - 1, NB_BIT(MODEL),
-                                    "a physical planet"};
+                                    "a physical planet (gravity is in \"scale_height\" of its airs)"};
 
 /* Degrees, as seen from there: Earth's and Mars's mean distances from the sun, whose diameter is 1.3927e9 m. */
 static const struct {
@@ -94,16 +94,17 @@ static bool read_preset(nb_json *json, const nb_json_node *node, nebel_planet *p
 static bool read_sizes(nb_scene_reader *in, const nb_json_node *const *found, nebel_planet *planet)
 {
     static const nb_range radius_range = {.low = 1, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
-    static const nb_range thickness_range = {.low = 1e-6, .high = 1e12, .dimension = NB_LENGTH, .text = "a length"};
     static const nb_range diameter_range = {.low = 0, .high = 10, .text = "a number of degrees from 0 to 10"};
     nebel_atmosphere_desc *desc = &planet->air;
     double radius = desc->radius / in->space.unit, thickness = desc->thickness / in->space.unit, center[3];
     if (!nb_value_number(in->json, found[RADIUS], &radius_range, &radius) ||
-        !nb_value_number(in->json, found[THICKNESS], &thickness_range, &thickness) ||
         !nb_value_place(in->json, found[CENTER], center) ||
         !nb_value_number(in->json, found[SUN_DIAMETER], &diameter_range, &planet->sun_diameter))
         return false;
     if (found[RADIUS] != NULL) desc->radius = radius * in->space.unit;
+    const nb_range thickness_range = {
+        .low = desc->radius / 1e6, .high = 1e12, .dimension = NB_LENGTH, .text = "a length (radius / 1e6 or more)"};
+    if (!nb_value_number(in->json, found[THICKNESS], &thickness_range, &thickness)) return false;
     if (found[THICKNESS] != NULL) desc->thickness = thickness * in->space.unit;
     if (found[CENTER] == NULL) return true;
     nb_space_convert_place(&in->space, center);
