@@ -6,10 +6,10 @@
  *     nebel_create_cloud_workspace(view, &workspace);                                          // one per thread
  *     nebel_trace_clouds(workspace, 1, &ray, 0, &(double){0.001}, 0, &knots, 0);
  *
- * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/planet.md): noise in
+ * The extinction of a layer at a place is one formula of the place, the same from everywhere (docs/clouds.md): noise in
  * three dimensions in the planet's axes, so that there is no seam and no pole; who looks from afar gets its mean over
  * what a pixel covers. Transmittance is integrated to a tolerance. Light is first order exact up to the shadow's
- * lattice, and higher orders by a model, delta-Eddington's on a slab: docs/planet.md says how far off.
+ * lattice, and higher orders by a model, delta-Eddington's on a slab: docs/clouds.md says how far off.
  *
  * Units are metres; places are those of the scene, y up. Nothing here calls a graphics interface.
  *
@@ -140,14 +140,14 @@ nebel_result nebel_trace_clouds(nebel_cloud_workspace *workspace, size_t n, cons
                                 size_t knot_stride);
 
 /* What part of the sun's light comes through clouds to n places, straight or scattered on the way; width as of
- * nebel_cloud_extinction. Nothing tells an error: docs/planet.md, "Light of clouds", has a table of what slabs send back by
+ * nebel_cloud_extinction. Nothing tells an error: docs/clouds.md, "Light of clouds", has a table of what slabs send back by
  * paths of light, which this is within 0.01 of where the sun is straight over them, within 0.08 aslant; of heaps it is not
  * known. Errors: ARGUMENT. */
 nebel_result nebel_shade_clouds(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
                                 size_t place_stride, float *parts);
 
 /* What part of the sky's light comes through clouds to n places, straight or scattered: that of straight above, as a mean
- * over as wide a place as is far above, or width where that is more. Nothing tells an error: docs/planet.md, "Clouds in
+ * over as wide a place as is far above, or width where that is more. Nothing tells an error: docs/clouds.md, "Clouds in
  * pictures", has how far it is from columns under closed clouds, 4 %; that gaps are seen aslant, too, is left out. Errors: ARGUMENT. */
 nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, size_t n, const double (*places)[3],
                              size_t place_stride, float *parts);
@@ -161,7 +161,7 @@ typedef struct nebel_air_shade {
 
 /* Along n rays up to t_max or the ground, as means over pieces: of sunlight what comes through clouds on the way to the sun, of
  * the sky's light what comes through straight from above, by their shares in clear air. Strides in bytes. Nothing tells an error:
- * docs/planet.md, "Air under clouds", has what closed clouds let through beside what air has before a wall, 0.339 and 0.345,
+ * docs/clouds.md, "Air under clouds", has what closed clouds let through beside what air has before a wall, 0.339 and 0.345,
  * and what is left out. Errors: ARGUMENT. */
 nebel_result nebel_shade_air(nebel_cloud_workspace *workspace, size_t n, const nebel_ray *rays, size_t ray_stride,
                              nebel_air_shade *shades, size_t shade_stride);

@@ -1,4 +1,4 @@
-/* The density of a layer's clouds at several places at once, one kernel per instruction set: see docs/planet.md for the formula. */
+/* The density of a layer's clouds at several places at once, one kernel per instruction set: see docs/clouds.md for the formula. */
 #ifndef NB_PLANET_CLOUD_LOOKS_H
 #define NB_PLANET_CLOUD_LOOKS_H
 

@@ -1,4 +1,4 @@
-/* Noise that clouds are made of: see docs/planet.md. */
+/* Noise that clouds are made of: see docs/clouds.md. */
 #ifndef NB_PLANET_CLOUD_NOISE_H
 #define NB_PLANET_CLOUD_NOISE_H
 

@@ -1,4 +1,4 @@
-/* Layers of clouds, ready for evaluation: see docs/planet.md for the formula. */
+/* Layers of clouds, ready for evaluation: see docs/clouds.md for the formula. */
 #ifndef NB_PLANET_CLOUDS_H
 #define NB_PLANET_CLOUDS_H
 
