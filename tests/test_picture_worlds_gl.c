@@ -5,6 +5,7 @@
 #include "planet_help.h"
 #include "worlds_help.h"
 
+#include <nebel/clouds.h>
 #include <nebel/environment.h>
 
 #include <math.h>
@@ -30,6 +31,7 @@ static double largest_color(const picture_pair *pair)
 static void check(const char *name, const nebel_scene_data *scene, nebel_snapshot *fog, const nebel_camera *camera)
 {
     picture_pair pair = picture_make(96 * scale, 54 * scale);
+    if (scene->planets[0].clouds != NULL) pair.tolerance = NEBEL_DEFAULT_TOLERANCE; /* as OpenGL takes */
     const int objects = pass_count_objects();
     picture_render(scene, fog, camera, 1, &pair);
     assert_int_equal(pass_count_objects(), objects);
@@ -130,6 +132,28 @@ static void half_shadows_lie_on_models(void **state)
     worlds_free(&s);
 }
 
+static void half_shadows_lie_on_clouds(void **state)
+{
+    (void)state;
+    static const worlds_body bodies[] = {{.name = "earth"}, {.name = "moon", .center = {1.2e6, 1.2e7, 0}}};
+    static const double up[3] = {0, 1, 0};
+    nb_gl context;
+    nebel_clouds *clouds;
+    worlds s;
+    worlds_make(2, bodies, up, 5, &s);
+    const nebel_clouds_desc desc = {
+        .atmosphere = s.atmospheres[0], .layers = {{.kind = NEBEL_CLOUD_STRATUS}}, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
+    s.planets[0].clouds = clouds;
+    pass_open(&context, NB_GL_330);
+    const nebel_camera camera = {
+        .position = {0, 3.5e6, 0}, .look_at = {0, 5e5, 0}, .up = {0, 0, -1}, .vertical_fov = 60};
+    check("a half shadow on clouds", &s.scene, NULL, &camera);
+    pass_close(&context);
+    nebel_destroy_clouds(clouds);
+    worlds_free(&s);
+}
+
 /* A plate over a small planet, from its day into its night; the ambient light is that of the sky. */
 static void models_have_the_sky_of_their_planet(void **state)
 {
@@ -165,6 +189,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(fog_and_panoramas_are_the_same),
         cmocka_unit_test(high_walls_see_a_sun_that_has_set),
         cmocka_unit_test(half_shadows_lie_on_models),
+        cmocka_unit_test(half_shadows_lie_on_clouds),
         cmocka_unit_test(models_have_the_sky_of_their_planet),
     };
     if (argc > 1) scale = (uint32_t)atoi(argv[1]);

@@ -7,6 +7,8 @@
 
 #include "base/eclipse.h"
 
+#include <nebel/clouds.h>
+
 enum { WIDTH = 40, HEIGHT = 24 };
 
 static test_picture render(const worlds *s, const nebel_camera *camera, int threads, uint32_t samples)
@@ -257,12 +259,49 @@ static void models_are_in_the_shadow_of_moons(void **state)
     assert_true(half > 0);
 }
 
+/* Closed clouds seen from a little above them. Air has no shadow, and adds what it has of light without a moon. */
+static void clouds_are_in_the_shadow_of_moons(void **state)
+{
+    (void)state;
+    static const double aside[] = {0, 1.6e6, 1.9e6};
+    const double up[3] = {0, 1, 0}, place[3] = {0, 700, 0};
+    const nebel_camera camera = {.position = {0, 820, 0}, .look_at = {0, 0, 0}, .up = {0, 0, 1}, .vertical_fov = 10};
+    double clear[3] = {0};
+    int half = 0;
+    for (int i = -1; i < 3; i++) {
+        const worlds_body bodies[] = {{.name = "earth"}, {.name = "moon", .center = {aside[i < 0 ? 0 : i], 1.2e7, 0}}};
+        worlds s;
+        worlds_make(i < 0 ? 1 : 2, bodies, up, 5, &s);
+        const nebel_clouds_desc desc = {
+            .atmosphere = s.atmospheres[0], .layers = {{.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}}, .layer_count = 1};
+        nebel_clouds *clouds;
+        assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
+        s.planets[0].clouds = clouds;
+        test_picture picture = render(&s, &camera, 1, 1);
+        nebel_air_light light;
+        assert_int_equal(nebel_light_air(s.atmospheres[0], &s.sun, 1, &place, 0, &light, 0), NEBEL_OK);
+        const double left = i < 0 ? 1 : count_suns(&s, 0, place);
+        for (int c = 0; c < 3; c++) {
+            const double got = (double)test_color(&picture, WIDTH / 2, HEIGHT / 2)[c];
+            const double want = (light.sky[c] + left * light.sun[c]) / (light.sky[c] + light.sun[c]);
+            if (i < 0) clear[c] = got;
+            print_message("%.3f of the sun leave %.4f of the light, expected %.4f\n", left, got / clear[c], want);
+            assert_near(got / clear[c], want, 1e-2);
+        }
+        half += left > .05 && left < .95;
+        test_picture_free(&picture);
+        nebel_destroy_clouds(clouds);
+        worlds_free(&s);
+    }
+    assert_true(half > 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(worlds_are_seen_one_behind_the_other), cmocka_unit_test(order_does_not_matter),
         cmocka_unit_test(moons_of_less_than_a_pixel_are_seen),  cmocka_unit_test(eclipses_are_areas_of_discs),
-        cmocka_unit_test(models_are_in_the_shadow_of_moons),
+        cmocka_unit_test(models_are_in_the_shadow_of_moons),    cmocka_unit_test(clouds_are_in_the_shadow_of_moons),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

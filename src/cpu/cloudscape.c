@@ -4,6 +4,7 @@
 #include "fog_shade.h"
 #include "haze.h"
 
+#include "base/cloud_eclipse.h"
 #include "base/cloud_share.h"
 
 #include <math.h>
@@ -138,19 +139,23 @@ static uint32_t lane_of(int pixel)
 /* Some pixels of a block, all at once. */
 static nebel_result trace_pixels(const nb_frame *frame, const int is_asked[NB_CLOUD_SHARE], nb_cloud_scratch *clouds)
 {
+    const nb_air *const air = &frame->air;
     uint32_t count = 0, lanes[NB_BATCH];
     for (int i = 0; i < NB_CLOUD_SHARE; i++) {
         const uint32_t lane = lane_of(i);
         if (!is_asked[i]) continue;
         clouds->asked[count] = nb_cloud_air_ray(frame, clouds, lane);
         clouds->asked[count].t_max = (double)clouds->end[lane];
-        clouds->spreads[count] = frame->air.pixel / (double)clouds->rays.length[lane];
+        clouds->spreads[count] = air->pixel / (double)clouds->rays.length[lane];
         lanes[count++] = lane;
     }
     const nebel_result result =
         nebel_trace_clouds(clouds->workspace, count, clouds->asked, sizeof *clouds->asked, clouds->spreads,
                            sizeof *clouds->spreads, clouds->found, sizeof *clouds->found);
-    for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) clouds->knots[lanes[k]] = clouds->found[k];
+    for (uint32_t k = 0; k < count && result == NEBEL_OK; k++) {
+        nb_cloud_eclipse(air->worlds, air->count, &clouds->asked[k], air->to_sun, air->sun_radius, &clouds->found[k]);
+        clouds->knots[lanes[k]] = clouds->found[k];
+    }
     return result;
 }
 

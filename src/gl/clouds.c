@@ -4,6 +4,7 @@
 #include "cloud_shade.h"
 #include "panorama.h"
 
+#include "base/cloud_eclipse.h"
 #include "base/cloud_haze.h"
 #include "base/vector.h"
 
@@ -224,8 +225,18 @@ static nebel_result shade_air(const job *j, nb_cloud_part *part, const nebel_ray
     return NEBEL_OK;
 }
 
+static nebel_result trace_rays(const nb_cloud_picture *picture, nb_cloud_part *part, uint32_t count,
+                               const nebel_ray *rays, const double *spreads, nebel_cloud_knots *knots)
+{
+    const nebel_result result =
+        nebel_trace_clouds(part->workspace, count, rays, sizeof *rays, spreads, sizeof *spreads, knots, sizeof *knots);
+    for (uint32_t i = 0; i < count && result == NEBEL_OK; i++)
+        nb_cloud_eclipse(picture->worlds, picture->world_count, &rays[i], picture->to_sun, picture->disc, &knots[i]);
+    return result;
+}
+
 /* Some of its pixels. */
-static nebel_result trace_pixels(nb_cloud_part *part, const int is_asked[NB_CLOUD_SHARE])
+static nebel_result trace_pixels(const job *j, nb_cloud_part *part, const int is_asked[NB_CLOUD_SHARE])
 {
     nb_cloud_bundle *const bundle = part->bundle;
     uint32_t count = 0;
@@ -235,8 +246,7 @@ static nebel_result trace_pixels(nb_cloud_part *part, const int is_asked[NB_CLOU
         bundle->asked_spreads[count++] = bundle->spreads[i];
     }
     const nebel_result result =
-        nebel_trace_clouds(part->workspace, count, bundle->asked, sizeof *bundle->asked, bundle->asked_spreads,
-                           sizeof *bundle->asked_spreads, bundle->found, sizeof *bundle->found);
+        trace_rays(j->picture, part, count, bundle->asked, bundle->asked_spreads, bundle->found);
     count = 0;
     for (int i = 0; i < NB_CLOUD_SHARE && result == NEBEL_OK; i++)
         if (is_asked[i]) bundle->knots[i] = bundle->found[count++];
@@ -272,7 +282,7 @@ static nebel_result trace_block(const job *j, nb_cloud_part *part, uint32_t left
     for (int level = 0; level < NB_CLOUD_SHARE_LEVELS && result == NEBEL_OK; level++) {
         int is_asked[NB_CLOUD_SHARE];
         nb_cloud_block_ask(&block, level, is_asked);
-        result = trace_pixels(part, is_asked);
+        result = trace_pixels(j, part, is_asked);
     }
     return result;
 }
@@ -557,7 +567,7 @@ static nebel_result lay_anew(const job *j, nb_cloud_part *part, const nb_cloud_p
     nb_cloud_pixel anew = *pixel;
     nb_cloud_knot list[NEBEL_MAX_CLOUD_KNOTS];
     nebel_cloud_knots knots;
-    nebel_result result = nebel_trace_clouds(part->workspace, 1, ray, 0, &spread, 0, &knots, 0);
+    nebel_result result = trace_rays(j->picture, part, 1, ray, &spread, &knots);
     if (result != NEBEL_OK) return result;
     anew.count = knots.count;
     set_knots(&knots, list);

@@ -67,6 +67,7 @@ typedef struct nb_cloud_picture {
     double pixel; /* width of a pixel per metre of the camera's axis, or of the way in a panorama */
     const nb_world *worlds;
     int world_count;
+    double to_sun[3], disc; /* as of nb_worlds_light */
     int has_fog;
     int lifts; /* whether samples of a pixel may see the sky though its middle meets the ground */
     /* Asked after some rows, in the caller's thread, for walks take seconds: what is not OK ends them. */

@@ -40,6 +40,9 @@ static nebel_result ask(void *user)
 
 static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pixel_point point)
 {
+    const nebel_scene_data *const scene = f->renderer->scene;
+    nebel_sun sun = nb_scene_sun(scene);
+    (void)nb_vector_make_unit(sun.direction);
     return (nb_cloud_picture){.view = view,
                               .panorama = f->panorama,
                               .pixel = nb_camera_pixel(view, f->panorama),
@@ -47,6 +50,8 @@ static nb_cloud_picture picture_of(nb_gl_frame *f, const nebel_view *view, nb_pi
                               .eye = {f->eye[0], f->eye[1], f->eye[2]},
                               .worlds = f->renderer->air.worlds,
                               .world_count = f->renderer->air.count,
+                              .to_sun = {sun.direction[0], sun.direction[1], sun.direction[2]},
+                              .disc = nb_worlds_disc(scene),
                               .has_fog = has_fog(f),
                               .ask = ask,
                               .ask_user = f};
