@@ -1,6 +1,8 @@
 /* What the renderer says to input that is wrong, and that nothing is lost on the way out. */
 #include "test_render_scene.h"
 
+#include <nebel/clouds.h>
+
 typedef struct test_log {
     int messages;
     nebel_result result;
@@ -130,6 +132,34 @@ static void test_bad_frames(void **state)
     assert_bad_frame(&(nebel_scene_data){.has_sun = 1, .sun_irradiance = {1, 1, 1}}, &good);
     assert_bad_frame(&(nebel_scene_data){.has_sun = 1, .sun_irradiance = {HUGE_VAL, 1, 1}, .sun_direction = {0, 1, 0}},
                      &good);
+}
+
+/* Clouds have moved by it, shells of layers have turned. */
+static void test_times_of_planets_are_numbers(void **state)
+{
+    (void)state;
+    static const double bad[] = {(double)NAN, HUGE_VAL, -HUGE_VAL, 2e12};
+    nebel_planet cloudy = {.air = *nebel_find_atmosphere("earth")};
+    nebel_planet layered = {.model = NEBEL_PLANET_LAYERS, .shells = {.cloud_count = 1}};
+    nebel_atmosphere *air;
+    nebel_clouds *clouds;
+    nebel_layers *layers;
+    assert_int_equal(nebel_create_atmosphere(&cloudy.air, &air), NEBEL_OK);
+    const nebel_clouds_desc desc = {.atmosphere = air, .layer_count = 1};
+    assert_int_equal(nebel_create_clouds(&desc, &clouds), NEBEL_OK);
+    assert_int_equal(nebel_create_layers(&layered.shells, &layers), NEBEL_OK);
+    cloudy.atmosphere = air;
+    cloudy.clouds = clouds;
+    layered.layers = layers;
+    for (int i = 0; i < 4; i++) {
+        nebel_frame_desc frame = good_frame();
+        frame.time = bad[i];
+        assert_bad_frame(&(nebel_scene_data){.planet_count = 1, .planets = &cloudy}, &frame);
+        assert_bad_frame(&(nebel_scene_data){.planet_count = 1, .planets = &layered}, &frame);
+    }
+    nebel_destroy_layers(layers);
+    nebel_destroy_clouds(clouds);
+    nebel_destroy_atmosphere(air);
 }
 
 static void test_missing_arguments_of_a_frame(void **state)
@@ -270,6 +300,7 @@ int main(void)
         cmocka_unit_test(test_bad_renderer_descriptions),
         cmocka_unit_test(test_bad_meshes),
         cmocka_unit_test(test_bad_frames),
+        cmocka_unit_test(test_times_of_planets_are_numbers),
         cmocka_unit_test(test_missing_arguments_of_a_frame),
         cmocka_unit_test(test_extreme_coordinates_give_numbers),
         cmocka_unit_test(test_light_without_end_is_an_error),

@@ -135,7 +135,7 @@ typedef struct nebel_gl_frame_desc {
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
                                   some microseconds each. Not where `fog` excludes, replaces or limits what particles
                                   do. Nonzero: sunlight passes particles by: for many of them and an eye that moves */
-    double time;             /* s, within 1e12: what a planet's layers have turned by, and its clouds have moved by */
+    double time;             /* as in nebel_frame_desc */
     int clouds_by_processor; /* 0: a planet with clouds of volume is refused. Nonzero: the processor walks through them along
                                 the ray of each pixel, and dims the sun's light, which takes as long as on the CPU: for
                                 pictures and films, not for windows */

@@ -112,7 +112,8 @@ typedef struct nebel_frame_desc {
      * themselves, at most 10000 times. Other seeds give independent pictures. */
     uint32_t bounces, seed;
     double
-        time; /* of a planet of layers, whose balls turn: within 1e12, in the unit of its days, which is frames in scenes */
+        time; /* within 1e12: what a planet's layers have turned by, in the unit of its days, and its clouds have moved by,
+                    in that of its winds; frames in scenes */
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not
