@@ -64,6 +64,30 @@ static void test_everything_it_may_say(void **state)
     nebel_destroy_scene(scene);
 }
 
+/* Half of it: heights of the preset's air twice as large, none that are given. */
+static void test_gravity_stretches_presets(void **state)
+{
+    (void)state;
+    const nebel_atmosphere_desc *earth = nebel_find_atmosphere("earth");
+    nebel_scene *scene = parse_good(SCENE("", "{\"model\": \"physical\", \"gravity\": 4.91}"));
+    const nebel_atmosphere_desc *air = &nebel_scene_contents(scene)->planets[0].air;
+    assert_number(air->thickness, 2 * earth->thickness);
+    assert_number(air->airs[0].scale_height, 2 * earth->airs[0].scale_height);
+    assert_number(air->airs[1].scale_height, 2 * earth->airs[1].scale_height);
+    assert_number(air->airs[2].middle, 2 * earth->airs[2].middle);
+    assert_number(air->airs[2].width, 2 * earth->airs[2].width);
+    assert_number(air->airs[0].scattering[2], earth->airs[0].scattering[2]);
+    assert_number(air->radius, earth->radius);
+    nebel_destroy_scene(scene);
+    scene =
+        parse_good(SCENE("", "{\"model\": \"physical\", \"preset\": \"mars\", \"gravity\": 1.865, \"thickness\": 2e5, "
+                             "\"airs\": [{\"type\": \"exponential\", \"scale_height\": 8000}]}"));
+    air = &nebel_scene_contents(scene)->planets[0].air;
+    assert_number(air->thickness, 2e5);
+    assert_number(air->airs[0].scale_height, 8000);
+    nebel_destroy_scene(scene);
+}
+
 static const char lit_fog[] =
     "{\"nebel\": 1, " SUN
     "%s \"planet\": {\"model\": \"physical\", \"preset\": \"toy\"}, \"fog\": [{\"shape\": {\"type\": "
@@ -150,8 +174,8 @@ static void test_what_is_wrong(void **state)
         {FORMAT, SCENE("", "`{}"), "planet: the key \"model\" is missing"},
         {FORMAT, SCENE("", "{\"model\": `\"shells\"}"), "planet.model: unknown; must be one of: physical, layers"},
         {FORMAT, PHYSICAL("\"preset\": `\"venus\""), "planet.preset: unknown; must be one of: earth, mars, toy, moon"},
-        {FORMAT, PHYSICAL("`\"gravity\": 9.81"),
-         "planet.gravity: unknown key; a physical planet (gravity is in \"scale_height\" of its airs) has: model, preset"},
+        {FORMAT, PHYSICAL("`\"ozone\": 1"), "planet.ozone: unknown key; a physical planet has: model, preset"},
+        {FORMAT, PHYSICAL("\"gravity\": `0"), "planet.gravity: is 0; must be a number from 0.1 to 1000, in m/s^2"},
         {FORMAT, PHYSICAL("\"radius\": `0"), "planet.radius: is 0; must be a length from 1 to 1e12 m"},
         {FORMAT, PHYSICAL("\"radius\": `-6e6"), "planet.radius: is -6000000; must be"},
         {FORMAT, PHYSICAL("\"thickness\": `0"),
@@ -279,9 +303,13 @@ static void test_without_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),       cmocka_unit_test(test_everything_it_may_say),
-        cmocka_unit_test(test_air_lights_fog), cmocka_unit_test(test_sky_is_that_of_the_air),
-        cmocka_unit_test(test_what_is_wrong),  cmocka_unit_test(test_several),
+        cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_everything_it_may_say),
+        cmocka_unit_test(test_gravity_stretches_presets),
+        cmocka_unit_test(test_air_lights_fog),
+        cmocka_unit_test(test_sky_is_that_of_the_air),
+        cmocka_unit_test(test_what_is_wrong),
+        cmocka_unit_test(test_several),
         cmocka_unit_test(test_without_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -68,26 +68,55 @@ static bool read_airs(nb_scene_reader *in, const nb_json_node *node, nebel_atmos
 
 /* ---- planets --------------------------------------------------------------------------------- */
 
-enum { MODEL, PRESET, CENTER, RADIUS, THICKNESS, AIRS, GROUND_ALBEDO, QUALITY, SUN_DIAMETER, CLOUDS, PLANET_KEY_COUNT };
+enum {
+    MODEL,
+    PRESET,
+    CENTER,
+    RADIUS,
+    GRAVITY,
+    THICKNESS,
+    AIRS,
+    GROUND_ALBEDO,
+    QUALITY,
+    SUN_DIAMETER,
+    CLOUDS,
+    PLANET_KEY_COUNT
+};
 
-static const char *const planet_names[] = {"model", "preset",        "center",  "radius",       "thickness",
+static const char *const planet_names[] = {"model", "preset",        "center",  "radius",       "gravity", "thickness",
                                            "airs",  "ground_albedo", "quality", "sun_diameter", "clouds"};
 static const nb_keys planet_keys = {planet_names, PLANET_KEY_COUNT, NB_BIT(PLANET_KEY_COUNT) - 1, NB_BIT(MODEL),
-                                    "a physical planet (gravity is in \"scale_height\" of its airs)"};
+                                    "a physical planet"};
 
-/* Degrees, as seen from there: Earth's and Mars's mean distances from the sun, whose diameter is 1.3927e9 m. */
+/* The sun in degrees, as seen from there: Earth's and Mars's mean distances from the sun, whose diameter is 1.3927e9 m. Gravity in
+ * m/s^2: NASA's fact sheets; of the toy the Earth's. */
 static const struct {
     const char *name;
-    double sun_diameter;
-} presets[] = {{"earth", 0.5334}, {"mars", 0.3501}, {"toy", 0.5334}, {"moon", 0.5334}};
+    double sun_diameter, gravity;
+} presets[] = {{"earth", 0.5334, 9.82}, {"mars", 0.3501, 3.73}, {"toy", 0.5334, 9.82}, {"moon", 0.5334, 1.62}};
 
-static bool read_preset(nb_json *json, const nb_json_node *node, nebel_planet *planet)
+/* Air of the same pressure and temperature at the ground: heights go by 1 / gravity, R T / (M g) of each gas. */
+static void stretch(nebel_atmosphere_desc *desc, double times)
+{
+    desc->thickness *= times;
+    for (uint32_t i = 0; i < desc->air_count; i++) {
+        desc->airs[i].scale_height *= times;
+        desc->airs[i].middle *= times;
+        desc->airs[i].width *= times;
+    }
+}
+
+static bool read_preset(nb_json *json, const nb_json_node *const *found, nebel_planet *planet)
 {
     static const char *const preset_names[] = {"earth", "mars", "toy", "moon"};
-    const int preset = node != NULL ? nb_value_choice(json, node, preset_names, 4) : 0;
+    static const nb_range gravity_range = {.low = 0.1, .high = 1000, .text = "a number from 0.1 to 1000, in m/s^2"};
+    const int preset = found[PRESET] != NULL ? nb_value_choice(json, found[PRESET], preset_names, 4) : 0;
     if (preset < 0) return false;
+    double gravity = presets[preset].gravity;
+    if (!nb_value_number(json, found[GRAVITY], &gravity_range, &gravity)) return false;
     planet->air = *nebel_find_atmosphere(presets[preset].name);
     planet->sun_diameter = presets[preset].sun_diameter;
+    if (found[GRAVITY] != NULL) stretch(&planet->air, presets[preset].gravity / gravity);
     return true;
 }
 
@@ -164,7 +193,7 @@ static bool read_physical(nb_scene_reader *in, const nb_json_node *node, nebel_p
     static const char *const quality_names[] = {"fast", "precise"};
     const nb_json_node *found[PLANET_KEY_COUNT];
     nb_json *json = in->json;
-    if (!nb_value_members(json, node, &planet_keys, found) || !read_preset(json, found[PRESET], planet) ||
+    if (!nb_value_members(json, node, &planet_keys, found) || !read_preset(json, found, planet) ||
         !read_sizes(in, found, planet) || !read_airs(in, found[AIRS], &planet->air) ||
         !nb_value_color(json, found[GROUND_ALBEDO], &nb_range_fraction, planet->air.ground_albedo))
         return false;
