@@ -113,6 +113,8 @@ static void clouds_are_the_same_from_everywhere(void **state)
     pass_open(&context, NB_GL_330);
     nebel_camera camera = planet_camera(-1200, .4);
     check("from below", &w, NULL, &camera);
+    camera = planet_camera(-700, -.05);
+    check_samples("over their shadows, four samples", &w, NULL, &camera, 4);
     camera = planet_camera(7500, -.3);
     check("from above", &w, NULL, &camera);
     camera = planet_camera(4e5, -.4);

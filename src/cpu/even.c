@@ -111,12 +111,16 @@ static int is_smooth(uint32_t columns, uint32_t rows, nb_light_samples *samples)
     return 1;
 }
 
-/* Whether light is that of air alone: clouds and their shadows are means over pixels already. */
-static int is_clear_sky(const nb_frame *frame, const nb_scratch *scratch)
+/* Whether clouds before the sky are seen, which are means over pixels already. Shadows on slanted ground are not. */
+static int sees_clouds_alone(const nb_frame *frame, const nb_scratch *scratch)
 {
-    for (int i = 0; i < NB_BATCH && frame->cloud_view != NULL; i++)
-        if (scratch->clouds.knots[i].count > 0 || scratch->air.ground.distance[i] < HUGE_VALF) return 0;
-    return 1;
+    int any = 0;
+    if (frame->cloud_view == NULL) return 0;
+    for (int i = 0; i < NB_BATCH; i++) {
+        if (scratch->air.ground.distance[i] < HUGE_VALF) return 0;
+        any |= scratch->clouds.knots[i].count > 0;
+    }
+    return any;
 }
 
 nebel_result nb_even_render(const nb_frame *frame, const nb_place *place, uint32_t count, nb_scratch *scratch,
@@ -131,6 +135,6 @@ nebel_result nb_even_render(const nb_frame *frame, const nb_place *place, uint32
         nb_air_sees_rim(&frame->air, &scratch->rays))
         return NEBEL_OK;
     const nebel_result result = nb_batch_light(frame, scratch);
-    *is_even = result == NEBEL_OK && (!is_clear_sky(frame, scratch) || is_smooth(columns, rows, &scratch->samples));
+    *is_even = result == NEBEL_OK && (sees_clouds_alone(frame, scratch) || is_smooth(columns, rows, &scratch->samples));
     return result;
 }
