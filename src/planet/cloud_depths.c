@@ -61,16 +61,17 @@ typedef struct nb_steps {
     int most;
 } nb_steps;
 
-enum { OWN_STEPS = 5, MOST_STEPS = 64 };
+enum { OWN_STEPS = 7, MOST_STEPS = 128 };
 
-/* Of ways that others do not share, and of those to the sun that a lattice keeps for all around. What is far away throws softer
+/* Of a ray's ways to the sun; of those to the sun that a lattice keeps for all around; of all others. What is far away throws softer
  * shadows the more steps grow. */
-#define GROWTH 1.5f
-#define SHARED_GROWTH 1.2f
+#define GROWTH 1.3f
+#define SHARED_GROWTH 1.05f
+#define OTHER_GROWTH 1.5f
 
 /* A ray's ways to the sun are its own for OWN_STEPS: then the next is so much longer than the first. What is behind them comes
  * from the lattice, whose nodes are half of that step apart. */
-#define OWN_GROWTH (GROWTH * GROWTH * GROWTH * GROWTH * GROWTH)
+#define OWN_GROWTH 6.2748517f /* GROWTH to the power of OWN_STEPS */
 #define NODES_STEP 0.5f
 
 /* Who looks from within a heap sees no gaps of it. */
@@ -175,7 +176,7 @@ static nb_way way_of(const double from[3], const double unit[3], const nb_steps 
 float nb_cloud_depth_along(nebel_cloud_workspace *workspace, const double from[3], const double unit[3], float first,
                            float width, int is_alone)
 {
-    nb_way way = way_of(from, unit, &(nb_steps){first, GROWTH, width, MOST_STEPS});
+    nb_way way = way_of(from, unit, &(nb_steps){first, OTHER_GROWTH, width, MOST_STEPS});
     find_ways(workspace, is_alone, 1, &way);
     return (float)way.depth;
 }
@@ -199,8 +200,8 @@ static void find_roof(nebel_cloud_workspace *workspace, int k, const double plac
     nb_vector_cross(place, across[0], across[1]);
     nb_vector_make_unit(across[1]);
     const int is_alone = width > MOST_COLUMNS * layer->size;
-    const nb_steps to_sun = {first, is_alone ? GROWTH : SHARED_GROWTH, fine, MOST_STEPS};
-    const nb_steps to_up = {first, GROWTH, fine, MOST_STEPS};
+    const nb_steps to_sun = {first, is_alone ? OTHER_GROWTH : SHARED_GROWTH, fine, MOST_STEPS};
+    const nb_steps to_up = {first, OTHER_GROWTH, fine, MOST_STEPS};
     parts[0] = parts[1] = parts[2] = 0;
     for (int i = 0; i < count * count; i++) {
         const double u = ((i % count + 0.5) / count - 0.5) * (double)width,
@@ -235,7 +236,7 @@ static void set_around(const nebel_cloud_workspace *workspace, const double plac
 static void find_around(nebel_cloud_workspace *workspace, const double place[3], float width, float depth[3])
 {
     nb_way ways[3];
-    set_around(workspace, place, &(nb_steps){width, GROWTH, width, MOST_STEPS}, ways);
+    set_around(workspace, place, &(nb_steps){width, OTHER_GROWTH, width, MOST_STEPS}, ways);
     find_ways(workspace, 0, 3, ways);
     for (int i = 0; i < 3; i++) depth[i] = (float)ways[i].depth;
 }

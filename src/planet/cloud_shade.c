@@ -187,7 +187,7 @@ nebel_result nebel_shade_sky(nebel_cloud_workspace *workspace, double width, siz
 /* Pieces are so long where fog begins and where the ray ends, in heights of the lowest layer's top, and so much longer for the way
  * from the nearer of both: most fog is seen around the eye, or lies on the ground. */
 #define FIRST_PIECE 0.06
-#define PIECE_GROWTH 0.25
+#define PIECE_GROWTH 0.18
 
 /* Over piece i. */
 static void shade_piece(nebel_cloud_workspace *workspace, const double place[3], float width, int i,
