@@ -272,6 +272,38 @@ static void test_light_as_pixels_grow(void **state)
     nebel_destroy_clouds(clouds);
 }
 
+/* Pieces of rays hide thousands of optical depths: nothing comes through, not even as the smallest number. */
+static void test_light_of_dense_clouds(void **state)
+{
+    (void)state;
+    static const double denser[] = {20, 200, 1000};
+    for (int d = 0; d < 3; d++) {
+        nebel_clouds *clouds =
+            make(1, (const nebel_cloud_layer[]){
+                        {.kind = NEBEL_CLOUD_STRATUS, .base = 500, .top = 600, .extinction = denser[d]}});
+        nebel_cloud_workspace *workspace;
+        nebel_cloud_view *view = view_of(clouds, 0, &workspace);
+        uint64_t numbers = 5;
+        int opaque = 0;
+        for (int i = 0; i < 2000; i++) {
+            const double down = dice(&numbers, .01, .5), turn = dice(&numbers, -PI, PI), level = sqrt(1 - down * down);
+            const nebel_ray ray = {{0, 3000, 0}, {level * sin(turn), -down, level * cos(turn)}, HUGE_VAL};
+            nebel_cloud_knots knots;
+            assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){.01}, 0, &knots, 0), NEBEL_OK);
+            for (uint32_t k = 0; k < knots.count; k++)
+                for (int c = 0; c < 3; c++)
+                    assert_true(isfinite(knots.in_scattering[k][c]) && knots.in_scattering[k][c] >= 0);
+            if (knots.count == 0 || knots.transmittance[knots.count - 1] > .01f) continue;
+            opaque++;
+            assert_true(knots.in_scattering[knots.count - 1][1] > .05f && knots.error < 2);
+        }
+        assert_true(opaque > 1000);
+        nebel_destroy_cloud_workspace(workspace);
+        nebel_destroy_cloud_view(view);
+        nebel_destroy_clouds(clouds);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -280,6 +312,7 @@ int main(void)
         cmocka_unit_test(test_ways_to_a_sun_below_level),
         cmocka_unit_test(test_light_of_flat_heaps),
         cmocka_unit_test(test_light_as_pixels_grow),
+        cmocka_unit_test(test_light_of_dense_clouds),
     };
     return cmocka_run_group_tests(tests, make_air, free_air);
 }

@@ -536,7 +536,7 @@ static void judge_piece(nb_walk *walk, const nb_stay *stay)
         walk->has_far = 1;
         return;
     }
-    walk->missed += missed / PIECES;
+    walk->missed += nb_min(walk->tally.left, missed / PIECES);
     take_halves(walk, stay, &depth);
     walk->t += length;
     walk->here = walk->far;
@@ -629,7 +629,8 @@ static void find_stays(nb_walk *walk, double t_max)
 static double through_all(nb_walk *walk)
 {
     const nb_cloud_tally *tally = &walk->tally;
-    const double seen = tally->left * visible(tally->left_apart) / tally->left_apart;
+    const double visibly = visible(tally->left_apart),
+                 seen = visibly > 0 ? tally->left * visibly / tally->left_apart : 0;
     double end[3], pieces[2][2];
     if (!(walk->ray.ahead > 0 && seen > 0 && walk->t_max < HUGE_VAL)) return seen;
     const nebel_cloud_view *view = walk->view;
