@@ -4,6 +4,7 @@
 #include "scene_help.h"
 
 #include <math.h>
+#include <sys/stat.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -121,11 +122,17 @@ static void test_maps_come_from_pictures(void **state)
     assert_int_equal(nebel_load_scene_planet(scene), NEBEL_OK);
     assert_int_equal(nebel_scene_contents(scene)->file_count, 3);
     nebel_destroy_scene(scene);
-    assert_int_equal(load("\"map\": \"grey.exr\"", &scene), NEBEL_ERROR_FORMAT);
+    assert_int_equal(load("\"map\": \"grey.exr\"", &scene), NEBEL_OK);
+    desc = &nebel_scene_contents(scene)->planets[0].shells;
+    assert_int_equal(desc->ground.channels, 3);
+    for (int i = 0; i < 6; i++) assert_true(fabs((double)desc->ground.texels[i] - .5) < 1e-3);
+    nebel_destroy_scene(scene);
+    assert_int_equal(mkfifo(in_folder("pipe.png"), 0600), 0);
+    assert_int_equal(load("\"map\": \"pipe.png\"", &scene), NEBEL_ERROR_FILE);
     assert_int_equal(load("\"map\": \"bright.exr\"", &scene), NEBEL_ERROR_FORMAT);
     assert_int_equal(load("\"map\": \"none.png\"", &scene), NEBEL_ERROR_FILE);
     assert_int_equal(load("\"map\": \"scene.json\"", &scene), NEBEL_ERROR_FORMAT);
-    static const char *const names[] = {"colors.png", "colors.exr", "grey.exr", "bright.exr", "scene.json"};
+    static const char *const names[] = {"colors.png", "colors.exr", "grey.exr", "bright.exr", "scene.json", "pipe.png"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) (void)remove(in_folder(names[i]));
     (void)rmdir(folder);
 }

@@ -43,7 +43,7 @@ nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, neb
 nebel_result nb_png_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
 nebel_result nb_exr_write_image(const nb_codec *codec, const nebel_image *image, nb_bytes *bytes);
 
-/* The picture at codec->name, whichever it is. Errors: FILE, FORMAT, LIMIT, MEMORY, UNSUPPORTED; it is empty then. */
+/* The picture in the regular file codec->name, whichever it is. Errors: FILE, FORMAT, LIMIT, MEMORY, UNSUPPORTED; it is empty then. */
 nebel_result nb_image_read(const nb_codec *codec, nebel_image *image);
 
 /* Gives the image memory for its samples, cleared, and copies of the names. Checks the limits. */

@@ -87,16 +87,22 @@ static nebel_result decode(const nb_codec *codec, const nb_bytes *bytes, nebel_i
     return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: neither a PNG nor an OpenEXR picture", codec->name);
 }
 
-nebel_result nb_image_read(const nb_codec *codec, nebel_image *image)
+static nebel_result read_image(const nb_codec *codec, nebel_image *image)
 {
     nb_bytes bytes;
-    *image = (nebel_image){0};
     nebel_result result =
         nb_file_read(&codec->allocator, &codec->log, NULL, "picture", codec->name, FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     result = decode(codec, &bytes, image);
     nb_release(&codec->allocator, bytes.data);
     return result;
+}
+
+nebel_result nb_image_read(const nb_codec *codec, nebel_image *image)
+{
+    *image = (nebel_image){0};
+    const nebel_result regular = nb_file_check(&codec->log, NULL, "picture", codec->name);
+    return regular == NEBEL_OK ? read_image(codec, image) : regular;
 }
 
 nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, nebel_image *image)
@@ -106,7 +112,7 @@ nebel_result nebel_read_image(const char *path, const nebel_scene_desc *desc, ne
     const nebel_result result = check_desc(desc);
     if (result != NEBEL_OK) return result;
     const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
-    return nb_image_read(&codec, image);
+    return read_image(&codec, image);
 }
 
 void nebel_free_image(const nebel_scene_desc *desc, nebel_image *image)

@@ -77,12 +77,12 @@ static bool check_apart(nb_scene_reader *in, const nb_json_node *node, const neb
     return true;
 }
 
-static bool check_size(nb_json *json, const nb_json_node *node, const nebel_planet *planet, double size)
+static bool check_size(nb_json *json, const nb_json_node *node, const nebel_planet *planet, bool is_given, double size)
 {
     const double most = NEBEL_MAX_CLOUD_RADII * planet->air.radius;
-    char message[120];
-    snprintf(message, sizeof message, "size: is %g m; must be at most %g m, which is %g times the radius", size, most,
-             NEBEL_MAX_CLOUD_RADII);
+    char message[140];
+    snprintf(message, sizeof message, "size: is %g m%s; must be at most %g m, which is %g times the radius", size,
+             is_given ? "" : ", as none is given", most, NEBEL_MAX_CLOUD_RADII);
     return size <= most || nb_value_fail_within(json, node, message, "");
 }
 
@@ -104,7 +104,9 @@ static bool read_layer(nb_scene_reader *in, const nb_json_node *node, nebel_plan
     nebel_cloud_layer resolved;
     if (!try_layer(in, node, planet->air.thickness, layer, &resolved)) return false;
     if (found[COVERAGE] != NULL && layer->coverage == 0) return true;
-    if (!check_size(json, node, planet, resolved.size) || !check_apart(in, node, planet, &resolved)) return false;
+    if (!check_size(json, node, planet, found[SIZE] != NULL, resolved.size) ||
+        !check_apart(in, node, planet, &resolved))
+        return false;
     planet->cloud_layer_count++;
     in->scene->data.moves_on |= layer->wind[0] != 0 || layer->wind[1] != 0;
     return true;

@@ -15,8 +15,8 @@ static const nb_range part_range = {
 
 /* ---- maps ------------------------------------------------------------------------------------ */
 
-/* In place: one channel of grey pictures and of the mean of others, or three, linear where the file's are not. */
-static void keep_channels(const nebel_image *image, const int first[3], int channels, bool is_linear)
+/* One channel of grey pictures and of the mean of others, or three, linear where the file's are not. `texels` may be the picture's. */
+static void keep_channels(const nebel_image *image, const int first[3], int channels, bool is_linear, float *texels)
 {
     const size_t count = (size_t)image->width * image->height, n = image->channel_count;
     for (size_t i = 0; i < count; i++) {
@@ -26,14 +26,23 @@ static void keep_channels(const nebel_image *image, const int first[3], int chan
             color[c] = is_linear || channels == 1 ? value : (float)nb_value_linear_from_srgb((double)value);
         }
         if (channels == 1) color[0] = (color[0] + color[1] + color[2]) / 3;
-        memcpy(&image->samples[(size_t)channels * i], color, (size_t)channels * sizeof *color);
+        memcpy(&texels[(size_t)channels * i], color, (size_t)channels * sizeof *color);
     }
+}
+
+/* Where texels go: where samples are, if they are no more. */
+static bool make_room(const nb_codec *codec, size_t count, int channels, const nebel_image *image, float **texels)
+{
+    *texels = image->samples;
+    if (image->channel_count < (size_t)channels) *texels = nb_allocate(&codec->allocator, count, sizeof **texels);
+    return *texels != NULL;
 }
 
 static nebel_result set_map(const nb_codec *codec, nebel_image *image, int channels, nebel_map *map)
 {
     static const char *const colors[3] = {"R", "G", "B"};
     int first[3];
+    float *texels;
     if (image->width > NEBEL_MAX_MAP_SIZE || image->height > NEBEL_MAX_MAP_SIZE)
         return nb_fail(&codec->log, NEBEL_ERROR_LIMIT, "%s: has %u x %u pixels; a map has at most %d on each side",
                        codec->name, (unsigned)image->width, (unsigned)image->height, NEBEL_MAX_MAP_SIZE);
@@ -43,11 +52,14 @@ static nebel_result set_map(const nb_codec *codec, nebel_image *image, int chann
         if (first[c] < 0)
             return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: has neither channels R, G and B nor Y", codec->name);
     }
-    if (image->channel_count < (size_t)channels && first[0] == first[1])
-        return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: is grey; the ground's map must have colours", codec->name);
-    keep_channels(image, first, channels, nebel_find_image_format(codec->name) == NEBEL_IMAGE_EXR);
-    *map = (nebel_map){image->width, image->height, channels, image->samples};
-    for (size_t i = 0; i < (size_t)image->width * image->height * (size_t)channels; i++)
+    const size_t count = (size_t)image->width * image->height * (size_t)channels;
+    if (!make_room(codec, count, channels, image, &texels))
+        return nb_fail(&codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", codec->name);
+    keep_channels(image, first, channels, nebel_find_image_format(codec->name) == NEBEL_IMAGE_EXR, texels);
+    if (texels != image->samples) nb_release(&codec->allocator, image->samples);
+    image->samples = texels;
+    *map = (nebel_map){image->width, image->height, channels, texels};
+    for (size_t i = 0; i < count; i++)
         if (!(image->samples[i] >= 0 && image->samples[i] <= 1))
             return nb_fail(&codec->log, NEBEL_ERROR_FORMAT, "%s: holds %g; a map holds numbers from 0 to 1",
                            codec->name, (double)image->samples[i]);
