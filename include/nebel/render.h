@@ -111,9 +111,9 @@ typedef struct nebel_frame_desc {
     /* Of REFERENCE: how often light is scattered or reflected at most. 1 is what EXACT shows; 0: until paths end by
      * themselves, at most 10000 times. Other seeds give independent pictures. */
     uint32_t bounces, seed;
-    double
-        time; /* within 1e12: what a planet's layers have turned by, in the unit of its days, and its clouds have moved by,
-                    in that of its winds; frames in scenes */
+    /* Within 1e12: what a planet's layers have turned by, in the unit of its days, and its clouds have moved by, in that of its
+     * winds; frames in scenes. */
+    double time;
 } nebel_frame_desc;
 
 /* One frame in linear light. Every plane is caller memory, width * height pixels, top row first, or NULL when not
