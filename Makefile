@@ -54,9 +54,9 @@ report: $(MODELS)
 	@scripts/install_packages.sh build demo test
 	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=ON
-	@$(COMPILE) $(BUILD) -j $(JOBS) --target test_picture_gl
+	@$(COMPILE) $(BUILD) -j $(JOBS) --target nebel_test_gl
 	@mkdir -p $(BUILD)/report
-	@NEBEL_REPORT=$(BUILD)/report $(BUILD)/tests/test_picture_gl
+	@NEBEL_REPORT=$(BUILD)/report $(BUILD)/tests/nebel_test_gl test_picture_gl
 	@echo "nebel: the report is $(BUILD)/report/index.html"
 
 bench: all

@@ -39,7 +39,7 @@ for model in "${models[@]}"; do
     for name in "${tests[@]}"; do
         case $model in
         aarch64) run_aarch64 "$name" >"$build/qemu-$model-$name.log" 2>&1 & ;;
-        *) qemu-x86_64 -cpu "$model" "$build/tests/$name" $segments >"$build/qemu-$model-$name.log" 2>&1 & ;;
+        *) qemu-x86_64 -cpu "$model" "$build/tests/nebel_test_core" "$name" $segments >"$build/qemu-$model-$name.log" 2>&1 & ;;
         esac
         running[$model-$name]=$!
     done

@@ -94,13 +94,11 @@ run_32() {
 
 # The tests but those of Direct3D, one after the other.
 run_tests_32() {
-    local program name
+    local name tests=$build/windows-32/tests
     mkdir -p "$NEBEL_WINE_PREFIX-32"
-    for program in "$build"/windows-32/tests/test_*.exe; do
-        name=$(basename "$program" .exe)
-        if [[ $name = test_d3d9 || $name = test_specular_example ]]; then continue; fi
-        (cd "$source/tests" && run_32 "$program") >"$build/windows-32/$name.log" 2>&1 || { cat "$build/windows-32/$name.log"; exit 1; }
-    done
+    while read -r name; do
+        (cd "$source/tests" && run_32 "$tests/nebel_test_core.exe" "$name") >"$build/windows-32/$name.log" 2>&1 || { cat "$build/windows-32/$name.log"; exit 1; }
+    done < <(sed -n 's/^SUITE.*(\(.*\))$/\1/p' "$tests/suites_core.inc")
     echo "check_wine: the tests pass in 32 bits"
 }
 

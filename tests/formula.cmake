@@ -1,4 +1,4 @@
-# The levels of formula_level.h, for the tests that ask shapes and profiles by name.
+# The levels of formula_level.h, for the suites that ask shapes and profiles by name.
 
 foreach(level IN ITEMS float double fast)
     add_library(formula_${level} OBJECT formula_level.c)
@@ -9,9 +9,9 @@ endforeach()
 target_compile_definitions(formula_double PRIVATE NB_DOUBLE=1)
 target_compile_definitions(formula_fast PRIVATE NB_FAST=1)
 
-foreach(test IN ITEMS test_shapes test_profiles test_formulas_gl)
-    if(TARGET ${test})
-        target_sources(${test} PRIVATE $<TARGET_OBJECTS:formula_float> $<TARGET_OBJECTS:formula_double>
+foreach(program IN ITEMS nebel_test_core nebel_test_gl)
+    if(TARGET ${program})
+        target_sources(${program} PRIVATE $<TARGET_OBJECTS:formula_float> $<TARGET_OBJECTS:formula_double>
             $<TARGET_OBJECTS:formula_fast>)
     endif()
 endforeach()
