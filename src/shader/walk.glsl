@@ -226,7 +226,11 @@ nebel_light nb_trace_further(inout nb_progress p, nb_ray ray, nb_media media, bo
 #if NB_DECLARES(NB_HAS_COVER | NB_HAS_MIXED | NB_HAS_SUN)
     if (walks && p.stage == NB_STAGE_WALK && !(NB_RESUMES && last)) nb_walk(p.walked, ray, first, count, listed, lit, turns);
     if (walks && p.stage == NB_STAGE_WALK && NB_MAY_TIRE && last && (NB_RESUMES || p.walked.is_cut)) {
-        p.walked = covers ? nb_pass_even(p.walked, sum) : nb_pass_rest(p.walked, sum, ray, first, count, listed);
+        /* WebGL 2 knows no conditional operator between structures */
+        if (covers)
+            p.walked = nb_pass_even(p.walked, sum);
+        else
+            p.walked = nb_pass_rest(p.walked, sum, ray, first, count, listed);
         p.walked.is_cut = false;
     }
 #endif
