@@ -1,4 +1,5 @@
 /* One scene in metres with y up, and the same in other units and axes: the same fog, camera and models. */
+#include "fog_help.h"
 #include "scene_help.h"
 
 #include <math.h>
@@ -119,12 +120,12 @@ static double random_number(uint32_t *seed)
 
 enum { RAYS = 2000 };
 
-static void trace(const nebel_scene *scene, nebel_light *lights)
+static void trace_at(const nebel_scene *scene, double frame, nebel_light *lights)
 {
     nebel_snapshot *fog = NULL;
     nebel_ray rays[RAYS];
     uint32_t seed = 7;
-    assert_int_equal(nebel_commit_scene_fog(scene, &fog), NEBEL_OK);
+    assert_int_equal(nebel_commit_scene_fog_at(scene, frame, &fog), NEBEL_OK);
     for (int i = 0; i < RAYS; i++) {
         rays[i] = (nebel_ray){.t_max = i % 3 == 0 ? HUGE_VAL : 40 * random_number(&seed)};
         for (int k = 0; k < 3; k++) rays[i].origin[k] = 24 * random_number(&seed) - 12;
@@ -134,6 +135,11 @@ static void trace(const nebel_scene *scene, nebel_light *lights)
         nebel_trace(fog, &(nebel_trace_desc){.tolerance = 1e-13}, RAYS, rays, sizeof *rays, lights, sizeof *lights),
         NEBEL_OK);
     nebel_release_snapshot(fog);
+}
+
+static void trace(const nebel_scene *scene, nebel_light *lights)
+{
+    trace_at(scene, 0, lights);
 }
 
 static void assert_same_light(const char *template)
@@ -198,6 +204,139 @@ static void test_every_density_and_amount(void **state)
                           "\"soft_edge\", \"distance\": L(1.5)}"));
     assert_same_light(FOG("\"type\": \"sphere\", \"center\": P(0 1 2), \"radius\": L(5)" TRANSFORM,
                           "\"extinction\": K(.3), \"source\": 1, \"density\": {\"type\": \"radial\", \"power\": 2}"));
+}
+
+static void write_file(const char *name, const char *text)
+{
+    FILE *stream = fopen(name, "wb");
+    assert_non_null(stream);
+    fputs(text, stream);
+    fclose(stream);
+}
+
+#define BOX_IN "\"fog\": [{\"shape\": {\"type\": \"box\", B(-8 -7 -6 8 6 7)" TRANSFORM "}, \"extinction\": K(.3), "
+#define NOISE                                                                                                          \
+    "{\"type\": \"noise\", \"size\": S(14 10 12), \"cells\": S(3 2 4), \"octaves\": 2, \"edge\": S(.1 .2 .3), "        \
+    "\"drift\": D(.3 -.2 .1), \"change\": 0.1}"
+
+static nebel_grid *first_grid(const nebel_scene *scene)
+{
+    return nebel_scene_contents(scene)->volumes[0].density.grid;
+}
+
+static void assert_same_noise(const nebel_scene_noise *got, const nebel_scene_noise *wanted)
+{
+    for (int k = 0; k < 3; k++) assert_int_equal(got->desc.size[k], wanted->desc.size[k]);
+    assert_same(got->desc.cells, wanted->desc.cells, 3, 1);
+    assert_same(got->desc.edge, wanted->desc.edge, 3, 1);
+    assert_same(got->drift, wanted->drift, 3, 1);
+}
+
+/* The voxels of two grids, by fog in them. */
+static void assert_same_grid(nebel_grid *got, nebel_grid *wanted)
+{
+    nebel_light lights[2][RAYS];
+    nebel_grid *const grids[2] = {got, wanted};
+    for (int i = 0; i < 2; i++) {
+        const nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-9, -9, -9}, .max = {9, 9, 9}},
+                                          .extinction = {.1, .1, .1},
+                                          .density = {.type = NEBEL_DENSITY_GRID, .grid = grids[i]}};
+        nebel_snapshot *fog = fog_commit(&(nebel_fog_desc){0}, &volume, 1);
+        uint32_t seed = 7;
+        for (int r = 0; r < RAYS; r++) {
+            nebel_ray ray = {.t_max = HUGE_VAL};
+            for (int k = 0; k < 3; k++) ray.origin[k] = 24 * random_number(&seed) - 12;
+            for (int k = 0; k < 3; k++) ray.direction[k] = random_number(&seed) - .5;
+            assert_int_equal(nebel_trace(fog, NULL, 1, &ray, 0, &lights[i][r], 0), NEBEL_OK);
+        }
+        nebel_release_snapshot(fog);
+    }
+    for (int r = 0; r < RAYS; r++) assert_same(lights[0][r].transmittance, lights[1][r].transmittance, 3, 1);
+}
+
+/* Noise lies along the axes of the file, drifts along them, and is told and changed along ours. */
+static void test_noise(void **state)
+{
+    (void)state;
+    static nebel_light wanted[2][RAYS], got[RAYS];
+    nebel_scene_noise noise, there;
+    nebel_grid *changed, *same;
+    nebel_scene *ours_too = parse_in(BOX_IN "\"source\": 1, \"density\": " NOISE "}]}", &ours);
+    for (int i = 0; i < 2; i++) trace_at(ours_too, 3 * i, wanted[i]);
+    assert_true(nebel_find_scene_noise(ours_too, first_grid(ours_too), &noise));
+    noise.drift[2] = .75;
+    noise.desc.cells[1] = 3;
+    assert_int_equal(nebel_change_scene_noise(ours_too, first_grid(ours_too), &noise, &changed), NEBEL_OK);
+    for (size_t k = 0; k < sizeof others / sizeof *others; k++) {
+        nebel_scene *scene = parse_in(BOX_IN "\"source\": 1, \"density\": " NOISE "}]}", &others[k]);
+        for (int i = 0; i < 2; i++) {
+            trace_at(scene, 3 * i, got);
+            for (int r = 0; r < RAYS; r++) assert_same(got[r].transmittance, wanted[i][r].transmittance, 3, 1);
+        }
+        assert_int_equal(nebel_change_scene_noise(scene, first_grid(scene), &noise, &same), NEBEL_OK);
+        assert_true(nebel_find_scene_noise(scene, same, &there));
+        assert_same_noise(&there, &noise);
+        assert_same_grid(same, changed);
+        nebel_release_grid(same);
+        nebel_destroy_scene(scene);
+    }
+    nebel_release_grid(changed);
+    nebel_destroy_scene(ours_too);
+}
+
+/* 2 x 3 x 4 numbers along the axes of the file. */
+static void write_voxels(const char *name, bool z_up)
+{
+    FILE *stream = fopen(name, "wb");
+    assert_non_null(stream);
+    const int rows = z_up ? 4 : 3, layers = z_up ? 3 : 4;
+    for (int z = 0; z < layers; z++)
+        for (int y = 0; y < rows; y++)
+            for (int x = 0; x < 2; x++) {
+                const float value = (float)(x + 2 * (z_up ? z : y) + 6 * (z_up ? rows - 1 - y : z));
+                assert_int_equal(fwrite(&value, sizeof value, 1, stream), 1);
+            }
+    fclose(stream);
+}
+
+static void test_voxels(void **state)
+{
+    (void)state;
+    static nebel_light wanted[RAYS], got[RAYS];
+    static const char grid[] = BOX_IN "\"source\": 1, \"density\": {\"type\": \"grid\", \"file\": "
+                                      "\"test_scene_space.raw\", \"size\": S(2 3 4), \"voxels\": \"float\"}}]}";
+    write_voxels("test_scene_space.raw", false);
+    nebel_scene *scene = parse_in(grid, &ours);
+    trace(scene, wanted);
+    nebel_destroy_scene(scene);
+    for (size_t k = 0; k < sizeof others / sizeof *others; k++) {
+        write_voxels("test_scene_space.raw", others[k].z_up);
+        scene = parse_in(grid, &others[k]);
+        trace(scene, got);
+        nebel_destroy_scene(scene);
+        for (int r = 0; r < RAYS; r++) assert_same(got[r].transmittance, wanted[r].transmittance, 3, 1);
+    }
+    remove("test_scene_space.raw");
+}
+
+/* glTF is y up: noise in a node of it is so, too, in any scene and at any frame. */
+static void test_noise_in_nodes(void **state)
+{
+    (void)state;
+    static nebel_light wanted[RAYS], got[RAYS];
+    write_file(
+        "test_scene_space.gltf",
+        "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"scale\": "
+        "[8, 7, 6], \"extras\": {\"nebel\": {\"extinction\": 0.3, \"source\": 1, \"density\": {\"type\": "
+        "\"noise\", \"size\": [14, 10, 12], \"cells\": [3, 2, 4], \"drift\": [0.3, -0.2, 0.1]}}}}]}");
+    for (size_t k = 0; k <= sizeof others / sizeof *others; k++) {
+        nebel_scene *scene = parse_in("\"models\": [{\"file\": \"test_scene_space.gltf\"}], \"fog\": []}",
+                                      k > 0 ? &others[k - 1] : &ours);
+        trace_at(scene, 3, k > 0 ? got : wanted);
+        for (int r = 0; r < RAYS && k > 0; r++) assert_same(got[r].transmittance, wanted[r].transmittance, 3, 1);
+        nebel_destroy_scene(scene);
+    }
+    remove("test_scene_space.gltf");
 }
 
 static void test_a_nebula(void **state)
@@ -276,14 +415,6 @@ static void test_a_scene_without_camera_has_the_usual_one(void **state)
     nebel_destroy_scene(scene);
 }
 
-static void write_file(const char *name, const char *text)
-{
-    FILE *stream = fopen(name, "wb");
-    assert_non_null(stream);
-    fputs(text, stream);
-    fclose(stream);
-}
-
 static void load_mesh(nebel_scene *scene, double places[3][3])
 {
     assert_int_equal(nebel_load_scene_models(scene), NEBEL_OK);
@@ -331,11 +462,10 @@ static void test_models(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_shape),
-        cmocka_unit_test(test_every_density_and_amount),
-        cmocka_unit_test(test_a_nebula),
-        cmocka_unit_test(test_cameras_and_sun),
-        cmocka_unit_test(test_a_scene_without_camera_has_the_usual_one),
+        cmocka_unit_test(test_every_shape),     cmocka_unit_test(test_every_density_and_amount),
+        cmocka_unit_test(test_noise),           cmocka_unit_test(test_voxels),
+        cmocka_unit_test(test_noise_in_nodes),  cmocka_unit_test(test_a_nebula),
+        cmocka_unit_test(test_cameras_and_sun), cmocka_unit_test(test_a_scene_without_camera_has_the_usual_one),
         cmocka_unit_test(test_models),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -295,8 +295,8 @@ typedef struct nebel_scene_noise {
     double drift[3], change; /* of its offset and its time, per frame */
 } nebel_scene_noise;
 
-/* Whether a grid is noise of the scene, or of nebel_change_scene_noise; then *noise is what the file says of it, with the
- * defaults of what it leaves out. Its name tells. 0 also where memory is out. Any thread. */
+/* Whether a grid is noise of the scene, or of nebel_change_scene_noise; then *noise is what the file says of it, along
+ * our axes (y up) and with the defaults of what it leaves out. Its name tells. 0 also where memory is out. Any thread. */
 int nebel_find_scene_noise(const nebel_scene *scene, const nebel_grid *grid, nebel_scene_noise *noise);
 
 /* Such a grid with other numbers, in *changed with one owner; on an error *changed is NULL. Offset, time, name, allocator

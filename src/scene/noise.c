@@ -83,7 +83,9 @@ int nebel_find_scene_noise(const nebel_scene *scene, const nebel_grid *grid, neb
 {
     bool is_noise;
     if (scene == NULL || noise == NULL) return 0;
-    return find_noise(&scene->allocator, grid, noise, &is_noise) == NEBEL_OK && is_noise;
+    if (find_noise(&scene->allocator, grid, noise, &is_noise) != NEBEL_OK || !is_noise) return 0;
+    nb_space_convert_noise(&scene->space, noise);
+    return 1;
 }
 
 /* ---- at a frame ------------------------------------------------------------------------------ */
@@ -99,6 +101,7 @@ nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double
         if (grid != NULL) *at = nebel_retain_grid(grid);
         return NEBEL_OK;
     }
+    nb_space_convert_noise(&scene->space, &noise);
     nebel_noise_desc desc = noise.desc;
     desc.allocator = scene->allocator;
     desc.log = scene->log;
@@ -146,21 +149,28 @@ void nb_save_noise_grid(nb_save *save, const nb_json *json, const nb_edit_object
     if (was_noise && is_noise) nb_save_noise(&save->edit, json, object, &a, &b);
 }
 
-/* The words of a grid, wrapped, with the numbers that are wanted in their places: to be released. */
-static nebel_result edit_words(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *wanted,
-                               nb_bytes *changed)
+/* Without what wraps it. False when memory is out. */
+static bool unwrap(const nebel_allocator *allocator, nb_bytes *bytes)
+{
+    const size_t size = bytes->size - strlen(before) - strlen(after);
+    memmove(bytes->data, bytes->data + strlen(before), size);
+    bytes->size = size;
+    return nb_bytes_write(allocator, bytes, size, "", 1);
+}
+
+nebel_result nb_noise_words(const nebel_scene *scene, const char *words, const nebel_scene_noise *wanted,
+                            nb_bytes *changed)
 {
     nb_edit edit = {.arena = {.allocator = scene->allocator}};
     nebel_scene_noise was;
     noise_task task = {.noise = &was, .wanted = wanted, .edit = &edit};
     char *whole;
-    nebel_result result = wrap(&scene->allocator, nebel_grid_name(grid), &whole);
+    nebel_result result = wrap(&scene->allocator, words, &whole);
     if (result != NEBEL_OK) return result;
     edit.text = whole;
     edit.size = strlen(whole);
     result = read_words(&scene->allocator, &scene->log, whole, &task);
-    if (result == NEBEL_OK &&
-        (!nb_edit_apply(&edit, changed) || !nb_bytes_write(&scene->allocator, changed, changed->size, "", 1)))
+    if (result == NEBEL_OK && (!nb_edit_apply(&edit, changed) || !unwrap(&scene->allocator, changed)))
         result = NEBEL_ERROR_MEMORY;
     nb_edit_release(&edit);
     nb_release(&scene->allocator, whole);
@@ -168,24 +178,27 @@ static nebel_result edit_words(const nebel_scene *scene, const nebel_grid *grid,
 }
 
 /* What its words say, to their last digit: a scene that is saved and read again has the same. */
-static nebel_result make_noise(const nebel_scene *scene, const nb_bytes *words, nebel_grid **grid)
+static nebel_result make_noise(const nebel_scene *scene, const char *words, nebel_grid **grid)
 {
     nebel_scene_noise noise;
     noise_task task = {.noise = &noise};
-    char *const whole = (char *)words->data;
-    const nebel_result result = read_words(&scene->allocator, &scene->log, whole, &task);
+    char *whole;
+    nebel_result result = wrap(&scene->allocator, words, &whole);
     if (result != NEBEL_OK) return result;
-    whole[strlen(whole) - strlen(after)] = '\0';
+    result = read_words(&scene->allocator, &scene->log, whole, &task);
+    nb_release(&scene->allocator, whole);
+    if (result != NEBEL_OK) return result;
+    nb_space_convert_noise(&scene->space, &noise);
     noise.desc.allocator = scene->allocator;
     noise.desc.log = scene->log;
-    noise.desc.name = whole + strlen(before);
+    noise.desc.name = words;
     return nebel_create_noise(&noise.desc, grid);
 }
 
 nebel_result nebel_change_scene_noise(const nebel_scene *scene, const nebel_grid *grid, const nebel_scene_noise *noise,
                                       nebel_grid **changed)
 {
-    nebel_scene_noise was;
+    nebel_scene_noise was, wanted;
     bool is_noise;
     nb_bytes words = {0};
     if (changed == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -193,8 +206,10 @@ nebel_result nebel_change_scene_noise(const nebel_scene *scene, const nebel_grid
     if (scene == NULL || noise == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = find_noise(&scene->allocator, grid, &was, &is_noise);
     if (result == NEBEL_OK && !is_noise) return NEBEL_ERROR_ARGUMENT;
-    if (result == NEBEL_OK) result = edit_words(scene, grid, noise, &words);
-    if (result == NEBEL_OK) result = make_noise(scene, &words, changed);
+    wanted = *noise;
+    nb_space_restore_noise(&scene->space, &wanted);
+    if (result == NEBEL_OK) result = nb_noise_words(scene, nebel_grid_name(grid), &wanted, &words);
+    if (result == NEBEL_OK) result = make_noise(scene, (const char *)words.data, changed);
     nb_release(&scene->allocator, words.data);
     return result;
 }

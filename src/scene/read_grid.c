@@ -107,7 +107,7 @@ bool nb_read_grid(nb_scene_reader *in, const nb_json_node *node, nebel_density *
     if (file.name == NULL || !nb_scene_keep_file(in->scene, file.file))
         return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
-    const nebel_result result = nebel_load_grid(&file, &desc, &density->grid);
+    const nebel_result result = nb_voxels_load(&file, &desc, &in->space, &density->grid);
     if (result != NEBEL_OK) return nb_json_fail(json, result, found[FILE_KEY], "%s", note.text);
     return nb_scene_keep_grid(in, node, density->grid);
 }

@@ -51,14 +51,30 @@ bool nb_noise_moves(const nebel_scene_noise *noise)
     return noise->change != 0 || noise->drift[0] != 0 || noise->drift[1] != 0 || noise->drift[2] != 0;
 }
 
+/* The words are the scene file's, whatever file they come from: those of a model's node are y up. NULL: out of memory. */
+static const char *name_noise(nb_scene_reader *in, const nb_json_node *node, const nebel_scene_noise *noise)
+{
+    nebel_scene *scene = in->scene;
+    const char *words = nb_arena_copy_text(&scene->arena, in->json->desc.text + node->offset, node->end - node->offset);
+    nebel_scene_noise own = *noise;
+    nb_bytes changed = {0};
+    if (words == NULL || in->space.z_up == scene->space.z_up) return words;
+    nb_space_restore_noise(&scene->space, &own);
+    const nebel_result result = nb_noise_words(scene, words, &own, &changed);
+    words = result == NEBEL_OK ? nb_arena_copy_text(&scene->arena, (const char *)changed.data, changed.size) : NULL;
+    nb_release(&scene->allocator, changed.data);
+    return words;
+}
+
 bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density)
 {
     nb_json *json = in->json;
     nb_note note = {""};
     nebel_scene_noise noise = {.desc = {.allocator = in->scene->allocator, .log = nb_note_log(&note)}};
     if (!nb_read_noise_numbers(json, node, &noise)) return false;
-    noise.desc.name = nb_arena_copy_text(&in->scene->arena, json->desc.text + node->offset, node->end - node->offset);
+    noise.desc.name = name_noise(in, node, &noise);
     if (noise.desc.name == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
+    nb_space_convert_noise(&in->space, &noise);
     *density = (nebel_density){.type = NEBEL_DENSITY_GRID};
     const nebel_result result = nebel_create_noise(&noise.desc, &density->grid);
     if (result != NEBEL_OK)

@@ -193,6 +193,7 @@ static nebel_result read_scene(nebel_scene *scene, const char *text, size_t size
     if (result != NEBEL_OK) return nb_fail(&scene->log, result, "%s: %s", name, nebel_result_text(result));
     result = find_space(&desc, &in);
     desc.unit = in.space.unit;
+    scene->space = in.space;
     if (result == NEBEL_OK)
         result = nb_json_read(&json, &desc);
     else

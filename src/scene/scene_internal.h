@@ -5,6 +5,7 @@
 #include <nebel/scene.h>
 
 #include "scene/affine.h"
+#include "scene/file.h"
 #include "scene/space.h"
 #include "scene/value.h"
 
@@ -40,6 +41,7 @@ struct nebel_scene {
     void *run_user;
     nb_arena arena;
     const char *folder; /* of the file, ending in a slash; "" is the current one */
+    nb_space space;     /* of the file's numbers */
     nebel_scene_data data;
     nebel_diffusion_desc diffusion; /* that of nebel_set_scene_diffusion */
 
@@ -180,6 +182,10 @@ bool nb_read_noise_numbers(nb_json *json, const nb_json_node *node, nebel_scene_
 
 /* Whether it changes from frame to frame. */
 bool nb_noise_moves(const nebel_scene_noise *noise);
+
+/* The words of noise, `words`, with the numbers that are wanted in their places, in the file's own terms: to be released. */
+nebel_result nb_noise_words(const nebel_scene *scene, const char *words, const nebel_scene_noise *wanted,
+                            nb_bytes *changed);
 
 /* The voxels of a density of the type "noise". */
 bool nb_read_noise(nb_scene_reader *in, const nb_json_node *node, nebel_density *density);

@@ -121,6 +121,23 @@ void nb_space_convert_cell(const nb_space *space, nebel_cell *cell)
     cell->density /= space->unit;
 }
 
+/* Which axis of a box is which: the same both ways. */
+static void exchange_axes(const nb_space *space, nebel_noise_desc *noise)
+{
+    const size_t size = noise->size[1];
+    if (!space->z_up) return;
+    noise->size[1] = noise->size[2];
+    noise->size[2] = size;
+    swap_y_and_z(noise->cells);
+    swap_y_and_z(noise->edge);
+}
+
+void nb_space_convert_noise(const nb_space *space, nebel_scene_noise *noise)
+{
+    exchange_axes(space, &noise->desc);
+    nb_space_convert_direction(space, noise->drift);
+}
+
 /* ---- camera ---------------------------------------------------------------------------------- */
 
 void nb_space_convert_camera(const nb_space *space, nebel_camera *camera)
@@ -217,6 +234,12 @@ void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula)
     scale_all(1 / space->unit, nebula->size, 2);
     nebula->turbulence /= space->unit;
     nebula->turbulence_size /= space->unit;
+}
+
+void nb_space_restore_noise(const nb_space *space, nebel_scene_noise *noise)
+{
+    exchange_axes(space, &noise->desc);
+    nb_space_restore_direction(space, noise->drift);
 }
 
 void nb_space_restore_cell(const nb_space *space, nebel_cell *cell)

@@ -25,6 +25,9 @@ void nb_space_convert_volume(const nb_space *space, nebel_volume_desc *volume);
 void nb_space_convert_nebula(const nb_space *space, nebel_nebula_desc *nebula);
 void nb_space_convert_cell(const nb_space *space, nebel_cell *cell);
 
+/* What goes along the axes of a noise's box, and its wind. */
+void nb_space_convert_noise(const nb_space *space, nebel_scene_noise *noise);
+
 void nb_space_convert_camera(const nb_space *space, nebel_camera *camera);
 
 /* The other way: from metres, y up, to the file's numbers. */
@@ -39,6 +42,7 @@ void nb_space_restore_plane(const nb_space *space, nebel_plane *plane);
 void nb_space_restore_shape(const nb_space *space, nebel_shape *shape);
 void nb_space_restore_volume(const nb_space *space, nebel_volume_desc *volume);
 void nb_space_restore_nebula(const nb_space *space, nebel_nebula_desc *nebula);
+void nb_space_restore_noise(const nb_space *space, nebel_scene_noise *noise);
 void nb_space_restore_cell(const nb_space *space, nebel_cell *cell);
 
 #endif

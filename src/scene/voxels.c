@@ -166,6 +166,25 @@ static nebel_result read_slices(const nb_codec *codec, const nebel_grid_file *fi
     return result;
 }
 
+/* ---- axes ------------------------------------------------------------------------------------ */
+
+/* From z up to y up: (x, y, z) becomes (x, z, -y), row by row. */
+static nebel_result turn(const nb_codec *codec, const nb_space *space, nb_voxels *voxels)
+{
+    const size_t *const size = voxels->size, row = size[0] * size_of_voxel(voxels->type);
+    nb_voxels turned = {.size = {size[0], size[2], size[1]}, .type = voxels->type};
+    if (!space->z_up) return NEBEL_OK;
+    const nebel_result result = nb_voxels_allocate(codec, &turned);
+    if (result != NEBEL_OK) return result;
+    for (size_t z = 0; z < size[2]; z++)
+        for (size_t y = 0; y < size[1]; y++)
+            memcpy((unsigned char *)turned.data + ((size[1] - 1 - y) * size[2] + z) * row,
+                   (const unsigned char *)voxels->data + (z * size[1] + y) * row, row);
+    nb_release(&codec->allocator, voxels->data);
+    *voxels = turned;
+    return NEBEL_OK;
+}
+
 /* ---- any file -------------------------------------------------------------------------------- */
 
 static bool ends_in(const char *path, size_t size, const char *ending)
@@ -220,7 +239,8 @@ static nebel_result make_grid(const nb_codec *codec, const nebel_grid_file *file
     return nebel_create_grid(&desc, grid);
 }
 
-nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc *desc, nebel_grid **grid)
+nebel_result nb_voxels_load(const nebel_grid_file *file, const nebel_scene_desc *desc, const nb_space *space,
+                            nebel_grid **grid)
 {
     if (grid != NULL) *grid = NULL;
     if (file == NULL || desc == NULL || grid == NULL || file->file == NULL) return NEBEL_ERROR_ARGUMENT;
@@ -229,7 +249,13 @@ nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc
     const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = file->file};
     nb_voxels voxels = {.data = NULL};
     nebel_result result = read_voxels(&codec, file, &voxels);
+    if (result == NEBEL_OK) result = turn(&codec, space, &voxels);
     if (result == NEBEL_OK) result = make_grid(&codec, file, &voxels, grid);
     nb_release(&codec.allocator, voxels.data);
     return result;
+}
+
+nebel_result nebel_load_grid(const nebel_grid_file *file, const nebel_scene_desc *desc, nebel_grid **grid)
+{
+    return nb_voxels_load(file, desc, &NB_SPACE_OURS, grid);
 }
