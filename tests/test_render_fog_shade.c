@@ -82,11 +82,12 @@ static double sky_at(const world *w, const double place[3])
     return (double)part;
 }
 
-static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky)
+static nebel_snapshot *make_limited_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky,
+                                        double max_opacity)
 {
     nebel_fog *fog;
     nebel_snapshot *snapshot;
-    nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}};
+    nebel_fog_desc desc = {.sun = {.direction = {0, 1, 0}}, .max_opacity = max_opacity};
     nebel_environment environment = w->scene.environment;
     memcpy(desc.sun.direction, w->scene.sun_direction, sizeof desc.sun.direction);
     for (int c = 0; c < 3; c++) desc.sun.irradiance[c] = sun * irradiance[c];
@@ -97,6 +98,11 @@ static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume,
     assert_int_equal(nebel_commit_fog(fog, &snapshot), NEBEL_OK);
     nebel_destroy_fog(fog);
     return snapshot;
+}
+
+static nebel_snapshot *make_fog(const world *w, const nebel_volume_desc *volume, double sun, double sky)
+{
+    return make_limited_fog(w, volume, sun, sky, 0);
 }
 
 static test_picture render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, int threads)
@@ -273,6 +279,39 @@ static void a_bank_has_the_light_of_its_place(void **state)
     free_world(&w);
 }
 
+/* max_opacity weakens all light of a ray by as much as its opacity, in the shade of clouds as elsewhere. */
+static void limited_opacity_keeps_the_shade(void **state)
+{
+    (void)state;
+    static const double sun[3] = {.3, .15, -1}, limit = .4;
+    world w;
+    make_world(&(nebel_cloud_layer){.coverage = .5}, sun, &w);
+    const nebel_volume_desc mist = {
+        .shape = {.type = NEBEL_SHAPE_BOX, .min = {-9000, -5, -9000}, .max = {9000, 400, 9000}},
+        .extinction = {1e-3, 2e-3, 4e-3},
+        .albedo = {.97, .97, .97}};
+    nebel_snapshot *const fog = make_fog(&w, &mist, 1, 1), *const limited = make_limited_fog(&w, &mist, 1, 1, limit);
+    const nebel_camera camera = planet_camera(300, -.1);
+    test_picture all = render(&w, fog, &camera, 2), most = render(&w, limited, &camera, 2);
+    double worst = 0;
+    int beyond = 0;
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) {
+        if (i / 3 / WIDTH < HEIGHT / 2) continue; /* clouds are before the sky, and before mist near it */
+        const double left = (double)all.planes.transmittance[i], light = (double)all.planes.in_scattering[i];
+        const double kept = limit / fmax(limit, 1 - left);
+        assert_true(fabs((double)most.planes.transmittance[i] - fmax(left, 1 - limit)) < 1e-3);
+        worst = fmax(worst, fabs((double)most.planes.in_scattering[i] - kept * light));
+        beyond += kept < .7;
+    }
+    print_message("with max_opacity %g: off by %.1e\n", limit, worst);
+    assert_true(beyond > 100 && worst < 1e-3);
+    test_picture_free(&all);
+    test_picture_free(&most);
+    nebel_release_snapshot(fog);
+    nebel_release_snapshot(limited);
+    free_world(&w);
+}
+
 static void threads_change_nothing(void **state)
 {
     (void)state;
@@ -392,11 +431,9 @@ static void shade_does_not_hang_on_the_origin(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mist_has_the_shadows_of_clouds),
-        cmocka_unit_test(a_bank_has_the_light_of_its_place),
-        cmocka_unit_test(threads_change_nothing),
-        cmocka_unit_test(clear_places_stay_as_they_are),
-        cmocka_unit_test(shade_does_not_hang_on_the_origin),
+        cmocka_unit_test(mist_has_the_shadows_of_clouds),  cmocka_unit_test(a_bank_has_the_light_of_its_place),
+        cmocka_unit_test(limited_opacity_keeps_the_shade), cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(clear_places_stay_as_they_are),   cmocka_unit_test(shade_does_not_hang_on_the_origin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -538,6 +538,7 @@ int nebel_snapshot_scattering_fog(const nebel_snapshot *snapshot, double min[3],
 typedef struct nebel_split_fog {
     nebel_snapshot *sun, *sky; /* lit by the sun alone, by ambient light alone */
     nebel_snapshot *own;       /* by lamps, and what the fog emits and its source; NULL where there is none of it */
+    double max_opacity;        /* 0 to 1, 1: no limit. The parts are not limited: the limit holds for their sum */
 } nebel_split_fog;
 
 /* Makes the three, for nebel_release_split_light. `sun` takes the place of the snapshot's. Cost of each as nebel_commit_fog.

@@ -11,11 +11,12 @@ typedef struct nb_knot {
     float at, fog_left[3], fog_light[3], air_left[3], air_light[3];
     float fog_sun[3], fog_sky[3], sun[3], sky[3]; /* of daylit fog, else 0 */
     nb_shade_between shade;                       /* of clouds, from the knot before */
+    float fog_sum[3], limit[3]; /* of daylit fog with max_opacity: its light, what the limit keeps of it */
 } nb_knot;
 
 static nb_knot start_of(const nb_air *air)
 {
-    nb_knot knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}};
+    nb_knot knot = {.fog_left = {1, 1, 1}, .air_left = {1, 1, 1}, .limit = {1, 1, 1}};
     for (int c = 0; c < 3 && nb_daylit_fog_is(air); c++) {
         knot.sun[c] = (float)air->sun_at_eye[c];
         knot.sky[c] = (float)air->sky_at_eye[c];
@@ -25,9 +26,8 @@ static nb_knot start_of(const nb_air *air)
 
 static nb_knot knot_of(const nb_air *air, const nb_air_scratch *scratch, int lane, int place)
 {
-    if (place < 0) return start_of(air);
     const nb_air_knots *knots = &scratch->knots[scratch->order[lane][place]];
-    nb_knot knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}};
+    nb_knot knot = {.at = knots->at[lane], .shade = {.sun = 1, .sky = 1}, .limit = {1, 1, 1}};
     if (air->roof.is_shaded) knot.shade = knots->shade[lane];
     for (int c = 0; c < 3; c++) {
         knot.fog_left[c] = knots->fog_left[c][lane];
@@ -55,17 +55,49 @@ static float sky_between(const nb_knot *a, const nb_knot *b, int c)
     return 0.5f * (a->sky[c] + b->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]);
 }
 
-/* The light of fog between two knots. */
-static float fog_between(const nb_knot *a, const nb_knot *b, int c)
+/* The same without max_opacity, with what fog has of its own. */
+static float unlimited_between(const nb_knot *a, const nb_knot *b, int c)
 {
     return (b->fog_light[c] - a->fog_light[c]) + b->shade.sun * sun_between(a, b, c) +
            b->shade.sky * sky_between(a, b, c);
 }
 
+/* max_opacity limits all light up to a place, not that of pieces (see nebel_set_max_opacity). */
+static void limit_opacity(const nb_air *air, const nb_knot *before, nb_knot *knot)
+{
+    const float most = (float)air->fog.max_opacity;
+    for (int c = 0; c < 3; c++) {
+        knot->fog_sum[c] = before->fog_sum[c] + unlimited_between(before, knot, c);
+        knot->limit[c] = most > 0 ? most / fmaxf(most, 1 - knot->fog_left[c]) : knot->fog_left[c] < 1 ? 0 : 1;
+        knot->fog_left[c] = fmaxf(knot->fog_left[c], 1 - most);
+    }
+}
+
+static int is_limited(const nb_air *air)
+{
+    return nb_daylit_fog_is(air) && air->fog.max_opacity < 1;
+}
+
+/* The knot of a place behind the one before. */
+static nb_knot knot_after(const nb_air *air, const nb_air_scratch *scratch, int lane, int place, const nb_knot *before)
+{
+    nb_knot knot = knot_of(air, scratch, lane, place);
+    if (is_limited(air)) limit_opacity(air, before, &knot);
+    return knot;
+}
+
+/* The light of fog between two knots. */
+static float fog_between(const nb_knot *a, const nb_knot *b, int c)
+{
+    if (!(b->limit[c] < 1)) return unlimited_between(a, b, c);
+    return b->limit[c] * b->fog_sum[c] - a->limit[c] * a->fog_sum[c];
+}
+
 /* By how much that may be off: all fog may be at one place. */
 static float shade_doubt(const nb_knot *a, const nb_knot *b, int c)
 {
-    return fabsf(b->shade.sun_doubt * sun_between(a, b, c)) + fabsf(b->shade.sky_doubt * sky_between(a, b, c));
+    return b->limit[c] *
+           (fabsf(b->shade.sun_doubt * sun_between(a, b, c)) + fabsf(b->shade.sky_doubt * sky_between(a, b, c)));
 }
 
 /* The same within pieces of shade. */
@@ -73,7 +105,7 @@ static float within(const nb_knot *a, const nb_knot *b)
 {
     float most = 0;
     for (int c = 0; c < 3; c++)
-        most = fmaxf(most, 0.5f * (a->air_left[c] + b->air_left[c]) *
+        most = fmaxf(most, 0.5f * (a->air_left[c] + b->air_left[c]) * b->limit[c] *
                                (fabsf(b->shade.sun_within * sun_between(a, b, c)) +
                                 fabsf(b->shade.sky_within * sky_between(a, b, c))));
     return most;
@@ -81,8 +113,10 @@ static float within(const nb_knot *a, const nb_knot *b)
 
 static float fog_doubt(const nb_knot *a, const nb_knot *b, int c)
 {
-    return 0.5f * fabsf((b->sun[c] - a->sun[c]) * (b->fog_sun[c] - a->fog_sun[c])) +
-           0.5f * fabsf((b->sky[c] - a->sky[c]) * (b->fog_sky[c] - a->fog_sky[c])) + shade_doubt(a, b, c);
+    return 0.5f * b->limit[c] *
+               (fabsf((b->sun[c] - a->sun[c]) * (b->fog_sun[c] - a->fog_sun[c])) +
+                fabsf((b->sky[c] - a->sky[c]) * (b->fog_sky[c] - a->fog_sky[c]))) +
+           shade_doubt(a, b, c);
 }
 
 /* Light of 1 may be off by the tolerance, brighter light by as much more, and light darker than DARK by less, though no less than
@@ -96,7 +130,7 @@ static void sum_light(const nb_air *air, const nb_air_scratch *scratch, int lane
     nb_knot before = start_of(air);
     for (int c = 0; c < 3; c++) light[c] = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_knot here = knot_of(air, scratch, lane, i);
+        const nb_knot here = knot_after(air, scratch, lane, i, &before);
         for (int c = 0; c < 3; c++)
             light[c] += 0.5f * (before.fog_left[c] + here.fog_left[c]) * (here.air_light[c] - before.air_light[c]) +
                         0.5f * (before.air_left[c] + here.air_left[c]) * fog_between(&before, &here, c);
@@ -127,20 +161,23 @@ static float doubt(const nb_knot *a, const nb_knot *b, const float scales[3])
     return most;
 }
 
-/* The piece of a lane that is in doubt most, and all doubts, in those scales. */
-static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane, const float scales[3], float *all)
+/* The piece of a lane that is in doubt most, with the knots at its ends, and all doubts, in those scales. */
+static int find_worst(const nb_air *air, const nb_air_scratch *scratch, int lane, const float scales[3], nb_knot *a,
+                      nb_knot *b, float *all)
 {
     int worst = 0;
     float most = -1;
     nb_knot before = start_of(air);
     *all = 0;
     for (int i = 0; i < scratch->count[lane]; i++) {
-        const nb_knot here = knot_of(air, scratch, lane, i);
+        const nb_knot here = knot_after(air, scratch, lane, i, &before);
         const float is = doubt(&before, &here, scales);
         *all += is;
         if (is > most) {
             most = is;
             worst = i;
+            *a = before;
+            *b = here;
         }
         before = here;
     }
@@ -301,9 +338,9 @@ static int choose(const nb_frame *frame, nb_scratch *scratch, int is_first)
             continue;
         }
         find_scales(&frame->air, air, i, scales);
-        const int worst = find_worst(&frame->air, air, i, scales, &all);
+        nb_knot a, b;
+        const int worst = find_worst(&frame->air, air, i, scales, &a, &b, &all);
         if (all <= frame->air.tolerance) continue;
-        const nb_knot a = knot_of(&frame->air, air, i, worst - 1), b = knot_of(&frame->air, air, i, worst);
         const float place = cut(frame, scratch, i, &a, &b, scales);
         if (!(place > a.at && place < b.at)) continue;
         cut_at(&frame->air, air, i, worst, place);
@@ -323,21 +360,33 @@ static void take_air(nb_scratch *scratch)
     memcpy(scratch->samples.error, all->air_error, sizeof all->air_error);
 }
 
+/* What the limit adds to the error: the light of fog up to the end is off by as much as what the limit keeps of it. */
+static float limit_error(const nb_knot *end, float most, float error)
+{
+    float worst = 0;
+    for (int c = 0; c < 3; c++)
+        if (end->limit[c] < 1 && most > 0)
+            worst = fmaxf(worst, fabsf(end->fog_sum[c]) * end->limit[c] * end->limit[c] / most * error);
+    return worst;
+}
+
 static void sum_up(const nb_air *of, nb_scratch *scratch, int lane)
 {
     static const float plain[3] = {1, 1, 1};
     const nb_air_scratch *air = &scratch->air;
     nb_light_samples *samples = &scratch->samples;
-    nb_knot before = start_of(of);
+    nb_knot before = start_of(of), a, b;
     float light[3], all = 0;
-    (void)find_worst(of, air, lane, plain, &all);
+    (void)find_worst(of, air, lane, plain, &a, &b, &all);
     for (int i = 0; i < air->count[lane]; i++) {
-        const nb_knot here = knot_of(of, air, lane, i);
+        const nb_knot here = knot_after(of, air, lane, i, &before);
         all += within(&before, &here);
         before = here;
     }
     sum_light(of, air, lane, light);
+    if (is_limited(of)) all += limit_error(&before, (float)of->fog.max_opacity, samples->error[lane]);
     for (int c = 0; c < 3; c++) {
+        if (is_limited(of)) samples->transmittance[c][lane] = before.fog_left[c];
         samples->transmittance[c][lane] *= air->knots[0].air_left[c][lane];
         samples->in_scattering[c][lane] = fmaxf(light[c], 0);
     }

@@ -11,6 +11,7 @@
 typedef struct selection {
     const nebel_sun *sun; /* NULL: none */
     int sky, own;         /* own: of lamps, and what the fog itself gives */
+    double max_opacity;
 } selection;
 
 static void keep(const nebel_snapshot *snapshot, selection kept, nb_slot *slots)
@@ -31,7 +32,7 @@ static nebel_result make_part(const nebel_snapshot *snapshot, selection kept, ne
         return nb_fail(&snapshot->log, NEBEL_ERROR_MEMORY, "snapshot: out of memory for its light apart");
     nebel_fog fog = {.allocator = snapshot->allocator,
                      .log = snapshot->log,
-                     .max_opacity = snapshot->max_opacity,
+                     .max_opacity = kept.max_opacity,
                      .diffusion = snapshot->diffusing,
                      .slots = slots,
                      .slot_count = snapshot->medium_count};
@@ -99,10 +100,14 @@ nebel_result nebel_split_light(const nebel_snapshot *snapshot, const nebel_sun *
     if (split != NULL) memset(split, 0, sizeof *split);
     if (snapshot == NULL || sun == NULL || split == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = nb_check_sun(&snapshot->log, sun);
-    if (result == NEBEL_OK) result = make_part(snapshot, (selection){.sun = sun}, &split->sun);
-    if (result == NEBEL_OK) result = make_part(snapshot, (selection){.sky = 1}, &split->sky);
-    if (result == NEBEL_OK && has_own(snapshot)) result = make_part(snapshot, (selection){.own = 1}, &split->own);
-    if (result != NEBEL_OK) nebel_release_split_light(split);
+    if (result == NEBEL_OK) result = make_part(snapshot, (selection){.sun = sun, .max_opacity = 1}, &split->sun);
+    if (result == NEBEL_OK) result = make_part(snapshot, (selection){.sky = 1, .max_opacity = 1}, &split->sky);
+    if (result == NEBEL_OK && has_own(snapshot))
+        result = make_part(snapshot, (selection){.own = 1, .max_opacity = 1}, &split->own);
+    if (result != NEBEL_OK)
+        nebel_release_split_light(split);
+    else
+        split->max_opacity = snapshot->max_opacity;
     return result;
 }
 
@@ -110,8 +115,9 @@ nebel_result nebel_relight(const nebel_snapshot *snapshot, const nebel_sun *sun,
 {
     if (lit != NULL) *lit = NULL;
     if (snapshot == NULL || sun == NULL || lit == NULL) return NEBEL_ERROR_ARGUMENT;
+    const selection all = {.sun = sun, .sky = 1, .own = 1, .max_opacity = snapshot->max_opacity};
     const nebel_result result = nb_check_sun(&snapshot->log, sun);
-    return result == NEBEL_OK ? make_part(snapshot, (selection){.sun = sun, .sky = 1, .own = 1}, lit) : result;
+    return result == NEBEL_OK ? make_part(snapshot, all, lit) : result;
 }
 
 void nebel_release_split_light(nebel_split_fog *split)
