@@ -322,6 +322,40 @@ static void test_hdrp_overwrites_what_ranks_below(void **state)
     nebel_destroy_scene(scene);
 }
 
+/* ---- phase functions ------------------------------------------------------------------------- */
+
+static void test_phases(void **state)
+{
+    (void)state;
+#define HDRP_LOCAL                                                                                                     \
+    "\"type\": \"hdrp_local_volumetric_fog\", \"size\": [1, 1, 1], \"positiveFade\": [0, 0, 0], \"negativeFade\": "    \
+    "[0, 0, 0]"
+    static const struct {
+        const char *text;
+        nebel_phase_type type;
+        double g;
+    } cases[] = {
+        {IMPORT("\"type\": \"bevy_fog_volume\", \"scattering_asymmetry\": -0.25"), NEBEL_PHASE_HENYEY_GREENSTEIN, -.25},
+        {IMPORT("\"type\": \"bevy_fog_volume\", \"scattering_asymmetry\": 0"), NEBEL_PHASE_ISOTROPIC, 0},
+        {IMPORT("\"type\": \"unreal_local_fog_volume\""), NEBEL_PHASE_HENYEY_GREENSTEIN, .2},
+        {IMPORT("\"type\": \"unreal_local_fog_volume\", \"FogPhaseG\": 0.6"), NEBEL_PHASE_HENYEY_GREENSTEIN, .6},
+        {IMPORT("\"type\": \"godot_volumetric_fog\""), NEBEL_PHASE_HENYEY_GREENSTEIN, .2},
+        {IMPORT("\"type\": \"godot_volumetric_fog\", \"volumetric_fog_anisotropy\": 0.9"),
+         NEBEL_PHASE_HENYEY_GREENSTEIN, .9},
+        {IMPORT("\"type\": \"godot_fog_volume\""), NEBEL_PHASE_HENYEY_GREENSTEIN, .2},
+        {IMPORT("\"type\": \"hdrp_fog\""), NEBEL_PHASE_ISOTROPIC, 0},
+        {IMPORT("\"type\": \"hdrp_fog\", \"anisotropy\": 0.3"), NEBEL_PHASE_CORNETTE_SHANKS, .3},
+        {IMPORT(HDRP_LOCAL ", \"anisotropy\": -0.3"), NEBEL_PHASE_CORNETTE_SHANKS, -.3},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        nebel_scene *scene;
+        const nebel_volume_desc *fog = import(cases[i].text, 1, &scene);
+        assert_int_equal(fog->phase.type, cases[i].type);
+        assert_number(fog->phase.g, cases[i].g);
+        nebel_destroy_scene(scene);
+    }
+}
+
 /* ---- Bevy ------------------------------------------------------------------------------------ */
 
 static void test_bevy(void **state)
@@ -338,6 +372,8 @@ static void test_bevy(void **state)
     assert_vector(fog->shape.transform.scale, 10, 4, 10);
     assert_grey(fog->extinction, .2);
     assert_vector(fog->albedo, .75, .375, 0);
+    assert_int_equal(fog->phase.type, NEBEL_PHASE_HENYEY_GREENSTEIN);
+    assert_number(fog->phase.g, .5);
     nebel_destroy_scene(scene);
     fog = import(IMPORT("\"type\": \"bevy_distance_fog\", \"color\": \"#fff\", \"density\": 0.02"), 1, &scene);
     assert_grey(fog->extinction, .02);
@@ -447,6 +483,7 @@ int main(void)
         cmocka_unit_test(test_hdrp_local_volumetric_fog),
         cmocka_unit_test(test_hdrp_fades_of_each_axis),
         cmocka_unit_test(test_hdrp_overwrites_what_ranks_below),
+        cmocka_unit_test(test_phases),
         cmocka_unit_test(test_bevy),
         cmocka_unit_test(test_a_source_stands_for_the_lights_of_the_engine),
         cmocka_unit_test(test_what_no_import_has),

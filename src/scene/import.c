@@ -111,6 +111,14 @@ void nb_import_set_height(nebel_volume_desc *volume, double base, double scale_h
         (nebel_density){.type = NEBEL_DENSITY_HEIGHT, .below = below, .base = base, .scale_height = scale_height};
 }
 
+bool nb_import_phase(nb_json *json, const nb_json_node *node, double usual, nebel_phase *phase)
+{
+    phase->g = usual;
+    if (!nb_value_number(json, node, &nb_range_asymmetry, &phase->g)) return false;
+    phase->type = phase->g != 0 ? NEBEL_PHASE_HENYEY_GREENSTEIN : NEBEL_PHASE_ISOTROPIC;
+    return true;
+}
+
 bool nb_import_refuse_other(nb_json *json, const nb_json_node *node, double neutral, const char *reason)
 {
     double value = neutral;

@@ -42,6 +42,9 @@ nebel_volume_desc nb_import_world(double extinction);
 /* Makes the density exp(-(y - base) / scale_height). */
 void nb_import_set_height(nebel_volume_desc *volume, double base, double scale_height, nebel_below below);
 
+/* Henyey and Greenstein's phase function with the g that the settings have, else `usual`; isotropic for 0. */
+bool nb_import_phase(nb_json *json, const nb_json_node *node, double usual, nebel_phase *phase);
+
 /* A number for which only `neutral` has a counterpart here; `reason` says why. */
 bool nb_import_refuse_other(nb_json *json, const nb_json_node *node, double neutral, const char *reason);
 

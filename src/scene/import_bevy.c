@@ -40,9 +40,10 @@ bool nb_import_bevy_distance_fog(nb_scene_reader *in, const nb_json_node *node, 
 /* A cube of side 1 before its transform. */
 bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, DENSITY, ABSORPTION, SCATTERING, COLOR, TRANSLATION, ROTATION, SCALE, COUNT };
-    static const char *const names[] = {"type",      "density_factor", "absorption", "scattering",
-                                        "fog_color", "translation",    "rotation",   "scale"};
+    enum { TYPE, DENSITY, ABSORPTION, SCATTERING, ASYMMETRY, COLOR, TRANSLATION, ROTATION, SCALE, COUNT };
+    static const char *const names[] = {
+        "type",      "density_factor", "absorption", "scattering", "scattering_asymmetry",
+        "fog_color", "translation",    "rotation",   "scale"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a bevy_fog_volume"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -54,6 +55,7 @@ bool nb_import_bevy_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb
         !nb_value_number(json, found[DENSITY], &nb_range_light, &density) ||
         !nb_value_number(json, found[ABSORPTION], &nb_range_amount, &absorption) ||
         !nb_value_number(json, found[SCATTERING], &nb_range_amount, &scattering) ||
+        !nb_import_phase(json, found[ASYMMETRY], 0.5, &volume->phase) ||
         !nb_value_color(json, found[COLOR], &nb_range_fraction, color) ||
         !nb_value_place(json, found[TRANSLATION], transform->position) ||
         !nb_value_rotation(json, found[ROTATION], transform->rotation) ||

@@ -43,11 +43,18 @@ bool nb_import_godot_fog(nb_scene_reader *in, const nb_json_node *node, nb_impor
     return true;
 }
 
+/* Of an Environment, whose volumetric fog and fog volumes have one phase function. */
+static const double usual_anisotropy = 0.2;
+
 bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, DENSITY, ALBEDO, EMISSION, ENERGY, COUNT };
-    static const char *const names[] = {"type", "volumetric_fog_density", "volumetric_fog_albedo",
-                                        "volumetric_fog_emission", "volumetric_fog_emission_energy"};
+    enum { TYPE, DENSITY, ALBEDO, EMISSION, ENERGY, ANISOTROPY, COUNT };
+    static const char *const names[] = {"type",
+                                        "volumetric_fog_density",
+                                        "volumetric_fog_albedo",
+                                        "volumetric_fog_emission",
+                                        "volumetric_fog_emission_energy",
+                                        "volumetric_fog_anisotropy"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_volumetric_fog"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -59,6 +66,7 @@ bool nb_import_godot_volumetric_fog(nb_scene_reader *in, const nb_json_node *nod
         !nb_value_number(json, found[ENERGY], &nb_range_light, &energy))
         return false;
     fog->volumes[0] = nb_import_world(density);
+    if (!nb_import_phase(json, found[ANISOTROPY], usual_anisotropy, &fog->volumes[0].phase)) return false;
     for (int c = 0; c < 3; c++) {
         fog->volumes[0].albedo[c] = albedo[c];
         fog->volumes[0].emission[c] = emission[c] * energy * density;
@@ -136,9 +144,10 @@ static bool read_transform(nb_json *json, const nb_json_node *node, nebel_transf
 
 bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, SHAPE, SIZE, TRANSFORM, DENSITY, ALBEDO, EMISSION, FALLOFF, FADE, COUNT };
-    static const char *const names[] = {"type",   "shape",    "size",           "transform", "density",
-                                        "albedo", "emission", "height_falloff", "edge_fade"};
+    enum { TYPE, SHAPE, SIZE, TRANSFORM, DENSITY, ALBEDO, EMISSION, FALLOFF, FADE, ANISOTROPY, COUNT };
+    static const char *const names[] = {
+        "type",   "shape",    "size",           "transform", "density",
+        "albedo", "emission", "height_falloff", "edge_fade", "volumetric_fog_anisotropy"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "a godot_fog_volume"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -154,7 +163,8 @@ bool nb_import_godot_fog_volume(nb_scene_reader *in, const nb_json_node *node, n
         !read_color(json, found[ALBEDO], &nb_range_fraction, volume->albedo) ||
         !read_color(json, found[EMISSION], &nb_range_light, emission) ||
         !nb_value_number(json, found[FALLOFF], &nb_range_light, &falloff) ||
-        !nb_value_number(json, found[FADE], &nb_range_light, &fade))
+        !nb_value_number(json, found[FADE], &nb_range_light, &fade) ||
+        !nb_import_phase(json, found[ANISOTROPY], usual_anisotropy, &volume->phase))
         return false;
     set_shape(&volume->shape, shape, size);
     for (int c = 0; c < 3; c++) {

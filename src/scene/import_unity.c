@@ -4,10 +4,18 @@
 #include <limits.h>
 #include <math.h>
 
+/* VolumeRendering.hlsl: Cornette and Shanks' phase function, and an isotropic one for 0. */
+static bool read_phase(nb_json *json, const nb_json_node *node, nebel_phase *phase)
+{
+    if (!nb_import_phase(json, node, 0, phase)) return false;
+    if (phase->g != 0) phase->type = NEBEL_PHASE_CORNETTE_SHANKS;
+    return true;
+}
+
 bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, PATH, BASE, TOP, ALBEDO, COUNT };
-    static const char *const names[] = {"type", "meanFreePath", "baseHeight", "maximumHeight", "albedo"};
+    enum { TYPE, PATH, BASE, TOP, ALBEDO, ANISOTROPY, COUNT };
+    static const char *const names[] = {"type", "meanFreePath", "baseHeight", "maximumHeight", "albedo", "anisotropy"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an hdrp_fog"};
     /* Fog.cs: at the maximum height 0.001 of the fog is left, with -1 / ln 0.001 cut to six digits. */
     static const double per_depth = 0.144765, least_depth = 0.01;
@@ -21,6 +29,7 @@ bool nb_import_hdrp_fog(nb_scene_reader *in, const nb_json_node *node, nb_import
         return false;
     nebel_volume_desc *volume = &fog->volumes[0];
     *volume = nb_import_world(1 / path);
+    if (!read_phase(json, found[ANISOTROPY], &volume->phase)) return false;
     volume->priority = INT_MIN; /* what any local volume may overwrite */
     nb_import_set_height(volume, base, per_depth * fmax(least_depth, top - base), NEBEL_BELOW_CONSTANT);
     for (int c = 0; c < 3; c++) volume->albedo[c] = albedo[c];
@@ -109,6 +118,7 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
         TYPE,
         PATH,
         ALBEDO,
+        ANISOTROPY,
         SIZE,
         POSITIVE_FADE,
         NEGATIVE_FADE,
@@ -122,20 +132,10 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
         ROTATION,
         COUNT
     };
-    static const char *const names[] = {"type",
-                                        "meanFreePath",
-                                        "albedo",
-                                        "size",
-                                        "positiveFade",
-                                        "negativeFade",
-                                        "invertFade",
-                                        "falloffMode",
-                                        "distanceFadeStart",
-                                        "distanceFadeEnd",
-                                        "blendingMode",
-                                        "priority",
-                                        "localPosition",
-                                        "localRotation"};
+    static const char *const names[] = {"type",        "meanFreePath",      "albedo",          "anisotropy",
+                                        "size",        "positiveFade",      "negativeFade",    "invertFade",
+                                        "falloffMode", "distanceFadeStart", "distanceFadeEnd", "blendingMode",
+                                        "priority",    "localPosition",     "localRotation"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1,
                                  NB_BIT(SIZE) | NB_BIT(POSITIVE_FADE) | NB_BIT(NEGATIVE_FADE),
                                  "an hdrp_local_volumetric_fog"};
@@ -148,6 +148,7 @@ bool nb_import_hdrp_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_
     for (int c = 0; c < 3; c++) albedo[c] = 1;
     if (!nb_value_members(json, node, &keys, found) || !nb_value_number(json, found[PATH], &nb_range_positive, &path) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, albedo) ||
+        !read_phase(json, found[ANISOTROPY], &volume->phase) ||
         !nb_value_numbers(json, found[SIZE], &nb_range_extent, 3, size) ||
         !read_fades(json, &found[POSITIVE_FADE], size, edges) ||
         !nb_import_refuse_other(json, found[INVERT], 0, "fog here is inside its shape") ||

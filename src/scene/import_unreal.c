@@ -91,9 +91,9 @@ static const double base_radius = 5;
 
 bool nb_import_unreal_local_fog(nb_scene_reader *in, const nb_json_node *node, nb_import *fog)
 {
-    enum { TYPE, EXTINCTION, ALBEDO, LOCATION, SCALE, COUNT };
-    static const char *const names[] = {"type", "RadialFogExtinction", "FogAlbedo", "RelativeLocation",
-                                        "RelativeScale3D"};
+    enum { TYPE, EXTINCTION, ALBEDO, PHASE_G, LOCATION, SCALE, COUNT };
+    static const char *const names[] = {"type",      "RadialFogExtinction", "FogAlbedo",
+                                        "FogPhaseG", "RelativeLocation",    "RelativeScale3D"};
     static const nb_keys keys = {names, COUNT, NB_BIT(COUNT) - 1, 0, "an unreal_local_fog_volume"};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -106,6 +106,7 @@ bool nb_import_unreal_local_fog(nb_scene_reader *in, const nb_json_node *node, n
     if (!nb_value_members(json, node, &keys, found) ||
         !nb_value_number(json, found[EXTINCTION], &nb_range_light, &extinction) ||
         !nb_value_color(json, found[ALBEDO], &nb_range_fraction, volume.albedo) ||
+        !nb_import_phase(json, found[PHASE_G], 0.2, &volume.phase) ||
         !nb_value_place(json, found[LOCATION], volume.shape.center) || !nb_value_scale(json, found[SCALE], scale))
         return false;
     convert_location(volume.shape.center);

@@ -31,6 +31,8 @@ const nb_range nb_range_distance = {.low = 0, .high = NEBEL_MAX_LENGTH, .dimensi
 const nb_range nb_range_amount = {.low = 0, .high = NEBEL_MAX_AMOUNT, .dimension = NB_PER_LENGTH, .text = "an amount"};
 const nb_range nb_range_density = {
     .low = 0, .high = NEBEL_MAX_AMOUNT, .open = true, .dimension = NB_PER_LENGTH, .text = "an amount"};
+const nb_range nb_range_asymmetry = {
+    .low = -NEBEL_MAX_G, .high = NEBEL_MAX_G, .text = "a number within -0.9999 and 0.9999"};
 const nb_range nb_range_frame = {
     .low = -MOST_FRAME, .high = MOST_FRAME, .text = "a number from -" NB_TEXT(MOST_FRAME) " to " NB_TEXT(MOST_FRAME)};
 

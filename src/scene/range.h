@@ -21,15 +21,16 @@ typedef struct nb_range {
 } nb_range;
 
 extern const nb_range nb_range_any, nb_range_positive, nb_range_fraction;
-extern const nb_range nb_range_light;    /* radiance and what comes of it, and settings of engines, >= 0 */
-extern const nb_range nb_range_factor;   /* of a scale; not 0 */
-extern const nb_range nb_range_place;    /* one coordinate of it */
-extern const nb_range nb_range_extent;   /* a length > 0 */
-extern const nb_range nb_range_end;      /* the radius of one end of a cone: 0, too */
-extern const nb_range nb_range_distance; /* a length >= 0 */
-extern const nb_range nb_range_amount;   /* extinction, emission, >= 0 */
-extern const nb_range nb_range_density;  /* the same of a fog factor, > 0 */
-extern const nb_range nb_range_frame;    /* of an animation */
+extern const nb_range nb_range_light;     /* radiance and what comes of it, and settings of engines, >= 0 */
+extern const nb_range nb_range_factor;    /* of a scale; not 0 */
+extern const nb_range nb_range_place;     /* one coordinate of it */
+extern const nb_range nb_range_extent;    /* a length > 0 */
+extern const nb_range nb_range_end;       /* the radius of one end of a cone: 0, too */
+extern const nb_range nb_range_distance;  /* a length >= 0 */
+extern const nb_range nb_range_amount;    /* extinction, emission, >= 0 */
+extern const nb_range nb_range_density;   /* the same of a fog factor, > 0 */
+extern const nb_range nb_range_frame;     /* of an animation */
+extern const nb_range nb_range_asymmetry; /* the mean cosine g of a phase function */
 
 /* Whether a number of a file whose unit is `unit` metres is in the range. */
 bool nb_range_holds(const nb_range *range, double unit, double number);

@@ -163,8 +163,6 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(G) | NB_BIT(ALPHA), NB_BIT(G) | NB_BIT(ALPHA),
          "a draine phase function"},
         {names, COUNT, NB_BIT(PHASE_TYPE) | NB_BIT(DIAMETER), NB_BIT(DIAMETER), "a droplets phase function"}};
-    static const nb_range g_range = {
-        .low = -NEBEL_MAX_G, .high = NEBEL_MAX_G, .text = "a number within -0.9999 and 0.9999"};
     static const nb_range alpha_range = {.low = 0, .high = NEBEL_MAX_ALPHA, .text = "a number from 0 to 1e9"};
     static const nb_range diameter_range = {
         .low = 1e-6, .high = NEBEL_MAX_DROPLET, .text = "a diameter within 1e-6 and 50 micrometres"};
@@ -174,7 +172,7 @@ bool nb_read_phase(nb_scene_reader *in, const nb_json_node *node, nebel_phase *p
     if (type < 0) return false;
     phase->type = types[type];
     return nb_value_members(in->json, node, &keys[type], found) &&
-           nb_value_number(in->json, found[G], &g_range, &phase->g) &&
+           nb_value_number(in->json, found[G], &nb_range_asymmetry, &phase->g) &&
            nb_value_number(in->json, found[ALPHA], &alpha_range, &phase->alpha) &&
            nb_value_number(in->json, found[DIAMETER], &diameter_range, &phase->diameter);
 }
