@@ -22,7 +22,7 @@ typedef struct nb_gltf_links {
 /* How the nodes of a file hang together. */
 typedef struct nb_gltf_tree {
     nebel_allocator allocator;
-    nb_affine *places; /* of each node in its parent */
+    nb_affine *places; /* of each node in its parent, and in the world once all are known */
     size_t count, capacity;
     nb_gltf_links children, roots;
     double scene;      /* which one is shown */

@@ -109,6 +109,35 @@ static void hang_up(nb_gltf_tree *tree)
             tree->parents[roots->items[i].child] = root;
 }
 
+/* Takes the nodes of a way up from their parents' coordinates to the world's, the uppermost first. */
+static void place_path(nb_gltf_tree *tree, const uint32_t *path, size_t count, bool is_shown)
+{
+    for (size_t i = count; i > 0; i--) {
+        const uint32_t node = path[i - 1];
+        if (is_shown) tree->places[node] = nb_affine_compose(&tree->places[tree->parents[node]], &tree->places[node]);
+        tree->parents[node] = is_shown ? root : apart;
+    }
+}
+
+/* Each node is gone through once: afterwards all are placed in the world and have no parent. A way that does not end
+ * goes in a circle. */
+static bool place_all(nb_gltf_tree *tree)
+{
+    uint32_t *path = nb_allocate(&tree->allocator, tree->count, sizeof *path);
+    if (path == NULL) return false;
+    for (size_t i = 0; i < tree->count; i++) {
+        size_t count = 0;
+        uint32_t at = (uint32_t)i;
+        while (tree->parents[at] != root && tree->parents[at] != apart && count < tree->count) {
+            path[count++] = at;
+            at = tree->parents[at];
+        }
+        place_path(tree, path, count, tree->parents[at] == root);
+    }
+    nb_release(&tree->allocator, path);
+    return true;
+}
+
 nebel_result nb_gltf_read_tree(const nb_json_desc *desc, nb_gltf_tree *tree)
 {
     static const char *const streamed[] = {"nodes", NULL};
@@ -121,9 +150,9 @@ nebel_result nb_gltf_read_tree(const nb_json_desc *desc, nb_gltf_tree *tree)
     const nebel_result result = nb_json_read(&json, &own);
     if (result != NEBEL_OK) return result;
     tree->parents = nb_allocate(&tree->allocator, tree->count, sizeof *tree->parents);
-    if (tree->parents == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", desc->name);
-    hang_up(tree);
-    return NEBEL_OK;
+    if (tree->parents != NULL) hang_up(tree);
+    if (tree->parents != NULL && place_all(tree)) return NEBEL_OK;
+    return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", desc->name);
 }
 
 void nb_gltf_release_tree(nb_gltf_tree *tree)
@@ -137,12 +166,5 @@ void nb_gltf_release_tree(nb_gltf_tree *tree)
 bool nb_gltf_find_place(const nb_gltf_tree *tree, size_t node, nb_affine *place)
 {
     *place = tree->places[node];
-    for (size_t steps = 0; steps <= tree->count; steps++) {
-        const uint32_t parent = tree->parents[node];
-        if (parent == root) return true;
-        if (parent == apart) return false;
-        *place = nb_affine_compose(&tree->places[parent], place);
-        node = parent;
-    }
-    return false;
+    return tree->parents[node] == root;
 }
