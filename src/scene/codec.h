@@ -19,6 +19,7 @@ typedef struct nb_codec {
 /* Larger pictures are refused before memory is asked for: pixels, and samples of all channels. */
 #define NB_MAX_PIXELS ((uint64_t)1 << 28)
 #define NB_MAX_SAMPLES ((uint64_t)1 << 30)
+#define NB_MAX_CHANNELS 1024
 
 /* A grey picture as whole numbers 0..max, top row first. */
 typedef struct nb_heights {
