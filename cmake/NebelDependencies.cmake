@@ -88,6 +88,8 @@ endmacro()
 # remembers.
 set(nebel_scene_dependencies PkgConfig::nebel_assimp PkgConfig::nebel_png PkgConfig::nebel_jpeg PkgConfig::nebel_yajl
     PkgConfig::nebel_zlib PkgConfig::nebel_blosc nebel_openexr_core)
+# Those of them that reading a model needs.
+set(nebel_model_dependencies PkgConfig::nebel_assimp PkgConfig::nebel_png PkgConfig::nebel_jpeg PkgConfig::nebel_yajl)
 macro(nebel_find_scene_dependencies mode)
     find_package(PkgConfig QUIET)
     if(PkgConfig_FOUND)

@@ -9,11 +9,13 @@ if(IS_ABSOLUTE "${CMAKE_INSTALL_LIBDIR}" OR IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDE
     set(pc_prefix ${CMAKE_INSTALL_PREFIX})
     set(pc_libdir ${CMAKE_INSTALL_FULL_LIBDIR})
     set(pc_includedir ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+    set(pc_bindir ${CMAKE_INSTALL_FULL_BINDIR})
 else()
     file(RELATIVE_PATH pc_prefix /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
     string(REGEX REPLACE "/$" "" pc_prefix "\${pcfiledir}/${pc_prefix}")
     set(pc_libdir "\${prefix}/${CMAKE_INSTALL_LIBDIR}")
     set(pc_includedir "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
+    set(pc_bindir "\${prefix}/${CMAKE_INSTALL_BINDIR}")
 endif()
 
 # On a static library the private dependencies are the caller's to link; on a shared one they are not.
@@ -48,6 +50,7 @@ nebel_install_library(nebel nebel.h cells.h classic.h clouds.h diffusion.h envir
 nebel_write_pkgconfig(nebel "Exact fog for any renderer" "" "" "-lm")
 if(TARGET nebel_scene)
     nebel_install_library(nebel_scene scene.h)
+    install(TARGETS nebel_read_model)
     set(webp "")
     set(openvdb "")
     if(nebel_with_openvdb)
@@ -56,8 +59,11 @@ if(TARGET nebel_scene)
     if(nebel_with_webp)
         set(webp " libwebpmux libwebp")
     endif()
+    # For hosts that are told where the prefix has been moved to.
+    set(pc_variables "model_reader=${pc_bindir}/nebel-read-model\n")
     nebel_write_pkgconfig(nebel_scene "Scene files, models and pictures for nebel" nebel
         "assimp libpng libjpeg yajl zlib blosc OpenEXR${webp}" "${openvdb}-lm")
+    set(pc_variables "")
 endif()
 if(TARGET nebel_cpu)
     nebel_install_library(nebel_cpu render.h)
@@ -86,7 +92,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/examples DEST
     PATTERN internal.md EXCLUDE PATTERN CMakeLists.txt EXCLUDE)
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/nebelConfig.cmake.in ${PROJECT_BINARY_DIR}/nebelConfig.cmake
-    INSTALL_DESTINATION ${nebel_package_dir} NO_SET_AND_CHECK_MACRO)
+    INSTALL_DESTINATION ${nebel_package_dir} PATH_VARS CMAKE_INSTALL_BINDIR NO_SET_AND_CHECK_MACRO)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/nebelConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/nebelConfig.cmake ${PROJECT_BINARY_DIR}/nebelConfigVersion.cmake
     cmake/NebelDependencies.cmake DESTINATION ${nebel_package_dir})

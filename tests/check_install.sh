@@ -50,6 +50,27 @@ int main(void)
     return 0;
 }
 C
+cat >"$work/consumer/models.c" <<'C'
+#include <nebel/scene.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A model is read by the program that the package names; without a name, and not installed where nebel was configured for,
+ * it is an error. */
+int main(int count, char **words)
+{
+    static const char text[] = "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"quad.obj\"}]}";
+    nebel_scene *scene = NULL;
+    const nebel_scene_desc desc = {.model_reader = count > 1 ? words[1] : READER};
+    if (nebel_parse_scene(text, strlen(text), "scene.json", &desc, &scene) != NEBEL_OK) return 1;
+    const nebel_result result = nebel_load_scene_models(scene);
+    printf("%s: %zu meshes\n", nebel_result_text(result), nebel_scene_contents(scene)->mesh_count);
+    nebel_destroy_scene(scene);
+    return result == (count > 1 ? NEBEL_ERROR_FILE : NEBEL_OK) ? 0 : 1;
+}
+C
+printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n' >"$work/consumer/quad.obj"
+echo '{"nebel": 1, "fog": [], "models": [{"file": "quad.obj"}]}' >"$work/consumer/scene.json"
 cat >"$work/consumer/passes.c" <<'C'
 #include <nebel/gl.h>
 #include <stdio.h>
@@ -71,6 +92,9 @@ add_executable(core core.c)
 target_link_libraries(core PRIVATE nebel::nebel m)
 add_executable(layers layers.c)
 target_link_libraries(layers PRIVATE nebel::cpu)
+add_executable(models models.c)
+target_link_libraries(models PRIVATE nebel::scene)
+target_compile_definitions(models PRIVATE READER="${nebel_MODEL_READER}")
 add_executable(passes passes.c)
 target_link_libraries(passes PRIVATE nebel::gl)
 C
@@ -82,16 +106,25 @@ read -ra layer_flags < <(pkg-config --cflags --libs nebel_cpu)
 "$compiler" -std=c11 -o core core.c "${core_flags[@]}" -lm
 read -ra pass_flags < <(pkg-config --cflags --libs nebel_gl)
 "$compiler" -std=c11 -o layers layers.c "${layer_flags[@]}"
+read -ra scene_flags < <(pkg-config --cflags --libs nebel_scene)
+"$compiler" -std=c11 -DREADER="\"$(pkg-config --variable=model_reader nebel_scene)\"" -o models models.c "${scene_flags[@]}"
 "$compiler" -std=c11 -o passes passes.c "${pass_flags[@]}"
 ./core
 ./layers
+./models
+./models "$prefix/nowhere"
 ./passes
 
 cmake -S . -B build -DCMAKE_PREFIX_PATH="$prefix" >"$work/configure.log"
 cmake --build build >"$work/build.log" || { cat "$work/build.log"; exit 1; }
 build/core
 build/layers
+build/models
 build/passes
 
-if [ -x "$NEBEL" ]; then "$prefix/bin/nebel" --help >/dev/null; fi
+# The program finds the reader beside it, and nothing else will do.
+if [ -x "$NEBEL" ]; then
+    "$prefix/bin/nebel" --help >/dev/null
+    "$prefix/bin/nebel" info scene.json | grep -q "1 meshes, 2 triangles"
+fi
 echo "installed, built twice, run"

@@ -154,6 +154,9 @@ static void test_what_no_model_has(void **state)
         {FORMAT, MODEL("\"file\": \"a\", \"unit\": `-1"), "models[0].unit: is -1; must be a number of metres"},
         {FORMAT, MODEL(HEIGHTS ", `\"scale\": 2"), "models[0].scale: does not go with \"heightfield\""},
         {FORMAT, MODEL("\"file\": `\"\""), "models[0].file: is empty; must be the path of a file"},
+        {FORMAT, MODEL(HEIGHTS ", `\"folder\": \"a\""), "models[0].folder: does not go with \"heightfield\""},
+        {FORMAT, MODEL("\"file\": \"a\", \"folder\": `\"\""),
+         "models[0].folder: is empty; must be the path of a folder"},
         {FORMAT, MODEL("\"file\": `\"a\\u0000b\""), "models[0].file: holds a zero character"},
         {FORMAT, MODEL("\"file\": `7"), "models[0].file: is a number; must be a string"},
         {FORMAT, MODEL("\"file\": \"a\", \"scale\": `0"),
@@ -172,7 +175,8 @@ static void test_what_no_model_has(void **state)
         {FORMAT, MODEL("\"heightfield\": `{\"file\": \"a.png\"}"),
          "models[0].heightfield: the key \"size\" is missing"},
         {FORMAT, SCENE("\"models\": [{\"file\": \"a\"}, {\"file\": \"b\", `\"colour\": 1}]"),
-         "models[1].colour: unknown key; a model has: file, up, unit, position, rotation, scale, heightfield, color; "
+         "models[1].colour: unknown key; a model has: file, up, unit, position, rotation, scale, folder, heightfield, "
+         "color; "
          "did you "
          "mean "
          "\"color\"?"},

@@ -200,6 +200,11 @@ typedef struct nebel_scene_desc {
     nebel_log log;        /* errors as "FILE:LINE:COLUMN: key: what is wrong; what is allowed" */
     nebel_air_run_fn run; /* for threads that make the air of the scene's planet; NULL: one part after the other */
     void *run_user;
+
+    /* Models are read by a program of their own, nebel-read-model, within limits of memory and time: a damaged or hostile
+     * file costs an error, not the process. */
+    const char *model_reader; /* its path; NULL: bin/nebel-read-model of the prefix that nebel was configured for */
+    int models_in_process;    /* nonzero: models are read in this process, without limits; for trusted files alone */
 } nebel_scene_desc;
 
 /* Reads and checks a scene file. Models named in it are not loaded yet. "-" is a file name like any other.

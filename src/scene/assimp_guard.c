@@ -118,12 +118,16 @@ nebel_result nb_assimp_check_file(const nb_model_load *load)
 
 /* ---- what went wrong when it was read -------------------------------------------------------- */
 
-nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason)
+nebel_result nb_assimp_refuse(const nb_assimp *in, const char *reason)
 {
     static const char unknown[] = "No suitable reader";
+    const nb_model_load *load = in->load;
     const char *file = load->source->file, *suffix = suffix_of(file);
     if (reason == NULL || reason[0] == '\0') reason = "its parts contradict each other";
     if (strstr(reason, "bad_alloc") != NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    if (in->files.refusal != NB_REFUSAL_NONE)
+        return nb_model_fail(load, NEBEL_ERROR_FORMAT, "the model \"%s\" cannot be read: it names \"%s\", which %s",
+                             file, in->files.refused, nb_model_files_refusal_text(in->files.refusal));
     size_t size = strlen(reason);
     while (size > 0 && (reason[size - 1] == '.' || reason[size - 1] == '\n')) size--;
     if (strncmp(reason, unknown, sizeof unknown - 1) != 0)

@@ -31,8 +31,8 @@ static bool has_polygons(const struct aiScene *scene)
 /* Points need no faces, which validation asks for. */
 static nebel_result import_points(nb_assimp *in)
 {
-    in->scene = aiImportFile(in->load->source->file, 0);
-    return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in->load, aiGetErrorString());
+    in->scene = aiImportFileEx(in->files.name, 0, &in->io);
+    return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in, aiGetErrorString());
 }
 
 /* Reads the file as it is, checks it, and only then has it worked on. Assimp's own validation belongs to the reading: a
@@ -41,15 +41,15 @@ static nebel_result import_points(nb_assimp *in)
 static nebel_result import_locked(nb_assimp *in)
 {
     if (in->load->points != NULL) return import_points(in);
-    const struct aiScene *raw = aiImportFile(in->load->source->file, aiProcess_ValidateDataStructure);
-    if (raw == NULL) return nb_assimp_refuse(in->load, aiGetErrorString());
+    const struct aiScene *raw = aiImportFileEx(in->files.name, aiProcess_ValidateDataStructure, &in->io);
+    if (raw == NULL) return nb_assimp_refuse(in, aiGetErrorString());
     const nebel_result result = nb_assimp_check_meshes(in, raw);
     if (result != NEBEL_OK) {
         aiReleaseImport(raw);
         return result;
     }
     in->scene = has_polygons(raw) ? aiApplyPostProcessing(raw, aiProcess_Triangulate) : raw;
-    return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in->load, NULL);
+    return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in, NULL);
 }
 
 static nebel_result import(nb_assimp *in)
@@ -150,9 +150,8 @@ static nebel_result convert_meshes(nb_assimp *in)
 {
     const nb_model_load *load = in->load;
     const uint64_t before = load->set->triangle_count;
-    in->folder = nb_path_folder(&in->scratch, load->source->file);
     in->surfaces = nb_arena_allocate(&in->scratch, in->scene->mNumMaterials, sizeof *in->surfaces);
-    if (in->folder == NULL || in->surfaces == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    if (in->surfaces == NULL) return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
     const nebel_result result = walk(in);
     if (result != NEBEL_OK) return result;
     note_left_out(in);
@@ -172,29 +171,47 @@ static nebel_result convert_points(nb_assimp *in)
     return nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds no vertex", load->source->file);
 }
 
-static nebel_result load_file(const nb_model_load *load, nebel_result (*take)(nb_assimp *in))
+/* Where reading went on without what a file names. */
+static void note_refusal(const nb_assimp *in)
 {
-    nb_assimp in = {.load = load, .scratch = {.allocator = load->allocator}};
-    nebel_result result = nb_file_check(&load->log, load->source->where, "model", load->source->file);
-    if (result == NEBEL_OK) result = nb_assimp_check_file(load);
-    if (result == NEBEL_OK) result = import(&in);
+    if (in->files.refusal != NB_REFUSAL_NONE)
+        nb_model_fail(in->load, NEBEL_OK, "\"%s\" is read without \"%s\", which it names: it %s",
+                      in->load->source->file, in->files.refused, nb_model_files_refusal_text(in->files.refusal));
+}
+
+static nebel_result take(nb_assimp *in)
+{
+    note_refusal(in);
+    if (in->scene->mRootNode == NULL)
+        return nb_model_fail(in->load, NEBEL_ERROR_FORMAT, "\"%s\" holds nothing", in->load->source->file);
+    return in->load->points != NULL ? convert_points(in) : convert_meshes(in);
+}
+
+static nebel_result load_file(nb_assimp *in)
+{
+    const nb_model_load *load = in->load;
+    nebel_result result = nb_assimp_check_file(load);
+    if (result == NEBEL_OK) result = import(in);
     if (result != NEBEL_OK) return result;
-    if (in.scene->mRootNode == NULL)
-        result = nb_model_fail(load, NEBEL_ERROR_FORMAT, "\"%s\" holds nothing", load->source->file);
-    else
-        result = take(&in);
-    aiReleaseImport(in.scene);
-    nb_release(&load->allocator, in.textures);
-    nb_arena_release(&in.scratch);
+    result = take(in);
+    aiReleaseImport(in->scene);
+    nb_release(&load->allocator, in->textures);
+    nb_arena_release(&in->scratch);
     return result;
 }
 
 nebel_result nb_assimp_load(const nb_model_load *load)
 {
-    return load_file(load, convert_meshes);
-}
-
-nebel_result nb_assimp_load_points(const nb_model_load *load)
-{
-    return load_file(load, convert_points);
+    nb_assimp in = {.load = load,
+                    .scratch = {.allocator = load->allocator},
+                    .files = {.file = load->source->file,
+                              .name = load->name,
+                              .folder = load->folder,
+                              .opened = load->opened,
+                              .user = load->opened_user}};
+    nebel_result result = nb_model_files_begin(&in.files, &load->log);
+    nb_assimp_set_files(&in);
+    if (result == NEBEL_OK) result = load_file(&in);
+    nb_model_files_end(&in.files);
+    return result;
 }

@@ -3,7 +3,9 @@
 #define NB_SCENE_ASSIMP_LOAD_H
 
 #include "scene/model.h"
+#include "scene/model_files.h"
 
+#include <assimp/cfileio.h>
 #include <assimp/scene.h>
 
 /* What a material says, once it has been looked at. */
@@ -20,14 +22,16 @@ typedef struct nb_surface {
 typedef struct nb_loaded_texture {
     const char *key;
     bool of_grey;
-    int32_t index;
+    int32_t index;                /* or -1 where it cannot be read */
+    uint8_t min_alpha, max_alpha; /* of all texels */
 } nb_loaded_texture;
 
 typedef struct nb_assimp {
     const nb_model_load *load;
     const struct aiScene *scene;
     nb_arena scratch;
-    const char *folder;          /* of the model */
+    nb_model_files files;
+    struct aiFileIO io;          /* opens them */
     nb_surface *surfaces;        /* one for each material */
     nb_loaded_texture *textures; /* those already tried */
     size_t loaded_count, loaded_capacity;
@@ -41,8 +45,11 @@ typedef struct nb_assimp {
 nebel_result nb_assimp_check_file(const nb_model_load *load);
 nebel_result nb_assimp_check_meshes(nb_assimp *in, const struct aiScene *scene);
 
-/* Says why a file could not be read, given Assimp's reason, NULL where it gives none. Returns FORMAT. */
-nebel_result nb_assimp_refuse(const nb_model_load *load, const char *reason);
+/* Says why a file could not be read, given Assimp's reason, NULL where it gives none. Errors: FORMAT, MEMORY. */
+nebel_result nb_assimp_refuse(const nb_assimp *in, const char *reason);
+
+/* Makes Assimp open what in->files allows. */
+void nb_assimp_set_files(nb_assimp *in);
 
 /* Adds one mesh of the model at a place. A mesh without triangles adds nothing. */
 nebel_result nb_assimp_add_mesh(nb_assimp *in, const struct aiMesh *mesh, const nb_affine *place);
@@ -53,9 +60,8 @@ nebel_result nb_assimp_add_points(nb_assimp *in, const struct aiMesh *mesh, cons
 /* Finds the surface of a material; a texture that cannot be read leaves the plain colour and a note in the log. */
 nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface *surface);
 
-/* Finds the texture of this name, or -1 where it cannot be read. With `of_grey` its alpha is the grey of a picture that
- * has no alpha of its own. */
-nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, int32_t *index);
+/* Finds the texture of this name. With `of_grey` its alpha is the grey of a picture that has no alpha of its own. */
+nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, nb_loaded_texture *found);
 
 /* Finds the mask of a material, in the members of a surface whose texture is known. */
 nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface);

@@ -17,20 +17,12 @@ static bool is_hole(unsigned alpha, double cutoff)
 }
 
 /* Keeps a mask that has both holes and others. */
-static void take_mask(const nb_assimp *in, int32_t mask, double cutoff, nb_surface *surface)
+static void take_mask(const nb_loaded_texture *mask, double cutoff, nb_surface *surface)
 {
-    if (mask < 0) return;
-    const nebel_texture *texture = &in->load->set->textures[mask];
-    const size_t count = (size_t)texture->width * texture->height;
-    unsigned least = 255, most = 0;
-    for (size_t i = 0; i < count; i++) {
-        const unsigned alpha = texture->rgba[4 * i + 3];
-        least = alpha < least ? alpha : least;
-        most = alpha > most ? alpha : most;
-    }
-    surface->is_clear = is_hole(most, cutoff);
-    if (!is_hole(least, cutoff) || is_hole(most, cutoff)) return;
-    surface->mask = mask;
+    if (mask->index < 0) return;
+    surface->is_clear = is_hole(mask->max_alpha, cutoff);
+    if (!is_hole(mask->min_alpha, cutoff) || is_hole(mask->max_alpha, cutoff)) return;
+    surface->mask = mask->index;
     surface->alpha_cutoff = (float)cutoff;
 }
 
@@ -39,12 +31,12 @@ static nebel_result find_in(nb_assimp *in, const struct aiMaterial *material, en
 {
     struct aiString path;
     unsigned uv_index = 0;
-    int32_t mask = -1;
+    nb_loaded_texture mask;
     if (aiGetMaterialTexture(material, type, 0, &path, NULL, &uv_index, NULL, NULL, NULL, NULL) != aiReturn_SUCCESS)
         return NEBEL_OK;
     const nebel_result result = nb_assimp_find_texture(in, path.data, of_grey, &mask);
     if (result != NEBEL_OK) return result;
-    take_mask(in, mask, cutoff, surface);
+    take_mask(&mask, cutoff, surface);
     if (surface->mask >= 0) surface->uv_index = uv_index;
     return NEBEL_OK;
 }

@@ -1,11 +1,14 @@
+#define _POSIX_C_SOURCE 200809L
 /* Base colour and its texture. */
 #include "scene/assimp_load.h"
 #include "scene/path.h"
 
 #include <assimp/material.h>
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* The largest file of a texture. */
 #define FILE_LIMIT ((size_t)1 << 30)
@@ -45,12 +48,11 @@ static nebel_result read_embedded(const nb_codec *codec, const struct aiTexture 
     return decode(codec, &bytes, texture);
 }
 
-static nebel_result read_file(const nb_codec *codec, const char *path, nebel_texture *texture)
+static nebel_result read_file(const nb_codec *codec, int file, nebel_texture *texture)
 {
     nb_bytes bytes;
-    nebel_result result = nb_file_check(&codec->log, NULL, "texture", path);
-    if (result == NEBEL_OK)
-        result = nb_file_read(&codec->allocator, &codec->log, NULL, "texture", path, FILE_LIMIT, &bytes);
+    nebel_result result =
+        nb_file_read_open(&codec->allocator, &codec->log, NULL, "texture", codec->name, file, FILE_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     result = decode(codec, &bytes, texture);
     nb_release(&codec->allocator, bytes.data);
@@ -73,14 +75,25 @@ static const struct aiTexture *find_embedded(const struct aiScene *scene, const 
     return NULL;
 }
 
-/* Where the named file is not, a file of its name beside the model often is: authors' absolute paths travel badly. */
-static const char *find_file(nb_assimp *in, const char *path)
+/* Where the named file is not, a file of its name beside the model often is: authors' absolute paths travel badly. The
+ * descriptor, or -1 with errno set. */
+static int open_texture(nb_assimp *in, const char *path)
 {
-    const nebel_log silent = {0};
-    const char *joined = nb_path_join(&in->scratch, in->folder, path);
-    if (joined == NULL || nb_file_check(&silent, NULL, "texture", joined) == NEBEL_OK) return joined;
-    const char *beside = nb_path_join(&in->scratch, in->folder, nb_path_name(path));
-    return beside != NULL && nb_file_check(&silent, NULL, "texture", beside) == NEBEL_OK ? beside : joined;
+    const int file = nb_model_files_open(&in->files, path);
+    const int error = errno;
+    if (file >= 0 || strchr(path, '/') == NULL) return file;
+    const char *folder = nb_path_folder(&in->scratch, in->files.name);
+    const char *beside = folder != NULL ? nb_path_join(&in->scratch, folder, nb_path_name(path)) : NULL;
+    const int other = beside != NULL ? nb_model_files_open(&in->files, beside) : -1;
+    if (other < 0) errno = error;
+    return other;
+}
+
+/* How the texture is called in messages: as it would be opened. */
+static const char *show_path(nb_assimp *in, const char *path)
+{
+    const char *folder = nb_path_folder(&in->scratch, in->load->source->file);
+    return folder != NULL ? nb_path_join(&in->scratch, folder, path) : NULL;
 }
 
 /* Where a picture has no alpha. */
@@ -94,49 +107,81 @@ static void set_alpha_of_grey(nebel_texture *texture)
         rgba[4 * i + 3] = (uint8_t)((rgba[4 * i] + rgba[4 * i + 1] + rgba[4 * i + 2] + 1) / 3);
 }
 
+static nebel_result read_named(nb_assimp *in, const nb_codec *codec, const char *path, nebel_texture *texture)
+{
+    const nb_refusal before = in->files.refusal;
+    in->files.refusal = NB_REFUSAL_NONE;
+    const int file = open_texture(in, path);
+    const int error = errno;
+    const nb_refusal refusal = in->files.refusal;
+    in->files.refusal = before;
+    if (file >= 0) {
+        const nebel_result result = read_file(codec, file, texture);
+        close(file);
+        return result;
+    }
+    if (refusal != NB_REFUSAL_NONE)
+        return nb_fail(&codec->log, NEBEL_ERROR_FILE, "the texture \"%s\" %s", path,
+                       nb_model_files_refusal_text(refusal));
+    return nb_fail(&codec->log, NEBEL_ERROR_FILE, "cannot read the texture \"%s\": %s", codec->name, strerror(error));
+}
+
 /* What a decoder says goes on as a note: the model is good without its texture. */
 static nebel_result read_picture(nb_assimp *in, const char *path, nebel_texture *texture)
 {
     nb_note note = {""};
     const struct aiTexture *embedded = find_embedded(in->scene, path);
-    const char *file = embedded == NULL ? find_file(in, path) : in->load->source->file;
-    const nb_codec codec = {.allocator = in->load->allocator, .log = nb_note_log(&note), .name = file};
-    if (file == NULL) return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
+    const char *name = embedded == NULL ? show_path(in, path) : in->load->source->file;
+    const nb_codec codec = {.allocator = in->load->allocator, .log = nb_note_log(&note), .name = name};
+    if (name == NULL) return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
     const nebel_result result =
-        embedded != NULL ? read_embedded(&codec, embedded, texture) : read_file(&codec, file, texture);
+        embedded != NULL ? read_embedded(&codec, embedded, texture) : read_named(in, &codec, path, texture);
     if (result == NEBEL_ERROR_MEMORY)
         return nb_model_fail(in->load, result, "out of memory for the texture \"%s\"", path);
     if (result != NEBEL_OK) nb_model_fail(in->load, NEBEL_OK, "%s; the plain colour is used instead", note.text);
     return NEBEL_OK;
 }
 
-static nebel_result remember(nb_assimp *in, const char *path, bool of_grey, int32_t index)
+static nebel_result remember(nb_assimp *in, const char *path, nb_loaded_texture *loaded)
 {
     void *textures = in->textures;
-    const char *key = nb_arena_copy_text(&in->scratch, path, strlen(path));
-    if (key == NULL || !nb_grow(&in->load->allocator, &textures, sizeof *in->textures, in->loaded_count,
-                                &in->loaded_capacity, in->loaded_count + 1))
+    loaded->key = nb_arena_copy_text(&in->scratch, path, strlen(path));
+    if (loaded->key == NULL || !nb_grow(&in->load->allocator, &textures, sizeof *in->textures, in->loaded_count,
+                                        &in->loaded_capacity, in->loaded_count + 1))
         return nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
     in->textures = textures;
-    in->textures[in->loaded_count++] = (nb_loaded_texture){key, of_grey, index};
+    in->textures[in->loaded_count++] = *loaded;
     return NEBEL_OK;
 }
 
-nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, int32_t *index)
+static void find_alphas(const nebel_texture *texture, nb_loaded_texture *loaded)
+{
+    const size_t count = (size_t)texture->width * texture->height;
+    loaded->min_alpha = 255;
+    loaded->max_alpha = 0;
+    for (size_t i = 0; i < count; i++) {
+        const uint8_t alpha = texture->rgba[4 * i + 3];
+        loaded->min_alpha = alpha < loaded->min_alpha ? alpha : loaded->min_alpha;
+        loaded->max_alpha = alpha > loaded->max_alpha ? alpha : loaded->max_alpha;
+    }
+}
+
+nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, nb_loaded_texture *found)
 {
     nebel_texture texture = {0};
-    *index = -1;
     for (char *at = path; *at != '\0'; at++)
         if (*at == '\\') *at = '/';
     for (size_t i = 0; i < in->loaded_count; i++)
         if (in->textures[i].of_grey == of_grey && strcmp(in->textures[i].key, path) == 0) {
-            *index = in->textures[i].index;
+            *found = in->textures[i];
             return NEBEL_OK;
         }
+    *found = (nb_loaded_texture){.of_grey = of_grey, .index = -1};
     nebel_result result = read_picture(in, path, &texture);
     if (texture.rgba != NULL && of_grey) set_alpha_of_grey(&texture);
-    if (result == NEBEL_OK && texture.rgba != NULL) result = nb_model_add_texture(in->load, &texture, index);
-    return result == NEBEL_OK ? remember(in, path, of_grey, *index) : result;
+    if (texture.rgba != NULL) find_alphas(&texture, found);
+    if (result == NEBEL_OK && texture.rgba != NULL) result = nb_model_add_texture(in->load, &texture, &found->index);
+    return result == NEBEL_OK ? remember(in, path, found) : result;
 }
 
 /* ---- the surface ----------------------------------------------------------------------------- */
@@ -156,12 +201,15 @@ static nebel_result read_texture(nb_assimp *in, const struct aiMaterial *materia
     static const enum aiTextureType types[] = {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE};
     for (int i = 0; i < 2; i++) {
         struct aiString path;
+        nb_loaded_texture found;
         unsigned uv_index = 0;
         if (aiGetMaterialTexture(material, types[i], 0, &path, NULL, &uv_index, NULL, NULL, NULL, NULL) !=
             aiReturn_SUCCESS)
             continue;
         surface->uv_index = uv_index;
-        return nb_assimp_find_texture(in, path.data, false, &surface->texture);
+        const nebel_result result = nb_assimp_find_texture(in, path.data, false, &found);
+        if (result == NEBEL_OK) surface->texture = found.index;
+        return result;
     }
     return NEBEL_OK;
 }

@@ -17,6 +17,10 @@ typedef struct nb_bytes {
 nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log, const char *where, const char *what,
                           const char *path, size_t limit, nb_bytes *bytes);
 
+/* The same of a file that is open, and stays so. */
+nebel_result nb_file_read_open(const nebel_allocator *allocator, const nebel_log *log, const char *where,
+                               const char *what, const char *path, int file, size_t limit, nb_bytes *bytes);
+
 /* Whether `path` is a regular file that may be read: other libraries open it by name, and a pipe would hold them up for
  * ever. Errors: FILE. */
 nebel_result nb_file_check(const nebel_log *log, const char *where, const char *what, const char *path);

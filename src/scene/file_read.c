@@ -54,14 +54,11 @@ static int read_all(const nebel_allocator *allocator, int file, size_t limit, nb
     return 0;
 }
 
-nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log, const char *where, const char *what,
-                          const char *path, size_t limit, nb_bytes *bytes)
+nebel_result nb_file_read_open(const nebel_allocator *allocator, const nebel_log *log, const char *where,
+                               const char *what, const char *path, int file, size_t limit, nb_bytes *bytes)
 {
     *bytes = (nb_bytes){0};
-    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
-    if (file < 0) return fail(log, where, what, path, errno);
     const int error = read_all(allocator, file, limit, bytes);
-    close(file);
     if (error == 0 && bytes->size <= limit) return NEBEL_OK;
     nb_release(allocator, bytes->data);
     const size_t size = bytes->size;
@@ -71,4 +68,15 @@ nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log
                        where != NULL ? where : "", where != NULL ? ": " : "", what, path, limit);
     const nebel_result result = fail(log, where, what, path, error);
     return error == ENOMEM ? NEBEL_ERROR_MEMORY : result;
+}
+
+nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log, const char *where, const char *what,
+                          const char *path, size_t limit, nb_bytes *bytes)
+{
+    *bytes = (nb_bytes){0};
+    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
+    if (file < 0) return fail(log, where, what, path, errno);
+    const nebel_result result = nb_file_read_open(allocator, log, where, what, path, file, limit, bytes);
+    close(file);
+    return result;
 }

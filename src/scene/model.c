@@ -10,6 +10,7 @@ nebel_result nb_model_fail(const nb_model_load *load, nebel_result result, const
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
+    if (load->source->where == NULL) return nb_fail(&load->log, result, "%s", message);
     return nb_fail(&load->log, result, "%s: %s", load->source->where, message);
 }
 
@@ -75,16 +76,18 @@ nebel_result nb_model_add_mesh(const nb_model_load *load, nebel_mesh *mesh)
     nebel_result result = NEBEL_OK;
     if (set->triangle_count + mesh->triangle_count > NB_MAX_TRIANGLES)
         result = nb_model_refuse_triangles(load);
+    else if (load->sink != NULL)
+        load->sink->mesh(load->sink->user, mesh);
     else if (!nb_grow(&load->allocator, &meshes, sizeof *mesh, set->mesh_count, &set->mesh_capacity,
                       set->mesh_count + 1))
         result = nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
-    if (result != NEBEL_OK) {
+    if (result == NEBEL_OK) set->triangle_count += mesh->triangle_count;
+    if (result != NEBEL_OK || load->sink != NULL) {
         nb_mesh_release(&load->allocator, mesh);
         return result;
     }
     set->meshes = meshes;
     set->meshes[set->mesh_count++] = *mesh;
-    set->triangle_count += mesh->triangle_count;
     return NEBEL_OK;
 }
 
@@ -93,6 +96,12 @@ nebel_result nb_model_add_texture(const nb_model_load *load, const nebel_texture
     nb_model_set *set = load->set;
     void *textures = set->textures;
     const size_t count = set->texture_count;
+    if (load->sink != NULL && count < INT32_MAX) {
+        load->sink->texture(load->sink->user, texture);
+        nb_release(&load->allocator, (void *)texture->rgba);
+        *index = (int32_t)set->texture_count++;
+        return NEBEL_OK;
+    }
     if (count >= INT32_MAX ||
         !nb_grow(&load->allocator, &textures, sizeof *texture, count, &set->texture_capacity, count + 1)) {
         nb_release(&load->allocator, (void *)texture->rgba);
@@ -140,8 +149,9 @@ static nebel_result load_all(const nebel_scene *scene, const nebel_model *models
     nebel_result result = NEBEL_OK;
     for (size_t i = 0; i < count && result == NEBEL_OK; i++) {
         const nb_model_source source = place_source(&scene->models[models[i].source], &models[i]);
-        const nb_model_load load = {scene->allocator, scene->log, &source, set, NULL};
-        result = source.is_heightfield ? nb_heightfield_load(&load) : nb_assimp_load(&load);
+        const nb_model_load load = {
+            .allocator = scene->allocator, .log = scene->log, .source = &source, .set = set, .reader = scene->reader};
+        result = source.is_heightfield ? nb_heightfield_load(&load) : nb_model_read(&load);
     }
     return result;
 }

@@ -5,6 +5,8 @@
 #include "scene/codec.h"
 #include "scene/scene_internal.h"
 
+#include <sys/stat.h>
+
 /* The most triangles of all models together. */
 #define NB_MAX_TRIANGLES ((uint64_t)1 << 28)
 
@@ -14,21 +16,41 @@ typedef struct nb_point_set {
     size_t limit; /* the most there may be */
 } nb_point_set;
 
-/* What a loader works with; `set` receives the meshes, or `points` the vertices. */
+/* Takes what has been read in place of the set, which then counts only; the memory stays the caller's. */
+typedef struct nb_model_sink {
+    void (*mesh)(void *user, const nebel_mesh *mesh);
+    void (*texture)(void *user, const nebel_texture *texture);
+    void *user;
+} nb_model_sink;
+
+/* What a loader works with; `set` receives the meshes, or `points` the vertices: those at one place once, in metres and
+ * where the source places them. */
 typedef struct nb_model_load {
     nebel_allocator allocator;
     nebel_log log;
     const nb_model_source *source;
     nb_model_set *set;
     nb_point_set *points;
+    nb_model_reader reader;
+    const nb_model_sink *sink; /* NULL: none */
+    const char *folder, *name; /* which references may not leave, and the file seen from it: set by nb_model_read */
+    void (*opened)(void *user, const char *path, const struct stat *status); /* told of files; NULL: nobody */
+    void *opened_user;
 } nb_model_load;
 
 nebel_result nb_heightfield_load(const nb_model_load *load);
+
+/* Reads a model file, in a process of its own or not, as load->reader says. */
+nebel_result nb_model_read(const nb_model_load *load);
+
+/* Reads it in this process; folder and name are set. */
 nebel_result nb_assimp_load(const nb_model_load *load);
 
-/* The vertices of a model, those at one place once, in metres and where load->source places them. Goes to load->points.
- */
-nebel_result nb_assimp_load_points(const nb_model_load *load);
+/* Has nebel-read-model read it, within limits, and checks what comes of it. Folder and name are set. */
+nebel_result nb_model_process_read(const nb_model_load *load);
+
+/* The path of nebel-read-model where nobody names one. */
+const char *nb_model_default_program(void);
 
 /* Memory for positions and normals, uvs where wanted. False when memory is out; release the mesh also then. */
 bool nb_mesh_allocate_vertices(const nebel_allocator *allocator, uint32_t count, bool has_uvs, nebel_mesh *mesh);

@@ -6,10 +6,10 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FILE_KEY, UP, UNIT, POSITION, ROTATION, SCALE, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
+enum { FILE_KEY, UP, UNIT, POSITION, ROTATION, SCALE, FOLDER, HEIGHTFIELD, COLOR, MODEL_KEY_COUNT };
 
-static const char *const model_names[] = {"file",     "up",    "unit",        "position",
-                                          "rotation", "scale", "heightfield", "color"};
+static const char *const model_names[] = {"file",  "up",     "unit",        "position", "rotation",
+                                          "scale", "folder", "heightfield", "color"};
 static const nb_keys model_keys = {model_names, MODEL_KEY_COUNT, NB_BIT(MODEL_KEY_COUNT) - 1, 0, "a model"};
 
 static const nb_model_source unplaced = {.space = {false, 1}, .rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
@@ -49,6 +49,23 @@ static bool read_file(nb_scene_reader *in, const nb_json_node *node, nb_model_so
     return nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
 }
 
+/* With its slash at the end. */
+static bool read_folder(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
+{
+    nb_arena *arena = &in->scene->arena;
+    const char *folder = "";
+    if (node == NULL) return true;
+    if (!nb_value_text(in->json, node, arena, &folder)) return false;
+    if (folder[0] == '\0')
+        return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, node, "is empty; must be the path of a folder");
+    const char *path = nb_path_join(arena, in->scene->folder, folder);
+    const bool is_whole = path != NULL && path[strlen(path) - 1] == '/';
+    char *ended = path != NULL && !is_whole ? nb_arena_allocate(arena, strlen(path) + 2, 1) : NULL;
+    if (ended != NULL) snprintf(ended, strlen(path) + 2, "%s/", path);
+    model->folder = is_whole ? path : ended;
+    return model->folder != NULL || nb_json_fail(in->json, NEBEL_ERROR_MEMORY, node, "out of memory");
+}
+
 static bool read_heightfield(nb_scene_reader *in, const nb_json_node *node, nb_model_source *model)
 {
     enum { HEIGHTFIELD_FILE, SIZE, HEIGHT, COUNT };
@@ -66,7 +83,7 @@ static bool check_kind(nb_json *json, const nb_json_node *node, const nb_json_no
     if (found[FILE_KEY] == NULL && found[HEIGHTFIELD] == NULL)
         return nb_json_fail(json, NEBEL_ERROR_FORMAT, node, "is neither; a model has \"file\" or \"heightfield\"");
     if (found[HEIGHTFIELD] == NULL) return true;
-    for (int i = FILE_KEY; i <= SCALE; i++) {
+    for (int i = FILE_KEY; i <= FOLDER; i++) {
         if (i == POSITION || found[i] == NULL) continue;
         return nb_json_fail_key(json, NEBEL_ERROR_FORMAT, found[i],
                                 "does not go with \"heightfield\", which has: position, color");
@@ -148,7 +165,8 @@ bool nb_read_model(nb_scene_reader *in, const nb_json_node *node)
     model.has_color = found[COLOR] != NULL;
     const bool is_file = found[FILE_KEY] != NULL;
     if (!(is_file ? read_file(in, found[FILE_KEY], &model) : read_heightfield(in, found[HEIGHTFIELD], &model)) ||
-        !read_placement(json, found, &model) || !nb_value_color(json, found[COLOR], &nb_range_fraction, model.color))
+        !read_folder(in, found[FOLDER], &model) || !read_placement(json, found, &model) ||
+        !nb_value_color(json, found[COLOR], &nb_range_fraction, model.color))
         return false;
     convert_model(&in->space, &model);
     return (!is_file || nb_read_nodes(in, found[FILE_KEY], &model)) && keep_model(in, node, &model);
@@ -178,16 +196,20 @@ bool nb_read_points(nb_scene_reader *in, const nb_json_node *node, size_t limit,
     const nb_json_node *found[MODEL_KEY_COUNT];
     nb_model_source model = unplaced;
     nb_point_set points = {.limit = limit};
-    const nb_model_load load = {in->scene->allocator, in->scene->log, &model, NULL, &points};
+    const nb_model_load load = {.allocator = in->scene->allocator,
+                                .log = in->scene->log,
+                                .source = &model,
+                                .points = &points,
+                                .reader = in->scene->reader};
     if (node == NULL) return true;
     if (!nb_value_members(in->json, node, &points_keys, found) || !read_file(in, found[FILE_KEY], &model) ||
-        !read_placement(in->json, found, &model))
+        !read_folder(in, found[FOLDER], &model) || !read_placement(in->json, found, &model))
         return false;
     convert_model(&in->space, &model);
     memcpy(place->position, model.position, sizeof place->position);
     memcpy(place->rotation, model.rotation, sizeof place->rotation);
     memcpy(place->scale, model.scale, sizeof place->scale);
-    const nebel_result result = nb_assimp_load_points(&load);
+    const nebel_result result = nb_model_read(&load);
     const bool good = result == NEBEL_OK ? keep_points(in, node, &points, nebula) : nb_json_stop(in->json, result);
     nb_release(&load.allocator, points.places);
     return good;

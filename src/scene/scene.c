@@ -1,6 +1,7 @@
 /* Scenes: read, kept, given back. */
 #include "scene/codec.h"
 #include "scene/file.h"
+#include "scene/model.h"
 #include "scene/path.h"
 #include "scene/save.h"
 #include "scene/scene_internal.h"
@@ -222,6 +223,14 @@ static nebel_scene *create_scene(const nebel_scene_desc *desc)
     scene->log = desc->log;
     scene->run = desc->run;
     scene->run_user = desc->run_user;
+    scene->reader.in_process = desc->models_in_process != 0;
+    scene->reader.program = nb_model_default_program();
+    if (desc->model_reader != NULL)
+        scene->reader.program = nb_arena_copy_text(&scene->arena, desc->model_reader, strlen(desc->model_reader));
+    if (scene->reader.program == NULL) {
+        nebel_destroy_scene(scene);
+        return NULL;
+    }
     scene->data.camera = nb_camera_default();
     return scene;
 }

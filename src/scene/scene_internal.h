@@ -11,9 +11,10 @@
 
 /* A model or height field as the file describes it. */
 typedef struct nb_model_source {
-    const char *file;  /* path, resolved against the scene's folder */
-    bool has_fog;      /* in its nodes */
-    const char *where; /* "FILE:LINE:COLUMN: models[0].file", for messages */
+    const char *file;   /* path, resolved against the scene's folder */
+    bool has_fog;       /* in its nodes */
+    const char *where;  /* "FILE:LINE:COLUMN: models[0].file", for messages; NULL: none */
+    const char *folder; /* which its references may not leave, as `file`; NULL: that of the file */
     bool is_heightfield;
     nb_space space; /* of the file's own numbers */
     double position[3], rotation[4], scale[3];
@@ -34,9 +35,16 @@ typedef struct nb_model_set {
 /* Of a planet: its ground's, and two of each shell of clouds. */
 enum { NB_MOST_MAPS = 1 + 2 * NEBEL_MAX_CLOUD_SHELLS };
 
+/* Where models are read. */
+typedef struct nb_model_reader {
+    const char *program; /* path of nebel-read-model */
+    bool in_process;     /* without it */
+} nb_model_reader;
+
 struct nebel_scene {
     nebel_allocator allocator;
     nebel_log log;
+    nb_model_reader reader;
     nebel_air_run_fn run; /* NULL: none */
     void *run_user;
     nb_arena arena;

@@ -72,6 +72,9 @@ int nb_draft_must_be_read(const nb_draft *draft);
 /* Whether the camera is one that the file could hold. */
 int nb_draft_can_save_camera(const nb_draft *draft);
 
+/* Reads a scene file and drops it again: whether it is good. The log says why it is not. */
+nebel_result nb_draft_try_file(const char *path, const nebel_log *log);
+
 /* Writes what has changed into the file. On an error the file is as it was, and the log has said why. */
 nebel_result nb_draft_save(nb_draft *draft, const char *path, int with_camera);
 

@@ -400,10 +400,8 @@ static nebel_result say_not_saved(viewer *all, nebel_result why)
 /* Where the file has gone or is broken it does not have what the window shows. */
 static nebel_result say_nothing_to_save(viewer *all)
 {
-    nebel_scene *scene = NULL;
-    const nebel_result result = nebel_load_scene(all->settings->scene, &(nebel_scene_desc){.log = all->log}, &scene);
+    const nebel_result result = nb_draft_try_file(all->settings->scene, &all->log);
     if (result != NEBEL_OK) return say_not_saved(all, result);
-    nebel_destroy_scene(scene);
     say(all, "Nothing to save: the file has it all.");
     nb_report_message("view: nothing to save");
     return NEBEL_OK;

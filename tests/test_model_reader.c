@@ -1,0 +1,449 @@
+/* Models are read by a process of its own: good ones come out as if they were read here, and nothing that the process
+ * does harms this one. This program is also a reader, an odd one, where it is started as one. */
+#define _GNU_SOURCE
+#include "model_help.h"
+#include "scene/model_wire.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <threads.h>
+
+#define MODELS "/usr/share/assimp/models/"
+
+static const char quad_obj[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+
+/* ---- an odd reader --------------------------------------------------------------------------- */
+
+static char asked[sizeof(nb_wire_request) + NB_WIRE_MAX_REQUEST];
+
+static void put(const void *bytes, size_t size)
+{
+    if (write(STDOUT_FILENO, bytes, size) != (ssize_t)size) _exit(1);
+}
+
+static void put_frame(uint32_t type, int32_t code, const void *bytes, size_t size)
+{
+    const nb_wire_frame frame = {type, code, size};
+    put(&frame, sizeof frame);
+    put(bytes, size);
+}
+
+/* A triangle with one thing changed. */
+static void put_triangle(nb_wire_mesh head, const float *positions, const float *normals, const uint32_t *indices)
+{
+    char bytes[sizeof head + 18 * sizeof(float) + 3 * sizeof(uint32_t)];
+    memcpy(bytes, &head, sizeof head);
+    memcpy(bytes + sizeof head, positions, 9 * sizeof(float));
+    memcpy(bytes + sizeof head + 9 * sizeof(float), normals, 9 * sizeof(float));
+    memcpy(bytes + sizeof head + 18 * sizeof(float), indices, 3 * sizeof(uint32_t));
+    put_frame(NB_WIRE_MESH, 0, bytes, sizeof bytes);
+}
+
+static void put_odd_mesh(const char *mode)
+{
+    nb_wire_mesh head = {.vertex_count = 3, .triangle_count = 1, .texture = -1, .mask = -1, .base_color = {1, 1, 1}};
+    float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, normals[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1};
+    uint32_t indices[3] = {0, 1, 2};
+    if (strcmp(mode, "index") == 0) indices[2] = 3;
+    if (strcmp(mode, "place") == 0) positions[4] = NAN;
+    if (strcmp(mode, "normal") == 0) normals[2] = 2;
+    if (strcmp(mode, "texture") == 0) head.texture = 0;
+    if (strcmp(mode, "color") == 0) head.base_color[1] = 1.5f;
+    if (strcmp(mode, "cutoff") == 0) head.alpha_cutoff = .5f;
+    if (strcmp(mode, "size") == 0) head.vertex_count = 4;
+    if (strcmp(mode, "none") == 0) head.triangle_count = 0;
+    put_triangle(head, positions, normals, indices);
+}
+
+static void put_end(nebel_result result, uint64_t meshes)
+{
+    const nb_wire_end end = {.meshes = meshes};
+    put_frame(NB_WIRE_END, (int32_t)result, &end, sizeof end);
+}
+
+/* More than any budget, announced or sent. */
+static void put_too_much(const char *mode)
+{
+    const nb_wire_mesh head = {.vertex_count = UINT32_MAX, .triangle_count = 1 << 28, .texture = -1, .mask = -1};
+    const nb_wire_texture flat = {1 << 14, 1 << 14};
+    const uint64_t size =
+        6 * sizeof(float) * (uint64_t)head.vertex_count + 3 * sizeof(uint32_t) * (uint64_t)head.triangle_count;
+    if (strcmp(mode, "vast") == 0) {
+        put(&(nb_wire_frame){NB_WIRE_MESH, 0, sizeof head + size}, sizeof(nb_wire_frame));
+        put(&head, sizeof head);
+    } else {
+        put(&(nb_wire_frame){NB_WIRE_TEXTURE, 0, sizeof flat + ((uint64_t)4 << 28)}, sizeof(nb_wire_frame));
+        put(&flat, sizeof flat);
+    }
+    (void)pause();
+}
+
+static void put_messages(void)
+{
+    for (;;) put_frame(NB_WIRE_MESSAGE, NEBEL_OK, "a", 1);
+}
+
+/* The name of the model says what to do. */
+static int be_odd(void)
+{
+    size_t size = 0;
+    for (ssize_t count; (count = read(STDIN_FILENO, asked + size, sizeof asked - size)) > 0;) size += (size_t)count;
+    const char *const file = asked + sizeof(nb_wire_request), *const mode = strrchr(file, '/') + 1;
+    if (strcmp(mode, "nothing") == 0) return 0;
+    if (strcmp(mode, "garbage") == 0) put(asked, 600);
+    put_frame(NB_WIRE_HELLO, NB_WIRE_VERSION + (strcmp(mode, "version") == 0), NULL, 0);
+    if (strcmp(mode, "hello") == 0) return 0;
+    if (strcmp(mode, "crash") == 0) raise(SIGSEGV);
+    if (strcmp(mode, "closes") == 0) close(STDOUT_FILENO), (void)pause();
+    if (strcmp(mode, "chatter") == 0) put_messages();
+    if (strcmp(mode, "escape") == 0)
+        put_frame(NB_WIRE_MESSAGE, NEBEL_ERROR_FORMAT, "\033[2J", 4), put_end(NEBEL_ERROR_FORMAT, 0);
+    if (strcmp(mode, "vast") == 0 || strcmp(mode, "vast texture") == 0) put_too_much(mode);
+    if (strcmp(mode, "points") == 0) put_frame(NB_WIRE_PLACES, 0, asked, 24);
+    put_odd_mesh(mode);
+    if (strcmp(mode, "no end") == 0) return 0;
+    put_end(NEBEL_OK, strcmp(mode, "lost") == 0 ? 2 : 1);
+    if (strcmp(mode, "lingers") == 0) (void)pause();
+    return 0;
+}
+
+/* ---- scenes ---------------------------------------------------------------------------------- */
+
+static nebel_result load_by(const char *reader, int in_process, const char *file, journal *kept, nebel_scene **scene)
+{
+    char text[1000];
+    const nebel_scene_desc desc = {.log = {remember, kept}, .model_reader = reader, .models_in_process = in_process};
+    *kept = (journal){0};
+    snprintf(text, sizeof text, "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"%s\"}]}", file);
+    if (nebel_parse_scene(text, strlen(text), in_folder("scene.json"), &desc, scene) != NEBEL_OK)
+        fail_msg("%s", kept->last);
+    return nebel_load_scene_models(*scene);
+}
+
+static nebel_result try_model(const char *reader, const char *file, journal *kept)
+{
+    nebel_scene *scene = NULL;
+    const nebel_result result = load_by(reader, 0, file, kept, &scene);
+    nebel_destroy_scene(scene);
+    return result;
+}
+
+static int count_files(void)
+{
+    int count = 0;
+    DIR *files = opendir("/proc/self/fd");
+    assert_non_null(files);
+    while (readdir(files) != NULL) count++;
+    closedir(files);
+    return count;
+}
+
+/* ---- good models ----------------------------------------------------------------------------- */
+
+static void assert_same_bytes(const void *a, const void *b, size_t size)
+{
+    assert_true((a == NULL) == (b == NULL));
+    if (a != NULL) assert_memory_equal(a, b, size);
+}
+
+static void assert_same_meshes(const nebel_scene_data *a, const nebel_scene_data *b)
+{
+    assert_int_equal(a->mesh_count, b->mesh_count);
+    assert_int_equal(a->texture_count, b->texture_count);
+    for (size_t i = 0; i < a->mesh_count; i++) {
+        const nebel_mesh *x = &a->meshes[i], *y = &b->meshes[i];
+        assert_int_equal(x->vertex_count, y->vertex_count);
+        assert_int_equal(x->triangle_count, y->triangle_count);
+        assert_true(x->texture == y->texture && x->mask == y->mask && x->alpha_cutoff == y->alpha_cutoff);
+        assert_memory_equal(x->base_color, y->base_color, sizeof x->base_color);
+        assert_memory_equal(x->origin, y->origin, sizeof x->origin);
+        assert_same_bytes(x->positions, y->positions, 12 * (size_t)x->vertex_count);
+        assert_same_bytes(x->normals, y->normals, 12 * (size_t)x->vertex_count);
+        assert_same_bytes(x->uvs, y->uvs, 8 * (size_t)x->vertex_count);
+        assert_same_bytes(x->indices, y->indices, 12 * (size_t)x->triangle_count);
+    }
+    for (size_t i = 0; i < a->texture_count; i++) {
+        assert_int_equal(a->textures[i].width, b->textures[i].width);
+        assert_same_bytes(a->textures[i].rgba, b->textures[i].rgba,
+                          4 * (size_t)a->textures[i].width * a->textures[i].height);
+    }
+}
+
+static void test_a_process_reads_what_this_one_reads(void **state)
+{
+    (void)state;
+    static const char *const files[] = {"quad.obj", MODELS "OBJ/spider.obj",
+                                        MODELS "glTF2/BoxTextured-glTF-Binary/BoxTextured.glb"};
+    write_text("quad.obj", quad_obj);
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        journal kept;
+        nebel_scene *apart = NULL, *here = NULL;
+        if (files[i][0] == '/' && access(files[i], R_OK) != 0) continue;
+        if (load_by(NULL, 0, files[i], &kept, &apart) != NEBEL_OK) fail_msg("%s", kept.last);
+        if (load_by("/nowhere", 1, files[i], &kept, &here) != NEBEL_OK) fail_msg("%s", kept.last);
+        assert_true(nebel_scene_contents(apart)->mesh_count > 0);
+        assert_same_meshes(nebel_scene_contents(apart), nebel_scene_contents(here));
+        nebel_destroy_scene(apart);
+        nebel_destroy_scene(here);
+    }
+}
+
+static void test_a_missing_reader_is_an_error(void **state)
+{
+    (void)state;
+    journal kept;
+    write_text("quad.obj", quad_obj);
+    assert_int_equal(try_model("/nowhere/reader", "quad.obj", &kept), NEBEL_ERROR_FILE);
+    assert_non_null(strstr(kept.last, "quad.obj"));
+    assert_non_null(strstr(kept.last, "\"/nowhere/reader\", does not start"));
+}
+
+/* ---- odd readers ----------------------------------------------------------------------------- */
+
+static void test_what_a_reader_sends_is_checked(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *mode;
+        nebel_result result;
+        const char *message;
+    } odd[] = {{"nothing", NEBEL_ERROR_FORMAT, "ended early"},
+               {"hello", NEBEL_ERROR_FORMAT, "ended early"},
+               {"crash", NEBEL_ERROR_FORMAT, "memory that is not its own"},
+               {"closes", NEBEL_ERROR_FORMAT, "cannot be read"},
+               {"version", NEBEL_ERROR_FILE, "another version"},
+               {"garbage", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"chatter", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"vast", NEBEL_ERROR_LIMIT, "memory"},
+               {"vast texture", NEBEL_ERROR_LIMIT, "memory"},
+               {"points", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"index", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"place", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"normal", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"texture", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"color", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"cutoff", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"size", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"none", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"no end", NEBEL_ERROR_FORMAT, "ended early"},
+               {"lost", NEBEL_ERROR_FORMAT, "cannot be"},
+               {"escape", NEBEL_ERROR_FORMAT, "?[2J"},
+               {"lingers", NEBEL_OK, ""},
+               {"good", NEBEL_OK, ""}};
+    char self[200];
+    const ssize_t size = readlink("/proc/self/exe", self, sizeof self - 1);
+    assert_true(size > 0);
+    self[size] = '\0';
+    const int files = count_files();
+    for (size_t i = 0; i < sizeof odd / sizeof *odd; i++) {
+        journal kept;
+        write_text(odd[i].mode, "model");
+        const nebel_result result = try_model(self, odd[i].mode, &kept);
+        if (result != odd[i].result || strstr(kept.last, odd[i].message) == NULL)
+            fail_msg("%s gave %d: %s", odd[i].mode, result, kept.last);
+    }
+    assert_int_equal(count_files(), files);
+    assert_int_equal(waitpid(-1, NULL, WNOHANG), -1); /* no child is left */
+}
+
+/* ---- hosts ----------------------------------------------------------------------------------- */
+
+/* Recursion without an end for Assimp's reader of AC3D. */
+static void write_deep_model(void)
+{
+    FILE *file = fopen(in_folder("deep.ac"), "w");
+    fputs("AC3Db\nMATERIAL \"\" rgb 1 1 1 amb 1 1 1 emis 0 0 0 spec 0 0 0 shi 0 trans 0\n", file);
+    for (int i = 0; i < 100000; i++) fputs("OBJECT group\nkids 1\n", file);
+    fputs("OBJECT poly\nkids 0\n", file);
+    fclose(file);
+}
+
+static void test_hosts_may_ignore_their_children(void **state)
+{
+    (void)state;
+    journal kept;
+    write_text("quad.obj", quad_obj);
+    write_deep_model();
+    void (*const before)(int) = signal(SIGCHLD, SIG_IGN);
+    assert_int_equal(try_model(NULL, "quad.obj", &kept), NEBEL_OK);
+    assert_int_equal(try_model(NULL, "deep.ac", &kept), NEBEL_ERROR_FORMAT);
+    assert_non_null(strstr(kept.last, "deep.ac"));
+    assert_ptr_equal(signal(SIGCHLD, before), SIG_IGN);
+}
+
+static void test_children_of_a_host_stay_its_own(void **state)
+{
+    (void)state;
+    journal kept;
+    int status;
+    write_text("quad.obj", quad_obj);
+    const pid_t own = fork();
+    if (own == 0) _exit(7);
+    assert_int_equal(try_model(NULL, "quad.obj", &kept), NEBEL_OK);
+    assert_int_equal(waitpid(own, &status, 0), own);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 7);
+}
+
+static void test_a_host_may_have_closed_its_standard_files(void **state)
+{
+    (void)state;
+    int status;
+    write_text("quad.obj", quad_obj);
+    const pid_t host = fork();
+    if (host == 0) {
+        journal kept;
+        for (int i = 0; i < 3; i++) close(i);
+        _exit(try_model(NULL, "quad.obj", &kept) == NEBEL_OK ? 0 : 1);
+    }
+    assert_int_equal(waitpid(host, &status, 0), host);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+static int load_often(void *result)
+{
+    journal kept;
+    for (int i = 0; i < 3; i++) {
+        const bool good = try_model(NULL, "quad.obj", &kept) == NEBEL_OK;
+        const bool refused = try_model(NULL, "deep.ac", &kept) == NEBEL_ERROR_FORMAT;
+        if (!good || !refused) *(int *)result = 1;
+    }
+    return 0;
+}
+
+static void test_many_threads_may_read_models(void **state)
+{
+    (void)state;
+    thrd_t threads[4];
+    int results[4] = {0};
+    write_text("quad.obj", quad_obj);
+    write_deep_model();
+    const int files = count_files();
+    for (int i = 0; i < 4; i++) assert_int_equal(thrd_create(&threads[i], load_often, &results[i]), thrd_success);
+    for (int i = 0; i < 4; i++) thrd_join(threads[i], NULL);
+    for (int i = 0; i < 4; i++) assert_int_equal(results[i], 0);
+    assert_int_equal(count_files(), files);
+}
+
+/* The state of a process in one letter; 0: there is none. */
+static char state_of(long id)
+{
+    char path[64], line[300] = "";
+    snprintf(path, sizeof path, "/proc/%ld/stat", id);
+    FILE *file = fopen(path, "r");
+    if (file == NULL) return 0;
+    const bool read = fgets(line, sizeof line, file) != NULL;
+    fclose(file);
+    const char *name_end = read ? strrchr(line, ')') : NULL;
+    return name_end != NULL ? name_end[2] : 0;
+}
+
+static long find_child(pid_t parent)
+{
+    char path[64];
+    long child = 0;
+    snprintf(path, sizeof path, "/proc/%ld/task/%ld/children", (long)parent, (long)parent);
+    for (int i = 0; i < 500 && child == 0; i++) {
+        FILE *file = fopen(path, "r");
+        if (file == NULL) return 0;
+        if (fscanf(file, "%ld", &child) != 1) child = 0;
+        fclose(file);
+        usleep(10000);
+    }
+    return child;
+}
+
+static void test_the_reader_dies_with_its_parent(void **state)
+{
+    (void)state;
+    write_text("endless.smd", "version 1\n\nnodes");
+    const pid_t host = fork();
+    if (host == 0) {
+        journal kept;
+        (void)try_model(NULL, "endless.smd", &kept);
+        _exit(0);
+    }
+    const long reader = find_child(host);
+    kill(host, SIGKILL);
+    assert_int_equal(waitpid(host, NULL, 0), host);
+    if (reader == 0) skip();
+    char now = state_of(reader);
+    for (int i = 0; i < 200 && now != 0 && now != 'Z'; i++, now = state_of(reader)) usleep(10000);
+    if (now != 0 && now != 'Z') fail_msg("the reader goes on: %c", now);
+}
+
+/* ---- files that a model names ---------------------------------------------------------------- */
+
+static void test_references_stay_in_the_folder(void **state)
+{
+    (void)state;
+    journal kept;
+    nebel_result result;
+    mkdir(in_folder("sub"), 0700);
+    write_text("paint.mtl", "newmtl red\nKd 1 0 0\n");
+    write_text("sub/quad.obj", "mtllib ../paint.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    nebel_scene *scene = load("\"file\": \"sub/quad.obj\"", &result, &kept);
+    assert_int_equal(result, NEBEL_OK);
+    assert_non_null(strstr(kept.last, "without \"../paint.mtl\""));
+    assert_non_null(strstr(kept.last, "outside the folder"));
+    assert_true(nebel_scene_contents(scene)->meshes[0].base_color[1] > 0);
+    nebel_destroy_scene(scene);
+    for (int i = 0; i < 2; i++) {
+        scene = load(i == 0 ? "\"file\": \"sub/quad.obj\", \"folder\": \".\""
+                            : "\"file\": \"sub/quad.obj\", \"folder\": \"sub/..\"",
+                     &result, &kept);
+        assert_int_equal(result, NEBEL_OK);
+        assert_int_equal(kept.count, 0);
+        assert_true(nebel_scene_contents(scene)->meshes[0].base_color[0] == 1);
+        assert_true(nebel_scene_contents(scene)->meshes[0].base_color[1] == 0);
+        nebel_destroy_scene(scene);
+    }
+    mkdir(in_folder("other"), 0700);
+    assert_broken("\"file\": \"sub/quad.obj\", \"folder\": \"other\"", NEBEL_ERROR_FORMAT, "does not hold the model");
+    assert_broken("\"file\": \"sub/quad.obj\", \"folder\": \"missing\"", NEBEL_ERROR_FILE, "cannot open the folder");
+}
+
+static void test_links_and_pipes_are_no_way_out(void **state)
+{
+    (void)state;
+    journal kept;
+    nebel_result result;
+    mkdir(in_folder("sub"), 0700);
+    assert_int_equal(symlink("../paint.mtl", in_folder("sub/link.mtl")), 0);
+    assert_int_equal(mkfifo(in_folder("sub/pipe"), 0600), 0);
+    for (int i = 0; i < 2; i++) {
+        write_text("sub/quad.obj", i == 0 ? "mtllib link.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+                                          : "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        nebel_scene *scene = load("\"file\": \"sub/quad.obj\"", &result, &kept);
+        assert_int_equal(result, NEBEL_OK);
+        assert_non_null(strstr(kept.last, i == 0 ? "outside the folder" : "a pipe"));
+        nebel_destroy_scene(scene);
+    }
+    assert_broken("\"file\": \"sub/pipe\"", NEBEL_ERROR_FILE, "a pipe");
+    /* The model itself may be a link: the scene names it. */
+    assert_int_equal(symlink("sub/quad.obj", in_folder("link.obj")), 0);
+    nebel_scene *scene = load_good("\"file\": \"link.obj\"");
+    nebel_destroy_scene(scene);
+}
+
+int main(int count, char **words)
+{
+    (void)words;
+    if (count == 3) return be_odd();
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_a_process_reads_what_this_one_reads),
+                                       cmocka_unit_test(test_a_missing_reader_is_an_error),
+                                       cmocka_unit_test(test_what_a_reader_sends_is_checked),
+                                       cmocka_unit_test(test_hosts_may_ignore_their_children),
+                                       cmocka_unit_test(test_children_of_a_host_stay_its_own),
+                                       cmocka_unit_test(test_a_host_may_have_closed_its_standard_files),
+                                       cmocka_unit_test(test_many_threads_may_read_models),
+                                       cmocka_unit_test(test_the_reader_dies_with_its_parent),
+                                       cmocka_unit_test(test_references_stay_in_the_folder),
+                                       cmocka_unit_test(test_links_and_pipes_are_no_way_out)};
+    return cmocka_run_group_tests(tests, make_folder, NULL);
+}
