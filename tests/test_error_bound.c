@@ -1,6 +1,7 @@
 /* Is the error that nebel_trace reports never smaller than the true one, and never larger than promised?
  *
- *     test_error_bound [cases [first]]        20000 from 0 unless said otherwise; a million take some minutes */
+ *     test_error_bound [cases [first]]        20000 from 0 unless said otherwise (a first opinion has fewer); a million take some
+ * minutes */
 #include "oracle.h"
 #include "random_fog.h"
 
@@ -14,7 +15,7 @@
 
 enum { RAYS_PER_FOG = 20 };
 
-static size_t case_count = 20000, first_case;
+static size_t case_count, first_case;
 
 /* One way of asking, and what came of it. */
 typedef struct mode {
@@ -194,7 +195,7 @@ static void test_reported_errors_bound_the_true_ones_and_keep_their_promise(void
 
 int main(int argc, char **argv)
 {
-    if (argc > 1) case_count = (size_t)strtoull(argv[1], NULL, 10);
+    case_count = argc > 1 ? (size_t)strtoull(argv[1], NULL, 10) : nb_test_count(20000);
     if (argc > 2) first_case = (size_t)strtoull(argv[2], NULL, 10) / RAYS_PER_FOG * RAYS_PER_FOG;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_reported_errors_bound_the_true_ones_and_keep_their_promise),

@@ -10,10 +10,11 @@
 
 /* The sanitizers make every segment twenty times as dear. */
 #if defined(__SANITIZE_ADDRESS__)
-static size_t segment_count = 50000;
+enum { SEGMENTS = 50000 };
 #else
-static size_t segment_count = 1000000;
+enum { SEGMENTS = 1000000 };
 #endif
+static size_t segment_count;
 
 /* ---- random fog and rays that hurt ----------------------------------------------------------- */
 
@@ -199,7 +200,7 @@ static void test_instruction_sets_are_bit_equal(void **state)
 static void test_a_ray_gives_the_same_bits_in_any_company(void **state)
 {
     (void)state;
-    for (int round = 0; round < 20; round++) {
+    for (size_t round = 0; round < nb_test_count(20); round++) {
         nebel_snapshot *fog = random_fog();
         for (int i = 0; i < RAYS; i++)
             rays[i] = random_ray(i + 1 - (i % 17 == 16)); /* none without end: no ray is an error */
@@ -333,7 +334,7 @@ static void test_dispatch_refuses_what_the_processor_lacks(void **state)
 
 int main(int argc, char **argv)
 {
-    if (argc > 1) segment_count = (size_t)strtoul(argv[1], NULL, 10);
+    segment_count = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : nb_test_count(SEGMENTS);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_dispatch_refuses_what_the_processor_lacks),
         cmocka_unit_test(test_instruction_sets_are_bit_equal),

@@ -265,13 +265,14 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
     nebel_ray rays[RAYS];
     nebel_light lights[RAYS];
     forced force[FORCED];
+    const int forced_rays = (int)nb_test_count(FORCED);
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = 2 * i;
     for (int i = 0; i < 2 * RAYS; i++) toggles[i] = i % 2 == 0 ? 7 : 9.5f;
     const nebel_lit_pieces pieces = {first, toggles};
     make_crowd(&of, count, mixed, light, 17 * count + (uint64_t)light);
     make_rays(rays, 5 * count + 3);
     nebel_snapshot *snapshot = commit_crowd(&of), *turned = commit_turned(&of);
-    for (int i = 0; i < FORCED; i++)
+    for (int i = 0; i < forced_rays; i++)
         force[i] = light_by_force(&of, snapshot, turned, &rays[i], in_shadow ? toggles : NULL);
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         for (int fine = 0; fine < 2; fine++) {
@@ -280,7 +281,7 @@ static void expect_brute_force(size_t count, int mixed, int light, int in_shadow
             if (in_shadow && light > 0) asked.lamplit = &pieces;
             trace(snapshot, &asked, rays, lights);
             if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_bits(snapshot, &asked, rays, lights);
-            for (int i = 0; i < FORCED; i++) {
+            for (int i = 0; i < forced_rays; i++) {
                 assert_true(lights[i].error < (fine ? 2e-5 : 1e-3));
                 for (int c = 0; c < 3; c++) {
                     assert_true(force[i].light[c] > 100 * force[i].off[c]);

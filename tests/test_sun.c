@@ -85,10 +85,16 @@ static void make_sunlit(random_fog_kind kind, uint64_t seed)
     memcpy(sky.ambient, fog.ambient, sizeof sky.ambient);
 }
 
+static void trace_some(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, size_t count, nebel_ray rays[RAYS],
+                       nebel_light lights[RAYS])
+{
+    assert_int_equal(nebel_trace(snapshot, desc, count, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+}
+
 static void trace(const nebel_snapshot *snapshot, const nebel_trace_desc *desc, nebel_ray rays[RAYS],
                   nebel_light lights[RAYS])
 {
-    assert_int_equal(nebel_trace(snapshot, desc, RAYS, rays, sizeof *rays, lights, sizeof *lights), NEBEL_OK);
+    trace_some(snapshot, desc, RAYS, rays, lights);
 }
 
 static void draw_rays(nebel_ray rays[RAYS])
@@ -119,6 +125,7 @@ static double brightest(void)
 /* Against the same light within a thousandth of the tolerance. */
 static void errors_are_told(void **state)
 {
+    const size_t count = nb_test_count(RAYS);
     (void)state;
     for (int kind = 0; kind < RANDOM_FOG_KIND_COUNT; kind++) {
         double worst = 0, slack = 0;
@@ -128,10 +135,10 @@ static void errors_are_told(void **state)
             make_sunlit((random_fog_kind)kind, seed);
             nebel_snapshot *snapshot = fog_commit(&sky, fog.volumes, fog.count);
             draw_rays(rays);
-            trace(snapshot, &(nebel_trace_desc){.tolerance = 2e-6}, rays, fine);
+            trace_some(snapshot, &(nebel_trace_desc){.tolerance = 2e-6}, count, rays, fine);
             for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
-                trace(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, rays, light);
-                for (int i = 0; i < RAYS; i++) {
+                trace_some(snapshot, &(nebel_trace_desc){.precision = (nebel_precision)precision}, count, rays, light);
+                for (size_t i = 0; i < count; i++) {
                     const double off = apart(&light[i], &fine[i]);
                     worst = fmax(worst, (off - fine[i].error) / light[i].error);
                     slack = fmax(slack, light[i].error);
@@ -166,7 +173,7 @@ static void light_is_the_same_in_any_order_and_set(void **state)
             const nebel_trace_desc desc = {.precision = NEBEL_PRECISION_FLOAT, .isa = (nebel_isa)isa};
             trace(turned, &desc, rays, other);
             assert_memory_equal(first, other, sizeof first);
-            for (int i = 0; i < RAYS; i++)
+            for (size_t i = 0; i < nb_test_count(RAYS); i++)
                 assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
             assert_memory_equal(first, other, sizeof first);
         }
@@ -287,7 +294,7 @@ static void pieces_are_the_same_in_any_set_and_split(void **state)
             desc.sunlit = &pieces;
             trace(snapshot, &desc, rays, other);
             assert_memory_equal(expected, other, sizeof expected);
-            for (int i = 0; i < RAYS; i++) {
+            for (size_t i = 0; i < nb_test_count(RAYS); i++) {
                 const nebel_lit_pieces one = {first + i, toggles};
                 desc.sunlit = &one;
                 assert_int_equal(nebel_trace(snapshot, &desc, 1, &rays[i], 0, &other[i], 0), NEBEL_OK);
@@ -359,15 +366,15 @@ static size_t make_bodies(uint64_t *numbers, int kind, nebel_volume_desc volumes
     return count;
 }
 
-static void expect_the_same_in_any_set(const nebel_snapshot *snapshot, const nebel_trace_desc *asked,
+static void expect_the_same_in_any_set(const nebel_snapshot *snapshot, const nebel_trace_desc *asked, size_t count,
                                        nebel_ray rays[RAYS], const nebel_light expected[RAYS])
 {
     nebel_light other[RAYS];
     nebel_trace_desc desc = *asked;
     for (desc.isa = NEBEL_ISA_DEFAULT; desc.isa < NEBEL_ISA_COUNT; desc.isa++) {
         if (!nebel_isa_available(desc.isa)) continue;
-        trace(snapshot, &desc, rays, other);
-        assert_memory_equal(expected, other, sizeof other);
+        trace_some(snapshot, &desc, count, rays, other);
+        assert_memory_equal(expected, other, count * sizeof *other);
     }
 }
 
@@ -379,7 +386,7 @@ static void closed_forms_are_what_marches_find(void **state)
     (void)state;
     for (uint32_t i = 0; i <= RAYS; i++) first[i] = i <= RAYS / 2 ? 0 : 4;
     const nebel_lit_pieces pieces = {first, toggles};
-    for (uint64_t seed = 0; seed < 44; seed++) {
+    for (uint64_t seed = 0; seed < 4 * nb_test_count(11); seed++) {
         uint64_t numbers = 77 * seed + 1;
         nebel_volume_desc volumes[BODIES + 1];
         nebel_ray rays[RAYS];
@@ -403,7 +410,7 @@ static void closed_forms_are_what_marches_find(void **state)
             trace(other, &asked, rays, marched);
             asked.precision = (nebel_precision)precision;
             trace(simple, &asked, rays, closed);
-            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(simple, &asked, rays, closed);
+            if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(simple, &asked, RAYS, rays, closed);
             for (int i = 0; i < RAYS; i++) {
                 const double off = apart(&closed[i], &marched[i]);
                 assert_true(off <= closed[i].error + marched[i].error);
@@ -519,10 +526,20 @@ static void expect_brute_force(const nebel_fog_desc *desc, const nebel_lamp *lam
     uint64_t numbers = 31 + count;
     nebel_ray rays[RAYS];
     nebel_light lights[RAYS];
+    forced fine[BALL_RAYS];
+    double off[BALL_RAYS];
     nebel_fog *made = NULL;
     nebel_snapshot *snapshot = NULL;
+    const int forced_rays = (int)nb_test_count(BALL_RAYS);
+    const size_t ray_count = count > 20 ? nb_test_count(RAYS) : RAYS;
     strew_balls(balls, count, thick, &numbers);
     strew_rays(rays, RAYS, &numbers);
+    for (int i = 0; i < forced_rays; i++) {
+        fine[i] = light_by_force(balls, count, lamp, &rays[i], i % 3, HALVES);
+        const double halved = light_by_force(balls, count, lamp, &rays[i], i % 3, HALVES / 2).light;
+        off[i] = fabs(fine[i].light - halved) + fine[i].jumps;
+        assert_true(fine[i].light > 50 * most && off[i] < most / 2);
+    }
     assert_int_equal(nebel_create_fog(desc, &made), NEBEL_OK);
     for (size_t i = 0; i < count; i++) assert_int_equal(nebel_add_volume(made, &balls[i], NULL), NEBEL_OK);
     assert_int_equal(nebel_set_lamps(made, lamp != NULL, lamp), NEBEL_OK);
@@ -530,16 +547,12 @@ static void expect_brute_force(const nebel_fog_desc *desc, const nebel_lamp *lam
     nebel_destroy_fog(made);
     for (int precision = NEBEL_PRECISION_DOUBLE; precision <= NEBEL_PRECISION_FLOAT; precision++) {
         const nebel_trace_desc asked = {.precision = (nebel_precision)precision, .tolerance = 1e-5};
-        trace(snapshot, &asked, rays, lights);
-        if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(snapshot, &asked, rays, lights);
-        for (int i = 0; i < BALL_RAYS; i++) {
-            const int c = i % 3;
-            const forced fine = light_by_force(balls, count, lamp, &rays[i], c, HALVES);
-            const double halved = light_by_force(balls, count, lamp, &rays[i], c, HALVES / 2).light;
-            const double off = fabs(fine.light - halved) + fine.jumps;
-            assert_true(fine.light > 50 * most && off < most / 2);
-            assert_true(fabs(lights[i].in_scattering[c] - fine.light) <= lights[i].error + off);
-            assert_true(fabs(lights[i].in_scattering[c] - fine.light) < most);
+        trace_some(snapshot, &asked, ray_count, rays, lights);
+        if (precision == NEBEL_PRECISION_FLOAT) expect_the_same_in_any_set(snapshot, &asked, ray_count, rays, lights);
+        for (int i = 0; i < forced_rays; i++) {
+            const double wrong = fabs(lights[i].in_scattering[i % 3] - fine[i].light);
+            assert_true(wrong <= lights[i].error + off[i]);
+            assert_true(wrong < most);
         }
     }
     nebel_release_snapshot(snapshot);
