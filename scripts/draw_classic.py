@@ -65,7 +65,7 @@ DIFFERENCES = {
     "classic-passes-difference": ("classic-additive", "classic-vertex", 8),
     **{f"linear-{kind}-{frame}-difference": (f"linear-{kind}-{frame}", f"linear-exact-{frame}", 4)
        for kind in ("plane", "radial") for frame in (0, 30)},
-    "exp-radial-difference": ("exp-radial", "linear-exact-0", 255),
+    "exp-radial-difference": ("exp-radial", "linear-exact-0", 4),
     "exp2-radial-difference": ("exp2-radial", "linear-exact-0", 4),
     "curve-table-difference": ("curve-table", "curve-exact", 4),
     "device-depth-difference": ("device-depth", "device-exact", 4),

@@ -156,6 +156,18 @@ static void test_added_fog_hides_nothing(void **state)
 
 /* ---- factors --------------------------------------------------------------------------------- */
 
+/* IEC 61966-2-1, from 0 to 1: what frame buffers store. */
+static double stored(double linear)
+{
+    const double x = fmin(fmax(linear, 0), 1);
+    return x <= .0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - .055;
+}
+
+static double restored(double x)
+{
+    return x <= .04045 ? x / 12.92 : pow((x + .055) / 1.055, 2.4);
+}
+
 static double factor_at(nebel_method method, const nebel_factor_desc *factor, const nebel_camera *camera,
                         const double place[3])
 {
@@ -200,7 +212,8 @@ static void test_factors(void **state)
                                          ? test_interpolate_ground(corners, place)
                                          : factor_at((nebel_method)method, &factor, &camera, place);
                     assert_near((double)test_transmittance(&picture, x, y)[1], f, 1e-5);
-                    assert_near((double)test_color(&picture, x, y)[2], .75 * f + .3 * (1 - f), 1e-5);
+                    assert_near((double)test_color(&picture, x, y)[2], restored(f * stored(.75) + (1 - f) * stored(.3)),
+                                1e-5);
                 }
         }
     nebel_release_snapshot(fog);
@@ -210,6 +223,11 @@ static void test_factors(void **state)
 /* ---- what hardware is given ------------------------------------------------------------------ */
 
 static const double pale[3] = {.9, .6, .3};
+
+static void store(const double color[3], double out[3])
+{
+    for (int c = 0; c < 3; c++) out[c] = stored(color[c]);
+}
 
 /* How far the ground is seen from factors that are linear between its corners, with that colour. */
 static double find_difference(const nebel_camera *camera, const test_picture *picture, const double factors[4],
@@ -263,17 +281,18 @@ static void test_streams_of_hardware(void **state)
     for (int curve = 0; curve < NEBEL_CURVE_COUNT; curve++) {
         const nebel_vertex_desc look = {.curve = (nebel_curve_type)curve, .table = table, .color = pale};
         const nebel_method_desc numbers = {.vertex = &look};
-        double factors[4], bytes[4], rounded[3];
-        for (int c = 0; c < 3; c++) rounded[c] = floor(255 * pale[c] + .5) / 255;
+        double factors[4], bytes[4], rounded[3], fresh[3];
+        store(pale, fresh);
+        for (int c = 0; c < 3; c++) rounded[c] = floor(255 * fresh[c] + .5) / 255;
         for (size_t v = 0; v < 4; v++) {
             const double depth = -log((double)trace_corner(fog, &camera, v).transmittance[0]);
             factors[v] = 1 - curve_at((nebel_curve_type)curve, depth);
             bytes[v] = 1 - floor(255 * (1 - factors[v]) + .5) / 255;
         }
         assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_FOG_COORD, &numbers, 2, &camera, &picture), NEBEL_OK);
-        assert_true(find_difference(&camera, &picture, factors, pale) < 1e-5);
+        assert_true(find_difference(&camera, &picture, factors, fresh) < 1e-5);
         assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_TWO_PASS, &numbers, 2, &camera, &picture), NEBEL_OK);
-        assert_true(find_difference(&camera, &picture, factors, pale) < 1e-5);
+        assert_true(find_difference(&camera, &picture, factors, fresh) < 1e-5);
         assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_ALPHA, &numbers, 2, &camera, &picture), NEBEL_OK);
         assert_true(find_difference(&camera, &picture, bytes, rounded) < 1e-5);
     }
@@ -281,17 +300,27 @@ static void test_streams_of_hardware(void **state)
     test_picture_free(&picture);
 }
 
+/* But for what is blended: light, or what of it is stored. Fog of one color has that everywhere. */
 static void test_two_passes_are_fog_at_vertices(void **state)
 {
     (void)state;
     const nebel_mesh mesh = test_ground();
     const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}, .background = {.1, .2, .3}};
     const nebel_camera camera = test_camera_down();
-    nebel_snapshot *fog = test_fog(1, &bank);
+    nebel_volume_desc grey = bank;
+    for (int c = 0; c < 3; c++) grey.extinction[c] = .1;
+    nebel_snapshot *fog = test_fog(1, &grey);
     test_picture one = test_picture_make(40, 30), two = test_picture_make(40, 30);
     assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 2, &camera, &one), NEBEL_OK);
     assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_TWO_PASS, NULL, 2, &camera, &two), NEBEL_OK);
-    assert_memory_equal(one.planes.color, two.planes.color, sizeof(float) * 3 * 40 * 30);
+    assert_memory_equal(one.planes.transmittance, two.planes.transmittance, sizeof(float) * 3 * 40 * 30);
+    for (size_t i = 0; i < 3 * 40 * 30; i++) {
+        const double left = (double)two.planes.transmittance[i], base = (double)one.planes.color[i],
+                     behind = (base - (double)one.planes.in_scattering[i]) / left,
+                     added = (1 - left) * stored(bank.source[i % 3]);
+        assert_near((double)two.planes.in_scattering[i], added, 1e-5);
+        assert_near((double)two.planes.color[i], restored(left * stored(behind) + added), 1e-5);
+    }
     assert_int_equal(render_by(&scene, NULL, NEBEL_METHOD_TWO_PASS, NULL, 2, &camera, &two), NEBEL_OK);
     for (int i = 0; i < 3 * 40 * 30; i++) assert_near((double)two.planes.transmittance[i], 1, 0);
     nebel_release_snapshot(fog);
@@ -308,14 +337,15 @@ static void test_own_coordinates(void **state)
     const nebel_camera camera = test_camera_down();
     nebel_snapshot *fog = test_fog(1, &bank);
     test_picture picture = test_picture_make(40, 30);
-    double coordinates[4], corners[4], largest = 0;
+    double coordinates[4], corners[4], fresh[3], largest = 0;
     nebel_factor_desc factor = {.coordinate = NEBEL_COORDINATE_USER, .density = .03, .color = {.9, .6, .3}};
     for (size_t v = 0; v < 4; v++) {
         coordinates[v] = 100 * (1 - (double)trace_corner(fog, &camera, v).transmittance[0]);
         corners[v] = exp(-.03 * coordinates[v]);
     }
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_EXP, &factor, 2, &camera, &picture), NEBEL_OK);
-    assert_true(find_difference(&camera, &picture, corners, pale) < 1e-5);
+    store(pale, fresh);
+    assert_true(find_difference(&camera, &picture, corners, fresh) < 1e-5);
     factor.stage = NEBEL_STAGE_PIXEL;
     assert_int_equal(render(&scene, fog, NEBEL_METHOD_EXP, &factor, 2, &camera, &picture), NEBEL_OK);
     for (uint32_t y = 0; y < 30; y++)
@@ -324,7 +354,7 @@ static void test_own_coordinates(void **state)
             if (!test_find_ground(&camera, &picture, x, y, place)) continue;
             const double f = exp(-.03 * test_interpolate_ground(coordinates, place));
             assert_near((double)test_transmittance(&picture, x, y)[0], f, 1e-5);
-            assert_near((double)test_in_scattering(&picture, x, y)[1], (1 - f) * .6, 1e-5);
+            assert_near((double)test_in_scattering(&picture, x, y)[1], (1 - f) * fresh[1], 1e-5);
             largest = fmax(largest, fabs(f - test_interpolate_ground(corners, place)));
         }
     assert_true(largest > .01);
@@ -369,6 +399,38 @@ static void test_devices(void **state)
     assert_int_equal(render_by(&scene, fog, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
     assert_true(find_difference(&camera, &picture, by_alpha, orange) < 1e-5);
     nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
+/* The right half of the ground, which is grey, is seen in fog of half: bytes are blended. */
+static void test_devices_blend_bytes(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = test_ground();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {4, .5, 0}, .background = {3, .2, 0}};
+    nebel_camera camera = test_camera_down();
+    test_picture picture = test_picture_make(40, 30);
+    const nebel_d3d9_fog d3d9 = {
+        .fog_color = 0xb4b4c0, .fog_table_mode = NEBEL_D3DFOG_LINEAR, .fog_start = 4, .fog_end = 10};
+    nebel_method_desc numbers = {.d3d9 = &d3d9};
+    assert_int_equal(render_by(&scene, NULL, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    float shown[3];
+    nebel_encode_srgb(1, test_color(&picture, 20, 15), 0, shown);
+    for (int c = 0; c < 3; c++) {
+        const double behind = 255 * stored((double)mesh.base_color[c] * scene.ambient[c]);
+        assert_near(255 * (double)shown[c], .5 * behind + .5 * (c == 2 ? 0xc0 : 0xb4), .01);
+    }
+    /* An orthographic camera has device depth: 7 m is three quarters of the way from 1 to 9 m. */
+    const nebel_d3d9_fog by_depth = {
+        .fog_color = 0xffffff, .fog_table_mode = NEBEL_D3DFOG_LINEAR, .fog_start = .5f, .fog_end = 1};
+    numbers = (nebel_method_desc){.d3d9 = &by_depth, .z_near = 1, .z_far = 9};
+    camera.projection = NEBEL_PROJECTION_ORTHOGRAPHIC;
+    camera.view_height = 4;
+    assert_int_equal(render_by(&scene, NULL, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    assert_near((double)test_transmittance(&picture, 20, 15)[0], .5, 1e-5);
+    numbers.z_near = numbers.z_far = 0; /* 0 and 1000 m */
+    assert_int_equal(render_by(&scene, NULL, NEBEL_METHOD_D3D9, &numbers, 2, &camera, &picture), NEBEL_OK);
+    assert_near((double)test_transmittance(&picture, 20, 15)[0], 1, 0);
     test_picture_free(&picture);
 }
 
@@ -438,6 +500,7 @@ int main(void)
         cmocka_unit_test(test_two_passes_are_fog_at_vertices),
         cmocka_unit_test(test_own_coordinates),
         cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_devices_blend_bytes),
         cmocka_unit_test(test_methods_come_and_go),
         cmocka_unit_test(test_words),
     };

@@ -84,8 +84,22 @@ static void test_device(void **state)
     d3d9 = nebel_scene_contents(scene)->classic_d3d9;
     wanted = (nebel_d3d9_fog){1, 0xff8033, NEBEL_D3DFOG_LINEAR, NEBEL_D3DFOG_EXP2, 2, 5, .5f, 1};
     assert_memory_equal(d3d9, &wanted, sizeof wanted);
+    assert_number(nebel_scene_contents(scene)->classic_z_near, 0);
+    assert_number(nebel_scene_contents(scene)->classic_z_far, 1000);
     /* Coordinates of one's own have no unit. */
     assert_number(nebel_scene_contents(scene)->classic->end, 100);
+    nebel_destroy_scene(scene);
+    scene =
+        parse_good(SCENE("\"unit\": 0.5, ", "{\"d3d9\": {\"fog_color\": \"#12b4c0\", \"z_near\": 4, \"z_far\": 20}}"));
+    assert_int_equal(nebel_scene_contents(scene)->classic_d3d9->fog_color, 0x12b4c0); /* bytes are stored as they are */
+    assert_number(nebel_scene_contents(scene)->classic_z_near, 2);
+    assert_number(nebel_scene_contents(scene)->classic_z_far, 10);
+    nebel_destroy_scene(scene);
+    /* Device depth has no unit. */
+    scene = parse_good(SCENE("\"unit\": 0.5, \"camera\": {\"projection\": \"orthographic\"}, ",
+                             "{\"d3d9\": {\"fog_table_mode\": \"exp\", \"fog_end\": 0.75, \"fog_density\": 3}}"));
+    assert_number((double)nebel_scene_contents(scene)->classic_d3d9->fog_end, .75);
+    assert_number((double)nebel_scene_contents(scene)->classic_d3d9->fog_density, 3);
     nebel_destroy_scene(scene);
     scene = parse_good(SCENE("", "{}"));
     assert_null(nebel_scene_contents(scene)->classic_d3d9);
@@ -104,6 +118,8 @@ static void test_what_is_wrong(void **state)
          "classic.density: is 0; must be an amount > 0 and < 1e9 per metre"},
         {NEBEL_ERROR_FORMAT, SCENE("", "{\"end\": `\"far\"}"), "classic.end: is a string; must be a coordinate"},
         {NEBEL_ERROR_FORMAT, SCENE("", "{\"color\": [1, `-1, 1]}"), "classic.color"},
+        {NEBEL_ERROR_FORMAT, SCENE("", "{\"d3d9\": {\"z_near\": `1000}}"),
+         "classic.d3d9.z_near: z_near is 1000 and z_far 1000; z_near must be less"},
         {NEBEL_ERROR_FORMAT, SCENE("", "{\"coordinate\": `\"far\"}"),
          "classic.coordinate: unknown; must be one of: plane, radial, user"},
         {NEBEL_ERROR_FORMAT, SCENE("", "{\"curve\": `\"table\"}"),

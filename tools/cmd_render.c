@@ -146,6 +146,15 @@ static void free_studio(studio *all)
     nb_load_free(&all->loaded);
 }
 
+/* Hardware shows what it has stored. */
+static void show_light(const nb_render_call *wanted, size_t pixels, float *samples)
+{
+    if (nebel_method_blends_stored(wanted->method))
+        nebel_encode_srgb(pixels, samples, wanted->exposure, samples);
+    else
+        nebel_tone_map(pixels, samples, wanted->exposure, samples);
+}
+
 /* The picture of all planes that are wanted. */
 static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHANNELS])
 {
@@ -161,8 +170,7 @@ static nebel_image join_planes(studio *all, const char *names[NB_LAYERS_MOST_CHA
             names[image.channel_count++] = nb_layer_kinds[i].names[c];
     }
     image.samples = all->interleaved != NULL ? all->interleaved : all->samples[NB_LAYER_COLOR];
-    if (wanted->is_film || wanted->format == NEBEL_IMAGE_PNG)
-        nebel_tone_map(pixels, image.samples, wanted->exposure, image.samples);
+    if (wanted->is_film || wanted->format == NEBEL_IMAGE_PNG) show_light(wanted, pixels, image.samples);
     return image;
 }
 
@@ -293,6 +301,8 @@ static nebel_result draw_frame(studio *all)
         .factor = scene->classic,
         .vertex = &look,
         .d3d9 = scene->classic_d3d9,
+        .z_near = scene->classic_z_near,
+        .z_far = scene->classic_z_far,
         .time = all->frame,
         .clouds_by_processor = 1,
     };
@@ -470,7 +480,11 @@ static int choose_method(studio *all)
     const nebel_cell_stage stage =
         wanted->method == NEBEL_METHOD_CELLS ? NEBEL_CELLS_PER_VERTEX : NEBEL_CELLS_PER_PIXEL;
     const nebel_vertex_desc look = look_of(wanted->method, scene);
-    const nebel_method_desc desc = {.factor = scene->classic, .vertex = &look, .d3d9 = scene->classic_d3d9};
+    const nebel_method_desc desc = {.factor = scene->classic,
+                                    .vertex = &look,
+                                    .d3d9 = scene->classic_d3d9,
+                                    .z_near = scene->classic_z_near,
+                                    .z_far = scene->classic_z_far};
     const nebel_result result = takes_cells(wanted->method)
                                     ? nebel_set_renderer_cells(all->renderer, all->cells, stage)
                                     : nebel_set_renderer_method(all->renderer, wanted->method, &desc);

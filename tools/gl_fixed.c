@@ -1,6 +1,7 @@
 #include "gl_fixed.h"
 
 #include <nebel/gl_classic.h>
+#include <nebel/render.h>
 
 #include <epoxy/gl.h>
 #include <math.h>
@@ -74,10 +75,37 @@ static nebel_vertex_format format_of(nebel_gl_classic_kind kind)
     }
 }
 
+/* ---- what is stored: sRGB, at most 1 (IEC 61966-2-1) ------------------------------------------- */
+
+static double store(double linear)
+{
+    const float light[3] = {(float)linear, (float)linear, (float)linear};
+    float stored[3];
+    nebel_encode_srgb(1, light, 0, stored);
+    return (double)stored[0];
+}
+
+static double restore(double stored)
+{
+    if (!(stored > 0)) return 0;
+    if (!(stored < 1)) return 1;
+    return stored <= 0.04045 ? stored / 12.92 : pow((stored + 0.055) / 1.055, 2.4);
+}
+
 static void fill_colors(unsigned char *bytes, size_t count, const double *color)
 {
     for (size_t v = 0; v < count; v++)
-        for (size_t c = 0; c < 3; c++) bytes[4 * v + c] = (unsigned char)floor(255 * fmin(color[c], 1) + .5);
+        for (size_t c = 0; c < 3; c++) bytes[4 * v + c] = (unsigned char)floor(255 * store(color[c]) + .5);
+}
+
+/* Light that fog of an amount adds is as much of a stored color. */
+static void store_colors(float (*colors)[4], size_t count)
+{
+    for (size_t v = 0; v < count; v++)
+        for (int c = 0; c < 3; c++) {
+            const double amount = (double)colors[v][3], light = (double)colors[v][c];
+            colors[v][c] = (float)(amount > 0 ? amount * store(light / amount) : store(light));
+        }
 }
 
 static nebel_result fog_mesh(const work *w, const nebel_mesh *mesh, nebel_vertex_output *stream)
@@ -91,7 +119,9 @@ static nebel_result fog_mesh(const work *w, const nebel_mesh *mesh, nebel_vertex
     *stream = (nebel_vertex_output){format, malloc(((size_t)mesh->vertex_count + 1) * size), size};
     if (stream->data == NULL) return NEBEL_ERROR_MEMORY;
     if (format == NEBEL_VERTEX_ALPHA) fill_colors(stream->data, mesh->vertex_count, look->color);
-    return nebel_fog_vertices(w->fixed->fog, look, mesh->vertex_count, &vertices, stream, 1);
+    const nebel_result result = nebel_fog_vertices(w->fixed->fog, look, mesh->vertex_count, &vertices, stream, 1);
+    if (result == NEBEL_OK && format == NEBEL_VERTEX_RGBA_FLOAT) store_colors(stream->data, mesh->vertex_count);
+    return result;
 }
 
 static nebel_result fog_meshes(work *w)
@@ -199,7 +229,7 @@ static nebel_result draw_fog(const work *w, const double projection[16])
     const int one_pass = nebel_gl_classic_method(w->classic) == NEBEL_GL_CLASSIC_FOG_COORD;
     const double *const opaque = w->desc->vertex->color;
     float color[3] = {0, 0, 0};
-    for (int c = 0; c < 3 && opaque != NULL; c++) color[c] = (float)opaque[c];
+    for (int c = 0; c < 3 && opaque != NULL; c++) color[c] = (float)store(opaque[c]);
     nebel_result result = nebel_gl_begin_classic(w->classic, color);
     for (size_t i = 0; i < scene->mesh_count && result == NEBEL_OK; i++) {
         set_matrices(w, projection, &scene->meshes[i]);
@@ -345,8 +375,9 @@ static nebel_result read_fog(const work *w, const nebel_gl_planes *planes)
 static nebel_result draw_planes(const work *w, const nebel_gl_planes *planes)
 {
     const size_t count = 3 * (size_t)w->width * w->height;
-    for (size_t i = 0; i < count; i++) w->color[i] -= w->in_scattering[i];
+    for (size_t i = 0; i < count; i++) w->color[i] = (float)store((double)(w->color[i] - w->in_scattering[i]));
     nebel_result result = fog_light(w, w->color, w->color);
+    for (size_t i = 0; i < count; i++) w->color[i] = (float)restore((double)w->color[i]);
     if (planes->color != NULL) reduce(w, w->color, planes->color);
     if (planes->normal != NULL) reduce(w, w->normal, planes->normal);
     if (planes->depth != NULL) reduce_depth(w, planes->depth);

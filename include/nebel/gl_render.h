@@ -130,7 +130,9 @@ typedef struct nebel_gl_frame_desc {
     const nebel_cells *cells;        /* of CELLS and CELLS_PIXEL */
     const nebel_factor_desc *factor; /* of LINEAR, EXP and EXP2, but for its mode */
     const nebel_vertex_desc *vertex; /* of FOG_COORD and ALPHA, with a color; of TWO_PASS, NULL: {0} */
-    const nebel_d3d9_fog *d3d9;      /* of D3D9; FOGENABLE counts as set, and table fog goes by metres of depth */
+    const nebel_d3d9_fog *d3d9;      /* of D3D9; FOGENABLE counts as set */
+    double z_near, z_far;            /* of D3D9 [m]: device depth 0 and 1 of an orthographic camera, by which table fog
+                                        goes there; both 0: 0 and 1000 */
     int particles_leave_sun; /* 0: sunlight on surfaces is attenuated by all particles on its way, as on the CPU,
                                   exactly, by the lists of particles along it; for a new eye or sun O(particles) more,
                                   some microseconds each. Not where `fog` excludes, replaces or limits what particles

@@ -78,6 +78,11 @@ typedef enum nebel_method {
 /* The word of `nebel render --method`; NULL: there is no such method. Any thread. */
 const char *nebel_method_word(nebel_method method);
 
+/* 1: the method imitates hardware of its time, LINEAR to D3D9 but FIVE_TAP and TWO_PASS's kin VERTEX and ADDITIVE. What such
+ * hardware stores in its frame buffer is blended: colors in sRGB, at most 1. `color` of a frame is linear light again; what
+ * the hardware shows is nebel_encode_srgb of it, without a tone curve. `in_scattering` is what is added to stored colors. Any thread. */
+int nebel_method_blends_stored(nebel_method method);
+
 /* What methods need; what a method does not need is not read. */
 typedef struct nebel_method_desc {
     const nebel_factor_desc *factor; /* LINEAR, EXP, EXP2; its mode is the method's. COORDINATE_USER is what
@@ -85,9 +90,11 @@ typedef struct nebel_method_desc {
                                         linear in between */
     const nebel_vertex_desc *vertex; /* FOG_COORD and ALPHA, with a color; TWO_PASS, NULL: {0}. Its isa and its
                                         coordinate_end are not read */
-    const nebel_d3d9_fog *d3d9;      /* D3D9. FOGENABLE counts as set. Table fog goes by metres of depth whatever the
-                                        camera, which has no device depth. Without table and vertex fog the factor is
-                                        specular alpha, the snapshot's fog at the vertices, in bytes */
+    const nebel_d3d9_fog *d3d9;      /* D3D9. FOGENABLE counts as set. Table fog goes by metres of depth; of an
+                                        orthographic camera by device depth, 0 at z_near to 1 at z_far. Without table and
+                                        vertex fog the factor is specular alpha, the snapshot's fog at the vertices, in
+                                        bytes */
+    double z_near, z_far;            /* of D3D9 [m]; both 0: 0 and 1000 */
 } nebel_method_desc;
 
 /* The method of the frames from now on: all but CELLS, CELLS_PIXEL and FIVE_TAP. desc may be NULL for EXACT, VERTEX,
@@ -138,6 +145,9 @@ nebel_result nebel_render_frame(nebel_renderer *renderer, const nebel_frame_desc
  * pixels of 3 floats, out may be in. Black stays 0, middle grey 0.18 stays 0.18, 1 comes out as 0.70 before the
  * transfer function, the limit is 1. Within 2e-6 of the exact curve; NaN and negative light give 0. Any thread. */
 void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb);
+
+/* The same without the tone curve: what frame buffers of classic hardware show. Light above 1 is 1. */
+void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *srgb);
 
 /* Runs parts on threads of OpenMP: for the `run` of descriptions of scenes and of air. `user` is a const int *, how many
  * threads there are, 1 to 1024; NULL: as many as processors. Any thread. */

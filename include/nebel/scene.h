@@ -171,10 +171,11 @@ typedef struct nebel_scene_data {
     const nebel_cells_desc *cells; /* good for nebel_create_cells; allocator and log are not set. NULL: none */
     const char *const *cell_names; /* UTF-8; "" where the file gives none */
 
-    const nebel_factor_desc *classic;   /* numbers of the fog factors; the mode is the method's to set. NULL: none */
-    nebel_curve_type classic_curve;     /* and what the same section says of other methods */
-    const float *classic_table;         /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
-    const nebel_d3d9_fog *classic_d3d9; /* switched on. NULL: none */
+    double classic_z_near, classic_z_far; /* of classic_d3d9 [m], as in nebel_method_desc */
+    const nebel_factor_desc *classic;     /* numbers of the fog factors; the mode is the method's to set. NULL: none */
+    nebel_curve_type classic_curve;       /* and what the same section says of other methods */
+    const float *classic_table;           /* of NEBEL_CURVE_ENTRIES, for the curve TABLE */
+    const nebel_d3d9_fog *classic_d3d9;   /* switched on. NULL: none */
 
     size_t planet_count;         /* at most NEBEL_MAX_PLANETS; of the model LAYERS: 1 */
     const nebel_planet *planets; /* the sky of the first one is that of the scene's origin */

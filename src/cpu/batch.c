@@ -6,6 +6,7 @@
 #include "shells.h"
 
 #include <math.h>
+#include <string.h>
 
 NB_CLONES static void set_inside(const nb_frame *frame, const nb_place *place, int *inside)
 {
@@ -364,6 +365,32 @@ static int has_one_light(const nb_lighting *lighting)
     return lighting->environment.type == NEBEL_ENVIRONMENT_CONSTANT;
 }
 
+static void choose_colors(const nb_frame *frame, nb_scratch *scratch)
+{
+    if (frame->air.count > 0)
+        set_colors_in_air(frame, scratch);
+    else if (has_one_light(&frame->lighting))
+        set_colors(&frame->lighting, scratch);
+    else
+        set_colors_by_direction(&frame->lighting, scratch);
+}
+
+/* Those behind the fog first. */
+static void set_stored_colors(const nb_frame *frame, nb_scratch *scratch)
+{
+    const nb_light_samples fog = scratch->samples;
+    nb_light_samples *const samples = &scratch->samples;
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < NB_BATCH; i++) {
+            samples->transmittance[c][i] = 1;
+            samples->in_scattering[c][i] = 0;
+        }
+    choose_colors(frame, scratch);
+    nb_classic_fog_blend(&fog, samples);
+    memcpy(samples->transmittance, fog.transmittance, sizeof fog.transmittance);
+    memcpy(samples->in_scattering, fog.in_scattering, sizeof fog.in_scattering);
+}
+
 static void find_hits(const nb_frame *frame, const nb_place *place, uint32_t sample, nb_scratch *scratch)
 {
     const nb_geometry *geometry = &frame->renderer->geometry;
@@ -428,12 +455,10 @@ nebel_result nb_batch_light(const nb_frame *frame, nb_scratch *scratch)
     const int has_surface = nb_hits_any(&scratch->hits) || (has_air && nb_air_sees_ground(&scratch->air));
     if (result == NEBEL_OK && has_surface) result = light_surfaces(frame, scratch);
     if (result != NEBEL_OK) return result;
-    if (has_air)
-        set_colors_in_air(frame, scratch);
-    else if (has_one_light(&frame->lighting))
-        set_colors(&frame->lighting, scratch);
+    if (nebel_method_blends_stored(frame->renderer->method))
+        set_stored_colors(frame, scratch);
     else
-        set_colors_by_direction(&frame->lighting, scratch);
+        choose_colors(frame, scratch);
     if (frame->layers != NULL) nb_shells_blend(frame, scratch);
     return result;
 }

@@ -51,6 +51,7 @@ static void set_eye_coordinates(const nb_view *camera, const double place[3], do
     out[2] = panorama ? nb_vector_length(way) : nb_vector_dot(way, camera->axes.forward);
 }
 
+/* Of a color as hardware stores it. */
 static nb_vertex_fog fog_of_color(double amount, const double color[3])
 {
     nb_vertex_fog fog = {{0, 0, 0}, (float)amount};
@@ -58,18 +59,28 @@ static nb_vertex_fog fog_of_color(double amount, const double color[3])
     return fog;
 }
 
+static nb_vertex_fog fog_of_light(double amount, const double light[3])
+{
+    const double color[3] = {nb_device_store(light[0]), nb_device_store(light[1]), nb_device_store(light[2])};
+    return fog_of_color(amount, color);
+}
+
 static nb_vertex_fog fog_of_coordinate(const nebel_factor_desc *factor, double coordinate)
 {
-    return fog_of_color(1 - nebel_compute_fog_factor(factor, coordinate), factor->color);
+    return fog_of_light(1 - nebel_compute_fog_factor(factor, coordinate), factor->color);
 }
 
 /* The device's factor of a vertex, or with table fog of a pixel. */
-static nb_vertex_fog fog_of_device(const nebel_d3d9_fog *d3d9, const nebel_d3d9_vertex *vertex)
+static nb_vertex_fog fog_of_device(const nb_frame *frame, const nebel_d3d9_vertex *vertex)
 {
+    const nebel_renderer *const renderer = frame->renderer;
+    const nebel_d3d9_fog *const d3d9 = &renderer->d3d9;
     const double of_vertex = nebel_compute_d3d9_vertex_factor(d3d9, vertex);
+    const int parallel = frame->view.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    const double depth = parallel ? nb_device_depth(&renderer->device_planes, vertex->place[2]) : vertex->place[2];
     double color[3];
     nebel_get_d3d9_color(d3d9, color);
-    return fog_of_color(1 - nebel_compute_d3d9_pixel_factor(d3d9, of_vertex, vertex->place[2]), color);
+    return fog_of_color(1 - nebel_compute_d3d9_pixel_factor(d3d9, of_vertex, depth), color);
 }
 
 static nb_vertex_fog fog_at(const nb_frame *frame, const double place[3])
@@ -79,7 +90,7 @@ static nb_vertex_fog fog_at(const nb_frame *frame, const double place[3])
     if (method == NEBEL_METHOD_CELLS || method == NEBEL_METHOD_CELLS_PIXEL) return fog_of_cells(frame, place);
     nebel_d3d9_vertex vertex = {.source = NEBEL_D3D9_FIXED};
     set_eye_coordinates(&frame->view, place, vertex.place);
-    if (method == NEBEL_METHOD_D3D9) return fog_of_device(&renderer->d3d9, &vertex);
+    if (method == NEBEL_METHOD_D3D9) return fog_of_device(frame, &vertex);
     return fog_of_coordinate(&renderer->factor, nebel_compute_fog_coordinate(&renderer->factor, vertex.place, 0));
 }
 
@@ -132,13 +143,23 @@ static nebel_vertex_format format_of(const nebel_renderer *renderer)
 static nb_vertex_fog unpack_alpha(const nebel_renderer *renderer, double alpha)
 {
     double color[3];
-    for (int c = 0; c < 3; c++) color[c] = floor(255 * fmin(renderer->look_color[c], 1) + .5) / 255;
+    for (int c = 0; c < 3; c++) color[c] = floor(255 * nb_device_store(renderer->look_color[c]) + .5) / 255;
     return fog_of_color(alpha, color);
 }
 
-/* What the hardware makes of it. Where the factor is one of pixels that is the coordinate, in the place of alpha. */
-static nb_vertex_fog unpack(const nebel_renderer *renderer, const nb_vertex_fog *stream)
+static nb_vertex_fog unpack_colors(const nebel_renderer *renderer, const nb_vertex_fog *stream)
 {
+    nb_vertex_fog fog = *stream;
+    if (!nebel_method_blends_stored(renderer->method)) return fog;
+    for (int c = 0; c < 3; c++)
+        fog.color[c] = (float)nb_device_store_fog((double)stream->alpha, (double)stream->color[c]);
+    return fog;
+}
+
+/* What the hardware makes of it. Where the factor is one of pixels that is the coordinate, in the place of alpha. */
+static nb_vertex_fog unpack(const nb_frame *frame, const nb_vertex_fog *stream)
+{
+    const nebel_renderer *const renderer = frame->renderer;
     enum { END = 100 };
     float coordinate;
     memcpy(&coordinate, stream, sizeof coordinate);
@@ -148,13 +169,13 @@ static nb_vertex_fog unpack(const nebel_renderer *renderer, const nb_vertex_fog 
     case NEBEL_VERTEX_ALPHA:
         return unpack_alpha(renderer, byte);
     case NEBEL_VERTEX_SPECULAR_ALPHA:
-        return fog_of_device(&renderer->d3d9, &vertex);
+        return fog_of_device(frame, &vertex);
     case NEBEL_VERTEX_COORDINATE:
-        if (!is_by_user(renderer)) return fog_of_color((double)coordinate / END, renderer->look_color);
+        if (!is_by_user(renderer)) return fog_of_light((double)coordinate / END, renderer->look_color);
         if (renderer->factor.stage == NEBEL_STAGE_PIXEL) return (nb_vertex_fog){{0, 0, 0}, coordinate};
         return fog_of_coordinate(&renderer->factor, (double)coordinate);
     default:
-        return *stream;
+        return unpack_colors(renderer, stream);
     }
 }
 
@@ -186,7 +207,7 @@ static nebel_result trace_vertices(const nb_frame *frame, const nebel_mesh *mesh
         result = nebel_fog_vertices(renderer->fog, &desc, count, &vertices, &output, 1);
     else
         memset(fog + first, format == NEBEL_VERTEX_SPECULAR_ALPHA ? 0xff : 0, count * sizeof *fog);
-    for (size_t v = first; v < first + count && result == NEBEL_OK; v++) fog[v] = unpack(renderer, &fog[v]);
+    for (size_t v = first; v < first + count && result == NEBEL_OK; v++) fog[v] = unpack(frame, &fog[v]);
     return result;
 }
 
@@ -293,4 +314,14 @@ void nb_classic_fog_trace(const nb_frame *frame, nb_scratch *scratch)
         }
         samples->error[i] = 0;
     }
+}
+
+void nb_classic_fog_blend(const nb_light_samples *fog, nb_light_samples *samples)
+{
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < NB_BATCH; i++) {
+            const double left = (double)fog->transmittance[c][i], surface = (double)samples->color[c][i];
+            const double stored = left * nb_device_store(surface) + (double)fog->in_scattering[c][i];
+            samples->color[c][i] = (float)nb_device_restore(stored);
+        }
 }

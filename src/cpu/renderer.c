@@ -133,6 +133,22 @@ const char *nebel_method_word(nebel_method method)
     return (unsigned)method < NEBEL_METHOD_COUNT ? words[method] : NULL;
 }
 
+int nebel_method_blends_stored(nebel_method method)
+{
+    switch (method) {
+    case NEBEL_METHOD_LINEAR:
+    case NEBEL_METHOD_EXP:
+    case NEBEL_METHOD_EXP2:
+    case NEBEL_METHOD_FOG_COORD:
+    case NEBEL_METHOD_TWO_PASS:
+    case NEBEL_METHOD_ALPHA:
+    case NEBEL_METHOD_D3D9:
+        return 1;
+    default:
+        return 0;
+    }
+}
+
 static nebel_result make_room_at_vertices(nebel_renderer *renderer)
 {
     if (renderer->vertex_fog != NULL) return NEBEL_OK;
@@ -188,10 +204,14 @@ static nebel_result set_look(nebel_renderer *renderer, nebel_method method, cons
     return NEBEL_OK;
 }
 
-static nebel_result set_d3d9(nebel_renderer *renderer, const nebel_d3d9_fog *d3d9)
+static nebel_result set_d3d9(nebel_renderer *renderer, const nebel_method_desc *desc)
 {
+    const nebel_d3d9_fog *const d3d9 = desc->d3d9;
+    nb_device_planes planes;
     if (d3d9 == NULL || d3d9->fog_table_mode > NEBEL_D3DFOG_LINEAR || d3d9->fog_vertex_mode > NEBEL_D3DFOG_LINEAR)
         return NEBEL_ERROR_ARGUMENT;
+    if (nb_device_planes_set(&planes, desc->z_near, desc->z_far) != NEBEL_OK) return NEBEL_ERROR_VALUE;
+    renderer->device_planes = planes;
     renderer->d3d9 = *d3d9;
     renderer->d3d9.fog_enable = 1;
     return NEBEL_OK;
@@ -209,7 +229,7 @@ static nebel_result set_numbers(nebel_renderer *renderer, nebel_method method, c
     case NEBEL_METHOD_ALPHA:
         return set_look(renderer, method, desc->vertex);
     case NEBEL_METHOD_D3D9:
-        return set_d3d9(renderer, desc->d3d9);
+        return set_d3d9(renderer, desc);
     case NEBEL_METHOD_EXACT:
     case NEBEL_METHOD_REFERENCE:
     case NEBEL_METHOD_VERTEX:
@@ -222,7 +242,7 @@ static nebel_result set_numbers(nebel_renderer *renderer, nebel_method method, c
 
 nebel_result nebel_set_renderer_method(nebel_renderer *renderer, nebel_method method, const nebel_method_desc *desc)
 {
-    static const nebel_method_desc nothing = {NULL, NULL, NULL};
+    static const nebel_method_desc nothing = {.factor = NULL};
     if (renderer == NULL) return NEBEL_ERROR_ARGUMENT;
     if (method != NEBEL_METHOD_EXACT && method != NEBEL_METHOD_REFERENCE) {
         const nebel_result result = make_room_at_vertices(renderer);

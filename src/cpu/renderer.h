@@ -16,6 +16,7 @@
 
 #include "base/air_shade.h"
 #include "base/cloud_haze.h"
+#include "base/device.h"
 #include "base/lighting.h"
 
 #include <nebel/render.h>
@@ -109,7 +110,8 @@ struct nebel_renderer {
     nebel_vertex_desc look;   /* of FOG_COORD, TWO_PASS, ALPHA; resolved, of color and table below */
     double look_color[3];
     float look_table[NEBEL_CURVE_ENTRIES];
-    nebel_d3d9_fog d3d9;       /* of D3D9, switched on */
+    nebel_d3d9_fog d3d9; /* of D3D9, switched on */
+    nb_device_planes device_planes;
     nb_vertex_fog *vertex_fog; /* of all surfaces, for the frame that is rendered; NULL until a method asks for it */
     nebel_isa fog_isa;
     int threads;

@@ -63,6 +63,21 @@ NB_CLONES static void map(size_t count, const float *linear, float scale, float 
     }
 }
 
+NB_CLONES static void encode_all(size_t count, const float *linear, float scale, float *srgb)
+{
+    NB_SIMD
+    for (size_t i = 0; i < count; i++) {
+        const float x = linear[i] * scale;
+        const float positive = x > 0 ? x : 0;
+        srgb[i] = encode(positive < 1 ? positive : 1);
+    }
+}
+
+void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *srgb)
+{
+    encode_all(3 * n, linear, (float)exp2(exposure), srgb);
+}
+
 void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb)
 {
     map(3 * n, linear, (float)exp2(exposure), srgb);

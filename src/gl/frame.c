@@ -193,6 +193,15 @@ static void set_factor_numbers(const frame *f, unsigned program)
     nb_frame_set_vector(program, "factor_color", color);
 }
 
+/* Table fog of an orthographic camera goes by device depth. */
+static void set_device_depth(const frame *f, unsigned program)
+{
+    const nb_device_planes *const planes = &f->method.planes;
+    const int is_device = f->method.kind == NEBEL_GL_METHOD_D3D9 && f->view.clip_from_eye[15] != 0 && !f->panorama;
+    glUniform2f(glGetUniformLocation(program, "device_depth"), is_device ? (float)planes->near : 0,
+                is_device ? (float)(1 / (planes->far - planes->near)) : 0);
+}
+
 /* The fog that vertices bring. */
 static void draw_vertex_fog(const frame *f)
 {
@@ -231,6 +240,7 @@ static nebel_result draw_factor(const frame *f)
     nb_frame_set_rays(f, program);
     set_axis(f, program);
     set_factor_numbers(f, program);
+    set_device_depth(f, program);
     nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, r->targets.place);
     glBindVertexArray(r->vertex_array);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -295,6 +305,7 @@ static nb_vertex_source find_source(const frame *f)
                                .factor = f->method.has_factor ? &f->method.factor : NULL,
                                .d3d9 = f->method.kind == NEBEL_GL_METHOD_D3D9 ? &f->method.d3d9 : NULL,
                                .look = &f->method.look,
+                               .blends_stored = f->method.blends_stored,
                                .format = nb_method_format(&f->method),
                                .view = {.ignore_walls = method != NEBEL_GL_METHOD_CELLS_PIXEL},
                                .projection = f->desc->camera.projection};
@@ -535,6 +546,7 @@ static void set_light(const frame *f, const nebel_gl_fog *fog, unsigned program)
     nb_frame_set_vector(program, "scene_sunlight", f->light.sunlight);
     if (f->planet != NULL) nb_gl_air_set_light(&r->air, program, r->scene);
     glUniform1f(glGetUniformLocation(program, "scene_share"), 1 / (float)f->samples);
+    glUniform1i(glGetUniformLocation(program, "scene_is_stored"), f->method.blends_stored);
     if (f->casts) nb_frame_set_shadows(f, program);
     if (has_lamps(f)) set_lamps(f, program);
     nb_frame_bind_texture(NB_UNIT_PLACE, GL_TEXTURE_2D, t->place);

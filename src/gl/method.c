@@ -36,7 +36,9 @@ static nebel_result set_factor(nb_method *m, const nebel_gl_frame_desc *desc)
     m->factor.mode = method == NEBEL_GL_METHOD_LINEAR ? NEBEL_FACTOR_LINEAR
                      : method == NEBEL_GL_METHOD_EXP  ? NEBEL_FACTOR_EXP
                                                       : NEBEL_FACTOR_EXP2;
-    return nebel_resolve_factor(&m->factor, &m->factor);
+    const nebel_result result = nebel_resolve_factor(&m->factor, &m->factor);
+    for (int c = 0; c < 3; c++) m->factor.color[c] = nb_device_store(m->factor.color[c]);
+    return result;
 }
 
 static nebel_result set_look(nb_method *m, const nebel_gl_frame_desc *desc)
@@ -65,6 +67,7 @@ static nebel_result set_device(nb_method *m, const nebel_gl_frame_desc *desc)
     const nebel_d3d9_fog *const d3d9 = desc->d3d9;
     if (d3d9 == NULL || d3d9->fog_table_mode > NEBEL_D3DFOG_LINEAR || d3d9->fog_vertex_mode > NEBEL_D3DFOG_LINEAR)
         return NEBEL_ERROR_ARGUMENT;
+    if (nb_device_planes_set(&m->planes, desc->z_near, desc->z_far) != NEBEL_OK) return NEBEL_ERROR_VALUE;
     m->d3d9 = *d3d9;
     m->d3d9.fog_enable = 1;
     m->has_factor = d3d9->fog_table_mode != NEBEL_D3DFOG_NONE;
@@ -77,9 +80,25 @@ static nebel_result set_device(nb_method *m, const nebel_gl_frame_desc *desc)
     return NEBEL_OK;
 }
 
+static int blends_stored(nebel_gl_method kind)
+{
+    switch (kind) {
+    case NEBEL_GL_METHOD_LINEAR:
+    case NEBEL_GL_METHOD_EXP:
+    case NEBEL_GL_METHOD_EXP2:
+    case NEBEL_GL_METHOD_FOG_COORD:
+    case NEBEL_GL_METHOD_TWO_PASS:
+    case NEBEL_GL_METHOD_ALPHA:
+    case NEBEL_GL_METHOD_D3D9:
+        return 1;
+    default:
+        return 0;
+    }
+}
+
 nebel_result nb_method_set(nb_method *m, const nebel_gl_frame_desc *desc)
 {
-    *m = (nb_method){.kind = desc->method};
+    *m = (nb_method){.kind = desc->method, .blends_stored = blends_stored(desc->method)};
     switch (m->kind) {
     case NEBEL_GL_METHOD_LINEAR:
     case NEBEL_GL_METHOD_EXP:

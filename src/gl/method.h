@@ -2,6 +2,8 @@
 #ifndef NB_GL_METHOD_H
 #define NB_GL_METHOD_H
 
+#include "base/device.h"
+
 #include <nebel/gl_render.h>
 
 typedef struct nb_method {
@@ -11,6 +13,8 @@ typedef struct nb_method {
     nebel_factor_desc factor; /* resolved, or the device's numbers as they stand */
     nebel_vertex_desc look;   /* of FOG_COORD, TWO_PASS and ALPHA; resolved */
     nebel_d3d9_fog d3d9;      /* switched on */
+    nb_device_planes planes;  /* of D3D9 */
+    int blends_stored;        /* see nebel_method_blends_stored; colors of `factor` are then as they are stored */
 } nb_method;
 
 /* The numbers of a known method. Errors: ARGUMENT (some are missing), VALUE. */

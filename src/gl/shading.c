@@ -1,6 +1,7 @@
 #include "shading.h"
 
 #include "air_text.h"
+#include "classic_text.h"
 #include "corners.h"
 #include "lamps.h"
 #include "panorama.h"
@@ -129,38 +130,6 @@ static const char surface_fragment_text[] =
     "    out_normal = vec4(normal, rise);\n"
     "    out_reflectance = vec4(reflectance, 0.0);\n"
     "    gl_FragDepth = 1.0 / (1.0 + t);\n"
-    "}\n";
-
-/* ---- fog factors ----------------------------------------------------------------------------- */
-
-/* As src/classic/factors.c has them for the stage of pixels. */
-static const char factor_text[] =
-    "uniform int factor_mode;\n"   /* nebel_factor_mode; below 0: none */
-    "uniform vec3 factor_range;\n" /* start, end, density */
-    "uniform vec3 factor_color;\n"
-    "float fog_factor(float c)\n"
-    "{\n"
-    "    float x = factor_range.z * c;\n"
-    "    if (factor_mode == 0) return exp(-x);\n"
-    "    if (factor_mode == 1) return exp(-x * x);\n"
-    "    if (factor_range.x == factor_range.y) return c < factor_range.x ? 1.0 : 0.0;\n"
-    "    return clamp((factor_range.y - c) / (factor_range.y - factor_range.x), 0.0, 1.0);\n"
-    "}\n";
-
-/* Depth is along the camera's axis; the axis is 0 where the distance counts. */
-static const char pixel_factor_text[] =
-    "uniform highp sampler2D scene_place;\n"
-    "uniform vec3 scene_axis;\n"
-    "layout(location = 0) out highp vec4 out_in_scattering;\n"
-    "layout(location = 1) out highp vec4 out_transmittance;\n"
-    "void main()\n"
-    "{\n"
-    "    float t = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
-    "    if (!(t > 0.0)) discard;\n"
-    "    vec3 at = ray_origin(gl_FragCoord.xy) + t * ray_direction(gl_FragCoord.xy);\n"
-    "    float f = fog_factor(scene_axis == vec3(0.0) ? length(at) : abs(dot(at, scene_axis)));\n"
-    "    out_in_scattering = vec4((1.0 - f) * factor_color, 1.0);\n"
-    "    out_transmittance = vec4(vec3(f), 1.0);\n"
     "}\n";
 
 /* ---- fog at vertices ------------------------------------------------------------------------- */
@@ -470,6 +439,7 @@ static const char light_text[] =
     "#else\n"
     "    vec3 transmittance = vec3(1.0), in_scattering = vec3(0.0);\n"
     "#endif\n"
+    "    device_open(transmittance, in_scattering);\n"
     "    see_through_veil(texel, transmittance, in_scattering);\n"
     "#ifdef SCENE_CLOUDS\n"
     "    vec4 clouds = texelFetch(scene_clouds, texel, 0);\n"
@@ -501,7 +471,9 @@ static const char light_text[] =
     "        surface = reflectance.rgb * light;\n"
     "    }\n"
     "    float hit = place.x > 0.0 ? scene_share : 0.0;\n"
+    "    surface = device_blend(surface);\n"
     "    vec3 color = transmittance * surface + in_scattering;\n"
+    "    device_close(transmittance, in_scattering);\n"
     "#ifdef SCENE_SHELLS\n"
     "    vec4 shells = texelFetch(scene_shells, texel, 0);\n"
     "    color = shells.rgb + shells.a * color;\n"
@@ -578,7 +550,7 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
     const nb_texts fragment = {{version, precision_of(context), nb_words_text, nb_ray_text, interpolated_text,
-                                fog_attribute_text, distance_text, hole_text, factor_text, vertex_fog_fragment_text},
+                                fog_attribute_text, distance_text, hole_text, nb_factor_text, vertex_fog_fragment_text},
                                10};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
@@ -605,7 +577,8 @@ nebel_result nb_shading_make_factor(nb_shading *shading, const nb_context *conte
 {
     const char *const version = nb_program_version(context), *const ray = panorama ? nb_panorama_ray_text : nb_ray_text;
     const nb_texts vertex = {{version, nb_whole_vertex_text}, 2};
-    const nb_texts fragment = {{version, precision_of(context), nb_words_text, ray, factor_text, pixel_factor_text}, 6};
+    const nb_texts fragment = {
+        {version, precision_of(context), nb_words_text, ray, nb_factor_text, nb_pixel_factor_text}, 6};
     unsigned *const name = panorama ? &shading->round_factor : &shading->factor;
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
@@ -647,7 +620,7 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts vertex = {{version, option, nb_words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
     const nb_texts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text, round_surface_text,
-                                distance_text, hole_text, factor_text, fragment_text},
+                                distance_text, hole_text, nb_factor_text, fragment_text},
                                10};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
@@ -732,12 +705,13 @@ static nebel_result make_light(const nb_context *context, const nebel_log *log, 
     const char *const fog = nebel_shader_text(context->es ? NEBEL_DIALECT_GLSL_300_ES : NEBEL_DIALECT_GLSL_330);
     const char *const ray = kind->panorama ? nb_panorama_ray_text : nb_ray_text;
     const char *const tile = kind->panorama && kind->tiled ? nb_panorama_tile_text : "";
-    const nb_texts light = {
-        {head, kind->air ? nb_air_words_text : "", kind->has_fog || kind->environment || kind->air ? fog : "",
-         nb_words_text, ray, shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
-         kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "", kind->air ? nb_air_places_text : "",
-         kind->air ? nb_air_sun_text : "", kind->air ? nb_air_light_text : "", nb_veil_text, light_text},
-        15};
+    const nb_texts light = {{head, kind->air ? nb_air_words_text : "",
+                             kind->has_fog || kind->environment || kind->air ? fog : "", nb_words_text, ray,
+                             shadow_text, sun_text, kind->lamplit ? nb_lamp_map_text : "",
+                             kind->lamplit ? nb_lamp_text : "", kind->air ? nb_air_worlds_text : "",
+                             kind->air ? nb_air_places_text : "", kind->air ? nb_air_sun_text : "",
+                             kind->air ? nb_air_light_text : "", nb_veil_text, nb_device_text, light_text},
+                            16};
     const nb_texts shell = {{head, nb_veil_text, nb_shell_over_text}, 3};
     const nb_texts dimming = {{head, fog, nb_words_text, ray, sun_text, dimming_text}, 6};
     const nb_texts particle = {{head, kind->five_taps ? nb_five_tap_text : "", kind->shafts ? nb_shaft_text : "", fog,

@@ -1,5 +1,7 @@
 #include "vertex_fog.h"
 
+#include "base/device.h"
+
 #include <nebel/classic.h>
 
 #include <epoxy/gl.h>
@@ -88,6 +90,12 @@ static void set_color(double amount, const double color[3], float out[4])
     out[3] = (float)amount;
 }
 
+static void set_light(double amount, const double light[3], float out[4])
+{
+    const double color[3] = {nb_device_store(light[0]), nb_device_store(light[1]), nb_device_store(light[2])};
+    set_color(amount, color, out);
+}
+
 static void set_factor(const nebel_factor_desc *factor, double coordinate, float out[4])
 {
     set_color(1 - nebel_compute_fog_factor(factor, coordinate), factor->color, out);
@@ -151,7 +159,7 @@ static void unpack_coordinate(const nb_vertex_source *source, float out[4])
     enum { END = 100 };
     const double coordinate = (double)out[0];
     if (source->factor == NULL)
-        set_color(coordinate / END, source->look->color, out);
+        set_light(coordinate / END, source->look->color, out);
     else if (source->factor->stage == NEBEL_STAGE_VERTEX)
         set_factor(source->factor, coordinate, out);
     else
@@ -173,10 +181,12 @@ static void unpack(const nb_vertex_source *source, float out[4])
         set_device(source->d3d9, &vertex, out);
         break;
     case NEBEL_VERTEX_ALPHA:
-        for (int i = 0; i < 3; i++) color[i] = floor(255 * fmin(source->look->color[i], 1) + .5) / 255;
+        for (int i = 0; i < 3; i++) color[i] = floor(255 * nb_device_store(source->look->color[i]) + .5) / 255;
         set_color(byte, color, out);
         break;
     default:
+        for (int i = 0; i < 3 && source->blends_stored; i++)
+            out[i] = (float)nb_device_store_fog((double)out[3], (double)out[i]);
         break;
     }
 }

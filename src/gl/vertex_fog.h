@@ -12,6 +12,7 @@ typedef struct nb_vertex_source {
     const nebel_factor_desc *factor; /* resolved; NULL: none */
     const nebel_d3d9_fog *d3d9;      /* NULL: none */
     const nebel_vertex_desc *look;   /* of the volumes; NULL: {0} */
+    int blends_stored;               /* colors are to be as hardware stores them; those of `factor` are so already */
     nebel_vertex_format format;      /* what hardware is given of the volumes */
     nebel_cell_view view;            /* of unit forward */
     nebel_projection projection;

@@ -1,6 +1,8 @@
 /* The section "classic": what the methods of old hardware need. */
 #include "scene/scene_internal.h"
 
+#include "base/device.h"
+
 #include <math.h>
 
 const char *const nb_coordinate_names[NEBEL_COORDINATE_COUNT] = {"plane", "radial", "user"};
@@ -55,6 +57,14 @@ static bool read_curve(nb_scene_reader *in, const nb_json_node *curve, const nb_
 
 /* ---- Direct3D 9 ------------------------------------------------------------------------------ */
 
+/* Numbers are parts of a byte, as in D3DCOLOR_COLORVALUE, and "#rrggbb" is bytes: neither is light. */
+static bool read_stored_color(nb_json *json, const nb_json_node *node, double color[3])
+{
+    if (!nb_value_color(json, node, &nb_range_fraction, color)) return false;
+    for (int c = 0; c < 3 && node != NULL && node->type == NB_JSON_STRING; c++) color[c] = nb_device_store(color[c]);
+    return true;
+}
+
 static uint32_t pack_color(const double color[3])
 {
     uint32_t packed = 0;
@@ -62,12 +72,28 @@ static uint32_t pack_color(const double color[3])
     return packed;
 }
 
+/* Of an orthographic camera, in metres where they are left out. */
+static bool read_planes(nb_scene_reader *in, const nb_json_node *near_node, const nb_json_node *far_node)
+{
+    const double unit = in->space.unit;
+    nebel_scene_data *const data = &in->scene->data;
+    double near = 0, far = 1000 / unit;
+    if (!nb_value_number(in->json, near_node, &nb_range_place, &near) ||
+        !nb_value_number(in->json, far_node, &nb_range_place, &far))
+        return false;
+    data->classic_z_near = near * unit;
+    data->classic_z_far = far * unit;
+    return near < far || nb_json_fail(in->json, NEBEL_ERROR_FORMAT, far_node != NULL ? far_node : near_node,
+                                      "z_near is %g and z_far %g; z_near must be less", near, far);
+}
+
 /* Absent numbers are those of a new device, in metres whatever the file's unit. */
 static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
 {
-    enum { VERTEX_MODE, TABLE_MODE, START, END, DENSITY, COLOR, RANGE, COUNT };
-    static const char *const d3d9_names[] = {"fog_vertex_mode", "fog_table_mode", "fog_start",       "fog_end",
-                                             "fog_density",     "fog_color",      "range_fog_enable"};
+    enum { VERTEX_MODE, TABLE_MODE, START, END, DENSITY, COLOR, RANGE, NEAR, FAR, COUNT };
+    static const char *const d3d9_names[] = {"fog_vertex_mode",  "fog_table_mode", "fog_start",
+                                             "fog_end",          "fog_density",    "fog_color",
+                                             "range_fog_enable", "z_near",         "z_far"};
     static const nb_keys keys = {d3d9_names, COUNT, NB_BIT(COUNT) - 1, 0, "\"d3d9\""};
     const nb_json_node *found[COUNT];
     nb_json *json = in->json;
@@ -82,8 +108,9 @@ static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
         !nb_value_number(json, found[START], &nb_range_place, &start) ||
         !nb_value_number(json, found[END], &nb_range_place, &end) ||
         !nb_value_number(json, found[DENSITY], &nb_range_density, &density) ||
-        !nb_value_color(json, found[COLOR], &nb_range_fraction, color) ||
-        (found[RANGE] != NULL && !nb_value_is(json, found[RANGE], NB_JSON_BOOLEAN, "true or false")))
+        !read_stored_color(json, found[COLOR], color) ||
+        (found[RANGE] != NULL && !nb_value_is(json, found[RANGE], NB_JSON_BOOLEAN, "true or false")) ||
+        !read_planes(in, found[NEAR], found[FAR]))
         return false;
     nebel_d3d9_fog *d3d9 = nb_arena_allocate(&in->scene->arena, 1, sizeof *d3d9);
     if (d3d9 == NULL) return nb_json_fail(json, NEBEL_ERROR_MEMORY, node, "out of memory");
@@ -97,6 +124,23 @@ static bool read_d3d9(nb_scene_reader *in, const nb_json_node *node)
                              .range_fog_enable = found[RANGE] != NULL && found[RANGE]->number != 0};
     in->scene->data.classic_d3d9 = d3d9;
     return true;
+}
+
+double nb_device_unit(const nebel_scene_data *scene, const nebel_d3d9_fog *fog, double unit)
+{
+    const int has_depth =
+        scene->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC && fog->fog_table_mode != NEBEL_D3DFOG_NONE;
+    return has_depth ? 1 : unit;
+}
+
+void nb_finish_classic(nb_scene_reader *in)
+{
+    nebel_d3d9_fog *const fog = (nebel_d3d9_fog *)in->scene->data.classic_d3d9;
+    if (fog == NULL) return;
+    const double back = nb_device_unit(&in->scene->data, fog, in->space.unit) / in->space.unit;
+    fog->fog_start = (float)(back * (double)fog->fog_start);
+    fog->fog_end = (float)(back * (double)fog->fog_end);
+    fog->fog_density = (float)((double)fog->fog_density / back);
 }
 
 /* ---- fog factors ----------------------------------------------------------------------------- */

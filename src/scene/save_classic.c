@@ -83,19 +83,25 @@ static void put_number(nb_words *out, const char *key, double number)
     nb_words_put_numbers(out, 1, &number, NB_EDIT_EACH);
 }
 
-static void put_d3d9(nb_words *out, const nb_space *space, const nebel_d3d9_fog *d3d9)
+static void put_d3d9(nb_words *out, const nb_space *space, const nebel_scene_data *scene)
 {
+    const nebel_d3d9_fog *const d3d9 = scene->classic_d3d9;
+    const double unit = nb_device_unit(scene, d3d9, space->unit);
     double color[3];
     nebel_get_d3d9_color(d3d9, color);
     nb_words_put(out, "{ \"fog_vertex_mode\": ");
     nb_words_put_text(out, nb_d3d9_mode_names[d3d9->fog_vertex_mode]);
     nb_words_put(out, ", \"fog_table_mode\": ");
     nb_words_put_text(out, nb_d3d9_mode_names[d3d9->fog_table_mode]);
-    put_number(out, "fog_start", (double)d3d9->fog_start / space->unit);
-    put_number(out, "fog_end", (double)d3d9->fog_end / space->unit);
-    put_number(out, "fog_density", (double)d3d9->fog_density * space->unit);
+    put_number(out, "fog_start", (double)d3d9->fog_start / unit);
+    put_number(out, "fog_end", (double)d3d9->fog_end / unit);
+    put_number(out, "fog_density", (double)d3d9->fog_density * unit);
     nb_words_put(out, ", \"fog_color\": ");
     nb_words_put_numbers(out, 3, color, NB_EDIT_AMOUNT);
+    if (scene->classic_z_near != 0 || (scene->classic_z_far != 0 && scene->classic_z_far != 1000)) {
+        put_number(out, "z_near", scene->classic_z_near / space->unit);
+        put_number(out, "z_far", scene->classic_z_far / space->unit);
+    }
     nb_words_put(out,
                  d3d9->range_fog_enable != 0 ? ", \"range_fog_enable\": true }" : ", \"range_fog_enable\": false }");
 }
@@ -103,7 +109,8 @@ static void put_d3d9(nb_words *out, const nb_space *space, const nebel_d3d9_fog 
 static int has_same_d3d9(const nebel_scene_data *a, const nebel_scene_data *b)
 {
     const nebel_d3d9_fog *x = a->classic_d3d9, *y = b->classic_d3d9;
-    return x == y || (x != NULL && y != NULL && memcmp(x, y, sizeof *x) == 0);
+    const int same = x == y || (x != NULL && y != NULL && memcmp(x, y, sizeof *x) == 0);
+    return same && a->classic_z_near == b->classic_z_near && a->classic_z_far == b->classic_z_far;
 }
 
 /* ---- the section ----------------------------------------------------------------------------- */
@@ -141,7 +148,7 @@ static void save_d3d9(nb_save *save, const nb_scene_reader *in, const nb_edit_ob
         nb_save_lose(lost, "d3d9");
         return;
     }
-    put_d3d9(&words, &in->space, save->changed->classic_d3d9);
+    put_d3d9(&words, &in->space, save->changed);
     set_member(save, in->json, section, "d3d9", &words);
 }
 
@@ -160,7 +167,7 @@ static void put_section(nb_words *out, const nb_space *space, const nebel_scene_
     }
     if (now->classic_d3d9 != NULL) {
         nb_words_put(out, ", \"d3d9\": ");
-        put_d3d9(out, space, now->classic_d3d9);
+        put_d3d9(out, space, now);
     }
     nb_words_put(out, " }");
 }

@@ -129,6 +129,7 @@ static bool check_whole(nb_scene_reader *in, const nb_json_node *root)
     if (missing != 0)
         return nb_json_fail(in->json, NEBEL_ERROR_FORMAT, root, "the key \"%s\" is missing; a scene needs it",
                             (missing & NB_BIT(NEBEL)) != 0 ? "nebel" : "fog");
+    nb_finish_classic(in);
     if ((in->seen & NB_BIT(MAX_OPACITY)) == 0) in->scene->data.max_opacity = in->imported_opacity;
     return true;
 }

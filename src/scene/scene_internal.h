@@ -150,6 +150,12 @@ bool nb_read_volume(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_nebula(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_cells(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_classic(nb_scene_reader *in, const nb_json_node *node);
+
+/* How long a unit of the numbers of a device's fog is: 1 where they count in device depth, which has none. */
+double nb_device_unit(const nebel_scene_data *scene, const nebel_d3d9_fog *fog, double unit);
+
+/* When camera and classic fog are read: numbers in device depth were taken for lengths. */
+void nb_finish_classic(nb_scene_reader *in);
 bool nb_read_planet(nb_scene_reader *in, const nb_json_node *node);
 bool nb_read_layers(nb_scene_reader *in, const nb_json_node *node, nebel_layers_desc *desc);
 bool nb_read_clouds(nb_scene_reader *in, const nb_json_node *node, nebel_planet *planet);

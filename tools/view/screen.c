@@ -1,18 +1,20 @@
 #include "screen.h"
 
+#include <nebel/render.h>
+
 #include <epoxy/gl.h>
 
 #include "program.h"
 
 #include <math.h>
 
-/* The curve is that of nebel_tone_map, so that the window shows what `nebel render` writes. Transmittance is shown as
+/* The curve is that of nebel_tone_map, none where nebel_encode_srgb takes its place, so that the window shows what `nebel render` writes. Transmittance is shown as
  * it is, depth on a scale that goes from white here to black far away. */
 static const char show_text[] =
     "uniform sampler2D drawn_texture, traced_texture;\n"
     "uniform vec2 size;\n"
     "uniform float light, split, gain, range;\n"
-    "uniform int plane, compare;\n"
+    "uniform int plane, compare, stored;\n"
     "out vec4 color;\n"
     "vec3 encode(vec3 x)\n"
     "{\n"
@@ -24,6 +26,7 @@ static const char show_text[] =
     "    if (plane == 1) return clamp(value, 0.0, 1.0);\n"
     "    if (plane == 3) return vec3(range / (range + max(value, 0.0)));\n"
     "    vec3 x = clamp(value * light, 0.0, 65504.0);\n"
+    "    if (stored != 0) return encode(x);\n"
     "    return encode(x * (x + 0.114967742) / (x * (x + 0.394193548) + 0.191612903));\n"
     "}\n"
     /* Pixel for pixel where the picture has as many, so that bright neighbours leave no trace. */
@@ -100,6 +103,7 @@ void nb_screen_draw(const nb_screen *screen, unsigned gl_texture, int has_cpu, c
     set(screen, "gain", look->gain);
     set(screen, "range", look->range);
     glUniform1i(glGetUniformLocation(screen->program, "plane"), (GLint)look->plane);
+    glUniform1i(glGetUniformLocation(screen->program, "stored"), nebel_method_blends_stored(look->method));
     glUniform1i(glGetUniformLocation(screen->program, "compare"), has_cpu ? (GLint)look->compare : 0);
     nb_program_bind(screen->program, "drawn_texture", 0, gl_texture);
     nb_program_bind(screen->program, "traced_texture", 1, screen->cpu_texture);
