@@ -149,6 +149,10 @@ function(nebel_add_model_reader)
     target_include_directories(nebel_read_model PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
     set_target_properties(nebel_read_model PROPERTIES
         OUTPUT_NAME nebel-read-model RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+    if(TARGET nebel_meshopt)
+        target_link_libraries(nebel_read_model PRIVATE nebel_meshopt)
+        target_compile_definitions(nebel_read_model PRIVATE NEBEL_HAVE_MESHOPT=1)
+    endif()
     nebel_name_model_reader(nebel_scene ${CMAKE_INSTALL_FULL_BINDIR}/nebel-read-model)
 endfunction()
 

@@ -4,6 +4,7 @@
 
 #include "scene_help.h"
 
+#include <ftw.h>
 #include <unistd.h>
 
 static char folder[] = "/tmp/nebel_model_XXXXXX";
@@ -63,6 +64,19 @@ static inline int make_folder(void **state)
 {
     (void)state;
     return mkdtemp(folder) == NULL;
+}
+
+static inline int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place)
+{
+    (void)status, (void)kind, (void)place;
+    return remove(path);
+}
+
+/* With all that is in it. */
+static inline int remove_folder_tree(void **state)
+{
+    (void)state;
+    return nftw(folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
 }
 
 #endif

@@ -509,23 +509,15 @@ static void test_models_are_placed_anew(void **state)
 
 /* ---- memory ---------------------------------------------------------------------------------- */
 
-static void test_every_failing_allocation_is_survived(void **state)
+static void survive_every_failing_allocation(const char *text, int in_process)
 {
-    (void)state;
-    const uint16_t values[4] = {0, 1, 2, 3};
-    char text[300];
-    write_text("t.obj", triangle_obj);
-    write_text("cube.ply", cube_ply);
-    write_heights("h.png", 2, 2, values);
-    snprintf(text, sizeof text,
-             "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"t.obj\"}, {\"file\": \"cube.ply\"}, "
-             "{" HEIGHTS("h.png") "}]}");
     nebel_result result = NEBEL_ERROR_MEMORY;
     for (long k = 0; result != NEBEL_OK; k++) {
         meter m;
         journal kept;
         nebel_scene *scene = NULL;
-        const nebel_scene_desc desc = metered_desc(&m, &kept);
+        nebel_scene_desc desc = metered_desc(&m, &kept);
+        desc.models_in_process = in_process;
         assert_int_equal(nebel_parse_scene(text, strlen(text), in_folder("s.json"), &desc, &scene), NEBEL_OK);
         m.fail_at = m.made + k;
         result = nebel_load_scene_models(scene);
@@ -535,6 +527,30 @@ static void test_every_failing_allocation_is_survived(void **state)
         assert_int_equal(m.live, 0);
         assert_true(k < 500);
     }
+}
+
+/* Integers as numbers of vertices, which are made floats. */
+static const char quantised_gltf[] =
+    "{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"mesh\": 0}], "
+    "\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], \"buffers\": [{\"byteLength\": 12, "
+    "\"uri\": \"data:;base64,AAAAAAEAAAAAAQAA\"}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": 12, "
+    "\"byteStride\": 4}], \"accessors\": [{\"bufferView\": 0, \"componentType\": 5121, \"count\": 3, "
+    "\"type\": \"VEC3\"}]}";
+
+static void test_every_failing_allocation_is_survived(void **state)
+{
+    (void)state;
+    const uint16_t values[4] = {0, 1, 2, 3};
+    char text[300];
+    write_text("t.obj", triangle_obj);
+    write_text("cube.ply", cube_ply);
+    write_text("quad.gltf", quantised_gltf);
+    write_heights("h.png", 2, 2, values);
+    snprintf(text, sizeof text,
+             "{\"nebel\": 1, \"fog\": [], \"models\": [{\"file\": \"t.obj\"}, {\"file\": \"cube.ply\"}, "
+             "{\"file\": \"quad.gltf\"}, {" HEIGHTS("h.png") "}]}");
+    survive_every_failing_allocation(text, 0);
+    survive_every_failing_allocation(text, 1);
 }
 
 /* ---- models of others ------------------------------------------------------------------------ */
@@ -585,7 +601,7 @@ static int remove_folder(void **state)
     static const char *const names[] = {"t.obj",     "t.mtl",     "empty.obj", "points.obj", "bad.obj",  "text.glb",
                                         "text.gltf", "no.format", "nan.ply",   "cut.ply",    "h.png",    "thin.png",
                                         "text.png",  "color.png", "cube.ply",  "fold.ply",   "cone.ply", "bowl.ply",
-                                        "empty.glb", "cut.glb",   "glb.obj"};
+                                        "empty.glb", "cut.glb",   "glb.obj",   "quad.gltf"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) unlink(in_folder(names[i]));
     return rmdir(folder);
 }

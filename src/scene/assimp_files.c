@@ -1,9 +1,11 @@
 #define _POSIX_C_SOURCE 200809L
 /* Assimp's way to files, through nb_model_files. */
 #include "scene/assimp_load.h"
+#include "scene/path.h"
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 static size_t read_some(struct aiFile *file, char *bytes, size_t size, size_t count)
@@ -43,20 +45,36 @@ static void flush(struct aiFile *file)
     (void)file;
 }
 
+/* What was made has a name that no file has. */
+static const nb_gltf_file *find_made(const nb_assimp *in, const char *path)
+{
+    for (int i = 0; i < NB_GLTF_FILE_COUNT; i++) {
+        const nb_gltf_file *file = &in->made.files[i];
+        if (file->bytes.size > 0 && strcmp(nb_path_name(path), file->name) == 0) return file;
+    }
+    return NULL;
+}
+
+static FILE *open_stream(nb_assimp *in, const char *path)
+{
+    const nb_gltf_file *made = find_made(in, path);
+    if (made != NULL) return fmemopen(made->bytes.data, made->bytes.size, "rb");
+    const int descriptor = nb_model_files_open(&in->files, path);
+    FILE *stream = descriptor >= 0 ? fdopen(descriptor, "rb") : NULL;
+    if (stream == NULL && descriptor >= 0) close(descriptor);
+    return stream;
+}
+
 /* NULL where it is refused or is not there; Assimp asks in this way whether a file exists, too. */
 static struct aiFile *open_file(struct aiFileIO *io, const char *path, const char *mode)
 {
-    const int descriptor = mode[0] == 'r' ? nb_model_files_open((nb_model_files *)io->UserData, path) : -1;
-    FILE *stream = descriptor >= 0 ? fdopen(descriptor, "rb") : NULL;
+    FILE *stream = mode[0] == 'r' ? open_stream((nb_assimp *)(void *)io->UserData, path) : NULL;
     struct aiFile *file = stream != NULL ? malloc(sizeof *file) : NULL;
     if (file != NULL) {
         *file = (struct aiFile){read_some, write_some, tell, file_size, seek, flush, (aiUserData)stream};
         return file;
     }
-    if (stream != NULL)
-        fclose(stream);
-    else if (descriptor >= 0)
-        close(descriptor);
+    if (stream != NULL) fclose(stream);
     return NULL;
 }
 
@@ -70,5 +88,5 @@ static void close_file(struct aiFileIO *io, struct aiFile *file)
 
 void nb_assimp_set_files(nb_assimp *in)
 {
-    in->io = (struct aiFileIO){open_file, close_file, (aiUserData)&in->files};
+    in->io = (struct aiFileIO){open_file, close_file, (aiUserData)in};
 }

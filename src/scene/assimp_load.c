@@ -1,4 +1,5 @@
 #include "scene/assimp_load.h"
+#include "scene/gltf.h"
 #include "scene/path.h"
 
 #include <assimp/cimport.h>
@@ -31,7 +32,7 @@ static bool has_polygons(const struct aiScene *scene)
 /* Points need no faces, which validation asks for. */
 static nebel_result import_points(nb_assimp *in)
 {
-    in->scene = aiImportFileEx(in->files.name, 0, &in->io);
+    in->scene = aiImportFileEx(in->name, 0, &in->io);
     return in->scene != NULL ? NEBEL_OK : nb_assimp_refuse(in, aiGetErrorString());
 }
 
@@ -41,7 +42,7 @@ static nebel_result import_points(nb_assimp *in)
 static nebel_result import_locked(nb_assimp *in)
 {
     if (in->load->points != NULL) return import_points(in);
-    const struct aiScene *raw = aiImportFileEx(in->files.name, aiProcess_ValidateDataStructure, &in->io);
+    const struct aiScene *raw = aiImportFileEx(in->name, aiProcess_ValidateDataStructure, &in->io);
     if (raw == NULL) return nb_assimp_refuse(in, aiGetErrorString());
     const nebel_result result = nb_assimp_check_meshes(in, raw);
     if (result != NEBEL_OK) {
@@ -187,14 +188,26 @@ static nebel_result take(nb_assimp *in)
     return in->load->points != NULL ? convert_points(in) : convert_meshes(in);
 }
 
+static nebel_result prepare(nb_assimp *in)
+{
+    const nb_gltf_file *text = &in->made.files[NB_GLTF_TEXT];
+    nebel_result result = nb_gltf_prepare(in->load, &in->files, &in->made);
+    in->name = in->files.name;
+    if (result != NEBEL_OK || text->bytes.size == 0) return result;
+    const char *folder = nb_path_folder(&in->scratch, in->files.name);
+    in->name = folder != NULL ? nb_path_join(&in->scratch, folder, text->name) : NULL;
+    return in->name != NULL ? NEBEL_OK : nb_model_fail(in->load, NEBEL_ERROR_MEMORY, "out of memory");
+}
+
 static nebel_result load_file(nb_assimp *in)
 {
     const nb_model_load *load = in->load;
     nebel_result result = nb_assimp_check_file(load);
+    if (result == NEBEL_OK) result = prepare(in);
     if (result == NEBEL_OK) result = import(in);
-    if (result != NEBEL_OK) return result;
-    result = take(in);
-    aiReleaseImport(in->scene);
+    if (result == NEBEL_OK) result = take(in);
+    if (in->scene != NULL) aiReleaseImport(in->scene);
+    nb_gltf_release_files(&load->allocator, &in->made);
     nb_release(&load->allocator, in->textures);
     nb_arena_release(&in->scratch);
     return result;
@@ -207,6 +220,7 @@ nebel_result nb_assimp_load(const nb_model_load *load)
                     .files = {.file = load->source->file,
                               .name = load->name,
                               .folder = load->folder,
+                              .has_uris = nb_gltf_is(load->name),
                               .opened = load->opened,
                               .user = load->opened_user}};
     nebel_result result = nb_model_files_begin(&in.files, &load->log);

@@ -2,8 +2,7 @@
 #ifndef NB_SCENE_ASSIMP_LOAD_H
 #define NB_SCENE_ASSIMP_LOAD_H
 
-#include "scene/model.h"
-#include "scene/model_files.h"
+#include "scene/gltf_prepare.h"
 
 #include <assimp/cfileio.h>
 #include <assimp/scene.h>
@@ -17,6 +16,8 @@ typedef struct nb_surface {
     float alpha_cutoff; /* > 0 and <= 1 with a mask, else 0 */
     bool is_clear;      /* all of it is a hole */
     unsigned uv_index;  /* which set of coordinates both take */
+    bool has_uv_map;    /* they go through a map, v downwards */
+    double uv_map[2][3];
 } nb_surface;
 
 typedef struct nb_loaded_texture {
@@ -31,6 +32,8 @@ typedef struct nb_assimp {
     const struct aiScene *scene;
     nb_arena scratch;
     nb_model_files files;
+    nb_gltf_files made;          /* read in place of some */
+    const char *name;            /* of what Assimp reads */
     struct aiFileIO io;          /* opens them */
     nb_surface *surfaces;        /* one for each material */
     nb_loaded_texture *textures; /* those already tried */
@@ -62,6 +65,10 @@ nebel_result nb_assimp_find_surface(nb_assimp *in, unsigned material, nb_surface
 
 /* Finds the texture of this name. With `of_grey` its alpha is the grey of a picture that has no alpha of its own. */
 nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, nb_loaded_texture *found);
+
+/* Finds which coordinates a texture of a material takes, and their map. */
+void nb_assimp_find_uvs(const nb_assimp *in, const struct aiMaterial *material, enum aiTextureType type,
+                        unsigned uv_index, nb_surface *surface);
 
 /* Finds the mask of a material, in the members of a surface whose texture is known. */
 nebel_result nb_assimp_find_mask(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface);

@@ -37,7 +37,7 @@ static nebel_result find_in(nb_assimp *in, const struct aiMaterial *material, en
     const nebel_result result = nb_assimp_find_texture(in, path.data, of_grey, &mask);
     if (result != NEBEL_OK) return result;
     take_mask(&mask, cutoff, surface);
-    if (surface->mask >= 0) surface->uv_index = uv_index;
+    if (surface->mask >= 0) nb_assimp_find_uvs(in, material, type, uv_index, surface);
     return NEBEL_OK;
 }
 

@@ -6,6 +6,7 @@
 #include <assimp/material.h>
 
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -184,12 +185,41 @@ nebel_result nb_assimp_find_texture(nb_assimp *in, char *path, bool of_grey, nb_
     return result == NEBEL_OK ? remember(in, path, found) : result;
 }
 
+/* ---- coordinates ----------------------------------------------------------------------------- */
+
+/* KHR_texture_transform: scale, then a turn counter-clockwise as the texture is seen, then an offset. Assimp tells the
+ * first two, with the turn negated, and moves the offset so that turns are about the middle and v points up; here
+ * that is taken back. */
+void nb_assimp_find_uvs(const nb_assimp *in, const struct aiMaterial *material, enum aiTextureType type,
+                        unsigned uv_index, nb_surface *surface)
+{
+    struct aiUVTransform map;
+    surface->uv_index = uv_index;
+    surface->has_uv_map = in->files.has_uris &&
+                          aiGetMaterialUVTransform(material, AI_MATKEY_UVTRANSFORM(type, 0), &map) == aiReturn_SUCCESS;
+    if (!surface->has_uv_map) return;
+    const double x = (double)map.mScaling.x, y = (double)map.mScaling.y, turn = -(double)map.mRotation;
+    const double c = cos(turn), s = sin(turn);
+    const double right = (double)map.mTranslation.x - x / 2 * (s - c + 1);
+    const double down = y / 2 * (s + c - 1) + 1 - y - (double)map.mTranslation.y;
+    const double rows[2][3] = {{c * x, s * y, right}, {-s * x, c * y, down}};
+    memcpy(surface->uv_map, rows, sizeof rows);
+}
+
 /* ---- the surface ----------------------------------------------------------------------------- */
 
-static void read_color(const struct aiMaterial *material, float color[3])
+/* KHR_materials_pbrSpecularGlossiness: its diffuse color is the base color; that of the other model is a default. */
+static bool is_glossy(const nb_assimp *in, const struct aiMaterial *material)
+{
+    ai_real glossiness = 0;
+    return in->files.has_uris &&
+           aiGetMaterialFloatArray(material, AI_MATKEY_GLOSSINESS_FACTOR, &glossiness, NULL) == aiReturn_SUCCESS;
+}
+
+static void read_color(const nb_assimp *in, const struct aiMaterial *material, float color[3])
 {
     struct aiColor4D found;
-    if (aiGetMaterialColor(material, AI_MATKEY_BASE_COLOR, &found) != aiReturn_SUCCESS &&
+    if ((is_glossy(in, material) || aiGetMaterialColor(material, AI_MATKEY_BASE_COLOR, &found) != aiReturn_SUCCESS) &&
         aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &found) != aiReturn_SUCCESS)
         return;
     const float values[3] = {found.r, found.g, found.b};
@@ -199,14 +229,14 @@ static void read_color(const struct aiMaterial *material, float color[3])
 static nebel_result read_texture(nb_assimp *in, const struct aiMaterial *material, nb_surface *surface)
 {
     static const enum aiTextureType types[] = {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE};
-    for (int i = 0; i < 2; i++) {
+    for (int i = is_glossy(in, material) ? 1 : 0; i < 2; i++) {
         struct aiString path;
         nb_loaded_texture found;
         unsigned uv_index = 0;
         if (aiGetMaterialTexture(material, types[i], 0, &path, NULL, &uv_index, NULL, NULL, NULL, NULL) !=
             aiReturn_SUCCESS)
             continue;
-        surface->uv_index = uv_index;
+        nb_assimp_find_uvs(in, material, types[i], uv_index, surface);
         const nebel_result result = nb_assimp_find_texture(in, path.data, false, &found);
         if (result == NEBEL_OK) surface->texture = found.index;
         return result;
@@ -225,7 +255,7 @@ static nebel_result read_surface(nb_assimp *in, unsigned material, nb_surface *s
     const struct aiMaterial *const found = in->scene->mMaterials[material];
     if (source->has_color) return nb_assimp_find_mask(in, found, surface);
     float *color = surface->base_color;
-    read_color(found, color);
+    read_color(in, found, color);
     const nebel_result result = read_texture(in, found, surface);
     if (surface->texture >= 0 && color[0] == 0 && color[1] == 0 && color[2] == 0) color[0] = color[1] = color[2] = 1;
     return result == NEBEL_OK ? nb_assimp_find_mask(in, found, surface) : result;

@@ -75,13 +75,23 @@ static void place_vertices(const builder *out, const uint32_t *kept, nebel_mesh 
     }
 }
 
-static void place_uvs(const nb_draft *draft, const uint32_t *kept, nebel_mesh *mesh)
+static void map_uv(const double map[2][3], float uv[2])
+{
+    const double u = (double)uv[0], v = (double)uv[1];
+    for (int i = 0; i < 2; i++) {
+        const float mapped = (float)(map[i][0] * u + map[i][1] * v + map[i][2]);
+        uv[i] = isfinite(mapped) ? mapped : 0;
+    }
+}
+
+static void place_uvs(const nb_draft *draft, const nb_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
 {
     float *uvs = (float *)mesh->uvs;
     for (uint32_t i = 0; i < mesh->vertex_count; i++) {
         const struct aiVector3D *uv = &draft->uvs[nb_draft_origin(draft, number_in_draft(kept, i))];
         uvs[2 * (size_t)i] = isfinite(uv->x) ? uv->x : 0;
         uvs[2 * (size_t)i + 1] = isfinite(uv->y) ? 1 - uv->y : 0; /* Assimp counts from the bottom */
+        if (surface->has_uv_map) map_uv(surface->uv_map, uvs + 2 * (size_t)i);
     }
 }
 
@@ -199,7 +209,7 @@ static bool find_vertices(nb_draft *draft, uint32_t **kept, uint32_t *count)
 static void fill(const builder *out, const nb_surface *surface, const uint32_t *kept, nebel_mesh *mesh)
 {
     place_vertices(out, kept, mesh);
-    if (out->draft.uvs != NULL) place_uvs(&out->draft, kept, mesh);
+    if (out->draft.uvs != NULL) place_uvs(&out->draft, surface, kept, mesh);
     place_triangles(out, mesh);
     clear_broken_positions(mesh);
     mend_normals(mesh);

@@ -6,6 +6,9 @@
 #include "scene/file.h"
 #include "scene/json.h"
 
+/* Whether the name says that it is glTF. */
+bool nb_gltf_is(const char *file);
+
 /* The JSON of a .gltf or .glb file; nothing where the file is another one, or cannot be read, which loading it will
  * say. Free text->data with nb_release. Errors: MEMORY. */
 nebel_result nb_gltf_read_text(const nebel_allocator *allocator, const char *file, nb_bytes *text);

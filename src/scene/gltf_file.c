@@ -50,6 +50,11 @@ static bool ends_in(const char *file, const char *suffix)
     return dot != NULL && strcasecmp(dot, suffix) == 0;
 }
 
+bool nb_gltf_is(const char *file)
+{
+    return ends_in(file, ".gltf") || ends_in(file, ".glb");
+}
+
 nebel_result nb_gltf_read_text(const nebel_allocator *allocator, const char *file, nb_bytes *text)
 {
     const nebel_log silent = {0};

@@ -23,6 +23,10 @@ typedef struct nb_model_sink {
     void *user;
 } nb_model_sink;
 
+/* Decompresses a view of a glTF buffer: gltf_data.h. */
+struct nb_meshopt_view;
+typedef bool (*nb_unpack)(const struct nb_meshopt_view *view, const unsigned char *bytes, unsigned char *result);
+
 /* What a loader works with; `set` receives the meshes, or `points` the vertices: those at one place once, in metres and
  * where the source places them. */
 typedef struct nb_model_load {
@@ -36,6 +40,7 @@ typedef struct nb_model_load {
     const char *folder, *name; /* which references may not leave, and the file seen from it: set by nb_model_read */
     void (*opened)(void *user, const char *path, const struct stat *status); /* told of files; NULL: nobody */
     void *opened_user;
+    nb_unpack unpack; /* of EXT_meshopt_compression; NULL: not supported */
 } nb_model_load;
 
 nebel_result nb_heightfield_load(const nb_model_load *load);

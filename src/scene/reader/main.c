@@ -4,6 +4,9 @@
 #include "scene/model.h"
 #include "scene/model_wire.h"
 #include "scene/reader/confine.h"
+#include "scene/reader/unpack.h"
+
+#include <assimp/cimport.h>
 
 #include <errno.h>
 #include <stdio.h>
@@ -14,10 +17,15 @@
 /* Points in one frame. */
 enum { POINTS_TOGETHER = 1 << 16 };
 
+/* Complaints of Assimp that are kept. */
+enum { MAX_HEARD = 3, HEARD_SIZE = 200 };
+
 typedef struct answer {
     nb_budget budget;
     nb_wire_end counts;
     unsigned messages;
+    char heard[MAX_HEARD][HEARD_SIZE];
+    unsigned heard_count;
 } answer;
 
 /* ---- writing --------------------------------------------------------------------------------- */
@@ -106,6 +114,42 @@ static void note_file(void *user, const char *path, const struct stat *status)
     put(path, size);
 }
 
+/* ---- what Assimp says ------------------------------------------------------------------------ */
+
+/* What else a file has is left out anyway. */
+static bool concerns_meshes(const char *text)
+{
+    static const char *const others[] = {"material",  "track", "normal layer",      "tangent",
+                                         "one index", "chunk", "No object detected"};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (strstr(text, others[i]) != NULL) return false;
+    return true;
+}
+
+/* Some of its readers put something of their own in place of what is wrong, and tell nobody but their log. */
+static void hear(const char *message, char *user)
+{
+    static const char error[] = "Error,";
+    answer *out = (answer *)(void *)user;
+    const char *text = strncmp(message, error, sizeof error - 1) == 0 ? strstr(message, ": ") : NULL;
+    if (text == NULL || out->heard_count == MAX_HEARD || !concerns_meshes(text)) return;
+    char *kept = out->heard[out->heard_count];
+    snprintf(kept, HEARD_SIZE, "%s", text + 2);
+    kept[strcspn(kept, "\n")] = '\0';
+    for (unsigned i = 0; i < out->heard_count; i++)
+        if (strcmp(out->heard[i], kept) == 0) return;
+    out->heard_count++;
+}
+
+static void tell_heard(answer *out, const char *file)
+{
+    char note[HEARD_SIZE + 600];
+    for (unsigned i = 0; i < out->heard_count; i++) {
+        snprintf(note, sizeof note, "\"%.500s\" may not be as it was meant: %s", file, out->heard[i]);
+        put_message(NEBEL_OK, note, out);
+    }
+}
+
 /* ---- the request ----------------------------------------------------------------------------- */
 
 typedef struct wanted {
@@ -179,8 +223,12 @@ static nebel_result read_model(const wanted *in, answer *out)
                                 .folder = in->folder,
                                 .name = in->name,
                                 .opened = note_file,
-                                .opened_user = out};
+                                .opened_user = out,
+                                .unpack = nb_unpack_meshopt()};
+    const struct aiLogStream log = {hear, (char *)out};
+    aiAttachLogStream(&log);
     const nebel_result result = nb_assimp_load(&load);
+    if (result == NEBEL_OK) tell_heard(out, in->file);
     if (result == NEBEL_OK && takes_points) put_points(out, &points);
     return result;
 }

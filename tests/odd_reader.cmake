@@ -1,0 +1,5 @@
+if(TARGET nebel_test_cpu)
+    nebel_add_program(odd_reader odd_reader.c nebel)
+    target_include_directories(odd_reader PRIVATE ${PROJECT_SOURCE_DIR}/src)
+    add_dependencies(nebel_test_cpu odd_reader)
+endif()
