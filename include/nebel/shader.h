@@ -204,7 +204,8 @@ typedef struct nebel_texel {
  * nebel_pack_fog answers LIMIT, too. */
 nebel_result nebel_pack_voxels(const nebel_snapshot *snapshot, nebel_texel *texels, size_t capacity, size_t *count);
 
-/* Whether nebel_pack_voxels makes the same of both: not where the sun moves. O(volumes) where they share their grids. Any thread. */
+/* Whether nebel_pack_voxels makes the same of both: not where the sun moves, nor in sunlight where the largest extinction of a grid's
+ * volume passes a power of two. O(volumes) where they share their grids. Any thread. */
 int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b);
 
 /* Packs the lattice of light that is scattered more than once. *count receives the number of words needed, 0 where

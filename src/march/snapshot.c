@@ -335,7 +335,7 @@ static int needs_lattice(const nebel_snapshot *s)
 }
 
 /* Two columns per cell where they come to no more than 64 MiB. */
-static const nb_lattice_limit lattice_limit = {2, (size_t)1 << 25};
+static const nb_lattice_limit lattice_limit = {2, (size_t)1 << 25, 1};
 
 /* The one of the commit before where it still serves. 0 when memory is out. */
 static int take_lattice(const nebel_fog *fog, const nebel_snapshot *s, nb_medium *medium)

@@ -46,7 +46,7 @@ static void set_counts(nb_grid_lattice *l, const nebel_grid *grid)
         l->first[s] = low;
         l->count[s] = (int)(high - low) + 1;
     }
-    l->count[2] = (int)layers + 1;
+    l->count[2] = (int)(layers * l->per_layer) + 1;
     for (int i = 0; i < 3; i++) l->blocks[i] = (l->count[i] + NB_LATTICE_BLOCK - 1) / NB_LATTICE_BLOCK;
 }
 
@@ -60,22 +60,24 @@ static size_t block_count(const nb_grid_lattice *l)
     return (size_t)l->blocks[0] * (size_t)l->blocks[1] * (size_t)l->blocks[2];
 }
 
-static void lay_along(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], int axis, double per_cell)
+static void lay_along(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], int axis,
+                      nb_lattice_limit limit)
 {
     set_axes(l, axis, to_sun);
-    l->per_cell = per_cell;
+    l->per_cell = limit.per_cell;
+    l->per_layer = limit.per_layer;
     set_counts(l, grid);
 }
 
 void nb_grid_lattice_lay(nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], nb_lattice_limit limit)
 {
     const int steepest = steepest_axis(to_sun);
-    lay_along(l, grid, to_sun, steepest, limit.per_cell);
+    lay_along(l, grid, to_sun, steepest, limit);
     /* Too many nodes: flat grids have fewer layers across, in which columns lean more. */
     for (int axis = 0; axis < 3 && node_count(l) > limit.most_nodes; axis++) {
         nb_grid_lattice other = *l;
         if (2 * fabs(to_sun[axis]) < fabs(to_sun[steepest])) continue;
-        lay_along(&other, grid, to_sun, axis, limit.per_cell);
+        lay_along(&other, grid, to_sun, axis, limit);
         if (node_count(&other) < node_count(l)) *l = other;
     }
     while (node_count(l) > limit.most_nodes && l->count[0] > 8 && l->count[1] > 8) {
@@ -90,8 +92,14 @@ void nb_grid_lattice_lay(nb_grid_lattice *l, const nebel_grid *grid, const doubl
  * half way between those the coordinates are held, where rounding cannot make them pass either. */
 #define HELD 0.25
 
-/* Along a side, of a column at a layer. */
-static double place_of(const nb_grid_lattice *l, int s, int column, double layer)
+/* Layers, in cells. */
+static double cells_along(const nb_grid_lattice *l)
+{
+    return (l->count[2] - 1) / l->per_layer;
+}
+
+/* Along a side, of a column so many cells along the axis. */
+static double place_of(const nb_grid_lattice *l, int s, double column, double layer)
 {
     return (l->first[s] + column) / l->per_cell + l->lean[s] * layer;
 }
@@ -99,11 +107,11 @@ static double place_of(const nb_grid_lattice *l, int s, int column, double layer
 /* Where a column is beside the box, the density is that at its side: there it is a line along the side. */
 enum { MOST_PARTS = 5 };
 
-/* Layers at which parts of a column begin and end, ascending; returns how many parts there are. */
-static int part_column(const nb_grid_lattice *l, const nebel_grid *grid, const int column[2],
+/* Places along the axis at which parts of a column begin and end, ascending; returns how many parts there are. */
+static int part_column(const nb_grid_lattice *l, const nebel_grid *grid, const double column[2],
                        double layer[MOST_PARTS + 1])
 {
-    const double last = l->count[2] - 1;
+    const double last = cells_along(l);
     int count = 0;
     layer[0] = 0;
     for (int s = 0; s < 2; s++)
@@ -119,14 +127,17 @@ static int part_column(const nb_grid_lattice *l, const nebel_grid *grid, const i
     return count;
 }
 
-/* Room for the nodes of a column: places along a part, what its walk says, and the sums so far. */
+/* What is asked along a column, and room for it: so many places, the first `offset` layers away from the sun's end and the
+ * others a layer apart; places along a part, what its walk says, and the sums so far. */
 typedef struct column_space {
+    int count;
+    double offset;
     double *place, *part, *sum;
 } column_space;
 
 /* The line from layer `start` towards `end`, away from the sun. Returns 0 where it is beside a box without fog at its
  * sides. */
-static int set_line(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
+static int set_line(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const double column[2],
                     double start, double end, nb_grid_line *line)
 {
     int is_beside = 0;
@@ -144,25 +155,25 @@ static int set_line(const nb_grid_lattice *l, const nebel_grid *grid, const doub
     return !is_beside || l->ends_in_fog;
 }
 
-/* From the sun down, so that the integral from a node to the sun is that of the walk so far. */
-static void walk_column(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3], const int column[2],
-                        const column_space *space)
+/* From the sun down, so that the integral from a place to the sun is that of the walk so far. */
+static void walk_column(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3],
+                        const double column[2], const column_space *space)
 {
     double layer[MOST_PARTS + 1];
-    const int nodes = l->count[2], parts = part_column(l, grid, column, layer);
-    const double metres = 1 / fabs(to_sun[l->axis]);
-    memset(space->sum, 0, (size_t)nodes * sizeof *space->sum);
+    const int parts = part_column(l, grid, column, layer);
+    const double last = cells_along(l), metres = 1 / fabs(to_sun[l->axis]);
+    memset(space->sum, 0, (size_t)space->count * sizeof *space->sum);
     for (int i = 0; i < parts; i++) {
         const double start = layer[l->up ? parts - i : i], end = layer[l->up ? parts - i - 1 : i + 1];
         const double length = fabs(end - start) * metres;
         nb_grid_line line;
         if (!(length > 0) || !set_line(l, grid, to_sun, column, start, end, &line)) continue;
-        for (int n = 0; n < nodes; n++) {
-            const double below = l->up ? start - (nodes - 1 - n) : n - start;
+        for (int n = 0; n < space->count; n++) {
+            const double at = (n + space->offset) / l->per_layer, below = l->up ? start - (last - at) : at - start;
             space->place[n] = fmin(fmax(below, 0) * metres, length);
         }
-        nb_grid_sums(grid, &line, length, nodes, space->place, space->part);
-        for (int n = 0; n < nodes; n++) space->sum[n] += space->part[n];
+        nb_grid_sums(grid, &line, length, space->count, space->place, space->part);
+        for (int n = 0; n < space->count; n++) space->sum[n] += space->part[n];
     }
 }
 
@@ -176,7 +187,7 @@ static void fill_column(nb_grid_lattice *l, const nebel_grid *grid, const double
 {
     uint16_t *node = l->amount + (size_t)column[1] * (size_t)l->count[0] + (size_t)column[0];
     const size_t layer = (size_t)l->count[0] * (size_t)l->count[1];
-    walk_column(l, grid, to_sun, column, space);
+    walk_column(l, grid, to_sun, (const double[2]){column[0], column[1]}, space);
     for (int n = 0; n < l->count[2]; n++) {
         const size_t k = (size_t)(l->up ? l->count[2] - 1 - n : n);
         node[k * layer] = number_of(space->sum[n] / l->step);
@@ -189,7 +200,7 @@ static int fill_columns(nb_grid_lattice *l, const nebel_grid *grid, const nebel_
     const size_t nodes = (size_t)l->count[2];
     double *memory = nb_allocate(allocator, 3 * nodes, sizeof *memory);
     if (memory == NULL) return 0;
-    const column_space space = {memory, memory + nodes, memory + 2 * nodes};
+    const column_space space = {l->count[2], 0, memory, memory + nodes, memory + 2 * nodes};
     for (int v = 0; v < l->count[1]; v++)
         for (int u = 0; u < l->count[0]; u++) fill_column(l, grid, to_sun, (const int[2]){u, v}, &space);
     nb_release(allocator, memory);
@@ -198,7 +209,7 @@ static int fill_columns(nb_grid_lattice *l, const nebel_grid *grid, const nebel_
 
 static double longest_amount(const nb_grid_lattice *l, const nebel_grid *grid, const double to_sun[3])
 {
-    return fmax((l->count[2] - 1) / fabs(to_sun[l->axis]) * nb_grid_peak(grid), 1e-30);
+    return fmax(cells_along(l) / fabs(to_sun[l->axis]) * nb_grid_peak(grid), 1e-30);
 }
 
 /* Whether there is fog at any face of linear voxels: level with the axis `across`, of which it asks the middles of voxels. */
@@ -290,6 +301,79 @@ static int finish_layers(nb_grid_lattice *l, const nebel_allocator *allocator)
         here = passed;
     }
     nb_release(allocator, memory);
+    return 1;
+}
+
+/* ---- flaws ----------------------------------------------------------------------------------- */
+
+/* The sum of a cell's eight nodes, and the least of them. */
+static double sum_corners(const nb_grid_lattice *l, int i, int j, int k, double *least)
+{
+    const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
+    double sum = 0;
+    *least = UINT16_MAX;
+    for (int n = 0; n < 8; n++) {
+        const uint16_t node =
+            l->amount[(size_t)(k + n / 4) * layer + (size_t)(j + n / 2 % 2) * row + (size_t)(i + n % 2)];
+        sum += node;
+        *least = fmin(*least, node);
+    }
+    return sum;
+}
+
+/* Steps from where the way to the sun leaves the box to the last layer, at most, of the columns of a cell: they are no part of that
+ * way, where columns go on beside the box. */
+static double most_outside(const nb_grid_lattice *l, int i, int j)
+{
+    const size_t row = (size_t)l->count[0], layer = row * (size_t)l->count[1];
+    double most = 0;
+    for (int n = 0; n < 4 && l->ends_in_fog; n++) {
+        const int column[2] = {i + n % 2, j + n / 2};
+        double end = l->end[2];
+        for (int s = 0; s < 2; s++) {
+            const double at = (l->end[s] - place_of(l, s, column[s], 0)) / l->lean[s];
+            if (isfinite(at)) end = l->up ? fmin(end, at) : fmax(end, at);
+        }
+        const double node = l->up ? floor(end * l->per_layer) : ceil(end * l->per_layer);
+        const size_t k = (size_t)fmin(fmax(node, 0), l->count[2] - 1);
+        most = fmax(most, l->amount[k * layer + (size_t)column[1] * row + (size_t)column[0]]);
+    }
+    return most;
+}
+
+/* Of one cell, `true_middle` steps in its middle. Second differences alone do not see what changes from cell to cell and back, nor
+ * does the middle alone where bends along two axes cancel there. */
+static int is_flawed(const nb_grid_lattice *l, const int cell[3], double true_middle, double outside,
+                     const nb_lattice_demand *demand)
+{
+    double least;
+    const size_t block[3] = {(size_t)cell[0] / NB_LATTICE_BLOCK, (size_t)cell[1] / NB_LATTICE_BLOCK,
+                             (size_t)cell[2] / NB_LATTICE_BLOCK};
+    const double bend = l->deviation[(block[2] * (size_t)l->blocks[1] + block[1]) * (size_t)l->blocks[0] + block[0]];
+    const double middle = sum_corners(l, cell[0], cell[1], cell[2], &least) / 8;
+    const double off = fmax(1.5 * fabs(middle - true_middle), bend), unit = l->step * demand->extinction;
+    return -expm1(-off * unit) * exp(-fmax(least - outside - off, 0) * unit) > demand->tolerance;
+}
+
+int nb_grid_lattice_find_flaws(const nb_grid_lattice *l, const nb_lattice_demand *demand, uint8_t *flawed)
+{
+    const body *b = (const body *)(const void *)l;
+    const size_t cells = (size_t)l->count[2] - 1;
+    const size_t row = (size_t)l->count[0] - 1, layer = row * ((size_t)l->count[1] - 1);
+    double *memory = nb_allocate(&b->allocator, 3 * cells, sizeof *memory);
+    if (memory == NULL) return 0;
+    const column_space space = {l->count[2] - 1, 0.5, memory, memory + cells, memory + 2 * cells};
+    for (int j = 0; j < l->count[1] - 1; j++)
+        for (int i = 0; i < l->count[0] - 1; i++) {
+            const double outside = most_outside(l, i, j);
+            walk_column(l, b->grid, b->to_sun, (const double[2]){i + 0.5, j + 0.5}, &space);
+            for (int n = 0; n < space.count; n++) {
+                const int cell[3] = {i, j, l->up ? space.count - 1 - n : n};
+                flawed[(size_t)cell[2] * layer + (size_t)j * row + (size_t)i] =
+                    (uint8_t)is_flawed(l, cell, space.sum[n] / l->step, outside, demand);
+            }
+        }
+    nb_release(&b->allocator, memory);
     return 1;
 }
 

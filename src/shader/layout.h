@@ -68,10 +68,11 @@
  *     0  cells along both sides and layers; the axis across layers
  *     1  lean of both sides, first of both sides, as the bits of floats
  *     2  the same of columns per cell and of a step; 1 where there is fog at the faces of the box;
- *        one unused
+ *        layers per cell, as the bits of a float
  *     3  the faces towards the sun, in cells along both sides and the axis; 1 where the sun is where layers have larger
  *        numbers, else -1; as the bits of floats
- * and the cells, columns of the first side fastest: eight integrals of the density, in steps, as the corners above.
+ * and the cells, columns of the first side fastest: eight integrals of the density, in steps, as the corners above; all bits 1
+ * where what lies between the nodes is to be walked through.
  *
  * Nodes of lattices are texels of four floats, the same for every eye: of each node, x fastest, two for each channel,
  * source radiance and flux of diffuse light; NB_NODE_TURNED, _ONCE, _GLOW and _WIDTH of march/diffusion.h; then one that

@@ -285,13 +285,13 @@ nb_turning nb_find_turn(nb_ray ray, float t, float end)
 
 /* ---- the shadow of voxels -------------------------------------------------------------------- */
 
-/* Cells across the way to the sun that light may be seen through at once. */
-#define NB_CELLS_AT_ONCE 2.0
+/* Columns across the way to the sun that light may be seen through at once. */
+#define NB_COLUMNS_AT_ONCE 2.0
 
-/* Metres along the ray within which the way to the sun passes so many cells by. */
-float nb_cells_by(nb_sun_lattice_ray to_sun)
+/* Metres along the ray within which the way to the sun passes so many columns by. */
+float nb_columns_by(nb_sun_lattice_ray to_sun)
 {
-    return NB_CELLS_AT_ONCE / max(max(abs(to_sun.slope.x), abs(to_sun.slope.y)), NB_TINY);
+    return NB_COLUMNS_AT_ONCE / max(max(abs(to_sun.slope.x), abs(to_sun.slope.y)), NB_TINY);
 }
 
 /* What a step may be where voxels lie between a place on the ray and the sun; NB_FAR where there are none. */
@@ -310,7 +310,7 @@ float nb_most_in_shadow(nb_ray ray, float t)
         nb_stretch s = nb_next_stretch(at, 1, way, 0.0);
         if (!(s.enter < s.leave)) continue;
         nb_profile profile = nb_profile_of(at, NB_KIND_GRID, ray, 0.0);
-        most = min(most, nb_cells_by(nb_sun_lattice_ray_of(int(NEBEL_WORD(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope)));
+        most = min(most, nb_columns_by(nb_sun_lattice_ray_of(int(NEBEL_WORD(at + NB_MEDIUM_LEAF).y), profile.offset, profile.slope)));
     }
     return most;
 }

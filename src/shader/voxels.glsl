@@ -96,6 +96,9 @@ nb_vec2 nb_sunlight_from(nb_piece piece, nb_ray ray, float t, bool of_fog, inout
     return nb_vec2(lit.x, stop - piece.start);
 }
 
+/* Cells that a step takes along the ray, where nothing else ends it. */
+#define NB_CELLS_AT_ONCE 2.0
+
 /* What a step bears: optical depth, and change of that to the sun. */
 #define NB_CELL_BEARS 1.0
 
@@ -110,17 +113,21 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
     nb_vec3 last = size - nb_splat3(1.0);
     nb_vec3 extinction = NEBEL_WORD(at).xyz;
     float length = piece.end - piece.start;
-    float most = min(nb_cells_by(to_sun), NB_CELLS_AT_ONCE / max(nb_largest(abs(path.slope)), NB_TINY));
+    float most = min(nb_columns_by(to_sun), NB_CELLS_AT_ONCE / max(nb_largest(abs(path.slope)), NB_TINY));
     if (piece.rate > 0.0) most = min(most, 0.5 / piece.rate);
     float guess = most;
     bool alone = !NB_HAS(NB_HAS_SEVERAL) || piece.present == 1;
     nb_vec3 radiance = nb_opaque_radiance(at, ray.direction);
     float t = 0.0;
     nb_vec2 sunlight = nb_vec2(0.0, piece.sunlit ? 0.0 : NB_FAR);
+    nb_vec3 way_at = nb_splat3(0.0); /* to the sun from t on, as far as it is known: steps into dense fog hide their lit skin from both points */
     nb_cell_walk w = nb_enter_brick(profile.first, size, nb_grid_brick_at(path.from, last), path.from);
     while (t < length && nb_smallest(g.depth) < NB_OPAQUE && !nb_is_tired(turns)) {
         turns += 1 + (alone ? 0 : 2 * used) + (NB_HAS(NB_HAS_SEVERAL) && piece.sunlit ? nb_turns_to_sun() / 2 : 0);
-        if (t >= sunlight.y) sunlight = nb_sunlight_from(piece, ray, t, NB_HAS(NB_HAS_SEVERAL) || to_sun.ends, lit, turns);
+        if (t >= sunlight.y) {
+            sunlight = nb_sunlight_from(piece, ray, t, NB_HAS(NB_HAS_SEVERAL) || to_sun.ends, lit, turns);
+            way_at = nb_splat3(0.0);
+        }
         nb_vec3 from = path.from - w.brick * NB_BRICK;
         nb_vec3 bricks = nb_grid_crossings(w.brick, last, path.from, path.inverse, NB_BRICK);
         nb_vec3 cells = nb_grid_crossings(w.cell, nb_splat3(NB_BRICK - 1.0), from, path.inverse, 1.0);
@@ -144,18 +151,23 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
         /* up to the points, of the line through both extinctions */
         nb_vec3 before = g.depth + (sum.extinction[0] * 0.25 + sum.extinction[1] * (0.25 - NB_GAUSS_HALF)) * h;
         nb_vec3 behind = g.depth + (sum.extinction[0] * (0.25 + NB_GAUSS_HALF) + sum.extinction[1] * 0.25) * h;
-        nb_vec3 way_before = nb_splat3(0.0);
-        nb_vec3 way_behind = nb_splat3(0.0);
-        if (sunlight.x > 0.0 && !empty) {
-            if (NB_HAS(NB_HAS_SEVERAL)) {
-                way_before = nb_depth_to_sun(ray.origin + ray.direction * (piece.start + first));
-                way_behind = nb_depth_to_sun(ray.origin + ray.direction * (piece.start + second));
-            } else {
-                way_before = extinction * nb_sun_lattice_amount(to_sun, first);
-                way_behind = extinction * nb_sun_lattice_amount(to_sun, second);
-            }
+        nb_vec3 ways[2];
+        ways[0] = nb_splat3(0.0);
+        ways[1] = nb_splat3(0.0);
+        nb_grid_turns = 0;
+        for (int j = 0; j < (sunlight.x > 0.0 && !empty ? 2 : 0); j++) {
+            float s = j == 0 ? first : second;
+            float amount = -1.0;
+            if (!NB_HAS(NB_HAS_SEVERAL)) amount = nb_sun_lattice_amount(to_sun, s);
+            if (amount >= 0.0)
+                ways[j] = extinction * amount;
+            else
+                ways[j] = nb_depth_to_sun(ray.origin + ray.direction * (piece.start + s));
         }
-        nb_vec3 shine = sunlight.x * (sum.glow[0] + sum.glow[1]) * nb_exp3(-min(way_before, way_behind));
+        turns += nb_grid_turns;
+        nb_vec3 way_before = ways[0];
+        nb_vec3 way_behind = ways[1];
+        nb_vec3 shine = sunlight.x * (sum.glow[0] + sum.glow[1]) * nb_exp3(-min(way_at, min(way_before, way_behind)));
         nb_vec3 bright = (shine + sum.light[0] + sum.light[1]) * (0.5 * h) * nb_exp3(-g.depth);
         float strain = nb_largest(depth + 0.5 / NB_GAUSS_HALF * abs(way_behind - way_before));
         bool faint = nb_largest(bright) <= tolerance;
@@ -167,6 +179,7 @@ int nb_walk_voxels(inout nb_gathered g, inout nb_piece piece, nb_ray ray, int us
             g.light += (sum.light[0] + sum.light[1]) * (0.5 * h);
             g.depth += depth;
             t = end;
+            way_at = max(way_behind + (way_behind - way_before) * (0.25 / NB_GAUSS_HALF - 0.5), nb_splat3(0.0));
             if (end >= brick_end) {
                 nb_vec3 brick = nb_grid_step(w.brick, bricks, path.inverse);
                 w = nb_enter_brick(profile.first, size, brick, path.from + path.slope * t);

@@ -133,6 +133,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
         bool begins = foggy && !on_leg && legged && !celled;
         bool over = !begins;
         if (NB_HAS(NB_HAS_SUN) && on_leg && nb_is_sunlit(leg)) turns += nb_turns_to_sun();
+        nb_grid_turns = 0; /* of walks to the sun */
         if (on_leg)
             over = nb_end_leg(g, leg, piece, ray, tolerance, lit) <= (piece.end - piece.start) * (4.0 * NB_EPSILON);
         else if (begins)
@@ -143,6 +144,7 @@ void nb_walk(inout nb_gathered g, nb_ray ray, int first, int count, bool listed,
 #endif
         else if (foggy)
             nb_pass_piece(g, piece, lit);
+        if (on_leg) turns += nb_grid_turns;
         stepping = !over;
         if (over) {
             t = piece.end;
