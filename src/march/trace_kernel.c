@@ -613,6 +613,13 @@ static nebel_result trace_job(nb_trace_job *job, workspace *w)
 #endif
 }
 
+/* What part of the budget the sun may spend, or all lamps: nothing but lights spends any in fog of one medium. */
+static double share_of_light(const nebel_snapshot *snapshot)
+{
+    const double all = snapshot->medium_count == 1 ? 0.9 : 0.3;
+    return all / (double)(snapshot->is_sunlit + snapshot->is_lamplit);
+}
+
 /* With a second march, to the lights. */
 static nebel_result trace_lit(nb_trace_job *job, workspace *w)
 {
@@ -627,7 +634,7 @@ static nebel_result trace_lit(nb_trace_job *job, workspace *w)
                     .turn_capacity = STACK_TURNS,
                     .shadows = shadows,
                     .shadow_capacity = STACK_SHADOWS,
-                    .share = 0.3 * job->budget / (double)(snapshot->is_sunlit + snapshot->is_lamplit)};
+                    .share = share_of_light(snapshot) * job->budget};
     if (!open_lamp_shades(&sun, job)) return NEBEL_ERROR_MEMORY;
     open_workspace(&way);
     w->m.sun = &sun;

@@ -26,10 +26,12 @@ static void note_cone(sunlight *sun, const lamp_pass *pass, nb_wvec3 direction, 
     note_roots(sun, pass->closest, d * d - square, f * d, f * f - square * pass->aside2);
 }
 
-/* Turns of the lamp itself: its surface and its cones. */
+/* Turns of the lamp itself: its surface and its cones; and where a ray passes through it the place closest to its centre, beyond
+ * which light comes from behind. */
 static void note_lamp(sunlight *sun, const march *m, const lamp_pass *pass)
 {
     const nb_lamp *lamp = pass->lamp;
+    note_turn(sun, pass->closest, pass->aside2 < WIDE(lamp->radius2));
     note_roots(sun, pass->closest, NB_W(1.0), NB_W(0.0), pass->aside2 - WIDE(lamp->radius2));
     if (!lamp->is_spot) return;
     note_cone(sun, pass, m->rays.direction, lamp->edge);
@@ -63,63 +65,64 @@ static nb_real most_fluence(const lamp_pass *pass, nb_wide start, nb_wide end)
 
 /* ---- a node ---------------------------------------------------------------------------------- */
 
-static sun_node lamp_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
-                          nb_wmask lanes, double place)
+/* Optical depth from t to the lamp. */
+static light_depth way_to_lamp(sunlight *sun, const march *m, const lamp_pass *pass, nb_wide t, nb_wmask lanes)
 {
-    const lamp_pass *pass = s->lamp;
-    const nb_lamp *lamp = pass->lamp;
-    const nb_real at = REAL(place), zero = NB_F(0.0);
-    const nb_wide w = nb_widen(s->length * scaled_place(s, at)), t = nb_swing_place(s->swing, w);
-    const nb_wide from = t - pass->closest;
-    const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, from));
-    const nb_wide square = nb_wdot3(apart, apart), distance = nb_wsqrt(square);
+    const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
+    const nb_wide distance = nb_wsqrt(nb_wdot3(apart, apart));
     const nb_wvec3 towards = nb_wscale3(apart, -nb_wrcp_bounded(distance));
-    const nb_wide reach = nb_wselect(lanes, nb_wmax(distance - WIDE(lamp->clear), NB_W(0.0)), NB_W(0.0));
-    const light_depth to_lamp = sun->snapshot->is_added ? depth_of_bodies(sun, m, t, towards, reach)
-                                                        : depth_by_march(sun, m, t, towards, reach);
+    const nb_wide clear = nb_wmax(distance - WIDE(pass->lamp->clear), NB_W(0.0));
+    const nb_wide reach = nb_wselect(lanes, clear, NB_W(0.0));
+    return sun->snapshot->is_added ? depth_of_bodies(sun, m, t, towards, reach)
+                                   : depth_by_march(sun, m, t, towards, reach);
+}
+
+/* What fog at t makes of the lamp's irradiance there. */
+static lit_fog lamplit_fog(const march *m, const lamp_pass *pass, nb_wide t)
+{
+    const nb_lamp *lamp = pass->lamp;
+    const nb_real zero = NB_F(0.0);
+    const nb_wvec3 apart = nb_wadd3(pass->foot, nb_wscale3(m->rays.direction, t - pass->closest));
+    const nb_wide square = nb_wdot3(apart, apart);
+    const nb_wvec3 towards = nb_wscale3(apart, -nb_wrcp_bounded(nb_wsqrt(square)));
     const nb_turn turn = nb_turn_between(m->rays.direction, towards);
-    const nb_wide speed = (pass->aside * pass->aside + from * from) * nb_swing_rate(s->swing, w) *
-                          nb_widen(s->length * scaled_speed(s, at));
-    nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)) * speed);
+    nb_real fluence = nb_narrow(nb_lamp_fluence(square, WIDE(lamp->radius2)));
     if (lamp->is_spot) {
         const nb_real cosine = nb_narrow(-nb_wdot3(towards, wide_vector(lamp->axis)));
         fluence = fluence * nb_lamp_cone(cosine, REAL(lamp->edge), REAL(lamp->rise));
     }
-    nb_real depth[3], error[3], glow[3] = {zero, zero, zero}, extinction[3] = {zero, zero, zero};
-    depth_until(m, p, g, t, depth, error);
+    lit_fog fog = {{zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_volume *body = &k->medium->body;
         const nb_real density = nb_select(k->inside, contact_density(k, t), zero);
-        const nb_real value = k->medium->is_lamplit ? scattered(&body->phase, turn) : zero;
+        const nb_real value = k->medium->is_lamplit ? scattered(&body->phase, turn) * fluence : zero;
         for (int c = 0; c < 3; c++) {
-            extinction[c] = extinction[c] + k->extinction[c] * density;
-            glow[c] = glow[c] + k->extinction[c] * density * (REAL(body->albedo[c]) * value);
+            const nb_real radiance = REAL(body->albedo[c]) * (value * REAL(lamp->intensity[c]));
+            fog.extinction[c] = fog.extinction[c] + k->extinction[c] * density;
+            fog.glow[c] = fog.glow[c] + k->extinction[c] * density * radiance;
+            fog.most = nb_select(k->inside, nb_max(fog.most, radiance), fog.most);
         }
     }
-    sun_node sum;
-    for (int c = 0; c < 3; c++) {
-        const nb_real all = depth[c] + to_lamp.depth[c];
-        sum.light[c] = glow[c] * (fluence * REAL(lamp->intensity[c])) * nb_exp(-all);
-        sum.doubt[c] = nb_min(error[c] + to_lamp.error[c], NB_F(1.0)) + (all + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
-        sum.taken[c] = extinction[c] * nb_narrow(speed) * nb_exp(-depth[c]);
-    }
-    return sum;
+    return fog;
+}
+
+/* How many metres node n stands for. */
+static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n)
+{
+    const nb_real at = REAL(sun_nodes[n]);
+    const nb_wide w = nb_widen(s->length * scaled_place(s, at)), from = t - s->lamp->closest;
+    return nb_narrow((s->lamp->aside * s->lamp->aside + from * from) * nb_swing_rate(s->swing, w) *
+                     nb_widen(s->length * scaled_speed(s, at)));
 }
 
 /* ---- steps ----------------------------------------------------------------------------------- */
 
 /* As limit_step, by the most that the lamp brings to the step. */
-static void limit_lamp_step(const march *m, const lamp_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
+static void limit_lamp_step(const lamp_pass *pass, const nb_real before[3], nb_wide end, sun_step *s)
 {
     const nb_real most = most_fluence(pass, s->start, end) * pass->scatter;
-    s->drop = NB_F(0.0);
-    for (int c = 0; c < 3; c++) {
-        const nb_real drop = nb_max(before[c] - s->behind[c], NB_F(0.0));
-        s->drop = nb_max(s->drop, drop);
-        s->error = nb_max(s->error, most * unseen_loss(m, s, before[c], drop, c));
-    }
-    s->error = nb_min(s->error, most * s->drop);
+    limit_light(before, (nb_real[3]){most, most, most}, s);
 }
 
 static void step_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass, const sun_piece *along, sun_walk *w,
@@ -129,24 +132,27 @@ static void step_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass,
     const nb_wide bright = pass->shade != NULL ? nb_wmin(pass->shade->toggle, along->p->end) : along->p->end;
     const nb_wide next = nb_wmin(next_turn(sun, w->t, bright), nearest_kink(m, w->t, bright));
     const nb_wide stop = nb_wselect(nb_widen_mask(last), bright, next);
-    sun_step s = {.lamp = pass, .start = w->t, .swing = nb_swing_between(pass->closest, pass->aside, w->t, stop)};
-    const nb_real rest = nb_narrow(s.swing.end);
-    s.length = nb_select(last, rest, nb_min(w->guess, rest));
-    const nb_wmask to_stop = nb_widen_mask(s.length >= rest);
+    const nb_swing swing = nb_swing_between(pass->closest, pass->aside, w->t, stop);
+    const nb_real rest = nb_narrow(swing.end), length = nb_select(last, rest, nb_min(w->guess, rest));
+    const nb_wmask to_stop = nb_widen_mask(length >= rest);
+    sun_step s = begin_step(w, length, to_stop);
+    s.lamp = pass;
+    s.swing = swing;
     const nb_wide within = nb_wmin(nb_swing_place(s.swing, nb_widen(s.length)), stop);
     const nb_wide end = nb_wselect(to_stop, stop, within);
     const nb_wmask turns = nb_wand(to_stop, stop < bright);
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
     const sun_origin from = origin_of(along, w);
     end_step(m, &from.p, &from.before, end, &s);
-    sum_light_nodes(sun, m, &from.p, &from.before, w->lanes, &s);
-    limit_lamp_step(m, pass, w->before, end, &s);
-    const nb_real least = NB_F(8.0) * NB_EPSILON * largest(s.light); /* what no halving makes less */
-    const nb_real length = nb_narrow(end - w->t) / along->whole;
-    const nb_real allowed = least + REAL(pass->share) * (NB_F(0.5) * s.drop + NB_F(0.25) * length / along->pieces +
-                                                         NB_F(0.001) / along->pieces);
+    sum_light_nodes(sun, m, &from.p, &from.before, w->lanes, end, &s);
+    limit_lamp_step(pass, w->before, end, &s);
+    const nb_real least = s.noise + s.noise; /* what no shorter step makes less */
+    const nb_real part_of_piece = nb_narrow(end - w->t) / along->whole;
+    const nb_real allowed =
+        least + REAL(pass->share) *
+                    (NB_F(0.5) * s.drop + NB_F(0.25) * part_of_piece / along->pieces + NB_F(0.001) / along->pieces);
     const nb_mask fits = nb_or(last, s.error <= allowed);
-    take_sun_step(g, w, &s, end, turns, nb_and(fits, nb_narrow_mask(w->lanes)));
+    take_sun_step(g, w, &s, end, turns, nb_and(fits, nb_narrow_mask(w->lanes)), allowed);
     w->left = w->left - NB_F(1.0);
 }
 
@@ -155,7 +161,7 @@ static void walk_past_lamp(sunlight *sun, const march *m, const lamp_pass *pass,
 {
     find_lamp_turns(sun, m, pass);
     sun_walk w = begin_walk(m, s->p, &s->before, lanes);
-    w.guess = NB_HUGE;
+    w.guess = nb_narrow(nb_swing_between(pass->closest, pass->aside, w.t, w.t + nb_widen(w.guess)).end);
     while (nb_wany(w.lanes)) {
         if (pass->shade != NULL) pass_toggles(pass->shade, w.t, w.lanes);
         const nb_wmask dark = pass->shade != NULL ? nb_wand(w.lanes, pass->shade->is_dark) : nb_wmask_false;

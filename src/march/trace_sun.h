@@ -5,25 +5,14 @@
  * where glow is what full sunlight would add. Depth up to t is exact; the depth to the sun is that of a march of its
  * own from there. As a function of t it is smooth but for *turns*: where the ray to the sun begins or ends to meet a
  * body, or passes one of its edges. At the silhouette of a round body it has the steepness of a root there. So steps go
- * from turn to turn, on a scale that flattens roots at their ends, and Kronrod's seven nodes are compared with the
- * three of Gauss's rule among them: a step is halved until they differ by less than the budget. The error that is told
- * is that of the three. Where the whole depth is linear in that along the ray from turn to turn, a step has a closed
- * form instead. Included by trace_kernel.c, which makes packets and workspaces. */
+ * from turn to turn, on a scale that flattens roots at their ends, and are shortened until what the rule may miss
+ * (trace_lit_rule.h) is less than the budget. Where the whole depth is linear in that along the ray from turn to turn, a
+ * step has a closed form instead. Included by trace_kernel.c, which makes packets and workspaces. */
 
-#define SUN_NODES 7
 #define MOST_SUN_STEPS 4096
 
 /* More media than this have their turns found by halving alone. */
 #define MOST_TURNING_MEDIA 256
-
-/* Kronrod's extension of Gauss's rule of three nodes, on [0, 1]. Source: Kronrod, Nodes and Weights of Quadrature
- * Formulas, 1965; derived again with 50 digits from the polynomial of Stieltjes. */
-static const double sun_nodes[SUN_NODES] = {0.019754365645989861, 0.11270166537925831, 0.28287812532659871, 0.5,
-                                            0.71712187467340129,  0.88729833462074169, 0.98024563435401014};
-static const double sun_weights[SUN_NODES] = {0.052328113013233632, 0.13424404493416672, 0.20069870738798111,
-                                              0.22545826932923707,  0.20069870738798111, 0.13424404493416672,
-                                              0.052328113013233632};
-static const double sun_weights_of_three[SUN_NODES] = {0, 5.0 / 18, 0, 8.0 / 18, 0, 5.0 / 18, 0};
 
 /* More turns than these take memory once. */
 #define STACK_TURNS 64
@@ -76,6 +65,8 @@ static void set_glow(contact *k, const packet *rays, const sunlight *sun)
 }
 
 #include "trace_turns.h"
+
+#include "trace_lit_rule.h"
 
 /* ---- turns ----------------------------------------------------------------------------------- */
 
@@ -335,17 +326,22 @@ struct lamp_pass;
 typedef struct sun_step {
     const struct lamp_pass *lamp; /* NULL: of the sun */
     nb_wide start;
-    nb_swing swing;                   /* of a lamp alone */
-    nb_real length;                   /* m; of a lamp in the counting of its swing */
-    nb_real scale[3];                 /* of the step: x = s (scale[0] + s (scale[1] + s scale[2])) */
-    nb_real depth[3], depth_error[3]; /* from the ray's origin to its end */
-    nb_real behind[3];                /* transmittance at its end */
+    nb_swing swing;                                      /* of a lamp alone */
+    nb_real length;                                      /* m; of a lamp in the counting of its swing */
+    nb_real scale[3];                                    /* of the step: x = s (scale[0] + s (scale[1] + s scale[2])) */
+    nb_real before[3], depth_before[3], error_before[3]; /* transmittance and depth up to its start */
+    nb_real depth[3], depth_error[3];                    /* from the ray's origin to its end */
+    nb_real behind[3];                                   /* transmittance at its end */
     nb_real light[3];
-    nb_real taken[3]; /* loss of transmittance by the rule, which is known without it */
-    nb_real error;    /* of the rule, worst channel */
-    nb_real rounding; /* of its terms */
-    nb_real drop;     /* largest loss of transmittance over it */
-    nb_wide amount;   /* of a grid alone: the density's integral over it, which may be off by so much */
+    nb_real error;                /* of the rule, worst channel */
+    nb_real rounding;             /* of its terms */
+    nb_real noise;                /* of that, what no shorter step makes less */
+    nb_real steepness;            /* see unseen_light */
+    nb_real drop;                 /* largest loss of transmittance over it */
+    nb_wmask knows_start;         /* the way to the light from its start is known */
+    nb_wmask to_stop;             /* it ends where the light may have a kink or a jump */
+    light_depth at_start, at_end; /* the ways to the light from both ends */
+    nb_wide amount;               /* of a grid alone: the density's integral over it, which may be off by so much */
     nb_real amount_error;
 } sun_step;
 
@@ -399,14 +395,10 @@ static void set_scale(sun_step *s, nb_mask first, nb_mask last)
     s->scale[2] = nb_select(nb_and(first, last), -two, zero);
 }
 
-/* What a node stands for if its weight were 1: light, by how much of itself that may be off, and loss of
- * transmittance. */
-typedef struct sun_node {
-    nb_real light[3], doubt[3], taken[3];
-} sun_node;
-
-static sun_node lamp_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
-                          nb_wmask lanes, double place);
+/* How far from an end, as a part of the step, the light there is looked at: at a body's face itself the way to the light
+ * may run along it. */
+#define STEP_MARGIN 1e-9
+#define MOST_MARGIN 1e-3
 
 static nb_real scaled_place(const sun_step *s, nb_real at)
 {
@@ -418,98 +410,154 @@ static nb_real scaled_speed(const sun_step *s, nb_real at)
     return s->scale[0] + at * (NB_F(2.0) * s->scale[1] + NB_F(3.0) * at * s->scale[2]);
 }
 
-static sun_node sunlit_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
-                            nb_wmask lanes, double place)
+/* Where the light is looked at that node n stands for: not on an end where it may have a kink or a jump, but beside it. */
+static nb_wide place_of_node(const sun_step *s, nb_wide end, int n)
 {
-    const nb_real at = REAL(place), zero = NB_F(0.0);
-    const nb_real speed = scaled_speed(s, at);
-    const nb_wide t = s->start + nb_widen(s->length * scaled_place(s, at));
-    const light_depth to_sun = depth_to_sun(sun, m, t, lanes);
-    nb_real depth[3], error[3], glow[3] = {zero, zero, zero}, extinction[3] = {zero, zero, zero};
-    depth_until(m, p, g, t, depth, error);
+    const nb_wide margin = nb_wmin((end - s->start) * WIDE(STEP_MARGIN), WIDE(MOST_MARGIN));
+    if (n == 0) return nb_wselect(s->knows_start, s->start, s->start + margin);
+    if (n == SUN_NODES - 1) return nb_wselect(s->to_stop, end - margin, end);
+    const nb_wide x = nb_widen(s->length * scaled_place(s, REAL(sun_nodes[n])));
+    return s->lamp != NULL ? nb_swing_place(s->swing, x) : s->start + x;
+}
+
+/* What fog is at a place of a step, of all media: extinction, and what it makes of light. `most` is of the brightest. */
+typedef struct lit_fog {
+    nb_real extinction[3], glow[3], most;
+} lit_fog;
+
+static lit_fog sunlit_fog(const march *m, nb_wide t)
+{
+    const nb_real zero = NB_F(0.0);
+    lit_fog fog = {{zero, zero, zero}, {zero, zero, zero}, zero};
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         const nb_real density = nb_select(k->inside, contact_density(k, t), zero);
         for (int c = 0; c < 3; c++) {
-            glow[c] = glow[c] + k->glow[c] * density;
-            extinction[c] = extinction[c] + k->extinction[c] * density;
+            fog.glow[c] = fog.glow[c] + k->glow[c] * density;
+            fog.extinction[c] = fog.extinction[c] + k->extinction[c] * density;
+            const nb_real radiance = k->glow[c] / nb_max(k->extinction[c], NB_TINY);
+            fog.most = nb_select(k->inside, nb_max(fog.most, radiance), fog.most);
         }
     }
-    const nb_real length = s->length * speed;
-    nb_real all[3], seen[3], behind[3];
-    for (int c = 0; c < 3; c++) all[c] = depth[c] + to_sun.depth[c];
-    map_channels(sun->snapshot, transmitted, all, seen);
-    map_channels(sun->snapshot, transmitted, depth, behind);
-    sun_node sum;
-    for (int c = 0; c < 3; c++) {
-        sum.light[c] = glow[c] * length * seen[c];
-        sum.doubt[c] = nb_min(error[c] + to_sun.error[c], NB_F(1.0)) + (all[c] + NB_F(16.0)) * (NB_F(2.0) * NB_EPSILON);
-        sum.taken[c] = extinction[c] * length * behind[c];
+    return fog;
+}
+
+/* The depths up to both ends are known. */
+static void depth_of_node(const sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
+                          nb_wide t, int n, sun_node *at, nb_real error[3])
+{
+    if (n > 0 && n < SUN_NODES - 1) {
+        depth_until(m, p, g, t, at->depth, error);
+        map_channels(sun->snapshot, transmitted, at->depth, at->behind);
+        return;
     }
-    return sum;
-}
-
-/* What both rules make of the nodes so far. */
-typedef struct rule_sum {
-    nb_real light[3], three[3], taken[3], rounding[3];
-} rule_sum;
-
-static rule_sum no_rule_sum(void)
-{
-    const nb_real zero = NB_F(0.0);
-    return (rule_sum){{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
-}
-
-static void add_node(rule_sum *sum, const sun_node *at, int n)
-{
     for (int c = 0; c < 3; c++) {
-        const nb_real light = REAL(sun_weights[n]) * at->light[c];
-        sum->light[c] = sum->light[c] + light;
-        sum->taken[c] = sum->taken[c] + REAL(sun_weights[n]) * at->taken[c];
-        sum->three[c] = sum->three[c] + REAL(sun_weights_of_three[n]) * at->light[c];
-        sum->rounding[c] = sum->rounding[c] + light * at->doubt[c];
+        at->depth[c] = n == 0 ? s->depth_before[c] : s->depth[c];
+        at->behind[c] = n == 0 ? s->before[c] : s->behind[c];
+        error[c] = n == 0 ? s->error_before[c] : s->depth_error[c];
     }
 }
 
-static void finish_rule(const rule_sum *sum, sun_step *s)
+/* The rest of a node that stands for `length` of fog, m; of a lamp the same times what it brings there. */
+static void fill_node(const sunlight *sun, sun_node *at, const lit_fog *fog, nb_real length, const nb_real error[3],
+                      const light_depth *to_light)
 {
-    s->error = s->rounding = NB_F(0.0);
+    map_channels(sun->snapshot, transmitted, to_light->depth, at->through);
     for (int c = 0; c < 3; c++) {
-        s->light[c] = sum->light[c];
-        s->taken[c] = sum->taken[c];
-        s->error = nb_max(s->error, nb_abs(sum->light[c] - sum->three[c]));
-        s->rounding = nb_max(s->rounding, sum->rounding[c]);
+        at->way[c] = to_light->depth[c];
+        at->noise[c] = (at->depth[c] + at->way[c] + NB_F(32.0)) * (NB_F(2.0) * NB_EPSILON);
+        at->doubt[c] = nb_min(error[c] + to_light->error[c], NB_F(1.0)) + at->noise[c];
+        at->light[c] = fog->glow[c] * length * (at->behind[c] * at->through[c]);
+        at->amount[c] = fog->extinction[c] * length;
     }
+    at->most = fog->most;
+}
+
+static light_depth way_to_lamp(sunlight *sun, const march *m, const struct lamp_pass *pass, nb_wide t, nb_wmask lanes);
+static lit_fog lamplit_fog(const march *m, const struct lamp_pass *pass, nb_wide t);
+static nb_real length_past_lamp(const sun_step *s, nb_wide t, int n);
+
+/* What node n of a step stands for; `way` is known at a start that the step knows. */
+static sun_node find_node(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_step *s,
+                          nb_wide end, int n, const light_depth *way)
+{
+    const nb_wide t = place_of_node(s, end, n);
+    const int by_lamp = s->lamp != NULL;
+    const lit_fog fog = by_lamp ? lamplit_fog(m, s->lamp, t) : sunlit_fog(m, t);
+    const nb_real length = by_lamp ? length_past_lamp(s, t, n) : s->length * scaled_speed(s, REAL(sun_nodes[n]));
+    sun_node at;
+    nb_real error[3];
+    depth_of_node(sun, m, p, g, s, t, n, &at, error);
+    fill_node(sun, &at, &fog, length, error, way);
+    return at;
+}
+
+static void select_way(nb_mask mask, light_depth *to, const light_depth *from)
+{
+    select_reals(mask, to->depth, from->depth);
+    select_reals(mask, to->error, from->error);
+}
+
+static void take_sum(sun_step *s, const lit_sum *sum)
+{
+    for (int c = 0; c < 3; c++) s->light[c] = sum->light[c];
+    s->error = sum->error;
+    s->rounding = sum->rounding;
+    s->noise = sum->noise;
+    s->steepness = sum->steepness;
+}
+
+static nb_real count_media(const march *m)
+{
+    nb_real count = NB_F(0.0);
+    for (size_t i = m->present_first; i < m->present_end; i++)
+        count = count + nb_select(present(m, i)->inside, NB_F(1.0), NB_F(0.0));
+    return count;
+}
+
+static light_depth way_from(sunlight *sun, const march *m, const sun_step *s, nb_wide end, int n, nb_wmask lanes)
+{
+    const nb_wide t = place_of_node(s, end, n);
+    return s->lamp != NULL ? way_to_lamp(sun, m, s->lamp, t, lanes) : depth_to_sun(sun, m, t, lanes);
 }
 
 static void sum_light_nodes(sunlight *sun, const march *m, const piece *p, const gathered *g, nb_wmask lanes,
-                            sun_step *s)
+                            nb_wide end, sun_step *s)
 {
-    rule_sum sum = no_rule_sum();
-    for (int n = 0; n < SUN_NODES; n++) {
-        const sun_node at = s->lamp != NULL ? lamp_node(sun, m, p, g, s, lanes, sun_nodes[n])
-                                            : sunlit_node(sun, m, p, g, s, lanes, sun_nodes[n]);
-        add_node(&sum, &at, n);
+    sun_node at[SUN_NODES];
+    if (!nb_wall(nb_wor(s->knows_start, nb_wnot(lanes)))) {
+        const light_depth way = way_from(sun, m, s, end, 0, lanes);
+        select_way(nb_narrow_mask(nb_wnot(s->knows_start)), &s->at_start, &way);
     }
-    finish_rule(&sum, s);
+    s->at_end = s->at_start;
+    for (int n = 0; n < SUN_NODES; n++) {
+        if (n > 0) s->at_end = way_from(sun, m, s, end, n, lanes);
+        at[n] = find_node(sun, m, p, g, s, end, n, &s->at_end);
+    }
+    const lit_sum sum = sum_nodes_of_step(at, count_media(m), sun->snapshot->is_gray);
+    take_sum(s, &sum);
 }
 
-/* What the rule may miss of the loss of transmittance over the step, beyond the rounding of both: that of depths is of
- * each medium that they are summed from. */
-static nb_real unseen_loss(const march *m, const sun_step *s, nb_real before, nb_real drop, int c)
+/* Light is never more than what full light gives: `most` times the loss of transmittance. A better bound than the rule's
+ * for steps that hardly take light away. */
+static void limit_light(const nb_real before[3], const nb_real most[3], sun_step *s)
 {
-    nb_real terms = NB_F(4.0);
-    for (size_t i = m->present_first; i < m->present_end; i++)
-        terms = terms + nb_select(present(m, i)->inside, NB_F(1.0), NB_F(0.0));
-    return nb_abs(s->taken[c] - drop) - before * (NB_EPSILON * (NB_F(8.0) + terms * s->depth[c]));
+    nb_real crude = NB_F(0.0);
+    s->drop = NB_F(0.0);
+    for (int c = 0; c < 3; c++) {
+        const nb_real drop = nb_max(before[c] - s->behind[c], NB_F(0.0));
+        const nb_real limit =
+            most[c] * (drop + before[c] * (NB_F(8.0) * NB_EPSILON)); /* what rounds to 0 may be light */
+        s->light[c] = nb_min(s->light[c], limit);
+        s->drop = nb_max(s->drop, drop);
+        crude = nb_max(crude, limit);
+    }
+    s->error = nb_min(s->error, crude);
 }
 
-/* Sunlight is never more than full sunlight gives: the most radiant medium's times the loss of transmittance. A better
- * bound than the rule's for steps that hardly take light away. And where the rule does not see that loss it has passed
- * over what takes it. */
 static void limit_step(const march *m, const nb_real before[3], sun_step *s)
 {
-    nb_real crude = NB_F(0.0), most[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
+    nb_real most[3] = {NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (size_t i = m->present_first; i < m->present_end; i++) {
         const contact *k = present(m, i);
         for (int c = 0; c < 3; c++) {
@@ -517,15 +565,7 @@ static void limit_step(const march *m, const nb_real before[3], sun_step *s)
             most[c] = nb_select(k->inside, nb_max(most[c], radiance), most[c]);
         }
     }
-    s->drop = NB_F(0.0);
-    for (int c = 0; c < 3; c++) {
-        const nb_real drop = nb_max(before[c] - s->behind[c], NB_F(0.0));
-        s->light[c] = nb_min(s->light[c], most[c] * drop);
-        s->drop = nb_max(s->drop, drop);
-        crude = nb_max(crude, most[c] * drop);
-        s->error = nb_max(s->error, most[c] * unseen_loss(m, s, before[c], drop, c));
-    }
-    s->error = nb_min(s->error, crude);
+    limit_light(before, most, s);
 }
 
 /* Where a lane's steps have come to. */
@@ -533,6 +573,8 @@ typedef struct sun_walk {
     nb_wide t;
     nb_wmask lanes, at_turn;
     nb_real left;             /* steps that the lane may still try before its next toggle */
+    nb_wmask knows_way;       /* the way to the light from here, */
+    light_depth way;          /* which is this */
     nb_real guess, before[3]; /* length of the next step; transmittance up to here */
     nb_real depth[3], depth_error[3];
     nb_wide along, along_error; /* of a grid: the integral of its density from the start of the piece up to here */
@@ -576,6 +618,25 @@ static sun_origin origin_of(const sun_piece *s, const sun_walk *w)
     return from;
 }
 
+/* `stops`: whether it ends where the light may have a kink or a jump. */
+static sun_step begin_step(const sun_walk *w, nb_real length, nb_wmask stops)
+{
+    sun_step s = {.start = w->t,
+                  .length = length,
+                  .knows_start = w->knows_way,
+                  .to_stop = stops,
+                  .at_start = w->way,
+                  .at_end = w->way,
+                  .amount = NB_W(0.0),
+                  .amount_error = NB_F(0.0)};
+    for (int c = 0; c < 3; c++) {
+        s.before[c] = w->before[c];
+        s.depth_before[c] = w->depth[c];
+        s.error_before[c] = w->depth_error[c];
+    }
+    return s;
+}
+
 static void end_step(const march *m, const piece *p, const gathered *g, nb_wide end, sun_step *s)
 {
     depth_until(m, p, g, end, s->depth, s->depth_error);
@@ -587,7 +648,7 @@ static void end_step(const march *m, const piece *p, const gathered *g, nb_wide 
 #include "trace_sun_grid.h"
 
 static sun_step try_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
-                         nb_real length, nb_wide end, nb_wmask turns)
+                         nb_real length, nb_wide end, nb_wmask turns, nb_wmask stops)
 {
     if (is_grid_alone(sun)) return try_grid_step(sun, m, g, w, length, end);
     if (is_ball_alone(sun)) {
@@ -595,10 +656,10 @@ static sun_step try_step(sunlight *sun, const march *m, const piece *p, const ga
         limit_step(m, w->before, &s);
         return s;
     }
-    sun_step s = {.start = w->t, .length = length, .amount = NB_W(0.0), .amount_error = NB_F(0.0)};
+    sun_step s = begin_step(w, length, stops);
     set_scale(&s, nb_narrow_mask(w->at_turn), nb_narrow_mask(turns));
     end_step(m, p, g, end, &s);
-    sum_light_nodes(sun, m, p, g, w->lanes, &s);
+    sum_light_nodes(sun, m, p, g, w->lanes, end, &s);
     limit_step(m, w->before, &s);
     return s;
 }
@@ -616,19 +677,28 @@ static nb_mask sunlit_lanes(const march *m, const piece *p)
 #include "trace_sun_lattice.h"
 #endif
 
-/* A first step of a few optical depths: endless pieces would be halved for ever. */
+/* A first step of a few optical depths: endless pieces would be halved for ever. By their mean, and by the density where
+ * they begin: light in dense fog comes from there. */
+static nb_real first_guess(const march *m, const piece *p, const gathered *g)
+{
+    const nb_real few = NB_F(2.0);
+    nb_real depth[3], error[3];
+    depth_until(m, p, g, p->end, depth, error);
+    const nb_real mean = p->length * (few / nb_max(largest(depth) - largest(g->depth), few));
+    return nb_min(mean, few * nb_rcp_bounded(largest(sunlit_fog(m, p->start).extinction)));
+}
+
 static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb_mask lanes)
 {
     sun_walk w = {.t = p->start,
                   .lanes = nb_widen_mask(lanes),
                   .at_turn = nb_wmask_false,
                   .left = NB_F(1.0) * MOST_SUN_STEPS,
+                  .knows_way = nb_wmask_false,
+                  .way = no_depth(),
                   .along = NB_W(0.0),
-                  .along_error = NB_W(0.0)};
-    nb_real depth[3], error[3];
-    depth_until(m, p, g, p->end, depth, error);
-    const nb_real within = nb_max(largest(depth) - largest(g->depth), NB_F(4.0));
-    w.guess = p->length * (NB_F(4.0) / within);
+                  .along_error = NB_W(0.0),
+                  .guess = first_guess(m, p, g)};
     for (int c = 0; c < 3; c++) {
         w.before[c] = g->transmittance[c];
         w.depth[c] = g->depth[c];
@@ -637,7 +707,26 @@ static sun_walk begin_walk(const march *m, const piece *p, const gathered *g, nb
     return w;
 }
 
-static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide end, nb_wmask turns, nb_mask taken)
+/* What a step is shortened to that does not fit: to half of it, or to where the light has changed by as much as the rule
+ * likes, by how steep it is where the step begins; not by more than that at once. */
+#define BEST_CHANGE 0.55
+#define LEAST_PART 1e-4
+
+/* Steps whose error is so much less than it may be are followed by longer ones. */
+#define EASY NB_F(32.0)
+
+/* The length of the next step after one of which `error` is known and `allowed`. */
+static nb_real length_of_next(const sun_step *s, nb_real guess, nb_mask taken, nb_real allowed)
+{
+    const nb_real share = REAL(BEST_CHANGE) / nb_max(s->steepness, REAL(BEST_CHANGE));
+    const nb_real shorter = s->length * nb_clamp(share, REAL(LEAST_PART), NB_F(0.5));
+    const nb_mask easy = s->error * EASY <= allowed;
+    const nb_real longer = nb_max(guess, nb_select(easy, s->length + s->length, s->length));
+    return nb_select(taken, longer, shorter);
+}
+
+static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide end, nb_wmask turns, nb_mask taken,
+                          nb_real allowed)
 {
     for (int c = 0; c < 3; c++) {
         g->radiance[c] = g->radiance[c] + nb_select(taken, s->light[c], NB_F(0.0));
@@ -653,7 +742,10 @@ static void take_sun_step(gathered *g, sun_walk *w, const sun_step *s, nb_wide e
     w->along_error = nb_wselect(moved, w->along_error + nb_widen(s->amount_error), w->along_error);
     w->t = nb_wselect(moved, end, w->t);
     w->at_turn = nb_wor(nb_wand(moved, turns), nb_wand(nb_wnot(moved), w->at_turn));
-    w->guess = nb_select(taken, nb_max(w->guess, s->length + s->length), NB_F(0.5) * s->length);
+    select_way(taken, &w->way, &s->at_end);
+    select_way(nb_not(taken), &w->way, &s->at_start);
+    w->knows_way = nb_wor(nb_wnot(moved), nb_wnot(s->to_stop));
+    w->guess = length_of_next(s, w->guess, taken, allowed);
 }
 
 static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_walk *w, gathered *g)
@@ -668,13 +760,13 @@ static void step_along(sunlight *sun, const march *m, const sun_piece *s, sun_wa
     const nb_wide end = nb_wselect(to_stop, stop, w->t + nb_widen(length));
     const nb_wmask turns = nb_wand(to_stop, stop < bright);
     const sun_origin from = origin_of(s, w);
-    const sun_step tried = try_step(sun, m, &from.p, &from.before, w, length, end, turns);
-    const nb_real least = NB_F(8.0) * NB_EPSILON * largest(tried.light); /* what no halving makes less */
-    const nb_real share = is_grid_alone(sun) ? GRID_SHARE * REAL(sun->share) : REAL(sun->share);
+    const sun_step tried = try_step(sun, m, &from.p, &from.before, w, length, end, turns, to_stop);
+    const nb_real least = tried.noise + tried.noise; /* what no shorter step makes less */
+    const nb_real share = REAL(sun->share);
     const nb_real allowed = least + share * (NB_F(0.5) * tried.drop + NB_F(0.25) * (length / s->whole) / s->pieces +
                                              NB_F(0.001) / s->pieces);
     const nb_mask fits = nb_or(last, tried.error <= allowed);
-    take_sun_step(g, w, &tried, end, turns, nb_and(fits, nb_narrow_mask(w->lanes)));
+    take_sun_step(g, w, &tried, end, turns, nb_and(fits, nb_narrow_mask(w->lanes)), allowed);
     w->left = w->left - NB_F(1.0);
 }
 
@@ -693,6 +785,7 @@ static void pass_shadow(const shade *shadow, const march *m, const sun_piece *s,
     }
     w->left = nb_select(lanes, NB_F(1.0) * MOST_SUN_STEPS, w->left);
     w->at_turn = nb_wand(w->at_turn, nb_wnot(dark));
+    w->knows_way = nb_wand(w->knows_way, nb_wnot(dark));
     w->t = nb_wselect(dark, end, w->t);
 }
 

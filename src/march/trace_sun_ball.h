@@ -46,53 +46,59 @@ static nb_real ball_way(const ball_ways *b, nb_wide x, nb_real *error)
     return length;
 }
 
-/* What both rules make of one channel. The doubt of the depth is the largest of all nodes. */
+/* What the rule makes of one channel. Within the body the way to the sun is concave along the ray, so that light is
+ * nowhere more than at the nodes beside. */
 typedef struct ball_sum {
-    nb_real light, three;
+    nb_real light, error, steepness;
+    nb_real depth; /* mean, by light */
 } ball_sum;
 
 static ball_sum sum_ball(const nb_real depth[SUN_NODES])
 {
-    ball_sum sum = {NB_F(0.0), NB_F(0.0)};
+    ball_sum sum = {NB_F(0.0), NB_F(0.0), nb_abs(depth[1] - depth[0]), NB_F(0.0)};
+    nb_real seen[SUN_NODES];
     for (int n = 0; n < SUN_NODES; n++) {
-        const nb_real seen = nb_exp(-depth[n]);
-        sum.light = sum.light + REAL(sun_weights[n]) * seen;
-        if (sun_weights_of_three[n] > 0) sum.three = sum.three + REAL(sun_weights_of_three[n]) * seen;
+        seen[n] = nb_exp(-depth[n]);
+        const nb_real weighted = REAL(sun_weights[n]) * seen[n];
+        sum.light = sum.light + weighted;
+        sum.depth = sum.depth + weighted * depth[n];
+        if (n == 0) continue;
+        const nb_real most = nb_max(seen[n - 1], seen[n]) * REAL(sun_nodes[n] - sun_nodes[n - 1]);
+        sum.error = sum.error + most * unseen_share(nb_abs(depth[n] - depth[n - 1]));
     }
+    sum.error = sum.error + error_by_null_rules(seen);
     return sum;
 }
 
-static sun_step try_ball_step(sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
+static sun_step try_ball_step(const sunlight *sun, const march *m, const piece *p, const gathered *g, const sun_walk *w,
                               nb_real length, nb_wide end)
 {
     const contact *k = present(m, m->present_first);
     const ball_ways b = find_ball_ways(sun, m, w->t);
-    nb_real before[3], error[3], way[SUN_NODES], depth[SUN_NODES], worst = NB_F(0.0);
-    sun_step s = {.start = w->t, .length = length, .amount = NB_W(0.0), .amount_error = NB_F(0.0)};
-    depth_until(m, p, g, end, before, error);
-    map_channels(sun->snapshot, transmitted, before, s.behind);
-    depth_until(m, p, g, w->t, before, error);
+    nb_real way[SUN_NODES], depth[SUN_NODES], worst = NB_F(0.0);
+    sun_step s = begin_step(w, length, nb_wmask_false);
+    end_step(m, p, g, end, &s);
     for (int n = 0; n < SUN_NODES; n++) {
         nb_real off = NB_F(0.0);
         const nb_real x = length * REAL(sun_nodes[n]);
         way[n] = x + ball_way(&b, nb_widen(x), m->wants_error ? &off : NULL);
         worst = nb_max(worst, off);
     }
-    s.error = s.rounding = NB_F(0.0);
-    ball_sum sum = {NB_F(0.0), NB_F(0.0)};
+    s.error = s.rounding = s.noise = s.steepness = NB_F(0.0);
+    ball_sum sum = {NB_F(0.0), NB_F(0.0), NB_F(0.0), NB_F(0.0)};
     for (int c = 0; c < 3; c++) {
-        nb_real most = NB_F(0.0);
-        for (int n = 0; n < SUN_NODES; n++) {
-            depth[n] = before[c] + k->extinction[c] * way[n];
-            most = nb_max(most, depth[n]);
+        if (c == 0 || !sun->snapshot->is_gray) {
+            for (int n = 0; n < SUN_NODES; n++) depth[n] = s.depth_before[c] + k->extinction[c] * way[n];
+            sum = sum_ball(depth);
         }
-        if (c == 0 || !sun->snapshot->is_gray) sum = sum_ball(depth);
         const nb_real full = k->glow[c] * length;
-        const nb_real doubt = nb_min(error[c] + k->extinction[c] * worst, NB_F(1.0));
+        const nb_real doubt = nb_min(s.error_before[c] + k->extinction[c] * worst, NB_F(1.0));
+        const nb_real noise = full * (sum.depth + NB_F(16.0) * sum.light) * (NB_F(2.0) * NB_EPSILON);
         s.light[c] = full * sum.light;
-        s.taken[c] = w->before[c] - s.behind[c]; /* the rule cannot miss where light is lost: it is lost evenly */
-        s.error = nb_max(s.error, full * nb_abs(sum.light - sum.three));
-        s.rounding = nb_max(s.rounding, s.light[c] * (doubt + (most + NB_F(16.0)) * (NB_F(2.0) * NB_EPSILON)));
+        s.error = nb_max(s.error, full * sum.error);
+        s.rounding = nb_max(s.rounding, s.light[c] * doubt + noise);
+        s.noise = nb_max(s.noise, noise);
+        s.steepness = nb_max(s.steepness, sum.steepness);
     }
     return s;
 }

@@ -102,15 +102,26 @@ static void add_closed_step(const sunlight *sun, const march *m, const sun_place
     g->radiance_error = g->radiance_error + nb_select(lanes, rounding, NB_F(0.0));
 }
 
+/* Where constant densities let no light through any more: from deep in endless fog the way to the sun is longer than
+ * NB_WFAR, where ways end, and the depth is not linear. */
+static nb_wide end_of_light(const sunlight *sun, const march *m, const piece *p)
+{
+    if (sun->snapshot->way_to_sun != NB_WAY_FLAT) return p->end;
+    const lit_fog fog = sunlit_fog(m, p->start);
+    const nb_real thinnest = nb_min(nb_min(fog.extinction[0], fog.extinction[1]), fog.extinction[2]);
+    return nb_wmin(p->end, p->start + nb_widen(OPAQUE_DEPTH * nb_rcp_bounded(thinnest)));
+}
+
 /* From toggle to toggle, and where the sun shines from turn to turn; all lanes go on at once, those in shadow, too. */
 static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p, nb_mask lit, gathered *g)
 {
-    nb_wmask lanes = nb_widen_mask(lit);
+    const nb_wide last = end_of_light(sun, m, p);
+    nb_wmask lanes = nb_wand(nb_widen_mask(lit), p->start < last);
     sun_place from = first_place(sun, m, p, g, lanes);
     while (nb_wany(lanes)) {
         pass_toggles(&sun->shade, from.t, lanes);
         const nb_wmask dark = nb_wand(lanes, sun->shade.is_dark);
-        const nb_wide bright = nb_wmin(sun->shade.toggle, p->end);
+        const nb_wide bright = nb_wmin(sun->shade.toggle, last);
         const nb_wide turn = nb_wmin(next_turn(sun, from.t, bright), nearest_kink(m, from.t, bright));
         const nb_wide end = nb_wselect(lanes, nb_wselect(dark, bright, turn), from.t);
         const sun_stretch between = stretch_between(m, from.t, end);
@@ -118,6 +129,6 @@ static void gather_in_closed_form(sunlight *sun, const march *m, const piece *p,
         const nb_mask shines = nb_narrow_mask(nb_wand(lanes, nb_wnot(dark)));
         if (nb_any(shines)) add_closed_step(sun, m, &from, &to, &between, shines, g);
         from = to;
-        lanes = nb_wand(lanes, from.t < p->end);
+        lanes = nb_wand(lanes, from.t < last);
     }
 }

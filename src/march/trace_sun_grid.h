@@ -12,6 +12,11 @@ static int is_grid_alone(const sunlight *sun)
     return sun->snapshot->way_to_sun == NB_WAY_GRID;
 }
 
+/* The nodes of the rule as shares of the density's integral. Nearly nothing is not nothing: before the first voxel with
+ * fog there may be many without. */
+static const double grid_shares[SUN_NODES] = {
+    1e-6, 0.091751709536136983, 0.27639320225002103, 0.5, 0.72360679774997897, 0.90824829046386302, 1 - 1e-6};
+
 /* Where in a step the nodes are, as parts of the whole density. */
 typedef struct grid_nodes {
     nb_wide place[SUN_NODES];
@@ -33,7 +38,7 @@ static grid_nodes place_nodes(const contact *k, nb_wide start, nb_wide end, nb_m
         amount[i] = (nb_scalar)sum.value;
         error[i] = (nb_scalar)sum.error;
         double at[SUN_NODES] = {0};
-        if (sum.value > 0) nb_grid_places(grid, &line, length[i], sum.value, SUN_NODES, sun_nodes, at);
+        if (sum.value > 0) nb_grid_places(grid, &line, length[i], sum.value, SUN_NODES, grid_shares, at);
         for (int n = 0; n < SUN_NODES; n++) place[n][i] = at[n];
     }
     const nb_real value = nb_load_lanes(amount);
@@ -62,51 +67,47 @@ static nb_real amount_that_hides(const sunlight *sun, const contact *k, const nb
 }
 
 /* What a node leaves out, which it tells. */
-#define HIDDEN_PART 0.01
+#define HIDDEN_PART 0.0033
 
 static sun_node grid_node(sunlight *sun, const march *m, const gathered *g, const sun_walk *w, const grid_nodes *nodes,
                           nb_mask lanes, int n)
 {
     const contact *k = present(m, m->present_first);
-    nb_real depth[3], all[3], seen[3], behind[3];
-    depth_after(k, g, w->along + nb_widen(nodes->amount * REAL(sun_nodes[n])), depth);
-    const light_depth to_sun =
-        depth_of_grid(sun, m, nodes->place[n], lanes, amount_that_hides(sun, k, depth, HIDDEN_PART));
-    for (int c = 0; c < 3; c++) all[c] = depth[c] + to_sun.depth[c];
-    map_channels(sun->snapshot, transmitted, all, seen);
-    map_channels(sun->snapshot, transmitted, depth, behind);
     const nb_real own = nb_narrow(w->along_error) + nodes->error;
-    sun_node sum;
+    sun_node at;
+    lit_fog fog = {.most = NB_F(0.0)};
+    nb_real error[3];
+    depth_after(k, g, w->along + nb_widen(nodes->amount * REAL(grid_shares[n])), at.depth);
+    const light_depth to_sun =
+        depth_of_grid(sun, m, nodes->place[n], lanes, amount_that_hides(sun, k, at.depth, HIDDEN_PART));
+    map_channels(sun->snapshot, transmitted, at.depth, at.behind);
     for (int c = 0; c < 3; c++) {
-        const nb_real error = g->depth_error[c] + k->extinction[c] * own + to_sun.error[c];
-        sum.light[c] = k->glow[c] * nodes->amount * seen[c];
-        sum.doubt[c] = nb_min(error, NB_F(1.0)) + (all[c] + NB_F(16.0)) * (NB_F(2.0) * NB_EPSILON);
-        sum.taken[c] = k->extinction[c] * nodes->amount * behind[c];
+        error[c] = g->depth_error[c] + k->extinction[c] * own;
+        fog.extinction[c] = k->extinction[c];
+        fog.glow[c] = k->glow[c];
+        fog.most = nb_max(fog.most, k->glow[c] / nb_max(k->extinction[c], NB_TINY));
     }
-    return sum;
+    fill_node(sun, &at, &fog, nodes->amount, error, &to_sun);
+    return at;
 }
 
-/* The error that is told, as a multiple of what the nodes are off a parabola: light from voxels is not as smooth as
- * rules want it. */
+/* The error that is told, as a multiple of what the nodes are off a cubic: light from voxels is not as smooth as rules
+ * want it. */
 #define GRID_CAUTION NB_F(4.0)
 
-/* Nothing but lights spends the budget in fog of one medium. */
-#define GRID_SHARE NB_F(3.0)
-
-/* Through Gauss's three nodes goes a parabola, whose integral is their sum. By how much the other nodes are off it adds
- * up to Kronrod's sum less Gauss's. Without signs it cannot vanish by chance, which that does on one ray of a hundred.
- */
-static nb_real off_parabola(const nb_real light[SUN_NODES])
+/* Through the four nodes of Lobatto's rule goes a cubic, whose integral is their sum. By how much the other nodes are off
+ * it adds up to the difference of both rules. Without signs it cannot vanish by chance. */
+static nb_real off_cubic(const sun_node at[SUN_NODES], int c)
 {
-    const double square = 3.0 / 20; /* of how far the outer nodes are from the middle */
-    const double root = sun_nodes[5] - 0.5;
+    static const double cubic[3][4] = {
+        {0.52981150277058676, 0.58869622048869869, -0.17202955382303202, 0.05352183056274658},
+        {-0.125, 0.625, 0.625, -0.125},
+        {0.05352183056274658, -0.17202955382303202, 0.58869622048869869, 0.52981150277058676}};
     nb_real off = NB_F(0.0);
-    for (int n = 0; n < SUN_NODES; n += 2) {
-        const double at = sun_nodes[n] - 0.5;
-        const nb_real between = REAL(at * (at - root) / (2 * square)) * light[1] +
-                                REAL(1 - at * at / square) * light[3] +
-                                REAL(at * (at + root) / (2 * square)) * light[5];
-        off = off + REAL(sun_weights[n]) * nb_abs(light[n] - between);
+    for (int i = 0; i < 3; i++) {
+        const nb_real between = REAL(cubic[i][0]) * at[0].light[c] + REAL(cubic[i][1]) * at[2].light[c] +
+                                REAL(cubic[i][2]) * at[4].light[c] + REAL(cubic[i][3]) * at[6].light[c];
+        off = off + REAL(sun_weights[2 * i + 1]) * nb_abs(at[2 * i + 1].light[c] - between);
     }
     return off;
 }
@@ -119,23 +120,23 @@ static sun_step try_grid_step(sunlight *sun, const march *m, const gathered *g, 
     const nb_mask lanes = nb_and(nb_narrow_mask(w->lanes), k->inside);
     const grid_nodes nodes = place_nodes(k, w->t, end, lanes);
     const nb_mask filled = nb_and(lanes, nodes.amount > NB_F(0.0));
-    sun_step s = {.start = w->t, .length = length, .amount = nb_widen(nodes.amount), .amount_error = nodes.error};
-    nb_real depth[3];
-    depth_after(k, g, w->along + s.amount, depth);
-    map_channels(sun->snapshot, transmitted, depth, s.behind);
-    rule_sum sum = no_rule_sum();
-    nb_real light[3][SUN_NODES] = {{NB_F(0.0)}};
-    for (int n = 0; n < SUN_NODES && nb_any(filled); n++) {
-        const sun_node at = grid_node(sun, m, g, w, &nodes, filled, n);
-        add_node(&sum, &at, n);
-        for (int c = 0; c < 3; c++) light[c][n] = at.light[c];
+    const nb_real zero = NB_F(0.0);
+    sun_step s = begin_step(w, length, nb_wmask_true);
+    s.amount = nb_widen(nodes.amount);
+    s.amount_error = nodes.error;
+    depth_after(k, g, w->along + s.amount, s.depth);
+    map_channels(sun->snapshot, transmitted, s.depth, s.behind);
+    lit_sum sum = {{zero, zero, zero}, zero, zero, zero, zero};
+    if (nb_any(filled)) {
+        sun_node at[SUN_NODES];
+        for (int n = 0; n < SUN_NODES; n++) at[n] = grid_node(sun, m, g, w, &nodes, filled, n);
+        sum = sum_nodes_of_step(at, NB_F(1.0), sun->snapshot->is_gray);
+        for (int c = 0; c < 3; c++) sum.error = nb_max(sum.error, GRID_CAUTION * off_cubic(at, c));
     }
-    finish_rule(&sum, &s);
-    const nb_real at_nodes = s.rounding;
-    for (int c = 0; c < 3 && nb_any(filled); c++) s.error = nb_max(s.error, GRID_CAUTION * off_parabola(light[c]));
+    take_sum(&s, &sum);
     limit_step(m, w->before, &s);
     const nb_real off = nb_min(nodes.error, NB_HUGE);
-    for (int c = 0; c < 3; c++) s.rounding = nb_max(s.rounding, at_nodes + w->before[c] * off * k->glow[c]);
+    for (int c = 0; c < 3; c++) s.rounding = nb_max(s.rounding, sum.rounding + w->before[c] * off * k->glow[c]);
     return s;
 }
 

@@ -303,7 +303,7 @@ static lattice_walk begin_lattice_walk(const voxel_rays *r)
 }
 
 /* Light of so small a part of what steps may add to the error is left out: an eighth of the tolerance at most. */
-#define LEFT_OUT 0.4
+#define LEFT_OUT 0.13
 
 /* Where lanes have come to, in a walk that finds light. */
 typedef struct lit_walk {
@@ -414,8 +414,8 @@ static nb_real usual_doubt_of(const lattice_light *found)
     return NB_F(0.13333333) * all + NB_F(0.3) * nb_sqrt(found->square);
 }
 
-/* Nothing but lights spends the budget in fog of one medium, and nothing here but this. */
-#define LATTICE_SHARE 3.1
+/* Nothing but this spends the budget here. */
+#define LATTICE_SHARE 1.03
 
 /* Adds the light of the lanes that it is good enough for; the others are left. `along` becomes the integral of the
  * density over the piece. */
