@@ -208,10 +208,13 @@ static void select_reals(nb_mask mask, nb_real to[3], const nb_real from[3])
     for (int c = 0; c < 3; c++) to[c] = nb_select(mask, from[c], to[c]);
 }
 
-/* The fog before the first large doubt, as far as it is in the piece. */
+/* The fog before the first large doubt, as far as it is in the piece. A lane without fog in it would not come here alone. */
 static void note_clear(const march *m, const piece *p, gathered *g)
 {
-    const nb_mask clear = nb_and(p->lanes, nb_narrow_mask(nb_wand(m->doubt_from > p->start, m->doubt_from <= NB_WFAR)));
+    nb_mask foggy = nb_mask_false;
+    for (size_t i = m->present_first; i < m->present_end; i++) foggy = nb_or(foggy, present(m, i)->inside);
+    const nb_mask doubtful = nb_narrow_mask(nb_wand(m->doubt_from > p->start, m->doubt_from <= NB_WFAR));
+    const nb_mask clear = nb_and(nb_and(p->lanes, foggy), doubtful);
     if (!nb_any(clear)) return;
     const nb_wide end = nb_wmax(nb_wmin(m->doubt_from, p->end), p->start);
     const nb_real length = nb_narrow(end - p->start) * (NB_F(1.0) - NB_F(2.0) * NB_EPSILON);
@@ -546,6 +549,7 @@ static nebel_result answer_packet(nb_trace_job *job, workspace *w, const allowan
     job->failed = first;
     w->m.wants_error = job->wants_error;
     w->m.ignores_distances = job->ignore_distances;
+    if (w->m.sun != NULL && job->snapshot->is_lamplit) w->m.lamps = most_of_lamps(&w->m);
     if (!meet_fog(w, job->snapshot)) return NEBEL_ERROR_MEMORY;
     allowance share = *may;
     const nb_real pieces = w->m.event_count + NB_F(1.0);

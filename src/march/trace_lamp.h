@@ -63,6 +63,18 @@ static nb_real most_fluence(const lamp_pass *pass, nb_wide start, nb_wide end)
     return fluence * REAL(fmax(fmax(intensity[0], intensity[1]), intensity[2]));
 }
 
+/* The most irradiance of all lamps anywhere on the rays. */
+static nb_real most_of_lamps(const march *m)
+{
+    const nebel_snapshot *snapshot = m->sun->snapshot;
+    nb_real most = NB_F(0.0);
+    for (size_t i = 0; i < snapshot->lamp_count; i++) {
+        const lamp_pass pass = pass_lamp(m, &snapshot->lamps[i]);
+        most = most + most_fluence(&pass, NB_W(0.0), m->rays.t_max);
+    }
+    return most;
+}
+
 /* ---- a node ---------------------------------------------------------------------------------- */
 
 /* Optical depth from t to the lamp. */

@@ -49,7 +49,7 @@ static void add_end_of(ends *sum, const contact *k, nb_wide t, nb_real slack)
         sum->depth[c] = sum->depth[c] + weight * k->extinction[c];
         const nb_real seen =
             nb_min(weight, nb_rcp_bounded(k->extinction[c])); /* no more than what it lets through itself */
-        sum->light[c] = sum->light[c] + seen * (k->light[c] + k->glow[c]);
+        sum->light[c] = sum->light[c] + seen * (k->light[c] + k->glow[c] + k->extinction[c] * k->lamps);
     }
 }
 
@@ -172,10 +172,11 @@ static nb_real per_extinction(const contact *k, int c, nb_real light)
     return nb_select(k->extinction[c] > NB_F(0.0), light / nb_max(k->extinction[c], NB_TINY), light * NB_HUGE);
 }
 
-/* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight and without any. */
+/* Light per extinction of a medium: the radiance it has where it is opaque, in full sunlight and without any; that of
+ * lamps at most. */
 static nb_real opaque_radiance(const contact *k, int c)
 {
-    return per_extinction(k, c, k->light[c] + k->glow[c]);
+    return per_extinction(k, c, k->light[c] + k->glow[c]) + k->lamps;
 }
 
 static nb_real shaded_radiance(const contact *k, int c)
@@ -288,6 +289,7 @@ static void set_skylight(march *m, contact *k, const nb_medium *medium)
 
 struct sunlight;
 static void set_glow(contact *k, const packet *rays, const struct sunlight *sun);
+static double most_scattered(const nb_volume *body);
 
 /* Adds a medium to the march when any ray meets it. */
 static void meet_medium(march *m, const nb_medium *medium)
@@ -304,7 +306,9 @@ static void meet_medium(march *m, const nb_medium *medium)
         k->glow[c] = NB_F(0.0);
     }
     if (medium->sky != NULL && m->wants_sky) set_skylight(m, k, medium);
+    k->lamps = NB_F(0.0);
     if (m->sun != NULL && medium->is_sunlit) set_glow(k, &m->rays, m->sun);
+    if (m->sun != NULL && medium->is_lamplit) k->lamps = m->lamps * REAL(most_scattered(&medium->body));
     k->least_slack = 1 / fmax(medium->densest + medium->brightest, 1e-9);
     if (nb_volume_has_fog(&medium->body)) profile_contact(k, &m->rays);
     if (!meet_leaves(m, k)) return;
