@@ -10,6 +10,13 @@
 
 #include <math.h>
 
+/* As many pixels as are tried of `full`: a quarter at least, for means of fewer would be off by chance. */
+static int pixels_of(int full)
+{
+    const int count = (int)nb_test_count((size_t)full);
+    return count > full / 4 ? count : full / 4;
+}
+
 /* From afar a cloud is the mean of what is seen near. */
 static void test_wide_pixels_see_means(void **state)
 {
@@ -30,9 +37,10 @@ static void test_wide_pixels_see_means(void **state)
 
 /* Through pixels that hide heaps as much comes as through many thin rays within them: in the mean over 300 pixels from
  * 400 km above the ground, whose rays lead so far aside for each metre down, or 0.6 more or less. */
-static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside)
+static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside, size_t turn)
 {
-    enum { PIXELS = 300, RAYS = 24 };
+    enum { RAYS = 24 };
+    const int pixels = pixels_of(300);
     static const double spreads[] = {4e-4, 1.3e-3, 5e-3};
     nebel_clouds *clouds = make(1, layer);
     const nb_cloud_layer *made = &clouds->layers[0];
@@ -41,13 +49,14 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside)
     uint64_t numbers = 23;
     for (size_t s = 0; s < sizeof spreads / sizeof *spreads; s++) {
         double seen = 0, truth = 0;
-        for (int i = 0; i < PIXELS; i++) {
+        if (!nb_test_tries((s + turn) % 3, 3)) continue;
+        for (int i = 0; i < pixels; i++) {
             const double x = aside + dice(&numbers, -.6, .6), z = dice(&numbers, -.6, .6);
             const nebel_ray ray = {{0, 4e5, 0}, {x, -1, z}, HUGE_VAL};
             const double length = sqrt(1 + x * x + z * z);
             nebel_cloud_knots knots;
             assert_int_equal(nebel_trace_clouds(workspace, 1, &ray, 0, &(double){spreads[s]}, 0, &knots, 0), NEBEL_OK);
-            seen += (knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1) / PIXELS;
+            seen += (knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1) / pixels;
             for (int k = 0; k < RAYS; k++) {
                 const double half = .5 * spreads[s] * length, a = x + dice(&numbers, -half, half);
                 const double b = z + dice(&numbers, -half, half), down = sqrt(1 + a * a + b * b);
@@ -56,7 +65,7 @@ static void compare_wide_pixels(const nebel_cloud_layer *layer, double aside)
                 assert_int_equal(nb_cloud_pieces(made->low, made->high, (const double[3]){0, RADIUS + 4e5, 0},
                                                  thin.direction, 3e6, pieces),
                                  1);
-                truth += brute_force(clouds, &thin, pieces[0][0], pieces[0][1], 20) / (PIXELS * RAYS);
+                truth += brute_force(clouds, &thin, pieces[0][0], pieces[0][1], 20) / (pixels * RAYS);
             }
         }
         print_message("pixels of %.0f m, %.1f aside: %.3f of the light comes through, %.3f through thin rays\n",
@@ -72,9 +81,10 @@ static void test_wide_pixels_let_as_much_through(void **state)
 {
     (void)state;
     for (int i = 0; i < 2; i++) {
-        compare_wide_pixels(&(nebel_cloud_layer){.coverage = .4}, 1.6 * i);
-        compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = .6}, 1.6 * i);
-        compare_wide_pixels(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_CIRRUS}, 1.6 * i);
+        const nebel_cloud_layer layers[] = {
+            {.coverage = .4}, {.kind = NEBEL_CLOUD_STRATUS, .coverage = .6}, {.kind = NEBEL_CLOUD_CIRRUS}};
+        for (size_t k = 0; k < 3; k++)
+            if (nb_test_tries((k + (size_t)i) % 2, 2)) compare_wide_pixels(&layers[k], 1.6 * i, k);
     }
 }
 
@@ -82,7 +92,8 @@ static void test_wide_pixels_let_as_much_through(void **state)
  * aslant towards the sun and away from it. */
 static void compare_light_of_pixels(const nebel_cloud_layer *layer)
 {
-    enum { PIXELS = 600, RAYS = 6 };
+    enum { RAYS = 6 };
+    const int pixels = pixels_of(600);
     static const double widths[] = {10, 40, 100}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
     const double far = 2e5;
     nebel_clouds *clouds = make(1, layer);
@@ -91,8 +102,9 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
     uint64_t numbers = 5;
     for (int i = 0; i < 9; i++) {
         const double *unit = directions[i / 3], width = widths[i % 3];
+        if (!nb_test_tries((size_t)(i % 3 + i / 3) % 3, 3)) continue;
         double seen = 0, truth = 0, middle[2] = {0, 0};
-        for (int k = 0; k < PIXELS * RAYS; k++) {
+        for (int k = 0; k < pixels * RAYS; k++) {
             const int is_first = k % RAYS == 0;
             for (int c = 0; c < 2 && is_first; c++) middle[c] = dice(&numbers, -2e4, 2e4);
             const double x = middle[0] + dice(&numbers, -.5, .5) * width,
@@ -104,11 +116,11 @@ static void compare_light_of_pixels(const nebel_cloud_layer *layer)
                 {x - far * unit[0], 1500 - far * unit[1], z - far * unit[2]}, {unit[0], unit[1], unit[2]}, HUGE_VAL};
             nebel_cloud_knots knots;
             assert_int_equal(nebel_trace_clouds(workspace, 1, &thin, 0, &(double){1 / far}, 0, &knots, 0), NEBEL_OK);
-            if (knots.count > 0) truth += (double)knots.in_scattering[knots.count - 1][1] / (PIXELS * RAYS);
+            if (knots.count > 0) truth += (double)knots.in_scattering[knots.count - 1][1] / (pixels * RAYS);
             if (!is_first) continue;
             assert_int_equal(nebel_trace_clouds(workspace, 1, &pixel, 0, &(double){width / far}, 0, &knots, 0),
                              NEBEL_OK);
-            if (knots.count > 0) seen += (double)knots.in_scattering[knots.count - 1][1] / PIXELS;
+            if (knots.count > 0) seen += (double)knots.in_scattering[knots.count - 1][1] / pixels;
         }
         print_message("pixels of %.0f m: light of %.4f, of thin rays %.4f\n", width, seen, truth);
         assert_near(seen, truth, .1 * truth);
@@ -150,7 +162,7 @@ static nb_shown show_pixels(nebel_cloud_workspace *workspace, const double unit[
 
 /* So is that of pixels that hide heaps, which is that of a table, but for places that the table has by chance; and pixels wider
  * than all heaps have no grain. */
-static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even)
+static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even, int turn)
 {
     static const double widths[] = {440, 2000, 20000}, directions[][3] = {{0, -1, 0}, {.7, -.7, .1}, {-.8, -.3, -.5}};
     nebel_clouds *clouds = make(1, layer);
@@ -158,9 +170,10 @@ static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even)
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 29;
     for (int i = 0; i < 3; i++) {
-        const double truth = show_pixels(workspace, directions[i], 10, 1200, &numbers).mean;
+        if (!nb_test_tries((size_t)(i + turn) % 3, 3)) continue;
+        const double truth = show_pixels(workspace, directions[i], 10, pixels_of(1200), &numbers).mean;
         for (int k = 0; k < 3; k++) {
-            const nb_shown seen = show_pixels(workspace, directions[i], widths[k], 3000, &numbers);
+            const nb_shown seen = show_pixels(workspace, directions[i], widths[k], pixels_of(3000), &numbers);
             print_message("pixels of %.0f m: light of %.4f, grain of %.4f; of thin rays %.4f\n", widths[k], seen.mean,
                           seen.deviation, truth);
             assert_near(seen.mean, truth, .15 * truth);
@@ -175,9 +188,9 @@ static void compare_light_of_crowds(const nebel_cloud_layer *layer, double even)
 static void test_light_of_pixels_that_hide_heaps(void **state)
 {
     (void)state;
-    compare_light_of_crowds(&(nebel_cloud_layer){.coverage = .5}, .15);
-    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS}, .05);
-    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, .02);
+    compare_light_of_crowds(&(nebel_cloud_layer){.coverage = .5}, .15, 0);
+    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS}, .05, 1);
+    compare_light_of_crowds(&(nebel_cloud_layer){.kind = NEBEL_CLOUD_STRATUS, .coverage = 1}, .02, 2);
 }
 
 /* With the sun ten degrees high, along flat rays towards it and away from it: thin rays end on the first cloud, of whose
@@ -197,8 +210,9 @@ static void test_light_under_a_low_sun(void **state)
         assert_int_equal(nebel_create_cloud_view(&desc, &view), NEBEL_OK);
         assert_int_equal(nebel_create_cloud_workspace(view, &workspace), NEBEL_OK);
         for (int i = 0; i < 2; i++) {
-            const double truth = show_pixels(workspace, directions[i], 10, 1200, &numbers).mean;
-            const double seen = show_pixels(workspace, directions[i], 20000, 1200, &numbers).mean;
+            if (!nb_test_tries((size_t)(i + kind) % 2, 2)) continue;
+            const double truth = show_pixels(workspace, directions[i], 10, pixels_of(1200), &numbers).mean;
+            const double seen = show_pixels(workspace, directions[i], 20000, pixels_of(1200), &numbers).mean;
             print_message("low sun, pixels of 20 km: light of %.4f, of thin rays %.4f\n", seen, truth);
             assert_near(seen, truth, .15 * truth);
         }
@@ -288,8 +302,9 @@ static void test_weather_ends_where_it_ends(void **state)
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     const double *center = clouds->atmosphere->center, radius = clouds->atmosphere->airs.radius;
     const double step = 2 * tan(25 * PI / 180) / ROWS, edge = PI / HIGH * BELT;
-    int within = 0, beyond = 0;
+    size_t within = 0, beyond = 0;
     for (int i = 0; i < ROWS * ROWS; i++) {
+        if (!nb_test_tries((size_t)i, ROWS * ROWS)) continue;
         const double x = step * (i % ROWS - ROWS / 2), y = step * (i / ROWS - ROWS / 2);
         const nebel_ray ray = {{center[0], center[1], center[2] + 16e6}, {x, y, -1}, HUGE_VAL};
         const double square = 1 + x * x + y * y, under = 16e6 * 16e6 - square * (16e6 * 16e6 - radius * radius);
@@ -303,7 +318,7 @@ static void test_weather_ends_where_it_ends(void **state)
         if (latitude > edge) beyond += knots.count > 0;
     }
     assert_int_equal(beyond, 0);
-    assert_true(within > 10000);
+    assert_true(within > 3 * nb_test_count(ROWS * ROWS) / 10);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     nebel_destroy_clouds(clouds);
@@ -381,17 +396,17 @@ static double once_before_sun(const nb_before_sun *scene, const nebel_ray *ray, 
 
 static void compare_straight_before_sun(nebel_cloud_kind kind, double degrees)
 {
-    enum { RAYS = 400 };
+    const int rays = pixels_of(400);
     nb_before_sun scene = begin_before_sun(kind, degrees);
     uint64_t numbers = 37;
     double sum = 0, truth = 0, most = 0;
-    for (int i = 0; i < RAYS; i++) {
+    for (int i = 0; i < rays; i++) {
         const double from[2] = {dice(&numbers, -3e5, 3e5), dice(&numbers, -3e5, 3e5)};
         const nebel_ray ray = ray_beside_sun(&scene, from, (const double[2]){1e-3, 1e-3});
         const nb_look look = look_along(&scene, &ray, 1e-5);
         const double once = look.left < 1 ? once_before_sun(&scene, &ray, kind == NEBEL_CLOUD_CIRRUS ? 60 : 6) : 0;
-        sum += look.light / RAYS;
-        truth += once / RAYS;
+        sum += look.light / rays;
+        truth += once / rays;
         if (look.left < 1e-4) most = fmax(most, look.light - once);
     }
     print_message(
@@ -402,14 +417,15 @@ static void compare_straight_before_sun(nebel_cloud_kind kind, double degrees)
     end_before_sun(&scene);
 }
 
+static const double heights_of_sun[] = {2.6, 8, 26}; /* degrees */
+
 static void test_light_straight_before_the_sun(void **state)
 {
     (void)state;
-    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++) {
-        compare_straight_before_sun((nebel_cloud_kind)kind, 2.6);
-        compare_straight_before_sun((nebel_cloud_kind)kind, 8);
-        compare_straight_before_sun((nebel_cloud_kind)kind, 26);
-    }
+    for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++)
+        for (int i = 0; i < 3; i++)
+            if (nb_test_tries((size_t)(kind + i) % 3, 3))
+                compare_straight_before_sun((nebel_cloud_kind)kind, heights_of_sun[i]);
 }
 
 /* Mean light of pixels, and of thin rays within them: where hardly any light comes through thin rays, and elsewhere. */
@@ -443,13 +459,14 @@ static void add_pixel(const nb_before_sun *scene, const double from[2], const do
 static void compare_beside_sun(nebel_cloud_kind kind, double degrees)
 {
     const double spread = 6e-3;
-    enum { PIXELS = 500 };
+    const int pixels = pixels_of(500);
     static const double angles[] = {.1, .5, 1.5};
     nb_before_sun scene = begin_before_sun(kind, degrees);
     for (size_t i = 0; i < sizeof angles / sizeof *angles; i++) {
         uint64_t numbers = 41;
         nb_beside sums[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
-        for (int k = 0; k < PIXELS; k++) {
+        if (!nb_test_tries((i + (size_t)kind) % 3, 3)) continue;
+        for (int k = 0; k < pixels; k++) {
             const double from[2] = {dice(&numbers, -3e5, 3e5), dice(&numbers, -3e5, 3e5)};
             const double turn = dice(&numbers, 0, PI), angle = angles[i] * PI / 180;
             add_pixel(&scene, from, (const double[2]){angle * cos(turn), angle * sin(turn)}, spread, sums);
@@ -496,9 +513,9 @@ static void test_heaps_fade_with_the_width_of_pixels(void **state)
 static void test_light_of_pixels_beside_the_sun(void **state)
 {
     (void)state;
-    static const double degrees[] = {2.6, 8, 26};
     for (int kind = 0; kind < NEBEL_CLOUD_KIND_COUNT; kind++)
-        for (int i = 0; i < 3; i++) compare_beside_sun((nebel_cloud_kind)kind, degrees[i]);
+        for (int i = 0; i < 3; i++)
+            if (nb_test_tries((size_t)(kind + i) % 3, 3)) compare_beside_sun((nebel_cloud_kind)kind, heights_of_sun[i]);
 }
 
 int main(void)

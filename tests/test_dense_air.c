@@ -138,15 +138,15 @@ static double walk(const scene *of)
 /* Mean and standard error. */
 static void walk_often(const scene *of, double mean[2])
 {
-    enum { WALKS = 100000 };
+    const size_t walks = nb_test_count(100000);
     double sum = 0, square = 0;
-    for (int i = 0; i < WALKS; i++) {
+    for (size_t i = 0; i < walks; i++) {
         const double light = walk(of);
         sum += light;
         square += light * light;
     }
-    mean[0] = sum / WALKS;
-    mean[1] = sqrt((square / WALKS - mean[0] * mean[0]) / WALKS);
+    mean[0] = sum / (double)walks;
+    mean[1] = sqrt((square / (double)walks - mean[0] * mean[0]) / (double)walks);
 }
 
 /* What is off is told, but for what chance itself may be off; most: part of the light. */

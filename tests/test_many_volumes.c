@@ -5,12 +5,13 @@
 #include "fog_help.h"
 
 #if defined(__SANITIZE_ADDRESS__)
-static size_t volume_count = 50000;
+enum { VOLUMES = 50000 };
 #elif SIZE_MAX == UINT32_MAX
-static size_t volume_count = 200000; /* programs of 32 bits have 2 GiB of Windows */
+enum { VOLUMES = 200000 }; /* programs of 32 bits have 2 GiB of Windows */
 #else
-static size_t volume_count = 1000000;
+enum { VOLUMES = 1000000 };
 #endif
+static size_t volume_count;
 
 enum { RAYS = 24, CROWD = 3000 };
 
@@ -192,7 +193,7 @@ static void test_thousands_of_volumes_on_one_ray_are_exact_in_any_order(void **u
 
 int main(int argc, char **argv)
 {
-    if (argc > 1) volume_count = (size_t)strtoull(argv[1], NULL, 10);
+    volume_count = argc > 1 ? (size_t)strtoull(argv[1], NULL, 10) : nb_test_count(VOLUMES);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_million_volumes_are_found_by_every_ray),
         cmocka_unit_test(test_thousands_of_volumes_on_one_ray_are_exact_in_any_order),

@@ -343,11 +343,20 @@ static estimate measure_flux(const layer *l, int above, uint32_t paths)
     return (estimate){sum, sqrt((square - sum * sum) / paths)};
 }
 
+/* Some of a table's layers, and the first of each kind of phase function. */
+static int is_tried(const layer *table, size_t count, const layer *l)
+{
+    const layer *first = table;
+    while (first->phase.type != l->phase.type) first++;
+    return first == l || nb_test_tries((size_t)(l - table), count);
+}
+
 static void layers_are_those_of_T33_and_T35(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof layers / sizeof *layers; i++) {
         const layer *l = &layers[i];
+        if (!is_tried(layers, sizeof layers / sizeof *layers, l)) continue;
         for (int above = 0; above < 2; above++) {
             const double expected = above ? l->reflected : l->transmitted;
             const estimate e = measure_flux(l, above, 20000 * effort);
@@ -362,6 +371,7 @@ static void layers_are_those_of_T34(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof disort_layers / sizeof *disort_layers; i++) {
         const layer *l = &disort_layers[i];
+        if (!is_tried(disort_layers, sizeof disort_layers / sizeof *disort_layers, l)) continue;
         for (int above = 0; above < 2; above++) {
             const double expected = above ? l->reflected : l->transmitted;
             const estimate e = measure_flux(l, above, 20000 * effort);
@@ -376,6 +386,7 @@ static void layers_under_white_sky_keep_what_they_do_not_absorb(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof layers / sizeof *layers; i++) {
         const layer *l = &layers[i];
+        if (!is_tried(layers, sizeof layers / sizeof *layers, l)) continue;
         run r = start_beam(l->depth, l->sun, 1);
         r.bounces = 0;
         r.samples = 1024;

@@ -593,6 +593,7 @@ static void the_horizon_has_no_steps(void **state)
     world w;
     make_world("earth", sun, &w);
     for (int k = 0; k < SHIFTS; k++) {
+        if (!nb_test_tries((size_t)k, SHIFTS)) continue;
         nebel_camera camera = planet_camera(1.7, 6. / HEIGHT * k / 14 * degree);
         camera.vertical_fov = 6;
         test_picture small = render(&w, NULL, &camera, NEBEL_ISA_DEFAULT, 2, 64);

@@ -19,4 +19,11 @@ static inline size_t nb_test_count(size_t full)
     return scaled > 1 ? (size_t)scaled : 1;
 }
 
+/* Whether row `row` of `all`, from 0, is one of nb_test_count(all) that lie evenly among them. */
+static inline int nb_test_tries(size_t row, size_t all)
+{
+    const size_t count = nb_test_count(all);
+    return row * count / all != (row + 1) * count / all;
+}
+
 #endif
