@@ -2,6 +2,7 @@
  * does harms this one. */
 #define _GNU_SOURCE
 #include "model_help.h"
+#include "scene/model_budget.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -282,6 +283,30 @@ static void test_the_reader_dies_with_its_parent(void **state)
     if (now != 0 && now != 'Z') fail_msg("the reader goes on: %c", now);
 }
 
+/* ---- hostile models -------------------------------------------------------------------------- */
+
+/* Where Assimp puts another corner in place of one that does not exist, and tells nobody but its log. */
+static void test_what_assimp_makes_up_is_told(void **state)
+{
+    (void)state;
+    journal kept;
+    write_text("corner.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9999999\n");
+    assert_int_equal(try_model(NULL, "corner.off", &kept), NEBEL_OK);
+    assert_non_null(strstr(kept.last, "corner.off"));
+    assert_non_null(strstr(kept.last, "out of range"));
+}
+
+static void test_more_memory_than_a_file_warrants(void **state)
+{
+    (void)state;
+    journal kept;
+    if (NB_SANITIZED) skip(); /* no limit then */
+    write_text("counts.off", "OFF\n300000000 300000000 0\n0 0 0\n");
+    assert_int_equal(try_model(NULL, "counts.off", &kept), NEBEL_ERROR_LIMIT);
+    assert_non_null(strstr(kept.last, "counts.off"));
+    assert_non_null(strstr(kept.last, "MB of memory"));
+}
+
 /* ---- files that a model names ---------------------------------------------------------------- */
 
 static void test_references_stay_in_the_folder(void **state)
@@ -346,6 +371,8 @@ int main(void)
                                        cmocka_unit_test(test_a_host_may_have_closed_its_standard_files),
                                        cmocka_unit_test(test_many_threads_may_read_models),
                                        cmocka_unit_test(test_the_reader_dies_with_its_parent),
+                                       cmocka_unit_test(test_what_assimp_makes_up_is_told),
+                                       cmocka_unit_test(test_more_memory_than_a_file_warrants),
                                        cmocka_unit_test(test_references_stay_in_the_folder),
                                        cmocka_unit_test(test_links_and_pipes_are_no_way_out)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder_tree);

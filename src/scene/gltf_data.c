@@ -108,7 +108,7 @@ nebel_result nb_gltf_find_bytes(nb_gltf_data *data, const nb_gltf_range *range, 
     if (result != NEBEL_OK) return result;
     const bool is_chunk = index == 0 && data->buffers[0].uri == NULL && data->has_chunk;
     const nb_bytes *whole = is_chunk ? &data->chunk : &data->buffers[index].bytes;
-    if (range->offset > whole->size || range->size > whole->size - range->offset)
+    if (whole->data == NULL || range->offset > whole->size || range->size > whole->size - range->offset)
         return nb_gltf_fail(data, "buffers", index, "is shorter than what is read of it");
     *bytes = whole->data + range->offset;
     return NEBEL_OK;

@@ -30,7 +30,7 @@ static nebel_result fail_memory(const nb_gltf_data *data)
 static bool is_possible(const nb_meshopt_view *view)
 {
     const uint64_t stride = view->stride, count = view->count;
-    if (stride == 0 || stride > 256 || count > UINT32_MAX) return false;
+    if (stride == 0 || stride > 256 || count == 0 || count > UINT32_MAX) return false;
     if (view->mode != NB_MESHOPT_ATTRIBUTES)
         return (stride == 2 || stride == 4) && view->filter == NB_MESHOPT_NONE &&
                (view->mode == NB_MESHOPT_INDICES || count % 3 == 0);
@@ -215,8 +215,8 @@ static bool change_views(const nb_gltf_data *data, changes *list)
     for (size_t i = 0; i < data->view_count && good; i++) {
         const nb_gltf_view *view = &data->views[i];
         if (!view->is_packed) continue;
-        snprintf(stride, sizeof stride, view->stride > 0 ? ",\"byteStride\":%llu" : "",
-                 (unsigned long long)view->stride);
+        stride[0] = '\0';
+        if (view->stride > 0) snprintf(stride, sizeof stride, ",\"byteStride\":%llu", (unsigned long long)view->stride);
         snprintf(text, sizeof text, "{\"buffer\":%zu,\"byteOffset\":%llu,\"byteLength\":%llu%s}", data->buffer_count,
                  (unsigned long long)view->unpacked, (unsigned long long)(view->packed.count * view->packed.stride),
                  stride);
@@ -345,15 +345,22 @@ static bool begins_object(const nb_bytes *text)
     return at < text->size && text->data[at] == '{';
 }
 
-nebel_result nb_gltf_prepare(const nb_model_load *load, nb_model_files *files, nb_gltf_files *made)
+nebel_result nb_gltf_prepare_text(const nb_model_load *load, nb_model_files *files, nb_bytes *text, nb_gltf_files *made)
 {
-    nb_gltf_data data = {.load = load, .files = files, .arena = {.allocator = load->allocator}};
-    *made = (nb_gltf_files){0};
-    nebel_result result = nb_gltf_read_text(&load->allocator, load->source->file, &data.text);
-    if (result != NEBEL_OK) return fail_memory(&data);
-    if (begins_object(&data.text)) result = prepare(&data, made);
+    nb_gltf_data data = {.load = load, .files = files, .arena = {.allocator = load->allocator}, .text = *text};
+    const nebel_result result = begins_object(text) ? prepare(&data, made) : NEBEL_OK;
+    *text = (nb_bytes){0};
     nb_gltf_release_data(&data);
     return result;
+}
+
+nebel_result nb_gltf_prepare(const nb_model_load *load, nb_model_files *files, nb_gltf_files *made)
+{
+    nb_bytes text;
+    *made = (nb_gltf_files){0};
+    if (nb_gltf_read_text(&load->allocator, load->source->file, &text) != NEBEL_OK)
+        return nb_model_fail(load, NEBEL_ERROR_MEMORY, "out of memory");
+    return nb_gltf_prepare_text(load, files, &text, made);
 }
 
 void nb_gltf_release_files(const nebel_allocator *allocator, nb_gltf_files *made)

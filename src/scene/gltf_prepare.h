@@ -21,6 +21,10 @@ typedef struct nb_gltf_files {
  * compressed buffer views are decompressed: Assimp then is to read made->files in place of the file. Release `made` also
  * after an error. Errors: FORMAT, LIMIT, MEMORY, UNSUPPORTED. */
 nebel_result nb_gltf_prepare(const nb_model_load *load, nb_model_files *files, nb_gltf_files *made);
+
+/* The same of a text that is there already, and becomes the callee's. */
+nebel_result nb_gltf_prepare_text(const nb_model_load *load, nb_model_files *files, nb_bytes *text,
+                                  nb_gltf_files *made);
 void nb_gltf_release_files(const nebel_allocator *allocator, nb_gltf_files *made);
 
 #endif

@@ -228,7 +228,7 @@ static nb_receipt take_mesh(nb_receiver *in, const nb_wire_frame *frame)
 static nb_receipt take_places(nb_receiver *in, const nb_wire_frame *frame)
 {
     nb_point_set *points = in->load->points;
-    if (points == NULL || frame->size % sizeof *points->places != 0) return NB_RECEIPT_BAD;
+    if (points == NULL || frame->size == 0 || frame->size % sizeof *points->places != 0) return NB_RECEIPT_BAD;
     const uint64_t count = frame->size / sizeof *points->places;
     if (count > points->limit - points->count) return NB_RECEIPT_BAD;
     if (!fits(in, frame->size)) return NB_RECEIPT_TOO_BIG;
