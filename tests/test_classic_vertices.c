@@ -620,7 +620,7 @@ static void test_descriptions_that_are_none_are_refused(void **unused)
     nebel_snapshot *const snapshot = fog_commit(&(nebel_fog_desc){.log = fog_messages_log(&messages)}, &box, 1);
     const float point[3] = {0};
     float out[4];
-    const double nan_color[3] = {0, 0, (double)NAN}, minus[3] = {-1, 0, 0};
+    const double nan_color[3] = {0, 0, (double)NAN}, minus[3] = {-1, 0, 0}, beyond[3] = {0, 1e39, 0};
     nebel_vertices vertices = {.positions = point};
     const nebel_vertex_output output = {NEBEL_VERTEX_RGBA_FLOAT, out, 0};
     const struct {
@@ -634,6 +634,8 @@ static void test_descriptions_that_are_none_are_refused(void **unused)
                  {{.curve = NEBEL_CURVE_LINEAR}, NEBEL_ERROR_ARGUMENT}, /* without a color */
                  {{.color = nan_color}, NEBEL_ERROR_VALUE},
                  {{.color = minus}, NEBEL_ERROR_VALUE},
+                 {{.color = beyond}, NEBEL_ERROR_VALUE}, /* no float */
+                 {{.coordinate_end = 1e39}, NEBEL_ERROR_VALUE},
                  {{.coordinate_end = -1}, NEBEL_ERROR_VALUE}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         assert_int_equal(nebel_fog_vertices(snapshot, &cases[i].desc, 1, &vertices, &output, 1), cases[i].result);

@@ -305,6 +305,20 @@ static void test_pictures_that_do_not_fit(void **state)
     assert_int_equal(create(&s, NULL), NEBEL_OK);
     expect_message(draw(&s, (uint32_t)widest + 1, 1), NEBEL_ERROR_LIMIT, "The CPU renders larger pictures");
     expect_message(draw(&s, 0, 1), NEBEL_ERROR_VALUE, "0 x 24 pixels");
+    for (int i = 0; i < 5; i++) {
+        nebel_particle bad = {.radius = 1};
+        if (i == 0) bad.center[2] = (double)NAN;
+        if (i == 1) bad.radius = -1;
+        if (i == 2) bad.extinction[1] = -.1;
+        if (i == 3) bad.emission[0] = (double)NAN;
+        if (i == 4) bad.radius = 0;
+        expect_message(nebel_set_gl_renderer_particles(s.renderer, &bad, 1), NEBEL_ERROR_VALUE, "particle 0");
+    }
+    const nebel_gl_frame_desc late = {.camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}, .vertical_fov = 50},
+                                      .width = 1,
+                                      .height = 1,
+                                      .time = (double)NAN};
+    expect_message(nebel_gl_render_frame(s.renderer, &late), NEBEL_ERROR_VALUE, "time is nan");
     assert_int_equal(draw(&s, 1, 1), NEBEL_OK);
     end(&s);
 }

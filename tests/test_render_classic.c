@@ -126,6 +126,23 @@ static void test_orthographic_rays_begin_beside_the_camera(void **state)
     test_picture_free(&picture);
 }
 
+/* Weights of corners come to 1 but for rounding. */
+static void test_opaque_fog_has_no_negative_light(void **state)
+{
+    (void)state;
+    const nebel_mesh mesh = test_ground();
+    const nebel_scene_data scene = {.meshes = &mesh, .mesh_count = 1, .ambient = {1, 1, 1}};
+    const nebel_camera camera = test_camera_down();
+    nebel_snapshot *fog = test_world_fog(1e3, 0);
+    test_picture picture = test_picture_make(80, 60);
+    assert_int_equal(render(&scene, fog, NEBEL_METHOD_VERTEX, NULL, 1, &camera, &picture), NEBEL_OK);
+    for (size_t i = 0; i < 3 * 80 * 60; i++)
+        assert_true(picture.planes.color[i] >= 0 && picture.planes.transmittance[i] >= 0 &&
+                    picture.planes.transmittance[i] <= 1);
+    nebel_release_snapshot(fog);
+    test_picture_free(&picture);
+}
+
 /* ---- added fog ------------------------------------------------------------------------------- */
 
 static void test_added_fog_hides_nothing(void **state)
@@ -494,6 +511,7 @@ int main(void)
         cmocka_unit_test(test_vertices_are_exact_and_linear_between),
         cmocka_unit_test(test_fine_meshes_come_near_to_exact),
         cmocka_unit_test(test_orthographic_rays_begin_beside_the_camera),
+        cmocka_unit_test(test_opaque_fog_has_no_negative_light),
         cmocka_unit_test(test_added_fog_hides_nothing),
         cmocka_unit_test(test_factors),
         cmocka_unit_test(test_streams_of_hardware),

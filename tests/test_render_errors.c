@@ -105,8 +105,10 @@ static void test_bad_frames(void **state)
 {
     (void)state;
     const nebel_scene_data scene = {0};
-    nebel_frame_desc frames[16];
-    for (int i = 0; i < 16; i++) frames[i] = good_frame();
+    nebel_frame_desc frames[18];
+    for (int i = 0; i < 18; i++) frames[i] = good_frame();
+    frames[16].time = (double)NAN;
+    frames[17].time = -2e12;
     frames[0].width = 0;
     frames[1].height = 32769;
     frames[2].samples = 4097;
@@ -125,7 +127,7 @@ static void test_bad_frames(void **state)
     frames[13].camera.view_height = HUGE_VAL;
     frames[14].camera.projection = (nebel_projection)7;
     frames[15].camera.up[2] = (double)NAN;
-    for (int i = 0; i < 16; i++) assert_bad_frame(&scene, &frames[i]);
+    for (int i = 0; i < 18; i++) assert_bad_frame(&scene, &frames[i]);
     const nebel_frame_desc good = good_frame();
     assert_bad_frame(&(nebel_scene_data){.background = {-1, 0, 0}}, &good);
     assert_bad_frame(&(nebel_scene_data){.ambient = {0, (double)NAN, 0}}, &good);

@@ -133,6 +133,9 @@ static void test_what_would_vanish_keeps_the_nearer_key(void **state)
     nebel_snapshot *fog = NULL;
     assert_int_equal(nebel_commit_scene_fog_at(scene, 1, &fog), NEBEL_OK);
     nebel_release_snapshot(fog);
+    assert_int_equal(nebel_commit_scene_fog_at(scene, (double)NAN, &fog), NEBEL_ERROR_VALUE);
+    assert_int_equal(nebel_commit_scene_volumes_at(scene, HUGE_VAL, &fog), NEBEL_ERROR_VALUE);
+    assert_null(fog);
     nebel_destroy_scene(scene);
 }
 

@@ -295,6 +295,17 @@ static void test_what_is_no_view_is_refused(void **state)
     refuse_view_with(1, 14, 0); /* the eye has no depth */
     refuse_view_with(0, 3, .1); /* a projection in place of a view */
     refuse_view_with(0, 15, 2);
+    for (int row = 0; row < 4; row++) { /* a row that two others give, or none: no place has a depth of its own */
+        view = make_view(PERSPECTIVE, (range){-1, 0});
+        for (int i = 0; i < 16; i += 4)
+            view.clip_from_eye[i + row] =
+                .3 * view.clip_from_eye[i + (row + 1) % 4] + .7 * view.clip_from_eye[i + (row + 2) % 4];
+        expect_refusal(&view, NULL);
+        view = make_view(ORTHOGRAPHIC, (range){-1, 0});
+        for (int i = 0; i < 16; i += 4)
+            view.clip_from_eye[i + row] = row == 3 ? 0 : .3 * view.clip_from_eye[i + (row + 1) % 3];
+        expect_refusal(&view, NULL);
+    }
     const nebel_view zero = {.width = 8, .height = 8};
     expect_refusal(&zero, NULL);
 }

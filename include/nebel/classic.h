@@ -225,8 +225,8 @@ typedef struct nebel_vertex_desc {
 } nebel_vertex_desc;
 
 /* Checks a description and puts its defaults in. Any thread. Errors: ARGUMENT (NULL, a channel or curve that is none,
- * a curve without its table, another isa than those of nebel.h), VALUE (a color or coordinate_end that is not finite
- * or negative). */
+ * a curve without its table, another isa than those of nebel.h), VALUE (a color or coordinate_end that is negative or
+ * not a finite float). */
 nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vertex_desc *resolved);
 
 /* What fog does between the eye and each of n vertices, written to `output_count` streams at once. In float; through

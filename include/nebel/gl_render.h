@@ -72,7 +72,7 @@ nebel_result nebel_set_gl_renderer_fog(nebel_gl_renderer *renderer, nebel_snapsh
  * up to the surface behind it have closed forms, from the farthest centre to the nearest: particles that overlap take
  * their light from each other as if one were behind the other, and fog counts before a particle's middle. They dim
  * the sun unless a frame leaves that out. O(count log count) for each frame, and what they cover. Errors: ARGUMENT,
- * MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
+ * VALUE (numbers that nebel_add_volume would refuse), MEMORY, UNSUPPORTED (OpenGL ES without GL_EXT_float_blend). */
 nebel_result nebel_set_gl_renderer_particles(nebel_gl_renderer *renderer, const nebel_particle *particles,
                                              size_t count);
 

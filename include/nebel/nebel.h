@@ -32,6 +32,9 @@
  * Conventions: metres, right-handed coordinates, linear Rec. 709 RGB. A description that is
  * all zero is valid; a zero member means the default named beside it. Functions return NEBEL_OK (0) or a negative
  * nebel_result; what went wrong, where and how to mend it goes to the log callback. Without a callback nebel is silent.
+ * NULL where something is needed gives ARGUMENT. Functions without a result then do nothing, or return what stands for
+ * nothing: 0, "", NULL, a structure of zeros, the default camera, a sun without light, a fog factor of 1, NaN of phase
+ * functions.
  *
  * Threads: different fogs may be used from different threads at once. One fog belongs to one thread at a time. A
  * snapshot never changes and may be queried by any number of threads.

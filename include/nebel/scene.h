@@ -260,7 +260,7 @@ nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double
 /* Lights the scene by the sun of a frame, where it has keys: the sun of the contents becomes that, and what the air of a
  * planet leaves of it at the scene's origin, with the sky there, is made anew (0.1 s), as far as nebel_load_scene_planet has
  * made it before. Frames and snapshots from now on have that light. Not thread safe against readers of the same scene, nor
- * while a frame of it is rendered. Errors: ARGUMENT (NULL), MEMORY; the sky is then as it was. */
+ * while a frame of it is rendered. Errors: ARGUMENT (NULL), VALUE (a frame beyond 1e12), MEMORY; the sky is then as it was. */
 nebel_result nebel_light_scene_at(nebel_scene *scene, double frame);
 
 /* The same by any sun, also in a scene without one; NULL: none. Errors: as above; ARGUMENT also for a sun with numbers that are not
@@ -269,7 +269,7 @@ nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun);
 
 /* The light of the sun that fog of a snapshot has: of the sun of the contents what the planets' air, their shadows and, as
  * the wind has moved them until the frame, their clouds leave at the scene's origin. Without a sun one of no light. Where
- * there are clouds, some 10 ms. Errors: ARGUMENT, MEMORY, VALUE (a frame beyond 1e12, with clouds); *sunlight is then
+ * there are clouds, some 10 ms. Errors: ARGUMENT, MEMORY, VALUE (a frame beyond 1e12); *sunlight is then
  * untouched. */
 nebel_result nebel_find_scene_sunlight(const nebel_scene *scene, double frame, nebel_sun *sunlight);
 

@@ -142,11 +142,13 @@ static int keep_portal(nebel_cells *cells, const size_t ends[2], const double (*
 
 size_t nebel_count_cell_portals(const nebel_cells *cells)
 {
+    if (cells == NULL) return 0;
     return cells->portal_count;
 }
 
 nebel_portal nebel_get_cell_portal(const nebel_cells *cells, size_t index)
 {
+    if (cells == NULL || index >= cells->portal_count) return (nebel_portal){.vertices = NULL};
     const nb_portal *portal = &cells->portals[index];
     return (nebel_portal){{portal->cells[0], portal->cells[1]},
                           (const double(*)[3])cells->vertices + portal->first_vertex,

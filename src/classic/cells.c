@@ -16,6 +16,7 @@
 
 nebel_volume_desc nebel_cell_volume(const nebel_cell *cell)
 {
+    if (cell == NULL) return (nebel_volume_desc){.priority = 0};
     nebel_volume_desc volume = {.shape = cell->shape};
     for (int c = 0; c < 3; c++) {
         volume.extinction[c] = cell->density;

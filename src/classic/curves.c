@@ -31,6 +31,7 @@ static double look_up(const float *table, double x)
 
 double nebel_compute_curve_amount(const nebel_curve *resolved, double s)
 {
+    if (resolved == NULL || (resolved->type == NEBEL_CURVE_TABLE && resolved->table == NULL)) return 0;
     const double x = s > 0 ? resolved->k * s : 0;
     switch (resolved->type) {
     case NEBEL_CURVE_LINEAR:

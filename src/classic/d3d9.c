@@ -9,6 +9,7 @@
 
 void nebel_reset_d3d9_fog(nebel_d3d9_fog *fog)
 {
+    if (fog == NULL) return;
     *fog = (nebel_d3d9_fog){.fog_end = 1, .fog_density = 1};
 }
 
@@ -58,7 +59,8 @@ nebel_result nebel_get_d3d9_fog(const nebel_d3d9_fog *fog, uint32_t state, uint3
 
 void nebel_get_d3d9_color(const nebel_d3d9_fog *fog, double rgb[3])
 {
-    for (int c = 0; c < 3; c++) rgb[c] = (fog->fog_color >> (16 - 8 * c) & 0xff) / 255.;
+    if (rgb == NULL) return;
+    for (int c = 0; c < 3; c++) rgb[c] = fog == NULL ? 0 : (fog->fog_color >> (16 - 8 * c) & 0xff) / 255.;
 }
 
 /* ---- factors --------------------------------------------------------------------------------- */
@@ -91,7 +93,7 @@ static double fixed_factor(const nebel_d3d9_fog *fog, const nebel_d3d9_vertex *v
 
 double nebel_compute_d3d9_vertex_factor(const nebel_d3d9_fog *fog, const nebel_d3d9_vertex *vertex)
 {
-    if (!fog->fog_enable) return 1;
+    if (fog == NULL || vertex == NULL || !fog->fog_enable) return 1;
     switch (vertex->source) {
     case NEBEL_D3D9_TRANSFORMED:
         return clamp_factor(vertex->specular_alpha);
@@ -104,12 +106,13 @@ double nebel_compute_d3d9_vertex_factor(const nebel_d3d9_fog *fog, const nebel_d
 
 double nebel_compute_d3d9_pixel_factor(const nebel_d3d9_fog *fog, double vertex_factor, double depth)
 {
-    if (!fog->fog_enable) return 1;
+    if (fog == NULL || !fog->fog_enable) return 1;
     if (fog->fog_table_mode == NEBEL_D3DFOG_NONE) return clamp_factor(vertex_factor);
     return evaluate(fog, fog->fog_table_mode, NEBEL_STAGE_PIXEL, depth);
 }
 
 int nebel_d3d9_uses_w(const float projection[16])
 {
+    if (projection == NULL) return 0;
     return projection[11] != 0;
 }

@@ -33,6 +33,7 @@ static double length_of(const double v[3])
 
 double nebel_compute_fog_coordinate(const nebel_factor_desc *resolved, const double place[3], double user)
 {
+    if (resolved == NULL || (place == NULL && resolved->coordinate != NEBEL_COORDINATE_USER)) return 0;
     switch (resolved->coordinate) {
     case NEBEL_COORDINATE_RADIAL:
         return length_of(place);
@@ -59,11 +60,13 @@ double nb_factor_evaluate(const nebel_factor_desc *d, double c)
 
 double nebel_compute_fog_factor(const nebel_factor_desc *resolved, double c)
 {
+    if (resolved == NULL) return 1;
     return nb_factor_evaluate(resolved, c);
 }
 
 void nebel_blend_fog_factor(double f, const float surface[4], const double fog[3], float out[4])
 {
+    if (surface == NULL || fog == NULL || out == NULL) return;
     const double factor = isnan(f) ? 1 : f;
     for (int c = 0; c < 3; c++) out[c] = (float)(factor * (double)surface[c] + (1 - factor) * fog[c]);
     out[3] = surface[3];

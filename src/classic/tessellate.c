@@ -167,7 +167,7 @@ static void set_error(const mesh *m, triangle *t)
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < 3; i++) ways[c][i] = m->from_eye[i] + (double)m->positions[t->corners[c]][i];
     const double error = nb_bound_fog(m->bound, (const double(*)[3])ways);
-    t->error = nextafterf((float)error, 2);
+    t->error = fminf(nextafterf((float)error, 2), 1); /* two numbers from 0 to 1 are no farther apart */
 }
 
 static nebel_result halve(mesh *m, size_t number, int at)

@@ -11,6 +11,7 @@
 #include "kernels/vertices.h"
 #include "march/boxes.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -31,8 +32,8 @@ nebel_result nebel_resolve_vertex_desc(const nebel_vertex_desc *desc, nebel_vert
         return NEBEL_ERROR_ARGUMENT;
     if (desc->curve == NEBEL_CURVE_TABLE && desc->table == NULL) return NEBEL_ERROR_ARGUMENT;
     for (int c = 0; c < 3 && desc->color != NULL; c++)
-        if (!(desc->color[c] >= 0 && desc->color[c] < HUGE_VAL)) return NEBEL_ERROR_VALUE;
-    if (!(desc->coordinate_end >= 0 && desc->coordinate_end < HUGE_VAL)) return NEBEL_ERROR_VALUE;
+        if (!(desc->color[c] >= 0 && desc->color[c] <= (double)FLT_MAX)) return NEBEL_ERROR_VALUE;
+    if (!(desc->coordinate_end >= 0 && desc->coordinate_end <= (double)FLT_MAX)) return NEBEL_ERROR_VALUE;
     *resolved = *desc;
     if (desc->coordinate_end == 0) resolved->coordinate_end = 100;
     return NEBEL_OK;

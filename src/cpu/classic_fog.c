@@ -272,7 +272,7 @@ static nb_vertex_fog interpolate(const nb_frame *frame, const nb_hits *hits, int
     const nb_vertex_fog *a = &fog[index[0]], *b = &fog[index[1]], *c = &fog[index[2]];
     const float u = hits->u[lane], v = hits->v[lane], w = 1 - u - v;
     nb_vertex_fog mean = {{0, 0, 0}, w * a->alpha + u * b->alpha + v * c->alpha};
-    for (int k = 0; k < 3; k++) mean.color[k] = w * a->color[k] + u * b->color[k] + v * c->color[k];
+    for (int k = 0; k < 3; k++) mean.color[k] = fmaxf(w * a->color[k] + u * b->color[k] + v * c->color[k], 0);
     return mean;
 }
 
@@ -309,7 +309,8 @@ void nb_classic_fog_trace(const nb_frame *frame, nb_scratch *scratch)
         nb_vertex_fog fog = {{0, 0, 0}, 0};
         if (scratch->inside[i] && scratch->hits.surface[i] != NB_NONE) fog = fog_of_lane(frame, scratch, i);
         for (int c = 0; c < 3; c++) {
-            samples->transmittance[c][i] = adds ? 1 : 1 - fog.alpha;
+            /* Rounding, also of weights at edges, leaves the range. */
+            samples->transmittance[c][i] = adds ? 1 : fminf(fmaxf(1 - fog.alpha, 0), 1);
             samples->in_scattering[c][i] = fog.color[c];
         }
         samples->error[i] = 0;

@@ -28,6 +28,8 @@ static nebel_result check_desc(const nebel_frame_desc *desc, const nebel_log *lo
     if (desc->samples > 4096) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "frame: %u samples; 1 to 4096 are possible", (unsigned)desc->samples);
     }
+    if (!(fabs(desc->time) <= 1e12))
+        return nb_fail(log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);
     if (!(desc->tolerance >= 0) || isinf(desc->tolerance)) {
         return nb_fail(log, NEBEL_ERROR_VALUE, "frame: tolerance is %g, it must be above 0, or 0 for %g",
                        desc->tolerance, NEBEL_DEFAULT_TOLERANCE);

@@ -37,6 +37,7 @@ static int count_threads(int wanted)
 
 void nebel_run_parts(size_t parts, void (*part)(void *data, size_t i), void *data, void *user)
 {
+    if (part == NULL) return;
     const int *wanted = user;
     const int threads = count_threads(wanted != NULL ? *wanted : 0);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)

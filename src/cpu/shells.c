@@ -12,9 +12,6 @@ nebel_result nb_shells_set(nb_frame *frame, const nebel_frame_desc *desc)
     if (renderer->method != NEBEL_METHOD_EXACT)
         return nb_fail(&renderer->log, NEBEL_ERROR_UNSUPPORTED,
                        "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
-    if (!(fabs(desc->time) <= 1e12))
-        return nb_fail(&renderer->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12",
-                       desc->time);
     const double pixel = nb_view_pixel(&frame->view, frame->height);
     frame->layers = scene->planets[0].layers;
     frame->layer_view = (nebel_layer_view){.time = desc->time, .spread = pixel / sqrt((double)frame->samples)};

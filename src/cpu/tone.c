@@ -75,10 +75,12 @@ NB_CLONES static void encode_all(size_t count, const float *linear, float scale,
 
 void nebel_encode_srgb(size_t n, const float *linear, double exposure, float *srgb)
 {
+    if (linear == NULL || srgb == NULL) return;
     encode_all(3 * n, linear, (float)exp2(exposure), srgb);
 }
 
 void nebel_tone_map(size_t n, const float *linear, double exposure, float *srgb)
 {
+    if (linear == NULL || srgb == NULL) return;
     map(3 * n, linear, (float)exp2(exposure), srgb);
 }

@@ -131,6 +131,7 @@ void nebel_destroy_gl_classic(nebel_gl_classic *classic)
 
 nebel_gl_classic_kind nebel_gl_classic_method(const nebel_gl_classic *classic)
 {
+    if (classic == NULL) return NEBEL_GL_CLASSIC_FOG_COORD;
     return classic->kind;
 }
 
@@ -337,7 +338,7 @@ static void point(const nebel_vertex_output *stream)
 
 nebel_result nebel_gl_feed_classic(nebel_gl_classic *classic, const nebel_vertex_output *stream, unsigned buffer)
 {
-    if (classic == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (classic == NULL || stream == NULL) return NEBEL_ERROR_ARGUMENT;
     const nebel_result result = check_stream(classic, stream, buffer);
     if (result != NEBEL_OK) return result;
     const int binds = has_buffers(classic);

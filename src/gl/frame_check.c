@@ -60,10 +60,8 @@ static nebel_result refuse(const nebel_log *log, const char *what)
                    "frame: OpenGL cannot draw %s yet; the CPU can (nebel render --device cpu)", what);
 }
 
-static nebel_result check_layers(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+static nebel_result check_layers(const nebel_gl_renderer *r)
 {
-    if (!(fabs(desc->time) <= 1e12))
-        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);
     if (!r->context.es || epoxy_has_gl_extension("GL_EXT_float_blend")) return NEBEL_OK;
     return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
                    "frame: OpenGL ES without GL_EXT_float_blend cannot lay the shells of a planet over each other; use "
@@ -87,12 +85,14 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
     if ((has_air || has_layers) && desc->method != NEBEL_GL_METHOD_EXACT)
         return nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
                        "planets are drawn by the method exact alone: ask for no other method, or leave the planet out");
-    if (has_layers) return check_layers(r, desc);
+    if (has_layers) return check_layers(r);
     return has_air ? check_air(r, desc) : NEBEL_OK;
 }
 
 nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)
 {
+    if (!(fabs(desc->time) <= 1e12))
+        return nb_fail(&r->log, NEBEL_ERROR_VALUE, "frame: time is %g; must be within -1e12 and 1e12", desc->time);
     nebel_result result = check_size(r, desc);
     if (result == NEBEL_OK) result = check_samples(r, samples);
     if (result == NEBEL_OK) result = check_planet(r, desc);

@@ -11,10 +11,39 @@ void nb_particles_release(const nebel_allocator *allocator, const nb_particles *
     for (int i = 0; i < 2; i++) nb_release(allocator, particles->order[i]);
 }
 
+static int is_within(const double *numbers, int count, double low, double high)
+{
+    int good = 1;
+    for (int i = 0; i < count; i++) good &= numbers[i] >= low && numbers[i] <= high;
+    return good;
+}
+
+/* As for nebel_add_volume. */
+static nebel_result check(const nebel_log *log, const nebel_particle *list, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const nebel_particle *const p = &list[i];
+        if ((unsigned)p->profile >= NEBEL_PARTICLE_COUNT)
+            return nb_fail(log, NEBEL_ERROR_ARGUMENT, "particles: particle %zu: profile %d is unknown", i,
+                           (int)p->profile);
+        if (!is_within(p->center, 3, -NEBEL_MAX_LENGTH, NEBEL_MAX_LENGTH) ||
+            !is_within(&p->radius, 1, NEBEL_MIN_LENGTH, NEBEL_MAX_LENGTH) ||
+            !is_within(p->extinction, 3, 0, NEBEL_MAX_AMOUNT) || !is_within(p->emission, 3, 0, NEBEL_MAX_AMOUNT))
+            return nb_fail(
+                log, NEBEL_ERROR_VALUE,
+                "particles: particle %zu: its center must be within 1e15 m, its radius from 1e-15 to 1e15 m, "
+                "extinction and emission from 0 to 1e9",
+                i);
+    }
+    return NEBEL_OK;
+}
+
 nebel_result nb_particles_set(nb_particles *particles, const nebel_allocator *allocator, const nebel_log *log,
                               const nebel_particle *list, size_t count)
 {
     nb_particles made = {.count = count, .is_grey = 1};
+    const nebel_result valid = check(log, list, count);
+    if (valid != NEBEL_OK) return valid;
     made.list = nb_allocate(allocator, count, sizeof *made.list);
     made.balls = nb_allocate(allocator, count, sizeof *made.balls);
     for (int i = 0; i < 2; i++) made.order[i] = nb_allocate(allocator, count, sizeof *made.order[i]);

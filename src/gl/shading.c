@@ -170,8 +170,9 @@ static const char vertex_fog_fragment_text[] =
     "    if (!(t > 0.0 && t <= 1.0001 * seen) || (scene_cutoff > 0.0 && t < 0.999 * seen)) discard;\n"
     "    vec4 fog = surface_fog;\n"
     "    if (factor_mode >= 0) fog = (1.0 - fog_factor(fog.a)) * vec4(factor_color, 1.0);\n"
-    "    out_in_scattering = vec4(fog.rgb, 1.0);\n"
-    "    out_transmittance = vec4(vec3(1.0 - scene_weakening * fog.a), 1.0);\n"
+    /* Rounding leaves the range. */
+    "    out_in_scattering = vec4(max(fog.rgb, 0.0), 1.0);\n"
+    "    out_transmittance = vec4(vec3(clamp(1.0 - scene_weakening * fog.a, 0.0, 1.0)), 1.0);\n"
     "}\n";
 
 /* ---- surfaces of panoramas

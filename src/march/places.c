@@ -306,6 +306,7 @@ nebel_result nebel_bound_fog(const nebel_snapshot *snapshot, const nebel_ray *ra
 
 int nebel_is_fog_grey(const nebel_snapshot *snapshot)
 {
+    if (snapshot == NULL) return 1;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const double *extinction = snapshot->media[i].body.extinction;
         if (extinction[0] != extinction[1] || extinction[1] != extinction[2]) return 0;

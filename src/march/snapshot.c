@@ -465,12 +465,13 @@ void nebel_release_snapshot(nebel_snapshot *snapshot)
 
 size_t nebel_snapshot_volume_count(const nebel_snapshot *snapshot)
 {
+    if (snapshot == NULL) return 0;
     return snapshot->medium_count;
 }
 
 int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *fog)
 {
-    if (!snapshot->is_sunlit) return 0;
+    if (snapshot == NULL || fog == NULL || !snapshot->is_sunlit) return 0;
     for (int c = 0; c < 3; c++) {
         fog->direction[c] = snapshot->to_sun[c];
         fog->min[c] = HUGE_VAL;
@@ -486,7 +487,7 @@ int nebel_snapshot_sunlit_fog(const nebel_snapshot *snapshot, nebel_sunlit_fog *
 
 int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], double max[3])
 {
-    if (!snapshot->is_lamplit) return 0;
+    if (snapshot == NULL || min == NULL || max == NULL || !snapshot->is_lamplit) return 0;
     for (int c = 0; c < 3; c++) {
         min[c] = HUGE_VAL;
         max[c] = -HUGE_VAL;
@@ -501,11 +502,13 @@ int nebel_snapshot_lamplit_fog(const nebel_snapshot *snapshot, double min[3], do
 
 size_t nebel_snapshot_lamp_count(const nebel_snapshot *snapshot)
 {
+    if (snapshot == NULL) return 0;
     return snapshot->lamp_count;
 }
 
 void nebel_snapshot_lamp(const nebel_snapshot *snapshot, size_t number, double position[3], double *radius)
 {
+    if (snapshot == NULL || number >= snapshot->lamp_count || position == NULL || radius == NULL) return;
     const nb_lamp *lamp = &snapshot->lamps[number];
     for (int c = 0; c < 3; c++) position[c] = lamp->place[c];
     *radius = lamp->clear;

@@ -73,6 +73,7 @@ static int is_local(const nb_volume *body)
 static int find_box(const nebel_snapshot *snapshot, int with_local, double min[3], double max[3])
 {
     int any = 0;
+    if (snapshot == NULL || min == NULL || max == NULL) return 0;
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         const nb_volume *body = &snapshot->media[i].body;
         if (!body->lit || !is_light(body->albedo) || (!with_local && is_local(body))) continue;

@@ -27,7 +27,8 @@ static nb_blend blend_channel(nebel_blend_mode mode, double color, double alpha,
 
 nebel_blend nebel_blend_surface(nebel_blend_mode mode, const double color[3], double alpha, const nebel_light *fog)
 {
-    nebel_blend blend;
+    nebel_blend blend = {.factor = {1, 1, 1}}; /* leaves the pixel as it is */
+    if (color == NULL || fog == NULL) return blend;
     for (int c = 0; c < 3; c++) {
         const nb_blend channel = blend_channel(mode, color[c], alpha, fog->transmittance[c], fog->in_scattering[c]);
         blend.source[c] = channel.source;

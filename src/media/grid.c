@@ -219,6 +219,7 @@ nebel_result nebel_create_grid(const nebel_grid_desc *desc, nebel_grid **grid)
 
 const char *nebel_grid_name(const nebel_grid *grid)
 {
+    if (grid == NULL) return "";
     return grid->name;
 }
 

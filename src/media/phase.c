@@ -12,6 +12,7 @@
 
 const char *nb_phase_fault(const nebel_phase *phase)
 {
+    if (phase == NULL) return "must not be NULL";
     switch (phase->type) {
     case NEBEL_PHASE_ISOTROPIC:
     case NEBEL_PHASE_RAYLEIGH:

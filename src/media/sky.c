@@ -237,8 +237,18 @@ void nb_sky_scattered(const nb_skylight *light, const double direction[3], doubl
 
 /* ---- the public queries ---------------------------------------------------------------------- */
 
+/* Then there is no light. */
+static int is_missing(const nebel_environment *environment, const double *direction, double *radiance)
+{
+    const int has_map = environment != NULL && (environment->type != NEBEL_ENVIRONMENT_MAP || environment->map != NULL);
+    if (has_map && direction != NULL && radiance != NULL) return 0;
+    if (radiance != NULL) memset(radiance, 0, 3 * sizeof *radiance);
+    return 1;
+}
+
 void nebel_environment_radiance(const nebel_environment *environment, const double direction[3], double radiance[3])
 {
+    if (is_missing(environment, direction, radiance)) return;
     double unit[3] = {direction[0], direction[1], direction[2]}, turned[3];
     if (environment->type == NEBEL_ENVIRONMENT_CONSTANT) {
         memcpy(radiance, environment->radiance, sizeof environment->radiance);
@@ -255,6 +265,7 @@ void nebel_environment_radiance(const nebel_environment *environment, const doub
 
 void nebel_environment_reflected(const nebel_environment *environment, const double normal[3], double radiance[3])
 {
+    if (is_missing(environment, normal, radiance)) return;
     double unit[3] = {normal[0], normal[1], normal[2]}, turned[3];
     if (environment->type == NEBEL_ENVIRONMENT_CONSTANT) {
         memcpy(radiance, environment->radiance, sizeof environment->radiance);

@@ -33,6 +33,7 @@ typedef struct cloud {
 
 nebel_volume_desc nebel_particle_volume(const nebel_particle *particle)
 {
+    if (particle == NULL) return (nebel_volume_desc){.priority = 0};
     nebel_volume_desc volume = {.shape = {.type = NEBEL_SHAPE_SPHERE, .radius = particle->radius}};
     if (particle->profile == NEBEL_PARTICLE_SOFT) {
         volume.density = (nebel_density){.type = NEBEL_DENSITY_RADIAL, .power = 2};

@@ -87,6 +87,7 @@ static nebel_camera mend(const nebel_camera *between, const nebel_camera *nearer
 
 nebel_camera nebel_camera_between_keys(const nebel_camera_key *keys, size_t count, double frame)
 {
+    if (keys == NULL || count == 0) return nb_camera_default();
     nb_keyframes around;
     if (!nb_keyframes_find(&keys->frame, sizeof *keys, count, frame, &around)) return keys[around.keys[1]].camera;
     double at[4][NUMBER_COUNT], numbers[NUMBER_COUNT];
@@ -118,6 +119,7 @@ static nebel_camera turn(const nebel_camera *start, double frame, uint32_t frame
 
 nebel_camera nebel_scene_camera(const nebel_scene *scene, double frame)
 {
+    if (scene == NULL) return nb_camera_default();
     const nebel_scene_data *data = &scene->data;
     if (data->camera_key_count > 0) return nebel_camera_between_keys(data->camera_keys, data->camera_key_count, frame);
     const bool turns = data->turntable_frames > 0 && isfinite(frame) && fmod(frame, data->turntable_frames) != 0;

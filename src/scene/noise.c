@@ -94,7 +94,10 @@ nebel_result nebel_scene_grid(const nebel_scene *scene, nebel_grid *grid, double
 {
     nebel_scene_noise noise;
     bool is_noise = false;
+    if (at == NULL) return NEBEL_ERROR_ARGUMENT;
     *at = NULL;
+    if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     const nebel_result result = frame != 0 ? find_noise(&scene->allocator, grid, &noise, &is_noise) : NEBEL_OK;
     if (result != NEBEL_OK) return nb_fail(&scene->log, result, "noise: out of memory");
     if (!is_noise || !nb_noise_moves(&noise)) {

@@ -182,6 +182,7 @@ nebel_result nebel_find_scene_light(const nebel_scene *scene, double frame, nebe
 {
     float sun = 1, sky = 1;
     if (scene == NULL || sunlight == NULL || ambient == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     const nebel_result result = scene->clouds != NULL ? shade_origin(scene, frame, &sun, &sky) : NEBEL_OK;
     if (result != NEBEL_OK) return result;
     *sunlight = nb_scene_sun(&scene->data);

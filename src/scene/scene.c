@@ -7,6 +7,7 @@
 #include "scene/scene_internal.h"
 
 #include <stdio.h>
+#include <math.h>
 #include <string.h>
 
 enum {
@@ -289,11 +290,13 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
 
 const nebel_scene_data *nebel_scene_contents(const nebel_scene *scene)
 {
+    if (scene == NULL) return NULL;
     return &scene->data;
 }
 
 nebel_volume_origin nebel_scene_volume_origin(const nebel_scene *scene, size_t index)
 {
+    if (scene == NULL || index >= scene->data.volume_count) return NEBEL_VOLUME_WRITTEN;
     return scene->volume_origins[index];
 }
 
@@ -327,6 +330,7 @@ nebel_result nebel_make_scene_particles(const nebel_scene *scene, nebel_particle
 
 void nebel_free_scene_particles(const nebel_scene *scene, nebel_particle *particles)
 {
+    if (scene == NULL) return;
     nb_release(&scene->allocator, particles);
 }
 
@@ -377,12 +381,20 @@ nebel_result nebel_set_scene_diffusion(nebel_scene *scene, const nebel_diffusion
     return NEBEL_OK;
 }
 
+bool nb_scene_is_frame(const nebel_scene *scene, double frame)
+{
+    if (fabs(frame) <= NB_MOST_FRAME) return true;
+    nb_fail(&scene->log, NEBEL_ERROR_VALUE, "frame: is %g; must be within -1e12 and 1e12", frame);
+    return false;
+}
+
 static nebel_result commit(const nebel_scene *scene, double frame, int with_particles, nebel_snapshot **snapshot)
 {
     if (scene == NULL || snapshot == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_fog *fog = NULL;
     nebel_fog_desc desc = {.allocator = scene->allocator, .log = scene->log};
     *snapshot = NULL;
+    if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     memcpy(desc.ambient, scene->data.ambient, sizeof desc.ambient);
     desc.max_opacity = scene->data.max_opacity;
     nebel_environment ambient;

@@ -108,6 +108,12 @@ enum { NB_SCENE_SECTIONS = 16 };
 
 typedef struct nb_save nb_save;
 
+/* Moments beyond leave no digits of motion. */
+#define NB_MOST_FRAME 1e12
+
+/* Whether a frame is a number within that; says what is wrong where it is none. */
+bool nb_scene_is_frame(const nebel_scene *scene, double frame);
+
 /* What reading needs beside the scene itself. */
 /* The ground of the scene's first planet as the file has it, for fog over it. */
 typedef struct nb_ball {

@@ -10,6 +10,7 @@
 /* Opposite keys leave no direction halfway: there the nearer key's holds. */
 nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double frame)
 {
+    if (keys == NULL || count == 0) return (nebel_sun){.direction = {0, 1, 0}};
     nb_keyframes around;
     if (!nb_keyframes_find(&keys->frame, sizeof *keys, count, frame, &around)) return keys[around.keys[1]].sun;
     const nebel_sun *at[4];
@@ -32,6 +33,7 @@ nebel_sun nebel_sun_between_keys(const nebel_sun_key *keys, size_t count, double
 
 nebel_sun nebel_scene_sun(const nebel_scene *scene, double frame)
 {
+    if (scene == NULL) return (nebel_sun){.direction = {0, 1, 0}};
     const nebel_scene_data *data = &scene->data;
     if (data->sun_key_count > 0) return nebel_sun_between_keys(data->sun_keys, data->sun_key_count, frame);
     nebel_sun sun = {.direction = {0, 1, 0}};
@@ -64,6 +66,7 @@ nebel_result nebel_light_scene_by(nebel_scene *scene, const nebel_sun *sun)
 nebel_result nebel_light_scene_at(nebel_scene *scene, double frame)
 {
     if (scene == NULL) return NEBEL_ERROR_ARGUMENT;
+    if (!nb_scene_is_frame(scene, frame)) return NEBEL_ERROR_VALUE;
     if (scene->data.sun_key_count == 0) return NEBEL_OK;
     const nebel_sun sun = nebel_scene_sun(scene, frame);
     return nebel_light_scene_by(scene, &sun);

@@ -169,6 +169,7 @@ static nebel_volume_desc volume_between(const nebel_volume_key *keys, const nb_k
 
 nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t count, double frame)
 {
+    if (keys == NULL || count == 0) return (nebel_volume_desc){.priority = 0};
     nb_keyframes around;
     if (!nb_keyframes_find(&keys->frame, sizeof *keys, count, frame, &around)) return keys[around.keys[1]].volume;
     return volume_between(keys, &around);
@@ -176,6 +177,7 @@ nebel_volume_desc nebel_volume_between_keys(const nebel_volume_key *keys, size_t
 
 nebel_volume_desc nebel_scene_volume(const nebel_scene *scene, size_t index, double frame)
 {
+    if (scene == NULL || index >= scene->data.volume_count) return (nebel_volume_desc){.priority = 0};
     const nebel_volume_entry *entry = &scene->volume_entries[index];
     return entry->key_count > 0 ? nebel_volume_between_keys(entry->keys, entry->key_count, frame)
                                 : scene->volumes[index];

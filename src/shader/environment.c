@@ -188,6 +188,7 @@ static int is_same_sky(const nebel_environment *a, const nebel_environment *b)
 
 int nebel_same_environment(const nebel_snapshot *a, const nebel_snapshot *b)
 {
+    if (a == NULL || b == NULL) return a == b;
     int same = a->skylight_count == b->skylight_count && is_same_sky(&a->sky, &b->sky);
     for (size_t i = 0; i < a->skylight_count && same; i++)
         same = nb_phase_compare(nb_sky_filter_phase(a->skylights[i].filter),

@@ -126,7 +126,10 @@ static int set_bundle(const double clip_from_eye[16], bundle *rays)
     }
     rays->z0 = shifted(along(r[2], &rays->o), r[2][3]);
     rays->z1 = along(r[2], &rays->d);
-    return (rays->parallel ? rays->z1.middle : rays->z0.middle) != 0;
+    /* Where clip z does not tell a place from the center, or goes with w, it is 0 but for rounding. */
+    const double depth = nb_vector_length(r[2]) * nb_vector_length(rays->parallel ? rays->d.middle : rays->o.middle);
+    return rays->parallel ? fabs(rays->z1.middle) > 1e-13 * depth
+                          : fabs(rays->z0.middle) > 1e-13 * fmax(depth, fabs(r[2][3]));
 }
 
 /* Makes a step one metre in the middle of the picture. */

@@ -98,6 +98,7 @@ void nb_place_voxels(const nebel_snapshot *snapshot, nebel_word *words)
 
 int nebel_same_voxels(const nebel_snapshot *a, const nebel_snapshot *b)
 {
+    if (a == NULL || b == NULL) return a == b;
     size_t i = next_grid(a, 0), k = next_grid(b, 0);
     while (i < a->medium_count && k < b->medium_count && nb_grid_compare(grid_of(a, i), grid_of(b, k)) == 0) {
         i = next_grid(a, i + 1);

@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+"""Writes the calls of tests/test_null.c and tests/test_null_gl.c: each public function with NULL for all of its pointers, and for
+each in turn while the others are good.
+
+    tests/null_calls.py INCLUDE_FOLDER OUTPUT HEADER...
+
+A function whose parameter has a type without a good value here is an error, so that no function is left out."""
+
+import pathlib
+import re
+import sys
+
+# Good values by type; those of output are members of `out`, those of objects members of `made`.
+OBJECTS = ["cells", "fog", "snapshot", "environment_map", "grid", "layers", "atmosphere", "air_view", "clouds", "cloud_view",
+           "cloud_workspace", "scene", "renderer", "film", "gl", "gl_classic", "gl_renderer"]
+INPUTS = ["cell", "cells_desc", "cell_view", "cell_point", "factor_desc", "d3d9_fog", "d3d9_vertex", "curve", "vertex_desc", "vertices",
+          "vertex_output", "tessellation_desc", "triangles", "cloud_layer", "log", "clouds_desc", "cloud_view_desc", "ray",
+          "diffusion_desc", "environment_map_desc", "environment", "map_desc", "map", "layers_desc", "layer_view", "grid_desc",
+          "noise_desc", "phase", "droplet_sizes", "fog_desc", "volume_desc", "sun", "lamp", "trace_desc", "ray_planes", "light_planes",
+          "segments", "pixels", "light", "particle", "nebula_desc", "place", "atmosphere_desc", "air_view_desc", "ground_planes",
+          "renderer_desc", "method_desc", "frame_desc", "frame", "scene_desc", "planet", "model", "camera_key", "sun_key", "volume_key",
+          "scene_noise", "image", "film_desc", "grid_file", "view", "depth_desc", "camera", "gl_desc", "gl_pass", "gl_classic_desc",
+          "gl_renderer_desc", "gl_frame_desc", "gl_planes"]
+OUTPUTS = ["cell_fog", "cell_layer", "factor_desc", "d3d9_fog", "curve", "vertex_desc", "cloud_layer", "cloud_knots", "air_shade",
+           "fog_shade", "map", "layer_hits", "droplet_sums", "volume_id", "sunlit_fog", "split_fog", "light", "particle", "matter",
+           "scatterer", "bound", "atmosphere_desc", "air_light", "sun", "environment", "scene_noise", "image", "rays", "word", "texel",
+           "gl_fog", "gl_textures", "view"]
+FRESH = OBJECTS + ["particle", "tessellation"]
+POINTERS = {"const char": '"test_null"', "const float": "floats", "float": "out.floats", "double": "&out.number", "const double": "numbers", "size_t": "&out.count",
+            "const size_t": "&zero", "uint32_t": "out.entries", "void": "&out"}
+VALUES = {"nebel_isa": "NEBEL_ISA_DEFAULT", "nebel_method": "NEBEL_METHOD_VERTEX", "nebel_cell_stage": "NEBEL_CELLS_PER_VERTEX",
+          "nebel_blend_mode": "NEBEL_BLEND_OVER", "nebel_dialect": "NEBEL_DIALECT_GLSL_330", "nebel_volume_id": "made.id",
+          "nebel_result": "NEBEL_OK"}
+NAMED = {"transmittance": ".5", "f": ".5", "chance": ".5", "tile_size": "16", "capacity": "64", "size": "2", "n": "1", "count": "1",
+         "output_count": "1", "room": "1", "parts": "1", "width": "1", "height": "1", "thickness": "1e5", "scale": "1"}
+
+
+def declarations(text):
+    """(result, name, [parameter, ...]) of each function."""
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    text = re.sub(r"^\s*#.*(?:\\\n.*)*", "", text, flags=re.M)
+    for found in re.finditer(r"^([A-Za-z_][\w \*]*?\b\**)(nebel_\w+)\(([^;{]*?)\);", text, flags=re.M | re.S):
+        if "typedef" not in found[1]:
+            yield found[1].strip(), found[2], split(" ".join(found[3].split()))
+
+
+def split(parameters):
+    parts, depth = [""], 0
+    for letter in parameters:
+        depth += letter in "(["
+        depth -= letter in ")]"
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts if part.strip() not in ("", "void")]
+
+
+def of_structure(kind, is_const):
+    """The good value of a pointer to nebel_KIND."""
+    if kind == "scene_data":
+        return "made.contents"
+    if kind in OBJECTS:
+        return f"made.{kind}"
+    if is_const and kind in INPUTS:
+        return f"&good_{kind}"
+    if not is_const and kind in OUTPUTS:
+        return f"out.{kind}" if kind in ("word", "texel") else f"&out.{kind}"
+    return None
+
+
+def good_value(parameter):
+    """(expression, whether it is a pointer)"""
+    if "(*part)" in parameter:
+        return "do_nothing", True
+    if re.match(r"const double \(\*\w+\)\[3\]", parameter):
+        return "places", True
+    if parameter.startswith("const double *const direction[3]"):
+        return "directions", True
+    array = re.match(r"(const )?(double|float) \w+\[(\d+)\]", parameter)
+    if array:
+        names = {"double": "matrix" if array[3] == "16" else "vector", "float": "floats"}
+        return (names[array[2]] if array[1] else f"out.{'vector' if array[2] == 'double' else 'floats'}"), True
+    fresh = re.match(r"nebel_(\w+) \*\*\w+$", parameter)
+    if fresh and fresh[1] in FRESH:
+        return f"&fresh.{fresh[1]}", True
+    pointer = re.match(r"(const )?(\w+) \*(\w+)$", parameter)
+    if pointer:
+        kind = (pointer[1] or "") + pointer[2]
+        value = "path" if pointer[3] == "path" else POINTERS.get(kind)
+        value = value or of_structure(pointer[2].removeprefix("nebel_"), bool(pointer[1]))
+        if value is None:
+            sys.exit(f"null_calls: no good value for \"{parameter}\"; give one to tests/null_calls.py and tests/test_null.c")
+        return value, True
+    kind, name = parameter.rsplit(" ", 1)
+    return VALUES.get(kind, NAMED.get(name, "0")), False
+
+
+def calls(result, name, parameters):
+    macro = "TRY" if result == "nebel_result" else "RUN"
+    if len(parameters) == 1 and "*" in parameters[0]:
+        yield f"    {macro}({name}(NULL));"
+        return
+    values = [good_value(parameter) for parameter in parameters]
+    pointers = [i for i, (_, is_pointer) in enumerate(values) if is_pointer]
+    gone = [set(pointers)] + [{i} for i in pointers if len(pointers) > 1]
+    for missing in gone if pointers else []:
+        words = ", ".join("NULL" if i in missing else value for i, (value, _) in enumerate(values))
+        yield f"    {macro}({name}({words}));"
+
+
+def main():
+    folder, output, headers = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3:]
+    lines = []
+    for header in headers:
+        lines += [f"static void null_in_{header}(void **state)", "{", "    (void)state;"]
+        for declaration in declarations((folder / f"{header}.h").read_text(encoding="utf-8")):
+            lines += calls(*declaration)
+        lines += ["}", ""]
+    tests = ", ".join(f"cmocka_unit_test(null_in_{header})" for header in headers)
+    output.write_text("\n".join([*lines, f"#define NULL_TESTS {tests}", ""]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
