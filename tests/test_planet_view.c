@@ -144,6 +144,7 @@ static void tables_are_as_far_off_as_they_say(void **state)
         for (int p = 0; p < (n == 0 ? 6 : 4); p++) {
             tally all = {.count = 0};
             for (int s = 0; s < 3; s++) {
+                if (!nb_test_tries((size_t)(n + p + s) % 3, 3)) continue;
                 const double angle = elevations[s] * acos(-1) / 180, height = places[p].height * known->thickness;
                 const nebel_air_view_desc desc = {.atmosphere = air,
                                                   .sun = {{cos(angle), sin(angle), 0.1}, {2, 1.9, 1.7}},
@@ -205,6 +206,7 @@ static void look_along_ends(const nebel_atmosphere_desc *desc, const double heig
     assert_int_equal(nebel_create_atmosphere(desc, &air), NEBEL_OK);
     for (int h = 0; h < height_count; h++)
         for (int s = 0; s < 3; s++) {
+            if (!nb_test_tries((size_t)(h + s) % 3, 3)) continue;
             const nebel_air_view_desc from = {.atmosphere = air,
                                               .sun = {{0.3, 0.02 + 0.2 * s, 1}, {1, 1, 1}},
                                               .position = {0, heights[h], 0},
@@ -399,6 +401,7 @@ static void odd_places_have_answers(void **state)
     for (int h = 0; h < 7; h++)
         for (int s = 0; s < 3; s++)
             for (int levels = 0; levels < 2; levels++) {
+                if (!nb_test_tries((size_t)(h + s + levels) % 3, 3)) continue;
                 nebel_air_view_desc desc = {.atmosphere = air,
                                             .sun = {.irradiance = {1, 1, 1}},
                                             .position = {0, heights[h], 0},

@@ -215,7 +215,7 @@ static void told_errors_bound_the_true_ones(void **state)
         for (int f = NB_FORMULA_height_integral; f <= NB_FORMULA_soft_edge_integral; ++f) {
             nb_formula_dice dice = {(unsigned)(100 * l + f)};
             worst w = {0};
-            for (int i = 0; i < PIECES / 4; ++i) {
+            for (size_t i = 0; i < nb_test_count(PIECES / 4); ++i) {
                 long double in[NB_FORMULA_INPUTS];
                 nb_formula_draw(&dice, (nb_formula)f, levels[l].digits, in);
                 const long double truth = nb_truth_integral((nb_formula)f, in);
@@ -419,7 +419,7 @@ static void densities_are_those_of_the_integrals(void **state)
     nb_formula_dice dice = {5};
     for (size_t i = 0; i < sizeof pairs / sizeof pairs[0]; ++i)
         for (int l = 0; l < LEVELS; ++l)
-            for (int n = 0; n < 2000; ++n) {
+            for (size_t n = 0; n < nb_test_count(2000); ++n) {
                 long double in[NB_FORMULA_INPUTS];
                 nb_formula_draw(&dice, pairs[i].integral, NB_DIGITS_FLOAT, in);
                 const long double truth = nb_truth_density(pairs[i].integral, in, 0);

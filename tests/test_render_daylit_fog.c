@@ -15,12 +15,28 @@ typedef struct world {
     nebel_sun sun;
 } world;
 
+/* The Earth's, for all tests. */
+static nebel_atmosphere *earth;
+
+static int make_air(void **state)
+{
+    (void)state;
+    return nebel_create_atmosphere(nebel_find_atmosphere("earth"), &earth) == NEBEL_OK ? 0 : -1;
+}
+
+static int free_air(void **state)
+{
+    (void)state;
+    nebel_destroy_atmosphere(earth);
+    return 0;
+}
+
 static void make_world(const double to_sun[3], world *w)
 {
     *w = (world){.planet = {.air = *nebel_find_atmosphere("earth")}, .sun = {.irradiance = {5, 4, 3}}};
     memcpy(w->sun.direction, to_sun, sizeof w->sun.direction);
     assert_true(nb_vector_make_unit(w->sun.direction));
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    w->atmosphere = earth;
     w->planet.atmosphere = w->atmosphere;
     w->scene = (nebel_scene_data){.has_sun = 1, .sun_irradiance = {5, 4, 3}, .planet_count = 1, .planets = &w->planet};
     memcpy(w->scene.sun_direction, w->sun.direction, sizeof w->scene.sun_direction);
@@ -105,6 +121,7 @@ static void a_ball_has_the_light_of_its_place(void **state)
     static const double angles[] = {30, 80, 87, 100};
     static const double suns[][3] = {{0, 1, 0}, {.3, .2, -.9}};
     for (int k = 0; k < 8; k++) {
+        if (!nb_test_tries((size_t)(k + k / 4) % 2, 2)) continue;
         world there, here;
         const double angle = angles[k % 4] * test_pi / 180;
         double turned[3] = {suns[k / 4][0], suns[k / 4][1], suns[k / 4][2]};
@@ -126,8 +143,6 @@ static void a_ball_has_the_light_of_its_place(void **state)
         assert_true(fogged > 100 && worst <= 1e-6);
         test_picture_free(&home);
         test_picture_free(&away);
-        nebel_destroy_atmosphere(here.atmosphere);
-        nebel_destroy_atmosphere(there.atmosphere);
     }
 }
 
@@ -171,7 +186,6 @@ static void a_ball_high_up_has_its_own_sun(void **state)
         assert_true(there.sun[c] > 1.5 * here.sun[c]);
         assert_true(fabs(above[c] / by_ground[c] * here.sun[c] / there.sun[c] - 1) < .02);
     }
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* In the shadow of a moon a ball of fog that scatters all light is black. */
@@ -216,7 +230,6 @@ static void a_ball_in_eclipse_is_black(void **state)
     assert_true(lit > .05);
     for (int k = 0; k < 3; k++) test_picture_free(&pictures[k]);
     nebel_destroy_atmosphere(moon);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* ---- mist that bends with the ground --------------------------------------------------------- */
@@ -315,6 +328,7 @@ static void mist_is_lit_by_place(void **state)
         test_picture picture = render(&w, fog, &camera, NEBEL_ISA_DEFAULT, 2);
         double worst = 0, apart = 0;
         for (uint32_t i = 7; i < WIDTH * HEIGHT; i += 83) {
+            if (!nb_test_tries((i / 83 + v) % 2, 2)) continue;
             const nebel_ray ray = planet_ray(&camera, views[v].pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
             const steps exact = step_along(&w, &daylight, by_sun, by_sky, ray);
             for (int c = 0; c < 3; c++) {
@@ -333,7 +347,6 @@ static void mist_is_lit_by_place(void **state)
         nebel_release_snapshot(by_sun);
         nebel_release_snapshot(by_sky);
         nebel_release_environment_map(map);
-        nebel_destroy_atmosphere(w.atmosphere);
     }
 }
 
@@ -358,7 +371,6 @@ static void every_thread_and_processor_gives_the_same(void **state)
     test_picture_free(&one);
     nebel_release_snapshot(fog);
     nebel_release_environment_map(map);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 int main(void)
@@ -370,5 +382,5 @@ int main(void)
         cmocka_unit_test(mist_is_lit_by_place),
         cmocka_unit_test(every_thread_and_processor_gives_the_same),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, make_air, free_air);
 }

@@ -27,13 +27,17 @@ static void make_world(const double ground[3], const double to_sun[3], world *w)
     memcpy(w->scene.sun_direction, to_sun, sizeof w->scene.sun_direction);
 }
 
-static void render(const world *w, nebel_snapshot *fog, const nebel_camera *camera, const test_picture *picture)
+static nebel_renderer *create_renderer(const world *w, nebel_snapshot *fog)
 {
     nebel_renderer *renderer;
-    const nebel_frame_desc desc = {.camera = *camera, .width = picture->width, .height = picture->height, .samples = 1};
     assert_int_equal(nebel_create_renderer(&w->scene, fog, &(nebel_renderer_desc){.threads = 2}, &renderer), NEBEL_OK);
+    return renderer;
+}
+
+static void render(nebel_renderer *renderer, const nebel_camera *camera, const test_picture *picture)
+{
+    const nebel_frame_desc desc = {.camera = *camera, .width = picture->width, .height = picture->height, .samples = 1};
     assert_int_equal(nebel_render_frame(renderer, &desc, &picture->planes), NEBEL_OK);
-    nebel_destroy_renderer(renderer);
 }
 
 /* Air, and Lambert's ground behind it. Returns whether there is any. */
@@ -71,13 +75,13 @@ typedef struct column {
     double off[HEIGHT][3]; /* of 255 */
 } column;
 
-static void fly_past(const world *w, double height, const test_picture *picture, column *seen)
+static void fly_past(const world *w, nebel_renderer *renderer, double height, const test_picture *picture, column *seen)
 {
     const double radius = w->planet.air.radius, dip = acos(radius / (radius + height));
     const double pitch = -dip - .12 * (test_pi / 2 - dip);
     const nebel_camera camera = planet_camera(height, pitch);
     double light[HEIGHT][3], brightest = 0;
-    render(w, NULL, &camera, picture);
+    render(renderer, &camera, picture);
     for (uint32_t y = 0; y < HEIGHT; y++) {
         const nebel_ray ray = planet_ray(&camera, pitch, WIDTH / 2, y, WIDTH, HEIGHT);
         seen->is_ground[y] = look(w, &ray, (double)test_depth(picture, WIDTH / 2, y), light[y]);
@@ -102,6 +106,12 @@ static int ascending(const void *a, const void *b)
     return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
 }
 
+/* Heights are tried by two, one beside the other. */
+static int is_tried(int i)
+{
+    return i >= 0 && nb_test_tries((size_t)i / 2, HEIGHTS / 2 + 1);
+}
+
 static void a_flight_has_no_seam(void **state)
 {
     (void)state;
@@ -113,11 +123,15 @@ static void a_flight_has_no_seam(void **state)
         size_t heights = 0, rows = 0;
         world w;
         make_world(ground, suns[k], &w);
+        nebel_renderer *const renderer = create_renderer(&w, NULL);
         for (int i = 0; i < HEIGHTS; i++) {
-            fly_past(&w, 2 * pow(1e7, i / (HEIGHTS - 1.)), &picture, &columns[i]);
-            for (int y = 0; y < HEIGHT && i > 0; y++) by_height[heights++] = apart(&columns[i], y, &columns[i - 1], y);
+            if (!is_tried(i)) continue;
+            fly_past(&w, renderer, 2 * pow(1e7, i / (HEIGHTS - 1.)), &picture, &columns[i]);
+            for (int y = 0; y < HEIGHT && is_tried(i - 1); y++)
+                by_height[heights++] = apart(&columns[i], y, &columns[i - 1], y);
             for (int y = 1; y < HEIGHT; y++) by_row[rows++] = apart(&columns[i], y, &columns[i], y - 1);
         }
+        nebel_destroy_renderer(renderer);
         qsort(by_height, heights, sizeof *by_height, ascending);
         qsort(by_row, rows, sizeof *by_row, ascending);
         print_message(
@@ -162,24 +176,25 @@ static void mist_stands_still_on_a_planet(void **state)
     enum { WIDE = 48, HIGH = 32 };
     static const double to_sun[3] = {.6, .8, 0}, places[2][3] = {{0, 0, 0}, {0x1p22, -0x1p21, 0x1p22 + 0x1p20}};
     test_picture pictures[2];
+    world worlds[2];
     double worst = 0;
     int fogged = 0;
     for (int k = 0; k < 2; k++) pictures[k] = test_picture_make(WIDE, HIGH);
+    for (int k = 0; k < 2; k++) make_world(places[k], to_sun, &worlds[k]);
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 2; k++) {
-            world w;
             nebel_camera camera = planet_camera(1.5, -.05);
-            make_world(places[k], to_sun, &w);
-            nebel_snapshot *fog = make_mist(&w, places[k]);
+            nebel_snapshot *fog = make_mist(&worlds[k], places[k]);
+            nebel_renderer *renderer = create_renderer(&worlds[k], fog);
             camera.position[0] += i * 0x1p-9;
             camera.look_at[0] += i * 0x1p-9;
             for (int c = 0; c < 3; c++) {
                 camera.position[c] += places[k][c];
                 camera.look_at[c] += places[k][c];
             }
-            render(&w, fog, &camera, &pictures[k]);
+            render(renderer, &camera, &pictures[k]);
+            nebel_destroy_renderer(renderer);
             nebel_release_snapshot(fog);
-            nebel_destroy_atmosphere(w.atmosphere);
         }
         for (uint32_t p = 0; p < WIDE * HIGH * 3; p++) {
             const double left = (double)pictures[0].planes.transmittance[p];
@@ -191,7 +206,10 @@ static void mist_stands_still_on_a_planet(void **state)
     }
     print_message("mist 6300 km from the origin: off by %.1e\n", worst);
     assert_true(fogged > 100 && worst <= 1e-5);
-    for (int k = 0; k < 2; k++) test_picture_free(&pictures[k]);
+    for (int k = 0; k < 2; k++) {
+        test_picture_free(&pictures[k]);
+        nebel_destroy_atmosphere(worlds[k].atmosphere);
+    }
 }
 
 int main(void)

@@ -14,13 +14,35 @@ typedef struct world {
     nebel_scene_data scene;
 } world;
 
+/* Made once for all tests. */
+static struct {
+    const char *name;
+    nebel_atmosphere *atmosphere;
+} kept[4] = {{"earth", NULL}, {"mars", NULL}, {"toy", NULL}, {"moon", NULL}};
+
+static nebel_atmosphere *keep_air(const char *name)
+{
+    int k = 0;
+    while (strcmp(kept[k].name, name) != 0) k++;
+    if (kept[k].atmosphere == NULL)
+        assert_int_equal(nebel_create_atmosphere(nebel_find_atmosphere(name), &kept[k].atmosphere), NEBEL_OK);
+    return kept[k].atmosphere;
+}
+
+static int free_air(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 4; k++) nebel_destroy_atmosphere(kept[k].atmosphere);
+    return 0;
+}
+
 static void make_world(const char *name, const double sun[3], world *w)
 {
     static const double origin[1][3] = {{0, 0, 0}};
     const nebel_sun white = {.direction = {sun[0], sun[1], sun[2]}, .irradiance = {1, 1, 1}};
     nebel_air_light light;
     *w = (world){.planet = {.air = *nebel_find_atmosphere(name)}};
-    assert_int_equal(nebel_create_atmosphere(&w->planet.air, &w->atmosphere), NEBEL_OK);
+    w->atmosphere = keep_air(name);
     assert_int_equal(nebel_light_air(w->atmosphere, &white, 1, origin, 0, &light, 0), NEBEL_OK);
     w->planet.atmosphere = w->atmosphere;
     memcpy(w->planet.sun_left, light.sun, sizeof light.sun);
@@ -118,7 +140,6 @@ static void sky_and_ground_are_those_of_the_air(void **state)
         assert_true(brightest > .05 && worst <= .02 * brightest && untold <= WIDTH * HEIGHT / 200);
         assert_true(ground > 0 && ground < WIDTH * HEIGHT);
         test_picture_free(&picture);
-        nebel_destroy_atmosphere(w.atmosphere);
     }
 }
 
@@ -163,7 +184,6 @@ static void models_are_seen_through_air(void **state)
                     fmin(.01 * exact, (double)picture.planes.error[middle] * 2 + 1e-4));
     }
     test_picture_free(&picture);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* Summits in the sun that has set below them, and plains that the night has reached. */
@@ -203,7 +223,6 @@ static void models_take_the_light_of_their_place(void **state)
         assert_true(w.planet.sun_left[0] == 0);
         lit_below += height < 100 ? there.sun[0] : 0;
         test_picture_free(&picture);
-        nebel_destroy_atmosphere(w.atmosphere);
     }
     assert_true(lit_below == 0);
 }
@@ -239,7 +258,6 @@ static void daylight_is_that_of_the_air(void **state)
         }
         print_message("%s: sun off by %.1e, sky by %.1e of that at the origin\n", names[n], worst_sun, worst_sky);
         assert_true(worst_sun <= 2e-3 && worst_sky <= 6e-3);
-        nebel_destroy_atmosphere(w.atmosphere);
     }
 }
 
@@ -312,7 +330,6 @@ static void fog_has_the_sky_from_all_sides(void **state)
         }
         print_message("%s: off by %.2g; by level ground it would be by %.2g\n", names[n], worst, by_level);
         assert_true(worst < .08 && by_level > 4 * worst);
-        nebel_destroy_atmosphere(w.atmosphere);
     }
 }
 
@@ -379,7 +396,6 @@ static void air_and_fog_share_a_ray(void **state)
     assert_true(worst < 6e-3 && apart > 5 * worst);
     test_picture_free(&picture);
     nebel_release_snapshot(snapshot);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* A ball that glows at night. */
@@ -429,7 +445,6 @@ static void fog_in_the_dark_is_as_exact(void **state)
     test_picture_free(&usual);
     test_picture_free(&exact);
     nebel_release_snapshot(snapshot);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* A ball of black fog 5 m over the ground, in the sun and beside a lamp. */
@@ -455,7 +470,6 @@ static test_picture render_shadow(const double shift[3], const nebel_mesh *mesh)
     nebel_camera camera = planet_camera(14, -1);
     world w;
     make_world("moon", to_sun, &w);
-    nebel_destroy_atmosphere(w.atmosphere);
     for (int c = 0; c < 3; c++) {
         w.planet.air.ground[c] += shift[c];
         camera.position[c] += shift[c];
@@ -552,6 +566,7 @@ static void many_samples_are_the_mean_of_single_ones(void **state)
                  {"toy", 30, -.3, {-.6, .48, .64}}};
     for (size_t v = 0; v < sizeof views / sizeof *views; v++) {
         world w;
+        if (v > 0 && v < 4 && !nb_test_tries(v - 1, 3)) continue;
         make_world(views[v].name, views[v].sun, &w);
         w.planet.sun_diameter = 2;
         nebel_camera camera = planet_camera(views[v].height, views[v].pitch);
@@ -579,7 +594,6 @@ static void many_samples_are_the_mean_of_single_ones(void **state)
         assert_true(far_off <= 3 * WIDTH && (v == 0 || worst <= 1e-2) && fabs(all[0] / all[1] - 1) <= 2e-3);
         test_picture_free(&small);
         test_picture_free(&large);
-        nebel_destroy_atmosphere(w.atmosphere);
     }
 }
 
@@ -610,7 +624,6 @@ static void the_horizon_has_no_steps(void **state)
     for (int c = 0; c < 3; c++) worst = fmax(worst, off[c] / border[c]);
     print_message("pixels are off by %.2f of what the horizon parts\n", worst);
     assert_true(worst <= .2); /* samples lie elsewhere: of four rows in a pixel one may see the other side */
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* All its light, however few pixels it is, and no more: the picture with it less the one without. */
@@ -641,7 +654,6 @@ static void the_sun_is_a_disc(void **state)
             assert_true(fabs(sum[c] / arrives - 1) < .1);
         }
     }
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 static void every_thread_and_processor_gives_the_same(void **state)
@@ -675,7 +687,6 @@ static void every_thread_and_processor_gives_the_same(void **state)
     test_picture_free(&one);
     nebel_release_snapshot(snapshot);
     nebel_destroy_fog(fog);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 /* Below the ground, in the centre, far away, and what planets are not drawn with. */
@@ -704,7 +715,6 @@ static void odd_cameras(void **state)
     assert_int_equal(nebel_set_renderer_method(renderer, NEBEL_METHOD_REFERENCE, NULL), NEBEL_OK);
     assert_int_equal(nebel_render_frame(renderer, &desc, &(nebel_frame){.color = NULL}), NEBEL_ERROR_UNSUPPORTED);
     nebel_destroy_renderer(renderer);
-    nebel_destroy_atmosphere(w.atmosphere);
 }
 
 int main(void)
@@ -724,5 +734,5 @@ int main(void)
         cmocka_unit_test(every_thread_and_processor_gives_the_same),
         cmocka_unit_test(odd_cameras),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, free_air);
 }
