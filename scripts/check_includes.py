@@ -40,7 +40,7 @@ POSIX = {"fcntl.h", "unistd.h", "dirent.h", "sys/types.h", "sys/stat.h", "sys/io
 FOREIGN = {
     "formulas": {"immintrin.h", "arm_neon.h"},
     "base": {"cpuid.h", "sys/auxv.h"},
-    "scene": POSIX | {"poll.h", "spawn.h", "sys/prctl.h", "sys/syscall.h", "linux/landlock.h", "linux/openat2.h", "meshoptimizer.h",
+    "scene": POSIX | {"poll.h", "spawn.h", "sys/prctl.h", "sys/syscall.h", "linux/landlock.h", "linux/openat2.h", "linux/audit.h", "linux/filter.h", "linux/seccomp.h", "meshoptimizer.h",
                       "assimp/", "png.h", "jpeglib.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h",
                       "nanovdb/", "zlib.h", "blosc.h", "webp/", "openvdb/", "exception", "new"},
     "cpu": {"embree3/", "omp.h"},

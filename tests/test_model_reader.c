@@ -283,6 +283,69 @@ static void test_the_reader_dies_with_its_parent(void **state)
     if (now != 0 && now != 'Z') fail_msg("the reader goes on: %c", now);
 }
 
+/* ---- what the reader may do ------------------------------------------------------------------ */
+
+/* The line of a file of /proc that begins so; "" where there is none. */
+static void find_line(long id, const char *name, const char *begin, char line[300])
+{
+    char path[64];
+    snprintf(path, sizeof path, "/proc/%ld/%s", id, name);
+    FILE *file = fopen(path, "r");
+    bool found = false;
+    while (file != NULL && !found && fgets(line, 300, file) != NULL) found = strncmp(line, begin, strlen(begin)) == 0;
+    if (!found) line[0] = '\0';
+    if (file != NULL) fclose(file);
+}
+
+static int count_files_of(long id)
+{
+    char path[64];
+    int count = 0;
+    snprintf(path, sizeof path, "/proc/%ld/fd", id);
+    DIR *files = opendir(path);
+    for (const struct dirent *entry; files != NULL && (entry = readdir(files)) != NULL;)
+        count += entry->d_name[0] != '.';
+    if (files != NULL) closedir(files);
+    return count;
+}
+
+static void test_the_reader_is_confined(void **state)
+{
+    (void)state;
+    static const char *const limits[] = {"Max core file size        0 ", "Max file size             0 ",
+                                         "Max processes             0 ", "Max open files            64 ",
+                                         "Max cpu time              4 ", "Max address space         8"};
+    char line[300] = "";
+    if (NB_SANITIZED) skip();
+    write_text("endless.smd", "version 1\n\nnodes");
+    const int open_file = open("/dev/null", O_RDONLY); /* which the reader must not get */
+    const pid_t host = fork();
+    if (host == 0) {
+        journal kept;
+        (void)try_model(NULL, "endless.smd", &kept);
+        _exit(0);
+    }
+    const long reader = find_child(host);
+    for (int i = 0; i < 200 && reader != 0; i++) {
+        find_line(reader, "status", "Seccomp:", line);
+        if (strstr(line, "2") != NULL) break;
+        usleep(10000);
+    }
+    char found[sizeof limits / sizeof *limits][300];
+    for (size_t i = 0; i < sizeof limits / sizeof *limits; i++) find_line(reader, "limits", limits[i], found[i]);
+    const int files = count_files_of(reader);
+    kill(host, SIGKILL);
+    assert_int_equal(waitpid(host, NULL, 0), host);
+    close(open_file);
+    if (reader == 0) skip();
+    for (size_t i = 0; i < sizeof limits / sizeof *limits; i++)
+        if (found[i][0] == '\0') fail_msg("%s", limits[i]);
+    if (files > 5) fail_msg("%d files", files); /* the standard ones, the folder and the model */
+#if defined(__x86_64__) || defined(__aarch64__)
+    if (line[0] != '\0') assert_non_null(strstr(line, "2"));
+#endif
+}
+
 /* ---- hostile models -------------------------------------------------------------------------- */
 
 /* Where Assimp puts another corner in place of one that does not exist, and tells nobody but its log. */
@@ -371,6 +434,7 @@ int main(void)
                                        cmocka_unit_test(test_a_host_may_have_closed_its_standard_files),
                                        cmocka_unit_test(test_many_threads_may_read_models),
                                        cmocka_unit_test(test_the_reader_dies_with_its_parent),
+                                       cmocka_unit_test(test_the_reader_is_confined),
                                        cmocka_unit_test(test_what_assimp_makes_up_is_told),
                                        cmocka_unit_test(test_more_memory_than_a_file_warrants),
                                        cmocka_unit_test(test_references_stay_in_the_folder),

@@ -206,7 +206,7 @@ static nebel_result load_file(nb_assimp *in)
     if (result == NEBEL_OK) result = prepare(in);
     if (result == NEBEL_OK) result = import(in);
     if (result == NEBEL_OK) result = take(in);
-    if (in->scene != NULL) aiReleaseImport(in->scene);
+    if (in->scene != NULL && load->sink == NULL) aiReleaseImport(in->scene); /* behind a sink the process ends */
     nb_gltf_release_files(&load->allocator, &in->made);
     nb_release(&load->allocator, in->textures);
     nb_arena_release(&in->scratch);

@@ -18,4 +18,7 @@ void nb_confine_budget(const nb_budget *budget);
 /* From now on only a file, and files in a folder, may be opened, for reading; where the system can see to that. */
 void nb_confine_files(const char *file, const char *folder);
 
+/* From now on no sockets, other programs or processes; where the system can see to that. */
+void nb_confine_calls(void);
+
 #endif

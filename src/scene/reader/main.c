@@ -247,6 +247,7 @@ int main(int count, char **words)
     nb_confine_resources();
     nb_confine_budget(&out.budget);
     nb_confine_files(in.file, in.folder);
+    nb_confine_calls();
     const nebel_result result = read_model(&in, &out);
     put_frame(NB_WIRE_END, (int32_t)result, sizeof out.counts);
     put(&out.counts, sizeof out.counts);
