@@ -22,7 +22,10 @@ endif
 # A make below has processes of its own to share out: it must not look for those of this one.
 COMPILE = MAKEFLAGS=--no-print-directory cmake --build
 
-.PHONY: all demo film test report bench asan lint format clean
+# What `make test` tries of what the suites count out; test-all tries all of it.
+SCALE ?= 0.1
+
+.PHONY: all demo pictures film test test-all tests report bench asan lint format clean
 
 all: $(MODELS)
 	@scripts/install_packages.sh build
@@ -43,12 +46,18 @@ film: all
 	@$(BUILD)/nebel render examples/scenes/wisps.json -o $(BUILD)/demo/wisps.webp --frames 0-35 --fps 12 --size 384x216 --samples 1
 	@$(BUILD)/nebel render examples/scenes/sunset.json -o $(BUILD)/demo/sunset.webp --frames 0-35 --fps 12 --size 384x216 --samples 1
 
-test: $(MODELS)
+# A first opinion in minutes: all that is not slow, at reduced counts.
+test: tests
+	@NEBEL_TEST_SCALE=$(SCALE) ctest --test-dir $(BUILD) --output-on-failure --no-tests=error -j 2 -LE slow --output-junit $(abspath $(BUILD))/tests.xml
+
+test-all: tests
+	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error -j 2 --output-junit $(abspath $(BUILD))/tests.xml
+
+tests: $(MODELS)
 	@scripts/install_packages.sh build demo test
 	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=ON
 	@$(COMPILE) $(BUILD) -j $(JOBS)
-	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error -j 2
 
 report: $(MODELS)
 	@scripts/install_packages.sh build demo test

@@ -26,6 +26,9 @@ BOX = {"type": "box", "min": [-5, -5, -5], "max": [5, 5, 5]}
 FOG = {"shape": BOX, "extinction": 0.1, "source": [0.7, 0.7, 0.5]}
 RAY = "-9 0 0 1 0 0 100\n"
 
+# Tables of air take a second each; the first opinion of `make test` does without.
+with_tables_of_air = unittest.skipIf(float(os.environ.get("NEBEL_TEST_SCALE", 1)) < 1, "makes tables of air")
+
 OBJECT = """v -2 -2 -3
 v 2 -2 -3
 v 0 2 -3
@@ -923,6 +926,7 @@ class InfoTest(PictureCase):
         self.assertIn("visibility: 60 m", nebel("info", scene).out)
         self.assertIn("visibility: no end", nebel("info", self.write_scene("none.json", [])).out)
 
+    @with_tables_of_air
     def test_visibility_in_air(self):
         """Of air that is as good as even: -ln(0.05) mean free paths; fog takes its part; and air is no lack of fog."""
         planet = {"model": "physical", "radius": 1e9, "thickness": 1e6,
@@ -934,6 +938,7 @@ class InfoTest(PictureCase):
             self.assertAlmostEqual(float(re.search(r"visibility: (\S+) m", out)[1]), wanted, delta=1e-3 * wanted)
             self.assertNotIn("there is no fog", out)
 
+    @with_tables_of_air
     def test_the_depth_of_air(self):
         """Scattering times scale height, but for what is above the air; and clouds cover a part of the planet."""
         air = {"type": "exponential", "scattering": [2e-5, 0, 0], "absorption": [0, 0, 1], "scale_height": 8000}
@@ -945,6 +950,7 @@ class InfoTest(PictureCase):
         self.assertNotIn("optical depth", moon)
         self.assertNotIn("deeper", nebel("info", self.write_scene("e.json", [], planet={"model": "physical"})).out)
 
+    @with_tables_of_air
     def test_deep_air_is_said_with_its_picture(self):
         air = {"type": "exponential", "scattering": [2e-3, 2e-3, 2e-3], "scale_height": 8000}
         for airs, told in (([air], 1), ([], 0)):
@@ -995,6 +1001,7 @@ class InfoTest(PictureCase):
             for said in (done.err, nebel("trace", scene, text=RAY).err):
                 self.assertEqual(f"warning: {scene}: no sunlight reaches fog or models: fog[1]" in said, is_dark)
 
+    @with_tables_of_air
     def test_a_planet_without_a_sun(self):
         air, layers, sun = {"model": "physical"}, self.make_layers(), {"direction": [0, 1, 0]}
         dark_air, dark = "the planet's air is black", "the planet is black"
