@@ -25,7 +25,7 @@ ACROSS = re.compile(
     r"is outside cell|outside cell|has no area|is not convex|overlap|has no end|has no bounds|at least -?\S+ m$|"
     r"so it must be|reads version 1|fog here overwrites|another scale along|above 1000000|"
     r"all fog here has one|does not touch|inner_angle|from 0 to outer_angle|units of|cannot read the (model|grid|picture)|"
-    r"of two voxels each|th of the distance|scale heights from the center|(of|times) the (thickness|radius)|radius / 1e6 or more|\(the thickness\)|above the base|within the air")
+    r"of two voxels each|th of the distance|scale heights from the center|(of|times) the (thickness|radius)|radius / 1e6 or more|\(the thickness\)|above the base|within the air|z_near must be less")
 
 # Stands in a text where a number will.
 SENTINEL = "\x01"

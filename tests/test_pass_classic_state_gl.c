@@ -475,7 +475,7 @@ static void test_without_fog_coordinates_there_are_two_passes(void **state)
     if (child == 0) {
         setenv("MESA_GL_VERSION_OVERRIDE", "1.3COMPAT", 1);
         setenv("MESA_EXTENSION_OVERRIDE", "-GL_EXT_fog_coord", 1);
-        execl("/proc/self/exe", "test_pass_classic_state_gl", without, (char *)NULL);
+        execl("/proc/self/exe", "nebel_test_gl", "test_pass_classic_state_gl", without, (char *)NULL);
         _exit(99);
     }
     assert_true(child > 0 && waitpid(child, &status, 0) == child);
