@@ -193,7 +193,7 @@ static void test_single_rays_find_every_box_they_touch(void **unused)
         nb_bvh bvh;
         fill_scene((scene_kind)(trial % KIND_COUNT), n, size, shift, boxes);
         assert_int_equal(nb_bvh_build(&allocator, boxes, (size_t)n, &bvh), NEBEL_OK);
-        for (int r = 0; r < 150; r++) {
+        for (size_t r = 0; r < nb_test_count(150); r++) {
             const segment s = random_segment(boxes, n, size, shift);
             walk_one(&bvh, n, &s);
         }
@@ -211,7 +211,7 @@ static void test_rays_from_far_away_find_every_box_they_touch(void **unused)
         const int n = 300;
         fill_scene((scene_kind)(trial % KIND_COUNT), n, 1, 0, boxes);
         assert_int_equal(nb_bvh_build(&allocator, boxes, (size_t)n, &bvh), NEBEL_OK);
-        for (int r = 0; r < 150; r++) {
+        for (size_t r = 0; r < nb_test_count(150); r++) {
             segment s = random_segment(boxes, n, 1, 0);
             const double back = pow(10, uniform(1, 8));
             /* The rounded origin shall still see the box's corner exactly along some direction: aim again. */
@@ -238,7 +238,7 @@ static void test_packets_find_every_box_that_an_active_lane_touches(void **unuse
         nb_bvh bvh;
         fill_scene((scene_kind)(trial % KIND_COUNT), n, size, shift, boxes);
         assert_int_equal(nb_bvh_build(&allocator, boxes, (size_t)n, &bvh), NEBEL_OK);
-        for (int r = 0; r < 60; r++) {
+        for (size_t r = 0; r < nb_test_count(60); r++) {
             segment s[NB_BVH_LANES];
             const int lanes = 1 + below(NB_BVH_LANES), coherent = below(2);
             for (int l = 0; l < lanes; l++) {

@@ -177,7 +177,7 @@ static void error_covers_what_chance_finds(void **state)
     (void)state;
     chance_state = UINT64_C(88172645463325252);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        if (i > 0 && !nb_test_tries(i, sizeof cases / sizeof *cases)) continue;
+        if (i > 1 && !nb_test_tries(i - 1, sizeof cases / sizeof *cases)) continue;
         const scene up = {cases[i].depth, 0, 0.5, {0, 1, 0}, 0}, down = {cases[i].depth, 0, 0.5, {0, -1, 0}, 1};
         nebel_atmosphere *air = make(1e9, cases[i].depth, 0, cases[i].quality);
         assert_told(&up, air, 0.15, "up");
@@ -227,7 +227,7 @@ static void error_covers_glow_around_the_sun(void **state)
     (void)state;
     chance_state = UINT64_C(88172645463325252);
     for (size_t q = 0; q < 2; q++) {
-        if (!nb_test_tries(q, 2)) continue;
+        if (!nb_test_tries(1 - q, 2)) continue;
         nebel_atmosphere *air = make_of(&of, glow.depth, SCALE, q ? NEBEL_AIR_PRECISE : NEBEL_AIR_FAST);
         assert_told(&glow, air, 0.9, q ? "glow, precise" : "glow, fast");
         nebel_destroy_atmosphere(air);

@@ -177,6 +177,7 @@ static off compare(const world *w, const nebel_volume_desc *mist, const nebel_ca
     test_picture picture = render(w, fog, camera, 2), even = render_evenly(w, fog, camera);
     off is = {.beyond = -1};
     for (uint32_t i = 5; i < WIDTH * HEIGHT; i += 7) {
+        if (!nb_test_tries(i / 7 % 2, 2)) continue;
         nebel_ray ray = planet_ray(camera, pitch, i % WIDTH, i / WIDTH, WIDTH, HEIGHT);
         double light[3];
         assert_true(nb_vector_make_unit(ray.direction));

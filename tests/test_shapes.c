@@ -334,7 +334,7 @@ static void check_slack(const char *what, int rounded)
         for (int s = 0; s < SHAPES; ++s) {
             nb_formula_dice dice = {(unsigned)(10 * l + s)};
             worst w = {0};
-            for (int i = 0; i < RAYS; ++i) {
+            for (size_t i = 0; i < nb_test_count(RAYS); ++i) {
                 long double in[NB_FORMULA_INPUTS];
                 nb_formula_draw(&dice, shapes[s], levels[l].digits, in);
                 const quad_ray ray =
