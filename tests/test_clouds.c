@@ -206,6 +206,7 @@ static void test_no_lines_in_thin_clouds(void **state)
     double worst = 0, sum = 0, last = 0;
     int between = 0;
     for (int i = 0; i < WIDE * HIGH; i++) {
+        if (!nb_test_tries((size_t)i / WIDE, HIGH)) continue;
         const double x = -.25 + .7 * (i % WIDE) / WIDE, y = .2 + .35 * (double)(i / WIDE) / HIGH;
         const double length = sqrt(x * x + y * y + 1);
         const nebel_ray ray = {{0, 1359.375, 0}, {x / length, y / length, -1 / length}, 300};
@@ -223,7 +224,7 @@ static void test_no_lines_in_thin_clouds(void **state)
                   "in the mean\n",
                   between, WIDE * HIGH, worst, sum);
     /* Ten times what all of a ray may be off by: the pieces of one place are a few, each within that. */
-    assert_true(between > WIDE * HIGH / 2 && worst < 10 * NEBEL_DEFAULT_TOLERANCE);
+    assert_true(between > WIDE * (int)nb_test_count(HIGH) / 2 && worst < 10 * NEBEL_DEFAULT_TOLERANCE);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     nebel_destroy_clouds(clouds);
@@ -333,14 +334,15 @@ static void test_two_clouds_have_light_of_two_places(void **state)
 static void test_billows_that_are_missed(void **state)
 {
     (void)state;
-    enum { RAYS = 450 };
+    enum { RAYS = 450, FEW = 150 };
+    const int rays = nb_test_count(RAYS) > FEW ? (int)nb_test_count(RAYS) : FEW;
     nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 1});
     nebel_cloud_workspace *workspace;
     nebel_cloud_view *view = view_of(clouds, 0, &workspace);
     uint64_t numbers = 11;
     double sum = 0, most = 0;
     int untold = 0;
-    for (int i = 0; i < RAYS; i++) {
+    for (int i = 0; i < rays; i++) {
         const double heights[3] = {dice(&numbers, 1000, 2600), 2, 5000}, turn = dice(&numbers, 0, 2 * PI);
         const double rise = dice(&numbers, .15, .7) * (i % 3 == 2 ? -1 : 1), height = heights[i % 3];
         const nebel_ray ray = {{dice(&numbers, -2e4, 2e4), height, dice(&numbers, -2e4, 2e4)},
@@ -353,13 +355,13 @@ static void test_billows_that_are_missed(void **state)
         const double left = knots.count > 0 ? (double)knots.transmittance[knots.count - 1] : 1;
         const double off = fabs(left - brute_force(clouds, &ray, begin, end, 1));
         const double beyond = off - (knots.count > 0 ? (double)knots.error : 0);
-        sum += off / RAYS;
+        sum += off / rays;
         most = fmax(most, beyond);
         untold += beyond > 2e-3;
     }
     print_message("%d thin rays: off by %.2g in the mean, %d by more than 2e-3 beyond what is told, by %.2g at most\n",
-                  RAYS, sum, untold, most);
-    assert_true(sum < 2e-3 && untold <= RAYS / 50 && most < .06);
+                  rays, sum, untold, most);
+    assert_true(sum < 2e-3 && untold <= rays / 50 && most < .06);
     nebel_destroy_cloud_workspace(workspace);
     nebel_destroy_cloud_view(view);
     nebel_destroy_clouds(clouds);
@@ -400,7 +402,6 @@ static void test_rays_from_edges_of_blocks(void **state)
 static void test_bases_are_seen(void **state)
 {
     (void)state;
-    enum { RAYS = 300 };
     static const double details[] = {.1, .5};
     for (int k = 0; k < 2; k++) {
         nebel_clouds *clouds = make(1, &(nebel_cloud_layer){.seed = 2, .detail = details[k]});
@@ -409,7 +410,7 @@ static void test_bases_are_seen(void **state)
         const nebel_ray known = {{8113.37, 1500, -3450.79}, {-.6338, -.3746, -.6768}, HUGE_VAL};
         uint64_t numbers = 3;
         assert_true(excess_of(clouds, workspace, &known, 4e3) < .02);
-        for (int i = 0; i < RAYS; i++) {
+        for (size_t i = 0; i < nb_test_count(300); i++) {
             const double turn = dice(&numbers, 0, 2 * PI), x = dice(&numbers, -3e4, 3e4), z = dice(&numbers, -3e4, 3e4);
             const nebel_ray ray = {{x, 1500, z}, {sin(turn), -.4, cos(turn)}, HUGE_VAL};
             assert_true(excess_of(clouds, workspace, &ray, 1500 / .4) < .1);

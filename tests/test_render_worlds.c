@@ -205,6 +205,7 @@ static void eclipses_are_areas_of_discs(void **state)
 {
     (void)state;
     for (int i = 0; i < 400; i++) {
+        if (!nb_test_tries((size_t)(i + i / 10) % 400, 400)) continue;
         const double sun = .004 * (1 + i % 5), ball = .002 * (1 + i / 5 % 8), apart = (sun + ball) * (i / 40) / 9;
         enum { ACROSS = 400 };
         int all = 0, seen = 0;
