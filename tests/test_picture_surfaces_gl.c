@@ -85,6 +85,61 @@ static void test_a_card_is_dark_where_the_sun_is_behind_it(void **state)
     }
 }
 
+/* ---- crests ---------------------------------------------------------------------------------- */
+
+/* A roof whose ridge goes up and down past the middles of a row of pixels by parts of what rasterizers move corners by. The
+ * slope behind it may not be seen. */
+enum { RIDGE = 32 };
+
+typedef struct roof {
+    float places[RIDGE + 1][3][3]; /* front, ridge, back */
+    uint32_t indices[12 * RIDGE];
+} roof;
+
+static void make_roof(roof *r, double pixel)
+{
+    uint64_t numbers = 5;
+    for (uint32_t i = 0; i <= RIDGE; i++)
+        for (int k = 0; k < 3; k++) {
+            const double height = k == 1 ? pixel * (.5 + dice(&numbers, -.005, .004)) : -10;
+            const float place[3] = {(float)(.37 * i - .5 * .37 * RIDGE), (float)height, (float)(-5 - 5 * k)};
+            memcpy(r->places[i][k], place, sizeof place);
+        }
+    for (uint32_t i = 0; i < RIDGE; i++) {
+        const uint32_t first = 3 * i, corners[12] = {0, 3, 4, 0, 4, 1, 1, 4, 5, 1, 5, 2};
+        for (int k = 0; k < 12; k++) r->indices[12 * i + (uint32_t)k] = first + corners[k];
+    }
+}
+
+static void test_a_crest_is_not_seen_from_behind(void **state)
+{
+    (void)state;
+    static roof r;
+    make_roof(&r, 2 * tan(20 * pi / 180) * 10 / HEIGHT);
+    const nebel_mesh mesh = {.positions = r.places[0][0],
+                             .indices = r.indices,
+                             .vertex_count = 3 * (RIDGE + 1),
+                             .triangle_count = 4 * RIDGE,
+                             .base_color = {.5f, .5f, .5f},
+                             .texture = -1};
+    const nebel_scene_data scene = {.mesh_count = 1,
+                                    .meshes = &mesh,
+                                    .background = {1, 1, 1},
+                                    .has_sun = 1,
+                                    .sun_direction = {0, .3, .95},
+                                    .sun_irradiance = {6, 6, 6}};
+    const nebel_camera camera = {.look_at = {0, 0, -1}, .up = {0, 1, 0}, .vertical_fov = 40};
+    nb_gl context;
+    picture_pair pair = picture_make(WIDTH, HEIGHT);
+    pass_open(&context, NB_GL_330);
+    picture_render(&scene, NULL, &camera, 1, &pair);
+    pass_close(&context);
+    size_t turned = 0; /* towards the eye, and less bright */
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) turned += !(pair.gl.color[3 * i] > .9f);
+    assert_int_equal(turned, 0);
+    picture_free(&pair);
+}
+
 /* ---- random models --------------------------------------------------------------------------- */
 
 typedef struct stage {
@@ -225,6 +280,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_card_is_dark_where_the_sun_is_behind_it),
+        cmocka_unit_test(test_a_crest_is_not_seen_from_behind),
         cmocka_unit_test(test_random_models),
     };
     if (argc > 1 && strcmp(argv[1], "all") == 0) random_scenes = 60;

@@ -8,6 +8,7 @@
 #include "particle_text.h"
 #include "shafts.h"
 #include "shells_text.h"
+#include "surface_text.h"
 #include "targets.h"
 
 #include <epoxy/gl.h>
@@ -73,15 +74,6 @@ static const char hole_text[] =
     "uniform highp sampler2D scene_mask;\n"
     "bool is_hole(vec2 uv) { return scene_cutoff > 0.0 && textureLod(scene_mask, uv, 0.0).a < scene_cutoff; }\n";
 
-static const char distance_text[] =
-    "float surface_distance(vec3 origin, vec3 direction)\n"
-    "{\n"
-    "    float met = dot(surface_face, surface_corner - origin) / dot(surface_face, direction);\n"
-    "    float near = dot(surface_place - origin, direction);\n"
-    "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5);\n"
-    "    return met > near - slack && met < near + slack ? met : near;\n"
-    "}\n";
-
 static const char attributes_text[] = "in vec3 surface_normal;\n"
                                       "in float surface_support;\n"
                                       "in vec2 surface_uv;\n"
@@ -115,7 +107,7 @@ static const char surface_fragment_text[] =
     "{\n"
     "    vec3 origin = ray_origin(gl_FragCoord.xy), direction = ray_direction(gl_FragCoord.xy);\n"
     "    if (!surface_is_met(direction) || is_hole(surface_uv)) discard;\n"
-    "    float t = surface_distance(origin, direction);\n"
+    "    float t = surface_inset(origin, direction, surface_distance(origin, direction));\n"
     "    if (!(t > 0.0)) discard;\n"
     "    vec3 side = dot(surface_face, direction) > 0.0 ? -surface_face : surface_face;\n"
     "    float size = dot(surface_normal, surface_normal);\n"
@@ -129,7 +121,7 @@ static const char surface_fragment_text[] =
     "    out_place = vec4(t, side);\n"
     "    out_normal = vec4(normal, rise);\n"
     "    out_reflectance = vec4(reflectance, 0.0);\n"
-    "    gl_FragDepth = 1.0 / (1.0 + t);\n"
+    "    gl_FragDepth = surface_rank / (1.0 + t);\n"
     "}\n";
 
 /* ---- fog at vertices ------------------------------------------------------------------------- */
@@ -137,21 +129,27 @@ static const char surface_fragment_text[] =
 static const char vertex_fog_vertex_text[] = "layout(location = 0) in vec3 mesh_position;\n"
                                              "layout(location = 3) in vec3 mesh_face;\n"
                                              "layout(location = 4) in vec4 mesh_fog;\n"
+                                             "layout(location = 5) in vec3 mesh_edge_a;\n"
+                                             "layout(location = 6) in vec3 mesh_edge_b;\n"
                                              "uniform mat4 scene_clip;\n"
                                              "uniform vec3 scene_offset;\n"
                                              "out vec3 surface_place;\n"
                                              "out vec4 surface_fog;\n"
                                              "flat out vec3 surface_corner;\n"
                                              "flat out vec3 surface_face;\n"
+                                             "flat out vec3 surface_edge_a, surface_edge_b;\n"
                                              "void main()\n"
                                              "{\n"
                                              "    surface_place = surface_corner = mesh_position + scene_offset;\n"
+                                             "    surface_edge_a = mesh_edge_a;\n"
+                                             "    surface_edge_b = mesh_edge_b;\n"
                                              "    surface_face = mesh_face;\n"
                                              "    surface_fog = mesh_fog;\n"
                                              "    gl_Position = scene_clip * vec4(surface_place, 1.0);\n"
                                              "}\n";
 
 static const char fog_attribute_text[] = "in vec4 surface_fog;\n"
+                                         "flat in vec3 surface_edge_a, surface_edge_b;\n"
                                          "bool surface_is_met(vec3 direction) { return true; }\n";
 
 /* Of the surface that is seen alone; two programs need not find the same distance to the last bit. What is nearer is a
@@ -165,7 +163,8 @@ static const char vertex_fog_fragment_text[] =
     "{\n"
     "    vec3 direction = ray_direction(gl_FragCoord.xy);\n"
     "    if (!surface_is_met(direction)) discard;\n"
-    "    float t = surface_distance(ray_origin(gl_FragCoord.xy), direction);\n"
+    "    vec3 origin = ray_origin(gl_FragCoord.xy);\n"
+    "    float t = surface_inset(origin, direction, surface_distance(origin, direction));\n"
     "    float seen = texelFetch(scene_place, ivec2(gl_FragCoord.xy), 0).x;\n"
     "    if (!(t > 0.0 && t <= 1.0001 * seen) || (scene_cutoff > 0.0 && t < 0.999 * seen)) discard;\n"
     "    vec4 fog = surface_fog;\n"
@@ -224,12 +223,6 @@ static const char round_surface_text[] =
     "float surface_support;\n"
     "vec2 surface_uv;\n"
     "#endif\n"
-    /* The volume that a ray spans with an edge, and what rounding may make of it. */
-    "vec2 edge_volume(vec3 direction, vec3 a, vec3 b)\n"
-    "{\n"
-    "    vec3 from = dot(a, a) < dot(b, b) ? a : b;\n"
-    "    return vec2(dot(b - a, cross(direction, from)), 2e-7 * length(b - a) * length(from));\n"
-    "}\n"
     "bool surface_is_met(vec3 direction)\n"
     "{\n"
     "    vec2 a = edge_volume(direction, corners_place[1], corners_place[2]);\n"
@@ -253,7 +246,9 @@ static const char round_surface_text[] =
     "    surface_uv = corners_uv * weights;\n"
     "#endif\n"
     "    return true;\n"
-    "}\n";
+    "}\n"
+    "const float surface_rank = 1.0;\n"
+    "float surface_inset(vec3 origin, vec3 direction, float t) { return t; }\n";
 
 /* ---- shadow maps ---------------------------------------------------------------------------------------------------
  * Light coordinates are relative to the eye, too: across the sun's light, and against it. */
@@ -524,8 +519,9 @@ nebel_result nb_shading_make(nb_shading *shading, const nb_context *context, con
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts surface_vertex = {{version, surface_vertex_text}, 2};
     const nb_texts surface_fragment = {{version, precision, nb_words_text, nb_ray_text, interpolated_text,
-                                        attributes_text, distance_text, hole_text, surface_fragment_text},
-                                       9};
+                                        attributes_text, nb_surface_edge_text, nb_surface_distance_text,
+                                        nb_surface_inset_text, hole_text, surface_fragment_text},
+                                       11};
     char block[64];
     (void)snprintf(block, sizeof block, "#define NB_SURVEY_BLOCK %d\n", (int)NB_SURVEY_BLOCK);
     const nb_texts survey_vertex = {{version, nb_whole_vertex_text}, 2};
@@ -551,8 +547,9 @@ nebel_result nb_shading_make_vertex_fog(nb_shading *shading, const nb_context *c
     const char *const version = nb_program_version(context);
     const nb_texts vertex = {{version, vertex_fog_vertex_text}, 2};
     const nb_texts fragment = {{version, precision_of(context), nb_words_text, nb_ray_text, interpolated_text,
-                                fog_attribute_text, distance_text, hole_text, nb_factor_text, vertex_fog_fragment_text},
-                               10};
+                                fog_attribute_text, nb_surface_edge_text, nb_surface_distance_text,
+                                nb_surface_inset_text, hole_text, nb_factor_text, vertex_fog_fragment_text},
+                               12};
     if (shading->vertex_fog != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, &shading->vertex_fog);
     if (result != NEBEL_OK) return result;
@@ -620,9 +617,9 @@ static nebel_result make_round(const nb_context *context, const nebel_log *log, 
 {
     const char *const version = nb_program_version(context), *const precision = precision_of(context);
     const nb_texts vertex = {{version, option, nb_words_text, nb_panorama_box_text, round_surface_vertex_text}, 5};
-    const nb_texts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text, round_surface_text,
-                                distance_text, hole_text, nb_factor_text, fragment_text},
-                               10};
+    const nb_texts fragment = {{version, option, precision, nb_words_text, nb_panorama_ray_text, nb_surface_edge_text,
+                                round_surface_text, nb_surface_distance_text, hole_text, nb_factor_text, fragment_text},
+                               11};
     if (*name != 0) return NEBEL_OK;
     const nebel_result result = nb_program_build(log, &vertex, &fragment, name);
     if (result != NEBEL_OK) return result;

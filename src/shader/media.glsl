@@ -104,7 +104,7 @@ nb_interval nb_planes_interval(int first, int count, nb_ray ray)
     return span;
 }
 
-/* Makes the noise in the formulas of curved shapes 0: the ends as float has them, none widened by what it may have lost. */
+/* Makes the noise in the formulas of curved shapes of size 1 0: the ends as float has them, none widened by what it may have lost. */
 #define NB_NO_REACH (-NB_WEPSILON)
 
 nb_interval nb_leaf_interval(int leaf, nb_ray ray)
@@ -125,7 +125,7 @@ nb_interval nb_leaf_interval(int leaf, nb_ray ray)
             span = nb_interval_box(local.origin, d, place, NEBEL_WORD(leaf + 2).xyz, 0.0);
 #if NB_DECLARES(NB_HAS_BALL)
         else if (NB_HAS(NB_HAS_BALL) && type == NB_TYPE_BALL)
-            span = nb_interval_ball(p, d, head.y, NB_NO_REACH);
+            span = nb_interval_ball(p, d, head.y, NB_NO_REACH * head.y);
 #endif
 #if NB_DECLARES(NB_HAS_TUBE)
         else if (NB_HAS(NB_HAS_TUBE) && type == NB_TYPE_TUBE)
