@@ -140,6 +140,57 @@ static void test_a_crest_is_not_seen_from_behind(void **state)
     picture_free(&pair);
 }
 
+/* ---- small scenes ---------------------------------------------------------------------------- */
+
+/* Sunlit fog with round, flat and soft edges, and a card in it, `size` metres wide. */
+static void try_size(double size)
+{
+    float positions[4][3];
+    for (int i = 0; i < 4; i++) {
+        const float corner[3] = {i == 1 || i == 2 ? 1 : -1, i >= 2 ? 1 : -1, .2f};
+        for (int k = 0; k < 3; k++) positions[i][k] = (float)(size * (double)corner[k]);
+    }
+    const double e = 1 / size;
+    const nebel_volume_desc volumes[] = {
+        {.shape = {.type = NEBEL_SHAPE_SPHERE, .center = {.3 * size, 0, 0}, .radius = size},
+         .extinction = {e, e, e},
+         .albedo = {.9, .9, .9}},
+        {.shape = {.type = NEBEL_SHAPE_BOX, .min = {-size, -size, -size}, .max = {0, size, size}},
+         .density = {.type = NEBEL_DENSITY_SOFT_EDGE, .distance = .3 * size},
+         .extinction = {e, e, e},
+         .source = {.2, .4, .6}},
+    };
+    const nebel_sun sun = {.direction = {.3, .8, .5}, .irradiance = {3, 3, 3}};
+    nebel_snapshot *const fog = fog_commit(&(nebel_fog_desc){.sun = sun}, volumes, 2);
+    const nebel_mesh card = card_of(positions, NULL);
+    const nebel_scene_data scene = {.mesh_count = 1,
+                                    .meshes = &card,
+                                    .background = {.2, .2, .2},
+                                    .has_sun = 1,
+                                    .sun_direction = {.303046, .808122, .505076},
+                                    .sun_irradiance = {3, 3, 3}};
+    const nebel_camera camera = {.position = {.3 * size, .5 * size, 4 * size}, .up = {0, 1, 0}, .vertical_fov = 40};
+    nb_gl context;
+    picture_pair pair = picture_make(32, 24);
+    pass_open(&context, NB_GL_330);
+    picture_render(&scene, fog, &camera, 1, &pair);
+    pass_close(&context);
+    const picture_difference d = picture_compare(&pair, 1);
+    print_message("%g m: of %zu pixels in fog %zu more than 1/255 apart, largest %g\n", size, d.fogged, d.beyond_step,
+                  d.largest);
+    assert_true(d.fogged > 200);
+    assert_int_equal(d.beyond_step, 0);
+    picture_free(&pair);
+    nebel_release_snapshot(fog);
+}
+
+static void test_small_scenes(void **state)
+{
+    (void)state;
+    try_size(1e-6);
+    try_size(2e-9);
+}
+
 /* ---- random models --------------------------------------------------------------------------- */
 
 typedef struct stage {
@@ -281,6 +332,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_card_is_dark_where_the_sun_is_behind_it),
         cmocka_unit_test(test_a_crest_is_not_seen_from_behind),
+        cmocka_unit_test(test_small_scenes),
         cmocka_unit_test(test_random_models),
     };
     if (argc > 1 && strcmp(argv[1], "all") == 0) random_scenes = 60;

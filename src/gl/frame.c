@@ -9,6 +9,8 @@
 #include "pixel_fog.h"
 #include "vertex_fog.h"
 
+#include <math.h>
+
 typedef nb_gl_frame frame;
 
 /* ---- what is drawn ---------------------------------------------------------------------------- */
@@ -43,6 +45,17 @@ static nebel_result set_fog(frame *f)
     return result;
 }
 
+/* Planets end nowhere near. */
+static double reach_of(const frame *f)
+{
+    const nb_meshes *const meshes = &f->renderer->meshes;
+    double farthest = 0;
+    if (f->planet != NULL || f->layers != NULL) return 1;
+    for (int i = 0; i < 3; i++)
+        farthest = fmax(farthest, fmax(fabs(meshes->low[i] - f->eye[i]), fabs(meshes->high[i] - f->eye[i])));
+    return farthest > 0 && farthest < 1 ? farthest : 1;
+}
+
 static nebel_result set_frame(frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -59,6 +72,8 @@ static nebel_result set_frame(frame *f)
     f->planet = nb_gl_air_planet(r->scene);
     f->layers = nb_gl_shells_planet(r->scene);
     f->clouds = f->planet != NULL ? f->planet->clouds : NULL;
+    f->reach = reach_of(f);
+    if (!(f->view.clip_from_eye[15] > 0)) f->view.clip_from_eye[14] *= f->reach; /* the nearest that is seen */
     result = set_fog(f);
     f->shafts = find_shafts(f);
     return result;
@@ -95,6 +110,7 @@ static void set_clip(const frame *f, unsigned program)
     }
     for (int column = 0; column < 4 && clip[15] != 0; column++) matrix[4 * column + 2] = 0;
     glUniformMatrix4fv(glGetUniformLocation(program, "scene_clip"), 1, GL_FALSE, matrix);
+    glUniform1f(glGetUniformLocation(program, "scene_reach"), (float)f->reach);
 }
 
 void nb_frame_bind_texture(GLuint unit, GLenum target, unsigned texture)

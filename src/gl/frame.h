@@ -22,6 +22,7 @@ typedef struct nb_gl_frame {
     float even_shade;           /* part of that sun that clouds leave to it, where that is the same everywhere */
     unsigned place, depth;      /* where rays end now: as those of the targets */
     nb_method method;
+    double reach;            /* [m]: 1, or how far models are, where they are nearer */
     nebel_view view;         /* through the pixels' centres; of a panorama without clip_from_eye */
     nb_pixel_point point;    /* of the present sample */
     nebel_view sample_view;  /* through that */

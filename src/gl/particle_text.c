@@ -72,6 +72,7 @@ const char nb_particle_start_text[] =
     "#endif\n"
     "#ifndef SCENE_FIVE_TAPS\n"
     "uniform highp sampler2D scene_depth;\n"
+    "uniform float scene_reach;\n"
     "uniform vec2 scene_size;\n"
     "#else\n"
     "uniform vec3 scene_axis;\n"
@@ -153,7 +154,7 @@ const char nb_particle_start_text[] =
     "    return 1e18;\n"
     "#else\n"
     "    float depth = textureLod(scene_depth, gl_FragCoord.xy / scene_size, 0.0).x;\n"
-    "    return depth > 0.0 ? 1.0 / depth - 1.0 : 1e18;\n"
+    "    return depth > 0.0 ? scene_reach / depth - scene_reach : 1e18;\n"
     "#endif\n"
     "}\n"
     "#endif\n";

@@ -86,7 +86,8 @@ static const char surface_fragment_text[] =
     "uniform vec3 scene_color;\n"
     "uniform bool scene_has_texture;\n"
     "uniform highp sampler2D scene_texture;\n"
-    "uniform vec3 scene_sun;\n" /* 0: none */
+    "uniform vec3 scene_sun;\n"    /* 0: none */
+    "uniform float scene_reach;\n" /* where depth is 0.5 */
     "layout(location = 0) out vec4 out_place;\n"
     "layout(location = 1) out vec4 out_normal;\n"
     "layout(location = 2) out vec4 out_reflectance;\n"
@@ -121,7 +122,7 @@ static const char surface_fragment_text[] =
     "    out_place = vec4(t, side);\n"
     "    out_normal = vec4(normal, rise);\n"
     "    out_reflectance = vec4(reflectance, 0.0);\n"
-    "    gl_FragDepth = surface_rank / (1.0 + t);\n"
+    "    gl_FragDepth = surface_rank * scene_reach / (scene_reach + t);\n"
     "}\n";
 
 /* ---- fog at vertices ------------------------------------------------------------------------- */

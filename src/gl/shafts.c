@@ -2,6 +2,8 @@
 
 #include "state.h"
 
+#include <math.h>
+
 /* A block of a level is 8 blocks of the level below wide and high. */
 enum { LEVELS = 2, LEVEL_SHIFT = 3 };
 
@@ -14,7 +16,7 @@ const char nb_shaft_text[] =
     "precision highp int;\n"
     "uniform mat3 shaft_light;\n"
     "uniform highp sampler2DArray shaft_maps, shaft_blocks;\n"
-    "uniform float shaft_size;\n"
+    "uniform float shaft_size, shaft_fine;\n"
     "uniform int shaft_count;\n" /* of maps, the finest first */
     "uniform int shaft_layers[8];\n"
     "uniform vec4 shaft_places[8];\n" /* low corner in light coordinates, texels per metre */
@@ -84,11 +86,9 @@ const char nb_shaft_text[] =
     "{\n"
     "    vec3 p = shaft_light * origin, d = shaft_light * direction;\n"
     "    vec2 z = vec2(shaft_heights.x - p.z, -d.z) * shaft_heights.y;\n"
-    "    shaft_piece piece;\n"
-    "    piece.known = piece.dark = false;\n"
-    "    piece.end = t;\n"
+    "    shaft_piece piece = shaft_piece(false, false, t);\n"
     "    while (piece.end < end) {\n"
-    "        float next = piece.end + max(piece.end * 5e-7, 1e-6), stop = end;\n"
+    "        float next = piece.end + max(piece.end * 5e-7, shaft_fine), stop = end;\n"
     "        int map = 0;\n"
     "        for (; map < shaft_count; map++) {\n"
     "            shaft_turns++;\n"
@@ -236,6 +236,8 @@ void nb_shafts_set(const nb_shafts *shafts, unsigned program)
         for (int i = 0; i < 4; i++) places[count][i] = s->places[map][i];
         layers[count++] = map;
     }
+    const float finest = count > 0 ? fmaxf(places[0][2], places[0][3]) : 1; /* texels per metre */
+    glUniform1f(glGetUniformLocation(program, "shaft_fine"), fminf(1e-6f, 5e-5f / finest));
     glUniform1i(glGetUniformLocation(program, "shaft_count"), count);
     glUniform1iv(glGetUniformLocation(program, "shaft_layers"), NB_MOST_MAPS, layers);
     glUniform4fv(glGetUniformLocation(program, "shaft_places"), NB_MOST_MAPS, places[0]);

@@ -550,7 +550,7 @@ nb_leg nb_next_leg(nb_leg leg, nb_piece piece, float rest, float strain, bool fi
 void nb_plan_leg(inout nb_leg leg, nb_piece piece, nb_ray ray, inout nb_vec2 lit, inout int turns)
 {
     float t = piece.start + leg.from;
-    float near = max(t * (8.0 * NB_EPSILON), 1e-6);
+    float near = nb_nearest(t);
     if (leg.number > 0 && leg.from < leg.stop - near) return;
     if (lit.y <= t + near) {
         turns -= NEBEL_SUN_LIT_TURNS;

@@ -92,7 +92,7 @@ float nb_root_behind(float closest, float t, float end, float a, float b, float 
 /* Where the ray next enters or leaves the lamp, or the light of its cone changes otherwise. */
 float nb_lamp_turn(nb_lamp_pass by, nb_ray ray, float t, float end)
 {
-    float near = t + max(abs(t) * (8.0 * NB_EPSILON), 1e-6);
+    float near = t + nb_nearest(t);
     float next = nb_root_behind(by.closest, near, end, 1.0, 0.0, by.aside2 - by.radius2);
     if (by.edge > -1.0) {
         float f = dot(by.foot, by.axis);
@@ -181,7 +181,7 @@ float nb_even_voxels(nb_ray ray, int medium, float t)
     float length = NB_FAR;
     if (NB_HAS(NB_HAS_GRID) && int(NEBEL_WORD(medium).w) == NB_KIND_GRID) {
         nb_profile profile = nb_profile_of(medium, NB_KIND_GRID, ray, t);
-        length = nb_grid_faces(profile.offset, profile.slope, NB_BRICK, max(t * (8.0 * NB_EPSILON), 1e-6));
+        length = nb_grid_faces(profile.offset, profile.slope, NB_BRICK, nb_nearest(t));
     }
     return length;
 }
@@ -339,7 +339,7 @@ nb_lamp_step nb_step_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece
 float nb_smooth_end(nb_lamp_pass by, nb_lamp_piece piece, float t, float end)
 {
     float from = t - by.closest;
-    float side = max(sqrt(by.aside2), 1e-12);
+    float side = max(sqrt(by.aside2), 1e-6 * NEBEL_WORD(NB_HEADER_LATTICE).z);
     float distance = sqrt(side * side + from * from);
     float ahead = from < 0.0 ? side / (distance - from) : (distance + from) / side;
     float next = 2.5 * ahead + 1.5 * piece.ahead;
@@ -367,7 +367,7 @@ nb_vec3 nb_light_past_lamp(nb_ray ray, int first, bool listed, nb_lamp_piece pie
         if (!(t < far) || nb_is_tired(turns + nb_grid_turns)) break;
         if (lit.y <= t) {
             lit = NEBEL_LAMP_LIT(by.number, ray.origin, ray.direction, t, far);
-            lit.y = min(max(lit.y, t + max(t * (8.0 * NB_EPSILON), 1e-6)), far);
+            lit.y = min(max(lit.y, t + nb_nearest(t)), far);
         }
         bool last = i + 1 == NB_MOST_LAMP_STEPS;
         float stop = last ? far : nb_smooth_end(by, piece, t, nb_lamp_turn(by, ray, t, lit.y));

@@ -6,7 +6,8 @@
  *         fog.
  * Word 1: the direction towards the sun, of length 1; how what the sun adds is had between turns, NB_SUN_.
  * Word 2: the sun's irradiance; the first word of the lamps. The sun's numbers are 0 where no medium is sunlit.
- * Word 3: the first word of the lattice of diffuse light, and of that of own light, 0 where there is none; two unused.
+ * Word 3: the first word of the lattice of diffuse light, and of that of own light, 0 where there is none; what is shorter along a ray
+ *         has no digits near the eye [m], a millionth of what the fog is wide, or of a metre; one unused.
  *
  * A medium, NB_MEDIUM_WORDS words in the snapshot's order:
  *     0  extinction, density kind

@@ -70,6 +70,9 @@ nb_attenuation nb_attenuate(nb_vec3 depth)
     return a;
 }
 
+/* How far behind a place on a ray the next one is that floats tell from it. */
+float nb_nearest(float t) { return max(abs(t) * (8.0 * NB_EPSILON), NEBEL_WORD(NB_HEADER_LATTICE).z); }
+
 /* ---- shapes ---------------------------------------------------------------------------------- */
 
 /* The ray in a leaf's frame, without the way to the frame's origin. */
@@ -401,7 +404,7 @@ float nb_planes_kink(nb_profile profile, float s)
         float slope = -dot(face.xyz, profile.slope);
         if (slope < lowest) way = min(way, max(face.w - dot(face.xyz, place) - least, 0.0) / (lowest - slope));
     }
-    return s + max(way, abs(s) * (4.0 * NB_EPSILON) + 1e-9);
+    return s + max(way, abs(s) * (4.0 * NB_EPSILON) + 1e-3 * NEBEL_WORD(NB_HEADER_LATTICE).z);
 }
 
 float nb_planes_integral(nb_profile profile, float h)

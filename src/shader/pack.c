@@ -331,6 +331,43 @@ static void pack_lamps(packer *p, const nebel_snapshot *snapshot)
 
 /* ---- fog ------------------------------------------------------------------------------------- */
 
+/* The length along which a density changes, 0 where it does not or where it goes by its body. */
+static double length_of(const nebel_density *density)
+{
+    switch (density->type) {
+    case NEBEL_DENSITY_HEIGHT:
+    case NEBEL_DENSITY_ALTITUDE:
+        return density->scale_height;
+    case NEBEL_DENSITY_GAUSSIAN:
+        return density->sigma;
+    default:
+        return 0;
+    }
+}
+
+/* How wide fog is: the widest of its bodies; where none has bounds, the lengths of densities, or how far light goes. */
+static double width_of(const nebel_snapshot *snapshot)
+{
+    double body = 0, length = 0, way = 0;
+    for (size_t i = 0; i < snapshot->medium_count; i++) {
+        const nb_volume *b = &snapshot->media[i].body;
+        for (int k = 0; k < 3; k++) {
+            const double width = b->high[k] - b->low[k];
+            if (width < HUGE_VAL) body = fmax(body, width);
+            if (b->extinction[k] > 0) way = fmax(way, 1 / b->extinction[k]);
+        }
+        length = fmax(length, length_of(&b->density));
+    }
+    return body > 0 ? body : length > 0 ? length : way;
+}
+
+/* Floats near 1 are as fine as a tenth of that. */
+static float nearest_of(const nebel_snapshot *snapshot)
+{
+    const double width = width_of(snapshot);
+    return (float)(1e-6 * (width > 0 && width < 1 ? width : 1));
+}
+
 static double light_flags(const nb_medium *medium, size_t rank)
 {
     return (medium->emits ? NB_LIGHT_EMITS : 0) + (nb_volume_covers(&medium->body) ? NB_LIGHT_COVERS : 0) +
@@ -400,7 +437,7 @@ nebel_result nebel_pack_fog(const nebel_snapshot *snapshot, const double eye[3],
         (nebel_word){{(float)snapshot->medium_count, (float)(STEP_TOLERANCE * fmax(1, snapshot->largest_radiance)),
                       (float)snapshot->max_opacity, 0}};
     pack_sun(snapshot, &words[NB_HEADER_SUN]);
-    words[NB_HEADER_LATTICE] = (nebel_word){{0}};
+    words[NB_HEADER_LATTICE] = (nebel_word){{0, 0, nearest_of(snapshot), 0}};
     const unsigned precision = nb_full_precision();
     for (size_t i = 0; i < snapshot->medium_count; i++) {
         if (i > 0 && snapshot->media[i].body.rank > snapshot->media[i - 1].body.rank) p.rank++;

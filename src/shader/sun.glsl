@@ -261,7 +261,7 @@ void nb_note_leaf(inout nb_turning turning, int leaf, nb_ray ray, nb_vec3 sun)
 nb_turning nb_find_turn(nb_ray ray, float t, float end)
 {
     nb_turning turning;
-    turning.t = t + max(abs(t) * (8.0 * NB_EPSILON), 1e-6);
+    turning.t = t + nb_nearest(t);
     turning.next = end;
     turning.curved = false;
     nb_vec3 sun = nb_to_sun();

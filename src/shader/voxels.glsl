@@ -84,7 +84,7 @@ void nb_add_others_at_points(inout nb_two_points sum, nb_piece piece, nb_ray ray
 nb_vec2 nb_sunlight_from(nb_piece piece, nb_ray ray, float t, bool of_fog, inout nb_vec2 lit, inout int turns)
 {
     float from = piece.start + t;
-    float near = max(from * (8.0 * NB_EPSILON), 1e-6);
+    float near = nb_nearest(from);
     if (lit.y <= from + near) {
         turns -= NEBEL_SUN_LIT_TURNS;
         lit = NEBEL_SUN_LIT(ray.origin, ray.direction, from + near, ray.t_max);
