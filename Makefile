@@ -39,6 +39,9 @@ demo: $(MODELS)
 	@echo "nebel: building"
 	@$(CONFIGURE) -B $(BUILD) -DNEBEL_BUILD_TESTS=OFF
 	@$(COMPILE) $(BUILD) -j $(JOBS) --target nebel_tool
+	@scripts/demo.sh $(BUILD) morning-mist sun-shafts ground-fog clearing gates street-lamps planet-day terminator
+
+pictures: all
 	@scripts/demo.sh $(BUILD)
 
 film: all
@@ -76,7 +79,7 @@ asan: $(MODELS)
 	@echo "nebel: building with sanitizers"
 	@$(CONFIGURE) -B $(BUILD)-asan -DCMAKE_BUILD_TYPE=Debug -DNEBEL_SANITIZE=ON $(OPTIONS)
 	@$(COMPILE) $(BUILD)-asan -j $(JOBS)
-	@ctest --test-dir $(BUILD)-asan --output-on-failure --no-tests=error -j 2 $(CHOSEN)
+	@NEBEL_TEST_SCALE=$(SCALE) ctest --test-dir $(BUILD)-asan --output-on-failure --no-tests=error -j 2 $(CHOSEN)
 
 lint: all
 	@scripts/install_packages.sh build test lint
