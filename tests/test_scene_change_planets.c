@@ -6,6 +6,7 @@
 
 #define SUN "\"sun\": {\"direction\": [0, 1, 0.2], \"irradiance\": [4, 3, 2]}, "
 #define SCENE(planet) "{\"nebel\": 1, " SUN "\"fog\": [], \"planet\": " planet "}"
+#define PICTURE NEBEL_SOURCE "/docs/pictures/fog-sphere-tessellated-difference.png"
 #define TOY(more) SCENE("{\"model\": \"physical\", \"preset\": \"toy\"" more "}")
 
 static nebel_scene *load(const char *text)
@@ -72,7 +73,9 @@ static void test_air_and_clouds(void **state)
 static void test_layers(void **state)
 {
     (void)state;
-    nebel_scene *const scene = load(SCENE("{\"model\": \"layers\", \"clouds\": [{}, {\"seed\": 4}]}"));
+    /* One map is made; that takes a second. */
+    nebel_scene *const scene = load(SCENE("{\"model\": \"layers\", \"map\": \"" PICTURE
+                                          "\", \"clouds\": [{\"map\": \"" PICTURE "\"}, {\"seed\": 4}]}"));
     nebel_planet planet = nebel_scene_contents(scene)->planets[0];
     planet.shells.day = 24;
     planet.shells.radius = 3;
