@@ -41,7 +41,7 @@ FOREIGN = {
     "formulas": {"immintrin.h", "arm_neon.h"},
     "base": {"cpuid.h", "sys/auxv.h"},
     "scene": POSIX | {"poll.h", "spawn.h", "sys/prctl.h", "sys/syscall.h", "linux/landlock.h", "linux/openat2.h", "linux/audit.h", "linux/filter.h", "linux/seccomp.h", "meshoptimizer.h",
-                      "assimp/", "png.h", "jpeglib.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h",
+                      "assimp/", "png.h", "jpeglib.h", "jerror.h", "openexr.h", "OpenEXR/", "yajl/", "jsmn.h",
                       "nanovdb/", "zlib.h", "blosc.h", "webp/", "openvdb/", "exception", "new"},
     "cpu": {"embree3/", "omp.h"},
     "gl": {"epoxy/"},

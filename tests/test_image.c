@@ -8,6 +8,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "scene/codec.h"
+
+#include <jpeglib.h>
 #include <openexr.h>
 #include <png.h>
 
@@ -298,6 +301,33 @@ static void write_exr(const char *path, exr_storage_t storage, exr_pixel_type_t 
         put_exr_chunk(exr, &chunk, (const uint8_t *)pixels + (i / 3 * 4 * 20 + i % 3 * 8) * bytes, bytes, 20 * bytes);
     }
     assert_int_equal(exr_finish(&exr), EXR_ERR_SUCCESS);
+}
+
+/* Good files of kinds that are not read are unsupported, not broken. */
+static void test_exr_of_other_kinds(void **state)
+{
+    (void)state;
+    static const char key[] = "compression\0compression\0\1\0\0";
+    const exr_attr_box2i_t display = {.max = {.x = 19, .y = 9}};
+    static float pixels[200];
+    journal kept;
+    nebel_image image;
+    write_exr(in_folder("t.exr"), EXR_STORAGE_SCANLINE, EXR_PIXEL_FLOAT, 0, 0, &display, pixels);
+    size_t size, at = 0;
+    unsigned char *bytes = read_bytes(in_folder("t.exr"), &size);
+    while (memcmp(bytes + at, key, sizeof key) != 0) at++;
+    for (int i = 0; i < 2; i++) {
+        bytes[at + sizeof key] = (unsigned char)(EXR_COMPRESSION_DWAA + i);
+        write_bytes(in_folder("t.exr"), bytes, size);
+        assert_int_equal(read_image(in_folder("t.exr"), &image, &kept), NEBEL_ERROR_UNSUPPORTED);
+        assert_non_null(strstr(kept.last, "DWAA"));
+    }
+    bytes[5] |= 0x10; /* several parts */
+    write_bytes(in_folder("t.exr"), bytes, size);
+    assert_int_equal(read_image(in_folder("t.exr"), &image, &kept), NEBEL_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(kept.last, "of several parts"));
+    free(bytes);
+    unlink(in_folder("t.exr"));
 }
 
 static void test_exr_in_tiles_halves_and_whole_numbers(void **state)
@@ -672,6 +702,36 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
+/* Four inks are no broken picture. */
+static void test_jpeg_in_four_inks(void **state)
+{
+    (void)state;
+    struct jpeg_compress_struct jpeg;
+    struct jpeg_error_mgr errors;
+    unsigned char row[4 * 8] = {0}, *bytes = NULL;
+    unsigned long size = 0;
+    JSAMPROW rows = row;
+    jpeg.err = jpeg_std_error(&errors);
+    jpeg_create_compress(&jpeg);
+    jpeg_mem_dest(&jpeg, &bytes, &size);
+    jpeg.image_width = jpeg.image_height = 8;
+    jpeg.input_components = 4;
+    jpeg.in_color_space = JCS_CMYK;
+    jpeg_set_defaults(&jpeg);
+    jpeg_start_compress(&jpeg, TRUE);
+    for (int y = 0; y < 8; y++) jpeg_write_scanlines(&jpeg, &rows, 1);
+    jpeg_finish_compress(&jpeg);
+    jpeg_destroy_compress(&jpeg);
+    journal kept = {.count = 0};
+    const nebel_allocator allocator = nb_resolve_allocator(&(nebel_allocator){NULL, NULL, NULL});
+    const nb_codec codec = {.allocator = allocator, .log = {remember, &kept}, .name = "cmyk.jpg"};
+    const nb_bytes file = {.data = bytes, .size = size};
+    nebel_texture texture;
+    assert_int_equal(nb_jpeg_read_texture(&codec, &file, &texture), NEBEL_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(kept.last, "make it one in RGB"));
+    free(bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -681,6 +741,8 @@ int main(void)
         cmocka_unit_test(test_png_rounds_without_bands_and_without_chance),
         cmocka_unit_test(test_png_takes_any_number),
         cmocka_unit_test(test_png_of_16_bit_and_with_alpha),
+        cmocka_unit_test(test_jpeg_in_four_inks),
+        cmocka_unit_test(test_exr_of_other_kinds),
         cmocka_unit_test(test_exr_in_tiles_halves_and_whole_numbers),
         cmocka_unit_test(test_exr_shows_the_display_window),
         cmocka_unit_test(test_broken_pictures_are_errors),

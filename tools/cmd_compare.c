@@ -296,6 +296,10 @@ static int compare(const settings *wanted, pair *both)
 {
     nb_report_listener listener = {0};
     int status = wanted->output != NULL ? nb_target_check(wanted->output) : NB_DONE;
+    for (int i = 0; i < 2 && status == NB_DONE && wanted->output != NULL; i++)
+        if (nb_target_is_same(wanted->output, wanted->paths[i]))
+            status = nb_report_failure("compare: cannot write \"%s\": it is one of the pictures; name another file",
+                                       wanted->output);
     if (status == NB_DONE) status = read_pictures(wanted, both, &listener);
     if (status != NB_DONE) return status;
     const findings found = measure(both);

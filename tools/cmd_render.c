@@ -72,6 +72,19 @@ static int check_targets(const nb_render_call *wanted)
     return NB_DONE;
 }
 
+/* The same where the scene is known: none takes the place of what it reads. */
+static int check_sources(const nb_render_call *wanted, const nebel_scene_data *contents)
+{
+    if (wanted->is_film) return nb_target_spare(wanted->output, wanted->scene, contents);
+    for (uint32_t frame = wanted->first_frame; frame <= wanted->last_frame; frame++) {
+        char *const name = name_picture(wanted, frame);
+        const int status = name != NULL ? nb_target_spare(name, wanted->scene, contents) : NB_FAILED;
+        free(name);
+        if (status != NB_DONE) return status;
+    }
+    return NB_DONE;
+}
+
 /* ---- the pictures ---------------------------------------------------------------------------- */
 
 /* What lives as long as all frames. */
@@ -570,6 +583,7 @@ static int load(studio *all)
 {
     const nb_render_call *const wanted = all->wanted;
     int status = nb_load_file(wanted->scene, 1, &all->listener, &all->loaded);
+    if (status == NB_DONE) status = check_sources(wanted, nebel_scene_contents(all->loaded.scene));
     if (status == NB_DONE) status = check_count(all);
     if (status == NB_DONE) choose_scattering(wanted, all->loaded.scene);
     return status == NB_DONE ? nb_load_fog(wanted->scene, wanted->first_frame, &all->listener, &all->loaded) : status;
@@ -605,6 +619,7 @@ static int render(const nb_render_call *wanted)
     studio all = {.wanted = wanted, .meter = nb_meter_start(wanted->quiet), .listener = {.quiet = wanted->quiet}};
     int status = open_film(&all);
     if (status == NB_DONE) status = set_up(&all);
+    nb_interrupt_listen(); /* before, nothing is written, and a signal ends the program at once */
     all.frame = wanted->first_frame;
     while (status == NB_DONE && all.frame <= wanted->last_frame) {
         status = make_picture(&all);
@@ -628,7 +643,6 @@ static int run(int count, char **words)
     int status = nb_options_parse(&nb_commands_render, count, words, &arguments);
     if (status < 0) status = nb_render_call_read(&arguments, &wanted);
     if (status >= 0) return status;
-    nb_interrupt_listen();
     status = check_targets(&wanted);
     if (status == NB_DONE) status = render(&wanted);
     nb_interrupt_obey();

@@ -2,8 +2,20 @@
 #ifndef NB_TARGET_H
 #define NB_TARGET_H
 
+#include <nebel/scene.h>
+
 /* NB_DONE when a picture can likely be written there: a file can be made in the folder, which is tried, and the path is
  * no folder. Otherwise NB_FAILED after a message. */
 int nb_target_check(const char *path);
+
+/* Whether two paths lead to one file that exists. */
+int nb_target_is_same(const char *path, const char *other);
+
+/* NB_DONE where the scene, read from `scene`, does not read what is to be written; otherwise NB_FAILED after a message. */
+int nb_target_spare(const char *path, const char *scene, const nebel_scene_data *contents);
+
+/* The same of what a window writes: a picture, and a list that is replaced again and again, which must be a regular file, or one
+ * that can be made. Either may be NULL. */
+int nb_target_check_window(const char *picture, const char *list, const char *scene, const nebel_scene_data *contents);
 
 #endif

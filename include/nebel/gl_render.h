@@ -174,7 +174,8 @@ typedef struct nebel_gl_planes {
     float *normal;        /* 3: mean of the world-space shading normals; 0 where nothing is hit */
 } nebel_gl_planes;
 
-/* Errors: ARGUMENT (also where no frame was drawn), MEMORY, UNSUPPORTED (the context is another one, or lost). */
+/* Errors: ARGUMENT (also where no frame was drawn), MEMORY, UNSUPPORTED (the context is another one, or lost; the driver draws
+ * nothing). */
 nebel_result nebel_gl_read_planes(nebel_gl_renderer *renderer, const nebel_gl_planes *planes);
 
 /* The view of a camera without near and far planes, for nebel_gl_set_fog and nebel_view_rays with

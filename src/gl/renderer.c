@@ -241,6 +241,16 @@ static void read_picture(const nb_targets *t, int number, float *texels)
     glReadPixels(0, 0, (GLsizei)t->width, (GLsizei)t->height, GL_RGBA, GL_FLOAT, texels);
 }
 
+/* The last component of transmittance is the share of the samples that were drawn, 1 of all of them. */
+static int has_drawn(const nb_targets *t)
+{
+    float texel[4] = {0};
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, t->picture_buffer);
+    glReadBuffer(GL_COLOR_ATTACHMENT1);
+    glReadPixels(0, 0, 1, 1, GL_RGBA, GL_FLOAT, texel);
+    return texel[3] > 0;
+}
+
 static void read_planes(const nb_targets *t, const nebel_gl_planes *planes, float *texels, float *colors)
 {
     float *const rgb[4] = {planes->color, planes->transmittance, planes->in_scattering, planes->normal};
@@ -271,7 +281,14 @@ nebel_result nebel_gl_read_planes(nebel_gl_renderer *r, const nebel_gl_planes *p
     } else {
         nb_scene_state_enter(&r->context, &state);
         read_planes(&r->targets, planes, texels, colors);
+        const int is_drawn = has_drawn(&r->targets);
         nb_scene_state_leave(&r->context, &state);
+        if (!is_drawn)
+            result =
+                nb_fail(&r->log, NEBEL_ERROR_UNSUPPORTED,
+                        "OpenGL: the driver (%s) draws nothing (is GALLIUM_NOOP set?); use another one, or the CPU "
+                        "renderer",
+                        (const char *)glGetString(GL_RENDERER));
     }
     nb_release(&r->allocator, texels);
     nb_release(&r->allocator, colors);

@@ -1,4 +1,4 @@
-/* OpenEXR in: the first part, scan lines or tiles of level 0, every channel as float. The picture is the display
+/* OpenEXR in: one part, scan lines or tiles of level 0, every channel as float. The picture is the display
  * window; where the data window does not reach it is 0. */
 #include "scene/codec.h"
 
@@ -18,6 +18,7 @@ typedef struct decoder {
     size_t block_capacity;
     exr_decode_pipeline_t pipeline;
     bool pipeline_ready;
+    exr_result_t failure; /* the first one; success: none */
     char message[200];
 } decoder;
 
@@ -58,8 +59,22 @@ static int64_t on_read(exr_const_context_t exr, void *user, void *buffer, uint64
 
 /* ---- the header ------------------------------------------------------------------------------ */
 
+static nebel_result fail_unsupported(const decoder *in, const char *what);
+
+/* Whether a call of OpenEXR succeeded; keeps why it did not. */
+static bool is_good(decoder *in, exr_result_t result)
+{
+    if (result == EXR_ERR_SUCCESS) return true;
+    if (in->failure == EXR_ERR_SUCCESS) in->failure = result;
+    return false;
+}
+
 static nebel_result fail_format(decoder *in)
 {
+    if (in->failure == EXR_ERR_OUT_OF_MEMORY)
+        return nb_fail(&in->codec->log, NEBEL_ERROR_MEMORY, "%s: out of memory", in->codec->name);
+    if (in->failure == EXR_ERR_FEATURE_NOT_IMPLEMENTED)
+        return fail_unsupported(in, "that are compressed in this way (DWAA, DWAB)");
     return nb_fail(&in->codec->log, NEBEL_ERROR_FORMAT, "%s: not a good OpenEXR picture: %s", in->codec->name,
                    in->message[0] != '\0' ? in->message : "it breaks the format");
 }
@@ -88,11 +103,11 @@ static bool is_empty(const exr_attr_box2i_t *window)
 static nebel_result check_header(decoder *in)
 {
     exr_storage_t storage;
-    if (exr_get_storage(in->exr, 0, &storage) != EXR_ERR_SUCCESS ||
-        exr_get_data_window(in->exr, 0, &in->data) != EXR_ERR_SUCCESS ||
-        exr_get_display_window(in->exr, 0, &in->display) != EXR_ERR_SUCCESS ||
-        exr_get_channels(in->exr, 0, &in->channels) != EXR_ERR_SUCCESS || is_empty(&in->data) ||
-        is_empty(&in->display) || in->channels->num_channels < 1)
+    if (!is_good(in, exr_get_storage(in->exr, 0, &storage)) ||
+        !is_good(in, exr_get_data_window(in->exr, 0, &in->data)) ||
+        !is_good(in, exr_get_display_window(in->exr, 0, &in->display)) ||
+        !is_good(in, exr_get_channels(in->exr, 0, &in->channels)) || is_empty(&in->data) || is_empty(&in->display) ||
+        in->channels->num_channels < 1)
         return fail_format(in);
     if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) return fail_unsupported(in, "with deep data");
     for (int i = 0; i < in->channels->num_channels; i++)
@@ -161,7 +176,7 @@ static bool grow_block(decoder *in, const exr_chunk_info_t *chunk)
     if (wanted > NB_MAX_SAMPLES) return false;
     const bool grown = nb_grow(&in->codec->allocator, &block, sizeof(float), 0, &in->block_capacity, (size_t)wanted);
     in->block = block;
-    return grown;
+    return grown || is_good(in, EXR_ERR_OUT_OF_MEMORY);
 }
 
 static void aim_channels(decoder *in, const exr_chunk_info_t *chunk)
@@ -182,12 +197,12 @@ static bool decode_block(decoder *in, int64_t x0, int64_t y0, const exr_chunk_in
     if (!grow_block(in, chunk)) return false;
     const exr_result_t prepared = in->pipeline_ready ? exr_decoding_update(in->exr, 0, chunk, &in->pipeline)
                                                      : exr_decoding_initialize(in->exr, 0, chunk, &in->pipeline);
-    if (prepared != EXR_ERR_SUCCESS || in->pipeline.channel_count != in->channels->num_channels) return false;
+    if (!is_good(in, prepared) || in->pipeline.channel_count != in->channels->num_channels) return false;
     aim_channels(in, chunk);
-    if (!in->pipeline_ready && exr_decoding_choose_default_routines(in->exr, 0, &in->pipeline) != EXR_ERR_SUCCESS)
+    if (!in->pipeline_ready && !is_good(in, exr_decoding_choose_default_routines(in->exr, 0, &in->pipeline)))
         return false;
     in->pipeline_ready = true;
-    if (exr_decoding_run(in->exr, 0, &in->pipeline) != EXR_ERR_SUCCESS) return false;
+    if (!is_good(in, exr_decoding_run(in->exr, 0, &in->pipeline))) return false;
     place_block(in, x0, y0, chunk);
     return true;
 }
@@ -196,9 +211,9 @@ static bool decode_lines(decoder *in)
 {
     int32_t step = 0;
     exr_chunk_info_t chunk;
-    if (exr_get_scanlines_per_chunk(in->exr, 0, &step) != EXR_ERR_SUCCESS || step < 1) return false;
+    if (!is_good(in, exr_get_scanlines_per_chunk(in->exr, 0, &step)) || step < 1) return false;
     for (int64_t y = in->data.min.y; y <= in->data.max.y; y += step)
-        if (exr_read_scanline_chunk_info(in->exr, 0, (int)y, &chunk) != EXR_ERR_SUCCESS ||
+        if (!is_good(in, exr_read_scanline_chunk_info(in->exr, 0, (int)y, &chunk)) ||
             !decode_block(in, in->data.min.x, y, &chunk))
             return false;
     return true;
@@ -208,13 +223,12 @@ static bool decode_tiles(decoder *in)
 {
     int32_t width = 0, height = 0;
     exr_chunk_info_t chunk;
-    if (exr_get_tile_sizes(in->exr, 0, 0, 0, &width, &height) != EXR_ERR_SUCCESS || width < 1 || height < 1)
-        return false;
+    if (!is_good(in, exr_get_tile_sizes(in->exr, 0, 0, 0, &width, &height)) || width < 1 || height < 1) return false;
     const int64_t columns = ((int64_t)window_width(&in->data) + width - 1) / width;
     const int64_t rows = ((int64_t)window_height(&in->data) + height - 1) / height;
     for (int64_t i = 0; i < columns * rows; i++) {
         const int64_t x = i % columns, y = i / columns;
-        if (exr_read_tile_chunk_info(in->exr, 0, (int)x, (int)y, 0, 0, &chunk) != EXR_ERR_SUCCESS ||
+        if (!is_good(in, exr_read_tile_chunk_info(in->exr, 0, (int)x, (int)y, 0, 0, &chunk)) ||
             !decode_block(in, in->data.min.x + x * width, in->data.min.y + y * height, &chunk))
             return false;
     }
@@ -231,6 +245,12 @@ static nebel_result decode_pixels(decoder *in)
     return fail_format(in);
 }
 
+/* The version's flag: https://openexr.com/en/latest/OpenEXRFileLayout.html#version-field */
+static bool has_parts(const nb_bytes *bytes)
+{
+    return bytes->size > 5 && (bytes->data[5] & 0x10) != 0;
+}
+
 nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, nebel_image *image)
 {
     decoder in = {.codec = codec, .bytes = bytes, .image = image};
@@ -241,8 +261,9 @@ nebel_result nb_exr_read_image(const nb_codec *codec, const nb_bytes *bytes, neb
     start.size_fn = on_size;
     start.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
     *image = (nebel_image){0};
+    if (has_parts(bytes)) return fail_unsupported(&in, "of several parts");
     nebel_result result = NEBEL_OK;
-    if (exr_start_read(&in.exr, codec->name, &start) != EXR_ERR_SUCCESS) result = fail_format(&in);
+    if (!is_good(&in, exr_start_read(&in.exr, codec->name, &start))) result = fail_format(&in);
     if (result == NEBEL_OK) result = check_header(&in);
     if (result == NEBEL_OK) result = allocate_image(&in);
     if (result == NEBEL_OK) result = decode_pixels(&in);

@@ -11,11 +11,15 @@ typedef struct nb_bytes {
     size_t size, capacity;
 } nb_bytes;
 
-/* Reads a file, pipe or device to its end, at most `limit` bytes. `what` names it in messages ("scene"); where they
+/* Reads a regular file to its end, at most `limit` bytes; nothing else is waited for. `what` names it in messages ("scene"); where they
  * begin with a place, `where` says it, otherwise NULL. Free bytes->data with nb_release. Errors: FILE, LIMIT, MEMORY.
  */
 nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log, const char *where, const char *what,
                           const char *path, size_t limit, nb_bytes *bytes);
+
+/* The same of a pipe or device, too, which is read until its end. */
+nebel_result nb_file_read_stream(const nebel_allocator *allocator, const nebel_log *log, const char *what,
+                                 const char *path, size_t limit, nb_bytes *bytes);
 
 /* The same of a file that is open, and stays so. */
 nebel_result nb_file_read_open(const nebel_allocator *allocator, const nebel_log *log, const char *where,
@@ -34,6 +38,9 @@ nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *lo
 /* Whether nb_file_write is likely to do it: whether a file can be made in the folder, which is tried, or the device is
  * open to writing. What is at the path does not change. Errors: FILE, MEMORY. */
 nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log, const char *path);
+
+/* The same, and whether there is room for so many bytes. */
+nebel_result nb_file_try_room(const nebel_allocator *allocator, const nebel_log *log, const char *path, size_t size);
 
 /* Whether nb_file_write writes there directly: a device, a pipe, a socket, or what is open already. */
 bool nb_file_is_direct(const char *path);

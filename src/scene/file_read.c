@@ -15,15 +15,19 @@ static nebel_result fail(const nebel_log *log, const char *where, const char *wh
                    where != NULL ? ": " : "", what, path, strerror(error));
 }
 
+static nebel_result refuse(const nebel_log *log, const char *where, const char *what, const char *path)
+{
+    return nb_fail(log, NEBEL_ERROR_FILE,
+                   "%s%scannot read the %s \"%s\": it is a device, a pipe or a socket; name a file",
+                   where != NULL ? where : "", where != NULL ? ": " : "", what, path);
+}
+
 nebel_result nb_file_check(const nebel_log *log, const char *where, const char *what, const char *path)
 {
     struct stat status;
     if (stat(path, &status) != 0) return fail(log, where, what, path, errno);
     if (S_ISDIR(status.st_mode)) return fail(log, where, what, path, EISDIR);
-    if (!S_ISREG(status.st_mode))
-        return nb_fail(log, NEBEL_ERROR_FILE,
-                       "%s%scannot read the %s \"%s\": it is a device, a pipe or a socket; name a file",
-                       where != NULL ? where : "", where != NULL ? ": " : "", what, path);
+    if (!S_ISREG(status.st_mode)) return refuse(log, where, what, path);
     return access(path, R_OK) == 0 ? NEBEL_OK : fail(log, where, what, path, errno);
 }
 
@@ -70,12 +74,28 @@ nebel_result nb_file_read_open(const nebel_allocator *allocator, const nebel_log
     return error == ENOMEM ? NEBEL_ERROR_MEMORY : result;
 }
 
+nebel_result nb_file_read_stream(const nebel_allocator *allocator, const nebel_log *log, const char *what,
+                                 const char *path, size_t limit, nb_bytes *bytes)
+{
+    *bytes = (nb_bytes){0};
+    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
+    if (file < 0) return fail(log, NULL, what, path, errno);
+    const nebel_result result = nb_file_read_open(allocator, log, NULL, what, path, file, limit, bytes);
+    close(file);
+    return result;
+}
+
 nebel_result nb_file_read(const nebel_allocator *allocator, const nebel_log *log, const char *where, const char *what,
                           const char *path, size_t limit, nb_bytes *bytes)
 {
     *bytes = (nb_bytes){0};
-    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
+    const int file = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK); /* a pipe would wait for a writer */
     if (file < 0) return fail(log, where, what, path, errno);
+    struct stat status;
+    if (fstat(file, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)) {
+        close(file);
+        return refuse(log, where, what, path);
+    }
     const nebel_result result = nb_file_read_open(allocator, log, where, what, path, file, limit, bytes);
     close(file);
     return result;

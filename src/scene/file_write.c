@@ -189,7 +189,7 @@ static int write_file(nb_arena *arena, const char *path, const nb_bytes *bytes)
     return fill_and_rename(file, temporary, found.path, found.exists ? &found.status : NULL, bytes);
 }
 
-static int try_file(nb_arena *arena, const char *path)
+static int try_file(nb_arena *arena, const char *path, size_t size)
 {
     target found;
     const char *temporary = NULL;
@@ -197,8 +197,10 @@ static int try_file(nb_arena *arena, const char *path)
     if (error != 0 || found.is_direct) return error;
     const int file = create_beside(arena, found.path, &temporary);
     if (file < 0) return errno;
+    const int full = size > 0 ? posix_fallocate(file, 0, (off_t)size) : 0;
     close(file);
-    return unlink(temporary) == 0 ? 0 : errno;
+    const int gone = unlink(temporary) == 0 ? 0 : errno;
+    return full == ENOSPC || full == EFBIG || full == EDQUOT ? full : gone;
 }
 
 /* ---- what went wrong ------------------------------------------------------------------------- */
@@ -230,10 +232,15 @@ nebel_result nb_file_write(const nebel_allocator *allocator, const nebel_log *lo
     return result;
 }
 
-nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log, const char *path)
+nebel_result nb_file_try_room(const nebel_allocator *allocator, const nebel_log *log, const char *path, size_t size)
 {
     nb_arena arena = {.allocator = *allocator};
-    const nebel_result result = fail(&arena, log, path, try_file(&arena, path));
+    const nebel_result result = fail(&arena, log, path, try_file(&arena, path, size));
     nb_arena_release(&arena);
     return result;
+}
+
+nebel_result nb_file_try(const nebel_allocator *allocator, const nebel_log *log, const char *path)
+{
+    return nb_file_try_room(allocator, log, path, 0);
 }

@@ -5,6 +5,10 @@
 #include <math.h>
 #include <string.h>
 
+/* The film is in memory until it is finished; hours of work are not begun, and not gone on with, where there is no room for the
+ * file of the fewest pictures, and then of a part of what there are. */
+enum { LEAST_ROOM = 1 << 14, PICTURE_ROOM = 1 << 12 };
+
 struct nebel_film {
     nb_codec codec;
     char *path;
@@ -49,7 +53,7 @@ nebel_result nebel_create_film(const char *path, const nebel_film_desc *desc, ne
     if (path == NULL || desc == NULL || film == NULL) return NEBEL_ERROR_ARGUMENT;
     const nb_codec codec = {.allocator = nb_resolve_allocator(&desc->allocator), .log = desc->log, .name = path};
     nebel_result result = check_desc(&codec, desc);
-    if (result == NEBEL_OK) result = nb_file_try(&codec.allocator, &codec.log, path);
+    if (result == NEBEL_OK) result = nb_file_try_room(&codec.allocator, &codec.log, path, LEAST_ROOM);
     if (result != NEBEL_OK) return result;
     nebel_film *made = nb_allocate_zero(&codec.allocator, 1, sizeof *made + strlen(path) + 1);
     if (made == NULL) return nb_fail(&desc->log, NEBEL_ERROR_MEMORY, "%s: out of memory", path);
@@ -88,6 +92,9 @@ nebel_result nebel_add_film_picture(nebel_film *film, const nebel_image *image)
 {
     if (film == NULL || image == NULL) return NEBEL_ERROR_ARGUMENT;
     nebel_result result = check_picture(film, image);
+    if (result == NEBEL_OK)
+        result = nb_file_try_room(&film->codec.allocator, &film->codec.log, film->path,
+                                  LEAST_ROOM + PICTURE_ROOM * (size_t)film->count);
     if (result == NEBEL_OK && film->webp == NULL) {
         film->width = image->width;
         film->height = image->height;

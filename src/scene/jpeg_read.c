@@ -4,6 +4,8 @@
 #include <setjmp.h>
 #include <stdio.h>
 #include <jpeglib.h>
+/* after it */
+#include <jerror.h>
 
 typedef struct decoder {
     struct jpeg_decompress_struct jpeg;
@@ -20,10 +22,27 @@ bool nb_jpeg_is(const nb_bytes *bytes)
     return bytes->size >= 3 && bytes->data[0] == 0xFF && bytes->data[1] == 0xD8 && bytes->data[2] == 0xFF;
 }
 
+/* What is in order, but not for libjpeg, is not broken. */
+static nebel_result result_of(int code)
+{
+    switch (code) {
+    case JERR_OUT_OF_MEMORY:
+        return NEBEL_ERROR_MEMORY;
+    case JERR_ARITH_NOTIMPL:
+    case JERR_BAD_PRECISION:
+    case JERR_CONVERSION_NOTIMPL:
+    case JERR_NOT_COMPILED:
+    case JERR_SOF_UNSUPPORTED:
+        return NEBEL_ERROR_UNSUPPORTED;
+    default:
+        return NEBEL_ERROR_FORMAT;
+    }
+}
+
 static void on_error(j_common_ptr jpeg)
 {
     decoder *in = jpeg->client_data;
-    if (in->result == NEBEL_OK) in->result = NEBEL_ERROR_FORMAT;
+    if (in->result == NEBEL_OK) in->result = result_of(jpeg->err->msg_code);
     jpeg->err->format_message(jpeg, in->message);
     longjmp(in->leave, 1);
 }
@@ -76,5 +95,9 @@ nebel_result nb_jpeg_read_texture(const nb_codec *codec, const nb_bytes *bytes, 
     jpeg_destroy_decompress(&in.jpeg);
     if (in.result == NEBEL_OK || in.result == NEBEL_ERROR_LIMIT) return in.result;
     nb_release(&codec->allocator, in.pixels);
+    if (in.result == NEBEL_ERROR_UNSUPPORTED)
+        return nb_fail(&codec->log, in.result, "%s: JPEG pictures of this kind are not read (%s); make it one in RGB",
+                       codec->name, in.message);
+    if (in.result == NEBEL_ERROR_MEMORY) return nb_fail(&codec->log, in.result, "%s: out of memory", codec->name);
     return nb_fail(&codec->log, in.result, "%s: not a good JPEG picture: %s", codec->name, in.message);
 }

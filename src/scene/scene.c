@@ -279,7 +279,7 @@ nebel_result nebel_load_scene(const char *path, const nebel_scene_desc *desc, ne
     nebel_result result = check_arguments(path, path, 0, desc, scene);
     if (result != NEBEL_OK) return result;
     const nebel_allocator allocator = nb_resolve_allocator(&desc->allocator);
-    result = nb_file_read(&allocator, &desc->log, NULL, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
+    result = nb_file_read_stream(&allocator, &desc->log, "scene", path, NB_SCENE_TEXT_LIMIT, &bytes);
     if (result != NEBEL_OK) return result;
     result = nebel_parse_scene((const char *)bytes.data, bytes.size, path, desc, scene);
     nb_release(&allocator, bytes.data);

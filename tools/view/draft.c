@@ -1,3 +1,4 @@
+#define _POSIX_C_SOURCE 200809L
 #include "draft.h"
 
 #include "../interrupt.h"
@@ -10,6 +11,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static nebel_result fail_memory(const nb_draft *draft)
 {
@@ -412,11 +414,23 @@ static nebel_result make_editions(nb_draft *draft)
     return nb_edition_copy(&draft->now, &draft->good) == 0 ? NEBEL_OK : fail_memory(draft);
 }
 
+/* A window reads its scene again and saves it: what is no file would wait for a writer. */
+static nebel_result load(const char *path, const nebel_scene_desc *desc, nebel_scene **scene)
+{
+    static const char message[] = "the scene is a device, a pipe or a socket; name a file";
+    struct stat status;
+    if (stat(path, &status) != 0 || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode))
+        return nebel_load_scene(path, desc, scene);
+    *scene = NULL;
+    if (desc->log.write != NULL) desc->log.write(NEBEL_ERROR_FILE, message, desc->log.user);
+    return NEBEL_ERROR_FILE;
+}
+
 nebel_result nb_draft_open(const char *path, double frame, const nebel_log *log, nb_draft *draft)
 {
     const nebel_scene_desc desc = {.log = *log, .run = nebel_run_parts, .model_reader = nb_reader_path()};
     *draft = (nb_draft){.log = *log, .frame = frame};
-    nebel_result result = nebel_load_scene(path, &desc, &draft->scene);
+    nebel_result result = load(path, &desc, &draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_models(draft->scene);
     if (result == NEBEL_OK) result = nebel_load_scene_planet(draft->scene);
     if (result == NEBEL_OK) {
@@ -652,7 +666,7 @@ static nebel_result read_back(nb_draft *draft, const char *path)
     const int has_moved = !nb_edition_has_same_sources(&draft->now, &draft->written);
     nebel_scene *fresh = NULL;
     nb_edition written;
-    nebel_result result = nebel_load_scene(path, &desc, &fresh);
+    nebel_result result = load(path, &desc, &fresh);
     if (result == NEBEL_OK) result = nebel_load_scene_planet(fresh);
     if (result == NEBEL_OK && nb_edition_make(nebel_scene_contents(fresh), &written) != 0) result = fail_memory(draft);
     if (result != NEBEL_OK) {
@@ -671,7 +685,7 @@ nebel_result nb_draft_try_file(const char *path, const nebel_log *log)
 {
     nebel_scene *scene = NULL;
     const nebel_scene_desc desc = {.log = *log, .model_reader = nb_reader_path()};
-    const nebel_result result = nebel_load_scene(path, &desc, &scene);
+    const nebel_result result = load(path, &desc, &scene);
     nebel_destroy_scene(scene);
     return result;
 }

@@ -5,6 +5,7 @@
 #include "../interrupt.h"
 #include "../meter.h"
 #include "../report.h"
+#include "../target.h"
 #include "draft.h"
 #include "hands.h"
 #include "navigate.h"
@@ -171,6 +172,8 @@ static int open_viewer(viewer *all)
     const nb_view_settings *const settings = all->settings;
     const nebel_result result = nb_draft_open(settings->scene, settings->frame, &all->log, &all->draft);
     if (result != NEBEL_OK) return fail(all, result);
+    if (nb_target_check_window(settings->screenshot, settings->controls, settings->scene, &all->draft.data) != NB_DONE)
+        return NB_FAILED;
     watch_files(all);
     set_home(all);
     return open_window(all, settings->width, settings->height);
@@ -787,8 +790,8 @@ int nb_view_run(const nb_view_settings *settings)
         .panel = {.shown = 1},
         .twin_is_stale = 1};
     all.log = (nebel_log){.write = listen, .user = &all};
+    int status = open_viewer(&all); /* a signal ends the program at once meanwhile */
     nb_interrupt_listen();
-    int status = open_viewer(&all);
     all.look.range = status == NB_DONE ? nb_navigate_distance(&all.draft.data.camera) : 1;
     while (status == NB_DONE && !is_ended(&all) && !nb_interrupt_is_requested()) status = turn(&all);
     close_viewer(&all);

@@ -1,0 +1,75 @@
+#!/usr/bin/env python3
+"""What the program may not write over or wait for, that a full disk stops a film at once, and that Ctrl-C ends it while a scene is prepared."""
+
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+sys.dont_write_bytecode = True
+
+import check_cli  # noqa: E402
+from check_cli import FOG, NEBEL, nebel  # noqa: E402
+
+
+class TargetTest(check_cli.PictureCase):
+    def test_pictures_that_the_scene_reads_stay(self):
+        self.assert_done(self.render("sky.exr", "--size", "64x32", "-q"))
+        self.scene = self.write_scene("lit.json", [FOG], ambient={"type": "environment", "file": "sky.exr"})
+        before = (self.folder / "sky.exr").read_bytes()
+        for output, more in (("sky.exr", ()), ("./sky.exr", ("--device", "gl"))):
+            self.assert_failed(self.render(output, *more), "cannot write", "the scene reads")
+        (self.folder / "frame_3.exr").symlink_to("sky.exr")
+        self.assert_failed(self.render("frame_%d.exr", "--frames", "0-5"), "frame_3.exr", "the scene reads")
+        self.assertEqual((self.folder / "sky.exr").read_bytes(), before)
+        self.assertFalse((self.folder / "frame_0.exr").exists())
+
+    def test_compared_pictures_stay(self):
+        self.assert_done(self.render("a.png", "-q"))
+        self.assert_done(self.render("b.png", "-q"))
+        before = (self.folder / "b.png").read_bytes()
+        self.assert_failed(nebel("compare", "a.png", "b.png", "-o", "b.png", cwd=self.folder), "one of the pictures")
+        self.assertEqual((self.folder / "b.png").read_bytes(), before)
+
+    def test_pipes_are_not_waited_for(self):
+        os.mkfifo(self.folder / "pipe")
+        self.assert_failed(nebel("compare", "pipe", "pipe", cwd=self.folder), "a pipe")
+        density = {"type": "grid", "file": "pipe", "size": [1, 1, 1], "voxels": "float"}
+        self.scene = self.write_scene("grid.json", [{**FOG, "density": density}])
+        self.assert_failed(nebel("info", self.scene), "a pipe")
+
+    def test_a_film_without_room_is_not_begun(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+
+        start = time.monotonic()
+        done = self.render("a.webp", "--frames", "0-100000", preexec_fn=limit)
+        if "without WebP" in done.err:
+            self.skipTest("no WebP")
+        self.assert_failed(done, "a.webp", "File too large")
+        self.assertLess(time.monotonic() - start, 20)
+        self.assertEqual(self.files(), self.given)
+
+
+class InterruptTest(check_cli.PictureCase):
+    def test_preparing_ends_at_once(self):
+        noise = {"type": "noise", "size": [200, 200, 200], "cells": [60, 60, 60], "octaves": 16, "gain": 0.9}
+        self.scene = self.write_scene("slow.json", [{**FOG, "density": noise}] * 8)
+        for words in (["render", self.scene, "-o", "a.png"], ["trace", self.scene], ["info", self.scene]):
+            process = subprocess.Popen([NEBEL, *map(str, words)], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+            time.sleep(0.3)
+            self.assertIsNone(process.poll(), "the scene was prepared too soon to be interrupted")
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(process.wait(2), -signal.SIGINT)
+        self.assertFalse((self.folder / "a.png").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
