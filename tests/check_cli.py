@@ -667,6 +667,8 @@ class RenderTest(PictureCase):
         self.assert_failed(self.render("a.png"), "triangle.obj")
         self.assertNotIn("a.png", self.files())
 
+
+class FramesTest(PictureCase):
     def test_frames(self):
         done = self.render("f%%_%04d.png", "--frames", "8-10")
         self.assert_done(done)
