@@ -910,6 +910,7 @@ class InfoTest(PictureCase):
         self.assert_done(done)
         self.assertEqual(done.err, "")
         for line in (r"nebel \d+\.\d+\.\d+", r"compiler: (gcc|clang) .+", r"build: .+", r"scene libraries: .*libpng.*",
+                     r"model reader: /.*/nebel-read-model",
                      r"renderer libraries: .*Embree.*", r"processor: .+", r"instruction sets: scalar.*", r"chosen: \w+",
                      r"threads: [1-9]\d*"):
             self.assertRegex(done.out, rf"(?m)^{line}$")

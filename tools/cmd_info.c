@@ -3,6 +3,7 @@
 #include "info_scene.h"
 #include "isa.h"
 #include "machine.h"
+#include "reader.h"
 #include "report.h"
 #include "workers.h"
 
@@ -99,6 +100,8 @@ static int print_program(void)
     (void)printf("compiler: %s\n", nb_machine_compiler());
     (void)printf("build: %s, %s, %s%s\n", ARCHITECTURE, OPTIMIZATION, ASSERTIONS, SANITIZER);
     (void)printf("scene libraries: %s\n", nebel_scene_libraries());
+    const char *const reader = nb_reader_path();
+    (void)printf("model reader: %s\n", reader != NULL ? reader : "not beside this program");
     (void)printf("renderer libraries: %s\n", nebel_renderer_libraries());
     (void)printf("processor: %s\n", processor);
     print_instruction_sets();
