@@ -187,6 +187,27 @@ static void test_extensions_that_are_missing(void **state)
     end(&s);
 }
 
+static nebel_result draw_narrow(stage *s, nebel_projection projection, double size)
+{
+    nebel_gl_frame_desc desc = {.camera = test_camera(3, 2, 5, 0, 0, 0), .width = 32, .height = 24, .samples = 1};
+    desc.camera.projection = projection;
+    desc.camera.view_height = desc.camera.vertical_fov = size;
+    return nebel_gl_render_frame(s->renderer, &desc);
+}
+
+/* Of them triangles would vanish. */
+static void test_views_that_are_too_narrow(void **state)
+{
+    (void)state;
+    static stage s;
+    start(&s, NB_GL_330);
+    assert_int_equal(create(&s, NULL), NEBEL_OK);
+    expect_message(draw_narrow(&s, NEBEL_PROJECTION_ORTHOGRAPHIC, 1e-8), NEBEL_ERROR_LIMIT, "view_height is 1e-08 m");
+    expect_message(draw_narrow(&s, NEBEL_PROJECTION_PERSPECTIVE, 1e-8), NEBEL_ERROR_LIMIT, "vertical_fov is 1e-08 deg");
+    assert_int_equal(draw_narrow(&s, NEBEL_PROJECTION_ORTHOGRAPHIC, 1e-3), NEBEL_OK);
+    end(&s);
+}
+
 /* The test deletes what the renderer must leave alone. */
 static void test_a_lost_context_is_survived(void **state)
 {
@@ -430,7 +451,7 @@ int main(void)
         cmocka_unit_test(test_a_lost_context_is_survived),      cmocka_unit_test(test_shaders_that_the_driver_refuses),
         cmocka_unit_test(test_pictures_that_do_not_fit),        cmocka_unit_test(test_a_driver_without_memory),
         cmocka_unit_test(test_a_driver_that_maps_nothing),      cmocka_unit_test(test_memory_that_runs_out),
-        cmocka_unit_test(test_shadows_of_particles_are_missed),
+        cmocka_unit_test(test_shadows_of_particles_are_missed), cmocka_unit_test(test_views_that_are_too_narrow),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -191,6 +191,42 @@ static void test_small_scenes(void **state)
     try_size(2e-9);
 }
 
+/* ---- large triangles ------------------------------------------------------------------------- */
+
+static void try_ground(double half_width, nebel_projection projection)
+{
+    const float w = (float)half_width;
+    float positions[4][3] = {{-w, 0, w}, {w, 0, w}, {w, 0, -w}, {-w, 0, -w}};
+    const nebel_mesh ground = card_of(positions, NULL);
+    const nebel_scene_data scene = {.mesh_count = 1, .meshes = &ground};
+    const nebel_camera camera = {
+        .position = {0, 2, 0}, .look_at = {1, 1, -3}, .up = {0, 1, 0}, .vertical_fov = 60, .projection = projection};
+    nb_gl context;
+    picture_pair pair = picture_make(32, 24);
+    pass_open(&context, NB_GL_330);
+    picture_render(&scene, NULL, &camera, 1, &pair);
+    pass_close(&context);
+    size_t seen = 0;
+    for (size_t i = 0; i < 32 * 24; i++) {
+        const float wanted = pair.cpu.depth[i], got = pair.gl.depth[i];
+        assert_int_equal(isfinite(wanted), isfinite(got));
+        if (!isfinite(wanted)) continue;
+        assert_true(fabsf(got - wanted) <= 2e-5f * wanted);
+        seen++;
+    }
+    assert_true(seen > 300);
+    picture_free(&pair);
+}
+
+/* Interpolation between corners that are far away has few digits near the eye. */
+static void test_large_triangles(void **state)
+{
+    (void)state;
+    try_ground(1e6, NEBEL_PROJECTION_PERSPECTIVE);
+    try_ground(1e8, NEBEL_PROJECTION_PERSPECTIVE);
+    try_ground(1e7, NEBEL_PROJECTION_PANORAMA);
+}
+
 /* ---- random models --------------------------------------------------------------------------- */
 
 typedef struct stage {
@@ -333,6 +369,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_a_card_is_dark_where_the_sun_is_behind_it),
         cmocka_unit_test(test_a_crest_is_not_seen_from_behind),
         cmocka_unit_test(test_small_scenes),
+        cmocka_unit_test(test_large_triangles),
         cmocka_unit_test(test_random_models),
     };
     if (argc > 1 && strcmp(argv[1], "all") == 0) random_scenes = 60;

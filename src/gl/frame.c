@@ -56,6 +56,18 @@ static double reach_of(const frame *f)
     return farthest > 0 && farthest < 1 ? farthest : 1;
 }
 
+/* The nearest surface that is seen, of a perspective view: planes of it may cut off nothing that is seen. */
+static void set_near_plane(frame *f)
+{
+    const nb_meshes *const meshes = &f->renderer->meshes;
+    double *const near = &f->view.clip_from_eye[14]; /* twice its distance, and less than 0 */
+    *near *= f->reach;
+    for (size_t i = 0; i < meshes->count; i++) {
+        const double distance = nb_meshes_distance(&meshes->list[i], f->eye);
+        if (distance > 0) *near = fmax(*near, -distance);
+    }
+}
+
 static nebel_result set_frame(frame *f)
 {
     const nebel_gl_renderer *const r = f->renderer;
@@ -73,7 +85,7 @@ static nebel_result set_frame(frame *f)
     f->layers = nb_gl_shells_planet(r->scene);
     f->clouds = f->planet != NULL ? f->planet->clouds : NULL;
     f->reach = reach_of(f);
-    if (!(f->view.clip_from_eye[15] > 0)) f->view.clip_from_eye[14] *= f->reach; /* the nearest that is seen */
+    if (f->desc->camera.projection == NEBEL_PROJECTION_PERSPECTIVE) set_near_plane(f);
     result = set_fog(f);
     f->shafts = find_shafts(f);
     return result;

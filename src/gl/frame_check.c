@@ -89,6 +89,45 @@ static nebel_result check_planet(const nebel_gl_renderer *r, const nebel_gl_fram
     return has_air ? check_air(r, desc) : NEBEL_OK;
 }
 
+/* Floats of corners have 24 bits: what is longer leaves none for a picture that shows a part of it. */
+#define LONGEST_EDGE 1e9
+#define MOST_PICTURES 1e7
+
+/* How many pictures high a mesh's longest edge is where the mesh is nearest; of one around the camera, at a sixteenth of that
+ * edge. */
+static double pictures_across(const nb_mesh *mesh, const nebel_camera *camera)
+{
+    if (camera->projection == NEBEL_PROJECTION_PANORAMA) return 0;
+    if (camera->projection == NEBEL_PROJECTION_ORTHOGRAPHIC) return mesh->longest / camera->view_height;
+    const double distance = fmax(nb_meshes_distance(mesh, camera->position), mesh->longest / 16);
+    return mesh->longest / (2 * distance * tan(camera->vertical_fov * (3.14159265358979323846 / 360)));
+}
+
+static nebel_result check_mesh(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, size_t i)
+{
+    const nb_mesh *const mesh = &r->meshes.list[i];
+    const int is_parallel = desc->camera.projection == NEBEL_PROJECTION_ORTHOGRAPHIC;
+    if (mesh->longest > LONGEST_EDGE && !is_parallel)
+        return nb_fail(&r->log, NEBEL_ERROR_LIMIT,
+                       "mesh %zu: an edge is %g m long; OpenGL draws triangles of at most %g m: split it, or use the "
+                       "CPU's renderer (--device cpu)",
+                       i, mesh->longest, LONGEST_EDGE);
+    if (!(pictures_across(mesh, &desc->camera) > MOST_PICTURES)) return NEBEL_OK;
+    return nb_fail(&r->log, NEBEL_ERROR_LIMIT,
+                   "camera: %s is %g %s, and an edge of mesh %zu is %g m long; OpenGL draws triangles that are at most "
+                   "%g pictures high: split the mesh, or use the CPU's renderer (--device cpu)",
+                   is_parallel ? "view_height" : "vertical_fov",
+                   is_parallel ? desc->camera.view_height : desc->camera.vertical_fov, is_parallel ? "m" : "degrees", i,
+                   mesh->longest, MOST_PICTURES);
+}
+
+static nebel_result check_meshes(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc)
+{
+    nebel_result result = NEBEL_OK;
+    for (size_t i = 0; i < r->meshes.count && result == NEBEL_OK; i++) result = check_mesh(r, desc, i);
+    return result;
+}
+
 nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_desc *desc, uint32_t samples)
 {
     if (!(fabs(desc->time) <= 1e12))
@@ -96,5 +135,6 @@ nebel_result nb_frame_check(const nebel_gl_renderer *r, const nebel_gl_frame_des
     nebel_result result = check_size(r, desc);
     if (result == NEBEL_OK) result = check_samples(r, samples);
     if (result == NEBEL_OK) result = check_planet(r, desc);
+    if (result == NEBEL_OK) result = check_meshes(r, desc);
     return result == NEBEL_OK ? check_method(r, desc) : result;
 }

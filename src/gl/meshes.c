@@ -121,12 +121,23 @@ static void include(nb_mesh *made, const float *position)
     }
 }
 
+static double length_between(const float *a, const float *b)
+{
+    double square = 0;
+    for (int i = 0; i < 3; i++) square += ((double)a[i] - (double)b[i]) * ((double)a[i] - (double)b[i]);
+    return sqrt(square);
+}
+
 static void add_triangle(draft *d, const uint32_t *corners)
 {
     const nebel_mesh *const mesh = d->mesh;
     nb_vertex last = vertex_of(mesh, corners[2]);
     if (!set_face(position_of(mesh, corners[0]), position_of(mesh, corners[1]), last.position, last.face)) return;
-    for (int k = 0; k < 3; k++) include(d->made, position_of(mesh, corners[k]));
+    for (int k = 0; k < 3; k++) {
+        const float *const corner = position_of(mesh, corners[k]);
+        include(d->made, corner);
+        d->made->longest = fmax(d->made->longest, length_between(corner, position_of(mesh, corners[(k + 1) % 3])));
+    }
     for (int e = 0; e < 2; e++) {
         for (int k = 0; k < 3; k++) last.edges[e][k] = position_of(mesh, corners[e])[k] - last.position[k];
     }
@@ -202,6 +213,17 @@ static nebel_result make_mesh(nb_meshes *meshes, const nebel_mesh *mesh, nb_mesh
     nb_release(&meshes->allocator, d.vertices);
     nb_release(&meshes->allocator, d.indices);
     return result;
+}
+
+double nb_meshes_distance(const nb_mesh *mesh, const double place[3])
+{
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        const double at = place[i] - mesh->origin[i];
+        const double beside = fmax(fmax((double)mesh->low[i] - at, at - (double)mesh->high[i]), 0);
+        square += beside * beside;
+    }
+    return sqrt(square);
 }
 
 static void include_mesh(nb_meshes *meshes, const nb_mesh *made)

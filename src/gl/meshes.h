@@ -25,6 +25,7 @@ typedef struct nb_vertex {
 typedef struct nb_mesh {
     double origin[3];
     float low[3], high[3]; /* of the positions that are used */
+    double longest;        /* edge of its triangles [m] */
     float base_color[3];
     unsigned vertex_array, vertices, indices, texture; /* texture 0: none */
     unsigned mask;                                     /* a texture; 0: no holes */
@@ -48,6 +49,9 @@ typedef struct nb_meshes {
 /* Checks and copies. What was made before an error is freed by nb_meshes_delete. Changes the bindings of TEXTURE_2D on
  * the active unit, ARRAY_BUFFER and the vertex array. Errors: as nebel_create_gl_renderer. */
 nebel_result nb_meshes_make(nb_meshes *meshes, const nb_context *context, const nebel_scene_data *scene);
+
+/* From there to the box around a mesh [m], 0 within it. */
+double nb_meshes_distance(const nb_mesh *mesh, const double place[3]);
 
 /* The mask of a mesh, for a program that has it on NB_UNIT_MASK and the cutoff at this location. Changes the active unit.
  */

@@ -31,6 +31,6 @@ const char nb_surface_distance_text[] =
     "{\n"
     "    float met = dot(surface_face, surface_corner - origin) / dot(surface_face, direction);\n"
     "    float near = dot(surface_place - origin, direction);\n"
-    "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5);\n"
+    "    float slack = abs(near) * min(0.5, 0.01 + abs(near) * 1e-5) + 1e-4 * length(surface_corner - origin);\n"
     "    return met > near - slack && met < near + slack ? met : near;\n"
     "}\n";
